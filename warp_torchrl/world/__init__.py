@@ -1,0 +1,1 @@
+"""The world: fire, terrain, wind and vehicles as pure batched tensor functions (torch and tensordict only)."""

@@ -1,0 +1,93 @@
+"""Counter-based randomness: every draw is a pure function of who asks and when.
+
+A draw depends on (world seed, episode, tick, stream, cell), and on nothing else: not on the batch a world is in,
+its place there, the device, or what was drawn before. So worlds are batch-invariant, policies that are compared on
+one seed meet the same fire, nothing has to be saved, and a CUDA graph can replay it.
+
+The integer mixers are Pelle Evensen's / Chris Wellons' published bijections: ``splitmix64`` (Steele, Lea and
+Flood, 2014) for the few per-world words and a ``lowbias32``-style finaliser for the many per-cell ones. Two 32-bit
+key words enter the cell hash at different rounds, so that two worlds whose first words agree still draw apart.
+"""
+
+import math
+from enum import IntEnum
+
+import torch
+from torch import Tensor
+
+_GOLDEN = -7046029254386353131  # 2^64 / golden ratio, odd, as a signed word
+_SPLITMIX = (-4658895280553007687, -7723592293110705685)
+_MULTIPLIERS = (0x21F0AAAD, 0xD35A2D97 - 2**32, 0x735A2D97)
+_LARGEST_BELOW_ONE = 1.0 - 2.0**-24
+
+
+class Stream(IntEnum):
+    """What a draw is for; two streams never share numbers."""
+
+    FIRE = 1
+    NOISE = 2
+    ELEVATION = 3
+    AGE = 4
+    IGNITION = 5
+    WIND = 6
+    START = 7
+    ACTION = 8
+    CROP = 9
+    POLICY = 10
+
+
+def _shift_right(word: Tensor, bits: int, width: int) -> Tensor:
+    """Shift a signed word right, filling with zeros as an unsigned one would."""
+    return (word >> bits).bitwise_and_((1 << (width - bits)) - 1)
+
+
+def _splitmix64(word: Tensor) -> Tensor:
+    word = (word ^ _shift_right(word, 30, 64)) * _SPLITMIX[0]
+    word = (word ^ _shift_right(word, 27, 64)) * _SPLITMIX[1]
+    return word ^ _shift_right(word, 31, 64)
+
+
+def world_key(seed: Tensor, episode: Tensor) -> Tensor:
+    """Return the key of each world's episode.
+
+    Args:
+        seed: int64 [B].
+        episode: int64 [B], 0 for the first.
+
+    Returns:
+        int64 [B].
+    """
+    return _splitmix64(_splitmix64(seed * 2 + 1) + episode * _GOLDEN)
+
+
+def uniform(key: Tensor, tick: Tensor | int, stream: Stream, shape: tuple[int, ...]) -> Tensor:
+    """Draw uniforms in [0, 1) with 32 random bits, fine-grained near 0.
+
+    Args:
+        key: World keys, int64 [B], from ``world_key``.
+        tick: Counter of the draw, int64 [B] or one number.
+        stream: What the draw is for.
+        shape: Shape of one world's draws.
+
+    Returns:
+        float32 [B, *shape]. Never 1, so that ``u < 1`` always holds; multiples of 2^-32 near 0, so that events of
+        probability 1e-8 happen as often as they should.
+    """
+    counter = torch.zeros_like(key).add_(tick).mul_(64).add_(int(stream))
+    word = _splitmix64(key + counter * _GOLDEN)
+    low = word.to(torch.int32)[:, None]
+    high = (word >> 32).to(torch.int32)[:, None]
+    count = math.prod(shape)
+    bits = _spread_bits(count, key.device) ^ low
+    bits.bitwise_xor_(_shift_right(bits, 16, 32)).mul_(_MULTIPLIERS[0])
+    bits.bitwise_xor_(_shift_right(bits, 15, 32)).add_(high).mul_(_MULTIPLIERS[1])
+    bits.bitwise_xor_(_shift_right(bits, 15, 32)).mul_(_MULTIPLIERS[2])
+    bits.bitwise_xor_(_shift_right(bits, 16, 32))
+    # The word is signed: a positive one is a small number as it stands, a negative one lies half a range higher.
+    fraction = bits.to(torch.float32).mul_(2.0**-32)
+    return fraction.sub_(fraction.floor()).clamp_(max=_LARGEST_BELOW_ONE).view(key.shape[0], *shape)
+
+
+def _spread_bits(count: int, device: torch.device) -> Tensor:
+    """Return a distinct well-mixed word for each index, int32 [1, count]."""
+    return (torch.arange(count, dtype=torch.int32, device=device) * 0x1E3779B1)[None]

@@ -1,0 +1,172 @@
+"""What the world is made of: the tensorclasses every other module reads, and the public codes.
+
+Letters, everywhere: B worlds, A agents, H rows, W columns.
+"""
+
+from enum import IntEnum
+
+import torch
+from tensordict import tensorclass
+from torch import Tensor
+
+
+class Cover(IntEnum):
+    """Land cover of a cell (WARP-CA, terrain types), and ``BARE``, which only rasters use."""
+
+    LAKE = 0
+    WETLAND = 1
+    GRASSLAND = 2
+    FOREST = 3
+    BARE = 4
+
+
+class Action(IntEnum):
+    """The paper's ten actions A = {0..9}, and ``STAY``. 0..7 move N, NE, E, SE, S, SW, W, NW."""
+
+    NORTH = 0
+    NORTH_EAST = 1
+    EAST = 2
+    SOUTH_EAST = 3
+    SOUTH = 4
+    SOUTH_WEST = 5
+    WEST = 6
+    NORTH_WEST = 7
+    EXTINGUISH = 8
+    CLEAR = 9
+    STAY = 10
+
+
+EMPTY = 0
+"""Cell code of bare ground, ash, lakes and firebreaks."""
+OLDEST = 10
+"""Cell code of the oldest tree; 1..10 are ages."""
+FIRST_FIRE = 11
+"""Cell code of the first burning stage; 11..15 burn."""
+EMBER = 15
+"""Cell code of the last stage."""
+
+
+@tensorclass(nocast=True)
+class Landscape:
+    """The ground of each world, fixed for an episode."""
+
+    cover: Tensor  # uint8 [B,H,W], a Cover code
+    age: Tensor  # uint8 [B,H,W], tree age before the fire, 0..10
+    elevation: Tensor | None  # float32 [B,H,W] [m]; None where every world is flat
+
+
+@tensorclass(nocast=True)
+class Tally:
+    """Counts of the initial trees by fate; they add up to ``initial`` (trees that regrow are counted apart)."""
+
+    initial: Tensor  # int32 [B], N0, trees before ignition
+    preserved: Tensor  # int32 [B], T_p, alive, untouched by fire or agents
+    extinguished: Tensor  # int32 [B], T_e, alive, put out at least once
+    cleared: Tensor  # int32 [B], T_c, turned into firebreak
+    burned: Tensor  # int32 [B], T_b, burned to ash at least once
+    burning: Tensor  # int32 [B], on fire for the first time
+    alight: Tensor  # int32 [B], every burning cell of the map, regrown trees included
+
+    def saved(self) -> Tensor:
+        """Return the share of the initial trees that stand: (T_p + T_e) / N0, float32 [B]."""
+        return (self.preserved + self.extinguished) / self.initial
+
+
+@tensorclass(nocast=True)
+class Vehicles:
+    """The team on the map."""
+
+    position: Tensor  # int64 [B,A,2], (row, column) [cells]
+    tank: Tensor  # int32 [B,A], water left [extinguish acts]; -1 without a tank
+    last_action: Tensor  # int64 [B,A], -1 before the first
+    base: Tensor  # int64 [B,2], (row, column) of the corner where the team started [cells]
+    acts: Tensor  # int32 [B,A], extinguish and clear actions chosen so far
+    redundant: Tensor  # int32 [B,A], those on a target that a team-mate had
+
+
+@tensorclass(nocast=True)
+class WorldState:
+    """Everything that a step reads or changes; batch size [B]."""
+
+    landscape: Landscape
+    alpha: Tensor  # float32 [B,H,W], flammability of the ground
+    cells: Tensor  # uint8 [B,H,W], 0 empty, 1..10 tree age, 11..15 fire
+    age: Tensor  # uint8 [B,H,W], age a burning tree had when it caught fire, else 0
+    initial: Tensor  # bool [B,H,W], had a tree before ignition
+    extinguished: Tensor  # bool [B,H,W], was put out at least once
+    burned: Tensor  # bool [B,H,W], has burned to ash at least once
+    firebreak: Tensor  # bool [B,H,W], cleared by an agent
+    wet: Tensor  # uint8 [B,H,W], ticks for which the cell cannot ignite
+    slope: Tensor | None  # float32 [B,8,H+1,W+1], spread factor into a cell by direction of travel; None where flat
+    wind: Tensor  # float32 [B,2,1,1] or [B,2,H,W], (u east, v north) of the air's motion [m/s]
+    vehicles: Vehicles
+    tally: Tally
+    key: Tensor  # int64 [B], key of the world's draws in this episode
+    step: Tensor  # int32 [B], agent steps since the start of the episode
+    tick: Tensor  # int32 [B], fire ticks since ignition
+    burning_area: Tensor  # float32 [B], sum over steps of burning initial trees / N0, the area under the fire's curve
+    terminated: Tensor  # bool [B], no cell burns any more
+    truncated: Tensor  # bool [B], the horizon was reached
+
+    @property
+    def done(self) -> Tensor:
+        """Return which worlds have ended, bool [B]."""
+        return self.terminated | self.truncated
+
+
+@tensorclass(nocast=True)
+class Outcome:
+    """What each agent's action of one step came to."""
+
+    action: Tensor  # int64 [B,A], as chosen
+    moved: Tensor  # bool [B,A], changed cell
+    extinguished: Tensor  # bool [B,A], put a fire out, credited
+    cleared: Tensor  # bool [B,A], cleared a tree, credited
+    redundant: Tensor  # bool [B,A], acted on a target that a team-mate of lower index took
+    target: Tensor  # int64 [B,A], flat index of the cell acted on, valid where extinguished or cleared
+
+
+@tensorclass(nocast=True)
+class Transition:
+    """One step of every world: all that rewards, metrics and pictures read."""
+
+    before: WorldState
+    outcome: Outcome
+    after: WorldState
+
+
+def is_burning(cells: Tensor) -> Tensor:
+    """Return which cells burn (codes 11..15), bool, shape of the input."""
+    return cells >= FIRST_FIRE
+
+
+def is_tree(cells: Tensor) -> Tensor:
+    """Return which cells hold a tree that does not burn (codes 1..10), bool, shape of the input."""
+    return (cells - 1) < OLDEST  # uint8: code 0 wraps round to 255
+
+
+def count_trees(state: WorldState) -> Tally:
+    """Count the initial trees by fate.
+
+        T_p + T_e + T_c + T_b + burning = N0      (WARP-CA, conservation metric)
+
+    A tree that has once burned to ash stays counted as burned when the ground regrows.
+    """
+    burning = is_burning(state.cells)
+    alive = state.initial & is_tree(state.cells) & ~state.burned
+    unburned = state.initial & ~state.burned
+
+    def count(mask: Tensor) -> Tensor:
+        return mask.sum((1, 2), dtype=torch.int32)
+
+    extinguished = count(alive & state.extinguished)
+    return Tally(
+        initial=count(state.initial),
+        preserved=count(alive) - extinguished,
+        extinguished=extinguished,
+        cleared=count(unburned & state.firebreak),
+        burned=count(state.initial & state.burned),
+        burning=count(unburned & burning),
+        alight=count(burning),
+        batch_size=state.batch_size,
+    )

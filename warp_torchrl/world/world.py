@@ -1,0 +1,206 @@
+"""The world: assembles landscape, wind, fire and team, and is the only one that draws for them."""
+
+from dataclasses import dataclass, field
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.world.fire import Fire
+from warp_torchrl.world.ignition import Ignition
+from warp_torchrl.world.landscape import LandscapeSource, Perlin, map_size
+from warp_torchrl.world.random import Stream, uniform, world_key
+from warp_torchrl.world.state import Landscape, Tally, Transition, Vehicles, WorldState, count_trees
+from warp_torchrl.world.team import Team
+from warp_torchrl.world.wind import Uniform, Wind
+
+
+@dataclass(frozen=True, kw_only=True)
+class World:
+    """The rules of a scenario. It holds no state: ``reset`` makes one, ``step`` makes the next.
+
+    Attributes:
+        landscape: Where the ground comes from.
+        wind: The air.
+        fire: The automaton.
+        team: The vehicles.
+        ignition: Where the fire starts.
+        steps_per_tick: Agent steps to a fire tick.
+        horizon: Agent steps to an episode.
+        cell_size: Side of a cell [m].
+
+    Raises:
+        ValueError: If a value is out of its range or the team does not fit on the map.
+    """
+
+    landscape: LandscapeSource = field(default_factory=Perlin)
+    wind: Wind = field(default_factory=Uniform)
+    fire: Fire = field(default_factory=Fire)
+    team: Team = field(default_factory=Team)
+    ignition: Ignition = field(default_factory=Ignition)
+    steps_per_tick: int = 5
+    horizon: int = 256
+    cell_size: float = 30.0
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.steps_per_tick <= 1000:
+            raise ValueError(f"steps_per_tick must be in 1..1000, got {self.steps_per_tick}")
+        if not 1 <= self.horizon <= 1_000_000:
+            raise ValueError(f"horizon must be in 1..1000000 steps, got {self.horizon}")
+        if not 0.01 <= self.cell_size <= 100_000.0:
+            raise ValueError(f"cell_size must be in [0.01, 100000] m, got {self.cell_size}")
+        height, width = self.size
+        if self.team.n_agents > height * width // 4:
+            raise ValueError(
+                f"team.n_agents must be at most a quarter of the map's {height * width} cells, got {self.team.n_agents}"
+            )
+        if self.ignition.count > height * width // 4:
+            raise ValueError(
+                f"ignition.count must be at most a quarter of the map's {height * width} cells, "
+                f"got {self.ignition.count}"
+            )
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Return the map's (H, W) [cells]."""
+        return map_size(self.landscape.size)
+
+    def reset(self, seed: Tensor, episode: Tensor) -> WorldState:
+        """Start an episode in each world: the ground, the fire after its head start, the team.
+
+        Args:
+            seed: int64 [B].
+            episode: int64 [B], 0 for a seed's first.
+
+        Returns:
+            The worlds, batch size [B].
+
+        Raises:
+            ValueError: If a landscape has no tree that can burn.
+        """
+        key = world_key(seed, episode)
+        ground = self.landscape(key)
+        wind = self.wind(key, self.size)
+        state = quiet_state(ground, self.fire, wind, key, self.team.place(key, ground.cover, ground.age), self.cell_size)
+        lit = self.ignition(key, self.fire.is_fuel(state) & (state.alpha > 0.0))
+        if not lit.flatten(1).any(dim=1).all():
+            raise ValueError("landscape: a map has no tree that can burn, so there is no fire to start")
+        cells = state.cells
+        state = state.replace(cells=torch.where(lit, 11, cells), age=torch.where(lit, cells, state.age))
+        for _ in range(self.ignition.head_start):
+            state = self._tick(state, torch.ones_like(key, dtype=torch.bool))
+        vehicles = self.team.place(key, ground.cover, state.cells)
+        state = state.replace(vehicles=vehicles)
+        return state.replace(tally=count_trees(state))
+
+    def step(self, state: WorldState, action: Tensor) -> Transition:
+        """Advance every world that has not ended by one agent step.
+
+        Agents move; agents act; on every ``steps_per_tick``-th step the fire ticks; the clock advances.
+
+        Args:
+            state: The worlds, batch size [B].
+            action: int64 [B, A], ``Action`` codes.
+
+        Returns:
+            The transition; ``before`` is ``state`` itself.
+        """
+        active = ~state.done
+        after, outcome = self.team.act(state, action, active, self.fire.last_spreading, self.fire.wet_ticks)
+        due = active & ((state.step + 1) % self.steps_per_tick == 0)
+        after = self._tick(after, due)
+        return Transition(
+            before=state, outcome=outcome, after=self._advance_clock(after, active), batch_size=state.batch_size
+        )
+
+    def action_mask(self, state: WorldState) -> Tensor:
+        """Return which actions would do something, bool [B, A, 10 or 11]."""
+        return self.team.action_mask(state, self.fire.last_spreading)
+
+    def _tick(self, state: WorldState, due: Tensor) -> WorldState:
+        draws = uniform(state.key, state.tick, Stream.FIRE, tuple(state.cells.shape[1:]))
+        return self.fire.tick(state, draws, due)
+
+    def _advance_clock(self, state: WorldState, active: Tensor) -> WorldState:
+        tally = count_trees(state)
+        step = state.step + active
+        terminated = (tally.alight == 0) & self.fire.burns_out
+        share_burning = tally.burning / tally.initial
+        return state.replace(
+            tally=tally,
+            step=step,
+            burning_area=state.burning_area + share_burning * active,
+            terminated=state.terminated | terminated,
+            truncated=state.truncated | (step >= self.horizon),
+        )
+
+
+def quiet_state(
+    ground: Landscape, fire: Fire, wind: Tensor, key: Tensor, vehicles: Vehicles, cell_size: float
+) -> WorldState:
+    """Return worlds at step 0 in which nothing burns yet.
+
+    Args:
+        ground: The landscapes, batch size [B].
+        fire: The automaton, for flammability and slope factors.
+        wind: float32 [B, 2, 1, 1] or [B, 2, H, W] [m/s].
+        key: World keys, int64 [B].
+        vehicles: The team.
+        cell_size: Side of a cell [m].
+    """
+    cells = ground.age
+    none = torch.zeros_like(cells)
+    no = torch.zeros_like(cells, dtype=torch.bool)
+    zero = torch.zeros_like(key, dtype=torch.int32)
+    state = WorldState(
+        landscape=ground,
+        alpha=fire.flammability(ground.cover),
+        cells=cells.clone(),
+        age=none,
+        initial=cells > 0,
+        extinguished=no,
+        burned=no.clone(),
+        firebreak=no.clone(),
+        wet=none.clone(),
+        slope=None if ground.elevation is None else fire.slope_factor(ground.elevation, cell_size),
+        wind=wind,
+        vehicles=vehicles,
+        tally=Tally(*[zero] * 7, batch_size=key.shape),
+        key=key,
+        step=zero.clone(),
+        tick=zero.clone(),
+        burning_area=torch.zeros_like(zero, dtype=torch.float32),
+        terminated=zero > 0,
+        truncated=zero > 0,
+        batch_size=key.shape,
+    )
+    return state.replace(tally=count_trees(state))
+
+
+def burn(cells: Tensor, cover: Tensor, elevation: Tensor | None, wind: Wind, fire: Fire, **clock: int) -> Tensor:
+    """Run the fire alone from given cells; see ``warp_torchrl.simulate``.
+
+    Args:
+        cells: Cell codes 0..15, uint8 [B, H, W]. The trees' age under a fire that is already lit counts as 10.
+        cover: Land cover, uint8 [B, H, W].
+        elevation: float32 [B, H, W] [m], or None.
+        wind: The wind component.
+        fire: The automaton.
+        clock: ``ticks`` to run, ``first_tick`` of the draws, and ``seed`` of world 0; world i draws with seed + i.
+
+    Returns:
+        Cell codes after the ticks, uint8 [B, H, W].
+    """
+    worlds, height, width = cells.shape
+    seed = clock["seed"] + torch.arange(worlds, device=cells.device)
+    key = world_key(seed, torch.zeros_like(seed))
+    ground = Landscape(cover=cover, age=cells, elevation=elevation, batch_size=key.shape)
+    nobody = Team(n_agents=1).place(key, cover, cells)
+    state = quiet_state(ground, fire, wind(key, (height, width)), key, nobody, 30.0)
+    state = state.replace(tick=state.tick + clock["first_tick"])
+    everywhere = torch.ones_like(key, dtype=torch.bool)
+    for _ in range(clock["ticks"]):
+        draws = uniform(key, state.tick, Stream.FIRE, (height, width))
+        state = fire.tick(state, draws, everywhere)
+    return state.cells
+
+
