@@ -182,6 +182,31 @@ class Fire:
             return on_map(q), None
         return on_map(q), on_map(sum_at_source[margin : margin + size])
 
+    def chance_to_ignite(self, state: WorldState) -> Tensor:
+        """Return each tree's chance to ignite in the next tick, q = p_spont + (1 - p_spont) p_spread.
+
+        float32 [B, H, W], 0 where nothing can ignite.
+        """
+        return self._join(state, self.spread(state)[0])
+
+    def threat(self, state: WorldState) -> Tensor:
+        """Return where the fire is about to grow, float32 [B, H, W] in 0..1.
+
+        Of a burning cell, the neighbours that it is expected to ignite in a tick, / 4, at most 1; of a tree, its
+        chance to ignite in the next tick.
+        """
+        q, expected = self.spread(state, expected=True)
+        return torch.where(is_burning(state.cells), (expected * 0.25).clamp_(max=1.0), self._join(state, q))
+
+    def _join(self, state: WorldState, spread: Tensor) -> Tensor:
+        """Join the chance to be ignited by neighbours with that of spontaneous ignition."""
+        if self.beta == 0.0:
+            return spread
+        cells = state.cells
+        fuel = self.is_fuel(state) & (state.alpha > 0.0)
+        spontaneous = self._look_up(self._spontaneous(cells.shape[1] * cells.shape[2]), cells) * fuel
+        return spontaneous + (1.0 - spontaneous) * spread
+
     def is_fuel(self, state: WorldState) -> Tensor:
         """Return which trees can ignite now: age >= A_min, dry; bool [B, H, W]."""
         return is_tree(state.cells) & (state.cells >= self.youngest_fuel) & (state.wet == 0)
@@ -202,11 +227,7 @@ class Fire:
         """
         cells, due = state.cells, due[:, None, None]
         burning = is_burning(cells) & due
-        q, _ = self.spread(state)
-        if self.beta > 0.0:
-            fuel = self.is_fuel(state) & (state.alpha > 0.0)
-            spontaneous = self._look_up(self._spontaneous(cells.shape[1] * cells.shape[2]), cells) * fuel
-            q = spontaneous + (1.0 - spontaneous) * q
+        q = self.chance_to_ignite(state)
         ignite = (u < q) & due
         to_ash = burning & (cells == EMBER)
         after = cells + burning

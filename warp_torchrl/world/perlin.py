@@ -1,6 +1,7 @@
 """Batched fractal gradient noise after Perlin (2002), for the terrain of WARP-CA."""
 
 import math
+from itertools import accumulate
 
 import torch
 from torch import Tensor
@@ -32,38 +33,37 @@ def fractal_noise(
     Returns:
         float32 [B, H, W], about zero, not normalised.
     """
-    worlds = key.shape[0]
-    total = torch.zeros(worlds, *size, device=key.device)
+    device = key.device
+    frequency = torch.tensor(frequencies, device=device)[:, None]
     offsets = uniform(key, 0, stream, (len(frequencies), 2))
-    for octave, (frequency, amplitude) in enumerate(zip(frequencies, amplitudes, strict=True)):
-        lattice = tuple(math.ceil((length - 1) * frequency) + 3 for length in size)
-        angle = uniform(key, octave + 1, stream, lattice).mul_(2.0 * math.pi)
-        gradients = torch.stack((angle.sin(), angle.cos()), dim=-1)
-        total += amplitude * _octave(gradients, offsets[:, octave], frequency, size)
+    rows, row_part = _locate(size[0], frequency, offsets[..., 0])
+    columns, column_part = _locate(size[1], frequency, offsets[..., 1])
+    lattices = [tuple(math.ceil((length - 1) * f) + 3 for length in size) for f in frequencies]
+    widths = torch.tensor([width for _, width in lattices], device=device)[:, None, None]
+    starts = [0, *accumulate(height * width for height, width in lattices)]
+    angle = uniform(key, 1, stream, (starts[-1],)).mul_(2.0 * math.pi)
+    gradients = torch.stack((angle.sin(), angle.cos()))
+    first = torch.tensor(starts[:-1], device=device)[:, None, None] + rows[..., :, None] * widths + columns[..., None, :]
+    row_part, column_part = row_part[..., :, None], column_part[..., None, :]
+    row_fade, column_fade = fade(row_part), fade(column_part)
+
+    def corner(down: int, right: int) -> Tensor:
+        index = (first + (down * widths + right)).flatten(1)
+        along_row, along_column = gradients.gather(2, index.expand(2, -1, -1)).view(2, *first.shape)
+        return along_row * (row_part - down) + along_column * (column_part - right)
+
+    top_left, bottom_left = corner(0, 0), corner(1, 0)
+    top = top_left + column_fade * (corner(0, 1) - top_left)
+    bottom = bottom_left + column_fade * (corner(1, 1) - bottom_left)
+    octaves = top + row_fade * (bottom - top)
+    total = torch.zeros(key.shape[0], *size, device=device)
+    for octave, amplitude in enumerate(amplitudes):  # one after the other: a sum's order must not depend on the batch
+        total += amplitude * octaves[:, octave]
     return total
 
 
-def _octave(gradients: Tensor, offset: Tensor, frequency: float, size: tuple[int, int]) -> Tensor:
-    """Interpolate one octave from its lattice of gradients, float32 [B, P, Q, 2] -> [B, H, W]."""
-    rows, row_part = _locate(size[0], frequency, offset[:, 0])
-    columns, column_part = _locate(size[1], frequency, offset[:, 1])
-    row_part, column_part = row_part[:, :, None], column_part[:, None, :]
-    row_fade, column_fade = fade(row_part), fade(column_part)
-    width = gradients.shape[2]
-    flat = gradients.flatten(1, 2)
-
-    def corner(down: int, right: int) -> Tensor:
-        index = ((rows + down)[:, :, None] * width + (columns + right)[:, None, :]).flatten(1)
-        gradient = flat.gather(1, index[..., None].expand(-1, -1, 2)).view(-1, *size, 2)
-        return gradient[..., 0] * (row_part - down) + gradient[..., 1] * (column_part - right)
-
-    top = corner(0, 0) + column_fade * (corner(0, 1) - corner(0, 0))
-    bottom = corner(1, 0) + column_fade * (corner(1, 1) - corner(1, 0))
-    return top + row_fade * (bottom - top)
-
-
-def _locate(length: int, frequency: float, offset: Tensor) -> tuple[Tensor, Tensor]:
-    """Return each cell's lattice index, int64 [B, length], and its place between lattice points in [0, 1)."""
-    place = torch.arange(length, device=offset.device) * frequency + offset[:, None]
+def _locate(length: int, frequency: Tensor, offset: Tensor) -> tuple[Tensor, Tensor]:
+    """Return each cell's lattice index, int64 [B, O, length], and its place between lattice points in [0, 1)."""
+    place = torch.arange(length, device=offset.device) * frequency + offset[..., None]
     lattice = place.floor()
     return lattice.to(torch.int64), place - lattice

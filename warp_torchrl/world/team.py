@@ -101,7 +101,7 @@ class Team:
         """Return the agents' roles and abilities as tensors of shape [A]."""
         return _role_table(tuple(self.agent_roles), device)
 
-    def place(self, key: Tensor, cover: Tensor, cells: Tensor) -> Vehicles:
+    def place(self, key: Tensor, cover: Tensor, burning: Tensor) -> Vehicles:
         """Return the team at the start of an episode.
 
         Each agent takes the free cell (neither lake nor burning) nearest to the corner, no two the same one.
@@ -109,10 +109,10 @@ class Team:
         Args:
             key: World keys, int64 [B].
             cover: Land cover, uint8 [B, H, W].
-            cells: Cell codes, uint8 [B, H, W].
+            burning: Cells on fire, bool [B, H, W].
         """
         worlds, height, width = cover.shape
-        taken = (cover == Cover.LAKE) | is_burning(cells)
+        taken = (cover == Cover.LAKE) | burning
         rows = torch.arange(height, device=cover.device)
         columns = torch.arange(width, device=cover.device)
         corner = (uniform(key, 0, Stream.START, (2,)) < 0.5).to(torch.int64)

@@ -9,7 +9,7 @@ from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.ignition import Ignition
 from warp_torchrl.world.landscape import LandscapeSource, Perlin, map_size
 from warp_torchrl.world.random import Stream, uniform, world_key
-from warp_torchrl.world.state import Landscape, Tally, Transition, Vehicles, WorldState, count_trees
+from warp_torchrl.world.state import FIRST_FIRE, Landscape, Tally, Transition, Vehicles, WorldState, count_trees, is_burning
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.wind import Uniform, Wind
 
@@ -26,7 +26,7 @@ class World:
         ignition: Where the fire starts.
         steps_per_tick: Agent steps to a fire tick.
         horizon: Agent steps to an episode.
-        cell_size: Side of a cell [m].
+        cell_size: Side of a cell [m]; None takes the landscape's own, 30 m where it has none.
 
     Raises:
         ValueError: If a value is out of its range or the team does not fit on the map.
@@ -39,15 +39,15 @@ class World:
     ignition: Ignition = field(default_factory=Ignition)
     steps_per_tick: int = 5
     horizon: int = 256
-    cell_size: float = 30.0
+    cell_size: float | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= self.steps_per_tick <= 1000:
             raise ValueError(f"steps_per_tick must be in 1..1000, got {self.steps_per_tick}")
         if not 1 <= self.horizon <= 1_000_000:
             raise ValueError(f"horizon must be in 1..1000000 steps, got {self.horizon}")
-        if not 0.01 <= self.cell_size <= 100_000.0:
-            raise ValueError(f"cell_size must be in [0.01, 100000] m, got {self.cell_size}")
+        if self.cell_size is not None and not 0.01 <= self.cell_size <= 100_000.0:
+            raise ValueError(f"cell_size must be in [0.01, 100000] m or null, got {self.cell_size}")
         height, width = self.size
         if self.team.n_agents > height * width // 4:
             raise ValueError(
@@ -64,6 +64,11 @@ class World:
         """Return the map's (H, W) [cells]."""
         return map_size(self.landscape.size)
 
+    @property
+    def side_of_cell(self) -> float:
+        """Return the side of a cell in force [m]."""
+        return getattr(self.landscape, "cell_size", 30.0) if self.cell_size is None else self.cell_size
+
     def reset(self, seed: Tensor, episode: Tensor) -> WorldState:
         """Start an episode in each world: the ground, the fire after its head start, the team.
 
@@ -79,17 +84,16 @@ class World:
         """
         key = world_key(seed, episode)
         ground = self.landscape(key)
-        wind = self.wind(key, self.size)
-        state = quiet_state(ground, self.fire, wind, key, self.team.place(key, ground.cover, ground.age), self.cell_size)
-        lit = self.ignition(key, self.fire.is_fuel(state) & (state.alpha > 0.0))
+        fuel = (ground.age >= self.fire.youngest_fuel) & (self.fire.flammability(ground.cover) > 0.0)
+        lit = self.ignition(key, fuel)
         if not lit.flatten(1).any(dim=1).all():
             raise ValueError("landscape: a map has no tree that can burn, so there is no fire to start")
+        vehicles = self.team.place(key, ground.cover, lit)
+        state = quiet_state(ground, self.fire, self.wind(key, self.size), key, vehicles, self.side_of_cell)
         cells = state.cells
-        state = state.replace(cells=torch.where(lit, 11, cells), age=torch.where(lit, cells, state.age))
+        state = state.replace(cells=torch.where(lit, FIRST_FIRE, cells), age=torch.where(lit, cells, state.age))
         for _ in range(self.ignition.head_start):
             state = self._tick(state, torch.ones_like(key, dtype=torch.bool))
-        vehicles = self.team.place(key, ground.cover, state.cells)
-        state = state.replace(vehicles=vehicles)
         return state.replace(tally=count_trees(state))
 
     def step(self, state: WorldState, action: Tensor) -> Transition:
@@ -111,6 +115,10 @@ class World:
         return Transition(
             before=state, outcome=outcome, after=self._advance_clock(after, active), batch_size=state.batch_size
         )
+
+    def threat(self, state: WorldState) -> Tensor:
+        """Return where the fire is about to grow, float32 [B, H, W] in 0..1; see ``Fire.threat``."""
+        return self.fire.threat(state)
 
     def action_mask(self, state: WorldState) -> Tensor:
         """Return which actions would do something, bool [B, A, 10 or 11]."""
@@ -176,31 +184,28 @@ def quiet_state(
     return state.replace(tally=count_trees(state))
 
 
-def burn(cells: Tensor, cover: Tensor, elevation: Tensor | None, wind: Wind, fire: Fire, **clock: int) -> Tensor:
-    """Run the fire alone from given cells; see ``warp_torchrl.simulate``.
-
-    Args:
-        cells: Cell codes 0..15, uint8 [B, H, W]. The trees' age under a fire that is already lit counts as 10.
-        cover: Land cover, uint8 [B, H, W].
-        elevation: float32 [B, H, W] [m], or None.
-        wind: The wind component.
-        fire: The automaton.
-        clock: ``ticks`` to run, ``first_tick`` of the draws, and ``seed`` of world 0; world i draws with seed + i.
-
-    Returns:
-        Cell codes after the ticks, uint8 [B, H, W].
-    """
-    worlds, height, width = cells.shape
-    seed = clock["seed"] + torch.arange(worlds, device=cells.device)
-    key = world_key(seed, torch.zeros_like(seed))
+def burn(
+    cells: Tensor,
+    cover: Tensor,
+    elevation: Tensor | None,
+    *,
+    wind: Wind,
+    fire: Fire,
+    ticks: int,
+    first_tick: int,
+    seed: int,
+    cell_size: float,
+) -> Tensor:
+    """Run the fire alone from given cells; see ``warp_torchrl.simulate``."""
+    height, width = cells.shape[1:]
+    seeds = seed + torch.arange(cells.shape[0], device=cells.device)
+    key = world_key(seeds, torch.zeros_like(seeds))
     ground = Landscape(cover=cover, age=cells, elevation=elevation, batch_size=key.shape)
-    nobody = Team(n_agents=1).place(key, cover, cells)
-    state = quiet_state(ground, fire, wind(key, (height, width)), key, nobody, 30.0)
-    state = state.replace(tick=state.tick + clock["first_tick"])
+    nobody = Team(n_agents=1).place(key, cover, is_burning(cells))
+    state = quiet_state(ground, fire, wind(key, (height, width)), key, nobody, cell_size)
+    state = state.replace(tick=state.tick + first_tick)
     everywhere = torch.ones_like(key, dtype=torch.bool)
-    for _ in range(clock["ticks"]):
+    for _ in range(ticks):
         draws = uniform(key, state.tick, Stream.FIRE, (height, width))
         state = fire.tick(state, draws, everywhere)
     return state.cells
-
-

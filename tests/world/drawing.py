@@ -1,0 +1,112 @@
+"""Small worlds drawn by hand as text.
+
+A map is rows of one character a cell, with white space between rows:
+
+    .  empty ground     1..9  tree of that age     T  tree of age 10
+    ~  lake             #     firebreak            a b c d e  fire, codes 11..15
+
+The ground under it is grassland, or drawn the same way: ~ lake, w wetland, g grassland, f forest, b bare.
+"""
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.world.fire import Fire
+from warp_torchrl.world.random import world_key
+from warp_torchrl.world.state import Cover, Landscape, WorldState, count_trees
+from warp_torchrl.world.team import Team
+from warp_torchrl.world.world import quiet_state
+
+CELLS = ".123456789Tabcde"
+GROUND = "~wgfb"
+LAKE, FIREBREAK = "~", "#"
+
+
+def codes(drawing: str, alphabet: str) -> Tensor:
+    """Return the place of each character in the alphabet, uint8 [H, W]; 0 for one that is not in it."""
+    return torch.tensor([[max(0, alphabet.find(cell)) for cell in row] for row in drawing.split()], dtype=torch.uint8)
+
+
+def tiled(drawing: str, down: int, across: int) -> str:
+    """Return the drawing repeated, ``down`` times by ``across``."""
+    return " ".join([row * across for row in drawing.split()] * down)
+
+
+def marks(drawing: str, mark: str) -> Tensor:
+    """Return where a character stands, bool [H, W]."""
+    return torch.tensor([[cell == mark for cell in row] for row in drawing.split()])
+
+
+def drawn_cover(drawing: str, ground: str = "") -> Tensor:
+    """Return the land cover, uint8 [H, W]: as ``ground`` has it, or grassland with the lakes of the drawing."""
+    if ground:
+        return codes(ground, GROUND)
+    return torch.where(marks(drawing, LAKE), Cover.LAKE, Cover.GRASSLAND).to(torch.uint8)
+
+
+def draw(
+    drawing: str,
+    *,
+    ground: str = "",
+    fire: Fire | None = None,
+    elevation: list[list[float]] | None = None,
+    wind: tuple[float, float] | Tensor = (0.0, 0.0),
+    team: Team | None = None,
+    at: list[tuple[int, int]] | None = None,
+    age_on_fire: int = 10,
+    worlds: int = 1,
+    seed: int = 0,
+) -> WorldState:
+    """Return ``worlds`` worlds like the drawing, with seeds from ``seed`` on, in which fires burn already.
+
+    Args:
+        drawing: The cells.
+        ground: The land cover, if it is not all grassland.
+        fire: The automaton that sets flammability and slope factors.
+        elevation: [H, W] [m].
+        wind: (u, v) over the whole map, or a field [2, H, W] [m/s].
+        team: The vehicles; one bulldozer unless given.
+        at: (row, column) of each vehicle; the north-west corner unless given.
+        age_on_fire: Age of the burning trees when they caught fire.
+        worlds: How many.
+        seed: Of the first.
+    """
+    fire, team = fire or Fire(), team or Team(n_agents=1)
+    cells, cover = codes(drawing, CELLS), drawn_cover(drawing, ground)
+    burning = cells > 10
+    key = world_key(torch.arange(seed, seed + worlds), torch.zeros(worlds, dtype=torch.int64))
+
+    def in_each(plane: Tensor) -> Tensor:
+        return plane.expand(worlds, *plane.shape).contiguous()
+
+    air = wind if isinstance(wind, Tensor) else torch.tensor(wind)[:, None, None]
+    height = None if elevation is None else in_each(torch.tensor(elevation, dtype=torch.float32))
+    trees = torch.where(burning, age_on_fire, cells)
+    land = Landscape(cover=in_each(cover), age=in_each(trees), elevation=height, batch_size=[worlds])
+    vehicles = team.place(key, land.cover, in_each(burning))
+    places = torch.tensor(at or [(0, 0)] * team.n_agents)
+    vehicles = vehicles.replace(position=in_each(places))
+    state = quiet_state(land, fire, air.expand(worlds, *air.shape), key, vehicles, 30.0)
+    state = state.replace(
+        cells=in_each(cells),
+        age=in_each(trees * burning),
+        firebreak=in_each(marks(drawing, FIREBREAK)),
+    )
+    return state.replace(tally=count_trees(state))
+
+
+def drawn(state: WorldState, world: int = 0) -> str:
+    """Return the cells of one world as a drawing of one line, rows apart by a space; lakes and firebreaks are '.'."""
+    return " ".join("".join(CELLS[code] for code in row) for row in state.cells[world].tolist())
+
+
+def planes(state: WorldState) -> dict[str, Tensor]:
+    """Return every tensor of the state by name."""
+    leaves = state.to_tensordict().flatten_keys(".").items()
+    return {name: leaf for name, leaf in leaves if isinstance(leaf, Tensor)}
+
+
+def differing(state: WorldState, other: WorldState) -> list[str]:
+    """Return the names of the tensors that are not the same bit for bit."""
+    theirs = planes(other)
+    return [name for name, plane in planes(state).items() if not torch.equal(plane, theirs[name])]

@@ -1,0 +1,103 @@
+"""One tick of the fire as world.md words it: cell by cell, in plain Python floats.
+
+Written from the specification alone, to be compared with the tensor code.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+LAKE, WETLAND, GRASSLAND, FOREST, BARE = range(5)
+NEIGHBOURS = [(row, column) for row in (-1, 0, 1) for column in (-1, 0, 1) if (row, column) != (0, 0)]
+
+
+@dataclass
+class LiteralFire:
+    """The automaton, law ``paper``, over lists of rows."""
+
+    cells: list[list[int]]
+    cover: list[list[int]]
+    elevation: list[list[float]]
+    wind: list[list[tuple[float, float]]]
+    wet: list[list[int]]
+    firebreak: list[list[bool]]
+    growth: bool = True
+    beta: float = 0.0
+    p_regrow: float = 0.0
+    burning_stages: int = 4
+    divide_by_distance: bool = True
+    alpha: dict[int, float] = field(
+        default_factory=lambda: {LAKE: 0.0, WETLAND: 0.1, GRASSLAND: 1.0, FOREST: 0.8, BARE: 0.0}
+    )
+
+    @property
+    def size(self) -> tuple[int, int]:
+        return len(self.cells), len(self.cells[0])
+
+    def can_ignite(self, row: int, column: int) -> bool:
+        return 2 <= self.cells[row][column] <= 10 and self.wet[row][column] == 0
+
+    def spreads(self, row: int, column: int) -> bool:
+        height, width = self.size
+        on_map = 0 <= row < height and 0 <= column < width
+        return on_map and 11 <= self.cells[row][column] <= 10 + self.burning_stages
+
+    def chance_across(self, source: tuple[int, int], target: tuple[int, int]) -> float:
+        """Return p_d = clip(alpha w_d s_d / dist_d, 0, 1)."""
+        south, east = target[0] - source[0], target[1] - source[1]
+        distance = math.hypot(south, east)
+        u, v = self.wind[source[0]][source[1]]
+        speed = math.hypot(u, v)
+        cosine = (u * east - v * south) / (speed * distance) if speed > 0 else 1.0
+        wind = math.exp(0.045 * speed) * math.exp(0.131 * speed * (cosine - 1.0))
+        climb = self.elevation[target[0]][target[1]] - self.elevation[source[0]][source[1]]
+        slope = math.exp(0.078 * math.degrees(math.atan(climb / (30.0 * distance))))
+        chance = self.alpha[self.cover[target[0]][target[1]]] * wind * slope
+        return min(1.0, chance / distance if self.divide_by_distance else chance)
+
+    def chance_from_neighbours(self, row: int, column: int) -> float:
+        """Return p_spread = 1 - prod (1 - p_d) over the neighbours that spread."""
+        if not self.can_ignite(row, column):
+            return 0.0
+        escapes = 1.0
+        for south, east in NEIGHBOURS:
+            source = (row + south, column + east)
+            if self.spreads(*source):
+                escapes *= 1.0 - self.chance_across(source, (row, column))
+        return 1.0 - escapes
+
+    def expected_to_ignite(self, row: int, column: int) -> float:
+        """Return how many neighbours a burning cell is expected to ignite by itself."""
+        height, width = self.size
+        total = 0.0
+        for south, east in NEIGHBOURS:
+            target = (row + south, column + east)
+            on_map = 0 <= target[0] < height and 0 <= target[1] < width
+            if self.spreads(row, column) and on_map and self.can_ignite(*target):
+                total += self.chance_across((row, column), target)
+        return total
+
+    def chance_to_ignite(self, row: int, column: int) -> float:
+        """Return q = p_spont + (1 - p_spont) p_spread."""
+        if not self.can_ignite(row, column):
+            return 0.0
+        height, width = self.size
+        age = self.cells[row][column]
+        spontaneous = min(1.0, self.beta * math.exp(10.0 * age / 10.0) / math.exp(10.0) / (height * width))
+        return spontaneous + (1.0 - spontaneous) * self.chance_from_neighbours(row, column)
+
+    def outcomes(self, row: int, column: int) -> dict[int, float]:
+        """Return the chance of each code that the cell may have after the tick."""
+        code = self.cells[row][column]
+        if code == 15:
+            return {0: 1.0}
+        if code >= 11:
+            return {code + 1: 1.0}
+        if code == 0:
+            fertile = self.cover[row][column] in (WETLAND, GRASSLAND, FOREST) and not self.firebreak[row][column]
+            regrows = self.p_regrow if fertile else 0.0
+            return {0: 1.0 - regrows, 1: regrows}
+        ignites = self.chance_to_ignite(row, column)
+        if not self.growth or code == 10:
+            return {11: ignites, code: 1.0 - ignites}
+        grows = (1.0 - ignites) * math.exp(-code / 10.0 * 5.0)
+        return {11: ignites, code + 1: grows, code: 1.0 - ignites - grows}

@@ -1,0 +1,1 @@
+"""Learners, each from TorchRL's own loss."""

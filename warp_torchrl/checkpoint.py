@@ -1,0 +1,274 @@
+"""Checkpoints: complete or invisible, verified before they are read, the newest found by listing.
+
+``checkpoints/<frames>/`` holds ``policy.pt`` and ``training.pt`` (tensors and plain values, read with
+``weights_only=True``), ``config.json``, and ``manifest.json`` with the size and sha256 of each.
+"""
+
+import fcntl
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import tensordict
+import torch
+import torchrl
+
+from warp_torchrl.config import Record
+from warp_torchrl.models import Entry, Signature
+
+FORMAT = 1
+MANIFEST = "manifest.json"
+_FILES = ("policy.pt", "training.pt", "config.json")
+_LARGEST_JSON = 1_000_000
+
+
+class CheckpointError(Exception):
+    """No sound checkpoint, told in one line."""
+
+
+class RunFolderInUse(Exception):  # noqa: N818
+    """Another process writes into the run folder."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Manifest:
+    """What a checkpoint says of itself.
+
+    Attributes:
+        format: Version of the layout.
+        frames: World steps trained.
+        scenario: Name of the scenario.
+        signature: Inputs and outputs of the policy.
+        mode: How the policy acts best on training seeds, ``sampled`` or ``deterministic``; None before that is known.
+        versions: Of the libraries that wrote it.
+        files: Size and sha256 by file name.
+    """
+
+    format: int
+    frames: int
+    scenario: str
+    signature: Signature
+    mode: str | None
+    versions: dict[str, str]
+    files: dict[str, dict[str, Any]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Checkpoint:
+    """A checkpoint whose files were verified; reading them can still fail only if the disk changes.
+
+    Attributes:
+        path: Its folder.
+        manifest: What it says of itself.
+    """
+
+    path: Path
+    manifest: Manifest
+
+    def record(self) -> Record:
+        """Return the configuration it was trained with."""
+        content = _json(self.path / "config.json")
+        return Record(choices=content["choices"], values=content["values"])
+
+    def policy(self) -> dict[str, torch.Tensor]:
+        """Return the policy's parameters."""
+        return self._load("policy.pt")
+
+    def training(self) -> dict[str, Any]:
+        """Return everything a run needs to go on."""
+        return self._load("training.pt")
+
+    def _load(self, name: str) -> dict[str, Any]:
+        try:
+            return torch.load(self.path / name, weights_only=True, map_location="cpu")
+        except Exception as error:
+            raise CheckpointError(f"{self.path / name} cannot be read: {_first_line(error)}") from None
+
+
+def save(
+    run: Path,
+    *,
+    frames: int,
+    scenario: str,
+    signature: Signature,
+    mode: str | None,
+    record: Record,
+    policy: Mapping[str, torch.Tensor],
+    training: Mapping[str, Any],
+    keep: int,
+) -> Path:
+    """Write a checkpoint, then drop the oldest ones over ``keep``.
+
+    It appears under its name only when every file is on the disk: temporary folder, fsync, one rename, fsync.
+
+    Returns:
+        Its folder.
+
+    Raises:
+        OSError: If the disk refuses; the checkpoints that were there stay.
+    """
+    parent = run / "checkpoints"
+    parent.mkdir(parents=True, exist_ok=True)
+    final = parent / f"{frames:012d}"
+    if final.exists():
+        return final
+    draft = parent / f".{frames:012d}.{os.getpid()}.tmp"
+    shutil.rmtree(draft, ignore_errors=True)
+    draft.mkdir()
+    try:
+        torch.save(dict(policy), draft / "policy.pt")
+        torch.save(dict(training), draft / "training.pt")
+        _write_json(draft / "config.json", asdict(record))
+        manifest = Manifest(
+            format=FORMAT,
+            frames=frames,
+            scenario=scenario,
+            signature=signature,
+            mode=mode,
+            versions={"torch": torch.__version__, "torchrl": torchrl.__version__, "tensordict": tensordict.__version__},
+            files={name: _describe(draft / name) for name in _FILES},
+        )
+        _write_json(draft / MANIFEST, asdict(manifest) | {"signature": _signature_to_json(signature)})
+        for path in (*draft.iterdir(), draft):
+            _sync(path)
+        draft.rename(final)
+        _sync(parent)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+    for old in _listed(run)[keep:]:
+        shutil.rmtree(old, ignore_errors=True)
+    return final
+
+
+def newest(path: Path | str) -> tuple[Checkpoint, list[str]]:
+    """Find the newest sound checkpoint.
+
+    Args:
+        path: A run folder, or one checkpoint folder.
+
+    Returns:
+        The checkpoint, and a line for each newer one that was skipped, with the reason.
+
+    Raises:
+        CheckpointError: If there is none.
+    """
+    path = Path(path)
+    if (path / MANIFEST).exists() or path.parent.name == "checkpoints":
+        return _verified(path), []
+    if not path.is_dir():
+        raise CheckpointError(f"{path} is not a run folder: nothing there")
+    skipped = []
+    for folder in _listed(path):
+        try:
+            return _verified(folder), skipped
+        except CheckpointError as error:
+            skipped.append(str(error))
+    reason = f": {skipped[0]}" if skipped else f": no folder in {path / 'checkpoints'}"
+    raise CheckpointError(f"{path} holds no sound checkpoint{reason}")
+
+
+class RunFolderLock:
+    """Holds a run folder for one writer; the operating system lets go of it when the process ends.
+
+    Raises:
+        RunFolderInUse: If another process holds it.
+    """
+
+    def __init__(self, run: Path) -> None:
+        run.mkdir(parents=True, exist_ok=True)
+        self._file = (run / ".lock").open("w")
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self._file.close()
+            raise RunFolderInUse(f"{run} is in use: another process trains into it") from None
+
+    def release(self) -> None:
+        """Let another process have it."""
+        self._file.close()
+
+
+def _listed(run: Path) -> list[Path]:
+    """Return the checkpoint folders, newest first."""
+    parent = run / "checkpoints"
+    folders = [each for each in parent.iterdir() if each.name.isdigit()] if parent.is_dir() else []
+    return sorted(folders, key=lambda each: int(each.name), reverse=True)
+
+
+def _verified(folder: Path) -> Checkpoint:
+    """Check every file of a checkpoint against its manifest before any of them is parsed."""
+    content = _json(folder / MANIFEST)
+    if content.get("format") != FORMAT:
+        raise CheckpointError(f"{folder} has format {content.get('format')!r}, this version reads {FORMAT}")
+    try:
+        signature = _signature_from_json(content.pop("signature"))
+        manifest = Manifest(signature=signature, **content)
+        files = {name: (entry["size"], entry["sha256"]) for name, entry in manifest.files.items()}
+    except (TypeError, KeyError, ValueError, AttributeError):
+        raise CheckpointError(f"{folder / MANIFEST} is not a manifest of format {FORMAT}") from None
+    if set(files) != set(_FILES):
+        raise CheckpointError(f"{folder / MANIFEST} must list {', '.join(_FILES)}")
+    for name, (size, digest) in files.items():
+        path = folder / name
+        if not path.is_file() or path.stat().st_size != size:
+            raise CheckpointError(f"{path} is missing or was cut: {size} bytes are expected")
+        if _sha256(path) != digest:
+            raise CheckpointError(f"{path} was altered: its sha256 is not the manifest's")
+    return Checkpoint(path=folder, manifest=manifest)
+
+
+def _json(path: Path) -> dict[str, Any]:
+    try:
+        if path.stat().st_size > _LARGEST_JSON:
+            raise CheckpointError(f"{path} is too large to be one of ours")
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise CheckpointError(f"{path} cannot be read: {_first_line(error)}") from None
+    if not isinstance(content, dict):
+        raise CheckpointError(f"{path} must hold a mapping")
+    return content
+
+
+def _write_json(path: Path, content: object) -> None:
+    path.write_text(json.dumps(content, indent=1), encoding="utf-8")
+
+
+def _describe(path: Path) -> dict[str, Any]:
+    return {"size": path.stat().st_size, "sha256": _sha256(path)}
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]
+
+
+def _signature_to_json(signature: Signature) -> dict[str, Any]:
+    return signature._asdict() | {
+        "observation": {name: entry._asdict() for name, entry in signature.observation.items()},
+        "state": signature.state._asdict(),
+    }
+
+
+def _signature_from_json(content: dict[str, Any]) -> Signature:
+    def entry(node: dict[str, Any]) -> Entry:
+        return Entry(tuple(int(side) for side in node["shape"]), str(node["dtype"]))
+
+    observation = {str(name): entry(node) for name, node in content["observation"].items()}
+    return Signature(observation, entry(content["state"]), int(content["n_agents"]), int(content["n_actions"]))

@@ -1,0 +1,389 @@
+"""Configuration: composes the yaml files of ``conf/``, checks every value, builds the components.
+
+A component's types, defaults and rules stand in its dataclass and nowhere else. The yaml files name the class, always
+one of this package's own; nothing that is read from a run folder is ever instantiated by name.
+"""
+
+import importlib
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+import torch
+from hydra import compose, initialize_config_dir
+from hydra.core.global_hydra import GlobalHydra
+from hydra.errors import HydraException
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from warp_torchrl.env import WildfireEnv
+from warp_torchrl.world.world import World
+
+COMPONENTS = (
+    "landscape",
+    "wind",
+    "fire",
+    "team",
+    "ignition",
+    "observation",
+    "reward",
+    "model",
+    "algorithm",
+    "collector",
+    "logger",
+)
+"""Groups whose options are classes."""
+WORLD_KEYS = ("scenario", "landscape", "wind", "fire", "team", "ignition", "steps_per_tick", "horizon", "cell_size")
+"""What a scenario sets."""
+TRAINING_SEEDS = 4096
+"""Seeds that one training seed owns: world i of seed s draws with 4096 s + i."""
+
+OmegaConf.register_new_resolver("pid", os.getpid, replace=True)
+
+
+class ConfigError(ValueError):
+    """A mistake in the configuration, told in one line with key, value and rule."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckpointPlan:
+    """When training saves.
+
+    Attributes:
+        interval: Frames between checkpoints.
+        keep: Checkpoints that stay.
+
+    Raises:
+        ValueError: If the interval is not positive or fewer than two are kept.
+    """
+
+    interval: int = 500_000
+    keep: int = 2
+
+    def __post_init__(self) -> None:
+        if self.interval < 1:
+            raise ValueError(f"interval must be at least 1 frame, got {self.interval}")
+        if not 2 <= self.keep <= 10_000:
+            raise ValueError(f"keep must be in 2..10000, got {self.keep}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvaluationPlan:
+    """How policies are evaluated.
+
+    Attributes:
+        interval: Frames between evaluations during training; 0 evaluates only at the end.
+        episodes: Worlds.
+        first_seed: Seed of the first; training seeds lie below 1 000 000.
+        mode: ``sampled``, ``deterministic``, or ``best``: whichever did better on training seeds.
+
+    Raises:
+        ValueError: If a value is out of its range.
+    """
+
+    interval: int = 0
+    episodes: int = 256
+    first_seed: int = 1_000_000
+    mode: Literal["sampled", "deterministic", "best"] = "best"
+
+    def __post_init__(self) -> None:
+        if self.interval < 0:
+            raise ValueError(f"interval must be 0 or more frames, got {self.interval}")
+        if not 1 <= self.episodes <= 1_000_000:
+            raise ValueError(f"episodes must be in 1..1000000, got {self.episodes}")
+        if not 0 <= self.first_seed < 2**62:
+            raise ValueError(f"first_seed must be in 0..2**62, got {self.first_seed}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """Everything that a run needs, checked: the components, built, and the run's own numbers.
+
+    Raises:
+        ValueError: If a value is out of its range.
+    """
+
+    scenario: str
+    world: World
+    observation: Any
+    reward: Any
+    model: Any
+    algorithm: Any
+    collector: Any
+    logger: Any
+    n_worlds: int
+    total_frames: int
+    seed: int
+    device: str
+    checkpoint: CheckpointPlan
+    evaluation: EvaluationPlan
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.n_worlds <= TRAINING_SEEDS:
+            raise ValueError(f"n_worlds must be in 1..{TRAINING_SEEDS}, got {self.n_worlds}")
+        if not 1 <= self.total_frames <= 10**15:
+            raise ValueError(f"total_frames must be in 1..1e15, got {self.total_frames}")
+        if not 0 <= self.seed < 244:
+            raise ValueError(
+                f"seed must be in 0..243, so that no training world has an evaluation seed, got {self.seed}"
+            )
+        _check_device(self.device)
+
+    def make_env(self, n_worlds: int, seed: int) -> WildfireEnv:
+        """Return an environment of the run's scenario, on the run's device."""
+        return WildfireEnv(
+            self.world,
+            observation=self.observation,
+            reward=self.reward,
+            n_worlds=n_worlds,
+            seed=seed,
+            device=self.device,
+        )
+
+
+def conf_folder() -> Path:
+    """Return the folder of the yaml files: inside the package when installed, beside it in a checkout."""
+    package = Path(__file__).parent
+    inside = package / "conf"
+    return inside if inside.is_dir() else package.parent / "conf"
+
+
+def compose_config(name: str, overrides: Sequence[str] = ()) -> DictConfig:
+    """Compose ``conf/<name>.yaml`` with overrides in Hydra's grammar.
+
+    Raises:
+        ConfigError: If an override does not fit, in one line.
+    """
+    GlobalHydra.instance().clear()
+    try:
+        with initialize_config_dir(str(conf_folder()), version_base="1.3"):
+            config = compose(name, overrides=list(overrides))
+            OmegaConf.resolve(config)
+            return config
+    except (HydraException, OmegaConfBaseException) as error:
+        raise ConfigError(_one_line(error)) from None
+
+
+def settings(config: Mapping[str, Any]) -> Settings:
+    """Check a composed configuration and build what it describes.
+
+    Raises:
+        ConfigError: With key, value and rule.
+    """
+    known = {each.name for each in fields(Settings)} | {*COMPONENTS, *WORLD_KEYS, "resume", "debug", "policy"}
+    for key in config:
+        if key not in known:
+            raise ConfigError(f"{key} is not a key of the configuration; it has {', '.join(sorted(known - {'world'}))}")
+    built = {name: build(config[name], name) for name in COMPONENTS}
+    world_keys = {each.name for each in fields(World)}
+    world = {key: built.get(key, config.get(key)) for key in world_keys if key in config}
+    values = {each.name: built.get(each.name, config.get(each.name)) for each in fields(Settings)}
+    values["world"] = construct(World, world, "")
+    values["checkpoint"] = construct(CheckpointPlan, config["checkpoint"], "checkpoint")
+    values["evaluation"] = construct(EvaluationPlan, config["evaluation"], "evaluation")
+    _check_together(config)
+    return construct(Settings, values, "")
+
+
+def _check_together(config: Mapping[str, Any]) -> None:
+    reward, algorithm = config["reward"], config["algorithm"]
+    if reward["shaping"] > 0.0 and reward["gamma"] != algorithm["gamma"]:
+        raise ConfigError(
+            f"reward.gamma must be algorithm.gamma, {algorithm['gamma']}, for shaping to leave optimal policies as "
+            f"they are, got {reward['gamma']}"
+        )
+
+
+def build(node: object, where: str) -> Any:
+    """Build the component that a configuration node describes.
+
+    Args:
+        node: A mapping with ``_target_``, one of this package's dataclasses, and its fields.
+        where: The node's key, for messages.
+
+    Raises:
+        ConfigError: If the target is not ours, a key is unknown, or a value breaks a rule.
+    """
+    if not isinstance(node, Mapping) or "_target_" not in node:
+        raise ConfigError(f"{where} must name one of the files of conf/{where}, got {node!r}")
+    target = str(node["_target_"])
+    module, _, name = target.rpartition(".")
+    component = None
+    if re.fullmatch(r"warp_torchrl(\.\w+)+", target):
+        try:
+            component = getattr(importlib.import_module(module), name, None)
+        except ImportError:
+            component = None
+    if not (isinstance(component, type) and is_dataclass(component)):
+        raise ConfigError(f"{where}._target_ must be a component of warp_torchrl, got {target}")
+    return construct(component, {key: value for key, value in node.items() if key != "_target_"}, where)
+
+
+def construct(component: type, values: Mapping[str, Any], where: str) -> Any:
+    """Make a dataclass from plain values, each checked against its field's type.
+
+    Raises:
+        ConfigError: With key, value and rule.
+    """
+    prefix = f"{where}." if where else ""
+    if not isinstance(values, Mapping):
+        raise ConfigError(f"{where} must be a mapping, got {values!r}")
+    hints = get_type_hints(component)
+    allowed = {each.name: each for each in fields(component) if each.init}
+    for key in values:
+        if key not in allowed:
+            raise ConfigError(f"{prefix}{key} is not a key of {where or component.__name__}; it has {', '.join(allowed)}")
+    for name, each in allowed.items():
+        if name not in values and each.default is MISSING and each.default_factory is MISSING:
+            raise ConfigError(f"{prefix}{name} must be given")
+    fitted = {key: _fit(value, hints[key], f"{prefix}{key}") for key, value in values.items()}
+    try:
+        return component(**fitted)
+    except ValueError as error:
+        message = str(error)
+        raise ConfigError(message if message.startswith(prefix) else f"{prefix}{message}") from None
+
+
+def _fit(value: object, hint: object, key: str) -> object:
+    """Return a value as its field's type wants it."""
+    choices = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+    for choice in choices:
+        fits, fitted = _try_fit(value, choice)
+        if fits:
+            return fitted
+    names = " or ".join(_describe(choice) for choice in choices)
+    raise ConfigError(f"{key} must be {names}, got {value!r}")
+
+
+def _try_fit(value: object, hint: object) -> tuple[bool, object]:
+    origin = get_origin(hint)
+    if hint is Any or origin is Any:
+        return True, value
+    if hint in (None, NoneType):
+        return value is None, None
+    if origin is Literal:
+        return value in get_args(hint), value
+    if origin is tuple:
+        return _try_fit_tuple(value, get_args(hint))
+    if hint is bool:
+        return isinstance(value, bool), value
+    if hint is int:
+        return isinstance(value, int) and not isinstance(value, bool), value
+    if hint is float:
+        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        return is_number, float(value) if is_number else value
+    kind = origin or hint
+    return isinstance(kind, type) and isinstance(value, kind), value
+
+
+def _try_fit_tuple(value: object, items: tuple[object, ...]) -> tuple[bool, object]:
+    if not isinstance(value, Sequence) or isinstance(value, str):
+        return False, value
+    kinds = [items[0]] * len(value) if items[-1] is Ellipsis else list(items)
+    if len(kinds) != len(value):
+        return False, value
+    fitted = [_try_fit(each, kind) for each, kind in zip(value, kinds, strict=True)]
+    return all(fits for fits, _ in fitted), tuple(each for _, each in fitted)
+
+
+def _describe(hint: object) -> str:
+    origin = get_origin(hint)
+    if hint in (None, NoneType):
+        return "null"
+    if origin is Literal:
+        return " or ".join(str(choice) for choice in get_args(hint))
+    if origin is tuple:
+        items = get_args(hint)
+        return f"a list of {_describe(items[0])}" if items[-1] is Ellipsis else f"a list of {len(items)} values"
+    names = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}
+    return names.get(hint, getattr(hint, "__name__", str(hint)))
+
+
+def _check_device(name: str) -> None:
+    try:
+        device = torch.device(name)
+    except RuntimeError:
+        raise ValueError(f"device must be cpu, cuda or cuda:<number>, got {name}") from None
+    if device.type not in ("cpu", "cuda"):
+        raise ValueError(f"device must be cpu, cuda or cuda:<number>, got {name}")
+    if device.type == "cuda" and (device.index or 0) >= torch.cuda.device_count():
+        raise ValueError(f"device must be one of this machine's {torch.cuda.device_count()} CUDA devices, got {name}")
+
+
+def _one_line(error: Exception) -> str:
+    """Return Hydra's message in one line, with the options where it lists them."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return " ".join(line for line in lines if not line.startswith(("full_key", "object_type", "Set the environment")))
+
+
+# What is written into a run folder, and read back
+
+_OPTION = re.compile(r"[A-Za-z0-9_]+")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Record:
+    """A configuration as a run folder keeps it: which option each group had, and every value.
+
+    Attributes:
+        choices: Option by group.
+        values: Resolved values, without the names of classes.
+    """
+
+    choices: dict[str, str] = field(default_factory=dict)
+    values: dict[str, Any] = field(default_factory=dict)
+
+
+def plain(config: DictConfig) -> dict[str, Any]:
+    """Return a configuration as plain, resolved values."""
+    return OmegaConf.to_container(config, resolve=True)
+
+
+def without_targets(node: Any) -> Any:
+    """Return a configuration node without its ``_target_`` entries."""
+    if isinstance(node, Mapping):
+        return {key: without_targets(value) for key, value in node.items() if key != "_target_"}
+    return list(node) if isinstance(node, list) else node
+
+
+def recompose(record: Record, overrides: Sequence[str] = ()) -> DictConfig:
+    """Compose the configuration of a record anew from this package's own files, and lay its values over it.
+
+    Classes come from our yaml files alone. Values that an override touches are the override's; an override of
+    ``scenario`` takes the whole world from that scenario.
+
+    Args:
+        record: From a run folder: not trusted.
+        overrides: In Hydra's grammar.
+
+    Raises:
+        ConfigError: If a choice or a value does not fit.
+    """
+    for group, option in record.choices.items():
+        if group not in (*COMPONENTS, "scenario") or not _OPTION.fullmatch(str(option)):
+            raise ConfigError(f"{group}={option!r} in the run folder is not one of our options")
+    touched = [override.split("=", 1)[0].lstrip("+~") for override in overrides]
+    if "scenario" in touched:
+        touched += WORLD_KEYS
+    choices = [f"{group}={option}" for group, option in record.choices.items() if group not in touched]
+    config = compose_config("train", [*choices, *overrides])
+    for path, value in _leaves(record.values):
+        if any(path == key or path.startswith(f"{key}.") for key in touched):
+            continue
+        try:
+            OmegaConf.update(config, path, value, merge=False, force_add=False)
+        except OmegaConfBaseException:
+            raise ConfigError(f"{path} in the run folder is not a key of this version's configuration") from None
+    return config
+
+
+def _leaves(node: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
+    found = []
+    for key, value in node.items():
+        path = f"{prefix}{key}"
+        found += _leaves(value, f"{path}.") if isinstance(value, Mapping) else [(path, value)]
+    return found

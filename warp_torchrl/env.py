@@ -1,0 +1,275 @@
+"""The environment: joins world, observation, reward and metrics to TorchRL. It has no physics of its own."""
+
+from collections.abc import Sequence
+
+import torch
+from tensordict import TensorDict, TensorDictBase
+from torch import Tensor
+from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
+from torchrl.envs import EnvBase
+
+from warp_torchrl.metrics import METRICS, metrics
+from warp_torchrl.observation import STATE, STATE_SIDE, Observation, Surroundings, central_state
+from warp_torchrl.render import render
+from warp_torchrl.reward import Efficiency, Reward
+from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.team import ROLES
+from warp_torchrl.world.world import World
+
+EPISODE_METRICS = (*METRICS, "episode_reward", "episode_length")
+"""Entries of ``info``: the metrics, the team's mean return so far, and the steps so far."""
+
+
+class WildfireEnv(EnvBase):
+    """A batch of wildfires and the teams that fight them.
+
+    World i draws with its own seed, ``seed + i`` or ``seeds[i]``: it evolves the same in any batch and at any place in
+    it. The first reset is its episode 0, each later reset the next. A finished world stays as it is, with reward 0,
+    until it is reset.
+
+    Args:
+        world: The scenario's rules.
+        observation: What agents see.
+        reward: What they earn.
+        n_worlds: B.
+        seed: Seed of world 0.
+        seeds: Seeds of all worlds, in place of ``seed``.
+        device: Where the worlds live.
+        validate: Check on every device that actions are in range, which costs a synchronisation on CUDA; by default
+            they are checked on the CPU only.
+
+    Raises:
+        ValueError: If ``n_worlds`` is not positive, ``seeds`` are not as many, or a seed is out of range.
+    """
+
+    batch_locked = True
+
+    def __init__(
+        self,
+        world: World | None = None,
+        *,
+        observation: Observation | None = None,
+        reward: Reward | None = None,
+        n_worlds: int = 1,
+        seed: int = 0,
+        seeds: Sequence[int] | None = None,
+        device: torch.device | str = "cpu",
+        validate: bool | None = None,
+    ) -> None:
+        if n_worlds < 1:
+            raise ValueError(f"n_worlds must be at least 1, got {n_worlds}")
+        super().__init__(device=torch.device(device), batch_size=[n_worlds])
+        self.world = World() if world is None else world
+        self.observation = Surroundings() if observation is None else observation
+        self.reward_function = Efficiency() if reward is None else reward
+        self.validate = self.device.type == "cpu" if validate is None else validate
+        names, roles = self.world.team.agent_names, self.world.team.agent_roles
+        self.agent_names = names
+        self.group_map = {"agents": list(names)}
+        self.role_map = {role: [n for n, r in zip(names, roles) if r == role] for role in ROLES if role in roles}
+        self._state: WorldState | None = None
+        self._episode_reward = torch.zeros(n_worlds, device=self.device)
+        self._set_seeds(range(seed, seed + n_worlds) if seeds is None else seeds)
+        self._make_specs()
+
+    # What users ask for
+
+    @property
+    def n_agents(self) -> int:
+        """Return A."""
+        return self.world.team.n_agents
+
+    @property
+    def world_state(self) -> WorldState:
+        """Return the worlds as they are now; clone them to keep them.
+
+        Raises:
+            RuntimeError: Before the first reset.
+        """
+        if self._state is None:
+            raise RuntimeError("the environment has no state yet: call reset() first")
+        return self._state
+
+    def render(self, scale: int = 12) -> Tensor:
+        """Draw the worlds, uint8 [B, H * scale, W * scale, 3]."""
+        return render(self.world_state, self.world.team.table(self.device).index, scale)
+
+    def set_state(self, state: WorldState) -> TensorDictBase:
+        """Go on from given worlds, and return what a reset would have returned for them.
+
+        Raises:
+            ValueError: If the batch, the map or the team differs from this environment's.
+        """
+        expected = (self.batch_size[0], *self.world.size, self.n_agents)
+        got = (*state.cells.shape, state.vehicles.position.shape[1])
+        if got != expected:
+            raise ValueError(f"state must have [worlds, rows, columns, agents] {list(expected)}, got {list(got)}")
+        self._state = state.to(self.device).clone()
+        self._episode_reward.zero_()
+        return self._observe(self._state)
+
+    def state_dict(self, *args: object, **kwargs: object) -> dict[str, object]:
+        """Return all that changes in the environment: seeds, episodes, worlds, returns."""
+        worlds = {} if self._state is None else self._state.to_tensordict().flatten_keys(".").to_dict()
+        return {
+            "seeds": self._seeds.clone(),
+            "episodes": self._episodes.clone(),
+            "episode_reward": self._episode_reward.clone(),
+            "worlds": {name: value.clone() for name, value in worlds.items() if isinstance(value, Tensor)},
+        }
+
+    def load_state_dict(self, state_dict: dict[str, object], *args: object, **kwargs: object) -> None:
+        """Restore what ``state_dict`` returned, all or nothing.
+
+        Raises:
+            ValueError: If an entry is missing or of another shape or type.
+        """
+        worlds = state_dict["worlds"]
+        state = None
+        if worlds:
+            template = self.world.reset(self._seeds, self._episodes)
+            state = _fill(template, worlds)
+        for name in ("seeds", "episodes", "episode_reward"):
+            if state_dict[name].shape != self._seeds.shape:
+                raise ValueError(f"{name} must have shape {list(self._seeds.shape)}, got {state_dict[name].shape}")
+        self._seeds = state_dict["seeds"].to(self.device).clone()
+        self._episodes = state_dict["episodes"].to(self.device).clone()
+        self._episode_reward = state_dict["episode_reward"].to(self.device).clone()
+        self._state = state
+
+    # What TorchRL asks for
+
+    def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
+        mask = None if tensordict is None else tensordict.get("_reset", None)
+        if mask is None or self._state is None or mask.all():
+            self._state = self.world.reset(self._seeds, self._episodes)
+            self._episodes = self._episodes + 1
+            self._episode_reward = torch.zeros_like(self._episode_reward)
+            return self._observe(self._state)
+        index = mask.flatten().nonzero()[:, 0]
+        fresh = self.world.reset(self._seeds[index], self._episodes[index])
+        self._state[index] = fresh
+        self._episodes = self._episodes.index_add(0, index, torch.ones_like(index))
+        self._episode_reward = self._episode_reward.index_fill(0, index, 0.0)
+        out = self.full_observation_spec.zero().update(self.full_done_spec.zero())
+        out[index] = self._observe(fresh, self._episode_reward[index])
+        return out
+
+    def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
+        action = self._checked(tensordict.get(("agents", "action"), None))
+        transition = self.world.step(self.world_state, action)
+        reward = self.reward_function(transition)
+        self._state = transition.after
+        self._episode_reward = self._episode_reward + reward.mean(1)[:, 0]
+        out = self._observe(transition.after)
+        out.set(("agents", "reward"), reward)
+        return out
+
+    def _set_seed(self, seed: int | None) -> None:
+        if seed is None:
+            seed = int(torch.empty((), dtype=torch.int64).random_(2**31))
+        self._set_seeds(range(seed, seed + self.batch_size[0]))
+
+    def _set_seeds(self, seeds: Sequence[int]) -> None:
+        if len(seeds) != self.batch_size[0]:
+            raise ValueError(f"seeds must be {self.batch_size[0]} numbers, one a world, got {len(seeds)}")
+        if not all(0 <= seed < 2**62 for seed in seeds):
+            raise ValueError(f"seed must be in 0..2**62, got {min(seeds)}..{max(seeds)}")
+        self._seeds = torch.tensor(list(seeds), dtype=torch.int64, device=self.device)
+        self._episodes = torch.zeros_like(self._seeds)
+
+    def _checked(self, action: Tensor | None) -> Tensor:
+        shape = (*self.batch_size, self.n_agents)
+        if action is None:
+            raise ValueError('("agents", "action") must be given: an int64 tensor of shape [worlds, agents]')
+        if action.dtype != torch.int64 or tuple(action.shape) != shape:
+            raise ValueError(
+                f'("agents", "action") must be int64 of shape {list(shape)}, got {action.dtype} {list(action.shape)}'
+            )
+        if action.device != self.device:
+            raise ValueError(f'("agents", "action") must be on {self.device}, got {action.device}')
+        if self.validate and not ((action >= 0) & (action < self.world.team.n_actions)).all():
+            raise ValueError(
+                f'("agents", "action") must be in 0..{self.world.team.n_actions - 1}, '
+                f"got {int(action.min())}..{int(action.max())}"
+            )
+        return action
+
+    def _observe(self, state: WorldState, episode_reward: Tensor | None = None) -> TensorDict:
+        """Return observations, mask, central state, flags and metrics of the worlds."""
+        batch = state.batch_size
+        team = [*batch, self.n_agents]
+        entries = self.observation(state, self.world)
+        seen = entries[""] if "" in entries else TensorDict(entries, batch_size=team)
+        agents = {"observation": seen, "action_mask": self.world.action_mask(state)}
+        info = metrics(state, self.world.horizon)
+        info["episode_reward"] = self._episode_reward if episode_reward is None else episode_reward
+        info["episode_length"] = state.step.to(torch.float32)
+        return TensorDict(
+            {
+                "agents": TensorDict(agents, batch_size=team),
+                "state": central_state(state, self.world),
+                "info": TensorDict({name: value[:, None] for name, value in info.items()}, batch_size=batch),
+                "done": state.done[:, None],
+                "terminated": state.terminated[:, None].clone(),
+                "truncated": state.truncated[:, None].clone(),
+            },
+            batch_size=batch,
+            device=self.device,
+        )
+
+    def _make_specs(self) -> None:
+        batch, team = self.batch_size, (*self.batch_size, self.n_agents)
+        device, n_actions = self.device, self.world.team.n_actions
+
+        def entry(space: object) -> Bounded:
+            return Bounded(space.low, space.high, shape=(*team, *space.shape), dtype=space.dtype, device=device)
+
+        spaces = {name: entry(space) for name, space in self.observation.spaces(self.world).items()}
+        seen = spaces[""] if "" in spaces else Composite(spaces, shape=team, device=device)
+        mask = Binary(n_actions, shape=(*team, n_actions), dtype=torch.bool, device=device)
+        state_shape = (*batch, len(STATE), STATE_SIDE, STATE_SIDE)
+        self.observation_spec = Composite(
+            agents=Composite(observation=seen, action_mask=mask, shape=team, device=device),
+            state=Bounded(-3.0, 256.0, shape=state_shape, device=device),
+            info=Composite(
+                {name: Unbounded(shape=(*batch, 1), device=device) for name in EPISODE_METRICS}, shape=batch
+            ),
+            shape=batch,
+            device=device,
+        )
+        action = Categorical(n_actions, shape=team, dtype=torch.int64, device=device)
+        self.action_spec = Composite(
+            agents=Composite(action=action, shape=team, device=device), shape=batch, device=device
+        )
+        reward = Unbounded(shape=(*team, 1), device=device)
+        self.reward_spec = Composite(
+            agents=Composite(reward=reward, shape=team, device=device), shape=batch, device=device
+        )
+        flag = {n: Categorical(2, shape=(*batch, 1), dtype=torch.bool, device=device) for n in _FLAGS}
+        self.done_spec = Composite(flag, shape=batch, device=device)
+
+
+_FLAGS = ("done", "terminated", "truncated")
+
+
+def _fill(template: WorldState, entries: dict[str, Tensor]) -> WorldState:
+    """Return worlds with the given entries, checked against a template's names, shapes and types."""
+    expected = {
+        name: value
+        for name, value in template.to_tensordict().flatten_keys(".").items()
+        if isinstance(value, Tensor)
+    }
+    if set(expected) != set(entries):
+        raise ValueError(f"worlds must have the entries {sorted(expected)}, got {sorted(entries)}")
+    filled = template.clone()
+    for name, value in entries.items():
+        old = expected[name]
+        if value.shape != old.shape or value.dtype != old.dtype:
+            raise ValueError(f"{name} must be {old.dtype} {list(old.shape)}, got {value.dtype} {list(value.shape)}")
+        *path, leaf = name.split(".")
+        owner = filled
+        for part in path:
+            owner = getattr(owner, part)
+        setattr(owner, leaf, value.to(old.device).clone())
+    return filled

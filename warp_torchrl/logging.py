@@ -1,0 +1,152 @@
+"""Where a run's numbers go: ``metrics.csv`` always, and a tracker where one is asked for."""
+
+import csv
+import logging
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, Protocol
+
+from torchrl.record.loggers import get_logger
+
+log = logging.getLogger("warp_torchrl")
+
+
+class MetricsFile:
+    """``metrics.csv``: one row an iteration, complete after a crash, cut back on resume.
+
+    The first row fixes the columns. A value that an iteration does not have is left empty.
+
+    Args:
+        path: The file.
+        keep_rows: Rows that stay when it exists; the others were written after the checkpoint.
+    """
+
+    def __init__(self, path: Path, keep_rows: int = 0) -> None:
+        self.path = path
+        self.rows = keep_rows
+        self._columns: list[str] | None = None
+        if keep_rows:
+            with path.open(newline="", encoding="utf-8") as file:
+                lines = list(csv.reader(file))
+            self._columns = lines[0]
+            self._write("w", lines[: keep_rows + 1])
+
+    def add(self, row: Mapping[str, float | None]) -> None:
+        """Append a row; it is on its way to the disk when this returns.
+
+        Raises:
+            ValueError: If a column is new.
+            OSError: If the disk refuses.
+        """
+        lines = []
+        if self._columns is None:
+            self._columns = list(row)
+            lines.append(self._columns)
+        unknown = set(row) - set(self._columns)
+        if unknown:
+            raise ValueError(f"metrics.csv has no columns {sorted(unknown)}")
+        values = [row.get(column) for column in self._columns]
+        lines.append(["" if value is None else repr(value) for value in values])
+        self._write("w" if len(lines) > 1 else "a", lines)
+        self.rows += 1
+
+    def _write(self, mode: str, lines: list[list[str]]) -> None:
+        with self.path.open(mode, newline="", encoding="utf-8") as file:
+            csv.writer(file).writerows(lines)
+
+
+class Tracker(Protocol):
+    """What a run needs of a tracker."""
+
+    def log(self, row: Mapping[str, float | None], frames: int) -> None:
+        """Send a row."""
+        ...
+
+    def close(self) -> None:
+        """Finish."""
+        ...
+
+
+class _Silent:
+    def log(self, row: Mapping[str, float | None], frames: int) -> None:
+        """Send nothing."""
+
+    def close(self) -> None:
+        """Finish nothing."""
+
+
+class _TorchRlTracker:
+    """One of TorchRL's loggers; the first failure ends the tracking and never the training."""
+
+    def __init__(self, name: str, run: Path, **options: object) -> None:
+        self._name = name
+        try:
+            self._logger = get_logger(name, str(run), run.name, **options)
+        except Exception as error:
+            self._fail(error)
+
+    def log(self, row: Mapping[str, float | None], frames: int) -> None:
+        """Send a row under the names of ``metrics.csv``."""
+        if self._logger is None:
+            return
+        try:
+            for name, value in row.items():
+                if value is not None:
+                    self._logger.log_scalar(name, value, step=frames)
+        except Exception as error:
+            self._fail(error)
+
+    def close(self) -> None:
+        """Finish the tracker's run."""
+        finish = getattr(getattr(self._logger, "experiment", None), "finish", None)
+        try:
+            if finish is not None:
+                finish()
+        except Exception as error:
+            self._fail(error)
+
+    def _fail(self, error: Exception) -> None:
+        self._logger = None
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        log.warning("%s does not work, the run goes on without it: %s", self._name, reason)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CsvOnly:
+    """No tracker: ``metrics.csv`` is always written."""
+
+    def open(self, run: Path) -> Tracker:
+        """Return a tracker for a run folder."""
+        return _Silent()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wandb:
+    """Weights & Biases.
+
+    Attributes:
+        project: Its project.
+        mode: ``offline`` keeps everything in the run folder, to be synced later; ``online`` sends it.
+        group: Its group, for sweeps.
+    """
+
+    project: str = "warp_torchrl"
+    mode: Literal["offline", "online"] = "offline"
+    group: str | None = None
+
+    def open(self, run: Path) -> Tracker:
+        """Return a tracker for a run folder."""
+        os.environ.setdefault("WANDB_SILENT", "true")
+        options = {"offline": self.mode == "offline", "project": self.project, "group": self.group}
+        return _TorchRlTracker("wandb", run, wandb_kwargs=options)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tensorboard:
+    """TensorBoard; needs the extra ``tensorboard``."""
+
+    def open(self, run: Path) -> Tracker:
+        """Return a tracker for a run folder."""
+        return _TorchRlTracker("tensorboard", run)

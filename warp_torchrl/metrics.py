@@ -1,0 +1,52 @@
+"""What an episode came to, as fractions in 0..1."""
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.world.state import WorldState
+
+METRICS = (
+    "saved",
+    "burned",
+    "extinguished",
+    "cleared",
+    "burning",
+    "burning_area",
+    "control_time",
+    "actions",
+    "redundant",
+    "success",
+)
+"""Names of the metrics, in the order of tables."""
+SUCCESS_LEVEL = 0.6
+
+
+def metrics(state: WorldState, horizon: int) -> dict[str, Tensor]:
+    """Return the metrics of each world's episode so far, float32 [B] each.
+
+    ``saved``, ``burned``, ``extinguished``, ``cleared``, ``burning``: shares of the initial trees, saved being those
+    that stand untouched or put out. ``burning_area``: area under the curve of burning trees, mean share over the
+    horizon. ``control_time``: agent steps until no cell burned, or until now, as a share of the horizon.
+    ``actions``: extinguish and clear actions, a share of the agents' steps. ``redundant``: the share of those on a
+    target that a team-mate had. ``success``: 1 where the fire is out and at least 60 % is saved.
+
+    Args:
+        state: The worlds.
+        horizon: Agent steps to an episode.
+    """
+    tally, vehicles = state.tally, state.vehicles
+    acts = vehicles.acts.sum(1)
+    agent_steps = (state.step * vehicles.acts.shape[1]).clamp(min=1)
+    saved = tally.saved()
+    return {
+        "saved": saved,
+        "burned": tally.burned / tally.initial,
+        "extinguished": tally.extinguished / tally.initial,
+        "cleared": tally.cleared / tally.initial,
+        "burning": tally.burning / tally.initial,
+        "burning_area": state.burning_area / horizon,
+        "control_time": state.step / horizon,
+        "actions": acts / agent_steps,
+        "redundant": vehicles.redundant.sum(1) / acts.clamp(min=1),
+        "success": ((tally.alight == 0) & (saved >= SUCCESS_LEVEL)).to(torch.float32),
+    }

@@ -1,0 +1,296 @@
+"""The one training loop. It names no algorithm: what differs between them is data of the learner."""
+
+import logging
+import signal
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import torch
+from tensordict import TensorDict, TensorDictBase
+from torch import Tensor
+from torchrl.collectors import Collector
+from tqdm import tqdm
+
+from warp_torchrl import checkpoint as checkpoints
+from warp_torchrl.algorithms.learner import Learner
+from warp_torchrl.config import TRAINING_SEEDS, Record, Settings
+from warp_torchrl.env import EPISODE_METRICS, WildfireEnv
+from warp_torchrl.evaluation import MODES, play
+from warp_torchrl.logging import MetricsFile
+from warp_torchrl.models import signature
+
+log = logging.getLogger("warp_torchrl")
+_SECONDS_BETWEEN_LINES = 15.0
+
+
+class NumericalFailure(Exception):  # noqa: N818
+    """A loss or a gradient is not finite; the weights were not touched."""
+
+
+class Stopped(Exception):  # noqa: N818
+    """A signal asked the run to stop; it has saved.
+
+    Attributes:
+        number: The signal's.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(f"stopped by signal {signal.Signals(number).name}; go on with resume=")
+        self.number = number
+
+
+@dataclass(frozen=True, kw_only=True)
+class Direct:
+    """Collects in this process: exact resume.
+
+    Attributes:
+        steps: World steps a batch, for each world.
+
+    Raises:
+        ValueError: If steps is not in 1..100000.
+    """
+
+    steps: int = 64
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.steps <= 100_000:
+            raise ValueError(f"steps must be in 1..100000, got {self.steps}")
+
+    def open(self, env: WildfireEnv, learner: Learner) -> Collector:
+        """Return TorchRL's collector, which resets finished worlds at once."""
+        return Collector(
+            env,
+            learner.explore,
+            frames_per_batch=self.steps * env.batch_size[0],
+            total_frames=-1,
+            return_same_td=True,
+            track_traj_ids=False,
+            auto_register_policy_transforms=False,
+        )
+
+
+class Training:
+    """A run: everything that moves, and how it is saved.
+
+    Args:
+        settings: What to train.
+        record: The configuration as the run folder keeps it.
+        run: The run folder.
+    """
+
+    def __init__(self, settings: Settings, record: Record, run: Path) -> None:
+        torch.manual_seed(settings.seed)
+        self.settings, self.record, self.run = settings, record, run
+        self.env = settings.make_env(settings.n_worlds, TRAINING_SEEDS * settings.seed)
+        self.frames_per_batch = settings.collector.steps * settings.n_worlds
+        self.learner: Learner = settings.algorithm.build(self.env, settings.model, self.frames_per_batch)
+        self.collector = settings.collector.open(self.env, self.learner)
+        self.frames = 0
+        self.seconds = 0.0
+        self.saved_at = 0
+        self.mode: str | None = None
+        self.metrics = MetricsFile(run / "metrics.csv")
+
+    def train(self) -> None:
+        """Train until ``total_frames``, saving on the way and at the end.
+
+        Raises:
+            Stopped: By a signal, after saving.
+            NumericalFailure: If a loss or gradient is not finite.
+        """
+        total, tracker = self.settings.total_frames, self.settings.logger.open(self.run)
+        bar = tqdm(total=total, initial=self.frames, unit="frame", disable=None, dynamic_ncols=True)
+        start, next_line = time.perf_counter() - self.seconds, 0.0
+        try:
+            with _Signals() as signals:
+                for batch in self.collector if self.frames < total else ():
+                    row = self._learn(batch)
+                    self.seconds = time.perf_counter() - start
+                    rate = batch.numel() / max(self.seconds - self._last_seconds, 1e-9)
+                    self._last_seconds = self.seconds
+                    row = {"time/frames": self.frames, "time/seconds": self.seconds, "time/fps": rate, **row}
+                    self.metrics.add(row)
+                    tracker.log(row, self.frames)
+                    bar.update(batch.numel())
+                    bar.set_postfix(saved=row["world/saved"], refresh=False)
+                    if bar.disable and (self.seconds >= next_line or self.frames >= total):
+                        next_line = self.seconds + _SECONDS_BETWEEN_LINES
+                        log.info(_line(row, total))
+                    if self.frames >= total:
+                        break
+                    if signals.received or self.frames - self.saved_at >= self.settings.checkpoint.interval:
+                        self.save()
+                    if signals.received:
+                        raise Stopped(signals.received)
+        finally:
+            bar.close()
+            tracker.close()
+        self.mode = self.mode or self._better_mode()
+        self.save()
+
+    _last_seconds = 0.0
+
+    def _learn(self, batch: TensorDictBase) -> dict[str, float | None]:
+        """Learn from one batch [B, T] and return the row of metrics."""
+        learner = self.learner
+        schedule = learner.schedule(min(1.0, self.frames / self.settings.total_frames))
+        row = _episode_columns(batch)
+        if not learner.keeps_data:
+            learner.buffer.empty()
+        learner.buffer.extend(learner.prepare(batch))
+        sums: dict[str, Tensor] = {}
+        updates = 0
+        for _ in range(learner.passes):
+            for sample in learner.buffer:
+                for name, value in self._update(sample).items():
+                    sums[name] = sums.get(name, 0.0) + value
+                updates += 1
+        self.frames += batch.numel()
+        means = {name: float(value) / updates for name, value in sums.items()}
+        row["train/loss"] = sum(means[key] for key in learner.loss_keys)
+        row |= {column: means.get(key) for key, column in learner.columns.items()} | schedule
+        row["evaluation/saved"] = self._evaluate(batch.numel())
+        return row
+
+    def _update(self, sample: TensorDictBase) -> dict[str, Tensor]:
+        """Take one optimiser step and return the loss's terms; nothing is read back from the device but finiteness."""
+        learner = self.learner
+        terms = learner.loss(sample)
+        loss = sum(terms[key] for key in learner.loss_keys)
+        loss.backward()
+        try:
+            torch.nn.utils.clip_grad_norm_(learner.loss.parameters(), learner.max_grad_norm, error_if_nonfinite=True)
+        except RuntimeError:
+            raise NumericalFailure(
+                f"after {self.frames} frames the gradient is not finite, loss {float(loss):g}; the weights were left "
+                f"as they were, and the last checkpoint stands"
+            ) from None
+        learner.optimizer.step()
+        learner.optimizer.zero_grad()
+        wanted = {*learner.loss_keys, *learner.columns}
+        return {name: terms[name].detach().mean() for name in wanted if name in terms.keys()}
+
+    def _evaluate(self, frames: int) -> float | None:
+        interval = self.settings.evaluation.interval
+        if not interval or self.frames // interval == (self.frames - frames) // interval:
+            return None
+        plan = self.settings.evaluation
+        env = self.settings.make_env(plan.episodes, plan.first_seed)
+        return float(play(env, self.learner.policy, plan.first_seed)["saved"].mean())
+
+    def _better_mode(self) -> str:
+        """Return how the policy does better on training seeds, sampled or deterministic."""
+        chosen = self.settings.evaluation.mode
+        if chosen != "best":
+            return chosen
+        first = TRAINING_SEEDS * self.settings.seed
+        env = self.settings.make_env(min(self.settings.evaluation.episodes, TRAINING_SEEDS), first)
+        saved = {mode: play(env, self.learner.policy, first, mode)["saved"].mean() for mode in MODES}
+        return max(saved, key=saved.__getitem__)
+
+    def save(self) -> Path:
+        """Write a checkpoint of everything."""
+        path = checkpoints.save(
+            self.run,
+            frames=self.frames,
+            scenario=self.settings.scenario,
+            signature=signature(self.env),
+            mode=self.mode,
+            record=self.record,
+            policy=self.learner.policy.state_dict(),
+            training=self.state_dict(),
+            keep=self.settings.checkpoint.keep,
+        )
+        self.saved_at = self.frames
+        return path
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return everything that a run needs to go on exactly as if never stopped."""
+        return {
+            "loss": dict(self.learner.loss.state_dict()),
+            "optimizer": self.learner.optimizer.state_dict(),
+            "random": torch.get_rng_state(),
+            "env": self.env.state_dict(),
+            "carrier": _flat(self.collector._carrier),
+            "frames": self.frames,
+            "seconds": self.seconds,
+            "rows": self.metrics.rows,
+        }
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Restore what ``state_dict`` returned.
+
+        Raises:
+            CheckpointError: If an entry does not fit this configuration.
+        """
+        try:
+            self.learner.loss.load_state_dict(state["loss"])
+            self.learner.optimizer.load_state_dict(state["optimizer"])
+            self.env.load_state_dict(state["env"])
+            carrier = TensorDict(state["carrier"], batch_size=self.env.batch_size).unflatten_keys(".")
+            self.collector._carrier = carrier.to(self.env.device)
+            self.frames, self.seconds = int(state["frames"]), float(state["seconds"])
+            self.saved_at, self._last_seconds = self.frames, self.seconds
+            self.metrics = MetricsFile(self.run / "metrics.csv", keep_rows=int(state["rows"]))
+            torch.set_rng_state(state["random"])
+        except (KeyError, ValueError, RuntimeError, TypeError) as error:
+            reason = " ".join(str(error).split())
+            raise checkpoints.CheckpointError(f"the checkpoint does not fit this configuration: {reason}") from None
+
+    def close(self) -> None:
+        """Shut the collector down."""
+        self.collector.shutdown()
+
+
+class _Signals:
+    """Notes SIGTERM, SIGINT and SIGUSR1; a second one acts as it would have."""
+
+    _WATCHED = (signal.SIGTERM, signal.SIGINT, signal.SIGUSR1)
+
+    def __init__(self) -> None:
+        self.received = 0
+
+    def __enter__(self) -> "_Signals":
+        try:
+            self._before = {number: signal.signal(number, self._note) for number in self._WATCHED}
+        except ValueError:  # not in the main thread, where signals cannot be watched
+            self._before = {}
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        if self.received:
+            raise SystemExit(128 + number)
+        self.received = number
+
+
+def _flat(carrier: TensorDictBase) -> dict[str, Tensor]:
+    return {name: value.clone() for name, value in carrier.flatten_keys(".").items()}
+
+
+def _episode_columns(batch: TensorDictBase) -> dict[str, float | None]:
+    """Return the means over the episodes that ended in a batch, None where none did."""
+    done = batch["next", "done"][..., 0]
+    info = batch["next", "info"]
+    count = int(done.sum())
+    means = {name: float(info[name][..., 0][done].mean()) if count else None for name in EPISODE_METRICS}
+    row = {"rollout/ep_rew_mean": means.pop("episode_reward"), "rollout/ep_len_mean": means.pop("episode_length")}
+    return row | {f"world/{name}": value for name, value in means.items()}
+
+
+def _line(row: Mapping[str, float | None], total: int) -> str:
+    def show(name: str, pattern: str) -> str:
+        return "-" if row[name] is None else pattern.format(row[name])
+
+    return (
+        f"{100 * row['time/frames'] / total:5.1f} %  {row['time/frames']} frames  {row['time/seconds']:.0f} s  "
+        f"{row['time/fps']:.0f} frames/s  saved {show('world/saved', '{:.3f}')}  "
+        f"reward {show('rollout/ep_rew_mean', '{:.2f}')}  loss {show('train/loss', '{:.3f}')}"
+    )
