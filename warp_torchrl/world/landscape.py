@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 import torch
@@ -21,6 +21,7 @@ LARGEST_SIDE = 4096
 """Longest side of a simulated map [cells]."""
 
 
+@runtime_checkable
 class LandscapeSource(Protocol):
     """What the world needs of a landscape component."""
 

@@ -1,0 +1,264 @@
+"""The two commands: checks first, works, and ends with one line and an exit code when something fails."""
+
+import errno
+import logging
+import os
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import hydra
+from hydra.core.hydra_config import HydraConfig
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.types import RunMode
+from omegaconf import DictConfig
+
+from warp_torchrl import checkpoint as checkpoints
+from warp_torchrl.api import policy_of
+from warp_torchrl.config import (
+    COMPONENTS,
+    ConfigError,
+    Record,
+    Settings,
+    compose_config,
+    conf_folder,
+    plain,
+    recompose,
+    settings,
+    without_targets,
+)
+from warp_torchrl.evaluation import play, play_heuristics, record_episode, report, table, write_json
+from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.training import NumericalFailure, Stopped, Training
+
+log = logging.getLogger("warp_torchrl")
+
+DONE, MISTAKE, IN_USE, UNSOUND, NUMERICAL, DISK = 0, 2, 3, 4, 5, 6
+_RECORDED = (*COMPONENTS, "scenario")
+_NOT_RECORDED = ("resume", "debug", "policy", "hydra")
+
+
+def train() -> None:
+    """Train, as ``python train.py`` and ``warp-train`` do; ends the process with the exit code."""
+    _run("train", _train_job)
+
+
+def evaluate() -> None:
+    """Evaluate, as ``python evaluate.py`` and ``warp-evaluate`` do; ends the process with the exit code."""
+    _run("evaluate", _evaluate_job)
+
+
+# The two jobs
+
+
+def _train_job(config: DictConfig) -> None:
+    folder, found = Path(HydraConfig.get().runtime.output_dir), None
+    record = Record(choices=_choices(), values=_values(config))
+    if config.resume is not None:
+        folder = Path(config.resume)
+        found, skipped = checkpoints.newest(folder)
+        for line in skipped:
+            log.warning("skipped: %s", line)
+        record = found.record()
+    plan = settings(plain(recompose(record)) if found else plain(config))
+    lock = checkpoints.RunFolderLock(folder)
+    try:
+        (folder / "config.yaml").exists() or _write_config(folder / "config.yaml", config)
+        training = Training(plan, record, folder)
+        if found is not None:
+            training.load_state_dict(found.training())
+            log.info("resumed %s at %d frames", found.path, training.frames)
+            if found.manifest.mode is not None and (folder / "evaluation.json").exists():
+                log.info("%s is finished", folder)
+                return
+        try:
+            training.train()
+        finally:
+            training.close()
+        found, _ = checkpoints.newest(folder)
+        _report(plan, folder, found=found)
+    finally:
+        lock.release()
+
+
+def _evaluate_job(config: DictConfig) -> None:
+    folder = Path(HydraConfig.get().runtime.output_dir)
+    given, name = config.checkpoint, config.policy
+    if given is None:
+        _report(settings(_without_checkpoint(config)), folder, heuristic=name)
+        return
+    found, skipped = checkpoints.newest(given)
+    for line in skipped:
+        log.warning("skipped: %s", line)
+    overrides = [each for each in HydraConfig.get().overrides.task if not each.startswith(("checkpoint=", "policy="))]
+    _report(settings(plain(recompose(found.record(), overrides))), folder, found=found)
+
+
+def _report(
+    plan: Settings, folder: Path, found: checkpoints.Checkpoint | None = None, heuristic: str | None = None
+) -> None:
+    """Evaluate a checkpoint or a heuristic beside the yardsticks: table, ``evaluation.json`` and ``episode.gif``."""
+    first, folder = plan.evaluation.first_seed, folder.resolve()
+    env = plan.make_env(plan.evaluation.episodes, first)
+    one = plan.make_env(1, first)
+    others = play_heuristics(env, first)
+    if found is None:
+        name, mode, policy = heuristic, "sampled", HEURISTICS[heuristic](one)
+        episodes = others.pop(heuristic)
+    else:
+        policy = policy_of(found, plan.evaluation.mode).to(plan.device)
+        _check_fits(found, env)
+        name, mode = f"trained, {policy.mode}", policy.mode
+        episodes = play(env, policy, first, mode)
+    folder.mkdir(parents=True, exist_ok=True)
+    content = report(plan.scenario, name, first, episodes, others)
+    write_json(folder / "evaluation.json", content)
+    print(table(content), flush=True)
+    record_episode(folder / "episode.gif", one, policy, f"{plan.scenario}\n{name}", first, mode)
+    log.info("wrote evaluation.json and episode.gif into %s", folder)
+
+
+def _check_fits(found: checkpoints.Checkpoint, env: Any) -> None:
+    from warp_torchrl.models import signature
+
+    here, there = signature(env), found.manifest.signature
+    if (here.observation, here.n_actions) != (there.observation, there.n_actions):
+        raise ConfigError(
+            f"scenario: the policy in {found.path} was trained on other observations or actions, "
+            f"{there.observation} and {there.n_actions}, than this environment's {here.observation} and {here.n_actions}"
+        )
+
+
+# What a run folder records
+
+
+def _choices() -> dict[str, str]:
+    chosen = HydraConfig.get().runtime.choices
+    return {group: chosen[group] for group in _RECORDED}
+
+
+def _values(config: DictConfig) -> dict[str, Any]:
+    return {key: value for key, value in without_targets(plain(config)).items() if key not in _NOT_RECORDED}
+
+
+def _write_config(path: Path, config: DictConfig) -> None:
+    from omegaconf import OmegaConf
+
+    path.write_text(OmegaConf.to_yaml(config, resolve=True), encoding="utf-8")
+
+
+def _without_checkpoint(config: DictConfig) -> dict[str, Any]:
+    return plain(config) | {"checkpoint": plain(compose_config("train"))["checkpoint"]}
+
+
+# Checks before any work, and what is said when something fails
+
+
+def _run(name: str, job: Callable[[DictConfig], None]) -> None:
+    arguments = sys.argv[1:]
+    debug = "debug=true" in [each.lower() for each in arguments]
+    try:
+        _check_first(name, arguments)
+    except Exception as error:
+        sys.exit(_fail(error, debug))
+    if name == "train":
+        sys.argv[1:] = _with_run_folder(arguments)
+
+    def guarded(config: DictConfig) -> None:
+        try:
+            job(config)
+        except Exception as error:
+            code = _fail(error, debug)
+            if HydraConfig.get().mode == RunMode.MULTIRUN:
+                raise
+            sys.exit(code)
+
+    hydra.main(version_base="1.3", config_path=str(conf_folder()), config_name=name)(guarded)()
+
+
+def _check_first(name: str, arguments: Sequence[str]) -> None:
+    """Compose and check every job of the command line before the first run folder is made."""
+    overrides = [each for each in arguments if not each.startswith("-")]
+    flags = [each for each in arguments if each.startswith("-")]
+    if any(flag not in ("-m", "--multirun") for flag in flags):
+        return  # Hydra's own flags (--help, --cfg, --config-dir ...) are Hydra's business
+    for job in _jobs([each for each in overrides if not each.startswith("hydra")], bool(flags)):
+        config = compose_config(name, job)
+        if name == "train":
+            _check_training(config, job)
+        else:
+            _check_evaluation(config, job)
+
+
+def _jobs(overrides: Sequence[str], multirun: bool) -> list[list[str]]:
+    """Return the overrides of each job of a sweep."""
+    if not multirun:
+        return [list(overrides)]
+    try:
+        parsed = OverridesParser.create().parse_overrides(list(overrides))
+    except Exception as error:
+        raise ConfigError(" ".join(str(error).split())) from None
+    choices = [
+        [f"{each.get_key_element()}={value}" for value in each.sweep_string_iterator()]
+        if each.is_sweep_override()
+        else [each.input_line]
+        for each in parsed
+    ]
+    return [list(job) for job in product(*choices)]
+
+
+def _check_training(config: DictConfig, overrides: Sequence[str]) -> None:
+    if config.resume is None:
+        settings(plain(config))
+        return
+    others = [each for each in overrides if each.split("=")[0] not in ("resume", "debug")]
+    if others:
+        raise ConfigError(f"resume goes on with the folder's own configuration; leave out {', '.join(others)}")
+    checkpoints.newest(Path(str(config.resume)))
+
+
+def _check_evaluation(config: DictConfig, overrides: Sequence[str]) -> None:
+    if (config.checkpoint is None) == (config.policy is None):
+        raise ConfigError("give either checkpoint=PATH or policy=NAME")
+    if config.policy is not None and config.policy not in HEURISTICS:
+        raise ConfigError(f"policy must be one of {', '.join(HEURISTICS)}, got {config.policy}")
+    if config.checkpoint is None:
+        settings(_without_checkpoint(config))
+        return
+    found, _ = checkpoints.newest(Path(str(config.checkpoint)))
+    settings(plain(recompose(found.record(), [each for each in overrides if not each.startswith("checkpoint=")])))
+
+
+def _with_run_folder(arguments: Sequence[str]) -> list[str]:
+    """Let a resumed run write into its own folder."""
+    resumed = [each.removeprefix("resume=") for each in arguments if each.startswith("resume=")]
+    return [*arguments, *(f"hydra.run.dir={folder}" for folder in resumed if folder != "null")]
+
+
+def _fail(error: Exception, debug: bool) -> int:
+    """Say what failed in one line, the last of stderr, and return the exit code."""
+    if debug:
+        traceback.print_exc()
+    code, line = _diagnose(error)
+    print(f"error: {line}", file=sys.stderr, flush=True)
+    return code
+
+
+def _diagnose(error: Exception) -> tuple[int, str]:
+    line = " ".join(str(error).split()) or type(error).__name__
+    if isinstance(error, Stopped):
+        return 128 + error.number, line
+    if isinstance(error, checkpoints.RunFolderInUse):
+        return IN_USE, line
+    if isinstance(error, checkpoints.CheckpointError):
+        return UNSOUND, line
+    if isinstance(error, NumericalFailure):
+        return NUMERICAL, line
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO):
+        return DISK, f"{error.filename or os.getcwd()}: {error.strerror}"
+    if isinstance(error, (ConfigError, ValueError)):
+        return MISTAKE, line
+    return 1, f"{type(error).__name__}: {line} (debug=true shows where)"
