@@ -1,4 +1,4 @@
-"""Evaluate a checkpoint or a rule of thumb: ``python evaluate.py checkpoint=RUN`` or ``policy=local scenario=default``."""
+"""Evaluate: ``python evaluate.py checkpoint=RUN``, or ``policy=local scenario=default``. See ``conf/evaluate.yaml``."""
 
 from warp_torchrl.command import evaluate
 

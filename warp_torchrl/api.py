@@ -104,7 +104,9 @@ def simulate(
     for name, number in (("ticks", ticks), ("first_tick", first_tick), ("seed", seed)):
         if number < 0:
             raise ValueError(f"{name} must be 0 or more, got {number}")
-    automaton = build(plain(compose_config("train", [f"fire={fire}"]))["fire"], "fire") if isinstance(fire, str) else fire
+    automaton = (
+        build(plain(compose_config("train", [f"fire={fire}"]))["fire"], "fire") if isinstance(fire, str) else fire
+    )
     air = constant_wind(*wind) if isinstance(wind, tuple | list) else wind
     height = None if elevation is None else elevation.to(torch.float32)
     return burn(
@@ -159,5 +161,3 @@ def policy_of(found: checkpoints.Checkpoint, mode: str = "best") -> Probabilisti
     )
     policy.mode = chosen
     return policy.requires_grad_(False).eval()
-
-

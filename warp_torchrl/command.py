@@ -2,7 +2,6 @@
 
 import errno
 import logging
-import os
 import sys
 import traceback
 from collections.abc import Callable, Sequence
@@ -14,7 +13,7 @@ import hydra
 from hydra.core.hydra_config import HydraConfig
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.types import RunMode
-from omegaconf import DictConfig
+from omegaconf import DictConfig, OmegaConf
 
 from warp_torchrl import checkpoint as checkpoints
 from warp_torchrl.api import policy_of
@@ -32,6 +31,7 @@ from warp_torchrl.config import (
 )
 from warp_torchrl.evaluation import play, play_heuristics, record_episode, report, table, write_json
 from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.models import signature
 from warp_torchrl.training import NumericalFailure, Stopped, Training
 
 log = logging.getLogger("warp_torchrl")
@@ -122,13 +122,11 @@ def _report(
 
 
 def _check_fits(found: checkpoints.Checkpoint, env: Any) -> None:
-    from warp_torchrl.models import signature
-
     here, there = signature(env), found.manifest.signature
     if (here.observation, here.n_actions) != (there.observation, there.n_actions):
         raise ConfigError(
-            f"scenario: the policy in {found.path} was trained on other observations or actions, "
-            f"{there.observation} and {there.n_actions}, than this environment's {here.observation} and {here.n_actions}"
+            f"scenario: the policy in {found.path} was trained on observations {there.observation} and "
+            f"{there.n_actions} actions, this environment has {here.observation} and {here.n_actions}"
         )
 
 
@@ -145,8 +143,6 @@ def _values(config: DictConfig) -> dict[str, Any]:
 
 
 def _write_config(path: Path, config: DictConfig) -> None:
-    from omegaconf import OmegaConf
-
     path.write_text(OmegaConf.to_yaml(config, resolve=True), encoding="utf-8")
 
 
@@ -258,7 +254,7 @@ def _diagnose(error: Exception) -> tuple[int, str]:
     if isinstance(error, NumericalFailure):
         return NUMERICAL, line
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO):
-        return DISK, f"{error.filename or os.getcwd()}: {error.strerror}"
+        return DISK, f"{error.filename or Path.cwd()}: {error.strerror}"
     if isinstance(error, (ConfigError, ValueError)):
         return MISTAKE, line
     return 1, f"{type(error).__name__}: {line} (debug=true shows where)"

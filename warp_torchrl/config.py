@@ -166,6 +166,8 @@ def compose_config(name: str, overrides: Sequence[str] = ()) -> DictConfig:
             return config
     except (HydraException, OmegaConfBaseException) as error:
         raise ConfigError(_one_line(error)) from None
+    except ValueError as error:
+        raise ConfigError(f"{_one_line(error)}, in {' '.join(overrides)}") from None
 
 
 def settings(config: Mapping[str, Any]) -> Settings:
@@ -236,7 +238,9 @@ def construct(component: type, values: Mapping[str, Any], where: str) -> Any:
     allowed = {each.name: each for each in fields(component) if each.init}
     for key in values:
         if key not in allowed:
-            raise ConfigError(f"{prefix}{key} is not a key of {where or component.__name__}; it has {', '.join(allowed)}")
+            raise ConfigError(
+                f"{prefix}{key} is not a key of {where or component.__name__}; it has {', '.join(allowed)}"
+            )
     for name, each in allowed.items():
         if name not in values and each.default is MISSING and each.default_factory is MISSING:
             raise ConfigError(f"{prefix}{name} must be given")

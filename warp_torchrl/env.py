@@ -256,9 +256,7 @@ _FLAGS = ("done", "terminated", "truncated")
 def _fill(template: WorldState, entries: dict[str, Tensor]) -> WorldState:
     """Return worlds with the given entries, checked against a template's names, shapes and types."""
     expected = {
-        name: value
-        for name, value in template.to_tensordict().flatten_keys(".").items()
-        if isinstance(value, Tensor)
+        name: value for name, value in template.to_tensordict().flatten_keys(".").items() if isinstance(value, Tensor)
     }
     if set(expected) != set(entries):
         raise ValueError(f"worlds must have the entries {sorted(expected)}, got {sorted(entries)}")

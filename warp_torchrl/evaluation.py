@@ -1,7 +1,6 @@
 """Paired evaluation of any policy: every policy meets the same worlds, on seeds that training never sees."""
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -125,7 +124,9 @@ def report(scenario: str, policy: str, first_seed: int, episodes: Episodes, othe
 
 def table(content: Mapping[str, Any]) -> str:
     """Return the report as a table for the terminal."""
-    header = f"{'policy':<22}{'saved %':>8}{'95 % interval':>16}{'iqm %':>8}{'success %':>11}{'control':>9}{'cleared %':>11}"
+    header = (
+        f"{'policy':<22}{'saved %':>8}{'95 % interval':>16}{'iqm %':>8}{'success %':>11}{'control':>9}{'cleared %':>11}"
+    )
     lines = [f"{content['scenario']}: {len(content['seeds'])} fires, seeds from {content['seeds'][0]}", header]
     for name, summary in {**content["yardsticks"], content["policy"]: content["metrics"]}.items():
         saved = summary["saved"]
@@ -149,7 +150,9 @@ def play_heuristics(env: WildfireEnv, first_seed: int, names: Sequence[str] = YA
     return {name: play(env, HEURISTICS[name](env), first_seed) for name in names}
 
 
-def record_episode(path: Path, env: WildfireEnv, policy: TensorDictModuleBase, title: str, seed: int, mode: str) -> None:
+def record_episode(
+    path: Path, env: WildfireEnv, policy: TensorDictModuleBase, title: str, seed: int, mode: str
+) -> None:
     """Draw one episode, of an environment with one world, as a GIF."""
     recorder = EpisodeRecorder(title=title, roles=env.world.team.agent_roles)
     play(env, policy, seed, mode, recorder)
@@ -160,4 +163,4 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
     """Write a file whole or not at all."""
     draft = path.with_name(f".{path.name}.tmp")
     draft.write_text(json.dumps(content, indent=1), encoding="utf-8")
-    os.replace(draft, path)
+    draft.replace(path)

@@ -110,6 +110,7 @@ class Coordinated(Heuristic):
     eagerness = 6.0  # cells of way that a full threat is worth
     elbow_room = 3  # cells about a claim that the others avoid
     discount = 6.0  # cells of way that avoiding them is worth
+    taken = 1000.0  # ... and the claimed cell itself, while another one burns
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
@@ -132,8 +133,8 @@ class Coordinated(Heuristic):
             best = gain.flatten(1).argmax(dim=1)
             agent, cell = best // value[0].numel(), best % value[0].numel()
             claim.scatter_(1, agent[:, None], cell[:, None])
-            near = chebyshev_distance(_place(cell[:, None], state), everywhere)[:, 0] <= self.elbow_room
-            gain = gain - (near * self.discount)[:, None]
+            distance = chebyshev_distance(_place(cell[:, None], state), everywhere)
+            gain = gain - self.discount * (distance <= self.elbow_room) - self.taken * (distance == 0)
             gain.scatter_(1, agent[:, None, None, None].expand(-1, 1, *value.shape[1:]), -2.0 * FAR)
         return _place(claim, state)
 

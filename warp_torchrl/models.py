@@ -4,6 +4,7 @@ They know the shapes of what they read, from a ``Signature``, and nothing of the
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal, NamedTuple
 
 import torch
@@ -68,7 +69,9 @@ class Encoder(nn.Module):
         super().__init__()
         self.entries = entries
         total = sum(_count(entry) for entry in entries)
-        self.parts = nn.ModuleList(nn.Linear(_count(entry), size, bias=index == 0) for index, entry in enumerate(entries))
+        self.parts = nn.ModuleList(
+            nn.Linear(_count(entry), size, bias=index == 0) for index, entry in enumerate(entries)
+        )
         joined = torch.empty(size, total)
         nn.init.orthogonal_(joined, 2.0**0.5)
         for part, weight in zip(self.parts, joined.split([_count(entry) for entry in entries], dim=1), strict=True):
@@ -122,7 +125,7 @@ class Network(nn.Module):
         super().__init__()
         self.encoder = Encoder(entries, hidden[0])
         layers: list[nn.Module] = [activation()]
-        for before, after in zip(hidden[:-1], hidden[1:], strict=True):
+        for before, after in pairwise(hidden):
             layers += [_orthogonal(nn.Linear(before, after), 2.0**0.5), activation()]
         self.body = nn.Sequential(*layers, _orthogonal(nn.Linear(hidden[-1], out), head_gain))
         self.dtype = dtype

@@ -13,6 +13,7 @@ from torch.nn.functional import adaptive_avg_pool2d, one_hot, pad
 
 from warp_torchrl.world.state import FIRST_FIRE, Action, WorldState, is_burning, is_tree
 from warp_torchrl.world.team import ROLE_NAMES
+from warp_torchrl.world.validation import check_fields
 from warp_torchrl.world.world import World
 
 CHANNELS = (
@@ -53,11 +54,6 @@ class Space(NamedTuple):
     high: float
 
 
-def _check_radius(radius: int) -> None:
-    if not 1 <= radius <= 32:
-        raise ValueError(f"radius must be in 1..32 cells, got {radius}")
-
-
 @dataclass(frozen=True, kw_only=True)
 class Local:
     """What an agent sees of its own surroundings, and nothing else.
@@ -76,7 +72,7 @@ class Local:
     radius: int = 5
 
     def __post_init__(self) -> None:
-        _check_radius(self.radius)
+        check_fields(self, radius=(1, 32))
 
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
@@ -108,7 +104,7 @@ class Surroundings:
     radius: int = 5
 
     def __post_init__(self) -> None:
-        _check_radius(self.radius)
+        check_fields(self, radius=(1, 32))
 
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
@@ -136,7 +132,7 @@ class Paper:
     radius: int = 3
 
     def __post_init__(self) -> None:
-        _check_radius(self.radius)
+        check_fields(self, radius=(1, 32))
 
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of the one, nameless entry."""
@@ -320,5 +316,3 @@ def central_state(state: WorldState, world: World) -> Tensor:
 
 def _fuel(state: WorldState) -> Tensor:
     return state.alpha * is_tree(state.cells)
-
-

@@ -19,6 +19,7 @@ from warp_torchrl.world.state import (
     is_burning,
     is_tree,
 )
+from warp_torchrl.world.validation import check_fields
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,14 +48,9 @@ class Reward:
     gamma: float = 0.99
 
     def __post_init__(self) -> None:
+        finite = {each.name: (-1e9, 1e9) for each in fields(self) if each.type in ("float", "int", float, int)}
         ranges = {"team_share": (0.0, 1.0), "scale": (1e-6, 1e6), "shaping": (0.0, 1e3), "gamma": (0.0, 1.0)}
-        for field in fields(self):
-            low, high = ranges.get(field.name, (None, None))
-            value = getattr(self, field.name)
-            if low is not None and not low <= value <= high:
-                raise ValueError(f"{field.name} must be in [{low:g}, {high:g}], got {value}")
-            if low is None and isinstance(value, (int, float)) and not abs(value) <= 1e9:
-                raise ValueError(f"{field.name} must be a finite number, got {value}")
+        check_fields(self, **{**finite, **ranges})
 
     def __call__(self, transition: Transition) -> Tensor:
         """Return the reward of each agent, float32 [B, A, 1]; 0 in a world that had ended before."""

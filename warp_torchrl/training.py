@@ -171,8 +171,8 @@ class Training:
             ) from None
         learner.optimizer.step()
         learner.optimizer.zero_grad()
-        wanted = {*learner.loss_keys, *learner.columns}
-        return {name: terms[name].detach().mean() for name in wanted if name in terms.keys()}
+        wanted = {*learner.loss_keys, *learner.columns} & set(terms.keys())
+        return {name: terms[name].detach().mean() for name in wanted}
 
     def _evaluate(self, frames: int) -> float | None:
         interval = self.settings.evaluation.interval

@@ -31,7 +31,7 @@ def largest_correlation(rows: Tensor) -> float:
 
 @pytest.fixture(scope="module")
 def draws() -> Tensor:
-    return uniform(keys([20]), 7, Stream.FIRE, (N,))[0]
+    return uniform(keys([21]), 7, Stream.FIRE, (N,))[0]
 
 
 def test_the_mean_is_a_half_and_the_variance_a_twelfth(draws: Tensor) -> None:
@@ -63,7 +63,7 @@ def test_draws_near_zero_have_32_bits(draws: Tensor) -> None:
 
 
 def test_no_draw_is_ever_one(draws: Tensor) -> None:
-    # A word in the last 2^-25 of the range rounds to 1.0 as a float32; of these draws, 1 or 2 in 2e7 would.
+    # A word in the last 2^-25 of the range rounds to 1.0 as a float32: two of these draws would, by this seed.
     assert draws.max() == 1.0 - 2.0**-24
     assert draws.min() >= 0.0
 
@@ -129,6 +129,13 @@ def test_one_cell_over_many_seeds_is_uniform(stream: Stream) -> None:
 def test_keys_of_seeds_and_episodes_are_all_different() -> None:
     seed, episode = torch.meshgrid(torch.arange(-1000, 1000), torch.arange(500), indexing="ij")
     assert world_key(seed.flatten(), episode.flatten()).unique().numel() == 1_000_000
+
+
+def test_no_two_worlds_draw_the_same_numbers() -> None:
+    # Of 2^20 worlds, 128 pairs agree in any 32 bits of their keys: a hash of one word would draw alike for those.
+    # Two draws make 2^55 combinations or so: false alarm 2e-5.
+    words = uniform(keys(range(1 << 20)), 0, Stream.FIRE, (2,)).view(torch.int32).to(torch.int64)
+    assert ((words[:, 0] << 32) | words[:, 1]).unique().numel() == 1 << 20
 
 
 def test_a_draw_does_not_depend_on_the_batch_or_the_place_in_it() -> None:

@@ -164,7 +164,5 @@ class Ppo:
 def _with_advantages(loss: MAPPOLoss, batch: TensorDictBase) -> TensorDictBase:
     """Add advantages and value targets over time, then drop what the loss does not read; [B, T] -> [B T]."""
     with torch.no_grad():
-        loss.value_estimator(
-            batch, params=loss.critic_network_params, target_params=loss.target_critic_network_params
-        )
+        loss.value_estimator(batch, params=loss.critic_network_params, target_params=loss.target_critic_network_params)
     return batch.exclude("next", "info", LOGITS, VALUE).reshape(-1)

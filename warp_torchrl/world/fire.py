@@ -16,6 +16,7 @@ from torch.nn.functional import pad
 from warp_torchrl.world.geometry import DIRECTIONS, DISTANCES, unit_vectors
 from warp_torchrl.world.landscape import holds_trees
 from warp_torchrl.world.state import EMBER, FIRST_FIRE, OLDEST, WorldState, is_burning, is_tree
+from warp_torchrl.world.validation import check_fields
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,20 +63,18 @@ class Fire:
     wet_ticks: int = 10
 
     def __post_init__(self) -> None:
-        ranges = {
-            "tau": (0.0, 100.0),
-            "beta": (0.0, 1e6),
-            "p_regrow": (0.0, 1.0),
-            "youngest_fuel": (1, OLDEST),
-            "burning_stages": (4, 5),
-            "wind_gain": (0.0, 1.0),
-            "wind_focus": (0.0, 1.0),
-            "slope_gain": (0.0, 1.0),
-            "wet_ticks": (0, 255),
-        }
-        for name, (low, high) in ranges.items():
-            if not low <= getattr(self, name) <= high:
-                raise ValueError(f"{name} must be in [{low:g}, {high:g}], got {getattr(self, name)}")
+        check_fields(
+            self,
+            tau=(0.0, 100.0),
+            beta=(0.0, 1e6),
+            p_regrow=(0.0, 1.0),
+            youngest_fuel=(1, OLDEST),
+            burning_stages=(4, 5),
+            wind_gain=(0.0, 1.0),
+            wind_focus=(0.0, 1.0),
+            slope_gain=(0.0, 1.0),
+            wet_ticks=(0, 255),
+        )
         if len(self.alpha) != 5 or not all(0.0 <= value <= 1.0 for value in self.alpha):
             raise ValueError(f"alpha must be five numbers in [0, 1], one a cover, got {list(self.alpha)}")
 
@@ -111,7 +110,7 @@ class Fire:
         for (row, column), distance in zip(DIRECTIONS, DISTANCES, strict=True):
             source = ground[:, 1 - row : 1 - row + height, 1 - column : 1 - column + width]
             slope = torch.atan((elevation - source) / (distance * cell_size)) * (180.0 / math.pi)
-            factors.append(torch.exp(self.slope_gain * slope))
+            factors.append(_factor(self.slope_gain * slope))
         return pad(torch.stack(factors, dim=1), (0, 1, 0, 1))
 
     def wind_factor(self, wind: Tensor) -> Tensor:
@@ -129,7 +128,7 @@ class Fire:
         u, v = wind[:, :1], wind[:, 1:]
         east, north = _directions(wind.device)
         along = u * east[:, None, None] + v * north[:, None, None]
-        return torch.exp((self.wind_gain - self.wind_focus) * speed + self.wind_focus * along)
+        return _factor((self.wind_gain - self.wind_focus) * speed + self.wind_focus * along)
 
     def spread(self, state: WorldState, expected: bool = False) -> tuple[Tensor, Tensor | None]:
         """Return each tree's chance to be ignited by its neighbours in one tick.
@@ -260,6 +259,11 @@ class Fire:
 
     def _look_up(self, table: tuple[float, ...], cells: Tensor) -> Tensor:
         return _constant(table, cells.device)[cells.to(torch.int64)]
+
+
+def _factor(exponent: Tensor) -> Tensor:
+    """Return exp of it, kept so that no product of two factors leaves float32: a chance is clipped at 1 anyway."""
+    return torch.exp(exponent.clamp(-40.0, 40.0))
 
 
 def _in_a_row(maps: Tensor, margin: int) -> Tensor:

@@ -7,6 +7,7 @@ from torch import Tensor
 
 from warp_torchrl.world.geometry import grow
 from warp_torchrl.world.random import Stream, uniform
+from warp_torchrl.world.validation import check_fields
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,7 +18,8 @@ class Ignition:
         count: Fires.
         radius: A fire is the trees within this many cells of its centre (1: a 3 x 3 patch).
         region: Share of the map's height and width, about the middle, in which centres lie.
-        head_start: Fire ticks before the team's first step.
+        head_start: Fire ticks before the team's first step; a fire that is down to embers waits, so that the team
+            finds it alive.
 
     Raises:
         ValueError: If a value is out of its range.
@@ -29,14 +31,7 @@ class Ignition:
     head_start: int = 1
 
     def __post_init__(self) -> None:
-        if not 1 <= self.count <= 64:
-            raise ValueError(f"count must be in 1..64, got {self.count}")
-        if not 0 <= self.radius <= 8:
-            raise ValueError(f"radius must be in 0..8 cells, got {self.radius}")
-        if not 0.0 < self.region <= 1.0:
-            raise ValueError(f"region must be in (0, 1], got {self.region}")
-        if not 0 <= self.head_start <= 1000:
-            raise ValueError(f"head_start must be in 0..1000 ticks, got {self.head_start}")
+        check_fields(self, count=(1, 64), radius=(0, 8), region=(1e-6, 1.0), head_start=(0, 1000))
 
     def __call__(self, key: Tensor, fuel: Tensor) -> Tensor:
         """Return the cells to light, bool [B, H, W]: fuel only, and at least one where a map has fuel.
@@ -48,11 +43,17 @@ class Ignition:
             fuel: Trees that can ignite, bool [B, H, W].
         """
         worlds, height, width = fuel.shape
-        score = uniform(key, 0, Stream.IGNITION, (height, width))
-        score = score + (fuel & self._middle(height, width, fuel.device)) * 1.0 + fuel * 2.0
-        best = score.flatten(1).topk(self.count, dim=1)
+        draw = (uniform(key, 0, Stream.IGNITION, (height, width)) * (1 << 24)).to(torch.int64)
+        score = (
+            draw
+            + (fuel.to(torch.int64) << 26)
+            + ((fuel & self._middle(height, width, fuel.device)).to(torch.int64) << 25)
+        )
+        cell = torch.arange(height * width, device=fuel.device)
+        score = score.flatten(1) * (height * width) + cell  # no two alike: topk breaks ties as it likes
+        best = score.topk(self.count, dim=1)
         centres = torch.zeros(worlds, height * width, dtype=torch.bool, device=fuel.device)
-        centres.scatter_(1, best.indices, best.values >= 2.0)
+        centres.scatter_(1, best.indices, best.values >= (height * width) << 26)
         return grow(centres.view_as(fuel), self.radius) & fuel
 
     def _middle(self, height: int, width: int, device: torch.device) -> Tensor:

@@ -16,6 +16,7 @@ from torch import Tensor
 from warp_torchrl.world.perlin import fractal_noise
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import OLDEST, Cover, Landscape
+from warp_torchrl.world.validation import check_fields
 
 LARGEST_SIDE = 4096
 """Longest side of a simulated map [cells]."""
@@ -41,10 +42,11 @@ def map_size(size: tuple[int, int] | int) -> tuple[int, int]:
     Raises:
         ValueError: If a side is not in 4..4096.
     """
-    height, width = (size, size) if isinstance(size, int) else tuple(size)
-    if not (4 <= height <= LARGEST_SIDE and 4 <= width <= LARGEST_SIDE):
+    sides = (size, size) if type(size) is int else size
+    fits = isinstance(sides, Sequence) and not isinstance(sides, str) and len(sides) == 2
+    if not fits or not all(type(side) is int and 4 <= side <= LARGEST_SIDE for side in sides):
         raise ValueError(f"size must be one side or [rows, columns], each in 4..{LARGEST_SIDE} cells, got {size}")
-    return height, width
+    return tuple(sides)
 
 
 def draw_age(key: Tensor, cover: Tensor) -> Tensor:
@@ -66,6 +68,9 @@ def holds_trees(cover: Tensor) -> Tensor:
     return (cover != Cover.LAKE) & (cover != Cover.BARE)
 
 
+_PRINTED = (0.01, 0.2, 0.01)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Perlin:
     """Terrain from fractal gradient noise (WARP-CA, terrain and table of hyperparameters).
@@ -82,14 +87,14 @@ class Perlin:
         frequency_law: ``text`` x lambda^i / sigma, finer with i as the paper's text says; ``printed``
             x / (sigma lambda^i), coarser with i as its equation has it.
         thresholds: ``quantile`` takes ``levels`` as cumulative shares of the map, so that every map has the same
-            mixture; ``minmax`` as values of n; ``printed`` as values of n and out of order, as the paper prints them
-            (0.01, 0.2, 0.01), which leaves no grassland.
-        levels: (L, W, G).
+            mixture; ``minmax`` as values of n; ``printed`` takes (0.01, 0.2, 0.01) as values of n, out of order as
+            the paper prints them, which leaves no grassland.
+        levels: (L, W, G); not read by ``printed``.
         relief: Height of n = 1 over n = 0 [m]; 0 makes a flat world.
         independent_elevation: Draw the elevation from a noise of its own, not the one that made the cover.
 
     Raises:
-        ValueError: If a value is out of its range or the levels are out of order (``printed`` excepted).
+        ValueError: If a value is out of its range or the levels are out of order.
     """
 
     size: tuple[int, int] | int = 32
@@ -105,13 +110,14 @@ class Perlin:
 
     def __post_init__(self) -> None:
         map_size(self.size)
-        for name, low, high in (("scale", 1.0, 1e4), ("persistence", 0.0, 1.0), ("lacunarity", 1.0, 8.0)):
-            if not low <= getattr(self, name) <= high:
-                raise ValueError(f"{name} must be in [{low:g}, {high:g}], got {getattr(self, name)}")
-        if not 1 <= self.octaves <= 12:
-            raise ValueError(f"octaves must be in 1..12, got {self.octaves}")
-        if not 0.0 <= self.relief <= 10_000.0:
-            raise ValueError(f"relief must be in [0, 10000] m, got {self.relief}")
+        check_fields(
+            self,
+            scale=(1.0, 1e4),
+            octaves=(1, 12),
+            persistence=(0.0, 1.0),
+            lacunarity=(1.0, 8.0),
+            relief=(0.0, 10_000.0),
+        )
         if self.frequency_law == "text" and max(self._frequencies()) > 32.0:
             raise ValueError(
                 f"lacunarity ** (octaves - 1) / scale must be at most 32 lattice steps a cell, "
@@ -120,7 +126,7 @@ class Perlin:
         levels = tuple(self.levels)
         if len(levels) != 3 or not all(0.0 <= level <= 1.0 for level in levels):
             raise ValueError(f"levels must be three numbers in [0, 1], got {list(levels)}")
-        if self.thresholds != "printed" and not levels[0] <= levels[1] <= levels[2]:
+        if not levels[0] <= levels[1] <= levels[2]:
             raise ValueError(f"levels must be in order, lake <= wetland <= grassland, got {list(levels)}")
 
     def __call__(self, key: Tensor) -> Landscape:
@@ -152,14 +158,14 @@ class Perlin:
                 ordered[:, min(cells - 1, math.floor(level * cells + 0.5)), None, None] for level in self.levels
             )
         else:
-            lake, wetland, grassland = self.levels
+            lake, wetland, grassland = _PRINTED if self.thresholds == "printed" else self.levels
         cover = torch.full_like(noise, Cover.FOREST, dtype=torch.uint8)
         for code, level in ((Cover.GRASSLAND, grassland), (Cover.WETLAND, wetland), (Cover.LAKE, lake)):
             cover.masked_fill_(noise < level, code)
         return cover
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Array:
     """A landscape that the user has: cover, and optionally elevation and tree age.
 

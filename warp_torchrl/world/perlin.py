@@ -43,7 +43,9 @@ def fractal_noise(
     starts = [0, *accumulate(height * width for height, width in lattices)]
     angle = uniform(key, 1, stream, (starts[-1],)).mul_(2.0 * math.pi)
     gradients = torch.stack((angle.sin(), angle.cos()))
-    first = torch.tensor(starts[:-1], device=device)[:, None, None] + rows[..., :, None] * widths + columns[..., None, :]
+    first = (
+        torch.tensor(starts[:-1], device=device)[:, None, None] + rows[..., :, None] * widths + columns[..., None, :]
+    )
     row_part, column_part = row_part[..., :, None], column_part[..., None, :]
     row_fade, column_fade = fade(row_part), fade(column_part)
 

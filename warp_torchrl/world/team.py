@@ -19,6 +19,7 @@ from warp_torchrl.world.state import (
     is_burning,
     is_tree,
 )
+from warp_torchrl.world.validation import check_fields
 
 _NEIGHBOURHOOD = ((0, 0), (-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1))
 
@@ -72,14 +73,9 @@ class Team:
     start: Literal["corner", "anywhere"] = "corner"
 
     def __post_init__(self) -> None:
-        if not 1 <= self.n_agents <= 256:
-            raise ValueError(f"n_agents must be in 1..256, got {self.n_agents}")
+        check_fields(self, n_agents=(1, 256), extinguish_p=(0.0, 1.0), tank=(1, 10_000))
         if not self.roles or any(role not in ROLES for role in self.roles):
             raise ValueError(f"roles must be a list of {', '.join(ROLES)}, got {list(self.roles)}")
-        if not 0.0 <= self.extinguish_p <= 1.0:
-            raise ValueError(f"extinguish_p must be in [0, 1], got {self.extinguish_p}")
-        if self.tank is not None and not 1 <= self.tank <= 10_000:
-            raise ValueError(f"tank must be in 1..10000 acts or null, got {self.tank}")
 
     @property
     def n_actions(self) -> int:
@@ -104,7 +100,7 @@ class Team:
     def place(self, key: Tensor, cover: Tensor, burning: Tensor) -> Vehicles:
         """Return the team at the start of an episode.
 
-        Each agent takes the free cell (neither lake nor burning) nearest to the corner, no two the same one.
+        Each agent takes the free cell (neither lake nor lit) nearest to the corner, no two the same one.
 
         Args:
             key: World keys, int64 [B].

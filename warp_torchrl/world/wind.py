@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.random import Stream, uniform
+from warp_torchrl.world.validation import check_fields
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,17 +33,14 @@ class Uniform:
             for each episode.
 
     Raises:
-        ValueError: If the speed is not in [0, 60] or the direction is not finite.
+        ValueError: If the speed is not in [0, 60] or the direction not a finite angle.
     """
 
     speed: float = 4.0
     direction: float | None = None
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.speed <= 60.0:
-            raise ValueError(f"speed must be in [0, 60] m/s, got {self.speed}")
-        if self.direction is not None and not math.isfinite(self.direction):
-            raise ValueError(f"direction must be a finite angle in degrees or null, got {self.direction}")
+        check_fields(self, speed=(0.0, 60.0), direction=(-1e6, 1e6))
 
     def __call__(self, key: Tensor, size: tuple[int, int]) -> Tensor:
         """Return the field of each world, float32 [B, 2, 1, 1] [m/s]."""
@@ -74,8 +72,7 @@ class Paper:
     rotate: bool = False
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.scale <= 10.0:
-            raise ValueError(f"scale must be in [0, 10], got {self.scale}")
+        check_fields(self, scale=(0.0, 10.0))
 
     def __call__(self, key: Tensor, size: tuple[int, int]) -> Tensor:
         """Return the field of each world, float32 [B, 2, H, W] [m/s]."""

@@ -9,8 +9,20 @@ from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.ignition import Ignition
 from warp_torchrl.world.landscape import LandscapeSource, Perlin, map_size
 from warp_torchrl.world.random import Stream, uniform, world_key
-from warp_torchrl.world.state import FIRST_FIRE, Landscape, Tally, Transition, Vehicles, WorldState, count_trees, is_burning
+from warp_torchrl.world.state import (
+    EMBER,
+    FIRST_FIRE,
+    Cover,
+    Landscape,
+    Tally,
+    Transition,
+    Vehicles,
+    WorldState,
+    count_trees,
+    is_burning,
+)
 from warp_torchrl.world.team import Team
+from warp_torchrl.world.validation import check_fields
 from warp_torchrl.world.wind import Uniform, Wind
 
 
@@ -42,12 +54,7 @@ class World:
     cell_size: float | None = None
 
     def __post_init__(self) -> None:
-        if not 1 <= self.steps_per_tick <= 1000:
-            raise ValueError(f"steps_per_tick must be in 1..1000, got {self.steps_per_tick}")
-        if not 1 <= self.horizon <= 1_000_000:
-            raise ValueError(f"horizon must be in 1..1000000 steps, got {self.horizon}")
-        if self.cell_size is not None and not 0.01 <= self.cell_size <= 100_000.0:
-            raise ValueError(f"cell_size must be in [0.01, 100000] m or null, got {self.cell_size}")
+        check_fields(self, steps_per_tick=(1, 1000), horizon=(1, 1_000_000), cell_size=(0.01, 100_000.0))
         height, width = self.size
         if self.team.n_agents > height * width // 4:
             raise ValueError(
@@ -80,7 +87,7 @@ class World:
             The worlds, batch size [B].
 
         Raises:
-            ValueError: If a landscape has no tree that can burn.
+            ValueError: If a landscape has no tree that can burn, or too little dry ground for the team.
         """
         key = world_key(seed, episode)
         ground = self.landscape(key)
@@ -89,11 +96,15 @@ class World:
         if not lit.flatten(1).any(dim=1).all():
             raise ValueError("landscape: a map has no tree that can burn, so there is no fire to start")
         vehicles = self.team.place(key, ground.cover, lit)
+        index = vehicles.position[..., 0] * self.size[1] + vehicles.position[..., 1]
+        if (ground.cover.flatten(1).gather(1, index) == Cover.LAKE).any():
+            raise ValueError(f"team.n_agents must fit on a map's dry ground, got {self.team.n_agents}")
         state = quiet_state(ground, self.fire, self.wind(key, self.size), key, vehicles, self.side_of_cell)
         cells = state.cells
         state = state.replace(cells=torch.where(lit, FIRST_FIRE, cells), age=torch.where(lit, cells, state.age))
         for _ in range(self.ignition.head_start):
-            state = self._tick(state, torch.ones_like(key, dtype=torch.bool))
+            spreads = (state.cells >= FIRST_FIRE) & (state.cells < EMBER)
+            state = self._tick(state, spreads.flatten(1).any(dim=1))
         return state.replace(tally=count_trees(state))
 
     def step(self, state: WorldState, action: Tensor) -> Transition:

@@ -1,0 +1,122 @@
+"""PPO's keys, shapes, advantages and updates."""
+
+import pytest
+import torch
+from torchrl.collectors import Collector
+
+from tests.conftest import small_world
+from warp_torchrl.algorithms.ppo import _ADVANTAGE, _VALUE_TARGET, Ppo
+from warp_torchrl.models import VALUE, Mlp
+
+
+def collected(env, learner, steps):
+    collector = Collector(
+        env,
+        learner.explore,
+        frames_per_batch=steps * env.batch_size[0],
+        total_frames=-1,
+        track_traj_ids=False,
+        auto_register_policy_transforms=False,
+    )
+    batch = next(iter(collector))
+    collector.shutdown()
+    return batch
+
+
+@pytest.mark.parametrize("central", [True, False])
+def test_advantages_have_a_value_for_each_agent(make_small_env, central):
+    env = make_small_env(4)
+    learner = Ppo(central_critic=central).build(env, Mlp(actor_hidden=(16,), critic_hidden=(16,)), 32)
+    batch = collected(env, learner, 8)
+    prepared = learner.prepare(batch)
+    assert prepared.batch_size == (32,)
+    assert prepared[_ADVANTAGE].shape == prepared[_VALUE_TARGET].shape == (32, 2, 1)
+    assert not {"next", "info"} & set(prepared.keys())
+
+
+def test_gae_by_hand():
+    """Three steps, reward 1 each, values 0.5, gamma 0.5, lambda 0.5; the episode terminates at the last.
+
+    delta_2 = 1 - 0.5 = 0.5;               A_2 = 0.5
+    delta_1 = 1 + 0.25 - 0.5 = 0.75;       A_1 = 0.75 + 0.25 x 0.5 = 0.875
+    delta_0 = 0.75;                        A_0 = 0.75 + 0.25 x 0.875 = 0.96875
+    Cut at the horizon instead (truncated), the last value still counts: delta_2 = 0.75, A_2 = 0.75.
+    """
+    from warp_torchrl import WildfireEnv
+
+    env = WildfireEnv(small_world(), n_worlds=2)
+    learner = Ppo(gamma=0.5, lmbda=0.5, value_norm=False).build(env, Mlp(critic_hidden=(4,)), 6)
+    for parameter in learner.loss.critic_network_params.flatten_keys().values():
+        parameter.data.zero_()
+    bias = [
+        value for key, value in learner.loss.critic_network_params.flatten_keys(".").items() if key.endswith("bias")
+    ]
+    bias[-1].data.fill_(0.5)
+    batch = collected(env, learner, 3)
+    batch["next", "agents", "reward"].fill_(1.0)
+    for flag in ("done", "terminated", "truncated"):
+        batch["next", flag].zero_()
+    batch["next", "done"][:, -1] = True
+    batch["next", "terminated"][0, -1] = True
+    batch["next", "truncated"][1, -1] = True
+    advantage = learner.prepare(batch)[_ADVANTAGE].view(2, 3, 2)
+    assert advantage[0, :, 0].tolist() == pytest.approx([0.96875, 0.875, 0.5], abs=1e-5)
+    assert advantage[1, -1, 0].item() == pytest.approx(0.75, abs=1e-5)
+    assert (advantage[..., 0] == advantage[..., 1]).all()
+
+
+def test_the_schedule_falls_linearly(make_small_env):
+    env = make_small_env(2)
+    learner = Ppo(learning_rate=1e-3, learning_rate_end=0.1, entropy_coeff=0.01, entropy_coeff_end=0.0).build(
+        env, Mlp(actor_hidden=(8,), critic_hidden=(8,)), 8
+    )
+    assert learner.schedule(0.0)["train/learning_rate"] == pytest.approx(1e-3)
+    row = learner.schedule(0.5)
+    assert row["train/learning_rate"] == pytest.approx(5.5e-4)
+    assert learner.optimizer.param_groups[0]["lr"] == pytest.approx(5.5e-4)
+    assert float(learner.loss.entropy_coeff) == pytest.approx(0.005)
+
+
+def test_a_few_updates_raise_the_return_of_a_bandit(make_small_env):
+    """Reward 1 for one action and nothing else: the policy must find it in a few dozen updates."""
+    env = make_small_env(16, small_world(horizon=400))
+    learner = Ppo(learning_rate=3e-3, minibatch_size=64).build(env, Mlp(actor_hidden=(32,), critic_hidden=(32,)), 128)
+    now = env.reset()
+    wanted = 10  # stay, which is always open
+    shares = []
+    for _ in range(15):
+        steps = []
+        for _ in range(8):
+            with torch.no_grad():
+                step = learner.policy(now.clone())
+            reward = (step["agents", "action"] == wanted).float()[..., None]
+            flags = {name: torch.ones(16, 1, dtype=torch.bool) for name in ("done", "terminated")}
+            following = now.clone().update({**flags, "truncated": ~flags["done"]})
+            following["agents", "reward"] = reward
+            steps.append(step.set("next", following))
+        batch = torch.stack(steps, 1)
+        shares.append(batch["next", "agents", "reward"].mean().item())
+        learner.buffer.empty()
+        learner.buffer.extend(learner.prepare(batch.contiguous()))
+        for _ in range(learner.passes):
+            for sample in learner.buffer:
+                terms = learner.loss(sample)
+                sum(terms[key] for key in learner.loss_keys).backward()
+                learner.optimizer.step()
+                learner.optimizer.zero_grad()
+    assert shares[0] < 0.7 and shares[-1] > 0.95
+
+
+@pytest.mark.parametrize(
+    ("field", "value"), [("gamma", 1.1), ("clip_epsilon", 0.0), ("epochs", 0), ("learning_rate", -1.0)]
+)
+def test_values_out_of_range_are_refused(field, value):
+    with pytest.raises(ValueError, match=f"{field} must be in"):
+        Ppo(**{field: value})
+
+
+def test_the_critic_is_not_part_of_the_policy(make_small_env):
+    env = make_small_env(2)
+    learner = Ppo().build(env, Mlp(actor_hidden=(8,), critic_hidden=(8,)), 8)
+    out = learner.policy(env.reset())
+    assert VALUE not in out.keys(True, True)

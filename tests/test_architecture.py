@@ -1,0 +1,68 @@
+"""The floors: what may import what."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parent.parent / "warp_torchrl"
+MODULES = sorted(path.relative_to(PACKAGE).with_suffix("").as_posix() for path in PACKAGE.rglob("*.py"))
+READS_STATE = ("observation", "reward", "metrics", "render")
+
+
+def imports(module: str) -> set[str]:
+    """Every module that a file imports, ours without the package's name and with slashes."""
+    found = set()
+    for node in ast.walk(ast.parse((PACKAGE / f"{module}.py").read_text())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+    return {name.removeprefix("warp_torchrl.").replace(".", "/") for name in found}
+
+
+def ours(module: str) -> set[str]:
+    return imports(module) & set(MODULES)
+
+
+@pytest.mark.parametrize("module", [name for name in MODULES if name.startswith("world/")])
+def test_the_world_knows_torch_and_itself(module):
+    assert all(name.startswith("world/") for name in ours(module))
+    foreign = {name.split("/")[0] for name in imports(module)}
+    assert not foreign & {"torchrl", "hydra", "omegaconf", "gymnasium", "pettingzoo", "wandb"}
+
+
+@pytest.mark.parametrize("module", READS_STATE)
+def test_what_reads_the_state_knows_only_the_world(module):
+    assert all(name.startswith("world/") for name in ours(module))
+    assert "torchrl" not in {name.split("/")[0] for name in imports(module)}
+
+
+@pytest.mark.parametrize("module", [name for name in MODULES if name == "models" or name.startswith("algorithms/")])
+def test_learning_knows_specs_and_not_the_world(module):
+    assert all(name == "models" or name.startswith("algorithms/") for name in ours(module))
+
+
+def test_the_environment_knows_no_learning():
+    allowed = {"observation", "reward", "metrics", "render"}
+    assert all(name.startswith("world/") or name in allowed for name in ours("env"))
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_hydra_appears_only_where_configuration_is_composed(module):
+    if module not in ("config", "command"):
+        assert not {name.split("/")[0] for name in imports(module)} & {"hydra", "omegaconf"}
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_rasterio_is_imported_in_one_place(module):
+    if module != "world/raster":
+        assert "rasterio" not in {name.split("/")[0] for name in imports(module)}
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_nothing_reads_pickles(module):
+    source = (PACKAGE / f"{module}.py").read_text()
+    assert "weights_only=False" not in source and "allow_pickle=True" not in source
+    assert "pickle" not in {name.split("/")[0] for name in imports(module)}
+    assert source.count("torch.load(") == source.count("weights_only=True, map_location")

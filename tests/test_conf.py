@@ -1,0 +1,141 @@
+"""Every yaml builds, says what its class says, and mistakes are told with key, value and rule."""
+
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from warp_torchrl.config import (
+    COMPONENTS,
+    ConfigError,
+    Record,
+    build,
+    compose_config,
+    conf_folder,
+    plain,
+    recompose,
+    settings,
+    without_targets,
+)
+
+SCENARIOS = ("skirmish", "single", "default", "large")
+OPTIONS = [(path.parent.name, path.stem) for path in sorted(conf_folder().glob("*/*.yaml"))]
+LANDFIRE = Path(__file__).parent.parent.parent / "shared" / "landscapes" / "landfire"
+
+
+@pytest.mark.parametrize(("group", "option"), [each for each in OPTIONS if each[0] in COMPONENTS])
+def test_every_option_builds_and_holds_every_field(group, option):
+    if (group, option) == ("landscape", "raster"):
+        with pytest.raises(ConfigError, match=r"landscape\.path must name"):
+            build(plain(compose_config("train", ["landscape=raster"]))[group], group)
+        return
+    node = plain(compose_config("train", [f"{group}={option}"]))[group]
+    component = build(node, group)
+    assert set(node) - {"_target_"} == {each.name for each in fields(component) if each.init} - _derived(component)
+
+
+def _derived(component):
+    return {each.name for each in fields(component) if each.name.startswith("_")}
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_every_scenario_is_a_run(scenario):
+    plan = settings(plain(compose_config("train", [f"scenario={scenario}"])))
+    assert plan.scenario == scenario and plan.world.horizon == 8 * plan.world.size[0]
+
+
+def test_the_landfire_scenario_runs_on_its_raster():
+    if not LANDFIRE.is_dir():
+        pytest.skip(f"no landscape at {LANDFIRE}")
+    pytest.importorskip("rasterio")
+    plan = settings(plain(compose_config("train", ["scenario=landfire", f"landscape.path={LANDFIRE}"])))
+    env = plan.make_env(2, 0)
+    env.rollout(6, break_when_any_done=False)
+    assert env.world_state.slope is not None and env.world.side_of_cell == 30.0
+
+
+def test_the_landfire_scenario_has_no_path_of_its_own():
+    with pytest.raises(ConfigError, match=r"landscape\.path"):
+        settings(plain(compose_config("train", ["scenario=landfire"])))
+
+
+MISTAKES = [
+    ("sede=1", "sede"),
+    ("+sede=1", "sede is not a key"),
+    ("team.n_agent=3", "n_agent"),
+    ("+team.n_agent=3", r"team\.n_agent is not a key"),
+    ("scenario=nowhere", "nowhere"),
+    ("algorithm=sarsa", "sarsa"),
+    ("n_worlds=0", "n_worlds must be in 1..4096, got 0"),
+    ("n_worlds=many", "n_worlds must be a whole number, got 'many'"),
+    ("n_worlds=1.5", "n_worlds must be a whole number"),
+    ("total_frames=-1", "total_frames must be"),
+    ("seed=244", "seed must be in 0..243"),
+    ("device=tpu", "device must be"),
+    ("device=cuda:99", "device must be"),
+    ("steps_per_tick=0", "steps_per_tick must be"),
+    ("horizon=0", "horizon must be"),
+    ("landscape.size=3", r"landscape\.size must be"),
+    ("landscape.size=[8]", r"landscape\.size must be"),
+    ("landscape.levels=[0.5,0.2,0.1]", r"landscape\.levels must be in order"),
+    ("landscape.thresholds=median", r"landscape\.thresholds must be quantile or minmax or printed"),
+    ("wind.speed=-1", r"wind\.speed must be"),
+    ("wind.speed=.nan", r"wind\.speed must be"),
+    ("fire.alpha=[0,1,2,3,4]", r"fire\.alpha must be"),
+    ("fire.p_regrow=2", r"fire\.p_regrow must be"),
+    ("team.n_agents=70", r"team\.n_agents must be"),
+    ("team.roles=[tank]", r"team\.roles must be"),
+    ("ignition.count=0", r"ignition\.count must be"),
+    ("observation.radius=2.5", r"observation\.radius must be a whole number"),
+    ("reward.team_share=2", r"reward\.team_share must be"),
+    ("reward.gamma=0.5", r"reward\.gamma must be algorithm\.gamma"),
+    ("model.actor_hidden=[]", r"model\.actor_hidden must be"),
+    ("algorithm.gamma=1.5", r"gamma must be"),
+    ("algorithm.epochs=0", r"algorithm\.epochs must be"),
+    ("collector.steps=0", r"collector\.steps must be"),
+    ("checkpoint.keep=1", r"checkpoint\.keep must be"),
+    ("evaluation.mode=lucky", r"evaluation\.mode must be"),
+    ("fire=null", "fire"),
+    ("fire._target_=os.system", r"fire\._target_ must be a component of warp_torchrl, got os\.system"),
+    ("fire._target_=warp_torchrl.config.conf_folder", r"fire\._target_ must be a component"),
+]
+
+
+@pytest.mark.parametrize(("override", "message"), MISTAKES)
+def test_mistakes_are_told_in_one_line(override, message):
+    with pytest.raises(ConfigError, match=message) as error:
+        settings(plain(compose_config("train", [override])))
+    assert "\n" not in str(error.value)
+
+
+def recorded(*overrides):
+    config = compose_config("train", overrides)
+    return Record(choices={"scenario": "single", "observation": "local"}, values=without_targets(plain(config)))
+
+
+def test_a_recorded_configuration_comes_back():
+    record = recorded("scenario=single", "observation=local", "seed=5", "team.n_agents=3")
+    config = recompose(record)
+    assert config.seed == 5 and config.team.n_agents == 3 and config.scenario == "single"
+    assert config.observation._target_.endswith("Local")
+
+
+def test_overrides_come_before_what_is_recorded():
+    record = recorded("scenario=single", "observation=local", "wind.speed=9")
+    config = recompose(record, ["team.n_agents=2", "fire=paper"])
+    assert config.team.n_agents == 2 and config.fire.beta == 0.65 and config.wind.speed == 9
+
+
+def test_another_scenario_takes_the_whole_world_from_it():
+    config = recompose(recorded("scenario=single", "observation=local", "wind.speed=9"), ["scenario=large"])
+    assert config.team.n_agents == 8 and config.horizon == 512 and config.wind.speed == 4.0
+    assert config.observation._target_.endswith("Local")
+
+
+def test_classes_never_come_from_a_record():
+    values = {"fire": {"_target_": "os.system"}}
+    with pytest.raises(ConfigError, match=r"os\.system"):
+        settings(plain(recompose(Record(choices={}, values=values))))
+    for choices in ({"scenario": "../../evil"}, {"hydra": "x"}):
+        with pytest.raises(ConfigError, match="not one of our options"):
+            recompose(Record(choices=choices, values={}))

@@ -1,0 +1,66 @@
+"""Networks fit their signature, and an actor sees its own observation and nothing else."""
+
+import pytest
+import torch
+from torch import nn
+
+from warp_torchrl.algorithms.ppo import Ppo
+from warp_torchrl.models import ACTION, LOGITS, OBSERVATION, VALUE, Encoder, Entry, Mlp, signature
+from warp_torchrl.observation import Local, Paper, Surroundings
+
+
+def test_the_encoder_equals_one_layer_over_joined_fractions():
+    entries = [Entry((2, 3), "uint8"), Entry((4,), "float32")]
+    encoder = Encoder(entries, 5)
+    pixels, numbers = torch.randint(0, 256, (7, 2, 3), dtype=torch.uint8), torch.randn(7, 4)
+    weight = torch.cat([part.weight for part in encoder.parts], dim=1)
+    joined = torch.cat((pixels.flatten(1) / 255.0, numbers), dim=1)
+    assert torch.allclose(encoder(pixels, numbers), nn.functional.linear(joined, weight), atol=1e-5)
+
+
+@pytest.mark.parametrize("observation", [Surroundings(), Local(), Paper()], ids=lambda each: type(each).__name__)
+@pytest.mark.parametrize("central", [True, False])
+def test_actor_and_critic_fit_every_preset(make_small_env, observation, central):
+    env = make_small_env(3, observation=observation)
+    shape, now = signature(env), env.reset()
+    assert Mlp().actor(shape)(now)[LOGITS].shape == (3, 2, 11)
+    assert Mlp().critic(shape, central)(now)[VALUE].shape == (3, 2, 1)
+
+
+def test_an_actor_sees_only_its_own_observation(make_small_env):
+    env = make_small_env(3)
+    actor, now = Mlp().actor(signature(env)), env.reset()
+    before = actor(now.clone())[LOGITS]
+    for name in ("view", "self", "picture"):
+        now[(*OBSERVATION, name)][:, 1] = torch.ones_like(now[(*OBSERVATION, name)][:, 1])
+    now["state"] = torch.randn_like(now["state"])
+    after = actor(now)[LOGITS]
+    assert (after[:, 0] == before[:, 0]).all() and (after[:, 1] != before[:, 1]).any()
+
+
+def test_half_precision_is_near_and_keeps_float32_weights(make_small_env):
+    env = make_small_env(3)
+    now = env.reset()
+    torch.manual_seed(1)
+    exact = Mlp(dtype="float32").actor(signature(env))
+    torch.manual_seed(1)
+    half = Mlp(dtype="bfloat16").actor(signature(env))
+    assert all(parameter.dtype == torch.float32 for parameter in half.parameters())
+    logits = half(now)[LOGITS]
+    assert logits.dtype == torch.float32 and torch.allclose(logits, exact(now)[LOGITS], atol=2e-3)
+
+
+def test_masked_actions_are_never_chosen(make_small_env):
+    env = make_small_env(64)
+    policy, now = Ppo().policy(signature(env), Mlp()), env.reset()
+    mask = torch.zeros_like(now["agents", "action_mask"])
+    mask[..., 4] = True  # all but one masked
+    now["agents", "action_mask"] = mask
+    out = policy(now)
+    assert (out[ACTION] == 4).all() and torch.isfinite(out["agents", "action_log_prob"]).all()
+
+
+@pytest.mark.parametrize(("field", "value"), [("actor_hidden", ()), ("critic_hidden", (0,))])
+def test_sizes_out_of_range_are_refused(field, value):
+    with pytest.raises(ValueError, match=f"{field} must be"):
+        Mlp(**{field: value})

@@ -1,0 +1,147 @@
+"""What agents see, by hand."""
+
+import pytest
+import torch
+
+from tests.conftest import small_world
+from warp_torchrl.observation import (
+    CHANNELS,
+    STATE,
+    Local,
+    Paper,
+    Surroundings,
+    central_state,
+    crop,
+    egocentric_view,
+    own_vector,
+    picture,
+)
+from warp_torchrl.world.landscape import Array
+from warp_torchrl.world.team import Team
+from warp_torchrl.world.wind import Uniform
+
+
+def drawn(cells, positions, *, elevation=None, roles=("ugv",), wind=None, cover=3):
+    """A world of given codes with agents at given places."""
+    codes = torch.tensor(cells, dtype=torch.uint8)[None]
+    land = Array(cover=torch.full(codes.shape[1:], cover), age=torch.full(codes.shape[1:], 5), elevation=elevation)
+    team = Team(n_agents=len(positions), roles=roles, start="anywhere")
+    world = small_world(landscape=land, team=team, wind=wind or Uniform(speed=10.0, direction=0.0))
+    state = world.reset(torch.tensor([0]), torch.tensor([0]))
+    place = torch.tensor(positions)[None]
+    state = state.replace(cells=codes, vehicles=state.vehicles.replace(position=place))
+    return state, world
+
+
+def channel(view, name):
+    return view[0, 0, CHANNELS.index(name)]
+
+
+def test_a_crop_is_the_square_about_the_agent_and_zero_off_the_map():
+    plane = torch.arange(1, 26).view(1, 1, 5, 5)
+    corner = crop(plane, torch.tensor([[[0, 0], [4, 3]]]), 1)
+    assert corner[0, 0, 0].tolist() == [[0, 0, 0], [0, 1, 2], [0, 6, 7]]
+    assert corner[0, 1, 0].tolist() == [[18, 19, 20], [23, 24, 25], [0, 0, 0]]
+
+
+def test_crops_of_many_worlds_and_channels_equal_slices():
+    planes = torch.randint(0, 255, (3, 4, 9, 7), dtype=torch.uint8)
+    position = torch.stack((torch.randint(2, 7, (3, 5)), torch.randint(2, 5, (3, 5))), dim=-1)
+    crops = crop(planes, position, 2)
+    for world in range(3):
+        for agent in range(5):
+            row, column = position[world, agent].tolist()
+            assert (crops[world, agent] == planes[world, :, row - 2 : row + 3, column - 2 : column + 3]).all()
+
+
+def test_the_view_shows_fire_age_and_the_border():
+    cells = [[5, 5, 5, 5], [5, 11, 13, 5], [5, 5, 0, 5], [5, 5, 5, 10]]
+    state, world = drawn(cells, [[1, 0]])
+    view = egocentric_view(state, world, 1)
+    assert channel(view, "off_map").tolist() == [[255, 0, 0], [255, 0, 0], [255, 0, 0]]
+    assert channel(view, "fire_stage").tolist() == [[0, 0, 0], [0, 0, 51], [0, 0, 0]]  # stage 1 of 5
+    assert channel(view, "age").tolist() == [[0, 125, 125], [0, 125, 0], [0, 125, 125]]  # age 5 of 10
+    assert channel(view, "flammability").tolist() == [[0, 204, 204]] * 3  # 0.8 x 255
+
+
+def test_the_threat_of_a_tree_is_its_chance_to_ignite_and_of_a_fire_what_it_will_ignite():
+    # Calm air, one fire in the middle of forest: axial 0.8, diagonal 0.8 / sqrt 2 = 0.566; sum 4 x 0.8 + 4 x 0.566.
+    cells = [[5, 5, 5, 5], [5, 11, 5, 5], [5, 5, 5, 5], [5, 5, 5, 5]]
+    state, world = drawn(cells, [[1, 1]], wind=Uniform(speed=0.0))
+    threat = channel(egocentric_view(state, world, 1), "threat")
+    assert threat[0].tolist() == [int(0.8 / 2**0.5 * 255), int(0.8 * 255), int(0.8 / 2**0.5 * 255)]
+    assert threat[1, 1] == 255  # 5.46 / 4, at most 1
+
+
+def test_agents_see_each_other_and_not_themselves():
+    state, world = drawn([[5] * 6] * 6, [[2, 2], [2, 3], [3, 2]], roles=("ugv", "ugv", "uav"))
+    view = egocentric_view(state, world, 1)
+    assert channel(view, "other_ugv").tolist() == [[0, 0, 0], [0, 0, 63], [0, 0, 0]]
+    assert channel(view, "other_uav").tolist() == [[0, 0, 0], [0, 0, 0], [0, 63, 0]]
+
+
+def test_elevation_is_relative_to_the_agent():
+    slope = torch.arange(5).mul(50.0).expand(5, 5)
+    state, world = drawn([[5] * 5] * 5, [[2, 2]], elevation=slope)
+    # 50 m up: 128 + 127 / 2 = 191.5; 50 m down 64.5; whole numbers below
+    assert channel(egocentric_view(state, world, 1), "relative_elevation")[1].tolist() == [64, 128, 191]
+
+
+def test_an_agent_knows_its_place_the_time_and_the_wind():
+    state, world = drawn([[5] * 5] * 5, [[4, 0]])
+    row, column, time_left, east, north, to_tick, tank, has_tank = own_vector(state, world)[0, 0, :8].tolist()
+    assert (row, column, time_left, to_tick) == (1.0, 0.0, 1.0, 1.0)
+    assert (east, north) == pytest.approx((0.5, 0.0), abs=1e-6)  # 10 of 20 m/s
+    assert (tank, has_tank) == (1.0, 0.0)
+
+
+def test_the_last_action_is_remembered():
+    state, world = drawn([[5] * 5] * 5, [[4, 0]])
+    before = own_vector(state, world)[0, 0, -11:]
+    after = own_vector(world.step(state, torch.tensor([[8]])).after, world)[0, 0, -11:]
+    assert before.sum() == 0 and after.tolist() == [0] * 8 + [1, 0, 0]
+
+
+def test_the_picture_pools_the_whole_map():
+    cells = torch.full((16, 16), 5)
+    cells[0, 0] = 12  # one burning cell of four in the first block
+    state, _ = drawn(cells.tolist(), [[8, 8], [0, 15]])
+    seen = picture(state)
+    assert seen[0, 0, 0, 0, 0] == pytest.approx(0.5) and seen[0, 0, 0].sum() == pytest.approx(0.5)  # sqrt(1 / 4)
+    assert seen[0, 0, 1, 7, 7] == pytest.approx(0.8)
+    assert seen[0, 0, 2].nonzero().tolist() == [[0, 7]] and seen[0, 1, 2].nonzero().tolist() == [[4, 4]]
+
+
+def test_the_critic_sees_every_agent_and_the_clock():
+    state, world = drawn([[5] * 16] * 16, [[8, 8], [0, 15]])
+    seen = central_state(state, world)[0]
+    assert seen[STATE.index("ugv")].nonzero().tolist() == [[0, 15], [8, 8]]
+    assert (seen[STATE.index("time_left")] == 1).all() and (seen[STATE.index("wind_east")] == 0.5).all()
+
+
+def test_the_paper_preset_is_three_channels_flattened():
+    state, world = drawn([[5] * 4, [5, 11, 5, 5]] * 2, [[0, 0]])
+    seen = Paper(radius=1)(state, world)[""][0, 0].view(3, 3, 3)
+    forest = torch.tensor([[0, 0, 0], [0, 0.8, 0.8], [0, 0.8, 0.8]])  # (code 3 + 1) / 5, off the map 0
+    assert torch.allclose(seen[0], forest, atol=0.01)
+    assert seen[1, 1, 1] == pytest.approx(0.5, abs=0.01)  # age 5 of 10
+    assert seen[2, 2, 2] == pytest.approx(0.2, abs=0.01)  # stage 1 of 5
+
+
+@pytest.mark.parametrize("preset", [Surroundings(), Local(), Paper()], ids=lambda each: type(each).__name__)
+def test_what_lies_out_of_view_is_not_in_view_or_self(preset):
+    """Of strictly local presets, nothing changes when all beyond the radius does."""
+    inside = torch.full((20, 20), 5)
+    outside = inside.clone()
+    outside[12:, 12:] = 12
+    seen = [preset(*drawn(cells.tolist(), [[2, 2]])) for cells in (inside, outside)]
+    for name in seen[0]:
+        same = (seen[0][name] == seen[1][name]).all()
+        assert same == (name != "picture")
+
+
+@pytest.mark.parametrize("preset", [Surroundings, Local, Paper])
+@pytest.mark.parametrize("radius", [0, 33])
+def test_a_radius_out_of_range_is_refused(preset, radius):
+    with pytest.raises(ValueError, match="radius must be in"):
+        preset(radius=radius)
