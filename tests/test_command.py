@@ -1,0 +1,129 @@
+"""The two commands, as a user runs them: subprocesses on a tiny setting."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from warp_torchrl import load_policy, make_env
+
+ROOT = Path(__file__).parent.parent
+TINY = [
+    "landscape.size=12",
+    "horizon=16",
+    "n_worlds=4",
+    "collector.steps=8",
+    "total_frames=128",
+    "checkpoint.interval=32",
+    "evaluation.episodes=6",
+    "algorithm.minibatch_size=16",
+    "model.actor_hidden=[16]",
+    "model.critic_hidden=[16]",
+]
+
+
+def command(program, *arguments, folder):
+    """Run a command in a folder of its own and return it when it has ended."""
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "COLUMNS": "200"}
+    return subprocess.run(
+        [sys.executable, str(ROOT / program), *arguments],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("trained")
+    done = command("train.py", *TINY, "hydra.run.dir=run", folder=folder)
+    assert done.returncode == 0, done.stderr
+    return folder / "run", done
+
+
+def test_train_leaves_everything_that_the_contract_names(trained):
+    run, done = trained
+    for name in ("config.yaml", "metrics.csv", "train.log", "evaluation.json", "episode.gif"):
+        assert (run / name).stat().st_size > 0, name
+    assert len((run / "metrics.csv").read_text().splitlines()) == 5
+    assert "coordinated" in done.stdout and "trained" in done.stdout
+    content = json.loads((run / "evaluation.json").read_text())
+    assert content["seeds"] == list(range(1_000_000, 1_000_006))
+    assert set(content["versus"]) == {"noop", "random", "local", "greedy", "coordinated"}
+
+
+def test_evaluate_repeats_what_training_found(trained, tmp_path):
+    run, _ = trained
+    done = command("evaluate.py", f"checkpoint={run}", "hydra.run.dir=seen", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    ours, theirs = (json.loads((where / "evaluation.json").read_text()) for where in (tmp_path / "seen", run))
+    assert ours["episodes"] == theirs["episodes"] and ours["versus"] == theirs["versus"]
+    assert (tmp_path / "seen" / "episode.gif").exists()
+
+
+def test_evaluate_takes_another_scenario_for_the_same_policy(trained, tmp_path):
+    run, _ = trained
+    done = command(
+        "evaluate.py", f"checkpoint={run}", "scenario=single", "evaluation.episodes=3", "horizon=12", folder=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    assert "single: 3 fires" in done.stdout
+
+
+def test_evaluate_takes_a_policy_by_name(tmp_path):
+    arguments = ("policy=local", "scenario=skirmish", "horizon=12", "evaluation.episodes=4", "hydra.run.dir=seen")
+    done = command("evaluate.py", *arguments, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    content = json.loads((tmp_path / "seen" / "evaluation.json").read_text())
+    assert content["policy"] == "local" and "local" not in content["versus"]
+
+
+def test_a_finished_run_resumes_to_nothing_and_exits_0(trained):
+    run, _ = trained
+    before = (run / "metrics.csv").read_bytes()
+    done = command("train.py", f"resume={run}", folder=run.parent)
+    assert done.returncode == 0, done.stderr
+    assert (run / "metrics.csv").read_bytes() == before
+
+
+def test_a_loaded_policy_plays(trained):
+    env = make_env("skirmish", n_worlds=2, overrides=["landscape.size=12"])
+    rollout = env.rollout(4, load_policy(trained[0]), break_when_any_done=False)
+    assert rollout["agents", "action"].shape == (2, 4, 2)
+
+
+def test_a_sweep_trains_every_job(tmp_path):
+    arguments = (*TINY, "total_frames=32", "evaluation.episodes=2", "-m", "seed=0,1", "hydra.sweep.dir=sweep")
+    done = command("train.py", *arguments, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert [(tmp_path / "sweep" / job / "evaluation.json").exists() for job in "01"] == [True, True]
+
+
+MISTAKES = [
+    (("train.py", "sede=3"), 2, "sede"),
+    (("train.py", "team.n_agents=0"), 2, "team.n_agents must be in [1, 256], got 0"),
+    (("train.py", "scenario=nowhere"), 2, "nowhere"),
+    (("train.py", "+foo=1"), 2, "foo is not a key"),
+    (("train.py", "-m", "seed=0,400"), 2, "seed must be in 0..243"),
+    (("train.py", "scenario=landfire"), 2, "landscape.path must name"),
+    (("train.py", "resume=nowhere"), 4, "nowhere is not a run folder"),
+    (("evaluate.py",), 2, "give either checkpoint=PATH or policy=NAME"),
+    (("evaluate.py", "policy=genius"), 2, "policy must be one of"),
+    (("evaluate.py", "checkpoint=nowhere"), 4, "nowhere"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "code", "message"), MISTAKES, ids=lambda each: str(each)[:40])
+def test_a_mistake_ends_with_its_code_and_one_line_and_leaves_nothing(tmp_path, arguments, code, message):
+    done = command(*arguments, folder=tmp_path)
+    assert done.returncode == code, done.stderr
+    last = done.stderr.strip().splitlines()[-1]
+    assert message in last and last.startswith("error: ")
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.iterdir())

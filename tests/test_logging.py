@@ -1,0 +1,80 @@
+"""metrics.csv is complete, and a tracker that fails does not end the run."""
+
+import csv
+
+import pytest
+
+from warp_torchrl.logging import CsvOnly, MetricsFile, Tensorboard, Wandb, _TorchRlTracker
+
+
+def lines(path):
+    with path.open(newline="") as file:
+        return list(csv.reader(file))
+
+
+def test_rows_are_appended_and_holes_left_empty(tmp_path):
+    metrics = MetricsFile(tmp_path / "metrics.csv")
+    metrics.add({"a": 1, "b": 0.1 + 0.2})
+    metrics.add({"a": 2, "b": None})
+    assert lines(tmp_path / "metrics.csv") == [["a", "b"], ["1", "0.30000000000000004"], ["2", ""]]
+    with pytest.raises(ValueError, match="no columns"):
+        metrics.add({"c": 1})
+
+
+def test_a_resumed_file_is_cut_back_to_the_checkpoint(tmp_path):
+    metrics = MetricsFile(tmp_path / "metrics.csv")
+    for number in range(4):
+        metrics.add({"a": number})
+    resumed = MetricsFile(tmp_path / "metrics.csv", keep_rows=2)
+    resumed.add({"a": 9})
+    assert lines(tmp_path / "metrics.csv") == [["a"], ["0"], ["1"], ["9"]] and resumed.rows == 3
+
+
+def test_a_new_run_starts_a_new_file(tmp_path):
+    (tmp_path / "metrics.csv").write_text("old,columns\n1,2\n")
+    MetricsFile(tmp_path / "metrics.csv").add({"a": 1})
+    assert lines(tmp_path / "metrics.csv") == [["a"], ["1"]]
+
+
+def test_a_tracker_that_cannot_open_warns_once_and_is_silent(tmp_path, caplog):
+    tracker = _TorchRlTracker("no such tracker", tmp_path)
+    tracker.log({"a": 1.0}, 1)
+    tracker.close()
+    assert [record.levelname for record in caplog.records if record.name == "warp_torchrl"] == ["WARNING"]
+    assert "goes on without it" in caplog.text
+
+
+def test_a_tracker_that_breaks_on_the_way_warns_once(tmp_path, caplog):
+    tracker = _TorchRlTracker("csv", tmp_path)
+
+    def broken(*args, **kwargs):
+        raise OSError("server gone")
+
+    tracker._logger.log_scalar = broken
+    tracker.log({"a": 1.0}, 1)
+    tracker.log({"a": 2.0}, 2)
+    assert caplog.text.count("server gone") == 1
+
+
+def test_the_default_tracker_says_nothing(tmp_path):
+    tracker = CsvOnly().open(tmp_path)
+    tracker.log({"a": 1.0}, 1)
+    tracker.close()
+    assert not list(tmp_path.iterdir())
+
+
+def test_wandb_works_offline(tmp_path, caplog, monkeypatch):
+    monkeypatch.delenv("WANDB_API_KEY", raising=False)
+    tracker = Wandb().open(tmp_path)
+    tracker.log({"world/saved": 0.5, "train/loss": None}, 10)
+    tracker.close()
+    assert "goes on without it" not in caplog.text
+    assert any("offline-run" in path.name for path in tmp_path.rglob("*"))
+
+
+def test_tensorboard_works_where_it_is_installed(tmp_path, caplog):
+    pytest.importorskip("tensorboard")
+    tracker = Tensorboard().open(tmp_path)
+    tracker.log({"world/saved": 0.5}, 10)
+    tracker.close()
+    assert "goes on without it" not in caplog.text and any("tfevents" in path.name for path in tmp_path.rglob("*"))
