@@ -100,8 +100,7 @@ def test_metrics_have_the_columns_of_the_contract(finished):
         "train/policy_gradient_loss train/value_loss train/entropy_loss train/approx_kl train/clip_fraction "
         "train/clip_range train/explained_variance world/saved"
     ).split():
-        assert found[-1][name] != "", name
-        float(found[-1][name])
+        float(found[2][name])  # the horizon of 20 ends episodes in the third batch of eight steps
     assert [int(row["time/frames"]) for row in found] == [32, 64, 96, 128, 160, 192]
     assert found[0]["rollout/ep_len_mean"] == "", "no episode ends in the first eight steps"
 
@@ -154,7 +153,7 @@ def test_a_gradient_that_is_not_finite_stops_before_the_weights_change(tmp_path)
     training = tiny(tmp_path)
     batch = next(iter(training.collector))
     before = {name: value.clone() for name, value in training.learner.loss.state_dict().items() if "params" in name}
-    batch["next", "agents", "reward"][0, 0] = float("inf")
+    batch["next", "agents", "reward"].fill_(float("inf"))
     with pytest.raises(NumericalFailure, match="not finite"):
         training._learn(batch)
     for name, value in before.items():

@@ -38,6 +38,7 @@ log = logging.getLogger("warp_torchrl")
 
 DONE, MISTAKE, IN_USE, UNSOUND, NUMERICAL, DISK = 0, 2, 3, 4, 5, 6
 _RECORDED = (*COMPONENTS, "scenario")
+_MULTIRUN = ("-m", "--multirun")
 _NOT_RECORDED = ("resume", "debug", "policy", "hydra")
 
 
@@ -161,7 +162,8 @@ def _run(name: str, job: Callable[[DictConfig], None]) -> None:
     except Exception as error:
         sys.exit(_fail(error, debug))
     if name == "train":
-        sys.argv[1:] = _with_run_folder(arguments)
+        arguments = _with_run_folder(arguments)
+    sys.argv[1:] = sorted(arguments, key=lambda each: each not in _MULTIRUN)  # Hydra wants -m before the overrides
 
     def guarded(config: DictConfig) -> None:
         try:
@@ -179,7 +181,7 @@ def _check_first(name: str, arguments: Sequence[str]) -> None:
     """Compose and check every job of the command line before the first run folder is made."""
     overrides = [each for each in arguments if not each.startswith("-")]
     flags = [each for each in arguments if each.startswith("-")]
-    if any(flag not in ("-m", "--multirun") for flag in flags):
+    if any(flag not in _MULTIRUN for flag in flags):
         return  # Hydra's own flags (--help, --cfg, --config-dir ...) are Hydra's business
     for job in _jobs([each for each in overrides if not each.startswith("hydra")], bool(flags)):
         config = compose_config(name, job)

@@ -166,8 +166,8 @@ class Training:
             torch.nn.utils.clip_grad_norm_(learner.loss.parameters(), learner.max_grad_norm, error_if_nonfinite=True)
         except RuntimeError:
             raise NumericalFailure(
-                f"after {self.frames} frames the gradient is not finite, loss {float(loss):g}; the weights were left "
-                f"as they were, and the last checkpoint stands"
+                f"after {self.frames} frames the gradient is not finite, loss {float(loss.detach()):g}; the weights "
+                f"were left as they were, and the last checkpoint stands"
             ) from None
         learner.optimizer.step()
         learner.optimizer.zero_grad()
@@ -232,7 +232,8 @@ class Training:
             self.learner.optimizer.load_state_dict(state["optimizer"])
             self.env.load_state_dict(state["env"])
             carrier = TensorDict(state["carrier"], batch_size=self.env.batch_size).unflatten_keys(".")
-            self.collector._carrier = carrier.to(self.env.device)
+            shaped = self.collector._carrier.empty(recurse=True)  # keeps the batch sizes of the nested parts
+            self.collector._carrier = shaped.update(carrier.to(self.env.device))
             self.frames, self.seconds = int(state["frames"]), float(state["seconds"])
             self.saved_at, self._last_seconds = self.frames, self.seconds
             self.metrics = MetricsFile(self.run / "metrics.csv", keep_rows=int(state["rows"]))

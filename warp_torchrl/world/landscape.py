@@ -94,7 +94,7 @@ class Perlin:
         independent_elevation: Draw the elevation from a noise of its own, not the one that made the cover.
 
     Raises:
-        ValueError: If a value is out of its range or the levels are out of order.
+        ValueError: If a value is out of its range or the levels are out of order (``printed`` excepted).
     """
 
     size: tuple[int, int] | int = 32
@@ -126,7 +126,7 @@ class Perlin:
         levels = tuple(self.levels)
         if len(levels) != 3 or not all(0.0 <= level <= 1.0 for level in levels):
             raise ValueError(f"levels must be three numbers in [0, 1], got {list(levels)}")
-        if not levels[0] <= levels[1] <= levels[2]:
+        if self.thresholds != "printed" and not levels[0] <= levels[1] <= levels[2]:
             raise ValueError(f"levels must be in order, lake <= wetland <= grassland, got {list(levels)}")
 
     def __call__(self, key: Tensor) -> Landscape:
