@@ -11,7 +11,7 @@ import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,9 +29,11 @@ EPISODES = 256
 FIRST_SEED = 1_000_000
 
 
-def environment_speed(scenario: str, n_worlds: int, device: str, repeats: int = 7) -> dict[str, Any]:
+def environment_speed(
+    scenario: str, n_worlds: int, device: str, overrides: Sequence[str] = (), repeats: int = 7
+) -> dict[str, Any]:
     """Measure agent steps a second of the environment alone: random actions, observations, rewards and resets."""
-    env = make_env(scenario, n_worlds=n_worlds, device=device)
+    env = make_env(scenario, n_worlds=n_worlds, device=device, overrides=overrides)
     now = env.reset()
 
     def steps(count: int) -> None:
@@ -45,9 +47,13 @@ def environment_speed(scenario: str, n_worlds: int, device: str, repeats: int = 
     )
 
 
-def training_speed(scenario: str, n_worlds: int, device: str, repeats: int = 7) -> dict[str, Any]:
+def training_speed(
+    scenario: str, n_worlds: int, device: str, overrides: Sequence[str] = (), repeats: int = 7
+) -> dict[str, Any]:
     """Measure agent steps a second of training: collecting and learning, as ``train.py`` does."""
-    config = plain(compose_config("train", [f"scenario={scenario}", f"n_worlds={n_worlds}", f"device={device}"]))
+    config = plain(
+        compose_config("train", [f"scenario={scenario}", f"n_worlds={n_worlds}", f"device={device}", *overrides])
+    )
     plan = settings(config)
     with tempfile.TemporaryDirectory() as folder:
         training = Training(plan, Record(), Path(folder))
@@ -75,9 +81,9 @@ def _rate(steps: Callable[[int], None], count: int, agent_steps: int, repeats: i
     return {"agent_steps_per_second": statistics.median(rates), "lowest": min(rates), "highest": max(rates)}
 
 
-def calibrate(scenario: str, device: str, episodes: int) -> dict[str, Any]:
+def calibrate(scenario: str, device: str, episodes: int, overrides: Sequence[str] = ()) -> dict[str, Any]:
     """Return the trees that each heuristic saves on the evaluation seeds of a scenario."""
-    env = make_env(scenario, n_worlds=episodes, seed=FIRST_SEED, device=device)
+    env = make_env(scenario, n_worlds=episodes, seed=FIRST_SEED, device=device, overrides=overrides)
     rows = play_heuristics(env, FIRST_SEED)
     return {"scenario": scenario, "episodes": episodes} | {name: summarise(rows[name])["saved"] for name in YARDSTICKS}
 
@@ -120,6 +126,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m warp_torchrl.benchmark", description=__doc__)
     parser.add_argument("what", nargs="*", choices=[[], "env", "train", "tasks"], default=["env", "train"])
     parser.add_argument("--scenario", nargs="+", help="default for speed; all four for tasks")
+    parser.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE", help="overrides, as for train.py")
     parser.add_argument("--worlds", type=int, default=256)
     parser.add_argument("--episodes", type=int, default=EPISODES)
     parser.add_argument("--device", default="cpu")
@@ -128,13 +135,13 @@ def main(arguments: list[str] | None = None) -> None:
     what = options.what or ["env", "train"]
     speed = {"env": environment_speed, "train": training_speed}
     rows = [
-        speed[each](scenario, options.worlds, options.device)
+        speed[each](scenario, options.worlds, options.device, options.set)
         for each in what
         if each in speed
         for scenario in options.scenario or ["default"]
     ]
     names = (options.scenario or SCENARIOS) if "tasks" in what else ()
-    tasks = [calibrate(name, options.device, options.episodes) for name in names]
+    tasks = [calibrate(name, options.device, options.episodes, options.set) for name in names]
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1 if sys.platform == "darwin" else 1024) / 1024
     if options.json:
         print(json.dumps({"machine": _header(), "speed": rows, "tasks": tasks, "peak_memory_gib": memory}, indent=1))

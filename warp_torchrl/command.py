@@ -29,7 +29,7 @@ from warp_torchrl.config import (
     settings,
     without_targets,
 )
-from warp_torchrl.evaluation import play, play_heuristics, record_episode, report, table, write_json
+from warp_torchrl.evaluation import MODES, play, play_heuristics, record_episode, report, table, write_json
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import signature
 from warp_torchrl.training import NumericalFailure, Stopped, Training
@@ -105,7 +105,7 @@ def _report(
     first, folder = plan.evaluation.first_seed, folder.resolve()
     env = plan.make_env(plan.evaluation.episodes, first)
     one = plan.make_env(1, first)
-    others = play_heuristics(env, first)
+    others, other_modes = play_heuristics(env, first), {}
     if found is None:
         name, mode, policy = heuristic, "sampled", HEURISTICS[heuristic](one)
         episodes = others.pop(heuristic)
@@ -114,8 +114,10 @@ def _report(
         _check_fits(found, env)
         name, mode = f"trained, {policy.mode}", policy.mode
         episodes = play(env, policy, first, mode)
+        other = next(each for each in MODES if each != mode)
+        other_modes = {f"trained, {other}": play(env, policy, first, other)}
     folder.mkdir(parents=True, exist_ok=True)
-    content = report(plan.scenario, name, first, episodes, others)
+    content = report(plan.scenario, name, first, episodes, others, other_modes)
     write_json(folder / "evaluation.json", content)
     print(table(content), flush=True)
     record_episode(folder / "episode.gif", one, policy, f"{plan.scenario}\n{name}", first, mode)

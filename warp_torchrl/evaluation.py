@@ -95,7 +95,14 @@ def compare(episodes: Episodes, other: Episodes) -> dict[str, Any]:
     return {"saved_difference": float(difference.mean()), "ci95": _interval(_resampled(difference).mean(axis=1))}
 
 
-def report(scenario: str, policy: str, first_seed: int, episodes: Episodes, others: Mapping[str, Episodes]) -> dict:
+def report(
+    scenario: str,
+    policy: str,
+    first_seed: int,
+    episodes: Episodes,
+    others: Mapping[str, Episodes],
+    other_modes: Mapping[str, Episodes] | None = None,
+) -> dict[str, Any]:
     """Return the content of ``evaluation.json``.
 
     Args:
@@ -104,6 +111,7 @@ def report(scenario: str, policy: str, first_seed: int, episodes: Episodes, othe
         first_seed: Seed of world 0.
         episodes: The policy's.
         others: The heuristics' on the same worlds, by name.
+        other_modes: The same policy's, acting in another mode, by name.
     """
     count = len(episodes["saved"])
     seeds = list(range(first_seed, first_seed + count))
@@ -119,6 +127,7 @@ def report(scenario: str, policy: str, first_seed: int, episodes: Episodes, othe
         "episodes": rows,
         "versus": {name: compare(episodes, other) for name, other in others.items()},
         "yardsticks": {name: summarise(other) for name, other in others.items()},
+        "other_modes": {name: summarise(other) for name, other in (other_modes or {}).items()},
     }
 
 
@@ -128,7 +137,8 @@ def table(content: Mapping[str, Any]) -> str:
         f"{'policy':<22}{'saved %':>8}{'95 % interval':>16}{'iqm %':>8}{'success %':>11}{'control':>9}{'cleared %':>11}"
     )
     lines = [f"{content['scenario']}: {len(content['seeds'])} fires, seeds from {content['seeds'][0]}", header]
-    for name, summary in {**content["yardsticks"], content["policy"]: content["metrics"]}.items():
+    rows = {**content["yardsticks"], **content["other_modes"], content["policy"]: content["metrics"]}
+    for name, summary in rows.items():
         saved = summary["saved"]
         interval = "{:.1f} .. {:.1f}".format(*(100.0 * bound for bound in saved["ci95"]))
         lines.append(
