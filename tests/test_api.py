@@ -5,7 +5,7 @@ import torch
 
 from warp_torchrl import WildfireEnv, load_policy, make_env, simulate
 from warp_torchrl.checkpoint import CheckpointError
-from warp_torchrl.config import ConfigError
+from warp_torchrl.construction import ConfigError
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.wind import Calm

@@ -7,9 +7,7 @@ import pytest
 
 from warp_torchrl.config import (
     COMPONENTS,
-    ConfigError,
     Record,
-    build,
     compose_config,
     conf_folder,
     plain,
@@ -17,6 +15,7 @@ from warp_torchrl.config import (
     settings,
     without_targets,
 )
+from warp_torchrl.construction import ConfigError, build
 
 SCENARIOS = ("skirmish", "single", "default", "large")
 OPTIONS = [(path.parent.name, path.stem) for path in sorted(conf_folder().glob("*/*.yaml"))]

@@ -9,12 +9,13 @@ from torchrl.envs.utils import ExplorationType
 from torchrl.modules import ProbabilisticActor
 
 from warp_torchrl import checkpoint as checkpoints
-from warp_torchrl.config import COMPONENTS, build, compose_config, construct, plain, recompose
+from warp_torchrl.config import build_components, compose_config, plain, recompose
+from warp_torchrl.construction import build
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.state import Cover
 from warp_torchrl.world.wind import Wind, constant_wind
-from warp_torchrl.world.world import World, burn
+from warp_torchrl.world.world import burn
 
 
 def make_env(
@@ -45,11 +46,9 @@ def make_env(
         ConfigError: A ``ValueError``, with key, value and rule.
     """
     config = plain(compose_config("train", [f"scenario={scenario}", *overrides]))
-    parts = {name: build(config[name], name) for name in COMPONENTS}
-    keys = ("landscape", "wind", "fire", "team", "ignition", "steps_per_tick", "horizon", "cell_size")
-    world = construct(World, {key: parts.get(key, config.get(key)) for key in keys}, "")
+    parts = build_components(config)
     return WildfireEnv(
-        world,
+        parts["world"],
         observation=parts["observation"],
         reward=parts["reward"],
         n_worlds=n_worlds if seeds is None else len(seeds),

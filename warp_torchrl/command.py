@@ -19,7 +19,6 @@ from warp_torchrl import checkpoint as checkpoints
 from warp_torchrl.api import policy_of
 from warp_torchrl.config import (
     COMPONENTS,
-    ConfigError,
     Record,
     Settings,
     compose_config,
@@ -29,6 +28,7 @@ from warp_torchrl.config import (
     settings,
     without_targets,
 )
+from warp_torchrl.construction import ConfigError
 from warp_torchrl.evaluation import MODES, play, play_heuristics, record_episode, report, table, write_json
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import signature

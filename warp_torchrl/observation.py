@@ -88,32 +88,21 @@ class Local:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Surroundings:
+class Surroundings(Local):
     """An agent's own surroundings and the state of the fire, as the paper has it: the default.
 
     As ``Local``, and ``picture``: what a dispatcher would radio, the whole map's fire (square root of the share of
     each block that burns), fuel and team-mates in 8 x 8 blocks.
-
-    Attributes:
-        radius: r of the view [cells].
-
-    Raises:
-        ValueError: If the radius is not in 1..32.
     """
-
-    radius: int = 5
-
-    def __post_init__(self) -> None:
-        check_fields(self, radius=(1, 32))
 
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
         shape = (len(PICTURE), PICTURE_SIDE, PICTURE_SIDE)
-        return {**Local(radius=self.radius).spaces(world), "picture": Space(shape, torch.float32, 0.0, 1.0)}
+        return {**super().spaces(world), "picture": Space(shape, torch.float32, 0.0, 1.0)}
 
     def __call__(self, state: WorldState, world: World) -> dict[str, Tensor]:
         """Return ``view``, ``self``, and ``picture`` float32 [B, A, 3, 8, 8]."""
-        return {**Local(radius=self.radius)(state, world), "picture": picture(state)}
+        return {**super().__call__(state, world), "picture": picture(state)}
 
 
 @dataclass(frozen=True, kw_only=True)
