@@ -2,8 +2,10 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -16,7 +18,7 @@ TINY = [
     "horizon=16",
     "n_worlds=4",
     "collector.steps=8",
-    "total_frames=128",
+    "total_frames=256",
     "checkpoint.interval=32",
     "evaluation.episodes=6",
     "algorithm.minibatch_size=16",
@@ -51,7 +53,7 @@ def test_train_leaves_everything_that_the_contract_names(trained):
     run, done = trained
     for name in ("config.yaml", "metrics.csv", "train.log", "evaluation.json", "episode.gif"):
         assert (run / name).stat().st_size > 0, name
-    assert len((run / "metrics.csv").read_text().splitlines()) == 5
+    assert len((run / "metrics.csv").read_text().splitlines()) == 9
     assert "coordinated" in done.stdout and "trained" in done.stdout
     content = json.loads((run / "evaluation.json").read_text())
     assert content["seeds"] == list(range(1_000_000, 1_000_006))
@@ -90,6 +92,42 @@ def test_a_finished_run_resumes_to_nothing_and_exits_0(trained):
     done = command("train.py", f"resume={run}", folder=run.parent)
     assert done.returncode == 0, done.stderr
     assert (run / "metrics.csv").read_bytes() == before
+
+
+def test_a_run_folder_is_not_trained_into_twice(trained):
+    run, _ = trained
+    before = (run / "metrics.csv").read_bytes()
+    done = command("train.py", *TINY, "hydra.run.dir=run", folder=run.parent)
+    assert done.returncode == 2 and "holds a run already" in done.stderr.strip().splitlines()[-1]
+    assert (run / "metrics.csv").read_bytes() == before
+
+
+def test_a_run_stopped_by_a_signal_resumes_to_what_it_would_have_been(trained):
+    """SIGTERM in mid-run exits with 143; the resumed run's numbers equal those of the run never stopped."""
+    run, _ = trained
+    cut = run.parent / "cut"
+    arguments = [*TINY, "checkpoint.interval=1000000", "hydra.run.dir=cut"]
+    started = subprocess.Popen(
+        [sys.executable, str(ROOT / "train.py"), *arguments],
+        cwd=run.parent,
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    deadline = time.monotonic() + 120
+    while not (cut / "metrics.csv").exists() and time.monotonic() < deadline:
+        time.sleep(0.002)
+    started.send_signal(signal.SIGTERM)
+    _, errors = started.communicate(timeout=120)
+    assert started.returncode == 128 + signal.SIGTERM, errors
+    assert "go on with resume=" in errors.strip().splitlines()[-1]
+    assert command("train.py", "resume=cut", folder=run.parent).returncode == 0
+    ours, theirs = (
+        [row.split(",")[3:] for row in (folder / "metrics.csv").read_text().splitlines()] for folder in (cut, run)
+    )
+    assert ours == theirs
+    ours, theirs = (json.loads((folder / "evaluation.json").read_text()) for folder in (cut, run))
+    assert ours["episodes"] == theirs["episodes"]
 
 
 def test_a_loaded_policy_plays(trained):

@@ -67,6 +67,10 @@ def _train_job(config: DictConfig) -> None:
     plan = settings(plain(recompose(record)) if found else plain(config))
     lock = checkpoints.RunFolderLock(folder)
     try:
+        if found is None and (folder / "checkpoints").exists():
+            raise ConfigError(
+                f"hydra.run.dir: {folder} holds a run already; go on with resume={folder}, or take another"
+            )
         (folder / "config.yaml").exists() or _write_config(folder / "config.yaml", config)
         training = Training(plan, record, folder)
         if found is not None:
