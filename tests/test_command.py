@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from warp_torchrl import load_policy, make_env
+from warp_torchrl.command import evaluate, train
 
 ROOT = Path(__file__).parent.parent
 TINY = [
@@ -158,7 +159,22 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("arguments", "code", "message"), MISTAKES, ids=lambda each: str(each)[:40])
-def test_a_mistake_ends_with_its_code_and_one_line_and_leaves_nothing(tmp_path, arguments, code, message):
+def test_a_mistake_ends_with_its_code_and_one_line_and_leaves_nothing(
+    tmp_path, monkeypatch, capsys, arguments, code, message
+):
+    program, *overrides = arguments
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [program, *overrides])
+    with pytest.raises(SystemExit) as end:
+        {"train.py": train, "evaluate.py": evaluate}[program]()
+    assert end.value.code == code
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert message in line and line.startswith("error: ")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("arguments", "code", "message"), [MISTAKES[1], MISTAKES[-1]], ids=lambda each: str(each)[:40])
+def test_a_mistake_in_a_process_of_its_own(tmp_path, arguments, code, message):
     done = command(*arguments, folder=tmp_path)
     assert done.returncode == code, done.stderr
     last = done.stderr.strip().splitlines()[-1]
