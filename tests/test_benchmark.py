@@ -18,5 +18,11 @@ def test_it_prints_json(capsys):
     assert row["what"] == "training" and row["lowest"] <= row["agent_steps_per_second"] <= row["highest"]
 
 
+def test_it_measures_environment_and_training_by_default(capsys):
+    main(["--scenario", "skirmish", "--worlds", "2", "--set", "collector.steps=4", "horizon=8"])
+    out = capsys.readouterr().out
+    assert "environment skirmish" in out and "training    skirmish" in out
+
+
 def _json(text):
     return text[text.index("{\n") :]

@@ -124,7 +124,7 @@ def _task_table(rows: list[dict[str, Any]]) -> str:
 def main(arguments: list[str] | None = None) -> None:
     """Measure what the command line asks for, and print it."""
     parser = argparse.ArgumentParser(prog="python -m warp_torchrl.benchmark", description=__doc__)
-    parser.add_argument("what", nargs="*", choices=[[], "env", "train", "tasks"], default=["env", "train"])
+    parser.add_argument("what", nargs="*", choices=[[], "env", "train", "tasks"], help="env and train by default")
     parser.add_argument("--scenario", nargs="+", help="default for speed; all four for tasks")
     parser.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE", help="overrides, as for train.py")
     parser.add_argument("--worlds", type=int, default=256)
