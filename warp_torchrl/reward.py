@@ -10,7 +10,7 @@ from typing import Literal
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.geometry import flood, nearest
+from warp_torchrl.world.geometry import chebyshev_distance, flood, nearest
 from warp_torchrl.world.state import (
     Action,
     Tally,
@@ -73,7 +73,7 @@ class Reward:
 def _distance_potential(state: WorldState) -> Tensor:
     """Return -0.5 x distance to the nearest fire / H of each agent, 0 without fire, float32 [B, A]."""
     height = state.cells.shape[1]
-    distance, _ = nearest(state.vehicles.position, is_burning(state.cells))
+    distance = chebyshev_distance(state.vehicles.position, is_burning(state.cells)).amin((2, 3))
     return -0.5 / height * distance * (state.tally.alight > 0)[:, None]
 
 

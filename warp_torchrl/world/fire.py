@@ -155,24 +155,25 @@ class Fire:
         target = pad(state.alpha * self.is_fuel(state), (0, 1, 0, 1)).view(worlds, -1)
         wind = self.wind_factor(state.wind)
         uniform_wind = wind.shape[2:] == (1, 1)
-        q = torch.zeros_like(target)
+        q, p, spared = torch.zeros_like(target), torch.empty_like(target), torch.empty_like(target)
+        one = torch.ones((), device=cells.device)
         sum_at_source = torch.zeros_like(source) if expected else None
         for direction, ((row, column), distance) in enumerate(zip(DIRECTIONS, DISTANCES, strict=True)):
             start = margin - row * (width + 1) - column
             here = slice(start, start + size)
             gain = 1.0 if self.diagonal == "unit" else 1.0 / distance
             if uniform_wind:
-                p = source[here].view_as(target) * (wind[:, direction, :, 0] * gain)
+                torch.mul(source[here].view_as(target), wind[:, direction, :, 0] * gain, out=p)
             else:
                 blown = spreading * wind[:, direction] * gain
                 p = _in_a_row(blown, margin)[here].view_as(target)
-            p = p * target
+            p.mul_(target)
             if state.slope is not None:
                 p *= state.slope[:, direction].reshape(worlds, -1)
             p.clamp_(max=1.0)
             if sum_at_source is not None:
                 sum_at_source[here] += p.view(-1)
-            q += (1.0 - q).mul_(p)
+            q.add_(torch.sub(one, q, out=spared).mul_(p))
 
         def on_map(row_of_maps: Tensor) -> Tensor:
             return row_of_maps.view(worlds, height + 1, width + 1)[:, :height, :width].contiguous()
