@@ -33,8 +33,9 @@ def test_world_state_has_the_codes_of_the_contract():
     env = make_env("skirmish", n_worlds=2)
     env.reset()
     state = env.world_state
-    assert state.cells.dtype == state.landscape.cover.dtype == torch.uint8
-    assert int(state.cells.max()) <= 15 and int(state.landscape.cover.max()) <= 4
+    assert state.cells.dtype == state.cover.dtype == torch.uint8
+    assert state.cells.shape == state.cover.shape == (2, 16, 16)
+    assert int(state.cells.max()) <= 15 and int(state.cover.max()) <= 4
 
 
 def forest(worlds=2, side=9):

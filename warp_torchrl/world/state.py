@@ -109,6 +109,11 @@ class WorldState:
     truncated: Tensor  # bool [B], the horizon was reached
 
     @property
+    def cover(self) -> Tensor:
+        """Return the land cover, uint8 [B, H, W], a ``Cover`` code."""
+        return self.landscape.cover
+
+    @property
     def done(self) -> Tensor:
         """Return which worlds have ended, bool [B]."""
         return self.terminated | self.truncated
