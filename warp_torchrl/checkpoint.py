@@ -114,10 +114,10 @@ def save(
     """
     parent = run / "checkpoints"
     parent.mkdir(parents=True, exist_ok=True)
-    final = parent / f"{frames:012d}"
+    final = parent / f"{frames}"
     if final.exists():
         return final
-    draft = parent / f".{frames:012d}.{os.getpid()}.tmp"
+    draft = parent / f".{frames}.{os.getpid()}.tmp"
     shutil.rmtree(draft, ignore_errors=True)
     draft.mkdir()
     try:
