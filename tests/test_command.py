@@ -79,6 +79,13 @@ def test_evaluate_takes_another_scenario_for_the_same_policy(trained, tmp_path):
     assert "single: 3 fires" in done.stdout
 
 
+def test_a_policy_is_refused_where_it_does_not_fit(trained, tmp_path):
+    done = command("evaluate.py", f"checkpoint={trained[0]}", "observation.radius=4", folder=tmp_path)
+    assert done.returncode == 2
+    last = done.stderr.strip().splitlines()[-1]
+    assert "view [11, 11, 11]" in last and "view [11, 9, 9]" in last
+
+
 def test_evaluate_takes_a_policy_by_name(tmp_path):
     arguments = ("policy=local", "scenario=skirmish", "horizon=12", "evaluation.episodes=4", "hydra.run.dir=seen")
     done = command("evaluate.py", *arguments, folder=tmp_path)
@@ -145,7 +152,7 @@ def test_a_sweep_trains_every_job(tmp_path):
 
 
 MISTAKES = [
-    (("train.py", "sede=3"), 2, "sede"),
+    (("train.py", "sede=3"), 2, "sede is not a key"),
     (("train.py", "team.n_agents=0"), 2, "team.n_agents must be in [1, 256], got 0"),
     (("train.py", "scenario=nowhere"), 2, "nowhere"),
     (("train.py", "+foo=1"), 2, "foo is not a key"),

@@ -31,7 +31,7 @@ from warp_torchrl.config import (
 from warp_torchrl.construction import ConfigError
 from warp_torchrl.evaluation import MODES, play, play_heuristics, record_episode, report, table, write_json
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.models import signature
+from warp_torchrl.models import Signature, signature
 from warp_torchrl.training import NumericalFailure, Stopped, Training
 
 log = logging.getLogger("warp_torchrl")
@@ -109,13 +109,14 @@ def _report(
     first, folder = plan.evaluation.first_seed, folder.resolve()
     env = plan.make_env(plan.evaluation.episodes, first)
     one = plan.make_env(1, first)
+    if found is not None:
+        _check_fits(found, env)
     others, other_modes = play_heuristics(env, first), {}
     if found is None:
         name, mode, policy = heuristic, "sampled", HEURISTICS[heuristic](one)
         episodes = others.pop(heuristic)
     else:
         policy = policy_of(found, plan.evaluation.mode).to(plan.device)
-        _check_fits(found, env)
         name, mode = f"trained, {policy.mode}", policy.mode
         episodes = play(env, policy, first, mode)
         other = next(each for each in MODES if each != mode)
@@ -132,9 +133,13 @@ def _check_fits(found: checkpoints.Checkpoint, env: Any) -> None:
     here, there = signature(env), found.manifest.signature
     if (here.observation, here.n_actions) != (there.observation, there.n_actions):
         raise ConfigError(
-            f"scenario: the policy in {found.path} was trained on observations {there.observation} and "
-            f"{there.n_actions} actions, this environment has {here.observation} and {here.n_actions}"
+            f"the policy in {found.path} was trained on observations {_shapes(there)} and {there.n_actions} actions, "
+            f"this environment has {_shapes(here)} and {here.n_actions}"
         )
+
+
+def _shapes(shape: Signature) -> str:
+    return ", ".join(f"{name or 'vector'} {list(entry.shape)}" for name, entry in shape.observation.items())
 
 
 # What a run folder records

@@ -217,6 +217,9 @@ def _check_device(name: str) -> None:
 
 def _one_line(error: Exception) -> str:
     """Return Hydra's message in one line, with the options where it lists them."""
+    unknown = re.match(r"Could not override '([^']*)'", str(error))
+    if unknown:
+        return f"{unknown[1]} is not a key of the configuration; conf/ and --cfg job show what there is"
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     return " ".join(line for line in lines if not line.startswith(("full_key", "object_type", "Set the environment")))
 
