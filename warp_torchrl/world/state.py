@@ -53,6 +53,7 @@ class Landscape:
     cover: Tensor  # uint8 [B,H,W], a Cover code
     age: Tensor  # uint8 [B,H,W], tree age before the fire, 0..10
     elevation: Tensor | None  # float32 [B,H,W] [m]; None where every world is flat
+    corner: Tensor | None = None  # int64 [B,2], (row, column) of the map's first cell in its source; None: at (0, 0)
 
 
 @tensorclass(nocast=True)
@@ -92,6 +93,7 @@ class WorldState:
     alpha: Tensor  # float32 [B,H,W], flammability of the ground
     cells: Tensor  # uint8 [B,H,W], 0 empty, 1..10 tree age, 11..15 fire
     age: Tensor  # uint8 [B,H,W], age a burning tree had when it caught fire, else 0
+    stage_age: Tensor | None  # uint8 [B,H,W], ticks burned in the present stage; None where a stage lasts one tick
     initial: Tensor  # bool [B,H,W], had a tree before ignition
     extinguished: Tensor  # bool [B,H,W], was put out at least once
     burned: Tensor  # bool [B,H,W], has burned to ash at least once

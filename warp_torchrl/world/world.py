@@ -99,7 +99,9 @@ class World:
         index = vehicles.position[..., 0] * self.size[1] + vehicles.position[..., 1]
         if (ground.cover.flatten(1).gather(1, index) == Cover.LAKE).any():
             raise ValueError(f"team.n_agents must fit on a map's dry ground, got {self.team.n_agents}")
-        state = quiet_state(ground, self.fire, self.wind(key, self.size), key, vehicles, self.side_of_cell)
+        state = quiet_state(
+            ground, self.fire, self.wind(key, self.size, ground.corner), key, vehicles, self.side_of_cell
+        )
         cells = state.cells
         state = state.replace(cells=torch.where(lit, FIRST_FIRE, cells), age=torch.where(lit, cells, state.age))
         for _ in range(self.ignition.head_start):
@@ -120,7 +122,7 @@ class World:
             The transition; ``before`` is ``state`` itself.
         """
         active = ~state.done
-        after, outcome = self.team.act(state, action, active, self.fire.last_spreading, self.fire.wet_ticks)
+        after, outcome = self.team.act(state, action, active, self.fire.last_spreading, self.fire.wet_for)
         due = active & ((state.step + 1) % self.steps_per_tick == 0)
         after = self._tick(after, due)
         return Transition(
@@ -136,8 +138,7 @@ class World:
         return self.team.action_mask(state, self.fire.last_spreading)
 
     def _tick(self, state: WorldState, due: Tensor) -> WorldState:
-        draws = uniform(state.key, state.tick, Stream.FIRE, tuple(state.cells.shape[1:]))
-        return self.fire.tick(state, draws, due)
+        return advance(state, self.fire, self.wind, due)
 
     def _advance_clock(self, state: WorldState, active: Tensor) -> WorldState:
         tally = count_trees(state)
@@ -175,6 +176,7 @@ def quiet_state(
         alpha=fire.flammability(ground.cover),
         cells=cells.clone(),
         age=none,
+        stage_age=none.clone() if fire.ticks_per_stage > 1 else None,
         initial=cells > 0,
         extinguished=no,
         burned=no.clone(),
@@ -193,6 +195,15 @@ def quiet_state(
         batch_size=key.shape,
     )
     return state.replace(tally=count_trees(state))
+
+
+def advance(state: WorldState, fire: Fire, wind: Wind, due: Tensor) -> WorldState:
+    """Advance fire and wind by one tick where it is due, bool [B]."""
+    draws = uniform(state.key, state.tick, Stream.FIRE, tuple(state.cells.shape[1:]))
+    after = fire.tick(state, draws, due)
+    if not wind.changes:
+        return after
+    return after.replace(wind=torch.where(due[:, None, None, None], wind.after_tick(after), state.wind))
 
 
 def burn(
@@ -217,6 +228,5 @@ def burn(
     state = state.replace(tick=state.tick + first_tick)
     everywhere = torch.ones_like(key, dtype=torch.bool)
     for _ in range(ticks):
-        draws = uniform(key, state.tick, Stream.FIRE, (height, width))
-        state = fire.tick(state, draws, everywhere)
+        state = advance(state, fire, wind, everywhere)
     return state.cells
