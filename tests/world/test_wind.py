@@ -7,7 +7,9 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.random import world_key
-from warp_torchrl.world.wind import Calm, Paper, Uniform, constant_wind
+from warp_torchrl.world.wind import Calm, Paper, Uniform, Wandering, constant_wind
+
+from .drawing import draw
 
 
 def keys(worlds: int) -> Tensor:
@@ -91,3 +93,74 @@ def test_a_field_does_not_depend_on_the_batch(wind: Calm | Uniform | Paper) -> N
     batch = wind(keys(70), (11, 6))
     for world in (0, 6, 69):
         assert torch.equal(batch[world : world + 1], wind(keys(70)[world : world + 1], (11, 6)))
+
+
+# A wind that wanders.
+
+
+def wander(wind: Wandering, worlds: int, ticks: int) -> tuple[Tensor, Tensor]:
+    """Return speed [m/s] and direction [radians] of each world after each tick, [T + 1, B]."""
+    state = draw("....", worlds=worlds)
+    field = wind(state.key, (1, 4))
+    fields = [field]
+    for tick in range(1, ticks + 1):
+        state = state.replace(wind=fields[-1], tick=torch.full_like(state.tick, tick))
+        fields.append(wind.after_tick(state))
+    u, v = torch.stack(fields)[..., 0, 0].unbind(2)
+    return torch.hypot(u, v), torch.atan2(v, u)
+
+
+def test_a_wandering_wind_is_an_ornstein_uhlenbeck_process() -> None:
+    # 4096 worlds. Speed 6 + N(0, 1.5^2), direction 0 + N(0, 20 degrees): standard errors of mean, deviation and
+    # correlation are deviation / 64, deviation / 90.5 and at most 1 / 64; five of them each, false alarm under 1e-5.
+    wind = Wandering(speed=6.0, direction=0.0, speed_deviation=1.5, direction_deviation=20.0, memory=10.0)
+    speed, direction = wander(wind, 4096, 30)
+    degrees = torch.rad2deg(direction)
+    for tick in (0, 1, 30):  # stationary from the start
+        assert speed[tick].mean().item() == pytest.approx(6.0, abs=5 * 1.5 / 64)
+        assert speed[tick].std().item() == pytest.approx(1.5, abs=5 * 1.5 / 90.5)
+        assert degrees[tick].mean().item() == pytest.approx(0.0, abs=5 * 20 / 64)
+        assert degrees[tick].std().item() == pytest.approx(20.0, abs=5 * 20 / 90.5)
+    for lag in (1, 10, 30):  # exp(-lag / memory)
+        for process in (speed, degrees):
+            found = torch.corrcoef(torch.stack((process[0], process[lag])))[0, 1].item()
+            assert found == pytest.approx(math.exp(-lag / 10.0), abs=5 / 64)
+    assert torch.corrcoef(torch.stack((speed[9], degrees[9])))[0, 1].abs() < 5 / 64
+
+
+def test_without_deviations_it_blows_as_a_uniform_one() -> None:
+    wandering = Wandering(speed=3.0, speed_deviation=0.0, direction_deviation=0.0)
+    speed, direction = wander(wandering, 32, 5)
+    uniform = Uniform(speed=3.0)(draw("....", worlds=32).key, (1, 4))
+    torch.testing.assert_close(wandering(draw("....", worlds=32).key, (1, 4)), uniform)
+    torch.testing.assert_close(speed, torch.full_like(speed, 3.0))
+    turned = torch.remainder(direction[5] - direction[0] + math.pi, 2 * math.pi) - math.pi
+    assert turned.abs().max() < 1e-4
+
+
+def test_a_wandering_wind_turns_through_west_without_a_jump() -> None:
+    # About 180 degrees the angle changes its sign; the wind's own course must not notice.
+    east = Wandering(direction=0.0, memory=50.0, direction_deviation=40.0)
+    west = Wandering(direction=180.0, memory=50.0, direction_deviation=40.0)
+    (_, one), (_, other) = wander(east, 256, 40), wander(west, 256, 40)
+    difference = torch.remainder(other - one, 2 * math.pi) - math.pi
+    assert difference.abs().max() < 1e-3
+
+
+def test_a_wandering_wind_never_dies_nor_storms() -> None:
+    speed, _ = wander(Wandering(speed=0.0, speed_deviation=20.0, memory=0.1), 1024, 20)
+    assert speed.min() >= 1e-3 - 1e-6 and speed.max() <= 60.0 + 1e-4
+
+
+def test_a_wandering_wind_does_not_depend_on_the_batch() -> None:
+    speed, direction = wander(Wandering(), 64, 10)
+    for worlds in (1, 7):
+        alone_speed, alone_direction = wander(Wandering(), worlds, 10)
+        assert torch.equal(alone_speed, speed[:, :worlds]) and torch.equal(alone_direction, direction[:, :worlds])
+
+
+@pytest.mark.parametrize("wind", [Calm(), Uniform(), Paper()])
+def test_other_winds_stay(wind) -> None:
+    state = draw("....").replace(wind=wind(keys(1), (1, 4)))
+    assert not wind.changes
+    assert wind.after_tick(state) is state.wind

@@ -34,6 +34,8 @@ class Stream(IntEnum):
     ACTION = 8
     CROP = 9
     POLICY = 10
+    GUST = 11
+    TERRAIN = 12
 
 
 def _shift_right(word: Tensor, bits: int, width: int) -> Tensor:
