@@ -6,11 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from warp_torchrl.world.array import Array
 from warp_torchrl.world.fire import Fire
+from warp_torchrl.world.hazard import HazardFire
 from warp_torchrl.world.ignition import Ignition
-from warp_torchrl.world.landscape import Array, Perlin
+from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.team import Team
-from warp_torchrl.world.wind import Paper, Uniform
+from warp_torchrl.world.wind import Paper, Uniform, Wandering
 from warp_torchrl.world.world import World
 
 NAN, INF = math.nan, math.inf
@@ -22,21 +24,25 @@ OUT_OF_RANGE = [
     (Fire, "p_regrow", [-0.1, 1.1, NAN]),
     (Fire, "youngest_fuel", [0, 11, NAN]),
     (Fire, "burning_stages", [3, 6, NAN]),
+    (Fire, "head_gain", [-0.1, 1.1, NAN]),
+    (Fire, "neighbours", [0, 5, 9, NAN]),
     (Fire, "wind_gain", [-0.1, 1.1, NAN]),
     (Fire, "wind_focus", [-0.1, 1.1, NAN]),
     (Fire, "slope_gain", [-0.1, 1.1, NAN]),
     (Fire, "wet_ticks", [-1, 256, NAN]),
     (Fire, "alpha", [(0.0, 0.1, 1.0, 0.8), (0, 0, 0, 0, 0, 0), (0, 0.1, 1.1, 0.8, 0), (0, -0.1, 1, 1, 0), (NAN,) * 5]),
+    (HazardFire, "refinement", [0, 65]),
+    (HazardFire, "wet_ticks", [-1, 32]),  # 32 * 8 = 256
     (Ignition, "count", [0, 65]),
     (Ignition, "radius", [-1, 9]),
     (Ignition, "region", [0.0, -0.5, 1.1, NAN]),
     (Ignition, "head_start", [-1, 1001]),
     (Perlin, "size", [3, 4097, (3, 8), (8, 3), (8, 4097), 0, -8]),
-    (Perlin, "scale", [0.9, 1.1e4, NAN]),
-    (Perlin, "octaves", [0, 13]),
-    (Perlin, "persistence", [-0.1, 1.1, NAN]),
-    (Perlin, "lacunarity", [0.9, 8.1, NAN]),
-    (Perlin, "relief", [-1.0, 10_001.0, INF, NAN]),
+    (Perlin, "scale", [0.9, 1.1e4, NAN, (0.9, 10.0), (20.0, 10.0), (10.0, NAN), (10.0,), (5.0, 10.0, 15.0), ()]),
+    (Perlin, "octaves", [0, 13, (0, 4), (4, 3), (4, 13)]),
+    (Perlin, "persistence", [-0.1, 1.1, NAN, (0.5, 1.1), (0.6, 0.5)]),
+    (Perlin, "lacunarity", [0.9, 8.1, NAN, (2.0, 8.1), (3.0, 2.0), (1.0, 8.0)]),  # 8^5 / 15 is too fine
+    (Perlin, "relief", [-1.0, 10_001.0, INF, NAN, (0.0, INF), (100.0, 0.0)]),
     (
         Perlin,
         "levels",
@@ -50,6 +56,11 @@ OUT_OF_RANGE = [
     (Uniform, "speed", [-0.1, 60.1, NAN]),
     (Uniform, "direction", [NAN, INF]),
     (Paper, "scale", [-0.1, 10.1, NAN]),
+    (Wandering, "speed", [-0.1, 60.1, NAN]),
+    (Wandering, "direction", [NAN, INF]),
+    (Wandering, "speed_deviation", [-0.1, 20.1, NAN]),
+    (Wandering, "direction_deviation", [-0.1, 90.1, NAN]),
+    (Wandering, "memory", [0.0, -1.0, 1.1e6, NAN]),
     (World, "steps_per_tick", [0, 1001]),
     (World, "horizon", [0, 1_000_001]),
     (World, "cell_size", [0.0, -30.0, 100_001.0, NAN]),
@@ -57,6 +68,7 @@ OUT_OF_RANGE = [
 
 NO_SUCH_OPTION = [
     (Fire, "diagonal", ["units"]),
+    (Fire, "kernel", ["circle"]),
     (Perlin, "frequency_law", ["texts"]),
     (Perlin, "thresholds", ["quantiles"]),
     (Team, "start", ["corners"]),
@@ -66,10 +78,11 @@ NOT_WHOLE = [
     (Fire, "youngest_fuel", [2.5]),
     (Fire, "burning_stages", [4.5]),
     (Fire, "wet_ticks", [2.5]),
+    (HazardFire, "refinement", [2.5]),
     (Ignition, "count", [1.5]),
     (Ignition, "radius", [1.5]),
     (Ignition, "head_start", [1.5]),
-    (Perlin, "octaves", [2.5]),
+    (Perlin, "octaves", [2.5, (2, 3.5)]),
     (Team, "n_agents", [2.5]),
     (Team, "tank", [2.5]),
     (World, "steps_per_tick", [2.5]),
@@ -123,7 +136,7 @@ def test_every_field_with_a_range_is_in_the_list() -> None:
         (Paper, "rotate"),
         *((World, part) for part in ("landscape", "wind", "fire", "team", "ignition")),
     }
-    for component in (Fire, Ignition, Perlin, Array, Team, Uniform, Paper, World):
+    for component in (Fire, Ignition, Perlin, Array, Team, Uniform, Paper, Wandering, World):
         for name in component.__dataclass_fields__:
             assert (component, name) in listed | free, f"{component.__name__}.{name}"
 

@@ -1,14 +1,11 @@
-"""Terrain: the shares of the covers, the laws of the noise's frequencies, the first forest, a user's arrays."""
+"""Terrain: the shares of the covers, the laws of the noise's frequencies, the first forest."""
 
-from pathlib import Path
-
-import numpy as np
 import pytest
 import torch
 from scipy.stats import chi2
 from torch import Tensor
 
-from warp_torchrl.world.landscape import Array, Perlin, draw_age, holds_trees, map_size
+from warp_torchrl.world.landscape import Perlin, draw_age, holds_trees, map_size
 from warp_torchrl.world.perlin import fractal_noise
 from warp_torchrl.world.random import Stream, world_key
 from warp_torchrl.world.state import Cover
@@ -138,43 +135,74 @@ def test_no_tree_stands_on_a_lake_or_on_bare_ground() -> None:
     assert (age[0].amax(dim=0) > 0).tolist() == [False, True, True, True, False]
 
 
-def test_an_array_is_taken_as_it_is() -> None:
-    cover = [[0, 1, 2, 3], [3, 3, 3, 4], [2, 2, 2, 2], [1, 1, 1, 1]]
-    age = [[9, 9, 9, 9], [1, 2, 3, 4], [0, 0, 0, 0], [10, 10, 10, 10]]
-    metres = [[0.0, 1.0, 2.0, 3.0]] * 4
-    ground = Array(cover=cover, age=age, elevation=metres)(keys(2))
-    assert ground.cover.tolist() == [cover] * 2
-    assert ground.elevation.tolist() == [metres] * 2
-    # Trees drawn on the lake and on the bare cell are not there.
-    assert ground.age.tolist() == [[[0, 9, 9, 9], [1, 2, 3, 0], [0, 0, 0, 0], [10, 10, 10, 10]]] * 2
-
-
-def test_an_array_without_ages_draws_them_for_each_world() -> None:
-    age = Array(cover=np.full((16, 20), 3))(keys(2)).age
-    assert age.shape == (2, 16, 20)
-    assert not torch.equal(age[0], age[1])
-
-
-def test_an_array_may_come_from_a_file(tmp_path: Path) -> None:
-    path = tmp_path / "map.npz"
-    np.savez(path, cover=np.full((4, 6), 2), elevation=np.ones((4, 6)), age=np.full((4, 6), 7))
-    source = Array(path=str(path))
-    assert source.size == (4, 6)
-    ground = source(keys(1))
-    assert (ground.age == 7).all()
-    assert (ground.elevation == 1.0).all()
-
-
-def test_a_file_that_is_missing_or_no_archive_is_an_error(tmp_path: Path) -> None:
-    text = tmp_path / "map.npz"
-    text.write_text("not an archive")
-    pickled = tmp_path / "pickled.npz"
-    np.savez(pickled, cover=np.array([{"a": 1}], dtype=object))
-    for path in (tmp_path / "nothing.npz", text, pickled, tmp_path):
-        with pytest.raises(ValueError, match="path"):
-            Array(path=str(path))
-
-
 def test_a_map_is_a_side_or_rows_and_columns() -> None:
     assert map_size(32) == (32, 32)
     assert map_size([4, 4096]) == (4, 4096)
+
+
+# Parameters as ranges, drawn for each episode.
+
+RANGES = {
+    "scale": (6.0, 30.0),
+    "octaves": (1, 6),
+    "persistence": (0.2, 0.8),
+    "lacunarity": (1.5, 2.5),
+    "relief": (20.0, 80.0),
+}
+
+
+def test_a_range_of_one_value_is_that_value() -> None:
+    fixed = Perlin(scale=9.0, octaves=3, persistence=0.4, lacunarity=1.7, relief=30.0)(keys(3))
+    pairs = Perlin(scale=(9.0, 9.0), octaves=(3, 3), persistence=(0.4, 0.4), lacunarity=(1.7, 1.7), relief=(30.0, 30.0))
+    assert torch.equal(pairs(keys(3)).elevation, fixed.elevation)
+    assert torch.equal(pairs(keys(3)).cover, fixed.cover)
+
+
+@pytest.mark.parametrize("name", RANGES)
+def test_each_parameter_takes_a_range_that_each_episode_draws_from(name: str) -> None:
+    # 4096 draws lie in the range and fill it: each quarter holds 1024, 5 sigma is 139. False alarm 2e-6 a parameter.
+    low, high = RANGES[name]
+    draws = Perlin(**{name: RANGES[name]})._draw(keys(4096), name)
+    assert draws.min() >= low and draws.max() <= high
+    if name == "octaves":
+        counts = torch.bincount(draws.long(), minlength=7)[1:]
+        assert (counts - 4096 / 6).abs().max() < 5 * (4096 * 5 / 36) ** 0.5
+    else:
+        quarter = ((draws - low) / (high - low) * 4).long()
+        assert (torch.bincount(quarter, minlength=4) - 1024).abs().max() < 139
+
+
+def test_relief_in_a_range_makes_the_height_of_each_map() -> None:
+    source = Perlin(size=8, relief=(20.0, 80.0))
+    highest = source(keys(64)).elevation.amax((1, 2))
+    torch.testing.assert_close(highest, source._draw(keys(64), "relief").float())
+    assert highest.std() > 5.0
+
+
+def test_a_world_with_drawn_octaves_is_the_world_with_that_many() -> None:
+    mixed = Perlin(size=12, octaves=(1, 4))
+    drawn = mixed._draw(keys(16), "octaves").long()
+    assert set(drawn.tolist()) == {1, 2, 3, 4}
+    for octaves in (1, 4):
+        # The lattices of the octaves left out still take their draws; only their weight is nought.
+        frequency = torch.tensor([[2.0**octave / 15.0 for octave in range(4)]]).expand(16, 4)
+        weight = torch.tensor([[0.5**octave * (octave < octaves) for octave in range(4)]]).expand(16, 4)
+        raw = fractal_noise(keys(16), (12, 12), frequency, weight, Stream.NOISE, frequency[0].tolist())
+        low, high = raw.amin((1, 2), keepdim=True), raw.amax((1, 2), keepdim=True)
+        here = drawn == octaves
+        torch.testing.assert_close(mixed.noise(keys(16))[here], ((raw - low) / (high - low))[here])
+
+
+@pytest.mark.parametrize("law", ["text", "printed"])
+def test_ranges_do_not_depend_on_the_batch(law: str) -> None:
+    source = Perlin(size=(10, 13), frequency_law=law, **RANGES)
+    many = source(keys(64))
+    for world in (0, 7, 63):
+        alone = source(keys(64)[world : world + 1])
+        assert torch.equal(alone.elevation[0], many.elevation[world])
+        assert torch.equal(alone.cover[0], many.cover[world])
+
+
+def test_seven_octaves_as_the_sum_s_upper_limit_prints() -> None:
+    six, seven = Perlin(size=64).noise(keys(2)), Perlin(size=64, octaves=7).noise(keys(2))
+    assert not torch.allclose(six, seven)

@@ -1,15 +1,13 @@
-"""Landscape sources: Perlin noise, and arrays that a user passes.
+"""Landscape sources, and the one from Perlin noise.
 
 A source has a ``size`` (H, W) and, called with world keys, returns the ``Landscape`` of each world's episode.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Literal, Protocol, runtime_checkable
 
-import numpy as np
 import torch
 from torch import Tensor
 
@@ -69,6 +67,20 @@ def holds_trees(cover: Tensor) -> Tensor:
 
 
 _PRINTED = (0.01, 0.2, 0.01)
+_RANGES = ("scale", "octaves", "persistence", "lacunarity", "relief")
+
+
+def _ends(value: float | tuple[float, float]) -> tuple[float, float]:
+    """Return the lowest and the highest value of a number or a pair."""
+    return tuple(value) if isinstance(value, Sequence) else (value, value)
+
+
+def _powers(base: Tensor, count: int) -> Tensor:
+    """Return base^0, base^1, ... [B, count] of a base [B, 1].
+
+    As a product: torch's ``pow`` gives other last bits in other batches, and a world must not.
+    """
+    return torch.cat((torch.ones_like(base), base.expand(-1, count - 1)), dim=1).cumprod(dim=1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,6 +89,9 @@ class Perlin:
 
     The noise n is scaled to [0, 1] on each map; low ground is water, high ground forest:
     lake n < L, wetland L <= n < W, grassland W <= n < G, forest n >= G.
+
+    ``scale``, ``octaves``, ``persistence``, ``lacunarity`` and ``relief`` take a number, or a pair from low to high of
+    which each episode draws its own, uniformly (the paper's conclusion regrets that they are fixed).
 
     Attributes:
         size: Side of the map, or (rows, columns) [cells].
@@ -98,14 +113,14 @@ class Perlin:
     """
 
     size: tuple[int, int] | int = 32
-    scale: float = 15.0
-    octaves: int = 6
-    persistence: float = 0.5
-    lacunarity: float = 2.0
+    scale: float | tuple[float, float] = 15.0
+    octaves: int | tuple[int, int] = 6
+    persistence: float | tuple[float, float] = 0.5
+    lacunarity: float | tuple[float, float] = 2.0
     frequency_law: Literal["text", "printed"] = "text"
     thresholds: Literal["quantile", "minmax", "printed"] = "quantile"
     levels: tuple[float, float, float] = (0.06, 0.16, 0.36)
-    relief: float = 0.0
+    relief: float | tuple[float, float] = 0.0
     independent_elevation: bool = False
 
     def __post_init__(self) -> None:
@@ -118,10 +133,10 @@ class Perlin:
             lacunarity=(1.0, 8.0),
             relief=(0.0, 10_000.0),
         )
-        if self.frequency_law == "text" and max(self._frequencies()) > 32.0:
+        if max(self._finest()) > 32.0:
             raise ValueError(
                 f"lacunarity ** (octaves - 1) / scale must be at most 32 lattice steps a cell, "
-                f"got {max(self._frequencies()):g}"
+                f"got {max(self._finest()):g}"
             )
         levels = tuple(self.levels)
         if len(levels) != 3 or not all(0.0 <= level <= 1.0 for level in levels):
@@ -134,21 +149,41 @@ class Perlin:
         noise = self.noise(key)
         cover = self._cover(noise)
         elevation = None
-        if self.relief > 0.0:
+        if _ends(self.relief)[1] > 0.0:
             ground = self.noise(key, Stream.ELEVATION) if self.independent_elevation else noise
-            elevation = self.relief * ground
+            elevation = self._draw(key, "relief").to(torch.float32)[:, None, None] * ground
         return Landscape(cover=cover, age=draw_age(key, cover), elevation=elevation, batch_size=key.shape)
 
     def noise(self, key: Tensor, stream: Stream = Stream.NOISE) -> Tensor:
         """Return the noise scaled to [0, 1] on each map, float32 [B, H, W]."""
-        amplitudes = [self.persistence**octave for octave in range(self.octaves)]
-        noise = fractal_noise(key, map_size(self.size), self._frequencies(), amplitudes, stream)
+        count = _ends(self.octaves)[1]
+        scale, lacunarity, persistence, octaves = (
+            self._draw(key, name)[:, None] for name in ("scale", "lacunarity", "persistence", "octaves")
+        )
+        steps = _powers(lacunarity, count)
+        frequency = steps / scale if self.frequency_law == "text" else 1.0 / (scale * steps)
+        amplitude = _powers(persistence, count) * (torch.arange(count, device=key.device) < octaves)
+        frequencies, amplitudes = frequency.to(torch.float32), amplitude.to(torch.float32)
+        noise = fractal_noise(key, map_size(self.size), frequencies, amplitudes, stream, self._finest())
         low, high = noise.amin((1, 2), keepdim=True), noise.amax((1, 2), keepdim=True)
         return (noise - low) / (high - low).clamp_(min=1e-12)
 
-    def _frequencies(self) -> list[float]:
-        sign = 1.0 if self.frequency_law == "text" else -1.0
-        return [self.lacunarity ** (sign * octave) / self.scale for octave in range(self.octaves)]
+    def _draw(self, key: Tensor, name: str) -> Tensor:
+        """Return each world's value of a parameter, float64 [B], or [1] where it is fixed."""
+        low, high = _ends(getattr(self, name))
+        if low == high:
+            return torch.tensor([low], dtype=torch.float64, device=key.device)
+        draw = uniform(key, _RANGES.index(name), Stream.TERRAIN, (1,))[:, 0].double()
+        if name == "octaves":
+            return low + (draw * (high - low + 1)).floor()
+        return low + draw * (high - low)
+
+    def _finest(self) -> list[float]:
+        """Return the highest frequency that each octave can have [1 / cell]."""
+        scale, octaves, (low, high) = _ends(self.scale)[0], range(_ends(self.octaves)[1]), _ends(self.lacunarity)
+        if self.frequency_law == "text":
+            return [high**octave / scale for octave in octaves]
+        return [1.0 / (scale * low**octave) for octave in octaves]
 
     def _cover(self, noise: Tensor) -> Tensor:
         if self.thresholds == "quantile":
@@ -163,74 +198,3 @@ class Perlin:
         for code, level in ((Cover.GRASSLAND, grassland), (Cover.WETLAND, wetland), (Cover.LAKE, lake)):
             cover.masked_fill_(noise < level, code)
         return cover
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Array:
-    """A landscape that the user has: cover, and optionally elevation and tree age.
-
-    Attributes:
-        path: An ``.npz`` file with ``cover`` [H, W] of codes 0..4, and optionally ``elevation`` [m] and ``age``
-            0..10; or None where the arrays are passed.
-        cover: Land cover codes [H, W], anything ``numpy.asarray`` takes.
-        elevation: Elevation [H, W] [m]; None makes a flat world.
-        age: Tree age [H, W]; None draws it for each episode.
-
-    Raises:
-        ValueError: If there is no cover, shapes differ, a code is not in 0..4, an age not in 0..10, or an elevation
-            is not finite.
-    """
-
-    path: str | None = None
-    cover: Sequence[Sequence[int]] | np.ndarray | Tensor | None = field(default=None, repr=False)
-    elevation: Sequence[Sequence[float]] | np.ndarray | Tensor | None = field(default=None, repr=False)
-    age: Sequence[Sequence[int]] | np.ndarray | Tensor | None = field(default=None, repr=False)
-
-    def __post_init__(self) -> None:
-        layers = _read_npz(self.path) if self.path is not None else {}
-        for name in ("cover", "elevation", "age"):
-            layer = layers.get(name, getattr(self, name))
-            object.__setattr__(self, name, None if layer is None else np.asarray(layer))
-        if self.cover is None:
-            raise ValueError("cover must be given, as an array or in the file that path names")
-        map_size(self.size)
-        for name, low, high in (("cover", 0, max(Cover)), ("age", 0, OLDEST)):
-            layer = getattr(self, name)
-            if layer is not None and not ((layer >= low) & (layer <= high) & (layer == np.round(layer))).all():
-                raise ValueError(f"{name} must hold whole numbers in {low}..{high}")
-        if self.elevation is not None and not np.isfinite(self.elevation).all():
-            raise ValueError("elevation must be finite everywhere")
-        for name in ("elevation", "age"):
-            layer = getattr(self, name)
-            if layer is not None and layer.shape != self.cover.shape:
-                raise ValueError(f"{name} must have the shape of cover {self.cover.shape}, got {layer.shape}")
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Return (H, W) [cells]."""
-        if self.cover.ndim != 2:
-            raise ValueError(f"cover must have two dimensions, rows and columns, got shape {self.cover.shape}")
-        return self.cover.shape
-
-    def __call__(self, key: Tensor) -> Landscape:
-        """Return the landscape of each world, the same ground for all, batch size [B]."""
-        worlds, device = key.shape[0], key.device
-
-        def layer(array: np.ndarray, dtype: torch.dtype) -> Tensor:
-            return torch.as_tensor(array, device=device).to(dtype).expand(worlds, -1, -1).contiguous()
-
-        cover = layer(self.cover, torch.uint8)
-        age = draw_age(key, cover) if self.age is None else layer(self.age, torch.uint8) * holds_trees(cover)
-        elevation = None if self.elevation is None else layer(self.elevation, torch.float32)
-        return Landscape(cover=cover, age=age, elevation=elevation, batch_size=key.shape)
-
-
-def _read_npz(path: str) -> dict[str, np.ndarray]:
-    """Read the layers of an ``.npz`` file, without pickle."""
-    if not Path(path).is_file():
-        raise ValueError(f"path must name an .npz file, nothing at {path}")
-    try:
-        with np.load(path, allow_pickle=False) as layers:
-            return {name: layers[name] for name in ("cover", "elevation", "age") if name in layers}
-    except (OSError, ValueError, EOFError, KeyError, TypeError) as error:
-        raise ValueError(f"path must name an .npz file of plain arrays, {path} is not one: {error}") from None

@@ -15,7 +15,12 @@ def fade(t: Tensor) -> Tensor:
 
 
 def fractal_noise(
-    key: Tensor, size: tuple[int, int], frequencies: list[float], amplitudes: list[float], stream: Stream
+    key: Tensor,
+    size: tuple[int, int],
+    frequencies: list[float] | Tensor,
+    amplitudes: list[float] | Tensor,
+    stream: Stream,
+    finest: list[float] | None = None,
 ) -> Tensor:
     """Return a weighted sum of gradient-noise octaves, each with its own random offset.
 
@@ -26,19 +31,24 @@ def fractal_noise(
     Args:
         key: World keys, int64 [B].
         size: (H, W) [cells].
-        frequencies: f_i of each octave [1 / cell].
-        amplitudes: a_i of each octave.
+        frequencies: f_i of each octave, for all worlds, or float32 [B, O] [1 / cell].
+        amplitudes: a_i of each octave, for all worlds, or float32 [B, O].
         stream: The stream that its gradients are drawn from.
+        finest: The highest f_i of each octave in any world of any batch, where worlds differ [1 / cell].
 
     Returns:
         float32 [B, H, W], about zero, not normalised.
     """
     device = key.device
-    frequency = torch.tensor(frequencies, device=device)[:, None]
-    offsets = uniform(key, 0, stream, (len(frequencies), 2))
+    finest = frequencies if finest is None else finest
+    frequency, amplitude = (
+        torch.as_tensor(each, dtype=torch.float32, device=device) for each in (frequencies, amplitudes)
+    )
+    frequency = frequency[..., None]
+    offsets = uniform(key, 0, stream, (len(finest), 2))
     rows, row_part = _locate(size[0], frequency, offsets[..., 0])
     columns, column_part = _locate(size[1], frequency, offsets[..., 1])
-    lattices = [tuple(math.ceil((length - 1) * f) + 3 for length in size) for f in frequencies]
+    lattices = [tuple(math.ceil((length - 1) * f) + 3 for length in size) for f in finest]
     widths = torch.tensor([width for _, width in lattices], device=device)[:, None, None]
     starts = [0, *accumulate(height * width for height, width in lattices)]
     angle = uniform(key, 1, stream, (starts[-1],)).mul_(2.0 * math.pi)
@@ -59,8 +69,8 @@ def fractal_noise(
     bottom = bottom_left + column_fade * (corner(1, 1) - bottom_left)
     octaves = top + row_fade * (bottom - top)
     total = torch.zeros(key.shape[0], *size, device=device)
-    for octave, amplitude in enumerate(amplitudes):  # one after the other: a sum's order must not depend on the batch
-        total += amplitude * octaves[:, octave]
+    for octave in range(len(finest)):  # one after the other: a sum's order must not depend on the batch
+        total += amplitude[..., octave, None, None] * octaves[:, octave]
     return total
 
 
