@@ -8,8 +8,9 @@ import os
 if "OMP_WAIT_POLICY" not in os.environ:
     os.environ.setdefault("GOMP_SPINCOUNT", "1000")
 
-from warp_torchrl.api import load_policy, make_env, simulate
+from warp_torchrl.api import load_policy, make_env
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.simulation import fire_history, simulate
 
 __version__ = "0.1.0"
-__all__ = ["WildfireEnv", "__version__", "load_policy", "make_env", "simulate"]
+__all__ = ["WildfireEnv", "__version__", "fire_history", "load_policy", "make_env", "simulate"]

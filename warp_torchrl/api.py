@@ -1,10 +1,9 @@
-"""What a user asks for by name: environments, the fire alone, trained policies."""
+"""What a user asks for by name: environments and trained policies."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
 import torch
-from torch import Tensor
 from torchrl.envs.utils import ExplorationType
 from torchrl.modules import ProbabilisticActor
 
@@ -12,10 +11,6 @@ from warp_torchrl import checkpoint as checkpoints
 from warp_torchrl.config import build_components, compose_config, plain, recompose
 from warp_torchrl.construction import build
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.state import Cover
-from warp_torchrl.world.wind import Wind, constant_wind
-from warp_torchrl.world.world import burn
 
 
 def make_env(
@@ -56,68 +51,6 @@ def make_env(
         seeds=seeds,
         device=device,
         validate=validate,
-    )
-
-
-def simulate(
-    cells: Tensor,
-    cover: Tensor,
-    elevation: Tensor | None = None,
-    wind: tuple[float, float] | Wind = (0.0, 0.0),
-    fire: str | Fire = "paper",
-    ticks: int = 1,
-    first_tick: int = 0,
-    seed: int = 0,
-    cell_size: float = 30.0,
-) -> Tensor:
-    """Run the fire alone, by the same code as the environment.
-
-    Args:
-        cells: The paper's codes, uint8 [B, H, W]: 0 empty, 1..10 tree age, 11..15 fire.
-        cover: Land cover, uint8 [B, H, W]: 0 lake, 1 wetland, 2 grassland, 3 forest, 4 bare.
-        elevation: float32 [B, H, W] [m]; None is flat.
-        wind: (u east, v north) of the air's motion [m/s], or a wind component.
-        fire: One of ``conf/fire``, ``paper`` being the complete automaton, or a ``Fire``.
-        ticks: Fire ticks to run.
-        first_tick: Counter of the first; a run cut in two goes on where it stopped.
-        seed: World i draws with ``seed + i``.
-        cell_size: Side of a cell [m].
-
-    Returns:
-        The codes after the ticks, uint8 [B, H, W].
-
-    Raises:
-        ValueError: If a shape, type, code or number does not fit.
-    """
-    for name, plane, top in (("cells", cells, 15), ("cover", cover, max(Cover))):
-        if plane.dtype != torch.uint8 or plane.ndim != 3:
-            raise ValueError(f"{name} must be uint8 [worlds, rows, columns], got {plane.dtype} {list(plane.shape)}")
-        if plane.shape != cells.shape or plane.device != cells.device:
-            raise ValueError(f"{name} must have the shape and device of cells, {list(cells.shape)} on {cells.device}")
-        if plane.numel() and int(plane.max()) > top:
-            raise ValueError(f"{name} must hold codes 0..{top}, got {int(plane.max())}")
-    if elevation is not None and elevation.shape != cells.shape:
-        raise ValueError(f"elevation must have the shape of cells, {list(cells.shape)}, got {list(elevation.shape)}")
-    if elevation is not None and not bool(torch.isfinite(elevation).all()):
-        raise ValueError("elevation must be finite everywhere")
-    for name, number in (("ticks", ticks), ("first_tick", first_tick), ("seed", seed)):
-        if number < 0:
-            raise ValueError(f"{name} must be 0 or more, got {number}")
-    automaton = (
-        build(plain(compose_config("train", [f"fire={fire}"]))["fire"], "fire") if isinstance(fire, str) else fire
-    )
-    air = constant_wind(*wind) if isinstance(wind, tuple | list) else wind
-    height = None if elevation is None else elevation.to(torch.float32)
-    return burn(
-        cells,
-        cover,
-        height,
-        wind=air,
-        fire=automaton,
-        ticks=ticks,
-        first_tick=first_tick,
-        seed=seed,
-        cell_size=cell_size,
     )
 
 

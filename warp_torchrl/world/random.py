@@ -49,17 +49,17 @@ def _splitmix64(word: Tensor) -> Tensor:
     return word ^ _shift_right(word, 31, 64)
 
 
-def world_key(seed: Tensor, episode: Tensor) -> Tensor:
+def world_key(seed: Tensor, episode: Tensor | int = 0) -> Tensor:
     """Return the key of each world's episode.
 
     Args:
         seed: int64 [B].
-        episode: int64 [B], 0 for the first.
+        episode: int64 [B], or one number; 0 is the first.
 
     Returns:
         int64 [B].
     """
-    return _splitmix64(_splitmix64(seed * 2 + 1) + episode * _GOLDEN)
+    return _splitmix64(_splitmix64(seed * 2 + 1) + torch.as_tensor(episode, device=seed.device) * _GOLDEN)
 
 
 def uniform(key: Tensor, tick: Tensor | int, stream: Stream, shape: tuple[int, ...]) -> Tensor:

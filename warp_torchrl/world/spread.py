@@ -1,6 +1,7 @@
 """How fire passes from burning cells to their neighbours: the two laws, and the sum over directions.
 
-Each burning neighbour acts on a tree with a strength f = susceptibility w_d s_d / distance_d; a law makes a chance of it.
+Each burning neighbour acts on a tree with a strength f = susceptibility w_d s_d / distance_d; a law makes chances of
+strengths.
 """
 
 from typing import Protocol
@@ -16,7 +17,7 @@ LARGEST_ALPHA = 0.95
 
 
 class Law(Protocol):
-    """What makes chances of strengths. The planes are float32 of one shape."""
+    """What makes chances of strengths; the planes are float32 of one shape."""
 
     def susceptibility(self, alpha: Tensor) -> Tensor:
         """Return the ground's part of a strength."""

@@ -19,7 +19,6 @@ from warp_torchrl.world.state import (
     Vehicles,
     WorldState,
     count_trees,
-    is_burning,
 )
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.validation import check_fields
@@ -204,29 +203,3 @@ def advance(state: WorldState, fire: Fire, wind: Wind, due: Tensor) -> WorldStat
     if not wind.changes:
         return after
     return after.replace(wind=torch.where(due[:, None, None, None], wind.after_tick(after), state.wind))
-
-
-def burn(
-    cells: Tensor,
-    cover: Tensor,
-    elevation: Tensor | None,
-    *,
-    wind: Wind,
-    fire: Fire,
-    ticks: int,
-    first_tick: int,
-    seed: int,
-    cell_size: float,
-) -> Tensor:
-    """Run the fire alone from given cells; see ``warp_torchrl.simulate``."""
-    height, width = cells.shape[1:]
-    seeds = seed + torch.arange(cells.shape[0], device=cells.device)
-    key = world_key(seeds, torch.zeros_like(seeds))
-    ground = Landscape(cover=cover, age=cells, elevation=elevation, batch_size=key.shape)
-    nobody = Team(n_agents=1).place(key, cover, is_burning(cells))
-    state = quiet_state(ground, fire, wind(key, (height, width)), key, nobody, cell_size)
-    state = state.replace(tick=state.tick + first_tick)
-    everywhere = torch.ones_like(key, dtype=torch.bool)
-    for _ in range(ticks):
-        state = advance(state, fire, wind, everywhere)
-    return state.cells

@@ -1,0 +1,139 @@
+"""The fire alone, for those who study it without vehicles."""
+
+import math
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.config import compose_config, plain
+from warp_torchrl.construction import build
+from warp_torchrl.world.burn import FireHistory, burn, start_burning, trace
+from warp_torchrl.world.fire import Fire
+from warp_torchrl.world.state import EMBER, Cover, WorldState
+from warp_torchrl.world.wind import Wind, constant_wind
+
+
+def simulate(
+    cells: Tensor,
+    cover: Tensor,
+    elevation: Tensor | None = None,
+    wind: tuple[float, float] | Wind = (0.0, 0.0),
+    fire: str | Fire = "paper",
+    ticks: int = 1,
+    first_tick: int = 0,
+    seed: int = 0,
+    cell_size: float = 30.0,
+    stage_age: Tensor | None = None,
+) -> Tensor:
+    """Run the fire alone, by the same code as the environment.
+
+    Args:
+        cells: The paper's codes, uint8 [B, H, W]: 0 empty, 1..10 tree age, 11..15 fire.
+        cover: Land cover, uint8 [B, H, W]: 0 lake, 1 wetland, 2 grassland, 3 forest, 4 bare.
+        elevation: float32 [B, H, W] [m]; None is flat.
+        wind: (u east, v north) of the air's motion [m/s], or a wind component.
+        fire: One of ``conf/fire``, ``paper`` being the complete automaton, or a ``Fire``.
+        ticks: Fire ticks to run.
+        first_tick: Ticks that were run before; a run cut in two goes on where it stopped.
+        seed: World i draws with ``seed + i``.
+        cell_size: Side of a cell [m].
+        stage_age: Ticks that each burning cell has spent in its stage, uint8 [B, H, W], of a run cut in two under law
+            ``hazard``, where a stage lasts many; None is 0. ``fire_history`` returns it.
+
+    Returns:
+        The codes after the ticks, uint8 [B, H, W].
+
+    Raises:
+        ValueError: If a shape, type, code or number does not fit.
+    """
+    state, automaton, air = _start(cells, cover, elevation, wind, fire, ticks, first_tick, seed, cell_size, stage_age)
+    return burn(state, automaton, air, ticks).cells
+
+
+def fire_history(
+    cells: Tensor,
+    cover: Tensor,
+    elevation: Tensor | None = None,
+    wind: tuple[float, float] | Wind = (0.0, 0.0),
+    fire: str | Fire = "paper",
+    ticks: int = 1,
+    first_tick: int = 0,
+    seed: int = 0,
+    cell_size: float = 30.0,
+    stage_age: Tensor | None = None,
+) -> FireHistory:
+    """Run the fire alone, as ``simulate`` does, and keep when each cell caught fire.
+
+    Many fires on one map are one call: ``cover.expand(1000, -1, -1)``.
+
+    Args:
+        cells: As for ``simulate``, and so are the others.
+        cover: See ``simulate``.
+        elevation: See ``simulate``.
+        wind: See ``simulate``.
+        fire: See ``simulate``.
+        ticks: See ``simulate``.
+        first_tick: See ``simulate``.
+        seed: See ``simulate``.
+        cell_size: See ``simulate``.
+        stage_age: See ``simulate``.
+
+    Returns:
+        Arrival times, burning cells in time and the codes at the end; ``burn_probability()`` over the worlds,
+        ``burned_area()`` in time.
+
+    Raises:
+        ValueError: If a shape, type, code or number does not fit.
+    """
+    state, automaton, air = _start(cells, cover, elevation, wind, fire, ticks, first_tick, seed, cell_size, stage_age)
+    return trace(state, automaton, air, ticks, cell_size)
+
+
+def _start(
+    cells: Tensor,
+    cover: Tensor,
+    elevation: Tensor | None,
+    wind: tuple[float, float] | Wind,
+    fire: str | Fire,
+    ticks: int,
+    first_tick: int,
+    seed: int,
+    cell_size: float,
+    stage_age: Tensor | None,
+) -> tuple[WorldState, Fire, Wind]:
+    """Return the checked worlds at their start, and the components that names and numbers stand for."""
+    for name, plane, top in (("cells", cells, EMBER), ("cover", cover, max(Cover)), ("stage_age", stage_age, 255)):
+        if plane is None:
+            continue
+        if plane.dtype != torch.uint8 or plane.ndim != 3:
+            raise ValueError(f"{name} must be uint8 [worlds, rows, columns], got {plane.dtype} {list(plane.shape)}")
+        if plane.shape != cells.shape or plane.device != cells.device:
+            raise ValueError(f"{name} must have the shape and device of cells, {list(cells.shape)} on {cells.device}")
+        if plane.numel() and int(plane.max()) > top:
+            raise ValueError(f"{name} must hold codes 0..{top}, got {int(plane.max())}")
+    if elevation is not None and (elevation.shape != cells.shape or elevation.device != cells.device):
+        raise ValueError(f"elevation must have the shape of cells, {list(cells.shape)}, got {list(elevation.shape)}")
+    if elevation is not None and not bool(torch.isfinite(elevation).all()):
+        raise ValueError("elevation must be finite everywhere")
+    for name, number in (("ticks", ticks), ("first_tick", first_tick), ("seed", seed)):
+        if number < 0:
+            raise ValueError(f"{name} must be 0 or more, got {number}")
+    if not 0.0 < cell_size < math.inf:
+        raise ValueError(f"cell_size must be over 0 m, got {cell_size}")
+    node = plain(compose_config("train", [f"fire={fire}"]))["fire"] if isinstance(fire, str) else None
+    automaton = fire if node is None else build(node, "fire")
+    if stage_age is not None and int(stage_age.max()) >= automaton.ticks_per_stage:
+        raise ValueError(f"stage_age must be under {automaton.ticks_per_stage} ticks, got {int(stage_age.max())}")
+    air = constant_wind(*wind) if isinstance(wind, tuple | list) else wind
+    state = start_burning(
+        cells,
+        cover,
+        None if elevation is None else elevation.to(torch.float32),
+        wind=air,
+        fire=automaton,
+        first_tick=first_tick,
+        stage_age=stage_age,
+        seed=seed,
+        cell_size=cell_size,
+    )
+    return state, automaton, air
