@@ -56,7 +56,7 @@ def test_hydra_appears_only_where_configuration_is_composed(module):
 
 @pytest.mark.parametrize("module", MODULES)
 def test_rasterio_is_imported_in_one_place(module):
-    if module != "world/raster":
+    if module != "world/layer":
         assert "rasterio" not in {name.split("/")[0] for name in imports(module)}
 
 

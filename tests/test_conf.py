@@ -3,6 +3,7 @@
 from dataclasses import fields
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from warp_torchrl.config import (
@@ -16,6 +17,8 @@ from warp_torchrl.config import (
     without_targets,
 )
 from warp_torchrl.construction import ConfigError, build
+from warp_torchrl.world.array import Array
+from warp_torchrl.world.raster import Raster
 
 SCENARIOS = ("skirmish", "single", "default", "large")
 OPTIONS = [(path.parent.name, path.stem) for path in sorted(conf_folder().glob("*/*.yaml"))]
@@ -24,17 +27,29 @@ LANDFIRE = Path(__file__).parent.parent.parent / "shared" / "landscapes" / "land
 
 @pytest.mark.parametrize(("group", "option"), [each for each in OPTIONS if each[0] in COMPONENTS])
 def test_every_option_builds_and_holds_every_field(group, option):
-    if (group, option) == ("landscape", "raster"):
-        with pytest.raises(ConfigError, match=r"landscape\.path must name"):
-            build(plain(compose_config("train", ["landscape=raster"]))[group], group)
-        return
     node = plain(compose_config("train", [f"{group}={option}"]))[group]
-    component = build(node, group)
+    if option in ("raster", "array"):  # these need a file of the user's
+        with pytest.raises(ConfigError, match=r"landscape\.path must name"):
+            build(node, group)
+        component = {"raster": Raster, "array": Array}[option]
+    else:
+        component = build(node, group)
     assert set(node) - {"_target_"} == {each.name for each in fields(component) if each.init} - _derived(component)
 
 
 def _derived(component):
     return {each.name for each in fields(component) if each.name.startswith("_")}
+
+
+@pytest.mark.parametrize("scenario", ["single", "default"])
+def test_an_array_runs_in_every_scenario_cropped_to_its_size(scenario, tmp_path):
+    np.savez(tmp_path / "land.npz", cover=np.full((40, 50), 3))
+    overrides = [f"scenario={scenario}", "landscape=array", f"landscape.path={tmp_path / 'land.npz'}"]
+    plan = settings(plain(compose_config("train", overrides)))
+    env = plan.make_env(2, 0)
+    env.reset()
+    side = plan.world.size[0]
+    assert env.world_state.cover.shape == (2, side, side) and side < 40
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)

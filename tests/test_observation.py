@@ -16,7 +16,7 @@ from warp_torchrl.observation import (
     own_vector,
     picture,
 )
-from warp_torchrl.world.landscape import Array
+from warp_torchrl.world.array import Array
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.wind import Uniform
 

@@ -5,8 +5,8 @@ import torch
 
 from tests.conftest import small_world
 from warp_torchrl.reward import Efficiency, Paper, Reward
+from warp_torchrl.world.array import Array
 from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.landscape import Array
 from warp_torchrl.world.state import Action, count_trees
 from warp_torchrl.world.team import Team
 

@@ -1,6 +1,7 @@
 """Every rule that a component states for its fields: a bad value is a ValueError that names the field."""
 
 import math
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -48,6 +49,9 @@ OUT_OF_RANGE = [
         "levels",
         [(0.1, 0.2), (0.1, 0.2, 0.3, 0.4), (-0.1, 0.2, 0.3), (0.1, 0.2, 1.1), (0.01, 0.2, 0.01), (NAN,) * 3],
     ),
+    (Array, "size", [3, 4097, (3, 8)]),
+    (Array, "min_fuel", [-0.1, 1.1, NAN]),
+    (Array, "cell_size", [0.0, -30.0, 100_001.0, NAN]),
     (Array, "cover", [None, [3] * 16, [[5] * 5] * 4, [[-1] * 5] * 4, [[2.5] * 5] * 4, [[NAN] * 5] * 4]),
     (Team, "n_agents", [0, -1, 257]),
     (Team, "roles", [(), ("tank",), ("ugv", "boat"), "ugv"]),
@@ -89,7 +93,7 @@ NOT_WHOLE = [
     (World, "horizon", [9.5]),
 ]
 
-MALFORMED = [(Perlin, "size", [(8,), (8, 8, 8), 8.5, "8"])]
+MALFORMED = [(component, "size", [(8,), (8, 8, 8), 8.5, "8"]) for component in (Perlin, Array)]
 
 
 def each(rules: list[tuple[type, str, list[Any]]]) -> list[Any]:
@@ -132,12 +136,14 @@ def test_every_field_with_a_range_is_in_the_list() -> None:
         (Array, "path"),
         (Array, "elevation"),
         (Array, "age"),
+        (Array, "row"),
+        (Array, "column"),
         (Team, "allow_stay"),
         (Paper, "rotate"),
         *((World, part) for part in ("landscape", "wind", "fire", "team", "ignition")),
     }
     for component in (Fire, Ignition, Perlin, Array, Team, Uniform, Paper, Wandering, World):
-        for name in component.__dataclass_fields__:
+        for name in (field.name for field in fields(component) if field.init):
             assert (component, name) in listed | free, f"{component.__name__}.{name}"
 
 

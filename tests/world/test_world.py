@@ -1,19 +1,18 @@
 """The world as a whole: order of a step, bookkeeping, endings, and the same evolution wherever it runs."""
 
-from dataclasses import replace
-
 import pytest
 import torch
 from torch import Tensor
 
+from warp_torchrl.world.array import Array
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.ignition import Ignition
-from warp_torchrl.world.landscape import Array, Perlin
+from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import Cover, WorldState, count_trees, is_burning, is_tree
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.wind import Calm, Paper, Uniform
-from warp_torchrl.world.world import World, burn
+from warp_torchrl.world.world import World
 
 from .drawing import differing, draw, drawn, planes
 
@@ -113,29 +112,6 @@ def test_teams_that_stay_away_meet_the_same_fire() -> None:
     for _ in range(40):
         alone, together = one.step(alone, stay(one, alone)).after, five.step(together, stay(five, together)).after
         assert torch.equal(alone.cells, together.cells)
-
-
-def test_the_fire_alone_is_the_fire_of_the_world(world: World) -> None:
-    # ``burn`` draws world i with seed + i from ``first_tick`` on, so it must go on just as an idle team's world does.
-    state = start(replace(world, ignition=Ignition(head_start=2)), range(5, 9))
-    after = state
-    due = torch.ones(4, dtype=torch.bool)
-    for _ in range(6):
-        draws = uniform(after.key, after.tick, Stream.FIRE, tuple(after.cells.shape[1:]))
-        after = world.fire.tick(after, draws, due)
-    ground = state.landscape
-    alone = burn(
-        state.cells,
-        ground.cover,
-        ground.elevation,
-        wind=world.wind,
-        fire=world.fire,
-        ticks=6,
-        first_tick=2,
-        seed=5,
-        cell_size=30.0,
-    )
-    assert torch.equal(alone, after.cells)
 
 
 # Reset.

@@ -1,0 +1,67 @@
+"""Where the cells of a layer lie: shape, coordinate reference system and place, and whether two layers agree."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+
+class Grid(NamedTuple):
+    """Where the cells of a layer lie.
+
+    Attributes:
+        shape: (rows, columns).
+        crs: Coordinate reference system, a ``rasterio.crs.CRS``; None where the file has none.
+        transform: From (column, row) to coordinates, an ``affine.Affine``; the identity where the file has none.
+    """
+
+    shape: tuple[int, int]
+    crs: Any
+    transform: Any
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Return (west, south, east, north) in the CRS."""
+        (rows, columns), (a, b, left, d, e, top) = self.shape, self.transform[:6]
+        x = [left + a * column + b * row for column in (0, columns) for row in (0, rows)]
+        y = [top + d * column + e * row for column in (0, columns) for row in (0, rows)]
+        return min(x), min(y), max(x), max(y)
+
+    @property
+    def cell_size(self) -> float:
+        """Return the side of a cell of a metric grid [m]; 30 where the file has no place on Earth."""
+        if self.transform == type(self.transform).identity():
+            return 30.0
+        return self.transform[0] * (self.crs.linear_units_factor[1] if self.crs else 1.0)
+
+    @property
+    def is_metric(self) -> bool:
+        """Return whether the cells are squares of 0.1 m to 100 km, north up (a hundredth of a side may be off)."""
+        if self.crs and not self.crs.is_projected:
+            return False
+        side, skew_x, _, skew_y, down, _ = self.transform[:6]
+        straight = all(abs(off) <= 0.01 * side for off in (skew_x, skew_y, side + down))
+        return self.transform == type(self.transform).identity() or (straight and 0.1 <= self.cell_size <= 100_000.0)
+
+    @property
+    def is_on_earth(self) -> bool:
+        """Return whether the CRS, projected or in degrees, gives the cells a place on Earth."""
+        return bool(self.crs) and (self.crs.is_projected or self.crs.is_geographic)
+
+    def differs_in(self, other: "Grid") -> str | None:
+        """Return ``shape``, ``crs`` or ``bounds``, the first that differs; None where every cell lies on its like."""
+        near = 0.01 * abs(other.transform[0])
+        if self.shape == other.shape and self.crs == other.crs:
+            return None if np.allclose(self.bounds, other.bounds, rtol=0, atol=near) else "bounds"
+        return "crs" if self.shape == other.shape else "shape"
+
+
+def check_grid(name: str, grid: Grid, other: str, reference: Grid) -> None:
+    """Refuse a layer whose cells do not lie on those of another, ``other``.
+
+    Raises:
+        ValueError: With what differs: the shape, the CRS or the bounds.
+    """
+    what = grid.differs_in(reference)
+    if what is not None:
+        wanted, got = getattr(reference, what), getattr(grid, what)
+        raise ValueError(f"{name} must have the {what.replace('crs', 'CRS')} of {other}, {wanted}, got {got}")
