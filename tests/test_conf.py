@@ -18,6 +18,7 @@ from warp_torchrl.config import (
 )
 from warp_torchrl.construction import ConfigError, build
 from warp_torchrl.world.array import Array
+from warp_torchrl.world.gridded import Gridded
 from warp_torchrl.world.raster import Raster
 
 SCENARIOS = ("skirmish", "single", "default", "large")
@@ -28,10 +29,11 @@ LANDFIRE = Path(__file__).parent.parent.parent / "shared" / "landscapes" / "land
 @pytest.mark.parametrize(("group", "option"), [each for each in OPTIONS if each[0] in COMPONENTS])
 def test_every_option_builds_and_holds_every_field(group, option):
     node = plain(compose_config("train", [f"{group}={option}"]))[group]
-    if option in ("raster", "array"):  # these need a file of the user's
-        with pytest.raises(ConfigError, match=r"landscape\.path must name"):
+    needs_a_file = {"raster": Raster, "array": Array, "gridded": Gridded}
+    if option in needs_a_file:
+        with pytest.raises(ConfigError, match=rf"{group}\.path must name"):
             build(node, group)
-        component = {"raster": Raster, "array": Array}[option]
+        component = needs_a_file[option]
     else:
         component = build(node, group)
     assert set(node) - {"_target_"} == {each.name for each in fields(component) if each.init} - _derived(component)

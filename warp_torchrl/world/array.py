@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from hashlib import sha256
 from math import prod
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +65,7 @@ class Array:
         layers = {name: getattr(self, name) for name in LAYERS if getattr(self, name) is not None}
         if self.path is not None and layers:
             raise ValueError(f"path must be null where arrays are passed, got {self.path} and {', '.join(layers)}")
-        layers = layers if self.path is None else _read_npz(self.path)
+        layers = layers if self.path is None else read_npz(self.path, tuple(LAYERS))
         if "cover" not in layers:
             raise ValueError(f"path must name an .npz file with cover where cover is not passed, got {self.path}")
         layers = {name: _check_layer(name, layer) for name, layer in layers.items()}
@@ -82,14 +83,27 @@ class Array:
         """Return the landscape of each world's window, batch size [B]."""
         return self._crop(key)
 
+    @property
+    def extent(self) -> tuple[int, int]:
+        """Return (rows, columns) of the whole array."""
+        return self._crop.extent
 
-def _read_npz(path: str) -> dict[str, np.ndarray]:
-    """Read the layers of an ``.npz`` file, without pickle; an enormous one is refused from its header."""
+    def reach(self) -> np.ndarray:
+        """Return where a world may lie, bool [rows, columns]."""
+        return self._crop.reach()
+
+
+def read_npz(path: str | PathLike[str], names: tuple[str, ...]) -> dict[str, np.ndarray]:
+    """Return the arrays of an ``.npz`` file that have these names, without pickle.
+
+    Raises:
+        ValueError: If it cannot be read; if it is enormous, from its header.
+    """
     try:
         if not Path(path).is_file():
             raise FileNotFoundError("there is no such file")
         with zipfile.ZipFile(path) as archive:
-            shapes = {name: _read_shape(archive, name) for name in LAYERS if f"{name}.npy" in archive.namelist()}
+            shapes = {name: _read_shape(archive, name) for name in names if f"{name}.npy" in archive.namelist()}
         largest = max(map(prod, shapes.values()), default=0)
         if largest <= LARGEST_MAP:
             with np.load(path, allow_pickle=False) as layers:

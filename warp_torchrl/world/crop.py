@@ -73,6 +73,20 @@ class Crop:
         age = self._fill_age(key, cover, age)
         return Landscape(cover=cover, age=age, elevation=elevation, corner=corner, batch_size=key.shape)
 
+    @property
+    def extent(self) -> tuple[int, int]:
+        """Return (rows, columns) of the map."""
+        return self.cover.shape
+
+    def reach(self) -> np.ndarray:
+        """Return the cells that some window has, bool [rows, columns]."""
+        height, width = map_size(self.size)
+        corners = self._maps[torch.device("cpu")][0].numpy()
+        first = np.zeros(self.cover.shape, bool)
+        first.flat[corners] = True
+        padded = torch.from_numpy(np.pad(first, ((height - 1, 0), (width - 1, 0))))
+        return (_sum_windows(padded, height, width) > 0).numpy()
+
     def _cut(self, layer: Tensor, corner: Tensor) -> Tensor:
         """Return each world's window of a layer, [B, H, W]."""
         height, width = map_size(self.size)

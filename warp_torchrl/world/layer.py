@@ -17,6 +17,8 @@ import numpy as np
 
 from warp_torchrl.world.grid import Grid
 
+Method = Literal["nearest", "mode", "bilinear"]
+"""How values are put on another grid."""
 LARGEST_MAP = 100_000_000
 """Most cells of a map that is read; a header that declares more is refused."""
 _HEADER_LINE, _NUMBER = rb"(?i)\s*(ncols|nrows|[xy]ll|cellsize|d[xy]|nodata)", rb"(?i)(?<!\S)(nan|[-+.\de]+)(?!\S)"
@@ -87,9 +89,7 @@ def read_layer(name: str, path: Path) -> tuple[np.ndarray, np.ndarray]:
     return values, known
 
 
-def resample_layer(
-    name: str, path: Path, grid: Grid, method: Literal["nearest", "mode", "bilinear"]
-) -> tuple[np.ndarray, np.ndarray]:
+def resample_layer(name: str, path: Path, grid: Grid, method: Method) -> tuple[np.ndarray, np.ndarray]:
     """Return a layer's values on another grid, which may have another CRS, and where they are known.
 
     Args:
@@ -109,21 +109,43 @@ def resample_layer(
         ValueError: As ``read_grid`` and ``read_layer``; or if either grid has no CRS, or they do not overlap.
     """
     source = read_grid(name, path, metric=False)
-    _check_overlap(name, path, source, grid)
-    values, known = read_layer(name, path)
-    with _open(name, path):
-        from rasterio.warp import Resampling, reproject
+    _check_overlap(name, source, grid)
+    return resample(name, *read_layer(name, path), source, grid, method)
 
-        hole = math.nan if method == "bilinear" else _UNKNOWN
-        target = np.full(grid.shape, hole)
-        nodata = {"src_nodata": hole, "dst_nodata": hole} if method == "bilinear" else {}
-        places = {"src_transform": source.transform, "src_crs": source.crs}
-        places |= {"dst_transform": grid.transform, "dst_crs": grid.crs}
-        values = np.where(known, values, hole).astype(np.float64)
+
+def resample(
+    name: str, values: np.ndarray, known: np.ndarray, source: Grid, grid: Grid, method: Method
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return values of one grid on another; see ``resample_layer``.
+
+    Args:
+        name: What the layer is, for messages.
+        values: Its values, [rows, columns] of ``source``.
+        known: Where they are known, bool.
+        source: The grid that they are on.
+        grid: The grid to put them on.
+        method: ``nearest``, ``mode`` or ``bilinear``.
+
+    Returns:
+        float64 and bool, [H, W] of ``grid``.
+
+    Raises:
+        ValueError: If either grid has no CRS, they do not overlap, or one cannot be reached from the other.
+    """
+    _check_overlap(name, source, grid)
+    from rasterio.warp import Resampling, reproject
+
+    hole = math.nan if method == "bilinear" else _UNKNOWN
+    target = np.full(grid.shape, hole)
+    nodata = {"src_nodata": hole, "dst_nodata": hole} if method == "bilinear" else {}
+    places = {"src_transform": source.transform, "src_crs": source.crs}
+    places |= {"dst_transform": grid.transform, "dst_crs": grid.crs}
+    values = np.where(known, values, hole).astype(np.float64)
+    with _gdal_errors(f"{name} must be resampled to {grid.crs}, which fails"):
         reproject(values, target, **places, **nodata, resampling=Resampling[method], init_dest_nodata=False)
     known = ~np.isnan(target) if method == "bilinear" else target != _UNKNOWN
     if not known.any():
-        raise ValueError(f"{name} must hold data where it is resampled to, {path} has none there")
+        raise ValueError(f"{name} must hold data where it is resampled to, {grid.bounds}, it has none there")
     return target, known
 
 
@@ -181,15 +203,15 @@ def _project_bounds(name: str, grid: Grid, crs: Any) -> tuple[float, float, floa
         raise ValueError(f"{name} must have a CRS that {crs} can be reached from, got {grid.crs}: {reason}") from None
 
 
-def _check_overlap(name: str, path: Path, source: Grid, grid: Grid) -> None:
+def _check_overlap(name: str, source: Grid, grid: Grid) -> None:
     if not (source.is_on_earth and grid.is_on_earth):
         rule = "have a CRS, projected or in degrees, and so must the grid that it is resampled to"
-        raise ValueError(f"{name} must {rule}, {path} has {source.crs}, the grid {grid.crs}")
+        raise ValueError(f"{name} must {rule}, it has {source.crs}, the grid {grid.crs}")
     west, south, east, north = _project_bounds(name, source, grid.crs)
     left, bottom, right, top = grid.bounds
     if not (west < right and left < east and south < top and bottom < north):
         got = tuple(round(each, 1) for each in (west, south, east, north))
-        raise ValueError(f"{name} must overlap the grid {grid.bounds} that it is resampled to, {path} covers {got}")
+        raise ValueError(f"{name} must overlap the grid {grid.bounds} that it is resampled to, it covers {got}")
 
 
 @contextmanager
@@ -197,19 +219,28 @@ def _open(name: str, path: Path) -> Iterator[Any]:
     """Open a layer with the driver that its suffix states; GDAL's errors become one line."""
     try:
         import rasterio
-        from rasterio._err import CPLE_BaseError
     except ImportError:
         raise ValueError('path must be read with rasterio, which is missing: pip install "warp_torchrl[gis]"') from None
     driver = _DRIVERS.get(path.suffix.lower())
     if driver is None:
         raise ValueError(f"{name} must be a GeoTIFF (.tif, .tiff) or an ESRI ASCII grid (.asc), got {path}")
     options = {"datatype": "Float64"} if driver == "AAIGrid" else {}  # left to guess integers, GDAL cuts decimals off
-    try:
+    with _gdal_errors(f"{name} must be a whole {driver} raster, {path} cannot be read"):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
             dataset = rasterio.open(path, driver=driver, **options)
         with dataset:
             yield dataset
-    except (rasterio.errors.RasterioError, rasterio.errors.CRSError, CPLE_BaseError, OSError) as error:
+
+
+@contextmanager
+def _gdal_errors(rule: str) -> Iterator[None]:
+    """Turn what GDAL raises into one line."""
+    from rasterio._err import CPLE_BaseError
+    from rasterio.errors import CRSError, RasterioError
+
+    try:
+        yield
+    except (RasterioError, CRSError, CPLE_BaseError, OSError) as error:
         reason = " ".join(str(error.__cause__ or error).split())
-        raise ValueError(f"{name} must be a whole {driver} raster, {path} cannot be read: {reason}") from None
+        raise ValueError(f"{rule}: {reason}") from None

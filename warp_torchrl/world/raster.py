@@ -103,6 +103,15 @@ class Raster:
         return self._grid
 
     @property
+    def extent(self) -> tuple[int, int]:
+        """Return (rows, columns) of the grid."""
+        return self._crop.extent
+
+    def reach(self) -> np.ndarray:
+        """Return where a world may lie, bool [rows, columns]."""
+        return self._crop.reach()
+
+    @property
     def cell_size(self) -> float:
         """Return the side of a cell of the grid [m]; 30 where the fuel layer has no place on Earth."""
         return self._grid.cell_size

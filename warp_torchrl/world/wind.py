@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from warp_torchrl.world.landscape import LandscapeSource
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.validation import check_fields
@@ -39,6 +40,14 @@ class Wind(ABC):
     def after_tick(self, state: WorldState) -> Tensor:
         """Return the field of each world after its tick number ``state.tick``, shape of ``state.wind`` [m/s]."""
         return state.wind
+
+    def over(self, landscape: LandscapeSource) -> "Wind":
+        """Return the wind on a landscape's map.
+
+        Raises:
+            ValueError: If it does not fit there.
+        """
+        return self
 
 
 @dataclass(frozen=True, kw_only=True)

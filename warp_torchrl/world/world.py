@@ -1,6 +1,7 @@
 """The world: assembles landscape, wind, fire and team, and is the only one that draws for them."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import torch
 from torch import Tensor
@@ -55,6 +56,7 @@ class World:
     def __post_init__(self) -> None:
         check_fields(self, steps_per_tick=(1, 1000), horizon=(1, 1_000_000), cell_size=(0.01, 100_000.0))
         height, width = self.size
+        _ = self.air  # refuses a wind that does not fit the landscape
         if self.team.n_agents > height * width // 4:
             raise ValueError(
                 f"team.n_agents must be at most a quarter of the map's {height * width} cells, got {self.team.n_agents}"
@@ -74,6 +76,11 @@ class World:
     def side_of_cell(self) -> float:
         """Return the side of a cell in force [m]."""
         return getattr(self.landscape, "cell_size", 30.0) if self.cell_size is None else self.cell_size
+
+    @cached_property
+    def air(self) -> Wind:
+        """Return the wind on this landscape's map."""
+        return self.wind.over(self.landscape)
 
     def reset(self, seed: Tensor, episode: Tensor) -> WorldState:
         """Start an episode in each world: the ground, the fire after its head start, the team.
@@ -99,7 +106,7 @@ class World:
         if (ground.cover.flatten(1).gather(1, index) == Cover.LAKE).any():
             raise ValueError(f"team.n_agents must fit on a map's dry ground, got {self.team.n_agents}")
         state = quiet_state(
-            ground, self.fire, self.wind(key, self.size, ground.corner), key, vehicles, self.side_of_cell
+            ground, self.fire, self.air(key, self.size, ground.corner), key, vehicles, self.side_of_cell
         )
         cells = state.cells
         state = state.replace(cells=torch.where(lit, FIRST_FIRE, cells), age=torch.where(lit, cells, state.age))
@@ -137,7 +144,7 @@ class World:
         return self.team.action_mask(state, self.fire.last_spreading)
 
     def _tick(self, state: WorldState, due: Tensor) -> WorldState:
-        return advance(state, self.fire, self.wind, due)
+        return advance(state, self.fire, self.air, due)
 
     def _advance_clock(self, state: WorldState, active: Tensor) -> WorldState:
         tally = count_trees(state)
