@@ -539,51 +539,6 @@ def test_with_four_neighbours_no_fire_goes_across_a_corner() -> None:
     assert drawn(tick(fire, draw("TTT TaT TTT"), u=0.0)) == "TaT aba TaT"
 
 
-# Laws of the front.
-
-
-def test_a_certain_fire_has_a_square_front() -> None:
-    # alpha 1, calm, flat, unit diagonal: after t ticks just the cells within t king's moves have caught fire.
-    fire, side = Fire(diagonal="unit"), 25
-    rows = ["T" * side] * 12 + ["T" * 12 + "a" + "T" * 12] + ["T" * side] * 12
-    state = draw(" ".join(rows))
-    place = (torch.arange(side) - 12).abs()
-    distance = torch.maximum(place[:, None], place[None, :])
-    for ticks in range(1, 13):
-        state = tick(fire, state)
-        assert torch.equal(state.cells[0] != 10, distance <= ticks)
-        front = state.cells[0][distance == ticks]
-        assert (front == 11).all()
-
-
-def burned_share(transmission: float, worlds: int, side: int) -> Tensor:
-    """Return the share of trees burned in each world, from a 7 x 7 fire in the middle, [B].
-
-    A tree passes the fire to a neighbour with chance 1 - (1 - alpha)^4 over its four spreading stages.
-    """
-    alpha = 1.0 - (1.0 - transmission) ** 0.25
-    fire = Fire(alpha=(0.0, 0.0, alpha, 0.0, 0.0), diagonal="unit")
-    state = draw(tiled("T", side, side), fire=fire, worlds=worlds)
-    middle = slice(side // 2 - 3, side // 2 + 4)
-    state.cells[:, middle, middle] = 11
-    while is_burning(state.cells).any():
-        state = tick(fire, state)
-    return state.burned.float().mean((1, 2))
-
-
-def test_a_fire_dies_below_the_percolation_threshold_and_spreads_above() -> None:
-    # Bond percolation on the king's graph: threshold 0.2504. Measured over 64 worlds: a mean of 0.16 and at most 0.49
-    # of the trees at 0.23; at 0.30 a mean of 0.86 and at least 0.81.
-    dying, spreading = burned_share(0.23, worlds=8, side=65), burned_share(0.30, worlds=8, side=65)
-    assert dying.mean() < 0.3
-    assert spreading.min() > 0.7
-
-
-def test_the_paper_s_wetland_does_burn() -> None:
-    # alpha 0.1: 1 - 0.9^4 = 0.344, above the threshold.
-    assert burned_share(0.3439, worlds=4, side=49).min() > 0.8
-
-
 @pytest.mark.parametrize("wind", [Paper(), Paper(rotate=True)])
 def test_a_chance_does_not_depend_on_the_batch(wind: Wind) -> None:
     fire = Fire(beta=0.65)

@@ -93,7 +93,7 @@ def test_what_is_no_wind_is_an_error_that_names_it(options, message) -> None:
 
 
 def test_a_wind_of_another_shape_than_the_map_is_an_error() -> None:
-    with pytest.raises(ValueError, match=r"wind must have the shape of the landscape's map, \[16, 16\], got \[12, 14\]"):
+    with pytest.raises(ValueError, match=r"wind must have the shape of the landscape's map, \[16, 16\], got"):
         World(landscape=Perlin(size=16), wind=Gridded(u=U, v=V))
     World(landscape=Perlin(size=(ROWS, COLUMNS)), wind=Gridded(u=U, v=V))
 

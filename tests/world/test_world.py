@@ -1,17 +1,20 @@
 """The world as a whole: order of a step, bookkeeping, endings, and the same evolution wherever it runs."""
 
+import numpy as np
 import pytest
 import torch
 from torch import Tensor
 
 from warp_torchrl.world.array import Array
 from warp_torchrl.world.fire import Fire
+from warp_torchrl.world.gridded import Gridded
+from warp_torchrl.world.hazard import HazardFire
 from warp_torchrl.world.ignition import Ignition
 from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import Cover, WorldState, count_trees, is_burning, is_tree
 from warp_torchrl.world.team import Team
-from warp_torchrl.world.wind import Calm, Paper, Uniform
+from warp_torchrl.world.wind import Calm, Paper, Uniform, Wandering
 from warp_torchrl.world.world import World
 
 from .drawing import differing, draw, drawn, planes
@@ -20,6 +23,7 @@ STAY, EXTINGUISH, CLEAR, EAST = 10, 8, 9, 2
 
 COMPLETE_FIRE = Fire(growth=True, beta=0.65, p_regrow=0.01)
 SMALL_TEAM = Team(n_agents=3, roles=("ugv", "uav"))
+MAP = np.random.default_rng(0).integers(1, 5, (20, 30))  # land covers
 WORLDS = {
     "control": World(landscape=Perlin(size=(16, 21)), wind=Calm(), team=SMALL_TEAM, steps_per_tick=2),
     "relief and the paper's wind": World(
@@ -37,6 +41,20 @@ WORLDS = {
         team=Team(n_agents=2, allow_stay=False),
         steps_per_tick=3,
         horizon=150,
+    ),
+    "law hazard, the ellipse, a wind that wanders, drawn terrain": World(
+        landscape=Perlin(size=(14, 17), scale=(6.0, 20.0), octaves=(1, 6), persistence=(0.3, 0.6), relief=(0.0, 90.0)),
+        wind=Wandering(speed=7.0),
+        fire=HazardFire(kernel="ellipse", p_regrow=0.02, refinement=3),
+        team=SMALL_TEAM,
+        steps_per_tick=1,
+    ),
+    "windows of a map and its winds in time, four neighbours": World(
+        landscape=Array(cover=MAP, elevation=MAP * 9.0, size=(12, 15)),
+        wind=Gridded(u=np.stack([MAP - 2.0, 2.0 - MAP]), v=np.stack([MAP, MAP / 2.0]), ticks_per_field=4),
+        fire=Fire(neighbours=4, growth=True),
+        team=SMALL_TEAM,
+        steps_per_tick=2,
     ),
 }
 
