@@ -15,7 +15,7 @@ from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import Cover, WorldState, count_trees, is_burning, is_tree
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.wind import Calm, Paper, Uniform, Wandering
-from warp_torchrl.world.world import World
+from warp_torchrl.world.world import World, advance
 
 from .drawing import differing, draw, drawn, planes
 
@@ -96,6 +96,17 @@ def test_a_world_alone_is_the_world_in_batches_of_7_and_64(world: World) -> None
         assert differing(many[40:47], few) == [], step
         many, few, alone = (world.step(state, chosen(world, state)).after for state in (many, few, alone))
     assert many.done.any() or world.horizon > 200
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA device")
+def test_cuda_burns_as_the_cpu_does_for_100_ticks(world: World) -> None:
+    ours = start(world, range(4))
+    theirs, everywhere = ours.to("cuda"), torch.ones(4, dtype=torch.bool)
+    for tick in range(100):
+        ours = advance(ours, world.fire, world.air, everywhere)
+        theirs = advance(theirs, world.fire, world.air, everywhere.cuda())
+        for name in ("cells", "age", "burned", "wet", "tick"):
+            assert torch.equal(getattr(ours, name), getattr(theirs, name).cpu()), (tick, name)
 
 
 def test_a_reset_repeats(world: World) -> None:
