@@ -1,5 +1,6 @@
 """Landscapes from arrays that a user has: passed as they are, or from an ``.npz`` file."""
 
+import math
 import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -18,7 +19,7 @@ from warp_torchrl.world.layer import LARGEST_MAP
 from warp_torchrl.world.state import OLDEST, Cover, Landscape
 from warp_torchrl.world.validation import check_fields
 
-LAYERS = {"cover": np.uint8, "elevation": np.float32, "age": np.uint8}
+LAYERS = {"cover": np.uint8, "elevation": np.float32, "age": np.uint8, "assets": np.float32}
 """The arrays of a landscape, and the type that each is kept in."""
 
 
@@ -29,11 +30,12 @@ class Array:
     Two are equal where their layers, window and cell size are, wherever the layers come from.
 
     Attributes:
-        path: An ``.npz`` file with ``cover`` [H, W] of codes 0..4, and optionally ``elevation`` [m] and ``age``
-            0..10; or None where the arrays are passed.
+        path: An ``.npz`` file with ``cover`` [H, W] of codes 0..4, and optionally ``elevation`` [m], ``age`` 0..10 and
+            ``assets``; or None where the arrays are passed.
         cover: Land cover codes [H, W], anything ``numpy.asarray`` takes.
         elevation: Elevation [H, W] [m]; None makes a flat world.
         age: Tree age [H, W]; None draws it for each episode.
+        assets: What each cell is worth [H, W], 0 or more in any unit, for rewards that ask; None leaves all alike.
         size: Side of the world, or (rows, columns) [cells]: a window of the array. None, or the array's own shape,
             takes the whole array, whatever its fuel.
         row: Top row of the window in the array. None, with ``column``, draws a window for each episode.
@@ -50,6 +52,7 @@ class Array:
     cover: Sequence[Sequence[int]] | np.ndarray | Tensor | None = field(default=None, repr=False, compare=False)
     elevation: Sequence[Sequence[float]] | np.ndarray | Tensor | None = field(default=None, repr=False, compare=False)
     age: Sequence[Sequence[int]] | np.ndarray | Tensor | None = field(default=None, repr=False, compare=False)
+    assets: Sequence[Sequence[float]] | np.ndarray | Tensor | None = field(default=None, repr=False, compare=False)
     size: tuple[int, int] | int | None = None
     row: int | None = None
     column: int | None = None
@@ -131,10 +134,12 @@ def _check_layer(name: str, layer: Any) -> np.ndarray:
     if values.dtype.kind not in "buif" or values.ndim != 2:
         got = f"{values.dtype} of shape {values.shape}"
         raise ValueError(f"{name} must hold numbers in two dimensions, rows and columns, got {got}")
-    if name == "elevation":
-        broken = ~(np.abs(values) <= np.finfo(np.float32).max)
+    if name in ("elevation", "assets"):
+        lowest = 0.0 if name == "assets" else -math.inf
+        broken = ~((np.abs(values) <= np.finfo(np.float32).max) & (values >= lowest))
         if broken.any():
-            raise ValueError(f"elevation must be finite everywhere, got {values[broken][0]}")
+            rule = "finite and 0 or more" if name == "assets" else "finite"
+            raise ValueError(f"{name} must be {rule} everywhere, got {values[broken][0]}")
     else:
         highest = max(Cover) if name == "cover" else OLDEST
         broken = ~((values >= 0) & (values <= highest) & (values == np.round(values)))

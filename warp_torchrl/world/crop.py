@@ -24,6 +24,7 @@ class Crop:
         cover: Land cover, uint8 [rows, columns], ``Cover`` codes.
         elevation: Elevation [m], float32 [rows, columns]; None makes flat worlds.
         age: Tree age, uint8 [rows, columns], 0..10, or ``DRAWN``; None draws it everywhere.
+        assets: What each cell is worth, float32 [rows, columns]; None leaves all alike.
         known: Where the map is known, bool [rows, columns]; None is everywhere.
         size: Side of a window, or (rows, columns) [cells].
         row: Top row of the only window; None, with ``column``, leaves it to the draw.
@@ -37,6 +38,7 @@ class Crop:
     cover: np.ndarray = field(repr=False)
     elevation: np.ndarray | None = field(default=None, repr=False)
     age: np.ndarray | None = field(default=None, repr=False)
+    assets: np.ndarray | None = field(default=None, repr=False)
     known: np.ndarray | None = field(default=None, repr=False)
     size: tuple[int, int] | int
     row: int | None = None
@@ -51,7 +53,9 @@ class Crop:
         if len(corners) == 1:  # the only window, so every world gets the same ground: cut it out once
             ends = zip(divmod(int(corners), self.cover.shape[1]), map_size(self.size))
             ground = tuple(slice(first, first + side) for first, side in ends)
-        layers = [None if each is None else each[ground] for each in (self.cover, self.elevation, self.age)]
+        layers = [
+            None if each is None else each[ground] for each in (self.cover, self.elevation, self.age, self.assets)
+        ]
         maps = [None if each is None else torch.from_numpy(np.ascontiguousarray(each)) for each in layers]
         object.__setattr__(self, "_draws_age", self.age is None or bool((self.age == DRAWN).any()))
         object.__setattr__(self, "_maps", {torch.device("cpu"): [corners, *maps]})
@@ -69,9 +73,9 @@ class Crop:
         draw = uniform(key, 0, Stream.CROP, (1, 1))[:, 0, 0].double()  # float32 cannot count past 2^24 windows
         window, across = corners[(draw * len(corners)).long()], self.cover.shape[1]
         corner = torch.stack((window // across, window % across), dim=1)
-        cover, elevation, age = (layer if layer is None else self._cut(layer, corner) for layer in layers)
+        cover, elevation, age, assets = (layer if layer is None else self._cut(layer, corner) for layer in layers)
         age = self._fill_age(key, cover, age)
-        return Landscape(cover=cover, age=age, elevation=elevation, corner=corner, batch_size=key.shape)
+        return Landscape(cover=cover, age=age, elevation=elevation, assets=assets, corner=corner, batch_size=key.shape)
 
     @property
     def extent(self) -> tuple[int, int]:

@@ -40,6 +40,8 @@ class Raster:
             code = canopy / 10, halves up, 1 at least. It tells nothing of grass, shrub or wetland, where LANDFIRE has
             0 over grass and a mixture over shrub, so there, and under nodata, the age is drawn. A forest cell without
             canopy keeps a young tree, code 1, since its fuel is timber and code 0 is bare ground or ash.
+        assets: The same for a layer of what each cell is worth, 0 or more in any unit, for rewards that ask; nodata is
+            0. None leaves all alike.
         resample: What becomes of layers on another grid: ``refuse`` makes them an error; ``nearest`` and ``mode``
             (the most frequent class) are how class codes are put on the grid, elevation, age and canopy being
             interpolated (bilinear) in both. See ``resample_layer``.
@@ -63,6 +65,7 @@ class Raster:
     age: str | None = None
     full_age: float = 10.0
     canopy: str | None = None
+    assets: str | None = None
     resample: Literal["refuse", "nearest", "mode"] = "refuse"
     resolution: float | None = None
     row: int | None = None
@@ -90,8 +93,11 @@ class Raster:
                 age = _to_age(name, layers[name], known[name], top)
         if "canopy" in layers:
             age = np.where((cover == Cover.FOREST) & (age != DRAWN), np.maximum(age, 1), np.uint8(DRAWN))
+        assets = _to_worth(layers["assets"], known["assets"]) if "assets" in layers else None
         window = {"size": self.size, "row": self.row, "column": self.column, "min_fuel": self.min_fuel}
-        object.__setattr__(self, "_crop", Crop(cover=cover, elevation=elevation, age=age, known=whole, **window))
+        object.__setattr__(
+            self, "_crop", Crop(cover=cover, elevation=elevation, age=age, assets=assets, known=whole, **window)
+        )
 
     def __call__(self, key: Tensor) -> Landscape:
         """Return the landscape of each world's window, with its ``corner`` in ``grid``, batch size [B]."""
@@ -126,7 +132,7 @@ class Raster:
         path = Path(self.path)
         folder = path if path.is_dir() else path.parent
         paths = {"fuel": find_layer("fuel", folder, self.fuel) if path.is_dir() else path}
-        for name in ("elevation", "age", "canopy"):
+        for name in ("elevation", "age", "canopy", "assets"):
             if getattr(self, name) is not None:
                 paths[name] = find_layer(name, folder, getattr(self, name))
         return paths
@@ -158,6 +164,13 @@ def _to_metres(heights: np.ndarray, known: np.ndarray) -> np.ndarray:
     if broken.any():
         raise ValueError(f"elevation must be in [-1000, 10000] m wherever it is known, got {heights[broken][0]}")
     return np.where(known, heights, 0).astype(np.float32)
+
+
+def _to_worth(values: np.ndarray, known: np.ndarray) -> np.ndarray:
+    broken = known & ~((values >= 0.0) & (values <= np.finfo(np.float32).max))
+    if broken.any():
+        raise ValueError(f"assets must be finite and 0 or more wherever they are known, got {values[broken][0]}")
+    return np.where(known, values, 0).astype(np.float32)
 
 
 def _to_age(name: str, values: np.ndarray, known: np.ndarray, top: float) -> np.ndarray:

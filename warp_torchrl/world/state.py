@@ -53,6 +53,7 @@ class Landscape:
     cover: Tensor  # uint8 [B,H,W], a Cover code
     age: Tensor  # uint8 [B,H,W], tree age before the fire, 0..10
     elevation: Tensor | None  # float32 [B,H,W] [m]; None where every world is flat
+    assets: Tensor | None = None  # float32 [B,H,W], what each cell is worth, any unit; None: all alike
     corner: Tensor | None = None  # int64 [B,2], (row, column) of the map's first cell in its source; None: at (0, 0)
 
 
@@ -83,6 +84,7 @@ class Vehicles:
     base: Tensor  # int64 [B,2], (row, column) of the corner where the team started [cells]
     acts: Tensor  # int32 [B,A], extinguish and clear actions chosen so far
     redundant: Tensor  # int32 [B,A], those on a target that a team-mate had
+    last_useful: Tensor  # int32 [B,A], step of the last credited act; -1 before the first
 
 
 @tensorclass(nocast=True)

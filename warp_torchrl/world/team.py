@@ -131,6 +131,7 @@ class Team:
             base=base,
             acts=counter,
             redundant=counter.clone(),
+            last_useful=torch.full_like(counter, -1),
             batch_size=[worlds],
         )
 
@@ -226,6 +227,7 @@ class Team:
                 last_action=torch.where(active, action, vehicles.last_action),
                 acts=vehicles.acts + (wants_water | wants_clear),
                 redundant=vehicles.redundant + redundant,
+                last_useful=torch.where(hit_first | cut_first, state.step[:, None], vehicles.last_useful),
             )
         )
         outcome = Outcome(

@@ -1,0 +1,63 @@
+"""What all rewards have in common: shaping, shares, checks."""
+
+import pytest
+import torch
+
+from tests.conftest import small_world
+from warp_torchrl.reward import Adaptive, Collaborative, Coverage, Efficiency, Paper, Reward, Time
+from warp_torchrl.world.fire import Fire
+from warp_torchrl.world.state import Action
+
+from .drawing import EAST, EXTINGUISH, FIELD, drawn, earned
+
+
+def test_shaping_pays_the_way_to_the_fire():
+    state, world = drawn(FIELD, [[1, 3]])
+    shaped = Efficiency(shaping=1.0, gamma=0.9, act=0.0)
+    # distance 2 -> 1, H = 4: 0.9 x (-0.5 x 1/4) - (-0.5 x 2/4) = 0.1375
+    assert earned(shaped, state, world, int(Action.WEST)) == pytest.approx([0.1375])
+
+
+def test_the_exposure_potential_pays_for_fuel_out_of_reach():
+    state, world = drawn(FIELD, [[0, 0]])
+    shaped = Efficiency(shaping=1.0, potential="exposure", gamma=0.9, act=0.0)
+    # All 15 trees are within three cells: Phi = -0.5 x 15 / 16; put out, the end, Phi = 0.
+    assert earned(shaped, state, world, EXTINGUISH) == pytest.approx([0.9 / 16 + 0.5 * 15 / 16])
+
+
+@pytest.mark.parametrize("reward", [Efficiency, Time, Coverage, Collaborative, Adaptive, Paper])
+@pytest.mark.parametrize("potential", ["distance", "exposure"])
+@pytest.mark.parametrize("gamma", [0.9, 1.0])
+def test_shaping_adds_minus_the_first_potential_to_the_return(make_small_env, reward, potential, gamma):
+    """Sum of gamma^t F = -Phi(s0) for an episode that terminates (Ng, Harada and Russell 1999)."""
+    quick = small_world(fire=Fire(alpha=(0.0, 0.0, 0.0, 1e-6, 0.0)), horizon=400)
+    returns = []
+    for weight in (0.0, 1.0):
+        env = make_small_env(3, quick, reward=reward(shaping=weight, gamma=gamma, potential=potential))
+        env.reset()
+        if weight:
+            potential = env.reward_function.phi(env.world_state).mean(1)
+        total, discount = 0.0, 1.0
+        for _ in range(30):
+            action = torch.full((3, 2), EAST)
+            now = env.step(env.full_done_spec.zero().set(("agents", "action"), action))["next"]
+            total = total + discount * now["agents", "reward"][:, 0, 0]
+            discount *= gamma
+        assert now["terminated"].all()
+        returns.append(total)
+    assert torch.allclose(returns[1] - returns[0], -potential, atol=1e-5)
+
+
+@pytest.mark.parametrize("reward", [Efficiency, Time, Coverage, Collaborative, Adaptive, Paper])
+@pytest.mark.parametrize(
+    ("field", "value"), [("team_share", 1.5), ("scale", 0.0), ("shaping", -1.0), ("gamma", float("nan"))]
+)
+def test_values_out_of_range_are_refused(reward, field, value):
+    with pytest.raises(ValueError, match=f"{field} must be in"):
+        reward(**{field: value})
+
+
+def test_a_reward_must_say_what_an_agent_earns(make_small_env):
+    env = make_small_env(1, reward=Reward())
+    with pytest.raises(TypeError, match="define own"):
+        env.rollout(1)

@@ -1,0 +1,32 @@
+"""The paper's reward, worked out by hand."""
+
+import pytest
+
+from warp_torchrl.reward import Paper
+
+from .drawing import CLEAR, EAST, EXTINGUISH, FIELD, STAY, drawn, earned
+
+
+def test_the_paper_reward_by_hand():
+    state, world = drawn(FIELD, [[0, 0], [3, 3]])
+    assert earned(Paper(team_share=0.0), state, world, EXTINGUISH, EAST) == pytest.approx([10 / 50, -0.2 / 50])
+    assert earned(Paper(team_share=0.0), state, world, STAY, EXTINGUISH) == pytest.approx([0, -1 / 50])
+
+
+def test_the_paper_reward_charges_clearing_far_from_fire():
+    state, world = drawn(["FTTTTT", *["TTTTTT"] * 5], [[5, 5]])
+    assert earned(Paper(), state, world, CLEAR) == pytest.approx([(1 - 2) / 50])
+
+
+def test_the_barrier_pays_what_it_cuts_off_and_the_printed_one_pays_any_clearing():
+    rows = ["TTT~TTT", "TFT~TTT", "TTTTTTT", "~~~~TTT"]
+    # The only bridge is row 2, column 3: clearing it cuts the right hand side's 3 + 3 + 3 + 3 = 12 trees off. The
+    # diagonal does not pass: (2, 2) and (3, 4) or (1, 4) are two columns apart.
+    state, world = drawn(rows, [[2, 3]])
+    initial = 9 + 1 + 12  # left block, bridge, right block; the fire is one of the left ones
+    cut = earned(Paper(), state, world, CLEAR)[0]
+    assert state.tally.initial.item() == initial
+    assert cut == pytest.approx((1 + 50 * 12 / initial) / 50)
+    elsewhere, _ = drawn(rows, [[0, 0]])
+    assert earned(Paper(), elsewhere, world, CLEAR) == pytest.approx([1 / 50])
+    assert earned(Paper(barrier_rule="printed"), elsewhere, world, CLEAR) == pytest.approx([51 / 50])

@@ -1,0 +1,202 @@
+"""The paper's five conservation rewards.
+
+    Q = (w_p T_p + w_e T_e - w_c T_c - w_b T_b) / N0      (WARP-CA, conservation metric)
+
+is what the forest is worth. Each reward makes a value R of it and of what the team did, and is telescoped, r_t = R(t) -
+R(t-1), so that an episode earns R(end) - R(start), however it was played. The trees are the team's; each agent pays
+for its own acts, as many times as there are agents, so that the team's mean is R.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import torch
+from torch import Tensor
+from torch.nn.functional import avg_pool2d
+
+from warp_torchrl.reward.base import Reward
+from warp_torchrl.world.front import alignment, block_shares, centre, containment, exposure
+from warp_torchrl.world.state import Transition, WorldState, is_burning
+
+
+@dataclass(frozen=True, kw_only=True)
+class Conservation(Reward):
+    """What the five have in common.
+
+    Attributes:
+        preserved: w_p, weight of each tree untouched by fire or agents [1 / initial tree].
+        extinguished: w_e, of each that was put out and stands.
+        cleared: w_c, of each that was cleared.
+        burned: w_b, of each that burned to ash.
+        act: w_a, of each extinguish or clear action [1].
+    """
+
+    preserved: float = 1.0
+    extinguished: float = 0.9
+    cleared: float = 0.5
+    burned: float = 1.0
+    act: float = 5e-4
+
+    def own(self, transition: Transition) -> Tensor:
+        """Return each agent's part, float32 [B, A]."""
+        before, after = transition.before, transition.after
+        gained = self.value(after) - self.value(before) + self.bonus(transition)
+        acts = after.vehicles.acts - before.vehicles.acts
+        return gained[:, None] - self.act * acts.shape[1] * acts
+
+    def worth(self, state: WorldState) -> Tensor:
+        """Return Q, float32 [B]."""
+        tally = state.tally
+        worth = (
+            self.preserved * tally.preserved
+            + self.extinguished * tally.extinguished
+            - self.cleared * tally.cleared
+            - self.burned * tally.burned
+        )
+        return worth / tally.initial
+
+    def value(self, state: WorldState) -> Tensor:
+        """Return R without the cost of acts, float32 [B]."""
+        return self.worth(state)
+
+    def bonus(self, transition: Transition) -> Tensor | float:
+        """Return what a step adds that no state holds, float32 [B]."""
+        return 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Efficiency(Conservation):
+    """Conservation reward 1: keep and save trees, with few actions.
+
+    R = Q - w_a A_total      (WARP-CA, eq. of the action efficiency)
+    """
+
+
+@dataclass(frozen=True, kw_only=True)
+class Time(Conservation):
+    """Conservation reward 2: ... and soon.
+
+        R = Q - zeta T_total / T_max - w_a A_total
+
+    The paper prints -zeta / T_total, which rewards slowness against its own text: ``rule: printed`` pays that once, at
+    the end.
+
+    Attributes:
+        zeta: Weight of the time until the episode's end.
+        rule: ``share`` of the horizon, or ``printed``.
+        horizon: T_max, agent steps; the environment's.
+    """
+
+    act: float = 0.0
+    zeta: float = 0.2
+    rule: Literal["share", "printed"] = "share"
+    horizon: int = 256
+
+    def value(self, state: WorldState) -> Tensor:
+        """Return R without the cost of acts, float32 [B]."""
+        if self.rule == "printed":
+            return self.worth(state)
+        return self.worth(state) - self.zeta / self.horizon * state.step
+
+    def bonus(self, transition: Transition) -> Tensor | float:
+        """Return -zeta / T_total at the end of an episode where that is the rule, float32 [B]."""
+        if self.rule == "share":
+            return 0.0
+        return -self.zeta / transition.after.step.clamp(min=1) * transition.after.done
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coverage(Conservation):
+    """Conservation reward 3: ... in every part of the map.
+
+        R = Q + sum over blocks of omega a_block [under 5 % of the block's trees burn or have burned] - w_a A_total
+
+    Attributes:
+        omega: Weight of each block.
+        side: Side of a block [cells].
+        least: Share of a block's trees from which it counts as burned.
+    """
+
+    act: float = 0.0
+    omega: float = 0.02
+    side: int = 8
+    least: float = 0.05
+
+    def value(self, state: WorldState) -> Tensor:
+        """Return R without the cost of acts, float32 [B]."""
+        lost = state.burned | is_burning(state.cells)
+        spared = block_shares(lost, state.initial, self.side) < self.least
+        assets = state.landscape.assets
+        if assets is None:
+            return self.worth(state) + self.omega * spared.sum((1, 2))
+        worth = avg_pool2d(assets[:, None], self.side, ceil_mode=True, count_include_pad=False)[:, 0]
+        worth = worth / worth.mean((1, 2), keepdim=True).clamp(min=1e-6)
+        return self.worth(state) + self.omega * (worth * spared).sum((1, 2))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Collaborative(Conservation):
+    """Conservation reward 4: ... together.
+
+        R = eta max(Q, 0) + min(Q, 0) - w_a A_total,   eta = 1 + bonus x share of agents with a useful act lately
+
+    so that idling never softens a loss; ``rule: printed`` has eta on all of Q.
+
+    Attributes:
+        together: Greatest addition to eta.
+        window: Steps for which a credited act counts as lately.
+        rule: ``positive`` or ``printed``.
+    """
+
+    act: float = 0.0
+    together: float = 0.5
+    window: int = 16
+    rule: Literal["positive", "printed"] = "positive"
+
+    def value(self, state: WorldState) -> Tensor:
+        """Return R without the cost of acts, float32 [B]."""
+        last = state.vehicles.last_useful
+        lately = (last >= 0) & (state.step[:, None] - last <= self.window)
+        eta = 1.0 + self.together * lately.to(torch.float32).mean(dim=1)
+        worth = self.worth(state)
+        return eta * worth if self.rule == "printed" else eta * worth.clamp(min=0.0) + worth.clamp(max=0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Adaptive(Conservation):
+    """Conservation reward 5: ... where the fire goes.
+
+        R = Q + theta_1 r_1 + theta_2 r_2 + theta_3 r_3 - w_a A_total
+
+    r_1: trees put out for the first time on the downwind half of the fire, a share of N0. r_2: drop since the start
+    in the trees within ``reach`` cells of fire, a share of N0. r_3: share of rays from the fire's centre to the border
+    that meet a lake, bare ground, a firebreak or a wet tree; 1 where nothing burns.
+
+    Attributes:
+        downwind: theta_1.
+        exposed: theta_2.
+        contained: theta_3.
+        reach: Cells about fire.
+    """
+
+    act: float = 0.0
+    downwind: float = 0.1
+    exposed: float = 0.1
+    contained: float = 0.1
+    reach: int = 3
+
+    def value(self, state: WorldState) -> Tensor:
+        """Return R without r_1 and the cost of acts, float32 [B]."""
+        barrier = (state.alpha == 0.0) | state.firebreak | (state.wet > 0)
+        shape = self.contained * containment(state, barrier) - self.exposed * exposure(state, self.reach)
+        return self.worth(state) + shape
+
+    def bonus(self, transition: Transition) -> Tensor:
+        """Return theta_1 times the trees put out downwind in this step, a share of N0, float32 [B]."""
+        before, outcome = transition.before, transition.outcome
+        width = before.cells.shape[2]
+        place = torch.stack((outcome.target // width, outcome.target % width), dim=-1)
+        downwind = alignment(place, centre(is_burning(before.cells)), before.wind) >= 0.0
+        new = ~before.extinguished.flatten(1).gather(1, outcome.target)
+        count = (outcome.extinguished & downwind & new).sum(dim=1)
+        return self.downwind * count / before.tally.initial
