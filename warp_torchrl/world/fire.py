@@ -192,8 +192,7 @@ class Fire:
         to_ash = stage_ends & (cells == EMBER)
         after = cells + stage_ends
         if self.growth:
-            grow = (u >= 1.0 - (1.0 - q) * self._look_up(self._growth(), cells)) & is_tree(cells) & due
-            after += grow & (cells < OLDEST)
+            after += (u >= 1.0 - (1.0 - q) * self._look_up(self._growth(), cells)) & due  # u < 1: none where p is 0
         after = torch.where(ignite, FIRST_FIRE, after).masked_fill_(to_ash, 0)
         if self.p_regrow > 0.0:
             bare = (cells == 0) & holds_trees(state.landscape.cover) & ~state.firebreak & due
