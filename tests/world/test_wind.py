@@ -6,8 +6,10 @@ import pytest
 import torch
 from torch import Tensor
 
+from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.wind import Calm, Paper, Uniform, Wandering, constant_wind
+from warp_torchrl.world.world import advance
 
 from .drawing import draw
 
@@ -164,3 +166,11 @@ def test_other_winds_stay(wind) -> None:
     state = draw("....").replace(wind=wind(keys(1), (1, 4)))
     assert not wind.changes
     assert wind.after_tick(state) is state.wind
+
+
+def test_a_wandering_wind_waits_with_a_world_that_is_not_due() -> None:
+    wind, state = Wandering(), draw("....", worlds=2)
+    state = state.replace(wind=wind(state.key, (1, 4)))
+    after = advance(state, Fire(), wind, torch.tensor([True, False]))
+    assert not torch.equal(after.wind[0], state.wind[0])
+    assert torch.equal(after.wind[1], state.wind[1])
