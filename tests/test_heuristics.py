@@ -1,12 +1,20 @@
 """The yardsticks do what they say, and rank as they should."""
 
+import numpy as np
 import pytest
 import torch
 
 from warp_torchrl import make_env
+from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation import play
 from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.heuristics.base import claim_cells
+from warp_torchrl.world.array import Array
+from warp_torchrl.world.ignition import Ignition
 from warp_torchrl.world.state import Action
+from warp_torchrl.world.team import Team
+from warp_torchrl.world.wind import Calm
+from warp_torchrl.world.world import World
 
 
 @pytest.mark.parametrize("name", HEURISTICS)
@@ -51,15 +59,73 @@ def test_fighters_put_out_a_fire_beside_them(make_small_env):
 def test_coordinated_agents_claim_different_fires():
     env = make_env("default", n_worlds=8)
     env.reset()
-    policy = HEURISTICS["coordinated"](env)
     state = env.world_state
-    threat = env.world.threat(state)
-    value = (6.0 * threat).masked_fill(~(state.cells > 10), -30_000.0)
-    claims = policy._claims(state, value)
+    value = HEURISTICS["coordinated"](env).value(state)
+    claims = claim_cells(state, value, elbow_room=3, discount=6.0, taken=1000.0)
     index = claims[..., 0] * 32 + claims[..., 1]
     for world in range(8):
         assert len(set(index[world].tolist())) == 4
         assert (state.cells[world].flatten()[index[world]] > 10).all()
+
+
+def one_fire(team, side=21, steps_per_tick=12, **options):
+    """A forest with a fire of 3 x 3 in its middle and the team in a corner."""
+    land = Array(cover=np.full((side, side), 3), age=np.full((side, side), 9))
+    world = World(
+        landscape=land,
+        wind=Calm(),
+        team=team,
+        ignition=Ignition(region=0.01, head_start=0),
+        steps_per_tick=steps_per_tick,
+        horizon=400,
+        **options,
+    )
+    return WildfireEnv(world, n_worlds=4, seed=0)
+
+
+def test_a_ring_is_a_closed_square_that_can_be_finished_in_time():
+    env = one_fire(Team(n_agents=4))
+    env.reset()
+    ring = HEURISTICS["ring"](env)
+    ring.choose(env.world_state, env.reset()["agents", "action_mask"])
+    fire = env.world_state.cells[0] > 10
+    rows = ring._plan[0].nonzero()[:, 0]
+    distance = int(rows.max() - fire.nonzero()[:, 0].max())
+    assert len(rows) == 4 * (2 + 2 * distance)  # a square of side 3 + 2 d has 4 (2 + 2 d) cells
+    # Four agents clear n cells in n / 2 steps, on top of the way there; the front has distance - 1 cells to go.
+    assert len(rows) / 2 <= (distance - 1) * 12
+
+
+def test_a_ring_without_water_stops_a_fire_that_nothing_else_would():
+    env = one_fire(Team(n_agents=4, tank=0))
+    saved = {name: play(env, HEURISTICS[name](env), 0)["saved"].mean() for name in ("noop", "coordinated", "ring")}
+    assert saved["noop"] == saved["coordinated"] < 0.2
+    assert saved["ring"] > 0.6
+
+
+def test_half_of_a_mixed_team_digs():
+    team = Team(n_agents=5, roles=("ugv", "uav", "ugv", "ugv", "ugv"))
+    env = one_fire(team)
+    env.reset()
+    assert HEURISTICS["ring"](env).diggers(env.world_state).tolist() == [True, False, True, True, True]
+    assert HEURISTICS["mixed"](env).diggers(env.world_state).tolist() == [True, False, False, True, False]
+
+
+@pytest.mark.parametrize("name", ["local", "greedy", "coordinated"])
+def test_agents_with_empty_tanks_go_for_water(name):
+    env = one_fire(Team(n_agents=1, tank=2))
+    now = env.reset()
+    state = env.world_state
+    base = state.vehicles.base[:, None]
+    away = base + torch.where(base > 0, -6, 6)
+    tank = torch.zeros_like(state.vehicles.tank)
+    policy = HEURISTICS[name](env)
+    now = env.set_state(state.replace(vehicles=state.vehicles.replace(position=away, tank=tank)))
+    for step in range(6):
+        assert (env.world_state.vehicles.tank == 0).all(), step
+        now = env.step(policy(now))["next"]
+    assert torch.equal(env.world_state.vehicles.position, base)
+    assert (env.world_state.vehicles.tank == 2).all()
 
 
 def test_yardsticks_rank_on_skirmish():
@@ -69,3 +135,4 @@ def test_yardsticks_rank_on_skirmish():
     assert saved["noop"] < 0.25
     assert saved["random"] < saved["local"] - 0.2
     assert saved["coordinated"] > saved["local"] + 0.1 and saved["coordinated"] > saved["greedy"] + 0.1
+    assert saved["noop"] < saved["ring"] < saved["mixed"] < saved["coordinated"]

@@ -57,8 +57,8 @@ class Team:
         roles: Role of each vehicle, repeated as often as needed: ``[ugv, uav]`` alternates.
         allow_stay: Whether there is an eleventh action, stay.
         extinguish_p: Chance that putting a fire out succeeds.
-        tank: Extinguish acts that a vehicle carries water for; None is unlimited. It fills up beside a lake and at
-            the corner where the team started.
+        tank: Extinguish acts that a vehicle carries water for; None is unlimited, 0 none at all. It fills up beside a
+            lake and at the corner where the team started.
         start: ``corner`` starts the team in a corner drawn for each episode, ``anywhere`` on cells drawn over the map.
 
     Raises:
@@ -73,7 +73,7 @@ class Team:
     start: Literal["corner", "anywhere"] = "corner"
 
     def __post_init__(self) -> None:
-        check_fields(self, n_agents=(1, 256), extinguish_p=(0.0, 1.0), tank=(1, 10_000))
+        check_fields(self, n_agents=(1, 256), extinguish_p=(0.0, 1.0), tank=(0, 10_000))
         if not self.roles or any(role not in ROLES for role in self.roles):
             raise ValueError(f"roles must be a list of {', '.join(ROLES)}, got {list(self.roles)}")
 

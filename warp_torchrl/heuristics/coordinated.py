@@ -1,0 +1,36 @@
+"""The team shares the front of the fire out."""
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.heuristics.base import (
+    Heuristic,
+    approach,
+    can_be_put_out,
+    claim_cells,
+    extinguish_or,
+    or_refill,
+)
+from warp_torchrl.world.geometry import FAR
+from warp_torchrl.world.state import WorldState
+
+
+class Coordinated(Heuristic):
+    """Shares the front out: agents claim distinct cells of it by distance and threat, so that they spread round the
+    fire and its head is attacked first; on the way, and there, they put out what they can reach.
+    """
+
+    eagerness = 6.0  # cells of way that a full threat is worth
+
+    def choose(self, state: WorldState, mask: Tensor) -> Tensor:
+        """Return the actions, int64 [B, A]."""
+        claims = claim_cells(state, self.value(state), elbow_room=3, discount=6.0, taken=1000.0)
+        return extinguish_or(approach(state, self.env, or_refill(state, self.env, claims)), mask)
+
+    def value(self, state: WorldState) -> Tensor:
+        """Return what each cell of the front is worth [cells of way], -FAR elsewhere, float32 [B, H, W]."""
+        fire = can_be_put_out(state, self.env)
+        threat = self.env.world.threat(state)
+        front = fire & (threat > 0.01)
+        front = torch.where(front.flatten(1).any(1)[:, None, None], front, fire)
+        return (self.eagerness * threat).masked_fill(~front, -float(FAR))

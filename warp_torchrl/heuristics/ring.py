@@ -1,0 +1,84 @@
+"""The team shuts the fire in with firebreaks."""
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.env import WildfireEnv
+from warp_torchrl.heuristics.base import approach, claim_cells, extinguish_or, or_refill
+from warp_torchrl.heuristics.coordinated import Coordinated
+from warp_torchrl.world.geometry import FAR, grow, nearest
+from warp_torchrl.world.state import Action, WorldState, is_burning, is_tree
+
+
+class Ring(Coordinated):
+    """Clears a ring about the fire, at the distance at which it can be closed in time; where several fires are near
+    each other it goes round them all. When the fire gets over it, a wider one is planned; when it is closed, or none
+    can be, agents that have water attack the front as ``Coordinated`` does, and so do those that cannot clear.
+    """
+
+    pace = 1.0  # cells that a front makes in one of the paper's ticks
+    effort = 2.0  # steps for each cell of the ring: go there, clear it
+
+    def __init__(self, env: WildfireEnv) -> None:
+        super().__init__(env)
+        self._plan: Tensor | None = None  # bool [B, H, W], the ring
+        self._inside: Tensor | None = None  # bool [B, H, W], what it encloses
+
+    def diggers(self, state: WorldState) -> Tensor:
+        """Return which agents work on the ring, bool [A]."""
+        return self.env.world.team.table(state.cells.device).clears
+
+    def choose(self, state: WorldState, mask: Tensor) -> Tensor:
+        """Return the actions, int64 [B, A]."""
+        self._revise(state)
+        todo = self._plan & is_tree(state.cells) & (state.alpha > 0.0)
+        digs = self.diggers(state) & todo.flatten(1).any(dim=1)[:, None]
+        ring = torch.zeros_like(state.alpha).masked_fill_(~todo, -float(FAR))
+        value = torch.where(digs[..., None, None], ring[:, None], self.value(state)[:, None])
+        claims = claim_cells(state, value, elbow_room=1, discount=2.0, taken=1000.0)
+        attack = extinguish_or(approach(state, self.env, or_refill(state, self.env, claims)), mask)
+        there = (claims == state.vehicles.position).all(dim=-1) & mask[..., Action.CLEAR]
+        dig = torch.where(there, int(Action.CLEAR), approach(state, self.env, claims))
+        return torch.where(digs, dig, attack)
+
+    def _revise(self, state: WorldState) -> None:
+        """Plan a ring in worlds that begin, and where the fire has got over the one there was."""
+        burning = is_burning(state.cells)
+        if self._plan is None or self._plan.shape != burning.shape:
+            self._plan, self._inside = torch.zeros_like(burning), torch.zeros_like(burning)
+        stale = (state.step == 0) | (burning & ~self._inside).flatten(1).any(dim=1)
+        plan, inside = self._lay(state, burning)
+        self._plan = torch.where(stale[:, None, None], plan, self._plan)
+        self._inside = torch.where(stale[:, None, None], inside, self._inside)
+
+    def _lay(self, state: WorldState, burning: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the nearest ring that can be closed in time and what it encloses; none where none can be."""
+        world = self.env.world
+        fuel = is_tree(state.cells) & (state.alpha > 0.0)
+        workers = self.diggers(state).sum().clamp(min=1)
+        position = state.vehicles.position
+        plan, inside = torch.zeros_like(burning), torch.zeros_like(burning)
+        found = torch.zeros_like(state.terminated)
+        reach = burning
+        steps = world.steps_per_tick * world.fire.ticks_per_stage / self.pace
+        own = position[..., 0] * burning.shape[2] + position[..., 1]
+        for distance in range(1, max(burning.shape[1:]) // 2):
+            wider = grow(reach)
+            ring = wider & ~reach
+            away = ~wider.flatten(1).gather(1, own)  # agents still outside: the way to the ring is yet to come
+            way = nearest(position, ring)[0].to(torch.float32) * away
+            need = way.amax(dim=1) + self.effort * (ring & fuel).sum((1, 2)) / workers
+            fits = (need <= (distance - 1) * steps) & ~found
+            plan = torch.where(fits[:, None, None], ring, plan)
+            inside = torch.where(fits[:, None, None], reach, inside)
+            found, reach = found | fits, wider
+        return plan, inside
+
+
+class Mixed(Ring):
+    """Every other agent that can clear works on the ring; the others attack the front."""
+
+    def diggers(self, state: WorldState) -> Tensor:
+        """Return which agents work on the ring, bool [A]."""
+        clears = super().diggers(state)
+        return clears & (clears.cumsum(0) % 2 == 1)
