@@ -11,7 +11,9 @@ FILES = {
     for path in PACKAGE.rglob("*.py")
 }
 MODULES = sorted(FILES)
-READS_STATE = [each for each in MODULES if each.split("/")[0] in ("observation", "reward", "metrics", "render")]
+READS_STATE = [
+    each for each in MODULES if each.split("/")[0] in ("observation", "reward", "metrics", "render", "behaviour")
+]
 
 
 def imports(module: str) -> set[str]:

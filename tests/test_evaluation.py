@@ -1,36 +1,13 @@
-"""Statistics by hand, and pairing."""
+"""Episodes that are paired, and the report."""
 
 import json
 
-import numpy as np
 import pytest
 import torch
 
-from warp_torchrl.evaluation import compare, interquartile_mean, play, report, summarise, table, write_json
-from warp_torchrl.heuristics import NoOp, Random
-
-
-def test_the_interquartile_mean_is_that_of_the_middle_half():
-    assert interquartile_mean(np.array([100.0, 1, 2, 3, 4, 5, 6, -50])) == pytest.approx(3.5)  # 2, 3, 4, 5
-    scipy = pytest.importorskip("scipy.stats")
-    values = np.random.default_rng(1).normal(size=101)
-    assert interquartile_mean(values) == pytest.approx(scipy.trim_mean(values, 0.25))
-
-
-def test_intervals_cover_the_mean_as_often_as_they_say():
-    """100 samples of 64 normals; a 95 % interval misses 5 on average, more than 13 with probability 4e-4."""
-    draws = np.random.default_rng(2).normal(size=(100, 64))
-    misses = 0
-    for values in draws:
-        low, high = summarise({"saved": values})["saved"]["ci95"]
-        misses += not low <= 0.0 <= high
-    assert 1 <= misses <= 13
-
-
-def test_a_paired_difference_is_narrower_than_its_parts():
-    luck = np.random.default_rng(3).uniform(size=200)
-    better = compare({"saved": luck + 0.05}, {"saved": luck})
-    assert better["saved_difference"] == pytest.approx(0.05) and better["ci95"] == pytest.approx([0.05, 0.05])
+from warp_torchrl.behaviour import BEHAVIOUR
+from warp_torchrl.evaluation import LeftOut, play, report, table, write_json
+from warp_torchrl.heuristics import Coordinated, Greedy, NoOp, Random
 
 
 def test_policies_meet_the_same_worlds_and_the_generator_is_left_alone(make_small_env):
@@ -57,5 +34,48 @@ def test_the_report_has_what_the_contract_says(make_small_env, tmp_path):
     assert read["seeds"] == [9, 10, 11] and read["scenario"] == "tiny" and read["policy"] == "random"
     assert set(read["metrics"]["saved"]) >= {"iqm", "mean", "ci95"}
     assert read["episodes"][1]["seed"] == 10 and 0.0 <= read["episodes"][1]["saved"] <= 1.0
-    assert set(read["versus"]["noop"]) == {"saved_difference", "ci95"}
+    assert set(read["versus"]["noop"]) >= {"saved_difference", "ci95", "probability_of_improvement"}
+    # The twin without a team, on the same draws: what was averted, world by world.
+    for index in range(3):
+        averted = read["episodes"][index]["averted"]
+        assert averted == pytest.approx(mine["saved"][index] - noop["saved"][index])
     assert "random - noop" in table(read) and "tiny: 3 fires" in table(read)
+
+
+def test_a_report_has_no_number_where_there_is_none(make_small_env, tmp_path):
+    env = make_small_env(3)
+    idle = play(env, NoOp(env), 9, watch=True)
+    content = report("tiny", "noop", 9, idle, {})
+    write_json(tmp_path / "evaluation.json", content)
+    read = json.loads((tmp_path / "evaluation.json").read_text())
+    assert read["metrics"]["lead_time"]["mean"] is None and read["episodes"][0]["head_attack"] is None
+    assert "lead time" not in table(read)
+
+
+def test_behaviour_is_seen_only_where_it_is_asked_for(make_small_env):
+    env = make_small_env(3)
+    assert not set(BEHAVIOUR) & set(play(env, Greedy(env), 9))
+    watched = play(env, Greedy(env), 9, watch=True)
+    assert set(BEHAVIOUR) <= set(watched) and env.watcher is None
+    assert (watched["saved"] == play(env, Greedy(env), 9)["saved"]).all()
+
+
+def test_a_team_without_an_agent_does_worse(make_small_env):
+    env = make_small_env(32)
+    whole = play(env, Coordinated(env), 0)
+    lamed = play(env, LeftOut(Coordinated(env), 1), 0)
+    assert whole["saved"].mean() > lamed["saved"].mean() + 0.05
+    content = report("tiny", "coordinated", 0, whole, {}, left_out={"bulldozer_1": lamed})
+    assert content["left_out"]["bulldozer_1"]["saved_difference"] > 0.05
+    assert "without bulldozer_1" in table(content)
+
+
+def test_the_agent_left_out_stays_where_it_is(make_small_env):
+    env = make_small_env(4)
+    now = env.reset()
+    start = env.world_state.vehicles.position.clone()
+    policy = LeftOut(Greedy(env), 0)
+    for _ in range(10):
+        now = env.step(policy(now))["next"]
+    after = env.world_state.vehicles.position
+    assert (after[:, 0] == start[:, 0]).all() and (after[:, 1] != start[:, 1]).any()

@@ -29,7 +29,17 @@ from warp_torchrl.config import (
     without_targets,
 )
 from warp_torchrl.construction import ConfigError
-from warp_torchrl.evaluation import MODES, play, play_heuristics, record_episode, report, table, write_json
+from warp_torchrl.evaluation import (
+    MODES,
+    YARDSTICKS,
+    LeftOut,
+    play,
+    play_heuristics,
+    record_episode,
+    report,
+    table,
+    write_json,
+)
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import Signature, signature
 from warp_torchrl.training import NumericalFailure, Stopped, Training
@@ -111,18 +121,22 @@ def _report(
     one = plan.make_env(1, first)
     if found is not None:
         _check_fits(found, env)
-    others, other_modes = play_heuristics(env, first), {}
+    others, other_modes = play_heuristics(env, first, [each for each in YARDSTICKS if each != heuristic]), {}
     if found is None:
         name, mode, policy = heuristic, "sampled", HEURISTICS[heuristic](one)
-        episodes = others.pop(heuristic)
+        actor = HEURISTICS[heuristic](env)
+        episodes = play(env, actor, first, mode, watch=True)
     else:
         policy = policy_of(found, plan.evaluation.mode).to(plan.device)
         name, mode = f"trained, {policy.mode}", policy.mode
-        episodes = play(env, policy, first, mode)
+        actor, episodes = policy, play(env, policy, first, mode, watch=True)
         other = next(each for each in MODES if each != mode)
         other_modes = {f"trained, {other}": play(env, policy, first, other)}
     folder.mkdir(parents=True, exist_ok=True)
-    content = report(plan.scenario, name, first, episodes, others, other_modes)
+    left_out = {}
+    if plan.evaluation.leave_one_out:
+        left_out = {agent: play(env, LeftOut(actor, index), first, mode) for index, agent in enumerate(env.agent_names)}
+    content = report(plan.scenario, name, first, episodes, others, other_modes, left_out)
     write_json(folder / "evaluation.json", content)
     print(table(content), flush=True)
     record_episode(folder / "episode.gif", one, policy, f"{plan.scenario}\n{name}", first, mode)

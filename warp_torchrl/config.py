@@ -75,6 +75,7 @@ class EvaluationPlan:
         episodes: Worlds.
         first_seed: Seed of the first; training seeds lie below 1 000 000.
         mode: ``sampled``, ``deterministic``, or ``best``: whichever did better on training seeds.
+        leave_one_out: Play once more for each agent, without it, to see what it is worth.
 
     Raises:
         ValueError: If a value is out of its range.
@@ -84,6 +85,7 @@ class EvaluationPlan:
     episodes: int = 256
     first_seed: int = 1_000_000
     mode: Literal["sampled", "deterministic", "best"] = "best"
+    leave_one_out: bool = False
 
     def __post_init__(self) -> None:
         if self.interval < 0:

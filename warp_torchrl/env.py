@@ -1,6 +1,6 @@
 """The environment: joins world, observation, reward and metrics to TorchRL. It has no physics of its own."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import torch
 from tensordict import TensorDict, TensorDictBase
@@ -12,7 +12,7 @@ from warp_torchrl.metrics import METRICS, metrics
 from warp_torchrl.observation import STATE, STATE_SIDE, Observation, Surroundings, central_state
 from warp_torchrl.render import render
 from warp_torchrl.reward import Efficiency, Reward
-from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.state import Transition, WorldState
 from warp_torchrl.world.team import ROLES
 from warp_torchrl.world.world import World
 
@@ -68,6 +68,8 @@ class WildfireEnv(EnvBase):
         self.group_map = {"agents": list(names)}
         self.role_map = {role: [n for n, r in zip(names, roles) if r == role] for role in ROLES if role in roles}
         self._state: WorldState | None = None
+        self.watcher: Callable[[Transition], None] | None = None
+        """Is shown every step's transition, for those who study behaviour."""
         self._episode_reward = torch.zeros(n_worlds, device=self.device)
         self._set_seeds(range(seed, seed + n_worlds) if seeds is None else seeds)
         self._make_specs()
@@ -160,6 +162,8 @@ class WildfireEnv(EnvBase):
         transition = self.world.step(self.world_state, action)
         reward = self.reward_function(transition)
         self._state = transition.after
+        if self.watcher is not None:
+            self.watcher(transition)
         self._episode_reward = self._episode_reward + reward.mean(1)[:, 0]
         out = self._observe(transition.after)
         out.set(("agents", "reward"), reward)

@@ -3,19 +3,23 @@
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
+from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
+from warp_torchrl.behaviour import BEHAVIOUR, Behaviour
 from warp_torchrl.env import EPISODE_METRICS, WildfireEnv
-from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.heuristics import HEURISTICS, idle_action
+from warp_torchrl.models import ACTION, ACTION_MASK
 from warp_torchrl.render import EpisodeRecorder
+from warp_torchrl.statistics import compare, summarise
 
+SHOWN = ("averted", *BEHAVIOUR)
 MODES = {"sampled": ExplorationType.RANDOM, "deterministic": ExplorationType.DETERMINISTIC}
-RESAMPLES = 4000
 YARDSTICKS = ("noop", "random", "local", "greedy", "coordinated")
 """Policies that every table shows."""
 
@@ -29,6 +33,7 @@ def play(
     first_seed: int,
     mode: str = "sampled",
     recorder: EpisodeRecorder | None = None,
+    watch: bool = False,
 ) -> Episodes:
     """Play one episode in each world of an environment, without resets, until all have ended.
 
@@ -40,14 +45,18 @@ def play(
         first_seed: Seed of world 0.
         mode: ``sampled`` or ``deterministic``.
         recorder: Is shown world 0 after every step.
+        watch: Whether to add the numbers of ``BEHAVIOUR``.
 
     Returns:
         The metrics of each world.
     """
+    behaviour = None
     with torch.random.fork_rng(), torch.no_grad(), set_exploration_type(MODES[mode]):
         torch.manual_seed(first_seed)
         env.set_seed(first_seed, static_seed=True)
         now = env.reset()
+        if watch:
+            behaviour = env.watcher = Behaviour(env.world_state)
         for _ in range(env.world.horizon):
             if recorder is not None:
                 recorder.add(env.world_state)
@@ -56,43 +65,34 @@ def play(
                 break
         if recorder is not None:
             recorder.add(env.world_state)
-    return {name: now["info", name][:, 0].double().cpu().numpy() for name in EPISODE_METRICS}
+    env.watcher = None
+    episodes = {name: now["info", name][:, 0].double().cpu().numpy() for name in EPISODE_METRICS}
+    return episodes if behaviour is None else episodes | behaviour.summary()
 
 
-def interquartile_mean(values: np.ndarray) -> np.ndarray:
-    """Return the mean of the middle half along the last axis (Agarwal et al. 2021, as ``scipy.stats.trim_mean``)."""
-    ordered = np.sort(values, axis=-1)
-    cut = values.shape[-1] // 4
-    return ordered[..., cut : values.shape[-1] - cut].mean(axis=-1)
+class LeftOut(TensorDictModuleBase):
+    """A policy whose team lacks one agent: that one stays where it is, or, where it cannot, does nothing.
 
+    Args:
+        policy: The whole team's.
+        agent: Index of the one left out.
+    """
 
-def _resampled(values: np.ndarray) -> np.ndarray:
-    """Return bootstrap samples [RESAMPLES, n], the same worlds for every policy and metric."""
-    draws = np.random.default_rng(0).integers(len(values), size=(RESAMPLES, len(values)))
-    return values[draws]
+    in_keys: ClassVar = [ACTION_MASK]
+    out_keys: ClassVar = [ACTION]
 
+    def __init__(self, policy: TensorDictModuleBase, agent: int) -> None:
+        super().__init__()
+        self.policy, self.agent = policy, agent
 
-def _interval(samples: np.ndarray) -> list[float]:
-    return [float(bound) for bound in np.percentile(samples, (2.5, 97.5))]
-
-
-def summarise(episodes: Episodes) -> dict[str, dict[str, Any]]:
-    """Return each metric's interquartile mean, mean, and the mean's 95 % bootstrap interval over worlds."""
-    return {
-        name: {
-            "iqm": float(interquartile_mean(values)),
-            "mean": float(values.mean()),
-            "ci95": _interval(_resampled(values).mean(axis=1)),
-            "iqm_ci95": _interval(interquartile_mean(_resampled(values))),
-        }
-        for name, values in episodes.items()
-    }
-
-
-def compare(episodes: Episodes, other: Episodes) -> dict[str, Any]:
-    """Return the mean difference in trees saved, paired by world, with its 95 % bootstrap interval."""
-    difference = episodes["saved"] - other["saved"]
-    return {"saved_difference": float(difference.mean()), "ci95": _interval(_resampled(difference).mean(axis=1))}
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Write the team's actions, int64 [B, A]."""
+        out = self.policy(tensordict)
+        mask = tensordict.get(ACTION_MASK)[:, self.agent]
+        idle = idle_action(mask)
+        action = out.get(ACTION).clone()
+        action[:, self.agent] = idle
+        return out.set(ACTION, action)
 
 
 def report(
@@ -102,6 +102,7 @@ def report(
     episodes: Episodes,
     others: Mapping[str, Episodes],
     other_modes: Mapping[str, Episodes] | None = None,
+    left_out: Mapping[str, Episodes] | None = None,
 ) -> dict[str, Any]:
     """Return the content of ``evaluation.json``.
 
@@ -112,23 +113,35 @@ def report(
         episodes: The policy's.
         others: The heuristics' on the same worlds, by name.
         other_modes: The same policy's, acting in another mode, by name.
+        left_out: The same policy's with an agent left out, by the agent's name.
     """
+    if "noop" in others:
+        episodes = episodes | {"averted": episodes["saved"] - others["noop"]["saved"]}
     count = len(episodes["saved"])
     seeds = list(range(first_seed, first_seed + count))
     rows = [
-        {"seed": seed, **{name: float(values[index]) for name, values in episodes.items()}}
+        {"seed": seed, **{name: _number(values[index]) for name, values in episodes.items()}}
         for index, seed in enumerate(seeds)
     ]
     return {
         "scenario": scenario,
         "policy": policy,
         "seeds": seeds,
-        "metrics": summarise(episodes),
+        "metrics": _summaries(episodes),
         "episodes": rows,
-        "versus": {name: compare(episodes, other) for name, other in others.items()},
-        "yardsticks": {name: summarise(other) for name, other in others.items()},
-        "other_modes": {name: summarise(other) for name, other in (other_modes or {}).items()},
+        "versus": {name: compare(episodes["saved"], other["saved"]) for name, other in others.items()},
+        "yardsticks": {name: _summaries(other) for name, other in others.items()},
+        "other_modes": {name: _summaries(other) for name, other in (other_modes or {}).items()},
+        "left_out": {agent: compare(episodes["saved"], other["saved"]) for agent, other in (left_out or {}).items()},
     }
+
+
+def _summaries(episodes: Episodes) -> dict[str, dict[str, Any]]:
+    return {name: summarise(values) for name, values in episodes.items()}
+
+
+def _number(value: float) -> float | None:
+    return None if np.isnan(value) else float(value)
 
 
 def table(content: Mapping[str, Any]) -> str:
@@ -150,9 +163,23 @@ def table(content: Mapping[str, Any]) -> str:
         low, high = (100.0 * bound for bound in difference["ci95"])
         lines.append(
             f"{content['policy']} - {name}: {100 * difference['saved_difference']:+.1f} points saved, "
-            f"{low:+.1f} .. {high:+.1f}"
+            f"{low:+.1f} .. {high:+.1f}; more on {100 * difference['probability_of_improvement']:.0f} % of fires"
         )
+    lines += _behaviour_lines(content)
     return "\n".join(lines)
+
+
+def _behaviour_lines(content: Mapping[str, Any]) -> list[str]:
+    lines = []
+    for name in SHOWN:
+        found = content["metrics"].get(name, {"mean": None})
+        if found["mean"] is not None:
+            low, high = found["ci95"]
+            lines.append(f"{name.replace('_', ' '):<22}{found['mean']:>8.3f}{f'{low:.3f} .. {high:.3f}':>16}")
+    for agent, loss in content["left_out"].items():
+        low, high = (100.0 * bound for bound in loss["ci95"])
+        lines.append(f"without {agent:<14}{-100 * loss['saved_difference']:>+8.1f}{f'{-high:+.1f} .. {-low:+.1f}':>16}")
+    return lines
 
 
 def play_heuristics(env: WildfireEnv, first_seed: int, names: Sequence[str] = YARDSTICKS) -> dict[str, Episodes]:

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from warp_torchrl.world.front import alignment, block_shares, centre, containment, exposure
+from warp_torchrl.world.front import alignment, block_shares, centre, containment, exposure, sector
 
 from .drawing import draw, marks
 
@@ -26,6 +26,12 @@ def test_alignment_is_the_cosine_to_the_wind() -> None:
     assert alignment(places, torch.tensor([[5.0, 5.0]]), 0.0 * wind).abs().max() == 0.0
 
 
+def test_sectors_go_round_clockwise_from_the_east() -> None:
+    places = torch.tensor([[[5, 9], [6, 9], [9, 9], [5, 1], [1, 5], [4, 9]]])
+    # East itself, just south of it, south-east (45 degrees), west, north, just north of east.
+    assert sector(places, torch.tensor([[5.0, 5.0]])).tolist() == [[0, 0, 1, 4, 6, 7]]
+
+
 def test_exposure_is_the_share_of_trees_near_fire() -> None:
     # 9 cells, one of them alight: 8 within one cell, of 9 initial trees; a lake and an ember's like do not count.
     state = draw("TTT TaT TTT")
@@ -35,18 +41,18 @@ def test_exposure_is_the_share_of_trees_near_fire() -> None:
 
 
 def test_containment_counts_the_rays_that_meet_a_barrier() -> None:
-    state = draw(FIELD)
+    fire = draw(FIELD).cells > 10
     none = torch.zeros(1, 15, 15, dtype=torch.bool)
-    assert containment(state, none).item() == 0.0
+    assert containment(fire, none).item() == 0.0
     ring = none.clone()
     ring[:, 3:12, 3:12] = True
     ring[:, 4:11, 4:11] = False
-    assert containment(state, ring).item() == 1.0
+    assert containment(fire, ring).item() == 1.0
     # A wall three columns east, from border to border: rays up to 67.5 degrees off east meet it, 13 of 32.
     wall = none.clone()
     wall[:, :, 10] = True
-    assert containment(state, wall).item() == pytest.approx(13 / 32)
-    assert containment(draw("TTT TTT TTT"), none[:, :3, :3]).item() == 1.0
+    assert containment(fire, wall).item() == pytest.approx(13 / 32)
+    assert containment(none, none).item() == 1.0
 
 
 def test_blocks_count_among_their_own_cells() -> None:

@@ -3,7 +3,7 @@
 They read the worlds through the environment: all but ``local`` see every cell, which no learned policy does.
 """
 
-from warp_torchrl.heuristics.base import Heuristic
+from warp_torchrl.heuristics.base import Heuristic, idle_action
 from warp_torchrl.heuristics.coordinated import Coordinated
 from warp_torchrl.heuristics.reactive import Greedy, Local, NoOp, Random
 from warp_torchrl.heuristics.ring import Mixed, Ring
@@ -19,4 +19,15 @@ HEURISTICS: dict[str, type[Heuristic]] = {
 }
 """Policies by name."""
 
-__all__ = ["HEURISTICS", "Coordinated", "Greedy", "Heuristic", "Local", "Mixed", "NoOp", "Random", "Ring"]
+__all__ = [
+    "HEURISTICS",
+    "Coordinated",
+    "Greedy",
+    "Heuristic",
+    "Local",
+    "Mixed",
+    "NoOp",
+    "Random",
+    "Ring",
+    "idle_action",
+]

@@ -40,6 +40,13 @@ class Heuristic(TensorDictModuleBase):
         raise TypeError(f"{type(self).__name__} does not say what to do: define choose()")
 
 
+def idle_action(mask: Tensor) -> Tensor:
+    """Return the action that does nothing, int64 [...], of action masks [..., 10 or 11]: stay, or a masked one."""
+    if mask.shape[-1] > Action.STAY:
+        return torch.full(mask.shape[:-1], int(Action.STAY), device=mask.device)
+    return mask.to(torch.uint8).argmin(dim=-1)
+
+
 def can_be_put_out(state: WorldState, env: WildfireEnv) -> Tensor:
     """Return the burning cells that an agent could put out, bool [B, H, W]."""
     return is_burning(state.cells) & (state.cells <= env.world.fire.last_spreading)

@@ -8,12 +8,13 @@ from warp_torchrl.heuristics.base import (
     approach,
     can_be_put_out,
     extinguish_or,
+    idle_action,
     nearest_fire,
     or_refill,
     place,
 )
 from warp_torchrl.world.random import Stream, uniform
-from warp_torchrl.world.state import Action, WorldState
+from warp_torchrl.world.state import WorldState
 
 
 class NoOp(Heuristic):
@@ -21,9 +22,7 @@ class NoOp(Heuristic):
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
-        if mask.shape[-1] > Action.STAY:
-            return torch.full(mask.shape[:-1], int(Action.STAY), device=mask.device)
-        return mask.to(torch.uint8).argmin(dim=-1)
+        return idle_action(mask)
 
 
 class Random(Heuristic):

@@ -188,7 +188,9 @@ class Adaptive(Conservation):
     def value(self, state: WorldState) -> Tensor:
         """Return R without r_1 and the cost of acts, float32 [B]."""
         barrier = (state.alpha == 0.0) | state.firebreak | (state.wet > 0)
-        shape = self.contained * containment(state, barrier) - self.exposed * exposure(state, self.reach)
+        shape = self.contained * containment(is_burning(state.cells), barrier) - self.exposed * exposure(
+            state, self.reach
+        )
         return self.worth(state) + shape
 
     def bonus(self, transition: Transition) -> Tensor:

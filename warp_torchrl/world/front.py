@@ -44,6 +44,19 @@ def alignment(place: Tensor, middle: Tensor, wind: Tensor) -> Tensor:
     return along / (torch.hypot(south, east) * torch.hypot(u, v)[:, None]).clamp(min=1e-6)
 
 
+def sector(place: Tensor, middle: Tensor, count: int = 8) -> Tensor:
+    """Return in which of ``count`` equal sectors about the fire's centre a place lies, int64 [B, A].
+
+    Args:
+        place: (row, column), [B, A, 2] [cells].
+        middle: The fire's centre, [B, 2] [cells].
+        count: Sectors; 0 begins in the east, and they go round clockwise.
+    """
+    south, east = (place - middle[:, None]).unbind(-1)
+    turn = torch.atan2(south, east) / (2.0 * math.pi)
+    return (turn.remainder(1.0) * count).to(torch.int64).clamp(max=count - 1)
+
+
 def exposure(state: WorldState, reach: int = 3) -> Tensor:
     """Return the trees that could burn within ``reach`` king's moves of fire, a share of N0, float32 [B]."""
     fuel = is_tree(state.cells) & (state.alpha > 0.0)
@@ -51,25 +64,24 @@ def exposure(state: WorldState, reach: int = 3) -> Tensor:
     return near.sum((1, 2)) / state.tally.initial
 
 
-def containment(state: WorldState, barrier: Tensor) -> Tensor:
+def containment(fire: Tensor, barrier: Tensor) -> Tensor:
     """Return the share of rays from the fire's centre to the border that meet a barrier, float32 [B].
 
-    1 where nothing burns.
+    1 where there is no fire.
 
     Args:
-        state: The worlds.
+        fire: The cells that count as fire, bool [B, H, W].
         barrier: The cells that stop a ray, bool [B, H, W].
     """
-    height, width = state.cells.shape[1:]
-    burning = is_burning(state.cells)
-    steps = _rays(max(height, width), state.cells.device)
-    place = (centre(burning)[:, None, None] + steps).round().to(torch.int64)
+    height, width = fire.shape[1:]
+    steps = _rays(max(height, width), fire.device)
+    place = (centre(fire)[:, None, None] + steps).round().to(torch.int64)
     row, column = place.unbind(-1)
     inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
     index = row.clamp(0, height - 1) * width + column.clamp(0, width - 1)
     met = barrier.flatten(1).gather(1, index.flatten(1)).view_as(index) & inside
     share = met.any(dim=2).to(torch.float32).mean(dim=1)
-    return share.masked_fill(~burning.flatten(1).any(dim=1), 1.0)
+    return share.masked_fill(~fire.flatten(1).any(dim=1), 1.0)
 
 
 def block_shares(mask: Tensor, among: Tensor, side: int = 8) -> Tensor:

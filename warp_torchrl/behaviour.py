@@ -1,0 +1,119 @@
+"""How a team behaves, as numbers: who works where, at the head or the rear, how early, and what shuts the fire in."""
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from warp_torchrl.world.front import alignment, centre, containment, sector
+from warp_torchrl.world.geometry import grow
+from warp_torchrl.world.state import Transition, WorldState, is_burning, is_tree
+
+SECTORS = 8
+SHUFFLES = 64
+BEHAVIOUR = ("division", "head_attack", "contested", "containment", "lead_time", "unused_breaks")
+"""Names of the numbers, in the order of tables."""
+
+
+class Behaviour:
+    """Watches the steps of worlds that are played without resets; ``WildfireEnv.watcher`` takes it.
+
+    Args:
+        state: The worlds at their start.
+    """
+
+    def __init__(self, state: WorldState) -> None:
+        worlds, agents = state.vehicles.position.shape[:2]
+        device = state.cells.device
+        self._counts = torch.zeros(worlds, agents, SECTORS, device=device)
+        self._cosine = torch.zeros(worlds, device=device)
+        self._acts = torch.zeros(worlds, device=device)
+        self._contested = torch.zeros(worlds, device=device)
+        self._targets = torch.zeros(worlds, device=device)
+        self._cleared_at = torch.full(state.cells.shape, -1, dtype=torch.int32, device=device)
+        self._lead = torch.full(state.cells.shape, -1, dtype=torch.int32, device=device)
+        self._state = state
+
+    def __call__(self, transition: Transition) -> None:
+        """Take note of one step."""
+        before, after, outcome = transition.before, transition.after, transition.outcome
+        width = before.cells.shape[2]
+        place = torch.stack((outcome.target // width, outcome.target % width), dim=-1)
+        middle = centre(is_burning(before.cells))
+        acted = (outcome.extinguished | outcome.cleared).to(torch.float32)
+        put_out = outcome.extinguished.to(torch.float32)
+        self._counts.scatter_add_(2, sector(place, middle, SECTORS)[..., None], acted[..., None])
+        self._cosine += (alignment(place, middle, before.wind) * acted).sum(dim=1)
+        self._acts += acted.sum(dim=1)
+        self._targets += put_out.sum(dim=1)
+        self._contested += _contested(outcome.target, outcome.extinguished, outcome.redundant)
+        new = after.firebreak & ~before.firebreak
+        step = before.step[:, None, None]
+        self._cleared_at = torch.where(new, step, self._cleared_at)
+        reached = grow(is_burning(after.cells)) & (self._cleared_at >= 0) & (self._lead < 0)
+        self._lead = torch.where(reached, step - self._cleared_at, self._lead)
+        self._state = after
+
+    def summary(self) -> dict[str, np.ndarray]:
+        """Return the numbers of each world's episode, float64 [B]; NaN where an episode has none.
+
+        ``division``: mutual information of agent and sector of the fire over credited acts, less its mean when the
+        sectors are shuffled among the acts [bits]. ``head_attack``: mean cosine of the wind and the way from the
+        fire's centre to the act. ``contested``: share of the cells put out that a team-mate went for in the same
+        step. ``containment``: share of rays from the middle of all that burned or was put out to the border that meet
+        a firebreak or a tree that was put out and stands. ``lead_time``: steps from a clearing until fire stands beside
+        it. ``unused_breaks``: share of clearings that fire never reached.
+        """
+        state = self._state
+        touched = is_burning(state.cells) | state.burned | state.extinguished
+        barrier = state.firebreak | (state.extinguished & is_tree(state.cells))
+        cleared = self._cleared_at >= 0
+        reached = self._lead >= 0
+        count, used = cleared.sum((1, 2)), reached.sum((1, 2))
+        numbers = {
+            "head_attack": self._cosine / self._acts,
+            "contested": self._contested / self._targets,
+            "containment": containment(touched, barrier),
+            "lead_time": (self._lead * reached).sum((1, 2)) / used,
+            "unused_breaks": 1.0 - used / count,
+        }
+        found = {name: value.double().cpu().numpy() for name, value in numbers.items()}
+        return {"division": divided(self._counts.cpu().numpy())} | found
+
+
+def _contested(target: Tensor, extinguished: Tensor, redundant: Tensor) -> Tensor:
+    """Return how many cells that were put out a team-mate went for too, float32 [B]."""
+    same = (target[:, :, None] == target[:, None, :]) & extinguished[:, :, None] & redundant[:, None, :]
+    return same.any(dim=2).to(torch.float32).sum(dim=1)
+
+
+def mutual_information(counts: np.ndarray) -> np.ndarray:
+    """Return the mutual information of the two indices of tables of counts [..., rows, columns], [...] [bits]."""
+    share = counts / np.maximum(counts.sum((-2, -1), keepdims=True), 1.0)
+    alone = share.sum(-1, keepdims=True) * share.sum(-2, keepdims=True)
+    ratio = np.divide(share, alone, out=np.ones_like(share), where=share > 0.0)
+    return (share * np.log2(ratio)).sum((-2, -1))
+
+
+def divided(counts: np.ndarray) -> np.ndarray:
+    """Return how much more the sector tells of the agent than chance would, float64 [B] [bits].
+
+    The information in small tables is above 0 by chance alone; tables with the same margins, as shuffling gives them,
+    say by how much.
+
+    Args:
+        counts: Acts by agent and sector, [B, A, sectors].
+    """
+    random, excess = np.random.default_rng(0), np.full(len(counts), np.nan)
+    for world, table in enumerate(counts.astype(np.int64)):
+        agents, sectors = table.sum(1), table.sum(0)
+        if agents.sum() < 2 or len(agents) < 2:
+            continue
+        shuffled = np.zeros((SHUFFLES, *table.shape))
+        left = np.broadcast_to(sectors, (SHUFFLES, len(sectors))).copy()
+        for agent, acts in enumerate(agents):
+            for draw in range(SHUFFLES):
+                taken = random.multivariate_hypergeometric(left[draw], acts)
+                shuffled[draw, agent] = taken
+                left[draw] -= taken
+        excess[world] = mutual_information(table.astype(float)) - mutual_information(shuffled).mean()
+    return excess

@@ -1,0 +1,78 @@
+"""What a set of episodes says, and how sure it is: means with bootstrap intervals, and paired comparisons.
+
+Values are one number an episode: [n] over world seeds, or [runs, n] of a policy trained several times. Intervals are
+hierarchical: training seeds are resampled, then world seeds, the same ones for every policy (Agarwal et al. 2021).
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+RESAMPLES = 4000
+
+
+def interquartile_mean(values: np.ndarray) -> np.ndarray:
+    """Return the mean of the middle half along the last axis (Agarwal et al. 2021, as ``scipy.stats.trim_mean``)."""
+    ordered = np.sort(values, axis=-1)
+    cut = values.shape[-1] // 4
+    return ordered[..., cut : values.shape[-1] - cut].mean(axis=-1)
+
+
+def interval(values: np.ndarray, statistic: Callable[[np.ndarray], np.ndarray]) -> list[float]:
+    """Return the 95 % bootstrap interval of a statistic over the last axis of values [n] or [runs, n]."""
+    runs, count = np.atleast_2d(values).shape
+    random = np.random.default_rng(0)
+    worlds = random.integers(count, size=(RESAMPLES, 1, count))
+    trained = random.integers(runs, size=(RESAMPLES, runs, 1)) if runs > 1 else np.zeros((1, 1, 1), np.int64)
+    samples = np.atleast_2d(values)[trained, worlds].reshape(RESAMPLES, runs * count)
+    return [float(bound) for bound in np.percentile(statistic(samples), (2.5, 97.5))]
+
+
+def _mean(values: np.ndarray) -> np.ndarray:
+    return values.mean(axis=-1)
+
+
+def summarise(values: np.ndarray) -> dict[str, Any]:
+    """Return the interquartile mean and the mean of values [n] or [runs, n], each with its 95 % interval.
+
+    NaN, an episode without the number, is left out of [n]; without any value the entries are None.
+    """
+    values = values[~np.isnan(values)] if values.ndim == 1 else values
+    if not values.size:
+        return {"iqm": None, "mean": None, "ci95": None, "iqm_ci95": None}
+    flat = values.reshape(-1)
+    return {
+        "iqm": float(interquartile_mean(flat)),
+        "mean": float(flat.mean()),
+        "ci95": interval(values, _mean),
+        "iqm_ci95": interval(values, interquartile_mean),
+    }
+
+
+def compare(saved: np.ndarray, other: np.ndarray) -> dict[str, Any]:
+    """Return how much more a policy saves than another, paired by world, and how often; with 95 % intervals.
+
+    Args:
+        saved: Trees saved, [n] or [runs, n].
+        other: The other policy's on the same worlds, [n] or [runs, n].
+
+    Returns:
+        ``saved_difference`` and ``ci95``; ``probability_of_improvement``, the chance that a run of the policy saves
+        more on a world than one of the other (ties count half), and ``probability_ci95``.
+    """
+    mine, theirs = np.atleast_2d(saved), np.atleast_2d(other)
+    difference = mine - theirs.mean(axis=0)
+    gap = mine[:, None] - theirs[None]
+    better = ((gap > 0.0) + 0.5 * (gap == 0.0)).mean(axis=1)
+    return {
+        "saved_difference": float(difference.mean()),
+        "ci95": interval(difference, _mean),
+        "probability_of_improvement": float(better.mean()),
+        "probability_ci95": interval(better, _mean),
+    }
+
+
+def performance_profile(values: np.ndarray, levels: np.ndarray) -> np.ndarray:
+    """Return the share of episodes that reach each level, float64 [levels] (Agarwal et al. 2021)."""
+    return (values.reshape(-1)[None] >= levels[:, None]).mean(axis=1)
