@@ -188,3 +188,16 @@ def test_a_mistake_in_a_process_of_its_own(tmp_path, arguments, code, message):
     assert message in last and last.startswith("error: ")
     assert "Traceback" not in done.stderr
     assert not list(tmp_path.iterdir())
+
+
+def test_a_sweep_of_evaluations_ends_in_one_table_and_one_figure(tmp_path):
+    pytest.importorskip("matplotlib")
+    sweep = tmp_path / "sweep"
+    done = command(
+        "evaluate.py", "-m", "policy=noop,greedy", "landscape.size=12", "horizon=20", "evaluation.episodes=4",
+        f"hydra.sweep.dir={sweep}", folder=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    text = (sweep / "summary.md").read_text()
+    assert "| skirmish | greedy | 1 | 4 |" in text and text.strip() in done.stdout
+    assert (sweep / "summary.png").stat().st_size > 10_000

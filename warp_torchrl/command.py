@@ -1,10 +1,12 @@
 """The two commands: checks first, works, and ends with one line and an exit code when something fails."""
 
 import errno
+import json
 import logging
 import sys
 import traceback
 from collections.abc import Callable, Sequence
+from hashlib import sha256
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -12,10 +14,12 @@ from typing import Any
 import hydra
 from hydra.core.hydra_config import HydraConfig
 from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.experimental.callback import Callback
 from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 
 from warp_torchrl import checkpoint as checkpoints
+from warp_torchrl import summary
 from warp_torchrl.api import policy_of
 from warp_torchrl.config import (
     COMPONENTS,
@@ -136,11 +140,38 @@ def _report(
     left_out = {}
     if plan.evaluation.leave_one_out:
         left_out = {agent: play(env, LeftOut(actor, index), first, mode) for index, agent in enumerate(env.agent_names)}
-    content = report(plan.scenario, name, first, episodes, others, other_modes, left_out)
+    method, configuration = (None, "") if found is None else _method(found.record())
+    content = report(plan.scenario, name, first, episodes, others, other_modes, left_out, method, configuration)
     write_json(folder / "evaluation.json", content)
     print(table(content), flush=True)
     record_episode(folder / "episode.gif", one, policy, f"{plan.scenario}\n{name}", first, mode)
     log.info("wrote evaluation.json and episode.gif into %s", folder)
+
+
+def _method(record: Record) -> tuple[str, str]:
+    """Return what a trained policy is called in a sweep, and a digest of its configuration but for the seed."""
+    names = [record.choices[group] for group in ("algorithm", "reward", "observation")]
+    values = {key: value for key, value in record.values.items() if key not in ("seed", "device", "evaluation")}
+    return " ".join(names), sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
+
+
+class SweepSummary(Callback):
+    """Ends a sweep with one table and one figure of all its evaluations."""
+
+    def on_multirun_end(self, config: DictConfig, **kwargs: Any) -> None:
+        """Write ``summary.md`` and ``summary.png`` into the sweep's folder, and print the table."""
+        folder = Path(str(config.hydra.sweep.dir))
+        entries = summary.gather(folder)
+        if not entries:
+            return
+        text = summary.table(entries)
+        (folder / "summary.md").write_text(text + "\n", encoding="utf-8")
+        print(text, flush=True)
+        try:
+            summary.draw(entries, folder / "summary.png")
+        except ImportError:
+            print('no summary.png: Matplotlib is missing, pip install "warp_torchrl[figures]"', flush=True)
+        print(f"wrote the summary into {folder}", flush=True)
 
 
 def _check_fits(found: checkpoints.Checkpoint, env: Any) -> None:

@@ -103,6 +103,8 @@ def report(
     others: Mapping[str, Episodes],
     other_modes: Mapping[str, Episodes] | None = None,
     left_out: Mapping[str, Episodes] | None = None,
+    method: str | None = None,
+    configuration: str = "",
 ) -> dict[str, Any]:
     """Return the content of ``evaluation.json``.
 
@@ -114,6 +116,8 @@ def report(
         others: The heuristics' on the same worlds, by name.
         other_modes: The same policy's, acting in another mode, by name.
         left_out: The same policy's with an agent left out, by the agent's name.
+        method: What the policy is called beside others; its name where None.
+        configuration: Tells policies of one method that were trained differently apart.
     """
     if "noop" in others:
         episodes = episodes | {"averted": episodes["saved"] - others["noop"]["saved"]}
@@ -126,6 +130,8 @@ def report(
     return {
         "scenario": scenario,
         "policy": policy,
+        "method": policy if method is None else method,
+        "configuration": configuration,
         "seeds": seeds,
         "metrics": _summaries(episodes),
         "episodes": rows,

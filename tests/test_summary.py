@@ -1,0 +1,61 @@
+"""What a sweep came to: runs that are gathered, the table, the figure."""
+
+import json
+
+import numpy as np
+import pytest
+
+from warp_torchrl.summary import draw, gather, table
+
+
+def write(folder, policy, saved, scenario="tiny", configuration="", seeds=None):
+    folder.mkdir(parents=True)
+    seeds = list(range(len(saved))) if seeds is None else seeds
+    episodes = [{"seed": seed, "saved": value, "success": float(value >= 0.6)} for seed, value in zip(seeds, saved)]
+    content = {"scenario": scenario, "method": policy, "configuration": configuration, "seeds": seeds}
+    (folder / "evaluation.json").write_text(json.dumps(content | {"episodes": episodes}))
+
+
+@pytest.fixture
+def sweep(tmp_path):
+    write(tmp_path / "0", "mappo", [0.5, 0.7, 0.9], configuration="aaaaaaaa")
+    write(tmp_path / "1", "mappo", [0.7, 0.9, 0.5], configuration="aaaaaaaa")
+    write(tmp_path / "2", "local", [0.5, 0.5, 0.6])
+    write(tmp_path / "3", "local", [0.1, 0.2, 0.3], scenario="other")
+    return tmp_path
+
+
+def test_runs_that_were_trained_alike_are_gathered(sweep):
+    mappo, local, other = gather(sweep)
+    assert mappo.policy == "mappo" and mappo.saved.shape == (2, 3)
+    assert local.saved.tolist() == [[0.5, 0.5, 0.6]] and local.success.tolist() == [[0.0, 0.0, 1.0]]
+    assert other.scenario == "other"
+
+
+def test_runs_that_were_trained_differently_are_told_apart(sweep):
+    write(sweep / "4", "mappo", [0.1, 0.1, 0.1], configuration="bbbbbbbb")
+    assert [entry.policy for entry in gather(sweep)] == ["mappo aaaaaa", "local", "local", "mappo bbbbbb"]
+
+
+def test_the_table_puts_the_best_first_and_compares_with_it(sweep):
+    header, _, first, second, third = table(gather(sweep)).splitlines()
+    assert "saved %" in header
+    assert first.split("|")[1:5] == [" tiny ", " mappo ", " 2 ", " 3 "] and "| 70.0 |" in first
+    # Local against the two runs, paired by world: 0.5333 - 0.7; better only where 0.6 beats 0.5, one of six; and
+    # equal where 0.5 meets 0.5, half of one: 1.5 / 6.
+    assert second.split("|")[2] == " local " and "| -16.7 |" in second and second.endswith("| 25 % |")
+    assert third.startswith("| other | local") and third.endswith("| - | - | - |")
+
+
+def test_policies_on_other_fires_are_not_compared(sweep):
+    write(sweep / "4", "greedy", [0.1, 0.1, 0.1], seeds=[7, 8, 9])
+    row = next(line for line in table(gather(sweep)).splitlines() if "greedy" in line)
+    assert row.endswith("| - | - | - |")
+
+
+def test_the_figure_is_drawn(sweep, tmp_path):
+    pytest.importorskip("matplotlib")
+    from matplotlib.image import imread
+
+    draw(gather(sweep), tmp_path / "summary.png")
+    assert np.ptp(imread(tmp_path / "summary.png")[..., :3]) > 0.5

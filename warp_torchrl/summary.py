@@ -1,0 +1,140 @@
+"""What the jobs of a sweep came to: one table and one figure from their ``evaluation.json`` files."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from warp_torchrl.statistics import compare, performance_profile, summarise
+
+LEVELS = np.linspace(0.0, 1.0, 101)
+
+
+class Entry(NamedTuple):
+    """A policy on a scenario, over all the runs that were trained alike."""
+
+    scenario: str
+    policy: str
+    saved: np.ndarray  # [runs, n]
+    success: np.ndarray  # [runs, n]
+    seeds: tuple[int, ...]
+
+
+def gather(folder: Path) -> list[Entry]:
+    """Return what the ``evaluation.json`` files under a folder hold, runs that differ in their seed alone together."""
+    found: dict[tuple[str, str, str, tuple[int, ...]], list[Mapping[str, Any]]] = {}
+    for path in sorted(folder.glob("**/evaluation.json")):
+        content = json.loads(path.read_text(encoding="utf-8"))
+        key = (content["scenario"], content["method"], content["configuration"], tuple(content["seeds"]))
+        found.setdefault(key, []).append(content)
+    several = {(scenario, method) for scenario, method, *_ in found if _differ(found, scenario, method)}
+    return [
+        Entry(
+            scenario,
+            f"{method} {configuration[:6]}" if (scenario, method) in several else method,
+            *(
+                np.array([[episode[name] for episode in run["episodes"]] for run in runs])
+                for name in ("saved", "success")
+            ),
+            seeds,
+        )
+        for (scenario, method, configuration, seeds), runs in found.items()
+    ]
+
+
+def _differ(found: Mapping[tuple, Any], scenario: str, method: str) -> bool:
+    return len({key[2] for key in found if key[:2] == (scenario, method)}) > 1
+
+
+def table(entries: Sequence[Entry]) -> str:
+    """Return the entries as a Markdown table, best first in each scenario, each compared with the best."""
+    lines = [
+        "| scenario | policy | runs | fires | saved % | 95 % | iqm % | success % | to the best | 95 % | better on |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for group in _by_scenario(entries):
+        best = group[0]
+        for entry in group:
+            saved = summarise(entry.saved)
+            cells = [
+                entry.scenario,
+                entry.policy,
+                str(len(entry.saved)),
+                str(entry.saved.shape[1]),
+                f"{100 * saved['mean']:.1f}",
+                _range(saved["ci95"]),
+                f"{100 * saved['iqm']:.1f}",
+                f"{100 * entry.success.mean():.1f}",
+            ]
+            if entry is best or entry.seeds != best.seeds:
+                cells += ["-", "-", "-"]
+            else:
+                gap = compare(entry.saved, best.saved)
+                cells += [
+                    f"{100 * gap['saved_difference']:+.1f}",
+                    _range(gap["ci95"], "+"),
+                    f"{100 * gap['probability_of_improvement']:.0f} %",
+                ]
+            lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def draw(entries: Sequence[Entry], path: Path) -> None:
+    """Draw saved trees with their intervals, and the share of fires on which each policy saves so much.
+
+    Raises:
+        ImportError: If Matplotlib is not installed.
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    groups = _by_scenario(entries)
+    policies = list(dict.fromkeys(entry.policy for group in groups for entry in group))
+    styles = {policy: _style(index) for index, policy in enumerate(policies)}
+    with rc_context({"font.size": 8.0, "axes.spines.top": False, "axes.spines.right": False}):
+        rows = [max(1.2, 0.28 * len(group) + 0.7) for group in groups]
+        figure = Figure(figsize=(8.0, sum(rows) + 0.6), dpi=140, layout="constrained")
+        axes = figure.subplots(len(groups), 2, squeeze=False, height_ratios=rows)
+        for (bars, profile), group in zip(axes, groups, strict=True):
+            _draw_bars(bars, group, styles)
+            for entry in group:
+                shares = 100.0 * performance_profile(entry.saved, LEVELS)
+                profile.plot(100.0 * LEVELS, shares, label=entry.policy, linewidth=1.4, **styles[entry.policy])
+            profile.set(xlim=(0, 100), ylim=(0, 102), ylabel="fires, %")
+            profile.set_title(f"{group[0].scenario}: share of fires with at least so much saved", fontsize=8.0)
+        for each in axes[-1]:
+            each.set_xlabel("forest saved, %")
+        handles = {h.get_label(): h for row in axes for h in row[1].get_lines()}
+        figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=4, frameon=False)
+        figure.savefig(path, metadata={"Software": None})
+
+
+def _draw_bars(axes: Any, group: Sequence[Entry], styles: Mapping[str, Mapping[str, Any]]) -> None:
+    for place, entry in enumerate(reversed(group)):
+        saved = summarise(entry.saved)
+        mean, (low, high) = 100 * saved["mean"], (100 * bound for bound in saved["ci95"])
+        axes.barh(place, mean, height=0.7, color=styles[entry.policy]["color"], alpha=0.75)
+        axes.errorbar(mean, place, xerr=[[mean - low], [high - mean]], color="#222222", capsize=2.5, linewidth=1.0)
+        axes.text(min(high + 1.5, 93), place, f"{mean:.1f}", va="center", fontsize=7.0)
+    axes.set(yticks=range(len(group)), yticklabels=[entry.policy for entry in reversed(group)], xlim=(0, 100))
+    axes.set_title(f"{group[0].scenario}: mean, 95 % interval", fontsize=8.0)
+
+
+def _style(index: int) -> dict[str, Any]:
+    colours = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7", "#555555", "#F0E442")  # Okabe, Ito
+    dashes = ("-", "--", "-.", ":")
+    return {"color": colours[index % len(colours)], "linestyle": dashes[index // len(colours) % len(dashes)]}
+
+
+def _by_scenario(entries: Sequence[Entry]) -> list[list[Entry]]:
+    """Return the entries of each scenario, the best first."""
+    scenarios = dict.fromkeys(entry.scenario for entry in entries)
+    groups = [[entry for entry in entries if entry.scenario == scenario] for scenario in scenarios]
+    return [sorted(group, key=lambda entry: -entry.saved.mean()) for group in groups]
+
+
+def _range(bounds: Sequence[float], sign: str = "") -> str:
+    low, high = (100.0 * bound for bound in bounds)
+    return f"{low:{sign}.1f} .. {high:{sign}.1f}"
