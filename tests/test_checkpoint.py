@@ -11,7 +11,7 @@ from warp_torchrl.checkpoint import CheckpointError, RunFolderInUse, RunFolderLo
 from warp_torchrl.config import Record
 from warp_torchrl.models import Entry, Signature
 
-SIGNATURE = Signature({"view": Entry((3, 5, 5), "uint8")}, Entry((9, 16, 16), "float32"), 2, 11)
+SIGNATURE = Signature({"view": Entry((3, 5, 5), "uint8")}, Entry((9, 16, 16), "float32"), 2, 11, 2)
 
 
 def saved(run, frames, keep=3):

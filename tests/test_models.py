@@ -4,9 +4,11 @@ import pytest
 import torch
 from torch import nn
 
+from tests.conftest import small_world
 from warp_torchrl.algorithms.ppo import Ppo
 from warp_torchrl.models import ACTION, LOGITS, OBSERVATION, VALUE, Encoder, Entry, Mlp, signature
 from warp_torchrl.observation import Local, Paper, Surroundings
+from warp_torchrl.world.team import Team
 
 
 def test_the_encoder_equals_one_layer_over_joined_fractions():
@@ -64,3 +66,47 @@ def test_masked_actions_are_never_chosen(make_small_env):
 def test_sizes_out_of_range_are_refused(field, value):
     with pytest.raises(ValueError, match=f"{field} must be"):
         Mlp(**{field: value})
+
+
+# Who shares a network.
+
+
+def mixed_env(make_small_env, **options):
+    return make_small_env(3, small_world(team=Team(n_agents=4, roles=("ugv", "uav"))), **options)
+
+
+@pytest.mark.parametrize("sharing", ["team", "role", "none"])
+@pytest.mark.parametrize("observation", [Surroundings(), Paper()], ids=lambda each: type(each).__name__)
+def test_every_way_of_sharing_fits_and_learns(make_small_env, sharing, observation):
+    env = mixed_env(make_small_env, observation=observation)
+    model = Mlp(sharing=sharing, actor_hidden=(16,), critic_hidden=(16,))
+    for central in (True, False):
+        learner = Ppo(central_critic=central, minibatch_size=12).build(env, model, 12)
+        with torch.no_grad():
+            batch = env.rollout(4, learner.explore, break_when_any_done=False)
+        terms = learner.loss(learner.prepare(batch))
+        sum(terms[key] for key in learner.loss_keys).backward()
+        gradients = [p.grad for p in learner.loss.parameters() if p.requires_grad]
+        assert all(g is not None and g.isfinite().all() for g in gradients)
+
+
+def test_networks_are_chosen_by_the_role_whatever_the_team(make_small_env):
+    env = mixed_env(make_small_env)
+    actor, now = Mlp(sharing="role").actor(signature(env)), env.reset()
+    assert now["agents", "role"].tolist() == [[0, 1, 0, 1]] * 3
+    own = [network(*(now[key] for key in signature(env).observation_keys())) for network in actor.module.networks]
+    logits = actor(now)[LOGITS]
+    for agent in range(4):
+        assert torch.equal(logits[:, agent], own[agent % 2][:, agent])
+    other = make_small_env(2, small_world(team=Team(n_agents=3, roles=("uav",))))
+    assert actor(other.reset())[LOGITS].shape == (2, 3, 11)
+
+
+def test_agents_without_sharing_have_a_network_each(make_small_env):
+    env = mixed_env(make_small_env)
+    actor, now = Mlp(sharing="none").actor(signature(env)), env.reset()
+    before = actor(now.clone())[LOGITS]
+    nn.init.zeros_(actor.module.networks[2].body[-1].weight)
+    after = actor(now)[LOGITS]
+    changed = [(after[:, agent] != before[:, agent]).any().item() for agent in range(4)]
+    assert changed == [False, False, True, False]

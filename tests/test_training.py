@@ -63,14 +63,22 @@ def finished(tmp_path_factory):
     return run, training
 
 
-@pytest.mark.parametrize("algorithm", ["mappo", "ippo"])
+RUNS = {
+    "mappo": ["algorithm=mappo"],
+    "ippo": ["algorithm=ippo"],
+    "all that moves": ["reward.normalise=true", "model.sharing=role", "team.roles=[ugv,uav]", "fire=hazard",
+                       "wind=wandering", "reward=collaborative", "team.tank=3"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", RUNS)
 @pytest.mark.parametrize("stop_after", [1, 3, 5])
-def test_a_run_resumed_equals_a_run_not_interrupted(tmp_path, stop_after, algorithm):
-    whole = tiny(tmp_path / "whole", f"algorithm={algorithm}")
+def test_a_run_resumed_equals_a_run_not_interrupted(tmp_path, stop_after, name):
+    whole = tiny(tmp_path / "whole", *RUNS[name])
     (tmp_path / "whole").mkdir(exist_ok=True)
     (tmp_path / "cut").mkdir()
     whole.train()
-    first = tiny(tmp_path / "cut", f"algorithm={algorithm}")
+    first = tiny(tmp_path / "cut", *RUNS[name])
     batches = iter(first.collector)
     for _ in range(stop_after):
         first.metrics.add({"time/frames": 0, "time/seconds": 0.0, "time/fps": 0.0, **first._learn(next(batches))})
@@ -78,7 +86,7 @@ def test_a_run_resumed_equals_a_run_not_interrupted(tmp_path, stop_after, algori
     extra = first._learn(next(batches))  # lost with the crash that comes now
     first.metrics.add({"time/frames": 0, "time/seconds": 0.0, "time/fps": 0.0, **extra})
     torch.manual_seed(123)
-    second = tiny(tmp_path / "cut", f"algorithm={algorithm}")
+    second = tiny(tmp_path / "cut", *RUNS[name])
     second.load_state_dict(newest(tmp_path / "cut")[0].training())
     second.train()
     ours, theirs = flattened(second.state_dict()), flattened(whole.state_dict())

@@ -271,4 +271,5 @@ def _signature_from_json(content: dict[str, Any]) -> Signature:
         return Entry(tuple(int(side) for side in node["shape"]), str(node["dtype"]))
 
     observation = {str(name): entry(node) for name, node in content["observation"].items()}
-    return Signature(observation, entry(content["state"]), int(content["n_agents"]), int(content["n_actions"]))
+    counts = (int(content["n_agents"]), int(content["n_actions"]), int(content.get("n_roles", 2)))
+    return Signature(observation, entry(content["state"]), *counts)

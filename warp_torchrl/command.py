@@ -183,6 +183,14 @@ def _check_fits(found: checkpoints.Checkpoint, env: Any) -> None:
         )
 
 
+    own = found.record().values.get("model", {}).get("sharing") == "none"
+    if own and here.n_agents != there.n_agents:
+        raise ConfigError(
+            f"the policy in {found.path} has a network for each of {there.n_agents} agents, this team has "
+            f"{here.n_agents}"
+        )
+
+
 def _shapes(shape: Signature) -> str:
     return ", ".join(f"{name or 'vector'} {list(entry.shape)}" for name, entry in shape.observation.items())
 

@@ -205,7 +205,8 @@ class WildfireEnv(EnvBase):
         team = [*batch, self.n_agents]
         entries = self.observation(state, self.world)
         seen = entries[""] if "" in entries else TensorDict(entries, batch_size=team)
-        agents = {"observation": seen, "action_mask": self.world.action_mask(state)}
+        roles = self.world.team.table(self.device).index.repeat(*batch, 1)
+        agents = {"observation": seen, "action_mask": self.world.action_mask(state), "role": roles}
         info = metrics(state, self.world.horizon)
         info["episode_reward"] = self._episode_reward if episode_reward is None else episode_reward
         info["episode_length"] = state.step.to(torch.float32)
@@ -232,9 +233,10 @@ class WildfireEnv(EnvBase):
         spaces = {name: entry(space) for name, space in self.observation.spaces(self.world).items()}
         seen = spaces[""] if "" in spaces else Composite(spaces, shape=team, device=device)
         mask = Binary(n_actions, shape=(*team, n_actions), dtype=torch.bool, device=device)
+        role = Categorical(len(ROLES), shape=team, dtype=torch.int64, device=device)
         state_shape = (*batch, len(STATE), STATE_SIDE, STATE_SIDE)
         self.observation_spec = Composite(
-            agents=Composite(observation=seen, action_mask=mask, shape=team, device=device),
+            agents=Composite(observation=seen, action_mask=mask, role=role, shape=team, device=device),
             state=Bounded(-3.0, 256.0, shape=state_shape, device=device),
             info=Composite(
                 {name: Unbounded(shape=(*batch, 1), device=device) for name in EPISODE_METRICS}, shape=batch

@@ -17,6 +17,7 @@ ACTION_MASK = ("agents", "action_mask")
 LOGITS = ("agents", "logits")
 LOG_PROB = ("agents", "action_log_prob")
 OBSERVATION = ("agents", "observation")
+ROLE = ("agents", "role")
 REWARD = ("agents", "reward")
 VALUE = ("agents", "state_value")
 
@@ -35,6 +36,7 @@ class Signature(NamedTuple):
     state: Entry
     n_agents: int
     n_actions: int
+    n_roles: int
 
     def observation_keys(self) -> list[tuple[str, ...]]:
         """Return the tensordict keys of the observation's entries."""
@@ -52,7 +54,7 @@ def signature(env: EnvBase) -> Signature:
 
     n_agents, n_actions = specs[ACTION_MASK].shape
     observation = {name: entry(spec, 1) for name, spec in sorted(named.items())}
-    return Signature(observation, entry(specs["state"], 0), n_agents, n_actions)
+    return Signature(observation, entry(specs["state"], 0), n_agents, n_actions, specs[ROLE].n)
 
 
 class Encoder(nn.Module):
@@ -149,6 +151,45 @@ class TeamValue(nn.Module):
         return self.network(state).unsqueeze(-1)
 
 
+class RoleNetworks(nn.Module):
+    """One network for each role, chosen by an agent's role index, whatever the team.
+
+    Args:
+        networks: By role index.
+    """
+
+    def __init__(self, networks: list[Network]) -> None:
+        super().__init__()
+        self.networks = nn.ModuleList(networks)
+
+    def forward(self, *inputs: Tensor) -> Tensor:
+        """Return float32 [..., A, out] from entries [..., A, ...] and, last, roles int64 [..., A]."""
+        *entries, role = inputs
+        out = self.networks[0](*entries)
+        for index, network in enumerate(self.networks):
+            out = out if index == 0 else torch.where((role == index)[..., None], network(*entries), out)
+        return out
+
+
+class AgentNetworks(nn.Module):
+    """One network for each agent of a team of fixed size.
+
+    Args:
+        networks: By agent.
+    """
+
+    def __init__(self, networks: list[Network]) -> None:
+        super().__init__()
+        self.networks = nn.ModuleList(networks)
+
+    def forward(self, *inputs: Tensor) -> Tensor:
+        """Return float32 [..., A, out] from entries [..., A, ...]."""
+        entries = self.networks[0].encoder.entries
+        split = [given.unbind(-1 - len(entry.shape)) for given, entry in zip(inputs, entries, strict=True)]
+        own = zip(self.networks, *split, strict=True)
+        return torch.stack([network(*seen) for network, *seen in own], dim=-2)
+
+
 def _orthogonal(layer: nn.Linear, gain: float) -> nn.Linear:
     nn.init.orthogonal_(layer.weight, gain)
     nn.init.zeros_(layer.bias)
@@ -160,9 +201,11 @@ _ACTIVATIONS = {"tanh": nn.Tanh, "relu": nn.ReLU}
 
 @dataclass(frozen=True, kw_only=True)
 class Mlp:
-    """Multilayer perceptrons over flattened observations, one network shared by all agents.
+    """Multilayer perceptrons over flattened observations.
 
     Attributes:
+        sharing: ``team`` gives all agents one network, ``role`` one to each role (chosen by the role index, so that
+            it fits any team), ``none`` one to each agent (which fits teams of the same size only).
         actor_hidden: Sizes of the actor's hidden layers.
         critic_hidden: Sizes of the critic's.
         activation: ``tanh`` or ``relu``.
@@ -173,6 +216,7 @@ class Mlp:
         ValueError: If a size is not in 1..8192 or there is no hidden layer.
     """
 
+    sharing: Literal["team", "role", "none"] = "team"
     actor_hidden: tuple[int, ...] = (128, 128)
     critic_hidden: tuple[int, ...] = (128, 128)
     activation: Literal["tanh", "relu"] = "tanh"
@@ -186,16 +230,26 @@ class Mlp:
 
     def actor(self, signature: Signature) -> TensorDictModule:
         """Return the module that writes logits [..., A, actions] from an agent's own observation."""
-        network = self._network(list(signature.observation.values()), self.actor_hidden, signature.n_actions, 0.01)
-        return TensorDictModule(network, in_keys=signature.observation_keys(), out_keys=[LOGITS])
+        return self._of_agents(signature, self.actor_hidden, signature.n_actions, 0.01, LOGITS)
 
     def critic(self, signature: Signature, central: bool) -> TensorDictModule:
         """Return the module that writes values [..., A, 1], from the state or from each agent's observation."""
         if central:
             network = self._network([signature.state], self.critic_hidden, signature.n_agents, 1.0)
             return TensorDictModule(TeamValue(network), in_keys=["state"], out_keys=[VALUE])
-        network = self._network(list(signature.observation.values()), self.critic_hidden, 1, 1.0)
-        return TensorDictModule(network, in_keys=signature.observation_keys(), out_keys=[VALUE])
+        return self._of_agents(signature, self.critic_hidden, 1, 1.0, VALUE)
+
+    def _of_agents(
+        self, signature: Signature, hidden: tuple[int, ...], out: int, head_gain: float, key: tuple[str, ...]
+    ) -> TensorDictModule:
+        """Return the module that writes [..., A, out] from each agent's own observation."""
+        entries, keys = list(signature.observation.values()), signature.observation_keys()
+        count = {"team": 1, "role": signature.n_roles, "none": signature.n_agents}[self.sharing]
+        networks = [self._network(entries, hidden, out, head_gain) for _ in range(count)]
+        if self.sharing == "role":
+            return TensorDictModule(RoleNetworks(networks), in_keys=[*keys, ROLE], out_keys=[key])
+        network = networks[0] if self.sharing == "team" else AgentNetworks(networks)
+        return TensorDictModule(network, in_keys=keys, out_keys=[key])
 
     def _network(self, entries: list[Entry], hidden: tuple[int, ...], out: int, head_gain: float) -> Network:
         dtype = getattr(torch, self.dtype)

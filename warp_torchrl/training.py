@@ -22,6 +22,7 @@ from warp_torchrl.env import EPISODE_METRICS, WildfireEnv
 from warp_torchrl.evaluation import MODES, play
 from warp_torchrl.logging import MetricsFile
 from warp_torchrl.models import signature
+from warp_torchrl.reward_scale import RewardScale
 
 log = logging.getLogger("warp_torchrl")
 _SECONDS_BETWEEN_LINES = 15.0
@@ -88,6 +89,7 @@ class Training:
         self.env = settings.make_env(settings.n_worlds, TRAINING_SEEDS * settings.seed)
         self.frames_per_batch = settings.collector.steps * settings.n_worlds
         self.learner: Learner = settings.algorithm.build(self.env, settings.model, self.frames_per_batch)
+        self.reward_scale = RewardScale(settings.reward.gamma) if settings.reward.normalise else None
         self.collector = settings.collector.open(self.env, self.learner)
         self.frames = 0
         self.seconds = 0.0
@@ -141,6 +143,8 @@ class Training:
         row = _episode_columns(batch)
         if not learner.keeps_data:
             learner.buffer.empty()
+        if self.reward_scale is not None:
+            self.reward_scale(batch)
         learner.buffer.extend(learner.prepare(batch))
         sums: dict[str, Tensor] = {}
         updates = 0
@@ -215,6 +219,7 @@ class Training:
             "optimizer": self.learner.optimizer.state_dict(),
             "random": torch.get_rng_state(),
             "env": self.env.state_dict(),
+            "reward_scale": {} if self.reward_scale is None else self.reward_scale.state_dict(),
             "carrier": _flat(self.collector._carrier),
             "frames": self.frames,
             "seconds": self.seconds,
@@ -231,6 +236,8 @@ class Training:
             self.learner.loss.load_state_dict(state["loss"])
             self.learner.optimizer.load_state_dict(state["optimizer"])
             self.env.load_state_dict(state["env"])
+            if self.reward_scale is not None:
+                self.reward_scale.load_state_dict(state["reward_scale"])
             carrier = TensorDict(state["carrier"], batch_size=self.env.batch_size).unflatten_keys(".")
             shaped = self.collector._carrier.empty(recurse=True)  # keeps the batch sizes of the nested parts
             self.collector._carrier = shaped.update(carrier.to(self.env.device))

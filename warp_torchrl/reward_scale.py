@@ -1,0 +1,59 @@
+"""Rewards of unit scale, whatever the reward function."""
+
+import torch
+from tensordict import TensorDictBase
+from torch import Tensor
+
+from warp_torchrl.models import REWARD
+
+
+class RewardScale:
+    """Divides rewards by the running standard deviation of their discounted sums, as they come in.
+
+    The mean is left as it is: shifting rewards would pay for longer or for shorter episodes. TorchRL's normalising
+    transforms shift.
+
+    Args:
+        gamma: Discount of the sums.
+    """
+
+    def __init__(self, gamma: float) -> None:
+        self.gamma = gamma
+        self._sums: Tensor | None = None  # [B, A], of the episodes that go on
+        self._moments = torch.zeros(3, dtype=torch.float64)  # count, mean, sum of squared departures
+
+    def __call__(self, batch: TensorDictBase) -> None:
+        """Scale the rewards of a batch [B, T] in place, after taking note of them."""
+        reward = batch["next", *REWARD]
+        rewards, done = reward[..., 0], batch["next", "done"]
+        if self._sums is None:
+            self._sums = torch.zeros_like(rewards[:, 0])
+        self._moments = self._moments.to(rewards.device)
+        sums = torch.empty_like(rewards)
+        for step in range(rewards.shape[1]):
+            sums[:, step] = self._sums * self.gamma + rewards[:, step]
+            self._sums = sums[:, step] * ~done[:, step]
+        self._add(sums.double())
+        reward.div_(self.deviation.to(reward.dtype).clamp(min=1e-8))
+
+    @property
+    def deviation(self) -> Tensor:
+        """Return the standard deviation so far, float64 []."""
+        return (self._moments[2] / self._moments[0].clamp(min=1.0)).sqrt()
+
+    def _add(self, values: Tensor) -> None:
+        """Join the moments of new values (Chan, Golub and LeVeque 1979)."""
+        count, mean, squares = self._moments
+        new, new_mean = values.numel(), values.mean()
+        total, gap = count + new, new_mean - mean
+        squares = squares + (values - new_mean).square().sum() + gap * gap * count * new / total
+        self._moments = torch.stack((total, mean + gap * new / total, squares))
+
+    def state_dict(self) -> dict[str, Tensor]:
+        """Return what changes."""
+        sums = {} if self._sums is None else {"sums": self._sums.clone()}
+        return {"moments": self._moments.clone(), **sums}
+
+    def load_state_dict(self, state: dict[str, Tensor]) -> None:
+        """Restore what ``state_dict`` returned."""
+        self._moments, self._sums = state["moments"].clone(), state.get("sums")
