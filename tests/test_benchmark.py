@@ -2,7 +2,10 @@
 
 import json
 
-from warp_torchrl.benchmark import main
+import numpy as np
+
+from warp_torchrl.benchmark.__main__ import main
+from warp_torchrl.benchmark.tasks import disagreements
 
 
 def test_it_prints_tables(capsys):
@@ -22,6 +25,20 @@ def test_it_measures_environment_and_training_by_default(capsys):
     main(["--scenario", "skirmish", "--worlds", "2", "--set", "collector.steps=4", "horizon=8"])
     out = capsys.readouterr().out
     assert "environment skirmish" in out and "training    skirmish" in out
+
+
+def test_it_ranks_the_rewards(capsys):
+    main(["rewards", "--scenario", "skirmish", "--episodes", "4", "--set", "landscape.size=12", "horizon=30"])
+    out = capsys.readouterr().out
+    for name in ("saved", "efficiency", "time", "coverage", "collaborative", "adaptive", "paper"):
+        assert f"| skirmish | {name} |" in out
+
+
+def test_only_sure_differences_disagree():
+    saved = {"one": np.array([0.1, 0.2, 0.3]), "other": np.array([0.5, 0.6, 0.7])}
+    assert disagreements({"one": np.array([0.9, 0.9, 0.8]), "other": np.zeros(3)}, saved) == ["one and other"]
+    assert disagreements({"one": np.array([0.9, -0.9, 0.1]), "other": np.zeros(3)}, saved) == []
+    assert disagreements(saved, saved) == []
 
 
 def _json(text):

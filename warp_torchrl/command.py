@@ -182,7 +182,6 @@ def _check_fits(found: checkpoints.Checkpoint, env: Any) -> None:
             f"this environment has {_shapes(here)} and {here.n_actions}"
         )
 
-
     own = found.record().values.get("model", {}).get("sharing") == "none"
     if own and here.n_agents != there.n_agents:
         raise ConfigError(

@@ -1,0 +1,1 @@
+"""Measures how fast the software is, and how hard its scenarios are."""

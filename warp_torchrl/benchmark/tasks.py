@@ -1,0 +1,119 @@
+"""How hard the scenarios are, and what the rewards make of policies."""
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import torch
+
+from warp_torchrl.api import make_env
+from warp_torchrl.evaluation import YARDSTICKS, play, play_heuristics
+from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.reward import Adaptive, Collaborative, Coverage, Efficiency, Paper, Time
+from warp_torchrl.statistics import compare, summarise
+from warp_torchrl.world.state import Transition
+
+SCENARIOS = (
+    "skirmish",
+    "single",
+    "default",
+    "large",
+    "water",
+    "hetero",
+    "hazard",
+    "shift",
+    "ring",
+    "lightning",
+    "paper_sarl",
+    "paper_marl",
+)
+"""What ``tasks`` plays unless it is told; ``giant`` takes hours, and ``landfire`` needs its rasters."""
+EPISODES = 256
+FIRST_SEED = 1_000_000
+
+
+def calibrate(scenario: str, device: str, episodes: int, overrides: Sequence[str] = ()) -> dict[str, Any]:
+    """Return the trees that each heuristic saves on the evaluation seeds of a scenario."""
+    env = make_env(scenario, n_worlds=episodes, seed=FIRST_SEED, device=device, overrides=overrides)
+    rows = play_heuristics(env, FIRST_SEED, tuple(HEURISTICS))
+    return {"scenario": scenario, "episodes": episodes} | {name: summarise(rows[name]["saved"]) for name in HEURISTICS}
+
+
+def rank_rewards(scenario: str, device: str, episodes: int, overrides: Sequence[str] = ()) -> dict[str, Any]:
+    """Return what each reward, unscaled and unshaped, pays the yardsticks, and how much they save, by policy [n]."""
+    env = make_env(scenario, n_worlds=episodes, seed=FIRST_SEED, device=device, overrides=overrides)
+    rewards = [Efficiency(), Time(horizon=env.world.horizon), Coverage(), Collaborative(), Adaptive(), Paper()]
+    returns: dict[str, dict[str, np.ndarray]] = {"saved": {}}
+    for policy in YARDSTICKS:
+        totals = {type(reward).__name__.lower(): torch.zeros(episodes, device=device) for reward in rewards}
+
+        def pay(transition: Transition, totals: dict[str, torch.Tensor] = totals) -> None:
+            for total, reward in zip(totals.values(), rewards, strict=True):
+                total += reward(transition).mean((1, 2))
+
+        env.watcher = pay
+        returns["saved"][policy] = play(env, HEURISTICS[policy](env), FIRST_SEED)["saved"]
+        for name, total in totals.items():
+            returns.setdefault(name, {})[policy] = total.double().cpu().numpy()
+    return {"scenario": scenario, "episodes": episodes, "returns": returns}
+
+
+def mean_returns(row: dict[str, Any]) -> dict[str, Any]:
+    """Return what ``rank_rewards`` found with the mean of the episodes in place of each."""
+    means = {
+        name: {policy: float(values.mean()) for policy, values in returns.items()}
+        for name, returns in row["returns"].items()
+    }
+    return row | {"returns": means}
+
+
+def disagreements(returns: dict[str, np.ndarray], saved: dict[str, np.ndarray]) -> list[str]:
+    """Return the pairs of policies that a reward ranks surely against the trees saved.
+
+    Only pairs count whose paired differences in trees saved and in return both have 95 % intervals without 0.
+
+    Args:
+        returns: Return of each episode by policy, [n].
+        saved: Trees saved, the same.
+    """
+    against = []
+    for one, other in combinations(saved, 2):
+        trees, pay = compare(saved[one], saved[other])["ci95"], compare(returns[one], returns[other])["ci95"]
+        if (trees[0] > 0.0 and pay[1] < 0.0) or (trees[1] < 0.0 and pay[0] > 0.0):
+            against.append(f"{one} and {other}")
+    return against
+
+
+def task_table(rows: list[dict[str, Any]]) -> str:
+    """Return the calibration as a Markdown table."""
+    count = rows[0]["episodes"]
+    lines = [
+        f"Trees saved, % (mean of {count} episodes, seeds from {FIRST_SEED}, and its 95 % interval)",
+        "",
+        "| scenario | " + " | ".join(HEURISTICS) + " |",
+        "|---|" + "---|" * len(HEURISTICS),
+    ]
+    for row in rows:
+        cells = []
+        for name in HEURISTICS:
+            low, high = (100 * bound for bound in row[name]["ci95"])
+            cells.append(f"{100 * row[name]['mean']:.1f} ({low:.1f} .. {high:.1f})")
+        lines.append(f"| {row['scenario']} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def reward_table(rows: list[dict[str, Any]]) -> str:
+    """Return the returns as a Markdown table."""
+    lines = [
+        f"Mean return of {rows[0]['episodes']} episodes by reward, unscaled and unshaped",
+        "",
+        "| scenario | reward | " + " | ".join(YARDSTICKS) + " | ranked against trees saved |",
+        "|---|---|" + "---|" * (len(YARDSTICKS) + 1),
+    ]
+    for row in rows:
+        for name, returns in row["returns"].items():
+            cells = [f"{returns[policy].mean():.3f}" for policy in YARDSTICKS]
+            against = ", ".join(disagreements(returns, row["returns"]["saved"])) or "none"
+            lines.append(f"| {row['scenario']} | {name} | " + " | ".join(cells) + f" | {against} |")
+    return "\n".join(lines)
