@@ -30,7 +30,8 @@ TINY = [
 
 
 def tiny(run, *overrides):
-    config = compose_config("train", [*TINY, *overrides])
+    base = [each for each in TINY if "algorithm=a2c" not in overrides or not each.startswith("algorithm.minibatch")]
+    config = compose_config("train", [*base, *overrides])
     values = {k: v for k, v in without_targets(plain(config)).items() if k not in ("resume", "debug")}
     return Training(settings(plain(config)), Record(choices={}, values=values), run)
 
@@ -66,6 +67,7 @@ def finished(tmp_path_factory):
 RUNS = {
     "mappo": ["algorithm=mappo"],
     "ippo": ["algorithm=ippo"],
+    "a2c": ["algorithm=a2c"],
     "all that moves": ["reward.normalise=true", "model.sharing=role", "team.roles=[ugv,uav]", "fire=hazard",
                        "wind=wandering", "reward=collaborative", "team.tank=3"],
 }  # fmt: skip

@@ -5,7 +5,8 @@ import torch
 from torchrl.collectors import Collector
 
 from tests.conftest import small_world
-from warp_torchrl.algorithms.ppo import _ADVANTAGE, _VALUE_TARGET, Ppo
+from warp_torchrl.algorithms.on_policy import ADVANTAGE, VALUE_TARGET
+from warp_torchrl.algorithms.ppo import Ppo
 from warp_torchrl.models import VALUE, Mlp
 
 
@@ -30,7 +31,7 @@ def test_advantages_have_a_value_for_each_agent(make_small_env, central):
     batch = collected(env, learner, 8)
     prepared = learner.prepare(batch)
     assert prepared.batch_size == (32,)
-    assert prepared[_ADVANTAGE].shape == prepared[_VALUE_TARGET].shape == (32, 2, 1)
+    assert prepared[ADVANTAGE].shape == prepared[VALUE_TARGET].shape == (32, 2, 1)
     assert not {"next", "info"} & set(prepared.keys())
 
 
@@ -59,7 +60,7 @@ def test_gae_by_hand():
     batch["next", "done"][:, -1] = True
     batch["next", "terminated"][0, -1] = True
     batch["next", "truncated"][1, -1] = True
-    advantage = learner.prepare(batch)[_ADVANTAGE].view(2, 3, 2)
+    advantage = learner.prepare(batch)[ADVANTAGE].view(2, 3, 2)
     assert advantage[0, :, 0].tolist() == pytest.approx([0.96875, 0.875, 0.5], abs=1e-5)
     assert advantage[1, -1, 0].item() == pytest.approx(0.75, abs=1e-5)
     assert (advantage[..., 0] == advantage[..., 1]).all()

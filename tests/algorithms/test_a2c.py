@@ -1,0 +1,41 @@
+"""A2C's terms by hand, and its one update for each batch."""
+
+import pytest
+import torch
+
+from warp_torchrl.algorithms.a2c import A2c
+from warp_torchrl.algorithms.on_policy import ADVANTAGE, VALUE_TARGET
+from warp_torchrl.models import ACTION, VALUE, Mlp
+
+SMALL = Mlp(actor_hidden=(16,), critic_hidden=(16,))
+
+
+@pytest.mark.parametrize("central", [True, False])
+def test_the_terms_are_those_of_the_textbook(make_small_env, central):
+    env = make_small_env(4)
+    torch.manual_seed(0)
+    learner = A2c(central_critic=central, entropy_coeff=0.02, critic_coeff=0.5).build(env, SMALL, 32)
+    with torch.no_grad():
+        batch = env.rollout(8, learner.explore, break_when_any_done=False)
+    data = learner.prepare(batch)
+    assert data.batch_size == (32,) and data[ADVANTAGE].shape == data[VALUE_TARGET].shape == (32, 2, 1)
+    terms = learner.loss(data)
+    distribution = learner.policy.get_dist(data)
+    log_prob, entropy = distribution.log_prob(data[ACTION]), distribution.entropy()
+    with learner.loss.critic_network_params.to_module(learner.loss.critic_network):
+        value = learner.loss.critic_network(data.clone())[VALUE]
+    torch.testing.assert_close(terms["loss_objective"], -(log_prob * data[ADVANTAGE][..., 0]).mean())
+    torch.testing.assert_close(terms["loss_entropy"], -0.02 * entropy.mean())
+    torch.testing.assert_close(terms["loss_critic"], 0.5 * (value - data[VALUE_TARGET]).square().mean())
+
+
+def test_a_batch_is_one_update(make_small_env):
+    learner = A2c().build(make_small_env(4), SMALL, 32)
+    assert learner.passes == 1
+    assert learner.buffer.batch_size == 32 and not learner.keeps_data
+
+
+@pytest.mark.parametrize("field, value", [("gamma", 1.5), ("learning_rate", -1.0), ("max_grad_norm", 0.0)])
+def test_values_out_of_range_are_refused(field, value):
+    with pytest.raises(ValueError, match=f"{field} must be in"):
+        A2c(**{field: value})

@@ -1,0 +1,30 @@
+"""Advantage actor-critic for teams, from TorchRL's loss.
+
+Mnih et al., "Asynchronous Methods for Deep Reinforcement Learning", 2016; its synchronous form.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from torchrl.modules import ProbabilisticActor
+from torchrl.objectives import A2CLoss, ValueEstimators
+
+from warp_torchrl.algorithms.on_policy import KEYS, OnPolicy
+
+
+@dataclass(frozen=True, kw_only=True)
+class A2c(OnPolicy):
+    """A2C with multi-agent generalised advantage estimation: one update for each batch, so short ones are best."""
+
+    def loss(self, policy: ProbabilisticActor, critic: torch.nn.Module) -> A2CLoss:
+        """Return TorchRL's loss, with the estimator that gives a team's end to each agent."""
+        loss = A2CLoss(
+            policy,
+            critic,
+            entropy_coeff=self.entropy_coeff,
+            critic_coeff=self.critic_coeff,
+            loss_critic_type="l2",
+        )
+        loss.set_keys(**KEYS)
+        loss.make_value_estimator(ValueEstimators.MAGAE, gamma=self.gamma, lmbda=self.lmbda)
+        return loss
