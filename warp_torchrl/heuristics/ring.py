@@ -47,9 +47,9 @@ class Ring(Coordinated):
         if self._plan is None or self._plan.shape != burning.shape:
             self._plan, self._inside = torch.zeros_like(burning), torch.zeros_like(burning)
         stale = (state.step == 0) | (burning & ~self._inside).flatten(1).any(dim=1)
-        plan, inside = self._lay(state, burning)
-        self._plan = torch.where(stale[:, None, None], plan, self._plan)
-        self._inside = torch.where(stale[:, None, None], inside, self._inside)
+        index = stale.nonzero()[:, 0]
+        if len(index):
+            self._plan[index], self._inside[index] = self._lay(state[index], burning[index])
 
     def _lay(self, state: WorldState, burning: Tensor) -> tuple[Tensor, Tensor]:
         """Return the nearest ring that can be closed in time and what it encloses; none where none can be."""
