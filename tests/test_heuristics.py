@@ -68,7 +68,7 @@ def test_coordinated_agents_claim_different_fires():
         assert (state.cells[world].flatten()[index[world]] > 10).all()
 
 
-def one_fire(team, side=21, steps_per_tick=12, **options):
+def one_fire(team, side=19, steps_per_tick=12, **options):
     """A forest with a fire of 3 x 3 in its middle and the team in a corner."""
     land = Array(cover=np.full((side, side), 3), age=np.full((side, side), 9))
     world = World(
@@ -77,7 +77,7 @@ def one_fire(team, side=21, steps_per_tick=12, **options):
         team=team,
         ignition=Ignition(region=0.01, head_start=0),
         steps_per_tick=steps_per_tick,
-        horizon=400,
+        horizon=240,
         **options,
     )
     return WildfireEnv(world, n_worlds=4, seed=0)
@@ -129,8 +129,8 @@ def test_agents_with_empty_tanks_go_for_water(name):
 
 
 def test_yardsticks_rank_on_skirmish():
-    """64 fires: intervals of the means are about 4 points wide, the gaps 10 and more."""
-    env = make_env("skirmish", n_worlds=64)
+    """24 fires: standard errors of the means are 1 to 4 points, the gaps 10 and more but for two of seven."""
+    env = make_env("skirmish", n_worlds=24)
     saved = {name: play(env, HEURISTICS[name](env), 1_000_000)["saved"].mean() for name in HEURISTICS}
     assert saved["noop"] < 0.25
     assert saved["random"] < saved["local"] - 0.2

@@ -3,6 +3,7 @@
 import csv
 import os
 import signal
+from itertools import product
 
 import pytest
 import torch
@@ -73,13 +74,29 @@ RUNS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", RUNS)
-@pytest.mark.parametrize("stop_after", [1, 3, 5])
-def test_a_run_resumed_equals_a_run_not_interrupted(tmp_path, stop_after, name):
-    whole = tiny(tmp_path / "whole", *RUNS[name])
-    (tmp_path / "whole").mkdir(exist_ok=True)
+@pytest.fixture(scope="module")
+def never_stopped(tmp_path_factory):
+    """Train each kind of run once, and return it with its folder."""
+    done = {}
+
+    def get(name):
+        if name not in done:
+            run = tmp_path_factory.mktemp("whole")
+            training = tiny(run, *RUNS[name])
+            training.train()
+            done[name] = run, training
+        return done[name]
+
+    return get
+
+
+@pytest.mark.parametrize(
+    ("name", "stop_after"),
+    [*product(("mappo", "all that moves"), (1, 3, 5)), *product(("ippo", "a2c"), (3,))],
+)
+def test_a_run_resumed_equals_a_run_not_interrupted(tmp_path, never_stopped, stop_after, name):
+    folder, whole = never_stopped(name)
     (tmp_path / "cut").mkdir()
-    whole.train()
     first = tiny(tmp_path / "cut", *RUNS[name])
     batches = iter(first.collector)
     for _ in range(stop_after):
@@ -97,7 +114,7 @@ def test_a_run_resumed_equals_a_run_not_interrupted(tmp_path, stop_after, name):
         if name == "/seconds":
             continue
         assert torch.equal(ours[name], value) if isinstance(value, torch.Tensor) else ours[name] == value, name
-    resumed, expected = without_times(rows(tmp_path / "cut")), without_times(rows(tmp_path / "whole"))
+    resumed, expected = without_times(rows(tmp_path / "cut")), without_times(rows(folder))
     assert len(resumed) == len(expected) == 6
     assert resumed[stop_after:] == expected[stop_after:]
 
