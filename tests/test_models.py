@@ -110,3 +110,15 @@ def test_agents_without_sharing_have_a_network_each(make_small_env):
     after = actor(now)[LOGITS]
     changed = [(after[:, agent] != before[:, agent]).any().item() for agent in range(4)]
     assert changed == [False, False, True, False]
+
+
+@pytest.mark.parametrize("native", [True, False])
+def test_auto_computes_in_half_precision_only_where_the_processor_does(make_small_env, monkeypatch, native):
+    env = make_small_env(3)
+    torch.manual_seed(0)
+    auto = Mlp(dtype="auto").actor(signature(env))
+    torch.manual_seed(0)
+    fixed = Mlp(dtype="bfloat16" if native else "float32").actor(signature(env))
+    monkeypatch.setattr("warp_torchrl.models.computes_in_half", lambda device: native)
+    now = env.reset()
+    assert torch.equal(auto(now.clone())[LOGITS], fixed(now.clone())[LOGITS])

@@ -4,6 +4,7 @@ They know the shapes of what they read, from a ``Signature``, and nothing of the
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
@@ -112,7 +113,7 @@ class Network(nn.Module):
         out: Size of the output.
         activation: Between layers.
         head_gain: Gain of the last layer's initial weights; 0.01 makes a first policy near uniform.
-        dtype: Arithmetic of the layers; weights stay float32.
+        dtype: Arithmetic of the layers, ``auto``, ``float32`` or ``bfloat16``; weights stay float32.
     """
 
     def __init__(
@@ -122,7 +123,7 @@ class Network(nn.Module):
         out: int,
         activation: type[nn.Module],
         head_gain: float,
-        dtype: torch.dtype,
+        dtype: str,
     ) -> None:
         super().__init__()
         self.encoder = Encoder(entries, hidden[0])
@@ -134,9 +135,19 @@ class Network(nn.Module):
 
     def forward(self, *inputs: Tensor) -> Tensor:
         """Return float32 [..., out]."""
-        enabled = self.dtype != torch.float32
-        with torch.autocast(inputs[0].device.type, dtype=torch.bfloat16, enabled=enabled, cache_enabled=False):
+        device = inputs[0].device.type
+        half = self.dtype == "bfloat16" or (self.dtype == "auto" and computes_in_half(device))
+        with torch.autocast(device, dtype=torch.bfloat16, enabled=half, cache_enabled=False):
             return self.body(self.encoder(*inputs)).to(torch.float32)
+
+
+@lru_cache(maxsize=4)
+def computes_in_half(device: str) -> bool:
+    """Return whether a kind of device computes in bfloat16 itself; where it does not, emulation is far slower."""
+    if device == "cuda":
+        return torch.cuda.is_bf16_supported(including_emulation=False)
+    supported = getattr(torch.cpu, "_is_avx512_bf16_supported", None)  # no public question says it
+    return device == "cpu" and supported is not None and bool(supported())
 
 
 class TeamValue(nn.Module):
@@ -210,7 +221,7 @@ class Mlp:
         critic_hidden: Sizes of the critic's.
         activation: ``tanh`` or ``relu``.
         dtype: ``bfloat16`` computes the layers in half precision (weights stay float32), several times faster on
-            processors that have it.
+            processors that have it and several times slower on those that have not; ``auto`` takes it where they do.
 
     Raises:
         ValueError: If a size is not in 1..8192 or there is no hidden layer.
@@ -220,7 +231,7 @@ class Mlp:
     actor_hidden: tuple[int, ...] = (128, 128)
     critic_hidden: tuple[int, ...] = (128, 128)
     activation: Literal["tanh", "relu"] = "tanh"
-    dtype: Literal["float32", "bfloat16"] = "float32"
+    dtype: Literal["auto", "float32", "bfloat16"] = "float32"
 
     def __post_init__(self) -> None:
         for name in ("actor_hidden", "critic_hidden"):
@@ -252,5 +263,4 @@ class Mlp:
         return TensorDictModule(network, in_keys=keys, out_keys=[key])
 
     def _network(self, entries: list[Entry], hidden: tuple[int, ...], out: int, head_gain: float) -> Network:
-        dtype = getattr(torch, self.dtype)
-        return Network(entries, tuple(hidden), out, _ACTIVATIONS[self.activation], head_gain, dtype)
+        return Network(entries, tuple(hidden), out, _ACTIVATIONS[self.activation], head_gain, self.dtype)
