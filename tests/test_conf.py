@@ -21,7 +21,7 @@ from warp_torchrl.world.array import Array
 from warp_torchrl.world.gridded import Gridded
 from warp_torchrl.world.raster import Raster
 
-SCENARIOS = ("skirmish", "single", "default", "large")
+SCENARIOS = sorted(path.stem for path in (conf_folder() / "scenario").glob("*.yaml") if path.stem != "landfire")
 OPTIONS = [(path.parent.name, path.stem) for path in sorted(conf_folder().glob("*/*.yaml"))]
 LANDFIRE = Path(__file__).parent.parent.parent / "shared" / "landscapes" / "landfire"
 
