@@ -173,3 +173,9 @@ def test_an_enormous_file_is_refused_from_its_header(tmp_path: Path) -> None:
     start = time.perf_counter()
     refuse("^path must name arrays of at most 100000000 cells, .* declares 160000000000", path=str(path))
     assert time.perf_counter() - start < 2.0
+
+
+def test_a_window_has_the_assets_of_its_cells() -> None:
+    worth = np.arange(80.0).reshape(8, 10)
+    ground = Array(cover=np.full((8, 10), 3), assets=worth, size=4, row=2, column=5)(world_key(torch.arange(2)))
+    assert torch.equal(ground.assets[1], torch.from_numpy(worth[2:6, 5:9]).float())
