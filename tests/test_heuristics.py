@@ -8,9 +8,11 @@ from warp_torchrl import make_env
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation import play
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.heuristics.base import claim_cells
+from warp_torchrl.heuristics.base import can_be_put_out, claim_cells, list_cells, nearest_fire
 from warp_torchrl.world.array import Array
+from warp_torchrl.world.geometry import FAR, chebyshev_distance
 from warp_torchrl.world.ignition import Ignition
+from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import Action
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.wind import Calm
@@ -56,12 +58,45 @@ def test_fighters_put_out_a_fire_beside_them(make_small_env):
         assert HEURISTICS[name](env)(now)["agents", "action"].tolist() == [[Action.EXTINGUISH] * 2]
 
 
+def test_the_listed_cells_are_the_marked_ones_in_row_major_order():
+    mask = torch.zeros(3, 4, 5, dtype=torch.bool)
+    mask[0, 1, 2] = mask[0, 3, 4] = mask[0, 0, 1] = mask[2, 2, 0] = True
+    cells, valid = list_cells(mask)
+    assert [row[keep].tolist() for row, keep in zip(cells, valid, strict=True)] == [[1, 7, 19], [], [10]]
+    assert list_cells(mask[1:2])[1].tolist() == [[False]]
+
+
+def test_the_nearest_fire_is_the_one_that_a_search_of_the_whole_map_finds():
+    env = make_env("default", n_worlds=6)
+    env.reset()
+    state = env.world_state
+    fire = can_be_put_out(state, env)
+    fire[3] = False
+    distance, index = nearest_fire(state, fire)
+    everywhere = chebyshev_distance(state.vehicles.position, fire).flatten(2)
+    taste = uniform(state.key, 0, Stream.POLICY, tuple(everywhere.shape[1:]))
+    best = (everywhere + taste).min(dim=-1)
+    assert (distance == best.values.floor()).all() and (distance[3] == FAR).all()
+    burning = fire.flatten(1).any(dim=1)
+    assert (index[burning] == best.indices[burning]).all()
+
+
+def test_agents_to_whom_nothing_is_worth_a_claim_stay(make_small_env):
+    env = make_small_env(1)
+    env.reset()
+    nothing = torch.full((1, 1, 3), -torch.inf)
+    claims = claim_cells(env.world_state, torch.tensor([[0, 1, 2]]), nothing, elbow_room=1, discount=2.0, taken=1.0)
+    assert (claims == env.world_state.vehicles.position).all()
+
+
 def test_coordinated_agents_claim_different_fires():
     env = make_env("default", n_worlds=8)
     env.reset()
     state = env.world_state
-    value = HEURISTICS["coordinated"](env).value(state)
-    claims = claim_cells(state, value, elbow_room=3, discount=6.0, taken=1000.0)
+    value, front = HEURISTICS["coordinated"](env).value(state)
+    cells, valid = list_cells(front)
+    worth = value.flatten(1).gather(1, cells).masked_fill(~valid, -torch.inf)[:, None]
+    claims = claim_cells(state, cells, worth, elbow_room=3, discount=6.0, taken=1000.0)
     index = claims[..., 0] * 32 + claims[..., 1]
     for world in range(8):
         assert len(set(index[world].tolist())) == 4

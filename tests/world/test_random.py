@@ -11,7 +11,7 @@ import torch
 from scipy.stats import chi2, poisson
 from torch import Tensor
 
-from warp_torchrl.world.random import Stream, uniform, world_key
+from warp_torchrl.world.random import Stream, uniform, uniform_at, world_key
 
 N = 20_000_000
 
@@ -157,3 +157,9 @@ def test_draws_repeat_and_leave_the_global_generator_alone() -> None:
     first, second = (uniform(keys([8]), 2, Stream.AGE, (100,)) for _ in range(2))
     assert torch.equal(first, second)
     assert torch.equal(before, torch.get_rng_state())
+
+
+def test_draws_at_some_places_are_those_of_the_whole() -> None:
+    index = torch.tensor([[5, 0, 41], [7, 7, 119]], dtype=torch.int32)
+    whole = uniform(keys([3, 4]), 6, Stream.POLICY, (10, 12)).flatten(1)
+    assert torch.equal(uniform_at(keys([3, 4]), 6, Stream.POLICY, index), whole.gather(1, index.long()))

@@ -1,13 +1,15 @@
 """What all heuristics share: how they are called, and what they see and do."""
 
+import math
+
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.world.geometry import DIRECTIONS, FAR, chebyshev_distance, nearest
-from warp_torchrl.world.random import Stream, uniform
+from warp_torchrl.world.geometry import DIRECTIONS, FAR, nearest
+from warp_torchrl.world.random import Stream, uniform_at
 from warp_torchrl.world.state import Action, Cover, WorldState, is_burning
 
 
@@ -52,16 +54,42 @@ def can_be_put_out(state: WorldState, env: WildfireEnv) -> Tensor:
     return is_burning(state.cells) & (state.cells <= env.world.fire.last_spreading)
 
 
+def list_cells(mask: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the marked cells of each world in row-major order, so that work can grow with them, not with the map.
+
+    Args:
+        mask: bool [B, H, W].
+
+    Returns:
+        Flat indices, int64 [B, K], K the most that any world has (1 where none has any), and which of them are cells
+        and not padding, bool [B, K].
+    """
+    marked = mask.flatten(1)
+    counts = marked.sum(dim=1)
+    world, cell = marked.nonzero().unbind(dim=1)
+    index = marked.new_zeros(len(marked), max(int(counts.max()), 1), dtype=torch.int64)
+    index[world, torch.arange(len(world), device=mask.device) - (counts.cumsum(0) - counts)[world]] = cell
+    return index, torch.arange(index.shape[1], device=mask.device) < counts[:, None]
+
+
+def way_to(state: WorldState, cells: Tensor) -> Tensor:
+    """Return the king's moves from each agent to cells [B, K], float32 [B, A, K]."""
+    gap = state.vehicles.position[:, :, None] - place(cells, state)[:, None]
+    return gap.abs().amax(dim=-1).to(torch.float32)
+
+
 def nearest_fire(state: WorldState, fire: Tensor) -> tuple[Tensor, Tensor]:
-    """Return each agent's distance to the nearest fire, float32 [B, A], and its flat index, int64 [B, A].
+    """Return each agent's distance to the nearest fire, float32 [B, A], ``FAR`` where none burns, and its flat index.
 
     Equally near ones are told apart by a draw of each agent's own: agents that stand together and see the same would
     otherwise do the same for ever.
     """
-    distance = chebyshev_distance(state.vehicles.position, fire).flatten(2)
-    taste = uniform(state.key, 0, Stream.POLICY, tuple(distance.shape[1:]))
-    best = (distance + taste).min(dim=-1)
-    return best.values.floor(), best.indices
+    cells, valid = list_cells(fire)
+    agents = torch.arange(state.vehicles.position.shape[1], device=cells.device)[:, None]
+    draw = (agents * fire[0].numel() + cells[:, None]).to(torch.int32)
+    taste = uniform_at(state.key, 0, Stream.POLICY, draw.flatten(1)).view(draw.shape)
+    best = (way_to(state, cells) + taste).masked_fill_(~valid[:, None], float(FAR)).min(dim=-1)
+    return best.values.floor(), cells.gather(1, best.indices)
 
 
 def place(index: Tensor, state: WorldState) -> Tensor:
@@ -97,32 +125,37 @@ def or_refill(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
     return torch.where((state.vehicles.tank == 0)[..., None], place(index, state), target)
 
 
-def claim_cells(state: WorldState, value: Tensor, elbow_room: int, discount: float, taken: float) -> Tensor:
+def claim_cells(
+    state: WorldState, cells: Tensor, value: Tensor, elbow_room: int, discount: float, taken: float
+) -> Tensor:
     """Return a cell for each agent, int64 [B, A, 2], the best of value less way, one agent after the other.
 
     In each of as many rounds as there are agents, the best pair of an agent without a claim and a cell is taken, and
-    the cells about it are discounted for the others.
+    the cells about it are discounted for the others. An agent whom no cell is worth anything stays where it is.
 
     Args:
         state: The worlds.
-        value: What each cell is worth to each agent [cells of way], float32 [B, H, W] or [B, A, H, W].
+        cells: Flat indices of the cells to share out, int64 [B, K].
+        value: What each is worth to each agent [cells of way], -inf for nothing, float32 [B, 1 or A, K].
         elbow_room: Cells about a claim that the others avoid.
         discount: What avoiding them is worth [cells of way].
         taken: What avoiding the claimed cell itself is worth.
     """
-    position = state.vehicles.position
-    worlds, agents = position.shape[:2]
-    everywhere = torch.ones_like(state.cells, dtype=torch.bool)
-    gain = (value if value.ndim == 4 else value[:, None]) - chebyshev_distance(position, everywhere)
-    claim = torch.zeros(worlds, agents, dtype=torch.int64, device=value.device)
+    gain = value - way_to(state, cells)
+    worlds, agents, count = gain.shape
+    place_of = place(cells, state)
+    claim = state.vehicles.position.clone()
+    rows = torch.arange(worlds, device=cells.device)
     for _ in range(agents):
-        best = gain.flatten(1).argmax(dim=1)
-        agent, cell = best // everywhere[0].numel(), best % everywhere[0].numel()
-        claim.scatter_(1, agent[:, None], cell[:, None])
-        distance = chebyshev_distance(place(cell[:, None], state), everywhere)
-        gain = gain - discount * (distance <= elbow_room) - taken * (distance == 0)
-        gain.scatter_(1, agent[:, None, None, None].expand(-1, 1, *everywhere.shape[1:]), -3.0 * FAR)
-    return place(claim, state)
+        best = gain.flatten(1).max(dim=1)
+        agent, cell = best.indices // count, best.indices % count
+        claimed = place_of[rows, cell]
+        worth = torch.isfinite(best.values)[:, None]
+        claim[rows, agent] = torch.where(worth, claimed, claim[rows, agent])
+        distance = (place_of - claimed[:, None]).abs().amax(dim=-1)
+        gain -= (discount * (distance <= elbow_room) + taken * (distance == 0))[:, None]
+        gain[rows, agent] = -math.inf
+    return claim
 
 
 def extinguish_or(move: Tensor, mask: Tensor) -> Tensor:

@@ -1,5 +1,7 @@
 """The team shares the front of the fire out."""
 
+import math
+
 import torch
 from torch import Tensor
 
@@ -9,9 +11,9 @@ from warp_torchrl.heuristics.base import (
     can_be_put_out,
     claim_cells,
     extinguish_or,
+    list_cells,
     or_refill,
 )
-from warp_torchrl.world.geometry import FAR
 from warp_torchrl.world.state import WorldState
 
 
@@ -24,13 +26,16 @@ class Coordinated(Heuristic):
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
-        claims = claim_cells(state, self.value(state), elbow_room=3, discount=6.0, taken=1000.0)
+        value, front = self.value(state)
+        cells, valid = list_cells(front)
+        worth = value.flatten(1).gather(1, cells).masked_fill_(~valid, -math.inf)
+        claims = claim_cells(state, cells, worth[:, None], elbow_room=3, discount=6.0, taken=1000.0)
         return extinguish_or(approach(state, self.env, or_refill(state, self.env, claims)), mask)
 
-    def value(self, state: WorldState) -> Tensor:
-        """Return what each cell of the front is worth [cells of way], -FAR elsewhere, float32 [B, H, W]."""
+    def value(self, state: WorldState) -> tuple[Tensor, Tensor]:
+        """Return what each cell is worth [cells of way], float32 [B, H, W], and which are of the front, bool."""
         fire = can_be_put_out(state, self.env)
         threat = self.env.world.threat(state)
         front = fire & (threat > 0.01)
         front = torch.where(front.flatten(1).any(1)[:, None, None], front, fire)
-        return (self.eagerness * threat).masked_fill(~front, -float(FAR))
+        return self.eagerness * threat, front

@@ -1,12 +1,14 @@
 """The team shuts the fire in with firebreaks."""
 
+import math
+
 import torch
 from torch import Tensor
 
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.heuristics.base import approach, claim_cells, extinguish_or, or_refill
+from warp_torchrl.heuristics.base import approach, claim_cells, extinguish_or, list_cells, or_refill
 from warp_torchrl.heuristics.coordinated import Coordinated
-from warp_torchrl.world.geometry import FAR, grow, nearest
+from warp_torchrl.world.geometry import grow, nearest
 from warp_torchrl.world.state import Action, WorldState, is_burning, is_tree
 
 
@@ -33,9 +35,12 @@ class Ring(Coordinated):
         self._revise(state)
         todo = self._plan & is_tree(state.cells) & (state.alpha > 0.0)
         digs = self.diggers(state) & todo.flatten(1).any(dim=1)[:, None]
-        ring = torch.zeros_like(state.alpha).masked_fill_(~todo, -float(FAR))
-        value = torch.where(digs[..., None, None], ring[:, None], self.value(state)[:, None])
-        claims = claim_cells(state, value, elbow_room=1, discount=2.0, taken=1000.0)
+        value, front = self.value(state)
+        cells, valid = list_cells(todo | front)
+        worth = value.flatten(1).gather(1, cells).masked_fill_(~(front.flatten(1).gather(1, cells) & valid), -math.inf)
+        unbroken = torch.zeros_like(worth).masked_fill_(~(todo.flatten(1).gather(1, cells) & valid), -math.inf)
+        worth = torch.where(digs[..., None], unbroken[:, None], worth[:, None])
+        claims = claim_cells(state, cells, worth, elbow_room=1, discount=2.0, taken=1000.0)
         attack = extinguish_or(approach(state, self.env, or_refill(state, self.env, claims)), mask)
         there = (claims == state.vehicles.position).all(dim=-1) & mask[..., Action.CLEAR]
         dig = torch.where(there, int(Action.CLEAR), approach(state, self.env, claims))
@@ -54,25 +59,23 @@ class Ring(Coordinated):
     def _lay(self, state: WorldState, burning: Tensor) -> tuple[Tensor, Tensor]:
         """Return the nearest ring that can be closed in time and what it encloses; none where none can be."""
         world = self.env.world
+        reach = max(burning.shape[1:]) // 2
+        away = torch.full(burning.shape, reach, device=burning.device)  # king's moves to the fire, ``reach`` at most
+        fire = burning
+        for distance in range(reach):
+            away = torch.where(fire & (away == reach), distance, away)
+            fire = grow(fire)
         fuel = is_tree(state.cells) & (state.alpha > 0.0)
+        cells = torch.zeros(len(burning), reach + 1, device=burning.device)
+        cells.scatter_add_(1, away.flatten(1), fuel.flatten(1).to(cells.dtype))
+        distance = torch.arange(1, reach, device=burning.device)
+        way = nearest(state.vehicles.position, burning)[0].amax(dim=1)[:, None] - distance  # of who is farthest out
         workers = self.diggers(state).sum().clamp(min=1)
-        position = state.vehicles.position
-        plan, inside = torch.zeros_like(burning), torch.zeros_like(burning)
-        found = torch.zeros_like(state.terminated)
-        reach = burning
+        need = way.clamp(min=0) + self.effort * cells[:, 1:reach] / workers
         steps = world.steps_per_tick * world.fire.ticks_per_stage / self.pace
-        own = position[..., 0] * burning.shape[2] + position[..., 1]
-        for distance in range(1, max(burning.shape[1:]) // 2):
-            wider = grow(reach)
-            ring = wider & ~reach
-            away = ~wider.flatten(1).gather(1, own)  # agents still outside: the way to the ring is yet to come
-            way = nearest(position, ring)[0].to(torch.float32) * away
-            need = way.amax(dim=1) + self.effort * (ring & fuel).sum((1, 2)) / workers
-            fits = (need <= (distance - 1) * steps) & ~found
-            plan = torch.where(fits[:, None, None], ring, plan)
-            inside = torch.where(fits[:, None, None], reach, inside)
-            found, reach = found | fits, wider
-        return plan, inside
+        fits = need <= (distance - 1) * steps
+        nearest_ring = torch.where(fits.any(dim=1), distance[fits.to(torch.uint8).argmax(dim=1)], 0)[:, None, None]
+        return (away == nearest_ring) & (nearest_ring > 0), away < nearest_ring
 
 
 class Mixed(Ring):

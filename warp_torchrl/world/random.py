@@ -75,21 +75,31 @@ def uniform(key: Tensor, tick: Tensor | int, stream: Stream, shape: tuple[int, .
         float32 [B, *shape]. Never 1, so that ``u < 1`` always holds; multiples of 2^-32 near 0, so that events of
         probability 1e-8 happen as often as they should.
     """
+    count = math.prod(shape)
+    return uniform_at(key, tick, stream, torch.arange(count, dtype=torch.int32, device=key.device)[None]).view(-1, *shape)
+
+
+def uniform_at(key: Tensor, tick: Tensor | int, stream: Stream, index: Tensor) -> Tensor:
+    """Draw what ``uniform`` draws, at some places only.
+
+    Args:
+        key: World keys, int64 [B], from ``world_key``.
+        tick: Counter of the draw, int64 [B] or one number.
+        stream: What the draw is for.
+        index: Flat index of each draw within a world's, int32 [B or 1, n].
+
+    Returns:
+        float32 [B, n].
+    """
     counter = torch.zeros_like(key).add_(tick).mul_(64).add_(int(stream))
     word = _splitmix64(key + counter * _GOLDEN)
     low = word.to(torch.int32)[:, None]
     high = (word >> 32).to(torch.int32)[:, None]
-    count = math.prod(shape)
-    bits = _spread_bits(count, key.device) ^ low
+    bits = (index * 0x1E3779B1) ^ low  # a distinct well-mixed word for each index
     bits.bitwise_xor_(_shift_right(bits, 16, 32)).mul_(_MULTIPLIERS[0])
     bits.bitwise_xor_(_shift_right(bits, 15, 32)).add_(high).mul_(_MULTIPLIERS[1])
     bits.bitwise_xor_(_shift_right(bits, 15, 32)).mul_(_MULTIPLIERS[2])
     bits.bitwise_xor_(_shift_right(bits, 16, 32))
     # The word is signed: a positive one is a small number as it stands, a negative one lies half a range higher.
     fraction = bits.to(torch.float32).mul_(2.0**-32)
-    return fraction.sub_(fraction.floor()).clamp_(max=_LARGEST_BELOW_ONE).view(key.shape[0], *shape)
-
-
-def _spread_bits(count: int, device: torch.device) -> Tensor:
-    """Return a distinct well-mixed word for each index, int32 [1, count]."""
-    return (torch.arange(count, dtype=torch.int32, device=device) * 0x1E3779B1)[None]
+    return fraction.sub_(fraction.floor()).clamp_(max=_LARGEST_BELOW_ONE)
