@@ -76,7 +76,9 @@ def uniform(key: Tensor, tick: Tensor | int, stream: Stream, shape: tuple[int, .
         probability 1e-8 happen as often as they should.
     """
     count = math.prod(shape)
-    return uniform_at(key, tick, stream, torch.arange(count, dtype=torch.int32, device=key.device)[None]).view(-1, *shape)
+    return uniform_at(key, tick, stream, torch.arange(count, dtype=torch.int32, device=key.device)[None]).view(
+        -1, *shape
+    )
 
 
 def uniform_at(key: Tensor, tick: Tensor | int, stream: Stream, index: Tensor) -> Tensor:
