@@ -5,15 +5,17 @@ import torch
 from torch import nn
 
 from tests.conftest import small_world
+from warp_torchrl.algorithms.on_policy import with_advantages
 from warp_torchrl.algorithms.ppo import Ppo
-from warp_torchrl.models import ACTION, LOGITS, OBSERVATION, VALUE, Encoder, Entry, Mlp, signature
+from warp_torchrl.models import ACTION, LOGITS, OBSERVATION, VALUE, Entry, Mlp, signature
+from warp_torchrl.models.networks import LinearEncoder
 from warp_torchrl.observation import Local, Paper, Surroundings
 from warp_torchrl.world.team import Team
 
 
 def test_the_encoder_equals_one_layer_over_joined_fractions():
     entries = [Entry((2, 3), "uint8"), Entry((4,), "float32")]
-    encoder = Encoder(entries, 5)
+    encoder = LinearEncoder(entries, 5)
     pixels, numbers = torch.randint(0, 256, (7, 2, 3), dtype=torch.uint8), torch.randn(7, 4)
     weight = torch.cat([part.weight for part in encoder.parts], dim=1)
     joined = torch.cat((pixels.flatten(1) / 255.0, numbers), dim=1)
@@ -84,7 +86,7 @@ def test_every_way_of_sharing_fits_and_learns(make_small_env, sharing, observati
         learner = Ppo(central_critic=central, minibatch_size=12).build(env, model, 12)
         with torch.no_grad():
             batch = env.rollout(4, learner.explore, break_when_any_done=False)
-        terms = learner.loss(learner.prepare(batch))
+        terms = learner.loss(with_advantages(learner.loss, batch))
         sum(terms[key] for key in learner.loss_keys).backward()
         gradients = [p.grad for p in learner.loss.parameters() if p.requires_grad]
         assert all(g is not None and g.isfinite().all() for g in gradients)
@@ -119,6 +121,6 @@ def test_auto_computes_in_half_precision_only_where_the_processor_does(make_smal
     auto = Mlp(dtype="auto").actor(signature(env))
     torch.manual_seed(0)
     fixed = Mlp(dtype="bfloat16" if native else "float32").actor(signature(env))
-    monkeypatch.setattr("warp_torchrl.models.computes_in_half", lambda device: native)
+    monkeypatch.setattr("warp_torchrl.models.networks.computes_in_half", lambda device: native)
     now = env.reset()
     assert torch.equal(auto(now.clone())[LOGITS], fixed(now.clone())[LOGITS])

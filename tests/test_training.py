@@ -30,6 +30,9 @@ TINY = [
 ]
 
 
+REPLAY = ["algorithm.capacity=100", "algorithm.warm_up=64", "algorithm.updates=2"]
+
+
 def tiny(run, *overrides):
     base = [each for each in TINY if "algorithm=a2c" not in overrides or not each.startswith("algorithm.minibatch")]
     config = compose_config("train", [*base, *overrides])
@@ -69,6 +72,10 @@ RUNS = {
     "mappo": ["algorithm=mappo"],
     "ippo": ["algorithm=ippo"],
     "a2c": ["algorithm=a2c"],
+    "dqn": ["algorithm=dqn", "algorithm.target_interval=3", *REPLAY],
+    "qmix": ["algorithm=qmix", *REPLAY],
+    "sac": ["algorithm=sac", *REPLAY],
+    "maddpg": ["algorithm=maddpg", *REPLAY],
     "all that moves": ["reward.normalise=true", "model.sharing=role", "team.roles=[ugv,uav]", "fire=hazard",
                        "wind=wandering", "reward=collaborative", "team.tank=3"],
 }  # fmt: skip
@@ -92,7 +99,12 @@ def never_stopped(tmp_path_factory):
 
 @pytest.mark.parametrize(
     ("name", "stop_after"),
-    [*product(("mappo", "all that moves"), (1, 3, 5)), *product(("ippo", "a2c"), (3,))],
+    [
+        *product(("mappo", "all that moves"), (1, 3, 5)),
+        *product(("ippo", "a2c", "qmix", "sac", "maddpg"), (3,)),
+        ("dqn", 1),
+        ("dqn", 5),
+    ],
 )
 def test_a_run_resumed_equals_a_run_not_interrupted(tmp_path, never_stopped, stop_after, name):
     folder, whole = never_stopped(name)
@@ -147,7 +159,7 @@ def test_a_loaded_policy_acts_as_the_trained_one(finished):
     loaded = policy_of(newest(run)[0], "deterministic")
     with torch.no_grad():
         logits = training.learner.policy[0](now.clone())["agents", "logits"]
-        assert torch.equal(loaded[0](now.clone())["agents", "logits"], logits)
+        assert torch.equal(loaded.module[0](now.clone())["agents", "logits"], logits)
     assert loaded(now)[ACTION].shape == (5, 2)
 
 

@@ -4,13 +4,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import torch
-from torchrl.envs.utils import ExplorationType
-from torchrl.modules import ProbabilisticActor
 
 from warp_torchrl import checkpoint as checkpoints
 from warp_torchrl.config import build_components, compose_config, plain, recompose
 from warp_torchrl.construction import build
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.policy import TrainedPolicy
 
 
 def make_env(
@@ -54,7 +53,7 @@ def make_env(
     )
 
 
-def load_policy(path: str | Path, mode: str = "best") -> ProbabilisticActor:
+def load_policy(path: str | Path, mode: str = "best") -> TrainedPolicy:
     """Load a trained policy: decentralised, observation and mask in, action out.
 
     Only the manifest, the configuration and the policy's parameters are read; all are verified first.
@@ -75,7 +74,7 @@ def load_policy(path: str | Path, mode: str = "best") -> ProbabilisticActor:
     return policy_of(found, mode)
 
 
-def policy_of(found: checkpoints.Checkpoint, mode: str = "best") -> ProbabilisticActor:
+def policy_of(found: checkpoints.Checkpoint, mode: str = "best") -> TrainedPolicy:
     """Return the policy of a verified checkpoint; see ``load_policy``."""
     if mode not in ("best", "sampled", "deterministic"):
         raise ValueError(f"mode must be best, sampled or deterministic, got {mode}")
@@ -88,8 +87,4 @@ def policy_of(found: checkpoints.Checkpoint, mode: str = "best") -> Probabilisti
         reason = " ".join(str(error).split())
         raise checkpoints.CheckpointError(f"{found.path} is of another architecture: {reason}") from None
     chosen = (found.manifest.mode or "sampled") if mode == "best" else mode
-    policy[-1].default_interaction_type = (
-        ExplorationType.RANDOM if chosen == "sampled" else ExplorationType.DETERMINISTIC
-    )
-    policy.mode = chosen
-    return policy.requires_grad_(False).eval()
+    return TrainedPolicy(policy.requires_grad_(False).eval(), chosen)

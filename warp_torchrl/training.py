@@ -26,6 +26,17 @@ from warp_torchrl.reward_scale import RewardScale
 
 log = logging.getLogger("warp_torchrl")
 _SECONDS_BETWEEN_LINES = 15.0
+TRAIN_COLUMNS = (
+    "train/policy_gradient_loss",
+    "train/value_loss",
+    "train/entropy_loss",
+    "train/approx_kl",
+    "train/clip_fraction",
+    "train/clip_range",
+    "train/explained_variance",
+    "train/learning_rate",
+)
+"""Columns of ``metrics.csv`` that every run has; empty where an algorithm has no value for them."""
 
 
 class NumericalFailure(Exception):  # noqa: N818
@@ -96,6 +107,7 @@ class Training:
         self.saved_at = 0
         self.mode: str | None = None
         self.metrics = MetricsFile(run / "metrics.csv")
+        self._scheduled = self.learner.schedule(0.0)
 
     def train(self) -> None:
         """Train until ``total_frames``, saving on the way and at the end.
@@ -139,26 +151,28 @@ class Training:
     def _learn(self, batch: TensorDictBase) -> dict[str, float | None]:
         """Learn from one batch [B, T] and return the row of metrics."""
         learner = self.learner
-        schedule = learner.schedule(min(1.0, self.frames / self.settings.total_frames))
         row = _episode_columns(batch)
-        if not learner.keeps_data:
-            learner.buffer.empty()
         if self.reward_scale is not None:
             self.reward_scale(batch)
-        learner.buffer.extend(learner.prepare(batch))
+        learner.store(batch)
         sums: dict[str, Tensor] = {}
         updates = 0
-        for _ in range(learner.passes):
-            for sample in learner.buffer:
-                for name, value in self._update(sample).items():
-                    sums[name] = sums.get(name, 0.0) + value
-                updates += 1
+        for sample in learner.samples():
+            for name, value in self._update(sample).items():
+                sums[name] = sums.get(name, 0.0) + value
+            updates += 1
         self.frames += batch.numel()
         means = {name: float(value) / updates for name, value in sums.items()}
-        row["train/loss"] = sum(means[key] for key in learner.loss_keys)
-        row |= {column: means.get(key) for key, column in learner.columns.items()} | schedule
+        row["train/loss"] = sum(means[key] for key in learner.loss_keys) if updates else None
+        row |= dict.fromkeys(TRAIN_COLUMNS)
+        row |= {column: means.get(key) for key, column in learner.columns.items()} | self._scheduled
+        self._schedule()
         row["evaluation/saved"] = self._evaluate(batch.numel())
         return row
+
+    def _schedule(self) -> None:
+        """Set what changes with progress; the columns that it gives belong to the next row."""
+        self._scheduled = self.learner.schedule(min(1.0, self.frames / self.settings.total_frames))
 
     def _update(self, sample: TensorDictBase) -> dict[str, Tensor]:
         """Take one optimiser step and return the loss's terms; nothing is read back from the device but finiteness."""
@@ -175,6 +189,7 @@ class Training:
             ) from None
         learner.optimizer.step()
         learner.optimizer.zero_grad()
+        learner.after_step(sample)
         wanted = {*learner.loss_keys, *learner.columns} & set(terms.keys())
         return {name: terms[name].detach().mean() for name in wanted}
 
@@ -216,6 +231,7 @@ class Training:
         """Return everything that a run needs to go on exactly as if never stopped."""
         return {
             "loss": dict(self.learner.loss.state_dict()),
+            "keeps": {name: each.state_dict() for name, each in self.learner.keeps.items()},
             "optimizer": self.learner.optimizer.state_dict(),
             "random": torch.get_rng_state(),
             "env": self.env.state_dict(),
@@ -235,6 +251,8 @@ class Training:
         try:
             self.learner.loss.load_state_dict(state["loss"])
             self.learner.optimizer.load_state_dict(state["optimizer"])
+            for name, each in self.learner.keeps.items():
+                each.load_state_dict(state["keeps"][name])
             self.env.load_state_dict(state["env"])
             if self.reward_scale is not None:
                 self.reward_scale.load_state_dict(state["reward_scale"])
@@ -244,6 +262,7 @@ class Training:
             self.frames, self.seconds = int(state["frames"]), float(state["seconds"])
             self.saved_at, self._last_seconds = self.frames, self.seconds
             self.metrics = MetricsFile(self.run / "metrics.csv", keep_rows=int(state["rows"]))
+            self._schedule()
             torch.set_rng_state(state["random"])
         except (KeyError, ValueError, RuntimeError, TypeError) as error:
             reason = " ".join(str(error).split())

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from warp_torchrl.algorithms.a2c import A2c
-from warp_torchrl.algorithms.on_policy import ADVANTAGE, VALUE_TARGET
+from warp_torchrl.algorithms.on_policy import ADVANTAGE, VALUE_TARGET, with_advantages
 from warp_torchrl.models import ACTION, VALUE, Mlp
 
 SMALL = Mlp(actor_hidden=(16,), critic_hidden=(16,))
@@ -17,7 +17,7 @@ def test_the_terms_are_those_of_the_textbook(make_small_env, central):
     learner = A2c(central_critic=central, entropy_coeff=0.02, critic_coeff=0.5).build(env, SMALL, 32)
     with torch.no_grad():
         batch = env.rollout(8, learner.explore, break_when_any_done=False)
-    data = learner.prepare(batch)
+    data = with_advantages(learner.loss, batch)
     assert data.batch_size == (32,) and data[ADVANTAGE].shape == data[VALUE_TARGET].shape == (32, 2, 1)
     terms = learner.loss(data)
     distribution = learner.policy.get_dist(data)
@@ -30,9 +30,12 @@ def test_the_terms_are_those_of_the_textbook(make_small_env, central):
 
 
 def test_a_batch_is_one_update(make_small_env):
-    learner = A2c().build(make_small_env(4), SMALL, 32)
-    assert learner.passes == 1
-    assert learner.buffer.batch_size == 32 and not learner.keeps_data
+    env = make_small_env(4)
+    learner = A2c().build(env, SMALL, 32)
+    with torch.no_grad():
+        learner.store(env.rollout(8, learner.explore, break_when_any_done=False))
+    samples = list(learner.samples())
+    assert [len(sample) for sample in samples] == [32]
 
 
 @pytest.mark.parametrize("field, value", [("gamma", 1.5), ("learning_rate", -1.0), ("max_grad_norm", 0.0)])

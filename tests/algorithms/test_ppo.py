@@ -5,7 +5,7 @@ import torch
 from torchrl.collectors import Collector
 
 from tests.conftest import small_world
-from warp_torchrl.algorithms.on_policy import ADVANTAGE, VALUE_TARGET
+from warp_torchrl.algorithms.on_policy import ADVANTAGE, VALUE_TARGET, with_advantages
 from warp_torchrl.algorithms.ppo import Ppo
 from warp_torchrl.models import VALUE, Mlp
 
@@ -29,7 +29,7 @@ def test_advantages_have_a_value_for_each_agent(make_small_env, central):
     env = make_small_env(4)
     learner = Ppo(central_critic=central).build(env, Mlp(actor_hidden=(16,), critic_hidden=(16,)), 32)
     batch = collected(env, learner, 8)
-    prepared = learner.prepare(batch)
+    prepared = with_advantages(learner.loss, batch)
     assert prepared.batch_size == (32,)
     assert prepared[ADVANTAGE].shape == prepared[VALUE_TARGET].shape == (32, 2, 1)
     assert not {"next", "info"} & set(prepared.keys())
@@ -60,7 +60,7 @@ def test_gae_by_hand():
     batch["next", "done"][:, -1] = True
     batch["next", "terminated"][0, -1] = True
     batch["next", "truncated"][1, -1] = True
-    advantage = learner.prepare(batch)[ADVANTAGE].view(2, 3, 2)
+    advantage = with_advantages(learner.loss, batch)[ADVANTAGE].view(2, 3, 2)
     assert advantage[0, :, 0].tolist() == pytest.approx([0.96875, 0.875, 0.5], abs=1e-5)
     assert advantage[1, -1, 0].item() == pytest.approx(0.75, abs=1e-5)
     assert (advantage[..., 0] == advantage[..., 1]).all()
@@ -97,14 +97,12 @@ def test_a_few_updates_raise_the_return_of_a_bandit(make_small_env):
             steps.append(step.set("next", following))
         batch = torch.stack(steps, 1)
         shares.append(batch["next", "agents", "reward"].mean().item())
-        learner.buffer.empty()
-        learner.buffer.extend(learner.prepare(batch.contiguous()))
-        for _ in range(learner.passes):
-            for sample in learner.buffer:
-                terms = learner.loss(sample)
-                sum(terms[key] for key in learner.loss_keys).backward()
-                learner.optimizer.step()
-                learner.optimizer.zero_grad()
+        learner.store(batch.contiguous())
+        for sample in learner.samples():
+            terms = learner.loss(sample)
+            sum(terms[key] for key in learner.loss_keys).backward()
+            learner.optimizer.step()
+            learner.optimizer.zero_grad()
     assert shares[0] < 0.7 and shares[-1] > 0.95
 
 

@@ -1,13 +1,26 @@
 """What the training loop needs of an algorithm: a record without an algorithm's name."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torchrl.data import ReplayBuffer
 from torchrl.objectives import LossModule
+
+
+class Stateful(Protocol):
+    """Anything that a checkpoint keeps."""
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return tensors and plain values."""
+        ...
+
+    def load_state_dict(self, state_dict: dict[str, Any]) -> Any:
+        """Restore them."""
+        ...
 
 
 @dataclass(kw_only=True)
@@ -22,11 +35,12 @@ class Learner:
         columns: Names of ``metrics.csv`` by entry of the loss's output.
         optimizer: Over the loss's parameters.
         max_grad_norm: Gradients are clipped to this norm.
-        prepare: Turns a collected batch [B, T] into what the buffer stores, [n].
         buffer: Where batches go and samples come from.
-        keeps_data: Whether the buffer's contents outlive an iteration.
-        passes: Samples are drawn until each stored item has been seen this often, on average, in an iteration.
+        store: Puts a collected batch [B, T] into the buffer.
+        samples: Returns what is learnt from before the next batch, one optimiser step for each sample.
+        after_step: Called with each sample once the optimiser has stepped.
         schedule: Sets what changes with progress in 0..1, and returns it as columns.
+        keeps: What else a checkpoint must hold for an exact resume, by name.
     """
 
     policy: TensorDictModuleBase
@@ -36,8 +50,9 @@ class Learner:
     columns: dict[str, str]
     optimizer: torch.optim.Optimizer
     max_grad_norm: float
-    prepare: Callable[[TensorDictBase], TensorDictBase]
     buffer: ReplayBuffer
-    keeps_data: bool
-    passes: int
+    store: Callable[[TensorDictBase], None]
+    samples: Callable[[], Iterable[TensorDictBase]]
+    after_step: Callable[[TensorDictBase], None]
     schedule: Callable[[float], dict[str, float]]
+    keeps: Mapping[str, Stateful] = field(default_factory=dict)

@@ -50,7 +50,7 @@ class Ppo(OnPolicy):
         loss.make_value_estimator(gamma=self.gamma, lmbda=self.lmbda)
         return loss
 
-    def samples(self, frames_per_batch: int) -> int:
+    def minibatch(self, frames_per_batch: int) -> int:
         """Return the world steps of a minibatch."""
         return self.minibatch_size
 

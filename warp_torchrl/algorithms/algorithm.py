@@ -1,0 +1,80 @@
+"""What all algorithms share: their numbers' ranges, the decentralised actor, and the falling learning rate."""
+
+from dataclasses import dataclass, fields
+
+import torch
+from torchrl.modules import MaskedCategorical, ProbabilisticActor
+
+from warp_torchrl.models import ACTION, ACTION_MASK, LOG_PROB, LOGITS, Mlp, Signature
+
+_RANGES = {
+    "gamma": (0.0, 1.0),
+    "learning_rate": (0.0, 1.0),
+    "learning_rate_end": (0.0, 1.0),
+    "max_grad_norm": (1e-6, 1e6),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Algorithm:
+    """What on-policy and off-policy algorithms have in common.
+
+    Attributes:
+        gamma: Discount.
+        learning_rate: Of Adam at the start.
+        learning_rate_end: At the end, as a share of the start; it falls linearly.
+        max_grad_norm: Gradient clipping.
+
+    Raises:
+        ValueError: If a value is out of its range.
+    """
+
+    gamma: float = 0.99
+    learning_rate: float = 1e-3
+    learning_rate_end: float = 0.05
+    max_grad_norm: float = 0.5
+
+    def __post_init__(self) -> None:
+        self.check()
+
+    def check(self, **ranges: tuple[float, float]) -> None:
+        """Check the numbers against their ranges, and further fields against ``ranges``."""
+        allowed = _RANGES | ranges
+        for field in fields(self):
+            if (
+                field.name in allowed
+                and not allowed[field.name][0] <= getattr(self, field.name) <= allowed[field.name][1]
+            ):
+                low, high = allowed[field.name]
+                raise ValueError(f"{field.name} must be in [{low:g}, {high:g}], got {getattr(self, field.name)}")
+
+    def rate_at(self, progress: float, optimizer: torch.optim.Optimizer) -> float:
+        """Set the optimiser's learning rate to that of progress in 0..1, and return it."""
+        rate = self.learning_rate * falling(1.0, self.learning_rate_end, progress)
+        for group in optimizer.param_groups:
+            group["lr"] = rate
+        return rate
+
+
+def falling(start: float, end: float, progress: float) -> float:
+    """Return the value between a start and an end at progress in 0..1, after which it stays."""
+    return start + (end - start) * min(progress, 1.0)
+
+
+def masked_actor(shape: Signature, model: Mlp, **distribution: float | bool) -> ProbabilisticActor:
+    """Return a team's decentralised policy: each agent's action drawn from its own observation and mask.
+
+    Args:
+        shape: What it fits.
+        model: Makes the network.
+        distribution: Options of TorchRL's ``MaskedCategorical``.
+    """
+    return ProbabilisticActor(
+        model.actor(shape),
+        in_keys={"logits": LOGITS, "mask": ACTION_MASK},
+        out_keys=[ACTION],
+        distribution_class=MaskedCategorical,
+        distribution_kwargs={"use_cross_entropy": False, **distribution},
+        return_log_prob=True,
+        log_prob_key=LOG_PROB,
+    )

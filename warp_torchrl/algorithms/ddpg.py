@@ -1,0 +1,86 @@
+"""Deep deterministic policy gradient for discrete actions, from TorchRL's loss, with straight-through one-hot actions.
+
+Lillicrap et al., "Continuous control with deep reinforcement learning", 2016; Lowe et al., "Multi-Agent Actor-Critic
+for Mixed Cooperative-Competitive Environments" (MADDPG), 2017; Jang et al., "Categorical Reparameterization with
+Gumbel-Softmax", 2017.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from tensordict.nn import TensorDictModule, TensorDictModuleBase, TensorDictSequential
+from torch import Tensor, nn
+from torchrl.envs.utils import ExplorationType, exploration_type
+from torchrl.objectives import DDPGLoss, ValueEstimators
+
+from warp_torchrl.algorithms.off_policy import AGENT_KEYS, OffPolicy
+from warp_torchrl.models import ACTION, ACTION_MASK, ACTION_ONE_HOT, LOGITS, STATE_ACTION_VALUE, Mlp, Signature
+
+
+class OneHotChoice(nn.Module):
+    """Chooses an action and lets the gradient through to the logits of all, as softmax would.
+
+    The highest logit is chosen; where TorchRL's exploration type is ``RANDOM``, after Gumbel noise, which draws it
+    from their softmax.
+
+    Args:
+        temperature: Of the softmax whose gradient is used.
+    """
+
+    def __init__(self, temperature: float) -> None:
+        super().__init__()
+        self.temperature = temperature
+
+    def forward(self, logits: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
+        """Return actions int64 [...] and one-hot float32 [..., actions] of logits and masks [..., actions]."""
+        logits = logits.masked_fill(~mask, -1e4)
+        if exploration_type() == ExplorationType.RANDOM:
+            logits = logits - torch.empty_like(logits).exponential_().log()
+        soft = torch.softmax(logits / self.temperature, dim=-1)
+        action = logits.argmax(dim=-1)
+        hard = nn.functional.one_hot(action, logits.shape[-1]).to(soft.dtype)
+        return action, hard + (soft - soft.detach())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ddpg(OffPolicy):
+    """DDPG with one-hot actions: the critic judges the action that the actor chose, and its gradient moves the actor.
+
+    Attributes:
+        central_critic: The critic reads the whole state and the team's joint action (MADDPG), or each agent's own
+            observation and action.
+        temperature: Of the softmax that the gradient goes through.
+
+    Raises:
+        ValueError: If a value is out of its range, or prioritised replay does not work here.
+    """
+
+    central_critic: bool = False
+    temperature: float = 1.0
+
+    def check(self, **ranges: tuple[float, float]) -> None:
+        """Check the numbers against their ranges, and further fields against ``ranges``."""
+        super().check(temperature=(1e-3, 100.0), **ranges)
+
+    def policy(self, shape: Signature, model: Mlp) -> TensorDictSequential:
+        """Return the team's decentralised policy: each agent's action from its own observation and mask."""
+        choose = TensorDictModule(
+            OneHotChoice(self.temperature), in_keys=[LOGITS, ACTION_MASK], out_keys=[ACTION, ACTION_ONE_HOT]
+        )
+        return TensorDictSequential(model.actor(shape), choose)
+
+    def loss(self, policy: TensorDictModuleBase, shape: Signature, model: Mlp, device: torch.device) -> DDPGLoss:
+        """Return TorchRL's loss with its value estimator."""
+        critic = model.action_critic(shape, self.central_critic).to(device)
+        loss = DDPGLoss(policy, critic, delay_actor=True, delay_value=True, loss_function="smooth_l1")
+        loss.set_keys(state_action_value=STATE_ACTION_VALUE, **AGENT_KEYS)
+        loss.make_value_estimator(ValueEstimators.TD0, gamma=self.gamma)
+        return loss
+
+    def loss_keys(self) -> tuple[str, ...]:
+        """Return the entries of the loss's output that are summed and minimised."""
+        return ("loss_actor", "loss_value")
+
+    def columns(self) -> dict[str, str]:
+        """Return the names of ``metrics.csv`` by entry of the loss's output."""
+        return {"loss_actor": "train/policy_gradient_loss", "loss_value": "train/value_loss"}

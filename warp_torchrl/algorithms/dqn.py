@@ -1,0 +1,117 @@
+"""Deep Q-learning for teams, from TorchRL's losses: independent, or mixed into one value of the team (VDN, QMIX).
+
+Mnih et al., "Human-level control through deep reinforcement learning", 2015; van Hasselt et al., "Deep Reinforcement
+Learning with Double Q-learning", 2016; Sunehag et al., "Value-Decomposition Networks", 2018; Rashid et al., "QMIX",
+2018.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import torch
+from tensordict.nn import TensorDictModule, TensorDictModuleBase, TensorDictSequential
+from torchrl.data import Categorical
+from torchrl.modules import EGreedyModule, QMixer, QValueModule, VDNMixer
+from torchrl.objectives import DQNLoss, LossModule, QMixerLoss, ValueEstimators
+
+from warp_torchrl.algorithms.algorithm import falling
+from warp_torchrl.algorithms.off_policy import AGENT_KEYS, TEAM_REWARD, OffPolicy
+from warp_torchrl.models import (
+    ACTION,
+    ACTION_MASK,
+    ACTION_VALUE,
+    CHOSEN_ACTION_VALUE,
+    STATE,
+    Mlp,
+    Signature,
+)
+
+TEAM_VALUE = "chosen_action_value"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dqn(OffPolicy):
+    """Q-learning with epsilon-greedy exploration; a policy that is evaluated as sampled explores as at the end.
+
+    Attributes:
+        mixer: ``none``, each agent learns its own values from its own reward (double DQN); ``vdn``, their sum is
+            learnt from the team's mean reward; ``qmix``, a monotonic network that reads the whole state mixes them.
+        mixer_hidden: Width of QMIX's mixing layer.
+        epsilon: Share of random actions at the start.
+        epsilon_end: At the end.
+        epsilon_until: Progress in 0..1 at which the end is reached; it falls linearly.
+
+    Raises:
+        ValueError: If a value is out of its range, or prioritised replay does not work here.
+    """
+
+    mixer: Literal["none", "vdn", "qmix"] = "none"
+    mixer_hidden: int = 32
+    epsilon: float = 1.0
+    epsilon_end: float = 0.05
+    epsilon_until: float = 0.5
+
+    def check(self, **ranges: tuple[float, float]) -> None:
+        """Check the numbers against their ranges, and further fields against ``ranges``."""
+        own = {"epsilon": (0.0, 1.0), "epsilon_end": (0.0, self.epsilon), "epsilon_until": (1e-6, 1.0)}
+        super().check(mixer_hidden=(1, 8192), **own, **ranges)
+
+    def policy(self, shape: Signature, model: Mlp) -> TensorDictSequential:
+        """Return the team's decentralised policy: the action of highest value, or some other one now and then."""
+        return TensorDictSequential(*self._values(shape, model), self._epsilon_greedy(shape, self.epsilon_end))
+
+    def _values(self, shape: Signature, model: Mlp) -> tuple[TensorDictModule, QValueModule]:
+        choose = QValueModule(
+            action_space="categorical",
+            action_value_key=ACTION_VALUE,
+            out_keys=[ACTION, ACTION_VALUE, CHOSEN_ACTION_VALUE],
+            action_mask_key=ACTION_MASK,
+        )
+        return model.action_value(shape), choose
+
+    def _epsilon_greedy(self, shape: Signature, epsilon: float) -> EGreedyModule:
+        return EGreedyModule(
+            Categorical(shape.n_actions),
+            eps_init=epsilon,
+            eps_end=self.epsilon_end,
+            action_key=ACTION,
+            action_mask_key=ACTION_MASK,
+        )
+
+    def explorer(self, policy: TensorDictModuleBase, shape: Signature) -> TensorDictSequential:
+        """Return the policy with an epsilon that falls."""
+        return TensorDictSequential(*policy.module[:-1], self._epsilon_greedy(shape, self.epsilon))
+
+    def explore_at(self, progress: float, explore: TensorDictModuleBase) -> dict[str, float]:
+        """Set epsilon."""
+        epsilon = falling(self.epsilon, self.epsilon_end, progress / self.epsilon_until)
+        explore.module[-1].eps.fill_(epsilon)
+        return {"rollout/exploration_rate": epsilon}
+
+    def loss(self, policy: TensorDictModuleBase, shape: Signature, model: Mlp, device: torch.device) -> LossModule:
+        """Return TorchRL's loss with its value estimator."""
+        values = TensorDictSequential(*policy.module[:-1])
+        if self.mixer == "none":
+            loss = DQNLoss(
+                values, action_space="categorical", delay_value=True, double_dqn=True, loss_function="smooth_l1"
+            )
+            loss.set_keys(action=ACTION, action_value=ACTION_VALUE, value=CHOSEN_ACTION_VALUE, **AGENT_KEYS)
+        else:
+            loss = QMixerLoss(values, self._mixer(shape, device), action_space="categorical", loss_function="smooth_l1")
+            loss.set_keys(
+                action=ACTION,
+                action_value=ACTION_VALUE,
+                local_value=CHOSEN_ACTION_VALUE,
+                global_value=TEAM_VALUE,
+                reward=TEAM_REWARD,
+            )
+        loss.make_value_estimator(ValueEstimators.TD0, gamma=self.gamma)
+        return loss
+
+    def _mixer(self, shape: Signature, device: torch.device) -> TensorDictModule:
+        if self.mixer == "vdn":
+            return TensorDictModule(
+                VDNMixer(n_agents=shape.n_agents, device=device), in_keys=[CHOSEN_ACTION_VALUE], out_keys=[TEAM_VALUE]
+            )
+        mixer = QMixer(shape.state.shape, self.mixer_hidden, shape.n_agents, device)
+        return TensorDictModule(mixer, in_keys=[CHOSEN_ACTION_VALUE, STATE], out_keys=[TEAM_VALUE])

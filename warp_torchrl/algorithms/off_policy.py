@@ -1,0 +1,168 @@
+"""What the off-policy algorithms share: a replay memory, target networks, and when they learn."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from torchrl.data import LazyTensorStorage, ReplayBuffer, TensorDictPrioritizedReplayBuffer, TensorDictReplayBuffer
+from torchrl.envs import EnvBase
+from torchrl.objectives import HardUpdate, LossModule, SoftUpdate
+from torchrl.objectives.utils import TargetNetUpdater
+
+from warp_torchrl.algorithms.algorithm import Algorithm
+from warp_torchrl.algorithms.learner import Learner
+from warp_torchrl.models import REWARD, Mlp, Signature, signature
+
+_PRIORITY = "td_error"
+AGENT_KEYS = {"reward": REWARD, "done": ("agents", "done"), "terminated": ("agents", "terminated")}
+"""Where TorchRL's losses find what each agent's values are learnt from; a team's end is each agent's."""
+TEAM_REWARD = "team_reward"
+"""The mean over the agents, what a value of the whole team is learnt from."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OffPolicy(Algorithm):
+    """What DQN, SAC and DDPG have in common.
+
+    Attributes:
+        capacity: World steps that the replay memory holds; the oldest fall out.
+        warm_up: World steps in the memory before learning starts.
+        minibatch_size: World steps in a minibatch (each has one sample an agent).
+        updates: Optimiser steps after each batch of the collector.
+        replay: ``uniform``, or ``prioritised`` by the temporal-difference error (Schaul et al., 2016).
+        target_interval: Optimiser steps between copies into the target networks; 0 lets them follow at ``tau``.
+        tau: How far the target networks move towards the others in an optimiser step.
+
+    Raises:
+        ValueError: If a value is out of its range, or prioritised replay does not work here.
+    """
+
+    capacity: int = 50_000
+    warm_up: int = 8192
+    minibatch_size: int = 256
+    updates: int = 64
+    replay: Literal["uniform", "prioritised"] = "uniform"
+    target_interval: int = 0
+    tau: float = 0.01
+
+    def check(self, **ranges: tuple[float, float]) -> None:
+        """Check the numbers against their ranges, and further fields against ``ranges``."""
+        large = (1, 10**9)
+        own = {"capacity": large, "minibatch_size": large, "updates": large, "warm_up": (0, 10**9)}
+        super().check(**own, target_interval=(0, 10**9), tau=(1e-6, 1.0), **ranges)
+        if self.warm_up > self.capacity:
+            raise ValueError(f"warm_up must be at most capacity, {self.capacity}, got {self.warm_up}")
+
+    def build(self, env: EnvBase, model: Mlp, frames_per_batch: int) -> Learner:
+        """Return a learner for an environment.
+
+        Args:
+            env: Whose specs it fits, and on whose device it lives.
+            model: Makes the networks.
+            frames_per_batch: World steps that are collected between updates.
+
+        Raises:
+            ValueError: If a batch does not fit into the memory, or prioritised replay does not work here.
+        """
+        if frames_per_batch > self.capacity:
+            raise ValueError(
+                f"capacity must be at least a batch, n_worlds x collector.steps = {frames_per_batch}, "
+                f"got {self.capacity}"
+            )
+        shape = signature(env)
+        policy = self.policy(shape, model).to(env.device)
+        loss = self.loss(policy, shape, model, env.device).to(env.device)
+        optimizer = torch.optim.Adam(loss.parameters(), lr=self.learning_rate, eps=1e-5)
+        memory = self.memory(env.device)
+        targets = self.targets(loss)
+        explore = self.explorer(policy, shape).to(env.device)
+
+        def samples() -> Iterator[TensorDictBase]:
+            enough = len(memory) >= max(self.warm_up, self.minibatch_size)
+            return (memory.sample() for _ in range(self.updates if enough else 0))
+
+        def after_step(sample: TensorDictBase) -> None:
+            targets.step()
+            if self.replay == "prioritised":
+                memory.update_tensordict_priority(sample)
+
+        def schedule(progress: float) -> dict[str, float]:
+            return {"train/learning_rate": self.rate_at(progress, optimizer), **self.explore_at(progress, explore)}
+
+        return Learner(
+            policy=policy,
+            explore=explore,
+            loss=loss,
+            loss_keys=self.loss_keys(),
+            columns=self.columns(),
+            optimizer=optimizer,
+            max_grad_norm=self.max_grad_norm,
+            buffer=memory,
+            store=lambda batch: memory.extend(transitions(loss, batch)),
+            samples=samples,
+            after_step=after_step,
+            schedule=schedule,
+            keeps={"replay": memory, "targets": targets},
+        )
+
+    def memory(self, device: torch.device) -> ReplayBuffer:
+        """Return TorchRL's replay buffer.
+
+        Raises:
+            ValueError: If it is prioritised and TorchRL's extension does not load.
+        """
+        storage = LazyTensorStorage(self.capacity, device=device)
+        if self.replay == "uniform":
+            return TensorDictReplayBuffer(storage=storage, batch_size=self.minibatch_size)
+        try:
+            return TensorDictPrioritizedReplayBuffer(
+                alpha=0.6, beta=0.4, storage=storage, batch_size=self.minibatch_size, priority_key=_PRIORITY
+            )
+        except (RuntimeError, ImportError):
+            raise ValueError(
+                f"replay must be uniform here: prioritised replay needs TorchRL's compiled extension, which does not "
+                f"load with torch {torch.__version__}"
+            ) from None
+
+    def targets(self, loss: LossModule) -> TargetNetUpdater:
+        """Return what moves the target networks."""
+        if self.target_interval:
+            # TorchRL counts the steps between two copies, not the steps from one to the next.
+            return HardUpdate(loss, value_network_update_interval=self.target_interval - 1)
+        return SoftUpdate(loss, tau=self.tau)
+
+    def policy(self, shape: Signature, model: Mlp) -> TensorDictModuleBase:
+        """Return the team's decentralised policy: each agent's action from its own observation and mask."""
+        raise TypeError(f"{type(self).__name__} does not say how it acts: define policy()")
+
+    def explorer(self, policy: TensorDictModuleBase, shape: Signature) -> TensorDictModuleBase:
+        """Return what the collector runs: the policy itself, where it explores by sampling."""
+        return policy
+
+    def explore_at(self, progress: float, explore: TensorDictModuleBase) -> dict[str, float]:
+        """Set how much is explored at progress in 0..1, and return it as columns."""
+        return {}
+
+    def loss(self, policy: TensorDictModuleBase, shape: Signature, model: Mlp, device: torch.device) -> LossModule:
+        """Return TorchRL's loss with its value estimator."""
+        raise TypeError(f"{type(self).__name__} does not say what it minimises: define loss()")
+
+    def loss_keys(self) -> tuple[str, ...]:
+        """Return the entries of the loss's output that are summed and minimised."""
+        return ("loss",)
+
+    def columns(self) -> dict[str, str]:
+        """Return the names of ``metrics.csv`` by entry of the loss's output."""
+        return {"loss": "train/value_loss"}
+
+
+def transitions(loss: LossModule, batch: TensorDictBase) -> TensorDictBase:
+    """Return what a loss reads of a batch, with the team's end for each agent; [B, T] -> [B T]."""
+    reward = batch["next", *REWARD]
+    batch["next", TEAM_REWARD] = reward.mean(dim=-2)
+    for name in ("done", "terminated"):
+        batch["next", "agents", name] = batch["next", name].unsqueeze(-2).expand(reward.shape)
+    return batch.select(*loss.in_keys, strict=False).reshape(-1)

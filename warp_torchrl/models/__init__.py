@@ -1,0 +1,45 @@
+"""Networks over observations: encoders, and the heads of actors and critics.
+
+They know the shapes of what they read, from a ``Signature``, and nothing of the world.
+"""
+
+from warp_torchrl.models.model import Cnn, Mlp
+from warp_torchrl.models.signature import (
+    ACTION,
+    ACTION_MASK,
+    ACTION_ONE_HOT,
+    ACTION_VALUE,
+    CHOSEN_ACTION_VALUE,
+    LOG_PROB,
+    LOGITS,
+    OBSERVATION,
+    REWARD,
+    ROLE,
+    STATE,
+    STATE_ACTION_VALUE,
+    VALUE,
+    Entry,
+    Signature,
+    signature,
+)
+
+__all__ = [
+    "ACTION",
+    "ACTION_MASK",
+    "ACTION_ONE_HOT",
+    "ACTION_VALUE",
+    "CHOSEN_ACTION_VALUE",
+    "LOGITS",
+    "LOG_PROB",
+    "OBSERVATION",
+    "REWARD",
+    "ROLE",
+    "STATE",
+    "STATE_ACTION_VALUE",
+    "VALUE",
+    "Cnn",
+    "Entry",
+    "Mlp",
+    "Signature",
+    "signature",
+]

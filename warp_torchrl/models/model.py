@@ -1,0 +1,150 @@
+"""Models: which networks an algorithm's actors and critics are, and what they read and write."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from tensordict.nn import TensorDictModule
+from torch import nn
+
+from warp_torchrl.models.networks import (
+    AgentNetworks,
+    ConvolutionalEncoder,
+    LinearEncoder,
+    Network,
+    RoleNetworks,
+    TeamValue,
+)
+from warp_torchrl.models.signature import (
+    ACTION_ONE_HOT,
+    ACTION_VALUE,
+    LOGITS,
+    ROLE,
+    STATE,
+    STATE_ACTION_VALUE,
+    VALUE,
+    Entry,
+    Signature,
+)
+
+_ACTIVATIONS = {"tanh": nn.Tanh, "relu": nn.ReLU}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mlp:
+    """Multilayer perceptrons over flattened observations.
+
+    Attributes:
+        sharing: ``team`` gives all agents one network, ``role`` one to each role (chosen by the role index, so that
+            it fits any team), ``none`` one to each agent (which fits teams of the same size only).
+        actor_hidden: Sizes of the hidden layers of actors and of the action values that act.
+        critic_hidden: Sizes of the critics'.
+        activation: ``tanh`` or ``relu``.
+        dtype: ``bfloat16`` computes the layers in half precision (weights stay float32), several times faster on
+            processors that have it and several times slower on those that have not; ``auto`` takes it where they do.
+
+    Raises:
+        ValueError: If a size is not in 1..8192 or there is no hidden layer.
+    """
+
+    sharing: Literal["team", "role", "none"] = "team"
+    actor_hidden: tuple[int, ...] = (128, 128)
+    critic_hidden: tuple[int, ...] = (128, 128)
+    activation: Literal["tanh", "relu"] = "tanh"
+    dtype: Literal["auto", "float32", "bfloat16"] = "float32"
+
+    def __post_init__(self) -> None:
+        for name in ("actor_hidden", "critic_hidden"):
+            check_sizes(name, getattr(self, name))
+
+    def actor(self, signature: Signature) -> TensorDictModule:
+        """Return the module that writes logits [..., A, actions] from each agent's own observation."""
+        return self._of_agents(signature, self.actor_hidden, signature.n_actions, 0.01, LOGITS)
+
+    def action_value(self, signature: Signature) -> TensorDictModule:
+        """Return the module that writes each action's value [..., A, actions] from each agent's own observation."""
+        return self._of_agents(signature, self.actor_hidden, signature.n_actions, 0.01, ACTION_VALUE)
+
+    def critic(self, signature: Signature, central: bool) -> TensorDictModule:
+        """Return the module that writes values [..., A, 1], from the state or from each agent's observation."""
+        if central:
+            return TensorDictModule(self._team_value(signature, []), in_keys=[STATE], out_keys=[VALUE])
+        return self._of_agents(signature, self.critic_hidden, 1, 1.0, VALUE)
+
+    def action_critic(self, signature: Signature, central: bool) -> TensorDictModule:
+        """Return the module that writes values [..., A, 1] of actions given as one-hot vectors [..., A, actions].
+
+        It reads the state and the whole team's actions, or each agent's observation and own action.
+        """
+        if central:
+            joint = Entry((signature.n_agents * signature.n_actions,), "float32")
+            network = self._team_value(signature, [joint])
+            return TensorDictModule(network, in_keys=[STATE, ACTION_ONE_HOT], out_keys=[STATE_ACTION_VALUE])
+        own = Entry((signature.n_actions,), "float32")
+        return self._of_agents(signature, self.critic_hidden, 1, 1.0, STATE_ACTION_VALUE, more={ACTION_ONE_HOT: own})
+
+    def _team_value(self, signature: Signature, more: list[Entry]) -> TeamValue:
+        return TeamValue(self._network([signature.state, *more], self.critic_hidden, signature.n_agents, 1.0))
+
+    def _of_agents(
+        self,
+        signature: Signature,
+        hidden: tuple[int, ...],
+        out: int,
+        head_gain: float,
+        key: tuple[str, ...],
+        more: dict[tuple[str, ...], Entry] | None = None,
+    ) -> TensorDictModule:
+        """Return the module that writes [..., A, out] from each agent's own observation, and ``more`` of its own."""
+        more = more or {}
+        entries = [*signature.observation.values(), *more.values()]
+        keys = [*signature.observation_keys(), *more]
+        count = {"team": 1, "role": signature.n_roles, "none": signature.n_agents}[self.sharing]
+        networks = [self._network(entries, hidden, out, head_gain) for _ in range(count)]
+        if self.sharing == "role":
+            return TensorDictModule(RoleNetworks(networks), in_keys=[*keys, ROLE], out_keys=[key])
+        network = networks[0] if self.sharing == "team" else AgentNetworks(networks)
+        return TensorDictModule(network, in_keys=keys, out_keys=[key])
+
+    def _network(self, entries: list[Entry], hidden: tuple[int, ...], out: int, head_gain: float) -> Network:
+        activation = _ACTIVATIONS[self.activation]
+        return Network(self._encoder(entries, hidden[0]), tuple(hidden), out, activation, head_gain, self.dtype)
+
+    def _encoder(self, entries: list[Entry], size: int) -> LinearEncoder | ConvolutionalEncoder:
+        return LinearEncoder(entries, size)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cnn(Mlp):
+    """Convolutions over what is a picture (the view, the map pooled to 8 x 8, the state), then as ``Mlp``.
+
+    Attributes:
+        channels: Output channels of each convolution.
+        kernel_size: Of each, odd.
+
+    Raises:
+        ValueError: If a size is out of range or the kernel is even.
+    """
+
+    channels: tuple[int, ...] = (16, 16)
+    kernel_size: int = 3
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_sizes("channels", self.channels)
+        if not (1 <= self.kernel_size <= 15 and self.kernel_size % 2):
+            raise ValueError(f"kernel_size must be odd and in 1..15, got {self.kernel_size}")
+
+    def _encoder(self, entries: list[Entry], size: int) -> ConvolutionalEncoder:
+        return ConvolutionalEncoder(
+            entries, size, tuple(self.channels), self.kernel_size, _ACTIVATIONS[self.activation]
+        )
+
+
+def check_sizes(name: str, sizes: tuple[int, ...]) -> None:
+    """Check the sizes of layers.
+
+    Raises:
+        ValueError: If one is not in 1..8192 or there is none.
+    """
+    if not sizes or not all(1 <= size <= 8192 for size in sizes):
+        raise ValueError(f"{name} must be a list of sizes in 1..8192, got {list(sizes)}")

@@ -1,0 +1,199 @@
+"""Networks: encoders of observations, heads, and who of a team shares which."""
+
+from functools import lru_cache
+
+import torch
+from torch import Tensor, nn
+from torchrl.modules import MLP, ConvNet
+
+from warp_torchrl.models.signature import Entry
+
+
+class LinearEncoder(nn.Module):
+    """The first layer over several entries: the sum of one linear map each, which equals one of them joined.
+
+    Bytes are read as fractions of 255. Entries may have any number of leading dimensions.
+
+    Args:
+        entries: What is read.
+        size: Features out.
+    """
+
+    def __init__(self, entries: list[Entry], size: int) -> None:
+        super().__init__()
+        self.entries = entries
+        counts = [count(entry) for entry in entries]
+        self.parts = nn.ModuleList(nn.Linear(each, size, bias=index == 0) for index, each in enumerate(counts))
+        joined = torch.empty(size, sum(counts))
+        nn.init.orthogonal_(joined, 2.0**0.5)
+        for part, weight in zip(self.parts, joined.split(counts, dim=1), strict=True):
+            part.weight.data.copy_(weight)
+        nn.init.zeros_(self.parts[0].bias)
+
+    def forward(self, *inputs: Tensor) -> Tensor:
+        """Return features, float [..., size]."""
+        total = None
+        for part, entry, tensor in zip(self.parts, self.entries, inputs, strict=True):
+            flat = tensor.flatten(-len(entry.shape)) if len(entry.shape) > 1 else tensor
+            if flat.dtype == torch.uint8:
+                # Scaling the weights is far cheaper than scaling the many bytes.
+                features = nn.functional.linear(_cast(flat, part.weight), part.weight * (1.0 / 255.0), part.bias)
+            else:
+                features = part(flat)
+            total = features if total is None else total + features
+        return total
+
+
+class ConvolutionalEncoder(nn.Module):
+    """The first layers over several entries: convolutions over those of three dimensions, then a linear map of all.
+
+    Args:
+        entries: What is read; those [C, V, V] as images, the others as they are.
+        size: Features out.
+        channels: Output channels of each convolution.
+        kernel_size: Of each; the borders are padded, so that an image keeps its size.
+        activation: After each convolution.
+    """
+
+    def __init__(
+        self, entries: list[Entry], size: int, channels: tuple[int, ...], kernel_size: int, activation: type[nn.Module]
+    ) -> None:
+        super().__init__()
+        self.entries = entries
+        self.images = nn.ModuleDict()
+        flat = []
+        for index, entry in enumerate(entries):
+            if len(entry.shape) < 3:
+                flat.append(entry)
+                continue
+            self.images[str(index)] = ConvNet(
+                in_features=entry.shape[0],
+                num_cells=list(channels),
+                kernel_sizes=kernel_size,
+                paddings=kernel_size // 2,
+                activation_class=activation,
+            )
+            flat.append(Entry((channels[-1] * entry.shape[1] * entry.shape[2],), "float32"))
+        self.joined = LinearEncoder(flat, size)
+
+    def forward(self, *inputs: Tensor) -> Tensor:
+        """Return features, float [..., size]."""
+        features = list(inputs)
+        for index, network in self.images.items():
+            image = inputs[int(index)]
+            image = image.to(torch.float32) * (1.0 / 255.0) if image.dtype == torch.uint8 else image
+            features[int(index)] = network(image)
+        return self.joined(*features)
+
+
+def count(entry: Entry) -> int:
+    """Return how many numbers an entry holds."""
+    return int(torch.Size(entry.shape).numel())
+
+
+def _cast(tensor: Tensor, like: Tensor) -> Tensor:
+    autocast = torch.is_autocast_enabled(tensor.device.type)
+    return tensor.to(torch.get_autocast_dtype(tensor.device.type) if autocast else like.dtype)
+
+
+class Network(nn.Module):
+    """An encoder, hidden layers, and a linear head, with orthogonal initialisation.
+
+    Args:
+        encoder: Writes the first layer's features.
+        hidden: Sizes of the hidden layers; the first is the encoder's.
+        out: Size of the output.
+        activation: Between layers.
+        head_gain: Gain of the last layer's initial weights; 0.01 makes a first policy near uniform.
+        dtype: Arithmetic of the layers, ``auto``, ``float32`` or ``bfloat16``; weights stay float32.
+    """
+
+    def __init__(
+        self,
+        encoder: LinearEncoder | ConvolutionalEncoder,
+        hidden: tuple[int, ...],
+        out: int,
+        activation: type[nn.Module],
+        head_gain: float,
+        dtype: str,
+    ) -> None:
+        super().__init__()
+        self.encoder = encoder
+        layers = MLP(in_features=hidden[0], out_features=out, num_cells=list(hidden[1:]), activation_class=activation)
+        for layer in layers:
+            if isinstance(layer, nn.Linear):
+                nn.init.orthogonal_(layer.weight, head_gain if layer is layers[-1] else 2.0**0.5)
+                nn.init.zeros_(layer.bias)
+        self.body = nn.Sequential(activation(), *layers)
+        self.dtype = dtype
+
+    def forward(self, *inputs: Tensor) -> Tensor:
+        """Return float32 [..., out]."""
+        device = inputs[0].device.type
+        half = self.dtype == "bfloat16" or (self.dtype == "auto" and computes_in_half(device))
+        with torch.autocast(device, dtype=torch.bfloat16, enabled=half, cache_enabled=False):
+            return self.body(self.encoder(*inputs)).to(torch.float32)
+
+
+@lru_cache(maxsize=4)
+def computes_in_half(device: str) -> bool:
+    """Return whether a kind of device computes in bfloat16 itself; where it does not, emulation is far slower."""
+    if device == "cuda":
+        return torch.cuda.is_bf16_supported(including_emulation=False)
+    supported = getattr(torch.cpu, "_is_avx512_bf16_supported", None)  # no public question says it
+    return device == "cpu" and supported is not None and bool(supported())
+
+
+class TeamValue(nn.Module):
+    """A central critic's head: one network over the whole team, a value for each agent, [..., A, 1].
+
+    Args:
+        network: Reads the state, and, last, the team's joint action where it judges that too.
+    """
+
+    def __init__(self, network: Network) -> None:
+        super().__init__()
+        self.network = network
+
+    def forward(self, state: Tensor, *joint: Tensor) -> Tensor:
+        """Return float32 [..., A, 1] from the state [...] and the agents' actions [..., A, actions]."""
+        return self.network(state, *(each.flatten(-2) for each in joint)).unsqueeze(-1)
+
+
+class RoleNetworks(nn.Module):
+    """One network for each role, chosen by an agent's role index, whatever the team.
+
+    Args:
+        networks: By role index.
+    """
+
+    def __init__(self, networks: list[Network]) -> None:
+        super().__init__()
+        self.networks = nn.ModuleList(networks)
+
+    def forward(self, *inputs: Tensor) -> Tensor:
+        """Return float32 [..., A, out] from entries [..., A, ...] and, last, roles int64 [..., A]."""
+        *entries, role = inputs
+        out = self.networks[0](*entries)
+        for index, network in enumerate(self.networks):
+            out = out if index == 0 else torch.where((role == index)[..., None], network(*entries), out)
+        return out
+
+
+class AgentNetworks(nn.Module):
+    """One network for each agent of a team of fixed size.
+
+    Args:
+        networks: By agent.
+    """
+
+    def __init__(self, networks: list[Network]) -> None:
+        super().__init__()
+        self.networks = nn.ModuleList(networks)
+
+    def forward(self, *inputs: Tensor) -> Tensor:
+        """Return float32 [..., A, out] from entries [..., A, ...]."""
+        entries = self.networks[0].encoder.entries
+        split = [given.unbind(-1 - len(entry.shape)) for given, entry in zip(inputs, entries, strict=True)]
+        own = zip(self.networks, *split, strict=True)
+        return torch.stack([network(*seen) for network, *seen in own], dim=-2)

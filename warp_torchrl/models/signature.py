@@ -1,0 +1,54 @@
+"""The keys of learning, and what a network must fit: shapes and types, read off an environment's specs."""
+
+from typing import NamedTuple
+
+from torchrl.envs import EnvBase
+
+ACTION = ("agents", "action")
+ACTION_MASK = ("agents", "action_mask")
+ACTION_ONE_HOT = ("agents", "action_one_hot")
+ACTION_VALUE = ("agents", "action_value")
+CHOSEN_ACTION_VALUE = ("agents", "chosen_action_value")
+LOGITS = ("agents", "logits")
+LOG_PROB = ("agents", "action_log_prob")
+OBSERVATION = ("agents", "observation")
+REWARD = ("agents", "reward")
+ROLE = ("agents", "role")
+STATE = "state"
+STATE_ACTION_VALUE = ("agents", "state_action_value")
+VALUE = ("agents", "state_value")
+
+
+class Entry(NamedTuple):
+    """Shape of one agent's (or the critic's) entry, and its type's name."""
+
+    shape: tuple[int, ...]
+    dtype: str
+
+
+class Signature(NamedTuple):
+    """What a network must fit: the environment's inputs and outputs, without its size."""
+
+    observation: dict[str, Entry]  # by name; "" where the observation is one tensor
+    state: Entry
+    n_agents: int
+    n_actions: int
+    n_roles: int
+
+    def observation_keys(self) -> list[tuple[str, ...]]:
+        """Return the tensordict keys of the observation's entries."""
+        return [(*OBSERVATION, name) if name else OBSERVATION for name in self.observation]
+
+
+def signature(env: EnvBase) -> Signature:
+    """Read the signature off an environment's specs."""
+    specs = env.full_observation_spec_unbatched
+    seen = specs[OBSERVATION]
+    named = dict(seen.items()) if hasattr(seen, "items") else {"": seen}
+
+    def entry(spec: object, skip: int) -> Entry:
+        return Entry(tuple(spec.shape[skip:]), str(spec.dtype).removeprefix("torch."))
+
+    n_agents, n_actions = specs[ACTION_MASK].shape
+    observation = {name: entry(spec, 1) for name, spec in sorted(named.items())}
+    return Signature(observation, entry(specs["state"], 0), n_agents, n_actions, specs[ROLE].n)
