@@ -151,6 +151,41 @@ def test_a_sweep_trains_every_job(tmp_path):
     assert [(tmp_path / "sweep" / job / "evaluation.json").exists() for job in "01"] == [True, True]
 
 
+def test_the_experiment_of_all_algorithms_is_a_sweep(tmp_path):
+    arguments = (
+        *TINY,
+        "total_frames=32",
+        "evaluation.episodes=2",
+        "experiment=algorithms",
+        "algorithm=a2c,vdn",
+        "seed=4",
+    )
+    done = command("train.py", *arguments, "hydra.sweep.dir=sweep", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "a2c" in (tmp_path / "sweep" / "summary.md").read_text() and (tmp_path / "sweep" / "1").is_dir()
+
+
+@pytest.mark.parametrize("launcher", ["basic", "joblib"])
+def test_a_job_that_fails_is_named_at_the_end_and_the_others_go_on(tmp_path, launcher):
+    pytest.importorskip(f"hydra_plugins.hydra_{launcher}_launcher" if launcher != "basic" else "hydra")
+    arguments = (
+        *TINY,
+        "total_frames=32",
+        "evaluation.episodes=2",
+        "-m",
+        "seed=0,1",
+        f"hydra/launcher={launcher}",
+    )
+    (tmp_path / "sweep" / "0" / "checkpoints").mkdir(parents=True)
+    done = command("train.py", *arguments, "hydra.sweep.dir=sweep", folder=tmp_path)
+    assert done.returncode == 2
+    *_, last = done.stderr.strip().splitlines()
+    assert last.startswith("error: job 0 (") and "seed=0) failed: " in last and "holds a run already" in last
+    assert "Traceback" not in done.stderr
+    assert (tmp_path / "sweep" / "1" / "evaluation.json").exists()
+    assert (tmp_path / "sweep" / "summary.md").exists()
+
+
 MISTAKES = [
     (("train.py", "sede=3"), 2, "sede is not a key"),
     (("train.py", "team.n_agents=0"), 2, "team.n_agents must be in [1, 256], got 0"),

@@ -22,6 +22,7 @@ from warp_torchrl.world.gridded import Gridded
 from warp_torchrl.world.raster import Raster
 
 SCENARIOS = sorted(path.stem for path in (conf_folder() / "scenario").glob("*.yaml") if path.stem != "landfire")
+EXPERIMENTS = sorted(path.stem for path in (conf_folder() / "experiment").glob("*.yaml"))
 OPTIONS = [(path.parent.name, path.stem) for path in sorted(conf_folder().glob("*/*.yaml"))]
 LANDFIRE = Path(__file__).parent.parent.parent / "shared" / "landscapes" / "landfire"
 
@@ -58,6 +59,12 @@ def test_an_array_runs_in_every_scenario_cropped_to_its_size(scenario, tmp_path)
 def test_every_scenario_is_a_run(scenario):
     plan = settings(plain(compose_config("train", [f"scenario={scenario}"])))
     assert plan.scenario == scenario and plan.world.horizon == 8 * plan.world.size[0]
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS)
+def test_every_experiment_is_a_run(experiment):
+    plan = settings(plain(compose_config("train", [f"experiment={experiment}"])))
+    assert plan.total_frames >= plan.n_worlds * plan.collector.steps
 
 
 def test_the_landfire_scenario_runs_on_its_raster():

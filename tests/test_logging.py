@@ -72,6 +72,40 @@ def test_wandb_works_offline(tmp_path, caplog, monkeypatch):
     assert any("offline-run" in path.name for path in tmp_path.rglob("*"))
 
 
+def test_the_runs_of_a_sweep_are_one_group(tmp_path, monkeypatch):
+    given = []
+    monkeypatch.setattr("warp_torchrl.logging.get_logger", lambda *args, **options: given.append(options))
+    (tmp_path / "sweep" / "3").mkdir(parents=True)
+    (tmp_path / "alone").mkdir()
+    (tmp_path / "sweep" / "multirun.yaml").touch()
+    Wandb().open(tmp_path / "sweep" / "3")
+    Wandb().open(tmp_path / "alone")
+    Wandb(group="mine").open(tmp_path / "sweep" / "3")
+    assert [each["wandb_kwargs"]["group"] for each in given] == ["sweep", None, "mine"]
+
+
+def test_trackers_get_the_names_and_values_of_metrics_csv(tmp_path):
+    row = {"time/frames": 64, "train/loss": 0.25, "train/approx_kl": None, "world/saved": 0.5}
+    events = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
+    tracker = Tensorboard().open(tmp_path)
+    tracker.log(row, 64)
+    tracker.close()
+    folder = next(path.parent for path in tmp_path.rglob("*tfevents*"))
+    found = events.EventAccumulator(str(folder)).Reload()
+    assert set(found.Tags()["scalars"]) == {name for name, value in row.items() if value is not None}
+    assert [(each.step, each.value) for each in found.Scalars("world/saved")] == [(64, 0.5)]
+
+
+def test_wandb_gets_the_names_of_metrics_csv(tmp_path, monkeypatch):
+    monkeypatch.delenv("WANDB_API_KEY", raising=False)
+    tracker = Wandb().open(tmp_path)
+    seen = []
+    monkeypatch.setattr(tracker._logger.experiment, "log", lambda values, **options: seen.append(values))
+    tracker.log({"world/saved": 0.5, "train/loss": None, "time/frames": 10}, 10)
+    tracker.close()
+    assert [name for each in seen for name in each if not name.endswith("/step")] == ["world/saved", "time/frames"]
+
+
 def test_tensorboard_works_where_it_is_installed(tmp_path, caplog):
     pytest.importorskip("tensorboard")
     tracker = Tensorboard().open(tmp_path)

@@ -34,8 +34,7 @@ REPLAY = ["algorithm.capacity=100", "algorithm.warm_up=64", "algorithm.updates=2
 
 
 def tiny(run, *overrides):
-    base = [each for each in TINY if "algorithm=a2c" not in overrides or not each.startswith("algorithm.minibatch")]
-    config = compose_config("train", [*base, *overrides])
+    config = compose_config("train", [*TINY, *overrides])
     values = {k: v for k, v in without_targets(plain(config)).items() if k not in ("resume", "debug")}
     return Training(settings(plain(config)), Record(choices={}, values=values), run)
 

@@ -7,19 +7,15 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from hashlib import sha256
-from itertools import product
 from pathlib import Path
 from typing import Any
 
 import hydra
 from hydra.core.hydra_config import HydraConfig
-from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.experimental.callback import Callback
 from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 
 from warp_torchrl import checkpoint as checkpoints
-from warp_torchrl import summary
 from warp_torchrl.api import policy_of
 from warp_torchrl.config import (
     COMPONENTS,
@@ -27,6 +23,7 @@ from warp_torchrl.config import (
     Settings,
     compose_config,
     conf_folder,
+    is_sweep,
     plain,
     recompose,
     settings,
@@ -46,6 +43,7 @@ from warp_torchrl.evaluation import (
 )
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import Signature, signature
+from warp_torchrl.sweep import SweepSummary, jobs, note_failure
 from warp_torchrl.training import NumericalFailure, Stopped, Training
 
 log = logging.getLogger("warp_torchrl")
@@ -155,25 +153,6 @@ def _method(record: Record) -> tuple[str, str]:
     return " ".join(names), sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
 
-class SweepSummary(Callback):
-    """Ends a sweep with one table and one figure of all its evaluations."""
-
-    def on_multirun_end(self, config: DictConfig, **kwargs: Any) -> None:
-        """Write ``summary.md`` and ``summary.png`` into the sweep's folder, and print the table."""
-        folder = Path(str(config.hydra.sweep.dir))
-        entries = summary.gather(folder)
-        if not entries:
-            return
-        text = summary.table(entries)
-        (folder / "summary.md").write_text(text + "\n", encoding="utf-8")
-        print(text, flush=True)
-        try:
-            summary.draw(entries, folder / "summary.png")
-        except ImportError:
-            print('no summary.png: Matplotlib is missing, pip install "warp_torchrl[figures]"', flush=True)
-        print(f"wrote the summary into {folder}", flush=True)
-
-
 def _check_fits(found: checkpoints.Checkpoint, env: Any) -> None:
     here, there = signature(env), found.manifest.signature
     if (here.observation, here.n_actions) != (there.observation, there.n_actions):
@@ -223,7 +202,7 @@ def _run(name: str, job: Callable[[DictConfig], None]) -> None:
     try:
         _check_first(name, arguments)
     except Exception as error:
-        sys.exit(_fail(error, debug))
+        sys.exit(_fail(error, debug)[0])
     if name == "train":
         arguments = _with_run_folder(arguments)
     sys.argv[1:] = sorted(arguments, key=lambda each: each not in _MULTIRUN)  # Hydra wants -m before the overrides
@@ -232,12 +211,15 @@ def _run(name: str, job: Callable[[DictConfig], None]) -> None:
         try:
             job(config)
         except Exception as error:
-            code = _fail(error, debug)
-            if HydraConfig.get().mode == RunMode.MULTIRUN:
+            code, line = _fail(error, debug)
+            if HydraConfig.get().mode != RunMode.MULTIRUN:
+                sys.exit(code)
+            if isinstance(error, Stopped):
                 raise
-            sys.exit(code)
+            note_failure(code, line)  # the other jobs go on
 
     hydra.main(version_base="1.3", config_path=str(conf_folder()), config_name=name)(guarded)()
+    sys.exit(SweepSummary.exit_code)
 
 
 def _check_first(name: str, arguments: Sequence[str]) -> None:
@@ -246,29 +228,13 @@ def _check_first(name: str, arguments: Sequence[str]) -> None:
     flags = [each for each in arguments if each.startswith("-")]
     if any(flag not in _MULTIRUN for flag in flags):
         return  # Hydra's own flags (--help, --cfg, --config-dir ...) are Hydra's business
-    for job in _jobs([each for each in overrides if not each.startswith("hydra")], bool(flags)):
+    own = [each for each in overrides if not each.startswith("hydra")]
+    for job in jobs(own) if flags or is_sweep(name, own) else [own]:
         config = compose_config(name, job)
         if name == "train":
             _check_training(config, job)
         else:
             _check_evaluation(config, job)
-
-
-def _jobs(overrides: Sequence[str], multirun: bool) -> list[list[str]]:
-    """Return the overrides of each job of a sweep."""
-    if not multirun:
-        return [list(overrides)]
-    try:
-        parsed = OverridesParser.create().parse_overrides(list(overrides))
-    except Exception as error:
-        raise ConfigError(" ".join(str(error).split())) from None
-    choices = [
-        [f"{each.get_key_element()}={value}" for value in each.sweep_string_iterator()]
-        if each.is_sweep_override()
-        else [each.input_line]
-        for each in parsed
-    ]
-    return [list(job) for job in product(*choices)]
 
 
 def _check_training(config: DictConfig, overrides: Sequence[str]) -> None:
@@ -299,13 +265,13 @@ def _with_run_folder(arguments: Sequence[str]) -> list[str]:
     return [*arguments, *(f"hydra.run.dir={folder}" for folder in resumed if folder != "null")]
 
 
-def _fail(error: Exception, debug: bool) -> int:
-    """Say what failed in one line, the last of stderr, and return the exit code."""
+def _fail(error: Exception, debug: bool) -> tuple[int, str]:
+    """Say what failed in one line, the last of stderr, and return the exit code and the line."""
     if debug:
         traceback.print_exc()
     code, line = _diagnose(error)
     print(f"error: {line}", file=sys.stderr, flush=True)
-    return code
+    return code, line
 
 
 def _diagnose(error: Exception) -> tuple[int, str]:

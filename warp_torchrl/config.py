@@ -15,6 +15,7 @@ import torch
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 from hydra.errors import HydraException
+from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
@@ -167,6 +168,14 @@ def compose_config(name: str, overrides: Sequence[str] = ()) -> DictConfig:
         raise ConfigError(f"{_one_line(error)}, in {' '.join(overrides)}") from None
 
 
+def is_sweep(name: str, overrides: Sequence[str]) -> bool:
+    """Return whether an experiment among the overrides is a sweep in itself."""
+    chosen = [each for each in overrides if each.startswith("experiment=")]
+    GlobalHydra.instance().clear()
+    with initialize_config_dir(str(conf_folder()), version_base="1.3"):
+        return compose(name, overrides=chosen, return_hydra_config=True).hydra.mode == RunMode.MULTIRUN
+
+
 def settings(config: Mapping[str, Any]) -> Settings:
     """Check a composed configuration and build what it describes.
 
@@ -183,7 +192,12 @@ def settings(config: Mapping[str, Any]) -> Settings:
     values["checkpoint"] = construct(CheckpointPlan, config["checkpoint"], "checkpoint")
     values["evaluation"] = construct(EvaluationPlan, config["evaluation"], "evaluation")
     _check_together(config)
-    return construct(Settings, values, "")
+    made = construct(Settings, values, "")
+    try:
+        made.algorithm.check_batch(made.n_worlds * made.collector.steps)
+    except ValueError as error:
+        raise ConfigError(f"algorithm.{error}") from None
+    return made
 
 
 def build_components(config: Mapping[str, Any]) -> dict[str, Any]:

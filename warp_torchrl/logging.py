@@ -100,7 +100,8 @@ class _TorchRlTracker:
 
     def close(self) -> None:
         """Finish the tracker's run."""
-        finish = getattr(getattr(self._logger, "experiment", None), "finish", None)
+        experiment = getattr(self._logger, "experiment", None)
+        finish = getattr(experiment, "finish", None) or getattr(experiment, "close", None)
         try:
             if finish is not None:
                 finish()
@@ -129,7 +130,7 @@ class Wandb:
     Attributes:
         project: Its project.
         mode: ``offline`` keeps everything in the run folder, to be synced later; ``online`` sends it.
-        group: Its group, for sweeps.
+        group: Its group; null puts the runs of a sweep into one, named as the sweep's folder.
     """
 
     project: str = "warp_torchrl"
@@ -139,7 +140,9 @@ class Wandb:
     def open(self, run: Path) -> Tracker:
         """Return a tracker for a run folder."""
         os.environ.setdefault("WANDB_SILENT", "true")
-        options = {"offline": self.mode == "offline", "project": self.project, "group": self.group}
+        sweep = run.resolve().parent
+        group = self.group or (sweep.name if (sweep / "multirun.yaml").exists() else None)
+        options = {"offline": self.mode == "offline", "project": self.project, "group": group}
         return _TorchRlTracker("wandb", run, wandb_kwargs=options)
 
 

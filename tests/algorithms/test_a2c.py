@@ -29,7 +29,7 @@ def test_the_terms_are_those_of_the_textbook(make_small_env, central):
     torch.testing.assert_close(terms["loss_critic"], 0.5 * (value - data[VALUE_TARGET]).square().mean())
 
 
-def test_a_batch_is_one_update(make_small_env):
+def test_a_batch_is_seen_once(make_small_env):
     env = make_small_env(4)
     learner = A2c().build(env, SMALL, 32)
     with torch.no_grad():

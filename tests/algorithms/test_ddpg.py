@@ -7,7 +7,7 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from tests.algorithms.test_dqn import three_transitions
 from warp_torchrl.algorithms.ddpg import Ddpg, OneHotChoice
-from warp_torchrl.models import ACTION_MASK, ACTION_ONE_HOT, LOGITS, STATE_ACTION_VALUE, Mlp
+from warp_torchrl.models import ACTION, ACTION_MASK, ACTION_ONE_HOT, LOGITS, STATE_ACTION_VALUE, Mlp
 
 SMALL = Mlp(actor_hidden=(8,), critic_hidden=(8,))
 
@@ -78,3 +78,13 @@ def test_a_central_critic_reads_the_joint_action(make_small_env):
     other = data.clone()
     other[ACTION_ONE_HOT][:, 1] = other[ACTION_ONE_HOT][:, 1].roll(1, -1)
     assert (critic(other)[STATE_ACTION_VALUE][:, 0] != before[:, 0]).all()
+
+
+def test_the_memory_holds_the_action_that_was_done(make_small_env):
+    env = make_small_env(64)
+    learner = Ddpg(epsilon=0.5, warm_up=1, capacity=256, minibatch_size=3).build(env, SMALL, 256)
+    with torch.no_grad():
+        batch = env.rollout(4, learner.explore, break_when_any_done=False)
+    assert torch.equal(batch[ACTION_ONE_HOT], one_hot(batch[ACTION], 11).float())
+    learner.store(batch)
+    assert learner.buffer[:][ACTION_ONE_HOT].sum(-1).eq(1).all()

@@ -6,7 +6,9 @@ from tensordict import TensorDict
 from torch.nn.functional import smooth_l1_loss
 
 from warp_torchrl.algorithms.dqn import Dqn
-from warp_torchrl.models import ACTION, ACTION_MASK, ACTION_VALUE, OBSERVATION, REWARD, Cnn, Mlp
+from warp_torchrl.config import compose_config, plain, settings
+from warp_torchrl.construction import ConfigError
+from warp_torchrl.models import ACTION, ACTION_MASK, ACTION_VALUE, OBSERVATION, REWARD, Mlp
 
 SMALL = Mlp(actor_hidden=(8,), critic_hidden=(8,))
 
@@ -132,20 +134,41 @@ def test_nothing_is_learnt_before_the_memory_is_warm(make_small_env):
     assert counts == [(32, 0), (64, 5), (64, 5)]
 
 
+def test_a_memory_is_restored_with_its_order_and_its_room(make_small_env):
+    env = make_small_env(4)
+    learners = [Dqn(warm_up=1, capacity=80, minibatch_size=16).build(env, SMALL, 32) for _ in range(2)]
+    with torch.no_grad():
+        batches = [env.rollout(8, learners[0].explore, break_when_any_done=False) for _ in range(4)]
+    for count in (1, 3):  # not yet full, and gone round
+        first, second = learners
+        first.buffer.empty()
+        for batch in batches[:count]:
+            first.store(batch.clone())
+        state = first.keeps["replay"].state_dict()
+        assert all(len(each) == min(32 * count, 80) for each in state["_storage"].values())
+        second.keeps["replay"].load_state_dict(state)
+        for learner in learners:
+            learner.store(batches[3].clone())
+        assert len(first.buffer) == len(second.buffer)
+        ours, theirs = first.buffer[:], second.buffer[:]
+        assert (ours == theirs).all() and ours["agents"].batch_size == theirs["agents"].batch_size
+
+
 def test_prioritised_replay_works_or_says_why_not(make_small_env):
     env = make_small_env(4)
-    algorithm = Dqn(replay="prioritised", warm_up=16, capacity=64, minibatch_size=16, updates=3)
     try:
-        learner = algorithm.build(env, Cnn(channels=(4,), actor_hidden=(8,)), 32)
+        algorithm = Dqn(replay="prioritised", warm_up=16, capacity=64, minibatch_size=16, updates=3)
     except ValueError as error:
-        assert "replay must be uniform here" in str(error) and "\n" not in str(error)
+        assert str(error).startswith("replay must be uniform here") and "\n" not in str(error)
         return
+    learner = algorithm.build(env, SMALL, 32)
     with torch.no_grad():
         learner.store(env.rollout(8, learner.explore, break_when_any_done=False))
     for sample in learner.samples():
         learner.loss(sample)["loss"].backward()
         learner.after_step(sample)
-    assert sample["td_error"].shape[0] == 16
+    again = learner.buffer.sample()
+    assert again["td_error"].shape[0] == 16 and again["_weight"].std() > 0
 
 
 @pytest.mark.parametrize(
@@ -160,6 +183,8 @@ def test_values_out_of_range_are_refused(field, value):
 def test_a_batch_must_fit_into_the_memory(make_small_env):
     with pytest.raises(ValueError, match="capacity must be at least a batch"):
         Dqn(capacity=16, warm_up=8).build(make_small_env(4), SMALL, 32)
+    with pytest.raises(ConfigError, match=r"algorithm\.capacity must be at least a batch"):
+        settings(plain(compose_config("train", ["algorithm=dqn", "algorithm.warm_up=10", "algorithm.capacity=100"])))
 
 
 def test_the_observation_is_kept_as_bytes(make_small_env):

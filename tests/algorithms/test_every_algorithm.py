@@ -18,9 +18,8 @@ def algorithm(name, *overrides):
     """The algorithm of a yaml, with a memory and minibatches that fit a test."""
     if name in REPLAYS:
         overrides = ("algorithm.capacity=512", "algorithm.warm_up=64", "algorithm.updates=8", *overrides)
-    if name != "a2c":
-        overrides = ("algorithm.minibatch_size=64", *overrides)
-    return settings(plain(compose_config("train", [f"algorithm={name}", *overrides]))).algorithm
+    overrides = (f"algorithm={name}", "algorithm.minibatch_size=64", "n_worlds=16", "collector.steps=8", *overrides)
+    return settings(plain(compose_config("train", list(overrides)))).algorithm
 
 
 def collected(env, learner, steps):

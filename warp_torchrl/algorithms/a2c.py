@@ -14,7 +14,10 @@ from warp_torchrl.algorithms.on_policy import KEYS, OnPolicy
 
 @dataclass(frozen=True, kw_only=True)
 class A2c(OnPolicy):
-    """A2C with multi-agent generalised advantage estimation: one update for each batch, so short ones are best."""
+    """A2C with multi-agent generalised advantage estimation: each batch is seen once.
+
+    Its minibatches are as many optimiser steps: small ones or short batches of the collector are best.
+    """
 
     def loss(self, policy: ProbabilisticActor, critic: torch.nn.Module) -> A2CLoss:
         """Return TorchRL's loss, with the estimator that gives a team's end to each agent."""

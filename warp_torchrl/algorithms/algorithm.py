@@ -48,6 +48,13 @@ class Algorithm:
                 low, high = allowed[field.name]
                 raise ValueError(f"{field.name} must be in [{low:g}, {high:g}], got {getattr(self, field.name)}")
 
+    def check_batch(self, frames_per_batch: int) -> None:
+        """Check that batches of so many world steps can be learnt from.
+
+        Raises:
+            ValueError: If not.
+        """
+
     def rate_at(self, progress: float, optimizer: torch.optim.Optimizer) -> float:
         """Set the optimiser's learning rate to that of progress in 0..1, and return it."""
         rate = self.learning_rate * falling(1.0, self.learning_rate_end, progress)

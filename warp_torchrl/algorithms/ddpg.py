@@ -13,7 +13,7 @@ from torch import Tensor, nn
 from torchrl.envs.utils import ExplorationType, exploration_type
 from torchrl.objectives import DDPGLoss, ValueEstimators
 
-from warp_torchrl.algorithms.off_policy import AGENT_KEYS, OffPolicy
+from warp_torchrl.algorithms.off_policy import AGENT_KEYS, EpsilonGreedy
 from warp_torchrl.models import ACTION, ACTION_MASK, ACTION_ONE_HOT, LOGITS, STATE_ACTION_VALUE, Mlp, Signature
 
 
@@ -42,8 +42,18 @@ class OneHotChoice(nn.Module):
         return action, hard + (soft - soft.detach())
 
 
+class _OneHot(nn.Module):
+    def __init__(self, n_actions: int) -> None:
+        super().__init__()
+        self.n_actions = n_actions
+
+    def forward(self, action: Tensor) -> Tensor:
+        """Return float32 [..., actions] of actions int64 [...]."""
+        return nn.functional.one_hot(action, self.n_actions).to(torch.float32)
+
+
 @dataclass(frozen=True, kw_only=True)
-class Ddpg(OffPolicy):
+class Ddpg(EpsilonGreedy):
     """DDPG with one-hot actions: the critic judges the action that the actor chose, and its gradient moves the actor.
 
     Attributes:

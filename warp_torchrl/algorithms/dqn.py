@@ -10,12 +10,10 @@ from typing import Literal
 
 import torch
 from tensordict.nn import TensorDictModule, TensorDictModuleBase, TensorDictSequential
-from torchrl.data import Categorical
-from torchrl.modules import EGreedyModule, QMixer, QValueModule, VDNMixer
+from torchrl.modules import QMixer, QValueModule, VDNMixer
 from torchrl.objectives import DQNLoss, LossModule, QMixerLoss, ValueEstimators
 
-from warp_torchrl.algorithms.algorithm import falling
-from warp_torchrl.algorithms.off_policy import AGENT_KEYS, TEAM_REWARD, OffPolicy
+from warp_torchrl.algorithms.off_policy import AGENT_KEYS, TEAM_REWARD, EpsilonGreedy
 from warp_torchrl.models import (
     ACTION,
     ACTION_MASK,
@@ -30,16 +28,13 @@ TEAM_VALUE = "chosen_action_value"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Dqn(OffPolicy):
+class Dqn(EpsilonGreedy):
     """Q-learning with epsilon-greedy exploration; a policy that is evaluated as sampled explores as at the end.
 
     Attributes:
         mixer: ``none``, each agent learns its own values from its own reward (double DQN); ``vdn``, their sum is
             learnt from the team's mean reward; ``qmix``, a monotonic network that reads the whole state mixes them.
         mixer_hidden: Width of QMIX's mixing layer.
-        epsilon: Share of random actions at the start.
-        epsilon_end: At the end.
-        epsilon_until: Progress in 0..1 at which the end is reached; it falls linearly.
 
     Raises:
         ValueError: If a value is out of its range, or prioritised replay does not work here.
@@ -47,18 +42,14 @@ class Dqn(OffPolicy):
 
     mixer: Literal["none", "vdn", "qmix"] = "none"
     mixer_hidden: int = 32
-    epsilon: float = 1.0
-    epsilon_end: float = 0.05
-    epsilon_until: float = 0.5
 
     def check(self, **ranges: tuple[float, float]) -> None:
         """Check the numbers against their ranges, and further fields against ``ranges``."""
-        own = {"epsilon": (0.0, 1.0), "epsilon_end": (0.0, self.epsilon), "epsilon_until": (1e-6, 1.0)}
-        super().check(mixer_hidden=(1, 8192), **own, **ranges)
+        super().check(mixer_hidden=(1, 8192), **ranges)
 
     def policy(self, shape: Signature, model: Mlp) -> TensorDictSequential:
         """Return the team's decentralised policy: the action of highest value, or some other one now and then."""
-        return TensorDictSequential(*self._values(shape, model), self._epsilon_greedy(shape, self.epsilon_end))
+        return TensorDictSequential(*self._values(shape, model), self.epsilon_greedy(shape, self.epsilon_end))
 
     def _values(self, shape: Signature, model: Mlp) -> tuple[TensorDictModule, QValueModule]:
         choose = QValueModule(
@@ -69,24 +60,9 @@ class Dqn(OffPolicy):
         )
         return model.action_value(shape), choose
 
-    def _epsilon_greedy(self, shape: Signature, epsilon: float) -> EGreedyModule:
-        return EGreedyModule(
-            Categorical(shape.n_actions),
-            eps_init=epsilon,
-            eps_end=self.epsilon_end,
-            action_key=ACTION,
-            action_mask_key=ACTION_MASK,
-        )
-
     def explorer(self, policy: TensorDictModuleBase, shape: Signature) -> TensorDictSequential:
         """Return the policy with an epsilon that falls."""
-        return TensorDictSequential(*policy.module[:-1], self._epsilon_greedy(shape, self.epsilon))
-
-    def explore_at(self, progress: float, explore: TensorDictModuleBase) -> dict[str, float]:
-        """Set epsilon."""
-        epsilon = falling(self.epsilon, self.epsilon_end, progress / self.epsilon_until)
-        explore.module[-1].eps.fill_(epsilon)
-        return {"rollout/exploration_rate": epsilon}
+        return TensorDictSequential(*policy.module[:-1], self.epsilon_greedy(shape, self.epsilon))
 
     def loss(self, policy: TensorDictModuleBase, shape: Signature, model: Mlp, device: torch.device) -> LossModule:
         """Return TorchRL's loss with its value estimator."""

@@ -2,21 +2,29 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import torch
-from tensordict import TensorDictBase
+from tensordict import TensorDict, TensorDictBase, is_tensor_collection
 from tensordict.nn import TensorDictModuleBase
-from torchrl.data import LazyTensorStorage, ReplayBuffer, TensorDictPrioritizedReplayBuffer, TensorDictReplayBuffer
+from torchrl.data import (
+    Categorical,
+    LazyTensorStorage,
+    ReplayBuffer,
+    TensorDictPrioritizedReplayBuffer,
+    TensorDictReplayBuffer,
+)
+from torchrl.data.replay_buffers import PrioritizedSampler
 from torchrl.envs import EnvBase
+from torchrl.modules import EGreedyModule
 from torchrl.objectives import HardUpdate, LossModule, SoftUpdate
 from torchrl.objectives.utils import TargetNetUpdater
 
-from warp_torchrl.algorithms.algorithm import Algorithm
+from warp_torchrl.algorithms.algorithm import Algorithm, falling
 from warp_torchrl.algorithms.learner import Learner
-from warp_torchrl.models import REWARD, Mlp, Signature, signature
+from warp_torchrl.models import ACTION, ACTION_MASK, REWARD, Mlp, Signature, signature
 
-_PRIORITY = "td_error"
+_ALPHA, _BETA = 0.6, 0.4  # Schaul et al., 2016, proportional prioritisation
 AGENT_KEYS = {"reward": REWARD, "done": ("agents", "done"), "terminated": ("agents", "terminated")}
 """Where TorchRL's losses find what each agent's values are learnt from; a team's end is each agent's."""
 TEAM_REWARD = "team_reward"
@@ -55,6 +63,20 @@ class OffPolicy(Algorithm):
         super().check(**own, target_interval=(0, 10**9), tau=(1e-6, 1.0), **ranges)
         if self.warm_up > self.capacity:
             raise ValueError(f"warm_up must be at most capacity, {self.capacity}, got {self.warm_up}")
+        if self.replay == "prioritised":
+            check_prioritised()
+
+    def check_batch(self, frames_per_batch: int) -> None:
+        """Check that a batch fits into the memory.
+
+        Raises:
+            ValueError: If not.
+        """
+        if frames_per_batch > self.capacity:
+            raise ValueError(
+                f"capacity must be at least a batch, n_worlds x collector.steps = {frames_per_batch}, "
+                f"got {self.capacity}"
+            )
 
     def build(self, env: EnvBase, model: Mlp, frames_per_batch: int) -> Learner:
         """Return a learner for an environment.
@@ -65,13 +87,9 @@ class OffPolicy(Algorithm):
             frames_per_batch: World steps that are collected between updates.
 
         Raises:
-            ValueError: If a batch does not fit into the memory, or prioritised replay does not work here.
+            ValueError: If a batch does not fit into the memory.
         """
-        if frames_per_batch > self.capacity:
-            raise ValueError(
-                f"capacity must be at least a batch, n_worlds x collector.steps = {frames_per_batch}, "
-                f"got {self.capacity}"
-            )
+        self.check_batch(frames_per_batch)
         shape = signature(env)
         policy = self.policy(shape, model).to(env.device)
         loss = self.loss(policy, shape, model, env.device).to(env.device)
@@ -105,27 +123,17 @@ class OffPolicy(Algorithm):
             samples=samples,
             after_step=after_step,
             schedule=schedule,
-            keeps={"replay": memory, "targets": targets},
+            keeps={"replay": ReplayMemory(memory), "targets": targets},
         )
 
     def memory(self, device: torch.device) -> ReplayBuffer:
-        """Return TorchRL's replay buffer.
-
-        Raises:
-            ValueError: If it is prioritised and TorchRL's extension does not load.
-        """
+        """Return TorchRL's replay buffer."""
         storage = LazyTensorStorage(self.capacity, device=device)
         if self.replay == "uniform":
             return TensorDictReplayBuffer(storage=storage, batch_size=self.minibatch_size)
-        try:
-            return TensorDictPrioritizedReplayBuffer(
-                alpha=0.6, beta=0.4, storage=storage, batch_size=self.minibatch_size, priority_key=_PRIORITY
-            )
-        except (RuntimeError, ImportError):
-            raise ValueError(
-                f"replay must be uniform here: prioritised replay needs TorchRL's compiled extension, which does not "
-                f"load with torch {torch.__version__}"
-            ) from None
+        return TensorDictPrioritizedReplayBuffer(
+            alpha=_ALPHA, beta=_BETA, storage=storage, batch_size=self.minibatch_size, priority_key="td_error"
+        )
 
     def targets(self, loss: LossModule) -> TargetNetUpdater:
         """Return what moves the target networks."""
@@ -157,6 +165,94 @@ class OffPolicy(Algorithm):
     def columns(self) -> dict[str, str]:
         """Return the names of ``metrics.csv`` by entry of the loss's output."""
         return {"loss": "train/value_loss"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class EpsilonGreedy(OffPolicy):
+    """What DQN and DDPG have in common: a share of the actions is drawn among the open ones.
+
+    Attributes:
+        epsilon: That share at the start.
+        epsilon_end: At the end.
+        epsilon_until: Progress in 0..1 at which the end is reached; it falls linearly.
+
+    Raises:
+        ValueError: If a value is out of its range, or prioritised replay does not work here.
+    """
+
+    epsilon: float = 1.0
+    epsilon_end: float = 0.05
+    epsilon_until: float = 0.3
+
+    def check(self, **ranges: tuple[float, float]) -> None:
+        """Check the numbers against their ranges, and further fields against ``ranges``."""
+        own = {"epsilon": (0.0, 1.0), "epsilon_end": (0.0, self.epsilon), "epsilon_until": (1e-6, 1.0)}
+        super().check(**own, **ranges)
+
+    def epsilon_greedy(self, shape: Signature, epsilon: float) -> EGreedyModule:
+        """Return TorchRL's module that replaces an action now and then, unless exploration is off."""
+        return EGreedyModule(
+            Categorical(shape.n_actions),
+            eps_init=epsilon,
+            eps_end=self.epsilon_end,
+            action_key=ACTION,
+            action_mask_key=ACTION_MASK,
+        )
+
+    def explore_at(self, progress: float, explore: TensorDictModuleBase) -> dict[str, float]:
+        """Set epsilon."""
+        epsilon = falling(self.epsilon, self.epsilon_end, progress / self.epsilon_until)
+        for module in explore.modules():
+            if isinstance(module, EGreedyModule):
+                module.eps.fill_(epsilon)
+        return {"rollout/exploration_rate": epsilon}
+
+
+@dataclass(frozen=True)
+class ReplayMemory:
+    """A replay buffer as checkpoints keep it: what it holds, not the room that it has.
+
+    Attributes:
+        buffer: TorchRL's.
+    """
+
+    buffer: ReplayBuffer
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return the transitions, the batch sizes of their nested parts, and where the next one goes."""
+        state = self.buffer.state_dict() | {"_storage": {}, "sizes": {}}
+        if len(self.buffer):
+            data = self.buffer[:]
+            nested = [key for key in data.keys(True, False, sort=True) if is_tensor_collection(data.get(key))]
+            state["_storage"] = dict(data.flatten_keys(".").items())
+            state["sizes"] = {".".join((key,) if isinstance(key, str) else key): data[key].batch_size for key in nested}
+        return state
+
+    def load_state_dict(self, state_dict: dict[str, Any]) -> None:
+        """Restore them; the rest of the room stays empty."""
+        self.buffer.empty()
+        if state_dict["_storage"]:
+            length = len(next(iter(state_dict["_storage"].values())))
+            data = TensorDict(state_dict["_storage"], batch_size=[length]).unflatten_keys(".")
+            for key, size in state_dict["sizes"].items():
+                data[tuple(key.split("."))].batch_size = size
+            self.buffer.extend(data)
+        self.buffer.load_state_dict(state_dict | {"_storage": self.buffer.state_dict()["_storage"]})
+
+
+def check_prioritised() -> None:
+    """Check that TorchRL's prioritised sampler works here.
+
+    Raises:
+        ValueError: If TorchRL's compiled extension does not load.
+    """
+    try:
+        PrioritizedSampler(1, _ALPHA, _BETA)
+    except (RuntimeError, ImportError):
+        raise ValueError(
+            f"replay must be uniform here: prioritised replay needs TorchRL's compiled extension, which does not load "
+            f"with torch {torch.__version__}"
+        ) from None
 
 
 def transitions(loss: LossModule, batch: TensorDictBase) -> TensorDictBase:

@@ -38,6 +38,7 @@ class OnPolicy(Algorithm):
         entropy_coeff: Weight of the entropy bonus at the start.
         entropy_coeff_end: At the end; it falls linearly.
         critic_coeff: Weight of the value loss.
+        minibatch_size: World steps in a minibatch (each has one sample an agent).
 
     Raises:
         ValueError: If a value is out of its range.
@@ -48,12 +49,13 @@ class OnPolicy(Algorithm):
     entropy_coeff: float = 0.01
     entropy_coeff_end: float = 0.001
     critic_coeff: float = 1.0
+    minibatch_size: int = 1024
 
     def check(self, **ranges: tuple[float, float]) -> None:
         """Check the numbers against their ranges, and further fields against ``ranges``."""
         share = (0.0, 1.0)
         own = {"lmbda": share, "entropy_coeff": share, "entropy_coeff_end": share, "critic_coeff": (0.0, 100.0)}
-        super().check(**own, **ranges)
+        super().check(minibatch_size=(1, 1_000_000), **own, **ranges)
 
     def policy(self, shape: Signature, model: Mlp) -> ProbabilisticActor:
         """Return the team's decentralised policy: each agent's action from its own observation and mask."""
@@ -79,7 +81,7 @@ class OnPolicy(Algorithm):
         buffer = TensorDictReplayBuffer(
             storage=LazyTensorStorage(frames_per_batch, device=env.device),
             sampler=SamplerWithoutReplacement(),
-            batch_size=min(self.minibatch(frames_per_batch), frames_per_batch),
+            batch_size=min(self.minibatch_size, frames_per_batch),
         )
 
         def store(batch: TensorDictBase) -> None:
@@ -104,10 +106,6 @@ class OnPolicy(Algorithm):
     def loss(self, policy: ProbabilisticActor, critic: torch.nn.Module) -> LossModule:
         """Return TorchRL's loss with its value estimator."""
         raise TypeError(f"{type(self).__name__} does not say what it minimises: define loss()")
-
-    def minibatch(self, frames_per_batch: int) -> int:
-        """Return the world steps of a minibatch."""
-        return frames_per_batch
 
     def passes(self) -> int:
         """Return how often each collected step is seen."""

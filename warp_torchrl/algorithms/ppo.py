@@ -21,7 +21,6 @@ class Ppo(OnPolicy):
         clip_epsilon: Clip range of the probability ratio.
         value_norm: Whether value targets are normalised by running statistics.
         epochs: Passes over each batch.
-        minibatch_size: World steps in a minibatch (each has one sample an agent).
 
     Raises:
         ValueError: If a value is out of its range.
@@ -30,10 +29,9 @@ class Ppo(OnPolicy):
     clip_epsilon: float = 0.2
     value_norm: bool = True
     epochs: int = 3
-    minibatch_size: int = 2048
 
     def __post_init__(self) -> None:
-        self.check(clip_epsilon=(1e-4, 1.0), epochs=(1, 1000), minibatch_size=(1, 1_000_000))
+        self.check(clip_epsilon=(1e-4, 1.0), epochs=(1, 1000))
 
     def loss(self, policy: ProbabilisticActor, critic: torch.nn.Module) -> MAPPOLoss:
         """Return TorchRL's MAPPO or IPPO loss."""
@@ -49,10 +47,6 @@ class Ppo(OnPolicy):
         loss.set_keys(**KEYS)
         loss.make_value_estimator(gamma=self.gamma, lmbda=self.lmbda)
         return loss
-
-    def minibatch(self, frames_per_batch: int) -> int:
-        """Return the world steps of a minibatch."""
-        return self.minibatch_size
 
     def passes(self) -> int:
         """Return the epochs."""

@@ -26,7 +26,7 @@ class Sac(OffPolicy):
         ValueError: If a value is out of its range, or prioritised replay does not work here.
     """
 
-    temperature: float = 0.05
+    temperature: float = 0.003
     target_entropy: float = 0.2
 
     def check(self, **ranges: tuple[float, float]) -> None:
