@@ -1,5 +1,9 @@
 """Small worlds that the tests of the upper floors share."""
 
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # the tests run side by side; read when torch is imported
+
 import pytest
 import torch
 

@@ -1,12 +1,10 @@
 """The two commands: checks first, works, and ends with one line and an exit code when something fails."""
 
 import errno
-import json
 import logging
 import sys
 import traceback
 from collections.abc import Callable, Sequence
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +41,7 @@ from warp_torchrl.evaluation import (
 )
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import Signature, signature
-from warp_torchrl.sweep import SweepSummary, jobs, note_failure
+from warp_torchrl.sweep import SweepSummary, jobs, method, note_failure
 from warp_torchrl.training import NumericalFailure, Stopped, Training
 
 log = logging.getLogger("warp_torchrl")
@@ -138,19 +136,12 @@ def _report(
     left_out = {}
     if plan.evaluation.leave_one_out:
         left_out = {agent: play(env, LeftOut(actor, index), first, mode) for index, agent in enumerate(env.agent_names)}
-    method, configuration = (None, "") if found is None else _method(found.record())
-    content = report(plan.scenario, name, first, episodes, others, other_modes, left_out, method, configuration)
+    learner, digest = (None, "") if found is None else method(found.record())
+    content = report(plan.scenario, name, first, episodes, others, other_modes, left_out, learner, digest)
     write_json(folder / "evaluation.json", content)
     print(table(content), flush=True)
     record_episode(folder / "episode.gif", one, policy, f"{plan.scenario}\n{name}", first, mode)
     log.info("wrote evaluation.json and episode.gif into %s", folder)
-
-
-def _method(record: Record) -> tuple[str, str]:
-    """Return what a trained policy is called in a sweep, and a digest of its configuration but for the seed."""
-    names = [record.choices[group] for group in ("algorithm", "reward", "observation")]
-    values = {key: value for key, value in record.values.items() if key not in ("seed", "device", "evaluation")}
-    return " ".join(names), sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
 
 def _check_fits(found: checkpoints.Checkpoint, env: Any) -> None:

@@ -92,7 +92,7 @@ def draw(entries: Sequence[Entry], path: Path) -> None:
 
     groups = _by_scenario(entries)
     policies = list(dict.fromkeys(entry.policy for group in groups for entry in group))
-    styles = {policy: _style(index) for index, policy in enumerate(policies)}
+    styles = {policy: line_style(index) for index, policy in enumerate(policies)}
     with rc_context({"font.size": 8.0, "axes.spines.top": False, "axes.spines.right": False}):
         rows = [max(1.2, 0.28 * len(group) + 0.7) for group in groups]
         figure = Figure(figsize=(8.0, sum(rows) + 0.6), dpi=140, layout="constrained")
@@ -122,7 +122,8 @@ def _draw_bars(axes: Any, group: Sequence[Entry], styles: Mapping[str, Mapping[s
     axes.set_title(f"{group[0].scenario}: mean, 95 % interval", fontsize=8.0)
 
 
-def _style(index: int) -> dict[str, Any]:
+def line_style(index: int) -> dict[str, Any]:
+    """Return the colour and the dashes of a figure's line by its place."""
     colours = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7", "#555555", "#F0E442")  # Okabe, Ito
     dashes = ("-", "--", "-.", ":")
     return {"color": colours[index % len(colours)], "linestyle": dashes[index // len(colours) % len(dashes)]}

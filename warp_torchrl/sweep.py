@@ -4,6 +4,7 @@ import json
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from hashlib import sha256
 from itertools import product
 from pathlib import Path
 from typing import Any, ClassVar
@@ -14,6 +15,7 @@ from hydra.experimental.callback import Callback
 from omegaconf import DictConfig
 
 from warp_torchrl import summary
+from warp_torchrl.config import Record
 from warp_torchrl.construction import ConfigError
 
 FAILURE = "failed.json"
@@ -68,6 +70,13 @@ def failures(folder: Path) -> list[Failure]:
     """Return the jobs of a sweep's folder that failed, in their order."""
     found = [Failure(**json.loads(path.read_text(encoding="utf-8"))) for path in folder.glob(f"*/{FAILURE}")]
     return sorted(found, key=lambda each: each.job)
+
+
+def method(record: Record) -> tuple[str, str]:
+    """Return what a trained policy is called in a sweep, and a digest of its configuration but for the seed."""
+    names = [record.choices[group] for group in ("algorithm", "reward", "observation")]
+    values = {key: value for key, value in record.values.items() if key not in ("seed", "device", "evaluation")}
+    return " ".join(names), sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
 
 class SweepSummary(Callback):

@@ -28,7 +28,7 @@ SCENARIOS = (
     "paper_sarl",
     "paper_marl",
 )
-"""What ``tasks`` plays unless it is told; ``giant`` takes hours, and ``landfire`` needs its rasters."""
+"""What ``tasks`` plays unless it is told; ``giant`` takes long, and ``landfire`` needs its rasters."""
 EPISODES = 256
 FIRST_SEED = 1_000_000
 

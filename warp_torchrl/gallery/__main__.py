@@ -1,6 +1,7 @@
 """Draws the figures of the world: ``python -m warp_torchrl.gallery [FIGURE ...]``.
 
-All of them by default, as PNG; those of the paper and those that show our laws. It needs the extra ``figures``.
+All of them by default, as PNG; those of the paper and those that show our laws. ``python -m warp_torchrl.gallery curves
+RUN [RUN ...]`` draws the learning curves of runs instead. It needs the extra ``figures``.
 """
 
 import argparse
@@ -12,6 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from warp_torchrl.gallery.curves import curve_figures
 from warp_torchrl.gallery.drawing import save, style
 from warp_torchrl.gallery.fires import fire_plain, fire_terrain_wind
 from warp_torchrl.gallery.landscapes import burn_probability
@@ -37,28 +39,44 @@ WORLD: dict[str, Callable[..., "Figure"]] = {
 REAL_GROUND: dict[str, Callable[..., "Figure"]] = {"burn_probability": burn_probability}
 """Figures that need a folder of rasters."""
 DONE, MISTAKE = 0, 2
+_CURVES = "curves RUN [RUN ...] [--out FOLDER]"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw what the command line asks for, a line for each figure, and return the exit code."""
-    options = _parser().parse_args(arguments)
-    if options.list:
-        print("\n".join(f"{name:<20}{_first_line(draw)}" for name, draw in (WORLD | REAL_GROUND).items()))
-        return DONE
-    mistake = _mistake(options)
-    if mistake is None:
-        try:
-            _draw_all(options)
-        except (ValueError, OSError) as error:  # of a folder of rasters, or of the one to write to
-            mistake = " ".join(str(error).split())
-    if mistake is not None:
-        print(f"gallery: {mistake}", file=sys.stderr)
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        if given[:1] == ["curves"]:
+            _curves(given[1:])
+        else:
+            _world(given)
+    except (ValueError, OSError) as error:  # of the command line, of a folder to read, or of the one to write to
+        print(f"gallery: {' '.join(str(error).split())}", file=sys.stderr)
         return MISTAKE
     return DONE
 
 
+def _world(arguments: Sequence[str]) -> None:
+    options = _parser().parse_args(arguments)
+    if options.list:
+        print("\n".join(f"{name:<20}{_first_line(draw)}" for name, draw in (WORLD | REAL_GROUND).items()))
+        print(f"{_CURVES} draws the learning curves of runs")
+        return
+    _check(options)
+    _draw_all(options)
+
+
+def _curves(arguments: Sequence[str]) -> None:
+    options = _curves_parser().parse_args(arguments)
+    if not options.runs:
+        raise ValueError(f"give the folder of at least one run: {_CURVES}")
+    _check_matplotlib()
+    for name, draw in curve_figures(options.runs).items():
+        _draw_one(name, draw, options.out)
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m warp_torchrl.gallery", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="python -m warp_torchrl.gallery", description=" ".join(__doc__.split()))
     parser.add_argument("figures", nargs="*", metavar="FIGURE", help="all by default; --list names them")
     parser.add_argument("--list", action="store_true", help="print what there is to draw")
     parser.add_argument("--out", type=Path, default=Path("docs/figures"), metavar="FOLDER", help="%(default)s")
@@ -66,16 +84,36 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _mistake(options: argparse.Namespace) -> str | None:
-    """Return what is wrong with the command line or the installation."""
+def _curves_parser() -> argparse.ArgumentParser:
+    about = (
+        "Draws the learning curves of runs: curves_single.png of those with one agent, curves_multi.png of the others, "
+        "curves_saved.png of all. Runs that differ in their seed alone are one line, with a band."
+    )
+    parser = argparse.ArgumentParser(prog="python -m warp_torchrl.gallery curves", description=about)
+    parser.add_argument(
+        "runs", nargs="*", type=Path, metavar="RUN", help="folder of a run, or of a sweep: all its runs"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path(), metavar="FOLDER", help="where to write, the current folder by default"
+    )
+    return parser
+
+
+def _check(options: argparse.Namespace) -> None:
+    """Refuse what is wrong with the command line or the installation."""
     unknown = [name for name in options.figures if name not in WORLD | REAL_GROUND]
+    if "curves" in unknown:
+        raise ValueError(f"curves goes first and alone: {_CURVES}")
     if unknown:
-        return f"figure must be one of {', '.join(WORLD | REAL_GROUND)}, got {unknown[0]}"
+        raise ValueError(f"figure must be one of {', '.join(WORLD | REAL_GROUND)}, got {unknown[0]}")
     if options.landscape is not None and not options.landscape.is_dir():
-        return f"landscape must be a folder of rasters that exists, got {options.landscape}"
+        raise ValueError(f"landscape must be a folder of rasters that exists, got {options.landscape}")
+    _check_matplotlib()
+
+
+def _check_matplotlib() -> None:
     if importlib.util.find_spec("matplotlib") is None:
-        return 'figures need Matplotlib: pip install "warp_torchrl[figures]"'
-    return None
+        raise ValueError('figures need Matplotlib: pip install "warp_torchrl[figures]"')
 
 
 def _draw_all(options: argparse.Namespace) -> None:
@@ -87,9 +125,13 @@ def _draw_all(options: argparse.Namespace) -> None:
         if name in missing:
             print(f"{name:<20} skipped: it needs --landscape FOLDER, a folder of rasters")
             continue
-        start = time.perf_counter()
-        path = draw_figure(ready[name], options.out / f"{name}.png")
-        print(f"{name:<20}{time.perf_counter() - start:6.1f} s  {path}", flush=True)
+        _draw_one(name, ready[name], options.out)
+
+
+def _draw_one(name: str, draw: Callable[[], "Figure"], folder: Path) -> None:
+    start = time.perf_counter()
+    path = draw_figure(draw, folder / f"{name}.png")
+    print(f"{name:<20}{time.perf_counter() - start:6.1f} s  {path}", flush=True)
 
 
 def draw_figure(draw: Callable[[], "Figure"], path: Path) -> Path:

@@ -1,0 +1,157 @@
+"""Run folders, read for their curves: ``metrics.csv`` and what was trained, without instantiating anything."""
+
+import csv
+import math
+from array import array
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from warp_torchrl.checkpoint import Checkpoint, CheckpointError, newest
+from warp_torchrl.config import Record
+from warp_torchrl.sweep import method
+
+FRAMES, SECONDS = "time/frames", "time/seconds"
+MOST_ROWS = 400
+"""Rows of a file beyond which they are averaged over bins."""
+_LARGEST, _LARGEST_CONFIG = 100_000_000, 1_000_000  # bytes
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """A run folder: what was trained, and its numbers.
+
+    Attributes:
+        columns: Columns of ``metrics.csv``, [rows] each, NaN where a value is missing.
+        rows_per_bin: Rows that one of these stands for.
+        names: Algorithm, reward, observation and scenario; the folder's own name alone where nothing is recorded.
+        alike: The same for runs that differ in their seed alone.
+        mark: What tells it from others of the same names.
+        scenario: Its name.
+        n_agents: A; None where it is not recorded.
+        seed: None where it is not recorded.
+    """
+
+    columns: Mapping[str, np.ndarray]
+    rows_per_bin: int
+    names: tuple[str, ...]
+    alike: str
+    mark: str
+    scenario: str
+    n_agents: int | None
+    seed: str | None
+
+
+def run_folders(paths: Sequence[Path]) -> list[Path]:
+    """Return the run folders that are meant, each once: itself, or all below the folder of a sweep."""
+    found: dict[Path, Path] = {}
+    for path in paths:
+        if not path.is_dir():
+            raise ValueError(f"RUN must be the folder of a run or of a sweep, got {path}")
+        below = [path] if (path / "metrics.csv").exists() else [file.parent for file in path.glob("**/metrics.csv")]
+        if not below:
+            raise ValueError(f"{path} holds no metrics.csv, nor do its sub-folders")
+        for folder in sorted(below, key=lambda each: (len(str(each)), str(each))):  # job 2 comes before job 10
+            found.setdefault(folder.resolve(), folder)
+    return list(found.values())
+
+
+def read_run(folder: Path) -> Run:
+    """Return what a run folder holds, without instantiating anything."""
+    columns = read_metrics(folder / "metrics.csv")
+    rows_per_bin = math.ceil(len(columns[FRAMES]) / MOST_ROWS)
+    columns = {name: bin_means(values, rows_per_bin) for name, values in columns.items()}
+    try:
+        found, _ = newest(folder)
+        trained = _recorded(found, found.record())
+    except CheckpointError:  # none was saved yet
+        trained = _not_recorded(folder.resolve())
+    return Run(columns=columns, rows_per_bin=rows_per_bin, **trained)
+
+
+def read_metrics(path: Path) -> dict[str, np.ndarray]:
+    """Return the columns of a ``metrics.csv``, float64 [rows], NaN where a cell is empty or not finite.
+
+    Raises:
+        ValueError: If it is over 100 MB or malformed.
+    """
+    if path.stat().st_size > _LARGEST:
+        raise ValueError(f"{path} is larger than {_LARGEST // 1_000_000} MB")
+    with path.open(newline="", encoding="utf-8") as file:
+        lines = csv.reader(file)
+        try:
+            header = next(lines, [])
+            if FRAMES not in header:
+                raise ValueError(f"it has no column {FRAMES}")
+            cells = array("d")  # a list of Python's numbers would be four times as large
+            for line in lines:
+                cells.extend(_numbers(line, header, lines.line_num))
+            columns = dict(zip(header, np.array(cells).reshape(-1, len(header)).T))
+            _check_time(columns)
+        except (csv.Error, ValueError) as error:
+            raise ValueError(f"{path} is malformed: {error}") from None
+    return columns
+
+
+def _numbers(cells: Sequence[str], header: Sequence[str], number: int) -> list[float]:
+    if len(cells) != len(header):
+        raise ValueError(f"line {number} has {len(cells)} cells, the header has {len(header)}")
+    values = []
+    for name, cell in zip(header, cells):
+        try:
+            value = float(cell) if cell else math.nan
+        except ValueError:
+            raise ValueError(f"line {number}, {name}: {cell[:40]!r} is not a number") from None
+        values.append(value if math.isfinite(value) else math.nan)
+    return values
+
+
+def _check_time(columns: Mapping[str, np.ndarray]) -> None:
+    if not columns[FRAMES].size:
+        raise ValueError("it has no rows")
+    for name in (FRAMES, SECONDS):
+        times = columns.get(name, columns[FRAMES])
+        if not (np.diff(times, prepend=0.0) > 0.0).all():  # nor is that so of NaN
+            raise ValueError(f"{name} must be in every row, positive, and grow")
+
+
+def _recorded(found: Checkpoint, record: Record) -> dict[str, Any]:
+    try:
+        names = tuple(str(record.choices[group]) for group in ("algorithm", "reward", "observation"))
+        _, digest = method(record)
+        n_agents, seed = record.values["team"]["n_agents"], str(record.values["seed"])
+    except (KeyError, TypeError, AttributeError):
+        raise ValueError(f"{found.path / 'config.json'} does not hold a run's configuration") from None
+    scenario = str(found.manifest.scenario)
+    alike = " ".join((scenario, *names, digest))
+    told = {"names": (*names, scenario), "alike": alike, "mark": digest[:6]}
+    return told | {"scenario": scenario, "n_agents": n_agents, "seed": seed}
+
+
+def _not_recorded(folder: Path) -> dict[str, Any]:
+    """Return what is known of a run without a checkpoint: its name, and what its ``config.yaml`` says."""
+    content, path = {}, folder / "config.yaml"
+    if path.is_file() and path.stat().st_size <= _LARGEST_CONFIG:
+        try:
+            content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        except (yaml.YAMLError, ValueError, RecursionError):
+            raise ValueError(f"{path} is not a run's configuration") from None
+    content = content if isinstance(content, dict) else {}
+    team, scenario = content.get("team"), content.get("scenario")
+    told = {"names": (folder.name,), "alike": str(folder), "mark": f"in {folder.parent.name}"}
+    n_agents = team.get("n_agents") if isinstance(team, dict) else None
+    scenario = scenario if isinstance(scenario, str) else "not recorded"
+    return told | {"scenario": scenario, "n_agents": n_agents, "seed": None}
+
+
+def bin_means(values: np.ndarray, size: int) -> np.ndarray:
+    """Return the means over bins of so many rows, the last of what is left; NaN where a bin has no value."""
+    if size == 1:
+        return values
+    starts, there = np.arange(0, len(values), size), np.isfinite(values)
+    sums, counts = (np.add.reduceat(each, starts) for each in (np.where(there, values, 0.0), there.astype(float)))
+    return np.where(counts > 0, sums / counts.clip(1), math.nan)
