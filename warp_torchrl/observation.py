@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import adaptive_avg_pool2d, one_hot, pad
 
+from warp_torchrl.world.flags import equal, number
 from warp_torchrl.world.state import FIRST_FIRE, Action, WorldState, is_burning, is_tree
 from warp_torchrl.world.team import ROLE_NAMES
 from warp_torchrl.world.validation import check_fields
@@ -165,7 +166,7 @@ def crop(planes: Tensor, position: Tensor, radius: int) -> Tensor:
 def egocentric_view(state: WorldState, world: World, radius: int) -> Tensor:
     """Return the agents' own views in the channels ``CHANNELS``, uint8 [B, A, C, V, V]."""
     cells, vehicles = state.cells, state.vehicles
-    empty = cells == 0
+    empty = equal(cells, 0)
     ugv, uav = _occupancy(state, world)
     planes = torch.stack(
         (
@@ -173,8 +174,8 @@ def egocentric_view(state: WorldState, world: World, radius: int) -> Tensor:
             (state.alpha * 255.0).to(torch.uint8),
             _age_plane(state),
             _stage_plane(state),
-            (state.burned & empty) * _FULL,
-            state.firebreak * _FULL,
+            (state.burned & empty).view(torch.uint8) * 255,
+            state.firebreak.view(torch.uint8) * 255,
             state.wet.clamp(max=10) * 25,
             torch.full_like(cells, 128),
             (world.threat(state) * 255.0).to(torch.uint8),
@@ -193,15 +194,12 @@ def egocentric_view(state: WorldState, world: World, radius: int) -> Tensor:
     return view
 
 
-_FULL = torch.tensor(255, dtype=torch.uint8)
-
-
 def _age_plane(state: WorldState) -> Tensor:
-    return state.cells * is_tree(state.cells) * 25
+    return state.cells * is_tree(state.cells).view(torch.uint8) * 25
 
 
 def _stage_plane(state: WorldState) -> Tensor:
-    return (state.cells - (FIRST_FIRE - 1)) * is_burning(state.cells) * 51
+    return (state.cells - (FIRST_FIRE - 1)) * is_burning(state.cells).view(torch.uint8) * 51
 
 
 def _relative_elevation(state: WorldState, radius: int) -> Tensor:
@@ -269,7 +267,7 @@ def picture(state: WorldState) -> Tensor:
     height, width = state.cells.shape[1:]
     position = state.vehicles.position
     shape = position.shape[:2]
-    maps = torch.stack((is_burning(state.cells).to(torch.float32), _fuel(state)), dim=1)
+    maps = torch.stack((number(is_burning(state.cells)), _fuel(state)), dim=1)
     pooled = adaptive_avg_pool2d(maps, PICTURE_SIDE)
     pooled[:, 0].sqrt_()
     block = (position[..., 0] * PICTURE_SIDE // height) * PICTURE_SIDE + position[..., 1] * PICTURE_SIDE // width
@@ -284,7 +282,7 @@ def central_state(state: WorldState, world: World) -> Tensor:
     height, width = state.cells.shape[1:]
     worlds = state.cells.shape[0]
     elevation = state.landscape.elevation
-    maps = [is_burning(state.cells).to(torch.float32), _fuel(state)]
+    maps = [number(is_burning(state.cells)), _fuel(state)]
     if elevation is not None:
         maps.append((elevation - elevation.mean((1, 2), keepdim=True)) / ELEVATION_SCALE)
     pooled = adaptive_avg_pool2d(torch.stack(maps, dim=1), STATE_SIDE)
@@ -304,4 +302,4 @@ def central_state(state: WorldState, world: World) -> Tensor:
 
 
 def _fuel(state: WorldState) -> Tensor:
-    return state.alpha * is_tree(state.cells)
+    return state.alpha * number(is_tree(state.cells))

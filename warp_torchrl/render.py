@@ -113,7 +113,7 @@ def _ground_colours(state: WorldState) -> Tensor:
     """Return the colour of each cell, uint8 [B, H, W, 3]."""
     cells = state.cells.to(torch.int64)
     row = state.landscape.cover.to(torch.int64) * _AGES + cells
-    row = torch.where(is_burning(cells), cells + (_FIRE_ROW - FIRST_FIRE), row)
+    row = torch.where(is_burning(state.cells), cells + (_FIRE_ROW - FIRST_FIRE), row)
     row = row.masked_fill(state.burned & (cells == EMPTY), _ASH_ROW)
     row = row.masked_fill(state.firebreak & (cells == EMPTY), _FIREBREAK_ROW)
     return _colour_table(cells.device)[row + (state.wet > 0) * _WET_ROW]

@@ -1,5 +1,6 @@
 """Models: which networks an algorithm's actors and critics are, and what they read and write."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -8,11 +9,11 @@ from torch import nn
 
 from warp_torchrl.models.networks import (
     AgentNetworks,
+    Central,
     ConvolutionalEncoder,
     LinearEncoder,
     Network,
     RoleNetworks,
-    TeamValue,
 )
 from warp_torchrl.models.signature import (
     ACTION_ONE_HOT,
@@ -65,25 +66,15 @@ class Mlp:
         return self._of_agents(signature, self.actor_hidden, signature.n_actions, 0.01, ACTION_VALUE)
 
     def critic(self, signature: Signature, central: bool) -> TensorDictModule:
-        """Return the module that writes values [..., A, 1], from the state or from each agent's observation."""
-        if central:
-            return TensorDictModule(self._team_value(signature, []), in_keys=[STATE], out_keys=[VALUE])
-        return self._of_agents(signature, self.critic_hidden, 1, 1.0, VALUE)
+        """Return the module that writes values [..., A, 1] from each agent's observation, and the state if central."""
+        return self._of_agents(signature, self.critic_hidden, 1, 1.0, VALUE, central=central)
 
     def action_critic(self, signature: Signature, central: bool) -> TensorDictModule:
         """Return the module that writes values [..., A, 1] of actions given as one-hot vectors [..., A, actions].
 
-        It reads the state and the whole team's actions, or each agent's observation and own action.
+        It reads each agent's observation and own action, and the state and the whole team's actions if central.
         """
-        if central:
-            joint = Entry((signature.n_agents * signature.n_actions,), "float32")
-            network = self._team_value(signature, [joint])
-            return TensorDictModule(network, in_keys=[STATE, ACTION_ONE_HOT], out_keys=[STATE_ACTION_VALUE])
-        own = Entry((signature.n_actions,), "float32")
-        return self._of_agents(signature, self.critic_hidden, 1, 1.0, STATE_ACTION_VALUE, more={ACTION_ONE_HOT: own})
-
-    def _team_value(self, signature: Signature, more: list[Entry]) -> TeamValue:
-        return TeamValue(self._network([signature.state, *more], self.critic_hidden, signature.n_agents, 1.0))
+        return self._of_agents(signature, self.critic_hidden, 1, 1.0, STATE_ACTION_VALUE, central=central, judges=True)
 
     def _of_agents(
         self,
@@ -92,18 +83,43 @@ class Mlp:
         out: int,
         head_gain: float,
         key: tuple[str, ...],
-        more: dict[tuple[str, ...], Entry] | None = None,
+        *,
+        central: bool = False,
+        judges: bool = False,
     ) -> TensorDictModule:
-        """Return the module that writes [..., A, out] from each agent's own observation, and ``more`` of its own."""
-        more = more or {}
-        entries = [*signature.observation.values(), *more.values()]
-        keys = [*signature.observation_keys(), *more]
-        count = {"team": 1, "role": signature.n_roles, "none": signature.n_agents}[self.sharing]
-        networks = [self._network(entries, hidden, out, head_gain) for _ in range(count)]
+        """Return the module that writes [..., A, out] from each agent's entries.
+
+        Args:
+            signature: Shapes of what is read.
+            hidden: Sizes of the hidden layers.
+            out: Size of the output.
+            head_gain: Gain of the last layer's initial weights.
+            key: Where it writes.
+            central: Whether it reads the state too.
+            judges: Whether it reads the action that was chosen too, and that of the team where it is central.
+        """
+        entries, keys = list(signature.observation.values()), list(signature.observation_keys())
+        if judges:
+            entries.append(Entry((signature.n_actions,), "float32"))
+            keys.append(ACTION_ONE_HOT)
+        action = len(keys) - 1 if judges else None
+        if central:
+            joint = [Entry((signature.n_agents * signature.n_actions,), "float32")] if judges else []
+            entries = [signature.state, *joint, *entries]
+        network = self._shared(signature, lambda: self._network(entries, hidden, out, head_gain))
         if self.sharing == "role":
-            return TensorDictModule(RoleNetworks(networks), in_keys=[*keys, ROLE], out_keys=[key])
-        network = networks[0] if self.sharing == "team" else AgentNetworks(networks)
+            keys.append(ROLE)
+        if central:
+            network, keys = Central(network, len(signature.state.shape), action), [STATE, *keys]
         return TensorDictModule(network, in_keys=keys, out_keys=[key])
+
+    def _shared(self, signature: Signature, make: Callable[[], Network]) -> nn.Module:
+        """Return as many networks as the team has."""
+        if self.sharing == "team":
+            return make()
+        if self.sharing == "role":
+            return RoleNetworks([make() for _ in range(signature.n_roles)])
+        return AgentNetworks([make() for _ in range(signature.n_agents)])
 
     def _network(self, entries: list[Entry], hidden: tuple[int, ...], out: int, head_gain: float) -> Network:
         activation = _ACTIVATIONS[self.activation]

@@ -144,20 +144,25 @@ def computes_in_half(device: str) -> bool:
     return device == "cpu" and supported is not None and bool(supported())
 
 
-class TeamValue(nn.Module):
-    """A central critic's head: one network over the whole team, a value for each agent, [..., A, 1].
+class Central(nn.Module):
+    """What a central critic adds to networks of agents: the state that they all are in, and all that they do.
 
     Args:
-        network: Reads the state, and, last, the team's joint action where it judges that too.
+        network: Reads the state, the joint action where there is one, and then each agent's own entries.
+        state_dims: Dimensions of the state without a batch's.
+        action: Place of the one-hot actions among the agents' entries; None where the critic does not judge actions.
     """
 
-    def __init__(self, network: Network) -> None:
+    def __init__(self, network: nn.Module, state_dims: int, action: int | None) -> None:
         super().__init__()
-        self.network = network
+        self.network, self.state_dims, self.action = network, state_dims, action
 
-    def forward(self, state: Tensor, *joint: Tensor) -> Tensor:
-        """Return float32 [..., A, 1] from the state [...] and the agents' actions [..., A, actions]."""
-        return self.network(state, *(each.flatten(-2) for each in joint)).unsqueeze(-1)
+    def forward(self, state: Tensor, *own: Tensor) -> Tensor:
+        """Return float32 [..., A, out] from the state [...] and entries [..., A, ...]."""
+        shared = [state.unsqueeze(-1 - self.state_dims)]
+        if self.action is not None:
+            shared.append(own[self.action].flatten(-2).unsqueeze(-2))
+        return self.network(*shared, *own)
 
 
 class RoleNetworks(nn.Module):
@@ -192,8 +197,10 @@ class AgentNetworks(nn.Module):
         self.networks = nn.ModuleList(networks)
 
     def forward(self, *inputs: Tensor) -> Tensor:
-        """Return float32 [..., A, out] from entries [..., A, ...]."""
-        entries = self.networks[0].encoder.entries
-        split = [given.unbind(-1 - len(entry.shape)) for given, entry in zip(inputs, entries, strict=True)]
+        """Return float32 [..., A, out] from entries [..., A, ...]; one that all share may be [..., 1, ...]."""
+        split = []
+        for given, entry in zip(inputs, self.networks[0].encoder.entries, strict=True):
+            each = given.unbind(-1 - len(entry.shape))
+            split.append(each * len(self.networks) if len(each) == 1 else each)
         own = zip(self.networks, *split, strict=True)
         return torch.stack([network(*seen) for network, *seen in own], dim=-2)

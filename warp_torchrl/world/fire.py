@@ -12,6 +12,7 @@ from typing import Literal
 import torch
 from torch import Tensor
 
+from warp_torchrl.world.flags import at_least, at_most, choose, clear, equal, number
 from warp_torchrl.world.kernel import alexandridis, ellipse, slope_factor
 from warp_torchrl.world.landscape import holds_trees
 from warp_torchrl.world.spread import Clipped, Law, ignition_chance
@@ -131,8 +132,8 @@ class Fire:
         law = self._law()
         return ignition_chance(
             law,
-            is_burning(state.cells) & (state.cells <= self.last_spreading),
-            law.susceptibility(state.alpha) * self.is_fuel(state),
+            is_burning(state.cells) & at_most(state.cells, self.last_spreading),
+            law.susceptibility(state.alpha) * number(self.is_fuel(state)),
             self.wind_factor(state.wind),
             state.slope,
             neighbours=self.neighbours,
@@ -154,7 +155,8 @@ class Fire:
         chance to ignite in the next tick.
         """
         q, expected = self.spread(state, expected=True)
-        return torch.where(is_burning(state.cells), (expected * 0.25).clamp_(max=1.0), self._join(state, q))
+        # A cell has one or the other: only burning cells are expected to ignite others, and they cannot ignite.
+        return (expected * 0.25).clamp_(max=1.0).add_(self._join(state, q))
 
     def _join(self, state: WorldState, spread: Tensor) -> Tensor:
         """Join the chance to be ignited by neighbours with that of spontaneous ignition."""
@@ -167,7 +169,7 @@ class Fire:
 
     def is_fuel(self, state: WorldState) -> Tensor:
         """Return which trees can ignite now: age >= A_min, dry; bool [B, H, W]."""
-        return is_tree(state.cells) & (state.cells >= self.youngest_fuel) & (state.wet == 0)
+        return is_tree(state.cells) & at_least(state.cells, self.youngest_fuel) & equal(state.wet, 0)
 
     def tick(self, state: WorldState, u: Tensor, due: Tensor) -> WorldState:
         """Advance the fire by one tick where it is due.
@@ -183,26 +185,26 @@ class Fire:
         Returns:
             The worlds after it, with new ``cells``, ``age``, ``burned``, ``wet`` and ``tick``.
         """
-        cells, due = state.cells, due[:, None, None]
+        cells, due = state.cells, due[:, None, None].expand_as(state.cells)
         burning = is_burning(cells) & due
         q = self.chance_to_ignite(state)
         ignite = (u < q) & due
         waited = None if state.stage_age is None else state.stage_age + burning
-        stage_ends = burning if waited is None else waited == self.ticks_per_stage
-        to_ash = stage_ends & (cells == EMBER)
+        stage_ends = burning if waited is None else equal(waited, self.ticks_per_stage)
+        to_ash = stage_ends & equal(cells, EMBER)
         after = cells + stage_ends
         if self.growth:
             after += (u >= 1.0 - (1.0 - q) * self._look_up(self._growth(), cells)) & due  # u < 1: none where p is 0
-        after = torch.where(ignite, FIRST_FIRE, after).masked_fill_(to_ash, 0)
+        after = clear(to_ash, choose(ignite, FIRST_FIRE, after))
         if self.p_regrow > 0.0:
-            bare = (cells == 0) & holds_trees(state.landscape.cover) & ~state.firebreak & due
+            bare = equal(cells, 0) & holds_trees(state.landscape.cover) & ~state.firebreak & due
             after += bare & (u < self._in_a_tick(self.p_regrow))
         return state.replace(
             cells=after,
-            age=torch.where(ignite, cells, state.age).masked_fill_(to_ash, 0),
-            stage_age=None if waited is None else waited.masked_fill_(ignite | stage_ends, 0),
+            age=clear(to_ash, choose(ignite, cells, state.age)),
+            stage_age=None if waited is None else clear(ignite | stage_ends, waited),
             burned=state.burned | to_ash,
-            wet=state.wet - ((state.wet > 0) & due).to(torch.uint8),
+            wet=state.wet - (at_least(state.wet, 1) & due).view(torch.uint8),
             tick=state.tick + due[:, 0, 0],
         )
 

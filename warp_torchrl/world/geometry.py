@@ -42,7 +42,8 @@ def chebyshev_distance(position: Tensor, mask: Tensor) -> Tensor:
     row_distance = (rows - place[..., :1]).abs_()[..., :, None]
     column_distance = (columns - place[..., 1:]).abs_()[..., None, :]
     distance = torch.maximum(row_distance, column_distance)
-    return distance.masked_fill_(~mask[:, None], FAR)
+    beyond = (~mask).view(torch.uint8).to(torch.int16) * FAR  # a maximum is many times faster than masked_fill
+    return torch.maximum(distance, beyond[:, None])
 
 
 def nearest(position: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:

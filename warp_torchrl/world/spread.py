@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import pad
 
+from warp_torchrl.world.flags import number
 from warp_torchrl.world.geometry import DIRECTIONS, DISTANCES
 
 LARGEST_ALPHA = 0.95
@@ -116,7 +117,8 @@ def ignition_chance(
     worlds, height, width = susceptible.shape
     margin = width + 2
     size = worlds * (height + 1) * (width + 1)
-    source = _in_a_row(spreading.to(torch.float32), margin)
+    burning = number(spreading)
+    source = _in_a_row(burning, margin)
     target = pad(susceptible, (0, 1, 0, 1)).view(worlds, -1)
     total, strength, spare = torch.zeros_like(target), torch.empty_like(target), torch.empty_like(target)
     sum_at_source = torch.zeros_like(source) if expected else None
@@ -128,7 +130,7 @@ def ignition_chance(
         if wind.shape[2:] == (1, 1):
             torch.mul(source[here].view_as(target), wind[:, direction, :, 0] * gain, out=strength)
         else:
-            strength = _in_a_row(spreading * wind[:, direction] * gain, margin)[here].view_as(target)
+            strength = _in_a_row(burning * wind[:, direction] * gain, margin)[here].view_as(target)
         strength.mul_(target)
         if slope is not None:
             strength *= slope[:, direction].reshape(worlds, -1)

@@ -5,9 +5,10 @@ Letters, everywhere: B worlds, A agents, H rows, W columns.
 
 from enum import IntEnum
 
-import torch
 from tensordict import tensorclass
 from torch import Tensor
+
+from warp_torchrl.world.flags import at_least, at_most, count
 
 
 class Cover(IntEnum):
@@ -145,13 +146,13 @@ class Transition:
 
 
 def is_burning(cells: Tensor) -> Tensor:
-    """Return which cells burn (codes 11..15), bool, shape of the input."""
-    return cells >= FIRST_FIRE
+    """Return which cells, uint8 codes, burn (11..15), bool, shape of the input."""
+    return at_least(cells, FIRST_FIRE)
 
 
 def is_tree(cells: Tensor) -> Tensor:
-    """Return which cells hold a tree that does not burn (codes 1..10), bool, shape of the input."""
-    return (cells - 1) < OLDEST  # uint8: code 0 wraps round to 255
+    """Return which cells, uint8 codes, hold a tree that does not burn (1..10), bool, shape of the input."""
+    return at_most(cells - 1, OLDEST - 1)  # uint8: code 0 wraps round to 255
 
 
 def count_trees(state: WorldState) -> Tally:
@@ -164,9 +165,6 @@ def count_trees(state: WorldState) -> Tally:
     burning = is_burning(state.cells)
     alive = state.initial & is_tree(state.cells) & ~state.burned
     unburned = state.initial & ~state.burned
-
-    def count(mask: Tensor) -> Tensor:
-        return mask.sum((1, 2), dtype=torch.int32)
 
     extinguished = count(alive & state.extinguished)
     return Tally(

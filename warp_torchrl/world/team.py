@@ -146,9 +146,10 @@ class Team:
         target = state.vehicles.position[:, :, None] + _offsets(state.cells.device) * roles.stride[:, None, None]
         inside = _inside(target, height, width)
         index = _flat_index(target, height, width)
-        blocked = (state.landscape.cover == Cover.LAKE) | is_burning(state.cells)
-        at_target = blocked.flatten(1).gather(1, index.flatten(1)).view_as(inside)
-        return inside & (~at_target | roles.flies[:, None])
+        index = index.flatten(1)
+        ground, cells = (plane.flatten(1).gather(1, index) for plane in (state.landscape.cover, state.cells))
+        blocked = ((ground == Cover.LAKE) | is_burning(cells)).view_as(inside)
+        return inside & (~blocked | roles.flies[:, None])
 
     def nearby_fire(self, state: WorldState, last_spreading: int) -> tuple[Tensor, Tensor]:
         """Return the fire that each agent would put out: the youngest of its 3 x 3 neighbourhood.

@@ -1,0 +1,43 @@
+"""Comparisons and choices on planes of bytes, at the speed of byte arithmetic.
+
+On CPUs a comparison that writes bool, ``where`` and ``masked_fill`` are many times slower than arithmetic on bytes: a
+comparison that writes its own type is vectorised, and a bool is a byte of 0 or 1.
+"""
+
+import torch
+from torch import Tensor
+
+
+def at_least(codes: Tensor, bound: int) -> Tensor:
+    """Return ``codes >= bound``, bool; codes are uint8."""
+    return torch.ge(codes, bound, out=torch.empty_like(codes)).view(torch.bool)
+
+
+def at_most(codes: Tensor, bound: int) -> Tensor:
+    """Return ``codes <= bound``, bool; codes are uint8."""
+    return torch.le(codes, bound, out=torch.empty_like(codes)).view(torch.bool)
+
+
+def equal(codes: Tensor, code: int) -> Tensor:
+    """Return ``codes == code``, bool; codes are uint8."""
+    return torch.eq(codes, code, out=torch.empty_like(codes)).view(torch.bool)
+
+
+def number(mask: Tensor) -> Tensor:
+    """Return a bool mask as 0 and 1, float32."""
+    return mask.view(torch.uint8).to(torch.float32)
+
+
+def choose(mask: Tensor, one: Tensor | int, other: Tensor) -> Tensor:
+    """Return ``where(mask, one, other)``, uint8, for a bool mask of the shape of ``other``."""
+    return (one - other).mul_(mask.view(torch.uint8)).add_(other)
+
+
+def clear(mask: Tensor, values: Tensor) -> Tensor:
+    """Return ``values`` with 0 where the bool mask is set, uint8; the mask has their shape."""
+    return values * (~mask).view(torch.uint8)
+
+
+def count(mask: Tensor) -> Tensor:
+    """Return how many cells of each world a bool mask [B, H, W] marks, int32 [B]."""
+    return mask.view(torch.uint8).sum((1, 2), dtype=torch.int32)
