@@ -31,6 +31,21 @@ def test_actor_and_critic_fit_every_preset(make_small_env, observation, central)
     assert Mlp().critic(shape, central)(now)[VALUE].shape == (3, 2, 1)
 
 
+@pytest.mark.parametrize("sharing", ["team", "role", "none"])
+def test_a_central_critic_sees_the_state_and_what_each_agent_sees(make_small_env, sharing):
+    env = make_small_env(3)
+    now = env.reset()
+    for central in (True, False):
+        critic = Mlp(sharing=sharing).critic(signature(env), central)
+        before = critic(now.clone())[VALUE]
+        other = now.clone()
+        other["state"] = other["state"] + 1.0
+        assert (critic(other)[VALUE] != before).all() if central else (critic(other)[VALUE] == before).all()
+        other = now.clone()
+        other[(*OBSERVATION, "self")][:, 1] += 1.0
+        assert (critic(other)[VALUE][:, 0] == before[:, 0]).all() and (critic(other)[VALUE][:, 1] != before[:, 1]).all()
+
+
 def test_an_actor_sees_only_its_own_observation(make_small_env):
     env = make_small_env(3)
     actor, now = Mlp().actor(signature(env)), env.reset()

@@ -15,7 +15,7 @@ from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import Cover, WorldState, count_trees, is_burning, is_tree
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.wind import Calm, Paper, Uniform, Wandering
-from warp_torchrl.world.world import World, advance
+from warp_torchrl.world.world import World, advance, advance_some
 
 from .drawing import differing, draw, drawn, planes
 
@@ -86,6 +86,15 @@ def run(world: World, state: WorldState, steps: int) -> WorldState:
 
 
 # The same world everywhere.
+
+
+def test_ticking_the_worlds_that_are_due_alone_changes_nothing(world: World) -> None:
+    state = run(world, start(world, range(8)), 5)
+    for due in ([True] * 8, [False] * 8, [index % 3 == 1 for index in range(8)]):
+        mask = torch.tensor(due)
+        assert not differing(
+            advance_some(state, world.fire, world.air, mask), advance(state, world.fire, world.air, mask)
+        )
 
 
 def test_a_world_alone_is_the_world_in_batches_of_7_and_64(world: World) -> None:

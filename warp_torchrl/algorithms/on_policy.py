@@ -33,7 +33,7 @@ class OnPolicy(Algorithm):
     """What PPO and A2C have in common.
 
     Attributes:
-        central_critic: Values from the whole state, or from each agent's observation.
+        central_critic: Values of the state and each agent's observation, or of the latter alone.
         lmbda: GAE's lambda.
         entropy_coeff: Weight of the entropy bonus at the start.
         entropy_coeff_end: At the end; it falls linearly.
