@@ -10,6 +10,7 @@ from warp_torchrl.observation import (
     Local,
     Paper,
     Surroundings,
+    block_means,
     central_state,
     crop,
     egocentric_view,
@@ -145,3 +146,11 @@ def test_what_lies_out_of_view_is_not_in_view_or_self(preset):
 def test_a_radius_out_of_range_is_refused(preset, radius):
     with pytest.raises(ValueError, match="radius must be in"):
         preset(radius=radius)
+
+
+@pytest.mark.parametrize("shape", [(16, 16), (32, 48), (64, 16), (20, 30), (12, 16)])
+def test_block_means_are_those_of_pooling(shape):
+    maps = torch.rand(3, 2, *shape)
+    for side in (8, 16):
+        if min(shape) >= side:
+            torch.testing.assert_close(block_means(maps, side), torch.nn.functional.adaptive_avg_pool2d(maps, side))

@@ -262,13 +262,33 @@ def _own_wind(state: WorldState) -> Tensor:
     return (own / WIND_SCALE).clamp(-3.0, 3.0)
 
 
+def block_means(maps: Tensor, side: int) -> Tensor:
+    """Return the means of maps over side x side blocks, float32 [B, C, side, side], of maps float32 [B, C, H, W].
+
+    Where the map divides into equal blocks they are sums of slices, which on CPUs is several times faster than pooling.
+    """
+    height, width = maps.shape[2:]
+    if height % side or width % side:
+        return adaptive_avg_pool2d(maps, side)
+    rows = maps.unflatten(2, (side, height // side)).unbind(3)
+    columns = _sum(rows).unflatten(3, (side, width // side)).unbind(4)
+    return _sum(columns) * (side * side / (height * width))
+
+
+def _sum(parts: tuple[Tensor, ...]) -> Tensor:
+    total = parts[0]
+    for part in parts[1:]:
+        total = total + part
+    return total
+
+
 def picture(state: WorldState) -> Tensor:
     """Return the state of the fire in 8 x 8 blocks of the map, float32 [B, A, 3, 8, 8]."""
     height, width = state.cells.shape[1:]
     position = state.vehicles.position
     shape = position.shape[:2]
     maps = torch.stack((number(is_burning(state.cells)), _fuel(state)), dim=1)
-    pooled = adaptive_avg_pool2d(maps, PICTURE_SIDE)
+    pooled = block_means(maps, PICTURE_SIDE)
     pooled[:, 0].sqrt_()
     block = (position[..., 0] * PICTURE_SIDE // height) * PICTURE_SIDE + position[..., 1] * PICTURE_SIDE // width
     place = one_hot(block, PICTURE_SIDE**2).to(torch.float32)
@@ -285,7 +305,7 @@ def central_state(state: WorldState, world: World) -> Tensor:
     maps = [number(is_burning(state.cells)), _fuel(state)]
     if elevation is not None:
         maps.append((elevation - elevation.mean((1, 2), keepdim=True)) / ELEVATION_SCALE)
-    pooled = adaptive_avg_pool2d(torch.stack(maps, dim=1), STATE_SIDE)
+    pooled = block_means(torch.stack(maps, dim=1), STATE_SIDE)
     position, role = state.vehicles.position, world.team.table(state.cells.device).index
     row, column = position[..., 0] * STATE_SIDE // height, position[..., 1] * STATE_SIDE // width
     index = (role * STATE_SIDE + row) * STATE_SIDE + column
