@@ -56,6 +56,15 @@ def test_the_environment_knows_no_learning():
 
 
 @pytest.mark.parametrize("module", MODULES)
+def test_adapters_are_views_that_nothing_needs(module):
+    if module.split("/")[0] == "adapters":
+        assert all(name.split("/")[0] in ("adapters", "api", "env") for name in ours(module)), "no physics in adapters"
+    else:
+        assert "adapters" not in {name.split("/")[0] for name in imports(module)}
+        assert "pettingzoo" not in {name.split("/")[0] for name in imports(module)}
+
+
+@pytest.mark.parametrize("module", MODULES)
 def test_hydra_appears_only_where_configuration_is_composed(module):
     if module not in ("config", "command", "sweep"):
         assert not {name.split("/")[0] for name in imports(module)} & {"hydra", "omegaconf"}

@@ -1,12 +1,26 @@
-"""A trained policy, as it is handed to users."""
+"""A trained policy, as it is handed to users: on TorchRL's tensordicts, and on the adapters' numpy observations."""
 
+from collections.abc import Iterable, Mapping
 from contextlib import nullcontext
+from typing import Any
 
-from tensordict import TensorDictBase
+import numpy as np
+import torch
+from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs.utils import exploration_type, set_exploration_type
 
 from warp_torchrl.evaluation import MODES
+from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, ROLE
+from warp_torchrl.models.networks import AgentNetworks, Network
+from warp_torchrl.observation import SELF_SIZE
+from warp_torchrl.world.state import Action
+from warp_torchrl.world.team import ROLE_NAMES, ROLES
+
+_ROLE_ENTRIES = slice(SELF_SIZE - len(Action) - len(ROLE_NAMES), SELF_SIZE - len(Action))  # of ``self``
+_ROLE_INDEX = {role.name: index for index, role in enumerate(ROLES.values())}
+
+AgentObservation = np.ndarray | Mapping[str, np.ndarray]
 
 
 class TrainedPolicy(TensorDictModuleBase):
@@ -27,3 +41,116 @@ class TrainedPolicy(TensorDictModuleBase):
         own = set_exploration_type(MODES[self.mode]) if exploration_type() is None else nullcontext()
         with own:
             return self.module(tensordict)
+
+    def numpy_policy(self) -> "NumpyPolicy":
+        """Return the policy as a function of the adapters' observations, ``act(observation, info)``."""
+        return NumpyPolicy(self)
+
+
+class NumpyPolicy:
+    """A trained policy on the numpy observations of ``warp_torchrl.adapters``.
+
+    It is decentralised: each agent's action comes from its own observation and mask. So one agent may ask alone, a
+    team together, a batch of worlds too; but a policy with a network for each agent (``sharing: none``) must be given
+    the whole team, in the order of ``possible_agents``. A policy with a network for each role (``sharing: role``)
+    reads an agent's role off its name (``bulldozer_0``) or, where it has none, off its ``self``.
+
+    Args:
+        policy: What acts, in its own mode; where it samples, it draws from torch's generator.
+    """
+
+    def __init__(self, policy: TrainedPolicy) -> None:
+        self._policy = policy
+        modules = list(policy.modules())
+        network = next(module for module in modules if isinstance(module, Network))
+        keys = [key for key in policy.in_keys if key[: len(OBSERVATION)] == OBSERVATION]
+        self._entries = {"".join(key[len(OBSERVATION) :]): entry for key, entry in zip(keys, network.encoder.entries)}
+        self._n_agents = next((len(each.networks) for each in modules if isinstance(each, AgentNetworks)), None)
+        self._by_role = ROLE in policy.in_keys
+        self._device = next(policy.parameters()).device
+
+    def __call__(
+        self, observation: AgentObservation | Mapping[str, AgentObservation], info: Mapping[str, Any] | None = None
+    ) -> int | np.ndarray | dict[str, int]:
+        """Choose actions.
+
+        Args:
+            observation: One agent's, as Gymnasium's adapters and each of PettingZoo's agents have it, or a dict of
+                agents' by name. Worlds may come first, [B, ...].
+            info: What came with it; needed in preset ``paper`` alone, whose mask is there.
+
+        Returns:
+            The agent's action, or a dict by agent's name; for a batch of worlds int64 [B] in place of a number.
+
+        Raises:
+            ValueError: If an entry is missing or of another shape or type than the policy was trained on, or the
+                policy needs the whole team or an agent's role and was not given it.
+        """
+        alone = self._is_of_one(observation)
+        team = {"": observation} if alone else observation
+        infos = {"": info or {}} if alone else (info or {})
+        if not team:
+            return {}
+        if self._n_agents not in (None, len(team)):
+            raise ValueError(
+                f"this policy has a network for each of {self._n_agents} agents: observations must be of all of them "
+                f"at once, got {len(team)}"
+            )
+        actions = self._act([self._of_agent(name, seen, infos.get(name, {})) for name, seen in team.items()])
+        numbers = [each if each.ndim else int(each) for each in actions]
+        return numbers[0] if alone else dict(zip(team, numbers))
+
+    def _is_of_one(self, observation: AgentObservation | Mapping[str, AgentObservation]) -> bool:
+        """Return whether an observation is one agent's and not a team's."""
+        if isinstance(observation, Mapping):
+            return bool(self._entries.keys() & observation.keys())
+        if "" not in self._entries:
+            raise ValueError(
+                f"observation must be a dict of {', '.join(self._entries)}, got {type(observation).__name__}"
+            )
+        return True
+
+    def _of_agent(self, name: str, seen: AgentObservation, info: Mapping[str, Any]) -> dict[Any, np.ndarray]:
+        """Return what the policy reads of one agent, by key."""
+        entries = {"": seen, **info} if "" in self._entries else {**info, **seen}
+        who = f" of {name}" if name else ""
+        missing = [entry for entry in ("action_mask", *self._entries) if entry not in entries]
+        if missing:
+            where = "info" if "" in self._entries else "observation"
+            raise ValueError(f"{where}{who} must have {', '.join(missing)}, got {', '.join(entries) or 'nothing'}")
+        mask = np.asarray(entries["action_mask"], dtype=bool)
+        read = {ACTION_MASK: mask}
+        for entry, (shape, dtype) in self._entries.items():
+            value, expected = np.asarray(entries[entry]), (*mask.shape[:-1], *shape)
+            if value.shape != expected or value.dtype != dtype:
+                rule = f"{entry or 'observation'}{who} must be {dtype} of shape {list(expected)}"
+                raise ValueError(f"{rule}, got {value.dtype} {list(value.shape)}")
+            read[(*OBSERVATION, entry) if entry else OBSERVATION] = value
+        if self._by_role:
+            read[ROLE] = np.full(mask.shape[:-1], _role(name, entries.get("self")))
+        return read
+
+    @torch.no_grad()
+    def _act(self, agents: list[dict[Any, np.ndarray]]) -> Iterable[np.ndarray]:
+        """Return each agent's actions, int64 [] or [B]."""
+        worlds = agents[0][ACTION_MASK].shape[:-1]
+        stacked = {key: np.stack([each[key] for each in agents], axis=len(worlds)) for key in agents[0]}
+        read = TensorDict({}, batch_size=worlds or (1,), device=self._device)
+        for key, value in stacked.items():
+            tensor = torch.from_numpy(value).to(self._device)
+            read.set(key, tensor if worlds else tensor[None])
+        action = self._policy(read)[ACTION].numpy(force=True)
+        return np.moveaxis(action if worlds else action[0], -1, 0)
+
+
+def _role(name: str, own: np.ndarray | None) -> int:
+    """Return the role's index that a name or an agent's ``self`` tells."""
+    kind = name.rpartition("_")[0]
+    if kind in _ROLE_INDEX:
+        return _ROLE_INDEX[kind]
+    if own is None:
+        raise ValueError(
+            f"this policy has a network for each role: observations must be in a dict by agent, such as "
+            f"{{'{next(iter(_ROLE_INDEX))}_0': ...}}, got {name or 'one without a name'}"
+        )
+    return int(np.asarray(own)[..., _ROLE_ENTRIES].reshape(-1, len(ROLE_NAMES))[0].argmax())

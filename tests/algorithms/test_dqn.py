@@ -167,8 +167,11 @@ def test_prioritised_replay_works_or_says_why_not(make_small_env):
     for sample in learner.samples():
         learner.loss(sample)["loss"].backward()
         learner.after_step(sample)
-    again = learner.buffer.sample()
-    assert again["td_error"].shape[0] == 16 and again["_weight"].std() > 0
+    twin = algorithm.build(env, SMALL, 32)
+    twin.keeps["replay"].load_state_dict(learner.keeps["replay"].state_dict())
+    ours, theirs = learner.buffer.sample(), twin.buffer.sample()
+    assert ours["priority_weight"].std() > 0 and torch.equal(ours["priority_weight"], theirs["priority_weight"])
+    assert torch.equal(ours["index"], theirs["index"])
 
 
 @pytest.mark.parametrize(

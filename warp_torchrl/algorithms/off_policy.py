@@ -24,6 +24,7 @@ from warp_torchrl.algorithms.algorithm import Algorithm, falling
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.models import ACTION, ACTION_MASK, REWARD, Mlp, Signature, signature
 
+_TREES = {"_sum_tree", "_min_tree"}  # where TorchRL's prioritised sampler keeps the priorities
 _ALPHA, _BETA = 0.6, 0.4  # Schaul et al., 2016, proportional prioritisation
 AGENT_KEYS = {"reward": REWARD, "done": ("agents", "done"), "terminated": ("agents", "terminated")}
 """Where TorchRL's losses find what each agent's values are learnt from; a team's end is each agent's."""
@@ -100,12 +101,12 @@ class OffPolicy(Algorithm):
 
         def samples() -> Iterator[TensorDictBase]:
             enough = len(memory) >= max(self.warm_up, self.minibatch_size)
-            return (memory.sample() for _ in range(self.updates if enough else 0))
+            return (weighted(memory.sample()) for _ in range(self.updates if enough else 0))
 
         def after_step(sample: TensorDictBase) -> None:
             targets.step()
             if self.replay == "prioritised":
-                memory.update_tensordict_priority(sample)
+                memory.update_tensordict_priority(sample.set("td_error", sample["td_error"].flatten(1).amax(dim=1)))
 
         def schedule(progress: float) -> dict[str, float]:
             return {"train/learning_rate": self.rate_at(progress, optimizer), **self.explore_at(progress, explore)}
@@ -131,8 +132,15 @@ class OffPolicy(Algorithm):
         storage = LazyTensorStorage(self.capacity, device=device)
         if self.replay == "uniform":
             return TensorDictReplayBuffer(storage=storage, batch_size=self.minibatch_size)
+        # A generator of its own: without one the sampler draws from NumPy's, which no seed of ours reaches.
+        generator = torch.Generator().manual_seed(int(torch.randint(2**31, ())))
         return TensorDictPrioritizedReplayBuffer(
-            alpha=_ALPHA, beta=_BETA, storage=storage, batch_size=self.minibatch_size, priority_key="td_error"
+            alpha=_ALPHA,
+            beta=_BETA,
+            storage=storage,
+            batch_size=self.minibatch_size,
+            priority_key="td_error",
+            generator=generator,
         )
 
     def targets(self, loss: LossModule) -> TargetNetUpdater:
@@ -208,6 +216,12 @@ class EpsilonGreedy(OffPolicy):
         return {"rollout/exploration_rate": epsilon}
 
 
+def weighted(sample: TensorDictBase) -> TensorDictBase:
+    """Give each agent its sample's weight of prioritised replay, as TorchRL's losses want them; others as they are."""
+    weight = sample.get("priority_weight", None)
+    return sample if weight is None else sample.set("priority_weight", weight[:, None].expand(sample["agents"].shape))
+
+
 @dataclass(frozen=True)
 class ReplayMemory:
     """A replay buffer as checkpoints keep it: what it holds, not the room that it has.
@@ -221,6 +235,10 @@ class ReplayMemory:
     def state_dict(self) -> dict[str, Any]:
         """Return the transitions, the batch sizes of their nested parts, and where the next one goes."""
         state = self.buffer.state_dict() | {"_storage": {}, "sizes": {}}
+        places = torch.arange(len(self.buffer))
+        for name in _TREES & state["_sampler"].keys():  # objects of the extension, which only pickle could write
+            tree = state["_sampler"][name]
+            state["_sampler"][name] = tree[places] if len(places) else torch.empty(0)
         if len(self.buffer):
             data = self.buffer[:]
             nested = [key for key in data.keys(True, False, sort=True) if is_tensor_collection(data.get(key))]
@@ -237,7 +255,14 @@ class ReplayMemory:
             for key, size in state_dict["sizes"].items():
                 data[tuple(key.split("."))].batch_size = size
             self.buffer.extend(data)
-        self.buffer.load_state_dict(state_dict | {"_storage": self.buffer.state_dict()["_storage"]})
+        now = self.buffer.state_dict()
+        sampler = dict(state_dict["_sampler"])
+        for name in _TREES & sampler.keys():
+            tree = now["_sampler"][name]
+            if len(sampler[name]):
+                tree[torch.arange(len(sampler[name]))] = sampler[name]
+            sampler[name] = tree
+        self.buffer.load_state_dict(state_dict | {"_storage": now["_storage"], "_sampler": sampler})
 
 
 def check_prioritised() -> None:

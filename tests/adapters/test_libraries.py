@@ -1,0 +1,76 @@
+"""Other libraries on the views."""
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.spaces import Box, Dict, flatten, flatten_space
+from torchrl.envs import PettingZooWrapper
+from torchrl.envs.utils import check_env_specs
+
+from warp_torchrl.adapters import gym_env, parallel_env
+
+TINY_PPO = {"n_steps": 16, "batch_size": 16, "n_epochs": 1, "device": "cpu"}
+
+
+@pytest.mark.parametrize(("scenario", "observation"), [("hetero", "surroundings"), ("skirmish", "paper")])
+def test_torchrl_reads_it_back(scenario, observation):
+    env = PettingZooWrapper(parallel_env(scenario, horizon=4, observation=observation), return_state=True)
+    check_env_specs(env)
+    rollout = env.rollout(6, break_when_any_done=False)
+    assert rollout["next", "done"].sum() == 1 and rollout["next", "state"].shape == (6, 9, 16, 16)
+    assert rollout["bulldozer", "action_mask"].shape[-1] == 11 and (rollout["bulldozer", "info", "saved"] > 0).all()
+
+
+def test_supersuit_and_stable_baselines3_train_a_team():
+    supersuit = pytest.importorskip("supersuit")
+    sb3 = pytest.importorskip("stable_baselines3")
+    env = supersuit.pad_action_space_v0(supersuit.pad_observations_v0(parallel_env("paper_marl", seed=None)))
+    env = supersuit.frame_stack_v1(supersuit.flatten_v0(env), 2)
+    worlds = supersuit.concat_vec_envs_v1(
+        supersuit.pettingzoo_env_to_vec_env_v1(env), 2, num_cpus=1, base_class="stable_baselines3"
+    )
+    learner = sb3.PPO("MlpPolicy", worlds, **TINY_PPO).learn(128)
+    actions, _ = learner.predict(worlds.reset())
+    assert learner.num_timesteps >= 128 and actions.shape == (2 * env.max_num_agents,)
+
+
+def test_supersuit_flattens_a_dict():
+    supersuit = pytest.importorskip("supersuit")
+    env = supersuit.observation_lambda_v0(
+        parallel_env("hetero", horizon=4), lambda seen, space: flatten(space, seen), flatten_space
+    )
+    seen, _ = env.reset()
+    assert all(seen[name] in env.observation_space(name) and seen[name].ndim == 1 for name in seen)
+
+
+@pytest.mark.filterwarnings("ignore:.*image", "ignore:.*spaces")
+@pytest.mark.parametrize("observation", ["surroundings", "paper"])
+def test_stable_baselines3_finds_its_interface_kept(observation):
+    pytest.importorskip("stable_baselines3")
+    from stable_baselines3.common.env_checker import check_env
+
+    check_env(gym_env(horizon=12, observation=observation))
+
+
+def test_stable_baselines3_trains_one_agent():
+    sb3 = pytest.importorskip("stable_baselines3")
+    env = gymnasium.wrappers.FlattenObservation(gymnasium.make("Wildfire-v0", horizon=20))
+    assert sb3.DQN("MlpPolicy", env, learning_starts=10, buffer_size=100, device="cpu").learn(20).num_timesteps == 20
+    learner = sb3.PPO("MultiInputPolicy", with_flat_view(gym_env(horizon=20)), **TINY_PPO).learn(16)
+    assert learner.num_timesteps == 16
+
+
+def with_flat_view(env):
+    """Keep SB3 from taking the view for a photograph: its network for those needs 36 x 36 pixels."""
+    view = env.observation_space["view"]
+    flat = Dict({**env.observation_space.spaces, "view": Box(0, 255, (int(np.prod(view.shape)),), np.uint8)})
+    return gymnasium.wrappers.TransformObservation(env, lambda seen: {**seen, "view": seen["view"].ravel()}, flat)
+
+
+def test_stable_baselines3_contrib_masks_actions():
+    contrib = pytest.importorskip("sb3_contrib")
+    env = gymnasium.wrappers.FlattenObservation(gym_env(horizon=20))
+    learner = contrib.MaskablePPO("MlpPolicy", env, **TINY_PPO).learn(16)
+    seen, _ = env.reset(seed=0)
+    action, _ = learner.predict(seen, action_masks=env.unwrapped.action_masks())
+    assert env.unwrapped.action_masks()[action]

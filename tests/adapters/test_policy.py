@@ -1,0 +1,98 @@
+"""Trained policies on the views' numpy observations."""
+
+import numpy as np
+import pytest
+import torch
+from tensordict import TensorDict
+
+from warp_torchrl import make_env
+from warp_torchrl.adapters import FireExtinguishingVectorEnv, gym_env, parallel_env
+from warp_torchrl.algorithms.dqn import Dqn
+from warp_torchrl.algorithms.ppo import Ppo
+from warp_torchrl.models import Cnn, Mlp, signature
+from warp_torchrl.policy import TrainedPolicy
+
+
+def policy_for(scenario, model=None, algorithm=None, **options):
+    env = make_env(scenario, n_worlds=1, seed=3, overrides=[f"{name}={value}" for name, value in options.items()])
+    torch.manual_seed(1)
+    module = (algorithm or Ppo()).policy(signature(env), model or Mlp(actor_hidden=(32,)))
+    return env, TrainedPolicy(module.requires_grad_(False).eval(), "deterministic")
+
+
+@pytest.mark.parametrize("observation", ["surroundings", "paper"])
+@pytest.mark.parametrize("sharing", ["team", "role", "none"])
+def test_a_team_acts_as_it_does_in_torchrl(sharing, observation):
+    model = Mlp(actor_hidden=(32,), sharing=sharing)
+    ours, policy = policy_for("hetero", model, observation=observation)
+    theirs, act = parallel_env("hetero", seed=3, observation=observation), policy.numpy_policy()
+    now, (seen, infos) = ours.reset(), theirs.reset()
+    chosen = []
+    for _ in range(4):
+        expected, actions = policy(now)["agents", "action"], act(seen, infos)
+        assert list(actions.values()) == expected[0].tolist()
+        assert list(actions) == theirs.agents and all(type(action) is int for action in actions.values())
+        now = ours.step(TensorDict({"agents": {"action": expected}}, batch_size=[1]))["next"]
+        seen, _, _, _, infos = theirs.step(actions)
+        chosen += actions.values()
+    assert len(set(chosen)) > 1
+
+
+@pytest.mark.parametrize("algorithm", [Ppo(), Dqn()], ids=lambda each: type(each).__name__)
+@pytest.mark.parametrize("sharing", ["team", "role"])
+def test_an_agent_may_ask_alone(sharing, algorithm):
+    _, policy = policy_for("hetero", Cnn(actor_hidden=(32,), sharing=sharing), algorithm)
+    env, act = parallel_env("hetero", seed=3), policy.numpy_policy()
+    seen, infos = env.reset()
+    together = act(seen, infos)
+    assert {name: act(seen[name], infos[name]) for name in seen} == together
+    assert {name: act({name: seen[name]})[name] for name in seen} == together
+
+
+@pytest.mark.parametrize("observation", ["surroundings", "paper"])
+def test_gymnasium_s_views_take_it_too(observation):
+    _, policy = policy_for("single", observation=observation)
+    act = policy.numpy_policy()
+    one, many = gym_env(seed=8, observation=observation), FireExtinguishingVectorEnv(3, observation=observation)
+    action = act(*one.reset())
+    actions = act(*many.reset(seed=7))
+    assert type(action) is int and actions.dtype == np.int64 and actions.shape == (3,) and actions[1] == action
+    one.step(action), many.step(actions)
+
+
+def test_nobody_acts_after_the_end():
+    _, policy = policy_for("skirmish")
+    assert policy.numpy_policy()({}) == {}
+
+
+def test_masked_actions_are_never_chosen():
+    _, policy = policy_for("single")
+    seen, _ = gym_env(seed=0).reset()
+    for action in range(11):
+        mask = np.zeros(11, np.int8)
+        mask[action] = 1
+        assert policy.numpy_policy()({**seen, "action_mask": mask}) == action
+
+
+def test_mistakes_are_told_in_one_line():
+    _, policy = policy_for("hetero")
+    _, of_paper = policy_for("hetero", Mlp(actor_hidden=(32,), sharing="role"), observation="paper")
+    _, by_agent = policy_for("hetero", Mlp(actor_hidden=(32,), sharing="none"))
+    seen, _ = parallel_env("hetero").reset()
+    flat, infos = parallel_env("hetero", observation="paper").reset()
+    one = seen["uav_0"]
+    for call, message in [
+        (lambda: policy.numpy_policy()({"view": one["view"]}), "must have action_mask, picture, self, got view"),
+        (
+            lambda: policy.numpy_policy()({**one, "self": one["self"][:5]}),
+            r"self must be float32 of shape \[22\], got .* \[5\]",
+        ),
+        (lambda: policy.numpy_policy()({**one, "view": one["view"] / 255}), "view must be uint8 of shape .* float64"),
+        (lambda: policy.numpy_policy()(flat["uav_0"]), "observation must be a dict of picture, self, view"),
+        (lambda: of_paper.numpy_policy()(flat), "info of .* must have action_mask"),
+        (lambda: of_paper.numpy_policy()(flat["uav_0"], infos["uav_0"]), "a network for each role"),
+        (lambda: by_agent.numpy_policy()(one), "a network for each of .* agents: .* got 1"),
+    ]:
+        with pytest.raises(ValueError, match=message) as error:
+            call()
+        assert "\n" not in str(error.value)

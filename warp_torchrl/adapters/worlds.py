@@ -1,0 +1,227 @@
+"""A ``WildfireEnv`` seen through numpy: what every adapter holds."""
+
+import json
+import operator
+import secrets
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from tensordict import TensorDict, TensorDictBase
+
+from warp_torchrl.api import make_env
+from warp_torchrl.env import WildfireEnv
+
+
+class Seen(NamedTuple):
+    """What a reset or a step shows, as numpy; A agents in each of B worlds."""
+
+    observation: dict[str, np.ndarray]  # [B, A, ...] each; "" where the observation is one array
+    action_mask: np.ndarray  # int8 [B, A, actions]
+    reward: np.ndarray  # float32 [B, A], zeros after a reset
+    terminated: np.ndarray  # bool [B]
+    truncated: np.ndarray  # bool [B]
+    info: dict[str, np.ndarray]  # float64 [B] each
+
+    def of_agent(self, world: int | slice, agent: int) -> np.ndarray | dict[str, np.ndarray]:
+        """Return one agent's observation, as its space has it."""
+        if "" in self.observation:
+            return self.observation[""][world, agent]
+        entries = {name: value[world, agent] for name, value in self.observation.items()}
+        return {**entries, "action_mask": self.action_mask[world, agent]}
+
+    def info_of_agent(self, world: int | slice, agent: int) -> dict[str, np.ndarray]:
+        """Return the world's metrics, and the agent's mask where its observation has none.
+
+        It is never in both: TorchRL's ``PettingZooWrapper`` then fails.
+        """
+        info = {name: value[world] for name, value in self.info.items()}
+        return {**info, "action_mask": self.action_mask[world, agent]} if "" in self.observation else info
+
+
+class Worlds:
+    """One environment made by ``make_env``, in and out as numpy, and whether its worlds may be stepped.
+
+    Args:
+        scenario: One of ``conf/scenario``.
+        n_worlds: B.
+        seed: World i draws with ``seed + i``; None draws a seed at the first reset.
+        device: Where the worlds live.
+        overrides: In the command line's grammar.
+        more: Further overrides by name.
+
+    Raises:
+        ConfigError: A ``ValueError``, with key, value and rule.
+        ValueError: If the seed is not a whole number in 0..2**62.
+    """
+
+    def __init__(
+        self,
+        scenario: str,
+        *,
+        n_worlds: int,
+        seed: int | None,
+        device: torch.device | str,
+        overrides: Sequence[str],
+        more: Mapping[str, object],
+    ) -> None:
+        named = [f"{name}={written(name, value)}" for name, value in more.items()]
+        first = 0 if seed is None else whole_number("seed", seed)
+        self.env = make_env(
+            scenario, n_worlds=n_worlds, device=device, seed=first, overrides=[*overrides, *named], validate=False
+        )
+        self._seeded = seed is not None
+        self._now: TensorDictBase | None = None
+
+    @property
+    def n_actions(self) -> int:
+        """Return how many actions an agent has."""
+        return self.env.world.team.n_actions
+
+    @property
+    def now(self) -> TensorDictBase:
+        """Return what the environment last gave.
+
+        Raises:
+            RuntimeError: Before the first reset.
+        """
+        if self._now is None:
+            raise RuntimeError("the environment has no state yet: call reset() first")
+        return self._now
+
+    @property
+    def ended(self) -> np.ndarray:
+        """Return which worlds have ended, bool [B].
+
+        Raises:
+            RuntimeError: Before the first reset.
+        """
+        return self.now["done"][:, 0].numpy(force=True)
+
+    def reset(self, seed: int | Sequence[int] | None = None) -> Seen:
+        """Start episode 0 of the seeds given, world i's being ``seed + i``; without, the next episode of each world.
+
+        Raises:
+            ValueError: If a seed is not a whole number in 0..2**62, or there are not as many as worlds.
+        """
+        n_worlds = self.env.batch_size[0]
+        if seed is None and not self._seeded:
+            seed = 2**31 + secrets.randbelow(2**31)  # the seeds below are for training and evaluation
+        if isinstance(seed, (list, tuple, np.ndarray)):
+            self.env._set_seeds([whole_number("seed", each) for each in seed])
+        elif seed is not None:
+            first = whole_number("seed", seed)
+            self.env._set_seeds(range(first, first + n_worlds))
+        self._seeded = True
+        self._now = self.env.reset()
+        return self._seen(np.zeros((n_worlds, self.env.n_agents), np.float32))
+
+    def step(self, action: np.ndarray) -> Seen:
+        """Advance every world by one step; a finished one stays as it is, with reward 0.
+
+        Args:
+            action: int64 [B, A], checked.
+        """
+        given = torch.from_numpy(action).to(self.env.device)
+        self._now = self.env.step(TensorDict({"agents": {"action": given}}, batch_size=self.env.batch_size))["next"]
+        return self._seen(self.now["agents", "reward"][..., 0].numpy(force=True))
+
+    def restart(self, which: np.ndarray, reward: np.ndarray) -> Seen:
+        """Start the next episode in some worlds.
+
+        Args:
+            which: bool [B].
+            reward: float32 [B, A], of the step before.
+        """
+        asked = torch.from_numpy(which).to(self.env.device)[:, None]
+        self._now = self.env.reset(self.now.exclude(("agents", "reward")).set("_reset", asked))
+        return self._seen(reward)
+
+    def state(self) -> np.ndarray:
+        """Return the central state, float32 [B, C, 16, 16]."""
+        return self.now["state"].numpy(force=True).copy()
+
+    def frames(self) -> np.ndarray:
+        """Return pictures, uint8 [B, H * s, W * s, 3]."""
+        return self.env.render().numpy(force=True)
+
+    def picture(self) -> np.ndarray:
+        """Return the picture of world 0, uint8 [H * s, W * s, 3]."""
+        return self.frames()[0]
+
+    def _seen(self, reward: np.ndarray) -> Seen:
+        agents, info = self.now["agents"], self.now["info"]
+        seen = agents["observation"]
+        named = {"": seen} if isinstance(seen, torch.Tensor) else dict(seen.items())
+        rows = torch.cat(list(info.values()), dim=-1).to(torch.float64).T.numpy(force=True)
+        return Seen(
+            observation={name: value.numpy(force=True) for name, value in named.items()},
+            action_mask=agents["action_mask"].to(torch.int8).numpy(force=True),
+            reward=reward,
+            terminated=self.now["terminated"][:, 0].numpy(force=True),
+            truncated=self.now["truncated"][:, 0].numpy(force=True),
+            info=dict(zip(info.keys(), rows)),
+        )
+
+
+def observation_space(env: WildfireEnv) -> spaces.Box | spaces.Dict:
+    """Return the space of one agent's observation: one Box in preset ``paper``, else a flat Dict with its mask."""
+    named = env.observation.spaces(env.world)
+    boxes = {name: _box(space.low, space.high, space.shape, space.dtype) for name, space in named.items()}
+    if "" in boxes:
+        return boxes[""]
+    return spaces.Dict({**boxes, "action_mask": _box(0, 1, (env.world.team.n_actions,), torch.int8)})
+
+
+def state_space(env: WildfireEnv) -> spaces.Box:
+    """Return the space of a world's central state."""
+    spec = env.full_observation_spec_unbatched["state"]
+    return _box(float(spec.space.low.min()), float(spec.space.high.max()), tuple(spec.shape), spec.dtype)
+
+
+def _box(low: float, high: float, shape: tuple[int, ...], dtype: torch.dtype) -> spaces.Box:
+    return spaces.Box(low, high, shape, torch.empty(0, dtype=dtype).numpy().dtype.type)
+
+
+def action_number(name: str, action: object, n_actions: int) -> int:
+    """Return a given action as a number.
+
+    Raises:
+        ValueError: If it is not a whole number, or not one of the actions.
+    """
+    number = whole_number(name, action)
+    if not 0 <= number < n_actions:
+        raise ValueError(f"{name} must be in 0..{n_actions - 1}, got {number}")
+    return number
+
+
+def whole_number(name: str, value: Any) -> int:
+    """Return a given whole number, of Python, numpy or torch, as Python's.
+
+    Raises:
+        ValueError: If it is none; true and false are none.
+    """
+    try:
+        if isinstance(value, bool):
+            raise TypeError
+        return operator.index(value)
+    except TypeError:
+        given = " ".join(repr(value).split())
+        raise ValueError(f"{name} must be a whole number, got {given} ({type(value).__name__})") from None
+
+
+def written(name: str, value: object) -> str:
+    """Return an override's value in the command line's grammar.
+
+    Raises:
+        ValueError: If it is not a text, a number, true, false, none or a list of those.
+    """
+    try:
+        text = value if isinstance(value, str) else json.dumps(value)
+    except (TypeError, ValueError):
+        text = None
+    if text is None or isinstance(value, dict):
+        raise ValueError(f"{name} must be a text, a number or a list, got {type(value).__name__}")
+    return text
