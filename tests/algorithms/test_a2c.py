@@ -29,6 +29,17 @@ def test_the_terms_are_those_of_the_textbook(make_small_env, central):
     torch.testing.assert_close(terms["loss_critic"], 0.5 * (value - data[VALUE_TARGET]).square().mean())
 
 
+def test_an_entropy_bonus_of_nought_may_still_rise(make_small_env):
+    env = make_small_env(4)
+    learner = A2c(entropy_coeff=0.0, entropy_coeff_end=0.02).build(env, SMALL, 32)
+    with torch.no_grad():
+        learner.store(env.rollout(8, learner.explore, break_when_any_done=False))
+    (sample,) = learner.samples()
+    assert learner.loss(sample)["loss_entropy"] == 0.0
+    learner.schedule(1.0)
+    assert learner.loss(sample)["loss_entropy"] < 0.0
+
+
 def test_a_batch_is_seen_once(make_small_env):
     env = make_small_env(4)
     learner = A2c().build(env, SMALL, 32)

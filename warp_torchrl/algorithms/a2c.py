@@ -24,10 +24,11 @@ class A2c(OnPolicy):
         loss = A2CLoss(
             policy,
             critic,
-            entropy_coeff=self.entropy_coeff,
+            entropy_coeff=self.entropy_coeff or 1.0,  # at 0 TorchRL would leave the term out for good
             critic_coeff=self.critic_coeff,
             loss_critic_type="l2",
         )
+        loss.entropy_coeff.fill_(self.entropy_coeff)
         loss.set_keys(**KEYS)
         loss.make_value_estimator(ValueEstimators.MAGAE, gamma=self.gamma, lmbda=self.lmbda)
         return loss
