@@ -1,6 +1,7 @@
 """The floors: what may import what."""
 
 import ast
+import sys
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,8 @@ FILES = {
     for path in PACKAGE.rglob("*.py")
 }
 MODULES = sorted(FILES)
+GROUND = ("validation",)
+"""What knows nothing of ours and every floor may use."""
 READS_STATE = [
     each for each in MODULES if each.split("/")[0] in ("observation", "reward", "metrics", "render", "behaviour")
 ]
@@ -33,21 +36,27 @@ def ours(module: str) -> set[str]:
 
 @pytest.mark.parametrize("module", [name for name in MODULES if name.startswith("world/")])
 def test_the_world_knows_torch_and_itself(module):
-    assert all(name.startswith("world/") for name in ours(module))
+    assert all(name.startswith("world/") or name in GROUND for name in ours(module))
     foreign = {name.split("/")[0] for name in imports(module)}
     assert not foreign & {"torchrl", "hydra", "omegaconf", "gymnasium", "pettingzoo", "wandb"}
+
+
+@pytest.mark.parametrize("module", GROUND)
+def test_the_ground_floor_knows_the_standard_library_alone(module):
+    assert not ours(module)
+    assert {name.split("/")[0] for name in imports(module)} <= sys.stdlib_module_names
 
 
 @pytest.mark.parametrize("module", READS_STATE)
 def test_what_reads_the_state_knows_only_the_world(module):
     own = module.split("/")[0]
-    assert all(name.split("/")[0] in ("world", own) for name in ours(module))
+    assert all(name.split("/")[0] in ("world", own, *GROUND) for name in ours(module))
     assert "torchrl" not in {name.split("/")[0] for name in imports(module)}
 
 
 @pytest.mark.parametrize("module", [name for name in MODULES if name.split("/")[0] in ("models", "algorithms")])
 def test_learning_knows_specs_and_not_the_world(module):
-    assert all(name.split("/")[0] in ("models", "algorithms") for name in ours(module))
+    assert all(name.split("/")[0] in ("models", "algorithms", *GROUND) for name in ours(module))
 
 
 def test_the_environment_knows_no_learning():

@@ -11,10 +11,10 @@ import torch
 from torch import Tensor
 from torch.nn.functional import adaptive_avg_pool2d, one_hot, pad
 
+from warp_torchrl.validation import check_fields
 from warp_torchrl.world.flags import equal, number
 from warp_torchrl.world.state import FIRST_FIRE, Action, WorldState, is_burning, is_tree
 from warp_torchrl.world.team import ROLE_NAMES
-from warp_torchrl.world.validation import check_fields
 from warp_torchrl.world.world import World
 
 CHANNELS = (

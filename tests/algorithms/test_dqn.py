@@ -176,7 +176,17 @@ def test_prioritised_replay_works_or_says_why_not(make_small_env):
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("gamma", 1.1), ("epsilon_end", 1.5), ("tau", 0.0), ("capacity", 0), ("minibatch_size", 0), ("warm_up", 10**6)],
+    [
+        ("gamma", 1.1),
+        ("epsilon_end", 1.5),
+        ("tau", 0.0),
+        ("capacity", 0),
+        ("capacity", 1e4),
+        ("minibatch_size", 0),
+        ("warm_up", 10**6),
+        ("mixer", "sum"),
+        ("replay", "ranked"),
+    ],
 )
 def test_values_out_of_range_are_refused(field, value):
     with pytest.raises(ValueError, match=f"{field} must be"):

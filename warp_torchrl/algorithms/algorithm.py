@@ -1,11 +1,12 @@
 """What all algorithms share: their numbers' ranges, the decentralised actor, and the falling learning rate."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import torch
 from torchrl.modules import MaskedCategorical, ProbabilisticActor
 
 from warp_torchrl.models import ACTION, ACTION_MASK, LOG_PROB, LOGITS, Mlp, Signature
+from warp_torchrl.validation import check_fields
 
 _RANGES = {
     "gamma": (0.0, 1.0),
@@ -38,15 +39,8 @@ class Algorithm:
         self.check()
 
     def check(self, **ranges: tuple[float, float]) -> None:
-        """Check the numbers against their ranges, and further fields against ``ranges``."""
-        allowed = _RANGES | ranges
-        for field in fields(self):
-            if (
-                field.name in allowed
-                and not allowed[field.name][0] <= getattr(self, field.name) <= allowed[field.name][1]
-            ):
-                low, high = allowed[field.name]
-                raise ValueError(f"{field.name} must be in [{low:g}, {high:g}], got {getattr(self, field.name)}")
+        """Check the fields' choices and kinds, their ranges, and those of further fields in ``ranges``."""
+        check_fields(self, **_RANGES, **ranges)
 
     def check_batch(self, frames_per_batch: int) -> None:
         """Check that batches of so many world steps can be learnt from.

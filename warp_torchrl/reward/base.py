@@ -5,10 +5,10 @@ from typing import Literal
 
 from torch import Tensor
 
+from warp_torchrl.validation import check_fields
 from warp_torchrl.world.front import exposure
 from warp_torchrl.world.geometry import chebyshev_distance
 from warp_torchrl.world.state import Transition, WorldState, is_burning
-from warp_torchrl.world.validation import check_fields
 
 
 @dataclass(frozen=True, kw_only=True)

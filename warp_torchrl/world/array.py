@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from torch import Tensor
 
+from warp_torchrl.validation import check_fields
 from warp_torchrl.world.crop import Crop
 from warp_torchrl.world.landscape import map_size
 from warp_torchrl.world.layer import LARGEST_MAP
 from warp_torchrl.world.state import OLDEST, Cover, Landscape
-from warp_torchrl.world.validation import check_fields
 
 LAYERS = {"cover": np.uint8, "elevation": np.float32, "age": np.uint8, "assets": np.float32}
 """The arrays of a landscape, and the type that each is kept in."""

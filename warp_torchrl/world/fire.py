@@ -12,12 +12,12 @@ from typing import Literal
 import torch
 from torch import Tensor
 
+from warp_torchrl.validation import check_fields
 from warp_torchrl.world.flags import at_least, at_most, choose, clear, equal, number
 from warp_torchrl.world.kernel import alexandridis, ellipse, slope_factor
 from warp_torchrl.world.landscape import holds_trees
 from warp_torchrl.world.spread import Clipped, Law, ignition_chance
 from warp_torchrl.world.state import EMBER, FIRST_FIRE, OLDEST, WorldState, is_burning, is_tree
-from warp_torchrl.world.validation import check_fields
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
+from warp_torchrl.validation import check_fields
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.spread import Hazard, Law
-from warp_torchrl.world.validation import check_fields
 
 
 @dataclass(frozen=True, kw_only=True)

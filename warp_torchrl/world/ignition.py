@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from warp_torchrl.validation import check_fields
 from warp_torchrl.world.geometry import grow
 from warp_torchrl.world.random import Stream, uniform
-from warp_torchrl.world.validation import check_fields
 
 
 @dataclass(frozen=True, kw_only=True)

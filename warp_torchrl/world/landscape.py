@@ -11,10 +11,10 @@ from typing import Literal, Protocol, runtime_checkable
 import torch
 from torch import Tensor
 
+from warp_torchrl.validation import check_fields
 from warp_torchrl.world.perlin import fractal_noise
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import OLDEST, Cover, Landscape
-from warp_torchrl.world.validation import check_fields
 
 LARGEST_SIDE = 4096
 """Longest side of a simulated map [cells]."""

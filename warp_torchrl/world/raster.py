@@ -9,13 +9,13 @@ from typing import Literal
 import numpy as np
 from torch import Tensor
 
+from warp_torchrl.validation import check_fields
 from warp_torchrl.world.crop import DRAWN, Crop
 from warp_torchrl.world.fuel import code_table, to_cover
 from warp_torchrl.world.grid import Grid, check_grid
 from warp_torchrl.world.landscape import map_size
 from warp_torchrl.world.layer import find_layer, read_grid, read_layer, regrid, resample_layer
 from warp_torchrl.world.state import OLDEST, Cover, Landscape
-from warp_torchrl.world.validation import check_fields
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,6 +7,7 @@ from typing import Literal, NamedTuple
 import torch
 from torch import Tensor
 
+from warp_torchrl.validation import check_fields
 from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import (
@@ -19,7 +20,6 @@ from warp_torchrl.world.state import (
     is_burning,
     is_tree,
 )
-from warp_torchrl.world.validation import check_fields
 
 _NEIGHBOURHOOD = ((0, 0), (-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1))
 

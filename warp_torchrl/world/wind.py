@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from warp_torchrl.validation import check_fields
 from warp_torchrl.world.landscape import LandscapeSource
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import WorldState
-from warp_torchrl.world.validation import check_fields
 
 _FASTEST = 60.0  # m/s
 

@@ -6,6 +6,7 @@ from functools import cached_property
 import torch
 from torch import Tensor
 
+from warp_torchrl.validation import check_fields
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.ignition import Ignition
 from warp_torchrl.world.landscape import LandscapeSource, Perlin, map_size
@@ -22,7 +23,6 @@ from warp_torchrl.world.state import (
     count_trees,
 )
 from warp_torchrl.world.team import Team
-from warp_torchrl.world.validation import check_fields
 from warp_torchrl.world.wind import Uniform, Wind
 
 
