@@ -1,7 +1,6 @@
 """Teams of autonomous vehicles that learn to fight wildfires, as a TorchRL environment."""
 
 import os
-from importlib.util import find_spec
 
 # GNU OpenMP's waiting threads spin for milliseconds by default: beside any other load on the machine a step of small
 # tensors was seen to take 30 times as long. A short spin costs next to nothing on a free machine and keeps most of the
@@ -9,18 +8,17 @@ from importlib.util import find_spec
 if "OMP_WAIT_POLICY" not in os.environ:
     os.environ.setdefault("GOMP_SPINCOUNT", "1000")
 
+import gymnasium
+
 from warp_torchrl.api import load_policy, make_env
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.simulation import fire_history, simulate
 
-if find_spec("gymnasium") is not None:
-    import gymnasium
-
-    gymnasium.register(
-        "Wildfire-v0",
-        entry_point="warp_torchrl.adapters:FireExtinguishingEnv",
-        vector_entry_point="warp_torchrl.adapters:FireExtinguishingVectorEnv",
-    )
+gymnasium.register(
+    "Wildfire-v0",
+    entry_point="warp_torchrl.adapters:FireExtinguishingEnv",
+    vector_entry_point="warp_torchrl.adapters:FireExtinguishingVectorEnv",
+)
 
 __version__ = "0.1.0"
 __all__ = ["WildfireEnv", "__version__", "fire_history", "load_policy", "make_env", "simulate"]

@@ -71,7 +71,7 @@ class WildfireEnv(EnvBase):
         self.watcher: Callable[[Transition], None] | None = None
         """Is shown every step's transition, for those who study behaviour."""
         self._episode_reward = torch.zeros(n_worlds, device=self.device)
-        self._set_seeds(range(seed, seed + n_worlds) if seeds is None else seeds)
+        self.set_seeds(range(seed, seed + n_worlds) if seeds is None else seeds)
         self._make_specs()
 
     # What users ask for
@@ -95,6 +95,22 @@ class WildfireEnv(EnvBase):
     def render(self, scale: int = 12) -> Tensor:
         """Draw the worlds, uint8 [B, H * scale, W * scale, 3]."""
         return render(self.world_state, self.world.team.table(self.device).index, scale)
+
+    def set_seeds(self, seeds: Sequence[int]) -> None:
+        """Give each world a seed of its own, in force from the next reset; their episodes count from 0 again.
+
+        Args:
+            seeds: One a world, in 0..2^62.
+
+        Raises:
+            ValueError: If their number or a seed's range is wrong.
+        """
+        if len(seeds) != self.batch_size[0]:
+            raise ValueError(f"seeds must be {self.batch_size[0]} numbers, one a world, got {len(seeds)}")
+        if not all(0 <= seed < 2**62 for seed in seeds):
+            raise ValueError(f"seed must be in 0..2**62, got {min(seeds)}..{max(seeds)}")
+        self._seeds = torch.tensor(list(seeds), dtype=torch.int64, device=self.device)
+        self._episodes = torch.zeros_like(self._seeds)
 
     def set_state(self, state: WorldState) -> TensorDictBase:
         """Go on from given worlds, and return what a reset would have returned for them.
@@ -172,15 +188,7 @@ class WildfireEnv(EnvBase):
     def _set_seed(self, seed: int | None) -> None:
         if seed is None:
             seed = int(torch.empty((), dtype=torch.int64).random_(2**31))
-        self._set_seeds(range(seed, seed + self.batch_size[0]))
-
-    def _set_seeds(self, seeds: Sequence[int]) -> None:
-        if len(seeds) != self.batch_size[0]:
-            raise ValueError(f"seeds must be {self.batch_size[0]} numbers, one a world, got {len(seeds)}")
-        if not all(0 <= seed < 2**62 for seed in seeds):
-            raise ValueError(f"seed must be in 0..2**62, got {min(seeds)}..{max(seeds)}")
-        self._seeds = torch.tensor(list(seeds), dtype=torch.int64, device=self.device)
-        self._episodes = torch.zeros_like(self._seeds)
+        self.set_seeds(range(seed, seed + self.batch_size[0]))
 
     def _checked(self, action: Tensor | None) -> Tensor:
         shape = (*self.batch_size, self.n_agents)

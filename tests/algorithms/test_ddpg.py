@@ -87,4 +87,4 @@ def test_the_memory_holds_the_action_that_was_done(make_small_env):
         batch = env.rollout(4, learner.explore, break_when_any_done=False)
     assert torch.equal(batch[ACTION_ONE_HOT], one_hot(batch[ACTION], 11).float())
     learner.store(batch)
-    assert learner.buffer[:][ACTION_ONE_HOT].sum(-1).eq(1).all()
+    assert learner.keeps["replay"].buffer[:][ACTION_ONE_HOT].sum(-1).eq(1).all()

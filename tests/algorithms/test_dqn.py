@@ -21,7 +21,7 @@ def three_transitions(env, learner):
     batch["next", "done"] = torch.tensor([[[False], [True], [True]]])
     batch["next", "terminated"] = torch.tensor([[[False], [False], [True]]])
     learner.store(batch)
-    return learner.buffer[:]
+    return learner.keeps["replay"].buffer[:]
 
 
 def values(learner, params, data):
@@ -130,7 +130,7 @@ def test_nothing_is_learnt_before_the_memory_is_warm(make_small_env):
     for _ in range(3):
         with torch.no_grad():
             learner.store(env.rollout(8, learner.explore, break_when_any_done=False))
-        counts.append((len(learner.buffer), len(list(learner.samples()))))
+        counts.append((len(learner.keeps["replay"].buffer), len(list(learner.samples()))))
     assert counts == [(32, 0), (64, 5), (64, 5)]
 
 
@@ -141,7 +141,7 @@ def test_a_memory_is_restored_with_its_order_and_its_room(make_small_env):
         batches = [env.rollout(8, learners[0].explore, break_when_any_done=False) for _ in range(4)]
     for count in (1, 3):  # not yet full, and gone round
         first, second = learners
-        first.buffer.empty()
+        first.keeps["replay"].buffer.empty()
         for batch in batches[:count]:
             first.store(batch.clone())
         state = first.keeps["replay"].state_dict()
@@ -149,8 +149,8 @@ def test_a_memory_is_restored_with_its_order_and_its_room(make_small_env):
         second.keeps["replay"].load_state_dict(state)
         for learner in learners:
             learner.store(batches[3].clone())
-        assert len(first.buffer) == len(second.buffer)
-        ours, theirs = first.buffer[:], second.buffer[:]
+        assert len(first.keeps["replay"].buffer) == len(second.keeps["replay"].buffer)
+        ours, theirs = first.keeps["replay"].buffer[:], second.keeps["replay"].buffer[:]
         assert (ours == theirs).all() and ours["agents"].batch_size == theirs["agents"].batch_size
 
 
@@ -169,7 +169,7 @@ def test_prioritised_replay_works_or_says_why_not(make_small_env):
         learner.after_step(sample)
     twin = algorithm.build(env, SMALL, 32)
     twin.keeps["replay"].load_state_dict(learner.keeps["replay"].state_dict())
-    ours, theirs = learner.buffer.sample(), twin.buffer.sample()
+    ours, theirs = learner.keeps["replay"].buffer.sample(), twin.keeps["replay"].buffer.sample()
     assert ours["priority_weight"].std() > 0 and torch.equal(ours["priority_weight"], theirs["priority_weight"])
     assert torch.equal(ours["index"], theirs["index"])
 

@@ -110,10 +110,10 @@ class Worlds:
         if seed is None and not self._seeded:
             seed = 2**31 + secrets.randbelow(2**31)  # the seeds below are for training and evaluation
         if isinstance(seed, (list, tuple, np.ndarray)):
-            self.env._set_seeds([whole_number("seed", each) for each in seed])
+            self.env.set_seeds([whole_number("seed", each) for each in seed])
         elif seed is not None:
             first = whole_number("seed", seed)
-            self.env._set_seeds(range(first, first + n_worlds))
+            self.env.set_seeds(range(first, first + n_worlds))
         self._seeded = True
         self._now = self.env.reset()
         return self._seen(np.zeros((n_worlds, self.env.n_agents), np.float32))

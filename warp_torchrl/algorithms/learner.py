@@ -7,7 +7,6 @@ from typing import Any, Protocol
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
-from torchrl.data import ReplayBuffer
 from torchrl.objectives import LossModule
 
 
@@ -35,8 +34,7 @@ class Learner:
         columns: Names of ``metrics.csv`` by entry of the loss's output.
         optimizer: Over the loss's parameters.
         max_grad_norm: Gradients are clipped to this norm.
-        buffer: Where batches go and samples come from.
-        store: Puts a collected batch [B, T] into the buffer.
+        store: Takes in a collected batch [B, T].
         samples: Returns what is learnt from before the next batch, one optimiser step for each sample.
         after_step: Called with each sample once the optimiser has stepped.
         schedule: Sets what changes with progress in 0..1, and returns it as columns.
@@ -50,7 +48,6 @@ class Learner:
     columns: dict[str, str]
     optimizer: torch.optim.Optimizer
     max_grad_norm: float
-    buffer: ReplayBuffer
     store: Callable[[TensorDictBase], None]
     samples: Callable[[], Iterable[TensorDictBase]]
     after_step: Callable[[TensorDictBase], None]

@@ -2,19 +2,12 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import torch
-from tensordict import TensorDict, TensorDictBase, is_tensor_collection
+from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
-from torchrl.data import (
-    Categorical,
-    LazyTensorStorage,
-    ReplayBuffer,
-    TensorDictPrioritizedReplayBuffer,
-    TensorDictReplayBuffer,
-)
-from torchrl.data.replay_buffers import PrioritizedSampler
+from torchrl.data import Categorical, ReplayBuffer
 from torchrl.envs import EnvBase
 from torchrl.modules import EGreedyModule
 from torchrl.objectives import HardUpdate, LossModule, SoftUpdate
@@ -22,10 +15,9 @@ from torchrl.objectives.utils import TargetNetUpdater
 
 from warp_torchrl.algorithms.algorithm import Algorithm, falling
 from warp_torchrl.algorithms.learner import Learner
+from warp_torchrl.algorithms.replay import ReplayMemory, check_prioritised, replay_buffer, weighted
 from warp_torchrl.models import ACTION, ACTION_MASK, REWARD, Mlp, Signature, signature
 
-_TREES = {"_sum_tree", "_min_tree"}  # where TorchRL's prioritised sampler keeps the priorities
-_ALPHA, _BETA = 0.6, 0.4  # Schaul et al., 2016, proportional prioritisation
 AGENT_KEYS = {"reward": REWARD, "done": ("agents", "done"), "terminated": ("agents", "terminated")}
 """Where TorchRL's losses find what each agent's values are learnt from; a team's end is each agent's."""
 TEAM_REWARD = "team_reward"
@@ -119,7 +111,6 @@ class OffPolicy(Algorithm):
             columns=self.columns(),
             optimizer=optimizer,
             max_grad_norm=self.max_grad_norm,
-            buffer=memory,
             store=lambda batch: memory.extend(transitions(loss, batch)),
             samples=samples,
             after_step=after_step,
@@ -129,19 +120,7 @@ class OffPolicy(Algorithm):
 
     def memory(self, device: torch.device) -> ReplayBuffer:
         """Return TorchRL's replay buffer."""
-        storage = LazyTensorStorage(self.capacity, device=device)
-        if self.replay == "uniform":
-            return TensorDictReplayBuffer(storage=storage, batch_size=self.minibatch_size)
-        # A generator of its own: without one the sampler draws from NumPy's, which no seed of ours reaches.
-        generator = torch.Generator().manual_seed(int(torch.randint(2**31, ())))
-        return TensorDictPrioritizedReplayBuffer(
-            alpha=_ALPHA,
-            beta=_BETA,
-            storage=storage,
-            batch_size=self.minibatch_size,
-            priority_key="td_error",
-            generator=generator,
-        )
+        return replay_buffer(self.replay, self.capacity, self.minibatch_size, device)
 
     def targets(self, loss: LossModule) -> TargetNetUpdater:
         """Return what moves the target networks."""
@@ -214,70 +193,6 @@ class EpsilonGreedy(OffPolicy):
             if isinstance(module, EGreedyModule):
                 module.eps.fill_(epsilon)
         return {"rollout/exploration_rate": epsilon}
-
-
-def weighted(sample: TensorDictBase) -> TensorDictBase:
-    """Give each agent its sample's weight of prioritised replay, as TorchRL's losses want them; others as they are."""
-    weight = sample.get("priority_weight", None)
-    return sample if weight is None else sample.set("priority_weight", weight[:, None].expand(sample["agents"].shape))
-
-
-@dataclass(frozen=True)
-class ReplayMemory:
-    """A replay buffer as checkpoints keep it: what it holds, not the room that it has.
-
-    Attributes:
-        buffer: TorchRL's.
-    """
-
-    buffer: ReplayBuffer
-
-    def state_dict(self) -> dict[str, Any]:
-        """Return the transitions, the batch sizes of their nested parts, and where the next one goes."""
-        state = self.buffer.state_dict() | {"_storage": {}, "sizes": {}}
-        places = torch.arange(len(self.buffer))
-        for name in _TREES & state["_sampler"].keys():  # objects of the extension, which only pickle could write
-            tree = state["_sampler"][name]
-            state["_sampler"][name] = tree[places] if len(places) else torch.empty(0)
-        if len(self.buffer):
-            data = self.buffer[:]
-            nested = [key for key in data.keys(True, False, sort=True) if is_tensor_collection(data.get(key))]
-            state["_storage"] = dict(data.flatten_keys(".").items())
-            state["sizes"] = {".".join((key,) if isinstance(key, str) else key): data[key].batch_size for key in nested}
-        return state
-
-    def load_state_dict(self, state_dict: dict[str, Any]) -> None:
-        """Restore them; the rest of the room stays empty."""
-        self.buffer.empty()
-        if state_dict["_storage"]:
-            length = len(next(iter(state_dict["_storage"].values())))
-            data = TensorDict(state_dict["_storage"], batch_size=[length]).unflatten_keys(".")
-            for key, size in state_dict["sizes"].items():
-                data[tuple(key.split("."))].batch_size = size
-            self.buffer.extend(data)
-        now = self.buffer.state_dict()
-        sampler = dict(state_dict["_sampler"])
-        for name in _TREES & sampler.keys():
-            tree = now["_sampler"][name]
-            if len(sampler[name]):
-                tree[torch.arange(len(sampler[name]))] = sampler[name]
-            sampler[name] = tree
-        self.buffer.load_state_dict(state_dict | {"_storage": now["_storage"], "_sampler": sampler})
-
-
-def check_prioritised() -> None:
-    """Check that TorchRL's prioritised sampler works here.
-
-    Raises:
-        ValueError: If TorchRL's compiled extension does not load.
-    """
-    try:
-        PrioritizedSampler(1, _ALPHA, _BETA)
-    except (RuntimeError, ImportError):
-        raise ValueError(
-            f"replay must be uniform here: prioritised replay needs TorchRL's compiled extension, which does not load "
-            f"with torch {torch.__version__}"
-        ) from None
 
 
 def transitions(loss: LossModule, batch: TensorDictBase) -> TensorDictBase:

@@ -96,7 +96,6 @@ class OnPolicy(Algorithm):
             columns=self.columns(),
             optimizer=optimizer,
             max_grad_norm=self.max_grad_norm,
-            buffer=buffer,
             store=store,
             samples=lambda: (sample for _ in range(self.passes()) for sample in buffer),
             after_step=lambda sample: None,
