@@ -11,6 +11,7 @@ from warp_torchrl.config import (
     Record,
     compose_config,
     conf_folder,
+    is_sweep,
     plain,
     recompose,
     settings,
@@ -87,8 +88,9 @@ MISTAKES = [
     ("+sede=1", "sede is not a key"),
     ("team.n_agent=3", "n_agent"),
     ("+team.n_agent=3", r"team\.n_agent is not a key"),
-    ("scenario=nowhere", "nowhere"),
-    ("algorithm=sarsa", "sarsa"),
+    ("scenario=nowhere", r"scenario must be one of default, .*, water, got nowhere"),
+    ("algorithm=sarsa", r"algorithm must be one of a2c, ddpg, .*, got sarsa"),
+    ("experiment=nowhere", r"experiment must be one of algorithms, .*, got nowhere"),
     ("n_worlds=0", "n_worlds must be in 1..4096, got 0"),
     ("n_worlds=many", "n_worlds must be a whole number, got 'many'"),
     ("n_worlds=1.5", "n_worlds must be a whole number"),
@@ -129,6 +131,12 @@ def test_mistakes_are_told_in_one_line(override, message):
     with pytest.raises(ConfigError, match=message) as error:
         settings(plain(compose_config("train", [override])))
     assert "\n" not in str(error.value)
+
+
+def test_an_unknown_experiment_is_no_sweep():
+    with pytest.raises(ConfigError, match="experiment must be one of algorithms"):
+        is_sweep("train", ["seed=1", "experiment=nowhere"])
+    assert is_sweep("train", ["experiment=algorithms"]) and not is_sweep("train", ["experiment=paper_sarl"])
 
 
 def recorded(*overrides):

@@ -156,24 +156,33 @@ def compose_config(name: str, overrides: Sequence[str] = ()) -> DictConfig:
     Raises:
         ConfigError: If an override does not fit, in one line.
     """
+    config = _compose(name, overrides)
+    try:
+        OmegaConf.resolve(config)
+    except OmegaConfBaseException as error:
+        raise ConfigError(_one_line(error)) from None
+    return config
+
+
+def is_sweep(name: str, overrides: Sequence[str]) -> bool:
+    """Return whether an experiment among the overrides is a sweep in itself.
+
+    Raises:
+        ConfigError: If there is no such experiment, in one line.
+    """
+    chosen = [each for each in overrides if each.startswith("experiment=")]
+    return _compose(name, chosen, with_hydra=True).hydra.mode == RunMode.MULTIRUN
+
+
+def _compose(name: str, overrides: Sequence[str], with_hydra: bool = False) -> DictConfig:
     GlobalHydra.instance().clear()
     try:
         with initialize_config_dir(str(conf_folder()), version_base="1.3"):
-            config = compose(name, overrides=list(overrides))
-            OmegaConf.resolve(config)
-            return config
+            return compose(name, overrides=list(overrides), return_hydra_config=with_hydra)
     except (HydraException, OmegaConfBaseException) as error:
         raise ConfigError(_one_line(error)) from None
     except ValueError as error:
         raise ConfigError(f"{_one_line(error)}, in {' '.join(overrides)}") from None
-
-
-def is_sweep(name: str, overrides: Sequence[str]) -> bool:
-    """Return whether an experiment among the overrides is a sweep in itself."""
-    chosen = [each for each in overrides if each.startswith("experiment=")]
-    GlobalHydra.instance().clear()
-    with initialize_config_dir(str(conf_folder()), version_base="1.3"):
-        return compose(name, overrides=chosen, return_hydra_config=True).hydra.mode == RunMode.MULTIRUN
 
 
 def settings(config: Mapping[str, Any]) -> Settings:
@@ -236,6 +245,11 @@ def _one_line(error: Exception) -> str:
     unknown = re.match(r"Could not override '([^']*)'", str(error))
     if unknown:
         return f"{unknown[1]} is not a key of the configuration; conf/ and --cfg job show what there is"
+    missing = re.search(
+        r"Could not find '(\w+)/([^']*)'.*Available options in '\w+':(.*)Config search path", str(error), re.S
+    )
+    if missing:
+        return f"{missing[1]} must be one of {', '.join(missing[3].split())}, got {missing[2]}"
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     return " ".join(line for line in lines if not line.startswith(("full_key", "object_type", "Set the environment")))
 

@@ -4,7 +4,6 @@ import logging
 import signal
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -12,13 +11,12 @@ from typing import Any
 import torch
 from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
-from torchrl.collectors import Collector
 from tqdm import tqdm
 
 from warp_torchrl import checkpoint as checkpoints
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.config import TRAINING_SEEDS, Record, Settings
-from warp_torchrl.env import EPISODE_METRICS, WildfireEnv
+from warp_torchrl.env import EPISODE_METRICS
 from warp_torchrl.evaluation import MODES, play
 from warp_torchrl.logging import MetricsFile
 from warp_torchrl.models import signature
@@ -53,36 +51,6 @@ class Stopped(Exception):  # noqa: N818
     def __init__(self, number: int) -> None:
         super().__init__(f"stopped by signal {signal.Signals(number).name}; go on with resume=")
         self.number = number
-
-
-@dataclass(frozen=True, kw_only=True)
-class Direct:
-    """Collects in this process: exact resume.
-
-    Attributes:
-        steps: World steps a batch, for each world.
-
-    Raises:
-        ValueError: If steps is not in 1..100000.
-    """
-
-    steps: int = 64
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.steps <= 100_000:
-            raise ValueError(f"steps must be in 1..100000, got {self.steps}")
-
-    def open(self, env: WildfireEnv, learner: Learner) -> Collector:
-        """Return TorchRL's collector, which resets finished worlds at once."""
-        return Collector(
-            env,
-            learner.explore,
-            frames_per_batch=self.steps * env.batch_size[0],
-            total_frames=-1,
-            return_same_td=True,
-            track_traj_ids=False,
-            auto_register_policy_transforms=False,
-        )
 
 
 class Training:
