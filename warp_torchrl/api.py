@@ -21,6 +21,7 @@ def make_env(
     seeds: Sequence[int] | None = None,
     overrides: Sequence[str] = (),
     validate: bool | None = None,
+    compile: bool = False,
 ) -> WildfireEnv:
     """Make the environment of a scenario.
 
@@ -32,6 +33,7 @@ def make_env(
         seeds: Seeds of the worlds one by one, in place of ``seed``.
         overrides: In the command line's grammar, ``["fire=paper", "team.n_agents=3"]``.
         validate: Check actions on CUDA too.
+        compile: Fuse what can be with ``torch.compile``.
 
     Returns:
         A TorchRL ``EnvBase`` of batch size [B].
@@ -50,6 +52,7 @@ def make_env(
         seeds=seeds,
         device=device,
         validate=validate,
+        fuse=compile,
     )
 
 

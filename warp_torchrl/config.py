@@ -21,6 +21,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from warp_torchrl.construction import ConfigError, build, construct
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.world.fusion import check_compiler
 from warp_torchrl.world.world import World
 
 COMPONENTS = (
@@ -117,6 +118,7 @@ class Settings:
     total_frames: int
     seed: int
     device: str
+    compile: bool
     checkpoint: CheckpointPlan
     evaluation: EvaluationPlan
 
@@ -130,6 +132,8 @@ class Settings:
                 f"seed must be in 0..243, so that no training world has an evaluation seed, got {self.seed}"
             )
         _check_device(self.device)
+        if self.compile:
+            check_compiler(torch.device(self.device))
 
     def make_env(self, n_worlds: int, seed: int) -> WildfireEnv:
         """Return an environment of the run's scenario, on the run's device."""
@@ -140,6 +144,7 @@ class Settings:
             n_worlds=n_worlds,
             seed=seed,
             device=self.device,
+            fuse=self.compile,
         )
 
 

@@ -12,6 +12,7 @@ from warp_torchrl.metrics import METRICS, metrics
 from warp_torchrl.observation import STATE, STATE_SIDE, Observation, Surroundings, central_state
 from warp_torchrl.render import render
 from warp_torchrl.reward import Efficiency, Reward
+from warp_torchrl.world.fusion import check_compiler, fusing
 from warp_torchrl.world.state import Transition, WorldState
 from warp_torchrl.world.team import ROLES
 from warp_torchrl.world.world import World
@@ -37,9 +38,11 @@ class WildfireEnv(EnvBase):
         device: Where the worlds live.
         validate: Check on every device that actions are in range, which costs a synchronisation on CUDA; by default
             they are checked on the CPU only.
+        fuse: Fuse what can be with ``torch.compile``, which takes a while at the first steps.
 
     Raises:
-        ValueError: If ``n_worlds`` is not positive, ``seeds`` are not as many, or a seed is out of range.
+        ValueError: If ``n_worlds`` is not positive, ``seeds`` are not as many, a seed is out of range, or there is no
+            C++ compiler to compile with.
     """
 
     batch_locked = True
@@ -55,6 +58,7 @@ class WildfireEnv(EnvBase):
         seeds: Sequence[int] | None = None,
         device: torch.device | str = "cpu",
         validate: bool | None = None,
+        fuse: bool = False,
     ) -> None:
         if n_worlds < 1:
             raise ValueError(f"n_worlds must be at least 1, got {n_worlds}")
@@ -63,6 +67,9 @@ class WildfireEnv(EnvBase):
         self.observation = Surroundings() if observation is None else observation
         self.reward_function = Efficiency() if reward is None else reward
         self.validate = self.device.type == "cpu" if validate is None else validate
+        if fuse:
+            check_compiler(self.device)
+        self._fuses = fuse
         names, roles = self.world.team.agent_names, self.world.team.agent_roles
         self.agent_names = names
         self.group_map = {"agents": list(names)}
@@ -175,13 +182,14 @@ class WildfireEnv(EnvBase):
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         action = self._checked(tensordict.get(("agents", "action"), None))
-        transition = self.world.step(self.world_state, action)
-        reward = self.reward_function(transition)
-        self._state = transition.after
+        with fusing(self._fuses):
+            transition = self.world.step(self.world_state, action)
+            reward = self.reward_function(transition)
+            self._state = transition.after
+            self._episode_reward = self._episode_reward + reward.mean(1)[:, 0]
+            out = self._observe(transition.after)
         if self.watcher is not None:
             self.watcher(transition)
-        self._episode_reward = self._episode_reward + reward.mean(1)[:, 0]
-        out = self._observe(transition.after)
         out.set(("agents", "reward"), reward)
         return out
 

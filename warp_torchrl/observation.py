@@ -12,7 +12,7 @@ from torch import Tensor
 from torch.nn.functional import adaptive_avg_pool2d, one_hot, pad
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.flags import equal, number
+from warp_torchrl.world.flags import byte, equal, number
 from warp_torchrl.world.state import FIRST_FIRE, Action, WorldState, is_burning, is_tree
 from warp_torchrl.world.team import ROLE_NAMES
 from warp_torchrl.world.world import World
@@ -174,8 +174,8 @@ def egocentric_view(state: WorldState, world: World, radius: int) -> Tensor:
             (state.alpha * 255.0).to(torch.uint8),
             _age_plane(state),
             _stage_plane(state),
-            (state.burned & empty).view(torch.uint8) * 255,
-            state.firebreak.view(torch.uint8) * 255,
+            byte(state.burned & empty) * 255,
+            byte(state.firebreak) * 255,
             state.wet.clamp(max=10) * 25,
             torch.full_like(cells, 128),
             (world.threat(state) * 255.0).to(torch.uint8),
@@ -195,11 +195,11 @@ def egocentric_view(state: WorldState, world: World, radius: int) -> Tensor:
 
 
 def _age_plane(state: WorldState) -> Tensor:
-    return state.cells * is_tree(state.cells).view(torch.uint8) * 25
+    return state.cells * byte(is_tree(state.cells)) * 25
 
 
 def _stage_plane(state: WorldState) -> Tensor:
-    return (state.cells - (FIRST_FIRE - 1)) * is_burning(state.cells).view(torch.uint8) * 51
+    return (state.cells - (FIRST_FIRE - 1)) * byte(is_burning(state.cells)) * 51
 
 
 def _relative_elevation(state: WorldState, radius: int) -> Tensor:

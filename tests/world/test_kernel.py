@@ -64,4 +64,4 @@ def test_the_slope_of_a_direction_is_the_reciprocal_of_the_opposite_one() -> Non
     ground = torch.rand(1, 5, 6, generator=torch.Generator().manual_seed(0)) * 50.0
     factor = slope_factor(ground, 30.0, 0.078)
     # East into (2, 3) from (2, 2), and west back.
-    assert (factor[0, EAST, 2, 3] * factor[0, WEST, 2, 2]).item() == pytest.approx(1.0, rel=1e-5)
+    assert (factor[0, EAST, 1 + 2, 3] * factor[0, WEST, 1 + 2, 2]).item() == pytest.approx(1.0, rel=1e-5)

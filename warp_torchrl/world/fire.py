@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.flags import at_least, at_most, choose, clear, equal, number
+from warp_torchrl.world.flags import as_mask, at_least, at_most, below, byte, choose, clear, equal, number
 from warp_torchrl.world.kernel import alexandridis, ellipse, slope_factor
 from warp_torchrl.world.landscape import holds_trees
 from warp_torchrl.world.spread import Clipped, Law, ignition_chance
@@ -109,7 +109,7 @@ class Fire:
         return _constant(tuple(self.alpha), cover.device)[cover.to(torch.int64)]
 
     def slope_factor(self, elevation: Tensor, cell_size: float) -> Tensor:
-        """Return the slope's factor of an episode, float32 [B, 8, H + 1, W + 1]; see ``kernel.slope_factor``."""
+        """Return the slope's factor of an episode, float32 [B, 8, H + 2, W + 1]; see ``kernel.slope_factor``."""
         return slope_factor(elevation, cell_size, self.slope_gain)
 
     def wind_factor(self, wind: Tensor) -> Tensor:
@@ -185,27 +185,29 @@ class Fire:
         Returns:
             The worlds after it, with new ``cells``, ``age``, ``burned``, ``wet`` and ``tick``.
         """
-        cells, due = state.cells, due[:, None, None].expand_as(state.cells)
-        burning = is_burning(cells) & due
+        cells = state.cells
+        due_cells = as_mask(byte(due)[:, None, None].expand(cells.shape).contiguous())
+        burning = is_burning(cells) & due_cells
         q = self.chance_to_ignite(state)
-        ignite = (u < q) & due
+        ignite = below(u, q) & due_cells
         waited = None if state.stage_age is None else state.stage_age + burning
         stage_ends = burning if waited is None else equal(waited, self.ticks_per_stage)
         to_ash = stage_ends & equal(cells, EMBER)
-        after = cells + stage_ends
+        after = cells + byte(stage_ends)
         if self.growth:
-            after += (u >= 1.0 - (1.0 - q) * self._look_up(self._growth(), cells)) & due  # u < 1: none where p is 0
+            stays = 1.0 - (1.0 - q) * self._look_up(self._growth(), cells)  # u < 1: none grows where p is 0
+            after += byte(~below(u, stays) & due_cells)
         after = clear(to_ash, choose(ignite, FIRST_FIRE, after))
         if self.p_regrow > 0.0:
-            bare = equal(cells, 0) & holds_trees(state.landscape.cover) & ~state.firebreak & due
-            after += bare & (u < self._in_a_tick(self.p_regrow))
+            bare = equal(cells, 0) & holds_trees(state.landscape.cover) & ~state.firebreak & due_cells
+            after += byte(bare & (u < self._in_a_tick(self.p_regrow)))
         return state.replace(
             cells=after,
             age=clear(to_ash, choose(ignite, cells, state.age)),
             stage_age=None if waited is None else clear(ignite | stage_ends, waited),
             burned=state.burned | to_ash,
-            wet=state.wet - (at_least(state.wet, 1) & due).view(torch.uint8),
-            tick=state.tick + due[:, 0, 0],
+            wet=state.wet - byte(at_least(state.wet, 1) & due_cells),
+            tick=state.tick + due,
         )
 
     def _law(self) -> Law:

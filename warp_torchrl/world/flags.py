@@ -1,43 +1,74 @@
 """Comparisons and choices on planes of bytes, at the speed of byte arithmetic.
 
 On CPUs a comparison that writes bool, ``where`` and ``masked_fill`` are many times slower than arithmetic on bytes: a
-comparison that writes its own type is vectorised, and a bool is a byte of 0 or 1.
+comparison that writes its own type is vectorised, and a bool is a byte of 0 or 1. A compiler that fuses these planes
+wants them plain.
 """
 
 import torch
 from torch import Tensor
+from torch.compiler import is_compiling
 
 
 def at_least(codes: Tensor, bound: int) -> Tensor:
     """Return ``codes >= bound``, bool; codes are uint8."""
+    if is_compiling():
+        return codes >= bound
     return torch.ge(codes, bound, out=torch.empty_like(codes)).view(torch.bool)
 
 
 def at_most(codes: Tensor, bound: int) -> Tensor:
     """Return ``codes <= bound``, bool; codes are uint8."""
+    if is_compiling():
+        return codes <= bound
     return torch.le(codes, bound, out=torch.empty_like(codes)).view(torch.bool)
 
 
 def equal(codes: Tensor, code: int) -> Tensor:
     """Return ``codes == code``, bool; codes are uint8."""
+    if is_compiling():
+        return codes == code
     return torch.eq(codes, code, out=torch.empty_like(codes)).view(torch.bool)
+
+
+def below(numbers: Tensor, bounds: Tensor) -> Tensor:
+    """Return ``numbers < bounds``, bool; both are float32 of one shape."""
+    if is_compiling():
+        return numbers < bounds
+    return torch.lt(numbers, bounds, out=torch.empty_like(numbers)).to(torch.uint8).view(torch.bool)
+
+
+def byte(mask: Tensor) -> Tensor:
+    """Return a bool mask as 0 and 1, uint8, maybe in the mask's own memory."""
+    return mask.to(torch.uint8) if is_compiling() else mask.view(torch.uint8)
+
+
+def as_mask(codes: Tensor) -> Tensor:
+    """Return codes 0 and 1, uint8, as a bool mask, maybe in their own memory."""
+    return codes.to(torch.bool) if is_compiling() else codes.view(torch.bool)
 
 
 def number(mask: Tensor) -> Tensor:
     """Return a bool mask as 0 and 1, float32."""
-    return mask.view(torch.uint8).to(torch.float32)
+    return byte(mask).to(torch.float32)
 
 
 def choose(mask: Tensor, one: Tensor | int, other: Tensor) -> Tensor:
     """Return ``where(mask, one, other)``, uint8, for a bool mask of the shape of ``other``."""
+    if is_compiling():
+        return torch.where(mask, one, other)
     return (one - other).mul_(mask.view(torch.uint8)).add_(other)
 
 
 def clear(mask: Tensor, values: Tensor) -> Tensor:
     """Return ``values`` with 0 where the bool mask is set, uint8; the mask has their shape."""
+    if is_compiling():
+        return torch.where(mask, 0, values)
     return values * (~mask).view(torch.uint8)
 
 
 def count(mask: Tensor) -> Tensor:
     """Return how many cells of each world a bool mask [B, H, W] marks, int32 [B]."""
+    if is_compiling():
+        return mask.sum((1, 2), dtype=torch.int32)
     return mask.view(torch.uint8).sum((1, 2), dtype=torch.int32)

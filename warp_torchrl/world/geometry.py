@@ -9,6 +9,8 @@ import math
 import torch
 from torch import Tensor
 
+from warp_torchrl.world.flags import byte
+
 DIRECTIONS = ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1))
 """(row, column) offset of N, NE, E, SE, S, SW, W, NW [cells]."""
 
@@ -42,7 +44,7 @@ def chebyshev_distance(position: Tensor, mask: Tensor) -> Tensor:
     row_distance = (rows - place[..., :1]).abs_()[..., :, None]
     column_distance = (columns - place[..., 1:]).abs_()[..., None, :]
     distance = torch.maximum(row_distance, column_distance)
-    beyond = (~mask).view(torch.uint8).to(torch.int16) * FAR  # a maximum is many times faster than masked_fill
+    beyond = byte(~mask).to(torch.int16) * FAR  # a maximum is many times faster than masked_fill
     return torch.maximum(distance, beyond[:, None])
 
 

@@ -76,7 +76,8 @@ def slope_factor(elevation: Tensor, cell_size: float, gain: float) -> Tensor:
         gain: a [1/degree].
 
     Returns:
-        float32 [B, 8, H + 1, W + 1]: the last row and column are margin, as ``ignition_chance`` lays the map out.
+        float32 [B, 8, H + 2, W + 1]: the first row, the last row and the last column are margin, so that a neighbour of
+        any cell lies within its world, as ``ignition_chance`` needs it.
     """
     ground = pad(elevation[:, None], (1, 1, 1, 1), mode="replicate")[:, 0]
     height, width = elevation.shape[1:]
@@ -85,7 +86,7 @@ def slope_factor(elevation: Tensor, cell_size: float, gain: float) -> Tensor:
         source = ground[:, 1 - row : 1 - row + height, 1 - column : 1 - column + width]
         slope = torch.atan((elevation - source) / (distance * cell_size)) * (180.0 / math.pi)
         factors.append(_bounded_exp(gain * slope))
-    return pad(torch.stack(factors, dim=1), (0, 1, 0, 1))
+    return pad(torch.stack(factors, dim=1), (0, 1, 1, 1))
 
 
 def _speed_and_part_along(wind: Tensor) -> tuple[Tensor, Tensor]:

@@ -15,6 +15,8 @@ from enum import IntEnum
 import torch
 from torch import Tensor
 
+from warp_torchrl.world.fusion import fusible
+
 _GOLDEN = -7046029254386353131  # 2^64 / golden ratio, odd, as a signed word
 _SPLITMIX = (-4658895280553007687, -7723592293110705685)
 _MULTIPLIERS = (0x21F0AAAD, 0xD35A2D97 - 2**32, 0x735A2D97)
@@ -95,8 +97,12 @@ def uniform_at(key: Tensor, tick: Tensor | int, stream: Stream, index: Tensor) -
     """
     counter = torch.zeros_like(key).add_(tick).mul_(64).add_(int(stream))
     word = _splitmix64(key + counter * _GOLDEN)
-    low = word.to(torch.int32)[:, None]
-    high = (word >> 32).to(torch.int32)[:, None]
+    return _mix(index, word.to(torch.int32)[:, None], (word >> 32).to(torch.int32)[:, None])
+
+
+@fusible
+def _mix(index: Tensor, low: Tensor, high: Tensor) -> Tensor:
+    """Return the uniform of each index, int32 [B or 1, n], under two key words, int32 [B, 1]."""
     bits = (index * 0x1E3779B1) ^ low  # a distinct well-mixed word for each index
     bits.bitwise_xor_(_shift_right(bits, 16, 32)).mul_(_MULTIPLIERS[0])
     bits.bitwise_xor_(_shift_right(bits, 15, 32)).add_(high).mul_(_MULTIPLIERS[1])

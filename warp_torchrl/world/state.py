@@ -102,7 +102,7 @@ class WorldState:
     burned: Tensor  # bool [B,H,W], has burned to ash at least once
     firebreak: Tensor  # bool [B,H,W], cleared by an agent
     wet: Tensor  # uint8 [B,H,W], ticks for which the cell cannot ignite
-    slope: Tensor | None  # float32 [B,8,H+1,W+1], spread factor into a cell by direction of travel; None where flat
+    slope: Tensor | None  # float32 [B,8,H+2,W+1], spread factor into a cell by direction of travel; None where flat
     wind: Tensor  # float32 [B,2,1,1] or [B,2,H,W], (u east, v north) of the air's motion [m/s]
     vehicles: Vehicles
     tally: Tally

@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
+from warp_torchrl.world.flags import as_mask, byte
 from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import (
@@ -184,10 +185,10 @@ class Team:
         ]
         if self.allow_stay:
             can.append(torch.ones_like(can[-1]))
-        mask = torch.cat(can, dim=-1)
+        open_actions = torch.cat(can, dim=-1)
         if not self.allow_stay:
-            mask[..., Action.EXTINGUISH] |= ~mask.any(dim=-1)
-        return mask
+            open_actions[..., Action.EXTINGUISH] |= ~open_actions.any(dim=-1)
+        return open_actions
 
     def act(
         self, state: WorldState, action: Tensor, active: Tensor, last_spreading: int, wet_ticks: int
@@ -245,7 +246,7 @@ class Team:
     def _move(self, state: WorldState, action: Tensor, active: Tensor) -> tuple[WorldState, Tensor]:
         direction = action.clamp(max=7)
         is_open = self.open_moves(state).gather(-1, direction[..., None])[..., 0]
-        moved = is_open & (action <= Action.NORTH_WEST) & active
+        moved = is_open & (action < len(DIRECTIONS)) & active
         roles = self.table(action.device)
         stride = (roles.stride * moved)[..., None]
         position = state.vehicles.position + _offsets(action.device)[direction] * stride
@@ -274,8 +275,7 @@ class Team:
         """Write the credited acts into the maps, as sums of differences so that their order does not matter."""
 
         def add(plane: Tensor, difference: Tensor) -> Tensor:
-            flat = plane.flatten(1).to(torch.uint8, copy=True)
-            return flat.scatter_add_(1, target, difference).view(plane.dtype).view_as(plane)
+            return plane.flatten(1).scatter_add(1, target, difference).view_as(plane)
 
         old = state.cells.flatten(1).gather(1, target)
         age = state.age.flatten(1).gather(1, target)
@@ -283,8 +283,8 @@ class Team:
         return state.replace(
             cells=add(state.cells, hit * (age - old) - cut * old),
             age=add(state.age, -(hit * age)),
-            extinguished=add(state.extinguished, hit * (1 - put_out_before)),
-            firebreak=add(state.firebreak, cut.to(torch.uint8)),
+            extinguished=as_mask(add(byte(state.extinguished), hit * (1 - put_out_before))),
+            firebreak=as_mask(add(byte(state.firebreak), byte(cut))),
             wet=add(state.wet, hit * (wet_ticks - state.wet.flatten(1).gather(1, target))),
         )
 

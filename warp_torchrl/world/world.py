@@ -8,6 +8,7 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.fire import Fire
+from warp_torchrl.world.fusion import is_fusing
 from warp_torchrl.world.ignition import Ignition
 from warp_torchrl.world.landscape import LandscapeSource, Perlin, map_size
 from warp_torchrl.world.random import Stream, uniform, world_key
@@ -144,7 +145,7 @@ class World:
         return self.team.action_mask(state, self.fire.last_spreading)
 
     def _tick(self, state: WorldState, due: Tensor) -> WorldState:
-        if due.is_cuda or self.steps_per_tick == 1:
+        if due.is_cuda or self.steps_per_tick == 1 or is_fusing():  # fused, a new number of worlds is a new compilation
             return advance(state, self.fire, self.air, due)
         return advance_some(state, self.fire, self.air, due)
 
