@@ -109,7 +109,7 @@ def test_a_run_resumed_equals_a_run_not_interrupted(tmp_path, never_stopped, sto
     folder, whole = never_stopped(name)
     (tmp_path / "cut").mkdir()
     first = tiny(tmp_path / "cut", *RUNS[name])
-    batches = iter(first.collector)
+    batches = iter(first.collection)
     for _ in range(stop_after):
         first.metrics.add({"time/frames": 0, "time/seconds": 0.0, "time/fps": 0.0, **first._learn(next(batches))})
     first.save()
@@ -189,7 +189,7 @@ def test_a_signal_saves_and_stops(tmp_path):
 
 def test_a_gradient_that_is_not_finite_stops_before_the_weights_change(tmp_path):
     training = tiny(tmp_path)
-    batch = next(iter(training.collector))
+    batch = next(iter(training.collection))
     before = {name: value.clone() for name, value in training.learner.loss.state_dict().items() if "params" in name}
     batch["next", "agents", "reward"].fill_(float("inf"))
     with pytest.raises(NumericalFailure, match="not finite"):

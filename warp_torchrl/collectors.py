@@ -1,11 +1,51 @@
-"""How batches are collected."""
+"""How batches are collected: in this process, in several, or on a Ray cluster, by TorchRL's collectors."""
 
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
+from typing import Any, Protocol
 
-from torchrl.collectors import Collector
+import torch
+from tensordict import TensorDict, TensorDictBase
+from torchrl.collectors import BaseCollector, Collector
 
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.validation import check_fields
+
+MakeEnv = Callable[[int, int], WildfireEnv]
+"""Makes so many worlds, the first with this seed."""
+
+
+_FOR_EVER = 10**12  # batches; TorchRL's Ray collector takes no -1
+
+
+class WorkerDied(Exception):  # noqa: N818
+    """A process that collects has ended before its time."""
+
+
+class Collection(Protocol):
+    """Collecting under way."""
+
+    def __iter__(self) -> Iterator[TensorDictBase]:
+        """Yield batches [B, T], for ever."""
+        ...
+
+    def refresh(self) -> None:
+        """Let those who collect act as the learner does now."""
+        ...
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return what a checkpoint keeps of it."""
+        ...
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Go on from there."""
+        ...
+
+    def close(self) -> None:
+        """End it."""
+        ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,17 +62,193 @@ class Direct:
     steps: int = 64
 
     def __post_init__(self) -> None:
-        if not 1 <= self.steps <= 100_000:
-            raise ValueError(f"steps must be in 1..100000, got {self.steps}")
+        check_fields(self, steps=(1, 100_000))
 
-    def open(self, env: WildfireEnv, learner: Learner) -> Collector:
-        """Return TorchRL's collector, which resets finished worlds at once."""
-        return Collector(
+    def check_worlds(self, n_worlds: int) -> None:
+        """Any number of worlds will do."""
+
+    def open(self, env: WildfireEnv, learner: Learner, make_env: MakeEnv, seed: int) -> Collection:
+        """Return the worlds of ``env``, played by the learner; finished ones are reset at once."""
+        return _Here(env, learner, self.steps)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Process(Direct):
+    """Collects in processes of this machine, each with its share of the worlds, while no one learns.
+
+    World i has the seed that it has with ``direct``. A resumed run goes on with fires that it has not met.
+
+    Attributes:
+        workers: Processes.
+
+    Raises:
+        ValueError: If a value is out of its range.
+    """
+
+    workers: int = 2
+
+    def __post_init__(self) -> None:
+        check_fields(self, steps=(1, 100_000), workers=(1, 1024))
+
+    def check_worlds(self, n_worlds: int) -> None:
+        """Check that the workers can share the worlds.
+
+        Raises:
+            ValueError: If not equally.
+        """
+        if n_worlds % self.workers:
+            raise ValueError(f"workers must divide n_worlds, {n_worlds}, got {self.workers}")
+
+    def open(self, env: WildfireEnv, learner: Learner, make_env: MakeEnv, seed: int) -> Collection:
+        """Return worlds like those of ``env``, played by the learner elsewhere."""
+        share = env.batch_size[0] // self.workers
+        starts = [seed + worker * share for worker in range(self.workers)]
+        frames = self.steps * env.batch_size[0]
+
+        def start(first_episode: int) -> BaseCollector:
+            makers = [partial(_worlds, make_env, share, each, first_episode) for each in starts]
+            return Collector(
+                makers,
+                learner.explore,
+                num_collectors=self.workers,
+                sync=True,
+                frames_per_batch=frames,
+                total_frames=frames * _FOR_EVER,
+                **self.backend(),
+            )
+
+        return _Elsewhere(start, self.steps, env.device)
+
+    def backend(self) -> dict[str, Any]:
+        """Return what TorchRL's collector is told of where it works."""
+        return {"backend": "process", "backend_options": {"auto_register_policy_transforms": False}}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ray(Process):
+    """Collects in workers of a Ray cluster; otherwise as ``Process``. Needs the extra ``ray``.
+
+    Attributes:
+        address: The cluster's, ``auto`` for the one that this machine belongs to; None starts one here.
+        cpus: CPUs that Ray sets aside for a worker.
+        gpus: GPUs, or a share of one; the worlds live there where ``device`` is cuda.
+
+    Raises:
+        ValueError: If a value is out of its range, or Ray is not installed.
+    """
+
+    address: str | None = None
+    cpus: float = 1.0
+    gpus: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_fields(self, steps=(1, 100_000), workers=(1, 1024), cpus=(0.0, 1e4), gpus=(0.0, 64.0))
+        try:
+            import ray  # noqa: F401
+        except ImportError:
+            raise ValueError('collector=ray needs Ray: pip install "warp_torchrl[ray]"') from None
+
+    def backend(self) -> dict[str, Any]:
+        """Return what TorchRL's collector is told of where it works."""
+        options = {
+            "ray_init_config": {"address": self.address, "log_to_driver": False},
+            "remote_configs": {"num_cpus": self.cpus, "num_gpus": self.gpus},
+            "collector_kwargs": {"auto_register_policy_transforms": False},
+        }
+        return {"backend": "ray", "backend_options": options}
+
+
+class _Here:
+    """One collector, in this process."""
+
+    def __init__(self, env: WildfireEnv, learner: Learner, steps: int) -> None:
+        self.env = env
+        self._collector = Collector(
             env,
             learner.explore,
-            frames_per_batch=self.steps * env.batch_size[0],
+            frames_per_batch=steps * env.batch_size[0],
             total_frames=-1,
             return_same_td=True,
             track_traj_ids=False,
             auto_register_policy_transforms=False,
         )
+
+    def __iter__(self) -> Iterator[TensorDictBase]:
+        return iter(self._collector)
+
+    def refresh(self) -> None:
+        """Nothing to do: the policy is the learner's own."""
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return the worlds and what the collector carries over to its next batch."""
+        carrier = self._collector._carrier.flatten_keys(".")
+        return {"env": self.env.state_dict(), "carrier": {name: value.clone() for name, value in carrier.items()}}
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Go on as if never stopped."""
+        self.env.load_state_dict(state["env"])
+        carrier = TensorDict(state["carrier"], batch_size=self.env.batch_size).unflatten_keys(".")
+        shaped = self._collector._carrier.empty(recurse=True)  # keeps the batch sizes of the nested parts
+        self._collector._carrier = shaped.update(carrier.to(self.env.device))
+
+    def close(self) -> None:
+        """Shut the collector down."""
+        self._collector.shutdown()
+
+
+class _Elsewhere:
+    """One collector with workers, started with the first batch."""
+
+    def __init__(self, start: Callable[[int], BaseCollector], steps: int, device: torch.device) -> None:
+        self._start, self._steps, self._device = start, steps, device
+        self._collector: BaseCollector | None = None
+        self._played = 0  # steps of each world
+
+    def __iter__(self) -> Iterator[TensorDictBase]:
+        try:
+            # No world has had more episodes than steps: from that number on, they are new.
+            self._collector = self._start(self._played)
+            for batch in self._collector:
+                self._played += self._steps
+                yield batch.exclude("collector").flatten(0, -2).to(self._device)  # [workers, B / workers, T]
+        except Exception as error:  # whatever the backend raises: nothing of ours runs in here
+            raise WorkerDied(f"a worker of the collector has ended: {_reason(self._collector, error)}") from error
+
+    def refresh(self) -> None:
+        """Send the learner's weights to the workers."""
+        if self._collector is not None:
+            self._collector.update_policy_weights_()
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return how far each world was played."""
+        return {"played": self._played}
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Go on in new worlds."""
+        self._played = int(state["played"])
+
+    def close(self) -> None:
+        """Shut the workers down."""
+        if self._collector is not None:
+            self._collector.shutdown()
+
+
+def _worlds(make_env: MakeEnv, count: int, seed: int, first_episode: int) -> WildfireEnv:
+    """Return a worker's worlds, and give it random numbers of its own for the actions."""
+    torch.manual_seed(seed + 2**40 * first_episode)
+    env = make_env(count, seed)
+    env.set_seeds(range(seed, seed + count), first_episode)
+    return env
+
+
+def _reason(collector: BaseCollector | None, error: Exception) -> str:
+    """Return which worker has ended and how, where it can be known, in one line."""
+    ended = []
+    for index, process in enumerate(getattr(collector, "procs", ())):
+        try:
+            code = process.exitcode
+        except ValueError:
+            code = None
+        if code:
+            ended.append(f"worker {index} by {'signal ' if code < 0 else 'exit code '}{abs(code)}")
+    return ", ".join(ended) or " ".join(str(error).split()) or type(error).__name__

@@ -211,6 +211,10 @@ def settings(config: Mapping[str, Any]) -> Settings:
         made.algorithm.check_batch(made.n_worlds * made.collector.steps)
     except ValueError as error:
         raise ConfigError(f"algorithm.{error}") from None
+    try:
+        made.collector.check_worlds(made.n_worlds)
+    except ValueError as error:
+        raise ConfigError(f"collector.{error}") from None
     return made
 
 

@@ -103,11 +103,12 @@ class WildfireEnv(EnvBase):
         """Draw the worlds, uint8 [B, H * scale, W * scale, 3]."""
         return render(self.world_state, self.world.team.table(self.device).index, scale)
 
-    def set_seeds(self, seeds: Sequence[int]) -> None:
-        """Give each world a seed of its own, in force from the next reset; their episodes count from 0 again.
+    def set_seeds(self, seeds: Sequence[int], first_episode: int = 0) -> None:
+        """Give each world a seed of its own, in force from the next reset.
 
         Args:
             seeds: One a world, in 0..2^62.
+            first_episode: Number of the next episode.
 
         Raises:
             ValueError: If their number or a seed's range is wrong.
@@ -117,7 +118,7 @@ class WildfireEnv(EnvBase):
         if not all(0 <= seed < 2**62 for seed in seeds):
             raise ValueError(f"seed must be in 0..2**62, got {min(seeds)}..{max(seeds)}")
         self._seeds = torch.tensor(list(seeds), dtype=torch.int64, device=self.device)
-        self._episodes = torch.zeros_like(self._seeds)
+        self._episodes = torch.full_like(self._seeds, first_episode)
 
     def set_state(self, state: WorldState) -> TensorDictBase:
         """Go on from given worlds, and return what a reset would have returned for them.

@@ -3,18 +3,19 @@
 import logging
 import signal
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
 import torch
-from tensordict import TensorDict, TensorDictBase
+from tensordict import TensorDictBase
 from torch import Tensor
 from tqdm import tqdm
 
 from warp_torchrl import checkpoint as checkpoints
 from warp_torchrl.algorithms.learner import Learner
+from warp_torchrl.collectors import WorkerDied
 from warp_torchrl.config import TRAINING_SEEDS, Record, Settings
 from warp_torchrl.env import EPISODE_METRICS
 from warp_torchrl.evaluation import MODES, play
@@ -69,7 +70,9 @@ class Training:
         self.frames_per_batch = settings.collector.steps * settings.n_worlds
         self.learner: Learner = settings.algorithm.build(self.env, settings.model, self.frames_per_batch)
         self.reward_scale = RewardScale(settings.reward.gamma) if settings.reward.normalise else None
-        self.collector = settings.collector.open(self.env, self.learner)
+        self.collection = settings.collector.open(
+            self.env, self.learner, settings.make_env, TRAINING_SEEDS * settings.seed
+        )
         self.frames = 0
         self.seconds = 0.0
         self.saved_at = 0
@@ -89,7 +92,7 @@ class Training:
         start, next_line = time.perf_counter() - self.seconds, 0.0
         try:
             with _Signals() as signals:
-                for batch in self.collector if self.frames < total else ():
+                for batch in self._batches(signals) if self.frames < total else ():
                     row = self._learn(batch)
                     self.seconds = time.perf_counter() - start
                     rate = batch.numel() / max(self.seconds - self._last_seconds, 1e-9)
@@ -116,6 +119,16 @@ class Training:
 
     _last_seconds = 0.0
 
+    def _batches(self, signals: "_Signals") -> Iterator[TensorDictBase]:
+        """Yield batches; where a worker dies, save first what was learnt."""
+        try:
+            yield from self.collection
+        except WorkerDied:
+            self.save()
+            if signals.received:  # which workers of the same terminal get too
+                raise Stopped(signals.received) from None
+            raise
+
     def _learn(self, batch: TensorDictBase) -> dict[str, float | None]:
         """Learn from one batch [B, T] and return the row of metrics."""
         learner = self.learner
@@ -135,6 +148,7 @@ class Training:
         row |= dict.fromkeys(TRAIN_COLUMNS)
         row |= {column: means.get(key) for key, column in learner.columns.items()} | self._scheduled
         self._schedule()
+        self.collection.refresh()
         row["evaluation/saved"] = self._evaluate(batch.numel())
         return row
 
@@ -202,9 +216,8 @@ class Training:
             "keeps": {name: each.state_dict() for name, each in self.learner.keeps.items()},
             "optimizer": self.learner.optimizer.state_dict(),
             "random": torch.get_rng_state(),
-            "env": self.env.state_dict(),
+            "collection": self.collection.state_dict(),
             "reward_scale": {} if self.reward_scale is None else self.reward_scale.state_dict(),
-            "carrier": _flat(self.collector._carrier),
             "frames": self.frames,
             "seconds": self.seconds,
             "rows": self.metrics.rows,
@@ -221,12 +234,9 @@ class Training:
             self.learner.optimizer.load_state_dict(state["optimizer"])
             for name, each in self.learner.keeps.items():
                 each.load_state_dict(state["keeps"][name])
-            self.env.load_state_dict(state["env"])
+            self.collection.load_state_dict(state["collection"])
             if self.reward_scale is not None:
                 self.reward_scale.load_state_dict(state["reward_scale"])
-            carrier = TensorDict(state["carrier"], batch_size=self.env.batch_size).unflatten_keys(".")
-            shaped = self.collector._carrier.empty(recurse=True)  # keeps the batch sizes of the nested parts
-            self.collector._carrier = shaped.update(carrier.to(self.env.device))
             self.frames, self.seconds = int(state["frames"]), float(state["seconds"])
             self.saved_at, self._last_seconds = self.frames, self.seconds
             self.metrics = MetricsFile(self.run / "metrics.csv", keep_rows=int(state["rows"]))
@@ -238,7 +248,7 @@ class Training:
 
     def close(self) -> None:
         """Shut the collector down."""
-        self.collector.shutdown()
+        self.collection.close()
 
 
 class _Signals:
@@ -264,10 +274,6 @@ class _Signals:
         if self.received:
             raise SystemExit(128 + number)
         self.received = number
-
-
-def _flat(carrier: TensorDictBase) -> dict[str, Tensor]:
-    return {name: value.clone() for name, value in carrier.flatten_keys(".").items()}
 
 
 def _episode_columns(batch: TensorDictBase) -> dict[str, float | None]:

@@ -368,7 +368,7 @@ def test_only_the_slope_between_source_and_target_matters(metres: list[float]) -
 
 
 def test_the_cell_size_makes_the_slope() -> None:
-    # 10 m over 10 m is 45 degrees: exp(0.078 * 45) = 33.448; direction 2 is east, into the second column; the first row is margin.
+    # 10 m over 10 m is 45 degrees: exp(0.078 * 45) = 33.448; direction 2 is east, into column 1 (row 0 is margin).
     factor = Fire().slope_factor(torch.tensor([[[0.0, 10.0], [0.0, 10.0]]]), cell_size=10.0)
     assert factor.shape == (1, 8, 4, 3)
     assert factor[0, 2, 1, 1].item() == pytest.approx(33.448, rel=1e-4)

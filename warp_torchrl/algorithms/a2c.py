@@ -30,5 +30,5 @@ class A2c(OnPolicy):
         )
         loss.entropy_coeff.fill_(self.entropy_coeff)
         loss.set_keys(**KEYS)
-        loss.make_value_estimator(ValueEstimators.MAGAE, gamma=self.gamma, lmbda=self.lmbda)
+        loss.make_value_estimator(ValueEstimators.MAGAE, gamma=self.gamma, lmbda=self.lmbda, average_gae=True)
         return loss
