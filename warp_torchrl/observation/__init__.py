@@ -1,0 +1,36 @@
+"""What the agents see, and what the central critic sees."""
+
+from warp_torchrl.observation.coarse import (
+    PICTURE,
+    PICTURE_SIDE,
+    STATE,
+    STATE_SIDE,
+    block_means,
+    central_state,
+    picture,
+)
+from warp_torchrl.observation.own import SELF_SIZE, WIND_SCALE, own_vector
+from warp_torchrl.observation.presets import Local, Observation, Paper, Space, Surroundings
+from warp_torchrl.observation.view import CHANNELS, ELEVATION_SCALE, crop, egocentric_view
+
+__all__ = [
+    "CHANNELS",
+    "ELEVATION_SCALE",
+    "PICTURE",
+    "PICTURE_SIDE",
+    "SELF_SIZE",
+    "STATE",
+    "STATE_SIDE",
+    "WIND_SCALE",
+    "Local",
+    "Observation",
+    "Paper",
+    "Space",
+    "Surroundings",
+    "block_means",
+    "central_state",
+    "crop",
+    "egocentric_view",
+    "own_vector",
+    "picture",
+]

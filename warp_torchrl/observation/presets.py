@@ -1,0 +1,111 @@
+"""What agents may be shown: a preset is a component.
+
+Its ``spaces`` tell the environment the shape, type and range of each entry, and called with a state it returns them.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.observation.coarse import PICTURE, PICTURE_SIDE, picture
+from warp_torchrl.observation.own import SELF_SIZE, own_vector
+from warp_torchrl.observation.view import CHANNELS, age_plane, crop, egocentric_view, stage_plane
+from warp_torchrl.validation import check_fields
+from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.world import World
+
+
+class Space(NamedTuple):
+    """Shape (one agent's), type and range of an entry of an observation."""
+
+    shape: tuple[int, ...]
+    dtype: torch.dtype
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Local:
+    """What an agent sees of its own surroundings, and nothing else.
+
+    ``view`` is the square of 2 r + 1 cells about the agent, north up, in the channels ``CHANNELS``, uint8: fractions
+    times 255, elevation relative to the agent's cell as 128 + 127 dz / 100 m, other agents 63 each. ``self`` is what
+    it knows of itself, see ``SELF_SIZE``.
+
+    Attributes:
+        radius: r [cells].
+
+    Raises:
+        ValueError: If the radius is not in 1..32.
+    """
+
+    radius: int = 5
+
+    def __post_init__(self) -> None:
+        check_fields(self, radius=(1, 32))
+
+    def spaces(self, world: World) -> dict[str, Space]:
+        """Return the space of each entry."""
+        side = 2 * self.radius + 1
+        return {
+            "view": Space((len(CHANNELS), side, side), torch.uint8, 0, 255),
+            "self": Space((SELF_SIZE,), torch.float32, -3.0, 3.0),
+        }
+
+    def __call__(self, state: WorldState, world: World) -> dict[str, Tensor]:
+        """Return ``view`` uint8 [B, A, C, V, V] and ``self`` float32 [B, A, F]."""
+        return {"view": egocentric_view(state, world, self.radius), "self": own_vector(state, world)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Surroundings(Local):
+    """An agent's own surroundings and the state of the fire, as the paper has it: the default.
+
+    As ``Local``, and ``picture``: what a dispatcher would radio, the whole map's fire (square root of the share of
+    each block that burns), fuel and team-mates in 8 x 8 blocks.
+    """
+
+    def spaces(self, world: World) -> dict[str, Space]:
+        """Return the space of each entry."""
+        shape = (len(PICTURE), PICTURE_SIDE, PICTURE_SIDE)
+        return {**super().spaces(world), "picture": Space(shape, torch.float32, 0.0, 1.0)}
+
+    def __call__(self, state: WorldState, world: World) -> dict[str, Tensor]:
+        """Return ``view``, ``self``, and ``picture`` float32 [B, A, 3, 8, 8]."""
+        return {**super().__call__(state, world), "picture": picture(state)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Paper:
+    """The paper's view: terrain class, tree age and fire stage about the agent, flattened.
+
+    Off the map the terrain class is 0 and the others too; covers are (code + 1) / 5, ages / 10, fire stages / 5.
+
+    Attributes:
+        radius: r of the view [cells]; the vector has 3 (2 r + 1)^2 entries.
+
+    Raises:
+        ValueError: If the radius is not in 1..32.
+    """
+
+    radius: int = 3
+
+    def __post_init__(self) -> None:
+        check_fields(self, radius=(1, 32))
+
+    def spaces(self, world: World) -> dict[str, Space]:
+        """Return the space of the one, nameless entry."""
+        return {"": Space((3 * (2 * self.radius + 1) ** 2,), torch.float32, 0.0, 1.0)}
+
+    def __call__(self, state: WorldState, world: World) -> dict[str, Tensor]:
+        """Return one entry, float32 [B, A, 3 (2 r + 1)^2]."""
+        cover = (state.landscape.cover + 1) * 51
+        planes = torch.stack((cover, age_plane(state), stage_plane(state)), dim=1)
+        crops = crop(planes, state.vehicles.position, self.radius)
+        return {"": crops.flatten(2).to(torch.float32).mul_(1.0 / 255.0)}
+
+
+Observation = Surroundings | Local | Paper
+"""Any observation preset."""
