@@ -13,8 +13,8 @@ from warp_torchrl.observation import STATE, STATE_SIDE, Observation, Surrounding
 from warp_torchrl.render import render
 from warp_torchrl.reward import Efficiency, Reward
 from warp_torchrl.world.fusion import check_compiler, fusing
+from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.state import Transition, WorldState
-from warp_torchrl.world.team import ROLES
 from warp_torchrl.world.world import World
 
 EPISODE_METRICS = (*METRICS, "episode_reward", "episode_length")

@@ -14,8 +14,8 @@ from warp_torchrl.evaluation import MODES
 from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, ROLE
 from warp_torchrl.models.networks import AgentNetworks, Network
 from warp_torchrl.observation import SELF_SIZE
+from warp_torchrl.world.role import ROLE_NAMES, ROLES
 from warp_torchrl.world.state import Action
-from warp_torchrl.world.team import ROLE_NAMES, ROLES
 
 _ROLE_ENTRIES = slice(SELF_SIZE - len(Action) - len(ROLE_NAMES), SELF_SIZE - len(Action))  # of ``self``
 _ROLE_INDEX = {role.name: index for index, role in enumerate(ROLES.values())}

@@ -4,8 +4,8 @@ import torch
 from torch import Tensor
 from torch.nn.functional import one_hot
 
+from warp_torchrl.world.role import ROLE_NAMES
 from warp_torchrl.world.state import Action, WorldState
-from warp_torchrl.world.team import ROLE_NAMES
 from warp_torchrl.world.world import World
 
 SELF_SIZE = 9 + len(ROLE_NAMES) + len(Action)

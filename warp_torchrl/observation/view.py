@@ -5,8 +5,8 @@ from torch import Tensor
 from torch.nn.functional import one_hot, pad
 
 from warp_torchrl.world.flags import byte, equal
+from warp_torchrl.world.role import ROLE_NAMES
 from warp_torchrl.world.state import FIRST_FIRE, WorldState, is_burning, is_tree
-from warp_torchrl.world.team import ROLE_NAMES
 from warp_torchrl.world.world import World
 
 CHANNELS = (

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import torch
 from torch import Tensor
@@ -11,6 +11,8 @@ from warp_torchrl.validation import check_fields
 from warp_torchrl.world.flags import as_mask, byte
 from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.random import Stream, uniform
+from warp_torchrl.world.role import ROLES, RoleTable, role_table
+from warp_torchrl.world.start import starting_cells
 from warp_torchrl.world.state import (
     FIRST_FIRE,
     Action,
@@ -23,30 +25,6 @@ from warp_torchrl.world.state import (
 )
 
 _NEIGHBOURHOOD = ((0, 0), (-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1))
-
-
-class Role(NamedTuple):
-    """What a kind of vehicle can do."""
-
-    name: str
-    stride: int  # cells a move
-    flies: bool  # over lakes and fire
-    clears: bool
-
-
-ROLES = {
-    "ugv": Role("bulldozer", stride=1, flies=False, clears=True),
-    "uav": Role("uav", stride=2, flies=True, clears=False),
-}
-"""The roles of WARP-CA: ground vehicles (bulldozers) and aircraft."""
-ROLE_NAMES = tuple(ROLES)
-
-
-class _RoleTable(NamedTuple):
-    index: Tensor  # int64 [A], into ROLE_NAMES
-    stride: Tensor  # int64 [A]
-    flies: Tensor  # bool [A]
-    clears: Tensor  # bool [A]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,46 +72,23 @@ class Team:
         roles = self.agent_roles
         return [f"{ROLES[role].name}_{roles[:index].count(role)}" for index, role in enumerate(roles)]
 
-    def table(self, device: torch.device) -> _RoleTable:
+    def table(self, device: torch.device) -> RoleTable:
         """Return the agents' roles and abilities as tensors of shape [A]."""
-        return _role_table(tuple(self.agent_roles), device)
+        return role_table(tuple(self.agent_roles), device)
 
     def place(self, key: Tensor, cover: Tensor, burning: Tensor) -> Vehicles:
-        """Return the team at the start of an episode.
-
-        Each agent takes the free cell (neither lake nor lit) nearest to the corner, no two the same one.
-
-        Args:
-            key: World keys, int64 [B].
-            cover: Land cover, uint8 [B, H, W].
-            burning: Cells on fire, bool [B, H, W].
-        """
-        worlds, height, width = cover.shape
-        taken = (cover == Cover.LAKE) | burning
-        rows = torch.arange(height, device=cover.device)
-        columns = torch.arange(width, device=cover.device)
-        corner = (uniform(key, 0, Stream.START, (2,)) < 0.5).to(torch.int64)
-        base = corner * torch.tensor([height - 1, width - 1], device=cover.device)
-        if self.start == "corner":
-            row_distance = (rows - base[:, :1]).abs()[:, :, None]
-            column_distance = (columns - base[:, 1:]).abs()[:, None, :]
-            order = torch.maximum(row_distance, column_distance) * (height + width) + row_distance + column_distance
-        else:
-            order = (uniform(key, 1, Stream.START, (height, width)) * (1 << 24)).to(torch.int64)
-        cell = torch.arange(height * width, device=cover.device)
-        rank = (order + taken * (1 << 30)).flatten(1) * (height * width) + cell
-        best = rank.topk(self.n_agents, dim=1, largest=False, sorted=True).indices
-        shape = (worlds, self.n_agents)
-        counter = torch.zeros(shape, dtype=torch.int32, device=cover.device)
+        """Return the team at the start of an episode; see ``starting_cells``."""
+        base, position = starting_cells(key, cover, burning, self.n_agents, self.start)
+        counter = torch.zeros(position.shape[:2], dtype=torch.int32, device=cover.device)
         return Vehicles(
-            position=torch.stack((best // width, best % width), dim=-1),
+            position=position,
             tank=torch.full_like(counter, -1 if self.tank is None else self.tank),
-            last_action=torch.full(shape, -1, dtype=torch.int64, device=cover.device),
+            last_action=torch.full_like(counter, -1, dtype=torch.int64),
             base=base,
             acts=counter,
             redundant=counter.clone(),
             last_useful=torch.full_like(counter, -1),
-            batch_size=[worlds],
+            batch_size=key.shape,
         )
 
     def open_moves(self, state: WorldState) -> Tensor:
@@ -309,17 +264,6 @@ def _flat_index(place: Tensor, height: int, width: int) -> Tensor:
     """Return row * W + column, with places off the map moved to its edge."""
     row, column = place.unbind(-1)
     return row.clamp(0, height - 1) * width + column.clamp(0, width - 1)
-
-
-@lru_cache(maxsize=64)
-def _role_table(roles: tuple[str, ...], device: torch.device) -> _RoleTable:
-    kinds = [ROLES[role] for role in roles]
-    return _RoleTable(
-        index=torch.tensor([ROLE_NAMES.index(role) for role in roles], device=device),
-        stride=torch.tensor([kind.stride for kind in kinds], device=device),
-        flies=torch.tensor([kind.flies for kind in kinds], device=device),
-        clears=torch.tensor([kind.clears for kind in kinds], device=device),
-    )
 
 
 @lru_cache(maxsize=8)
