@@ -5,7 +5,7 @@ import torch
 
 from warp_torchrl.algorithms.a2c import A2c
 from warp_torchrl.algorithms.on_policy import ADVANTAGE, VALUE_TARGET, with_advantages
-from warp_torchrl.models import ACTION, VALUE, Mlp
+from warp_torchrl.models import ACTION, VALUE, Mlp, signature
 
 SMALL = Mlp(actor_hidden=(16,), critic_hidden=(16,))
 
@@ -27,6 +27,21 @@ def test_the_terms_are_those_of_the_textbook(make_small_env, central):
     torch.testing.assert_close(terms["loss_objective"], -(log_prob * data[ADVANTAGE][..., 0]).mean())
     torch.testing.assert_close(terms["loss_entropy"], -0.02 * entropy.mean())
     torch.testing.assert_close(terms["loss_critic"], 0.5 * (value - data[VALUE_TARGET]).square().mean())
+
+
+def test_the_advantages_of_each_agent_are_standardised_where_asked(make_small_env):
+    env = make_small_env(4)
+    torch.manual_seed(0)
+    with torch.no_grad():
+        batch = env.rollout(8, A2c().policy(signature(env), SMALL), break_when_any_done=False)
+    found = {}
+    for asked in (False, True):
+        torch.manual_seed(1)
+        loss = A2c(normalize_advantage=asked).build(env, SMALL, 32).loss
+        found[asked] = with_advantages(loss, batch.clone())[ADVANTAGE]
+    plain = found[False]
+    torch.testing.assert_close(found[True], (plain - plain.mean(0)) / plain.std(0), rtol=1e-3, atol=1e-4)
+    assert (plain.std(0) < 0.9).all()
 
 
 def test_an_entropy_bonus_of_nought_may_still_rise(make_small_env):

@@ -17,7 +17,15 @@ class A2c(OnPolicy):
     """A2C with multi-agent generalised advantage estimation: each batch is seen once.
 
     Its minibatches are as many optimiser steps: small ones or short batches of the collector are best.
+
+    Attributes:
+        normalize_advantage: Whether each agent's advantages of a batch are standardised, as PPO's are.
+
+    Raises:
+        ValueError: If a value is out of its range.
     """
+
+    normalize_advantage: bool = True
 
     def loss(self, policy: ProbabilisticActor, critic: torch.nn.Module) -> A2CLoss:
         """Return TorchRL's loss, with the estimator that gives a team's end to each agent."""
@@ -30,5 +38,7 @@ class A2c(OnPolicy):
         )
         loss.entropy_coeff.fill_(self.entropy_coeff)
         loss.set_keys(**KEYS)
-        loss.make_value_estimator(ValueEstimators.MAGAE, gamma=self.gamma, lmbda=self.lmbda, average_gae=True)
+        loss.make_value_estimator(
+            ValueEstimators.MAGAE, gamma=self.gamma, lmbda=self.lmbda, average_gae=self.normalize_advantage
+        )
         return loss
