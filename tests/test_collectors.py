@@ -81,7 +81,7 @@ def test_a_worker_that_dies_is_named_and_what_was_learnt_is_saved(tmp_path):
         return row
 
     run._learn = killing
-    with pytest.raises(WorkerDied, match="a worker of the collector has ended: worker 0 by signal 9"):
+    with pytest.raises(WorkerDied, match="a worker has ended: worker 0 by signal 9"):
         run.train()
     run.close()
     assert newest(tmp_path)[0].manifest.frames == 48

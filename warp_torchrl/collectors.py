@@ -212,7 +212,8 @@ class _Elsewhere:
                 self._played += self._steps
                 yield batch.exclude("collector").flatten(0, -2).to(self._device)  # [workers, B / workers, T]
         except Exception as error:  # whatever the backend raises: nothing of ours runs in here
-            raise WorkerDied(f"a worker of the collector has ended: {_reason(self._collector, error)}") from error
+            what = "the collector's workers did not start" if self._collector is None else "a worker has ended"
+            raise WorkerDied(f"{what}: {_reason(self._collector, error)}") from error
 
     def refresh(self) -> None:
         """Send the learner's weights to the workers."""
@@ -251,4 +252,4 @@ def _reason(collector: BaseCollector | None, error: Exception) -> str:
             code = None
         if code:
             ended.append(f"worker {index} by {'signal ' if code < 0 else 'exit code '}{abs(code)}")
-    return ", ".join(ended) or " ".join(str(error).split()) or type(error).__name__
+    return ", ".join(ended) or next(iter(str(error).splitlines()), type(error).__name__)

@@ -15,6 +15,7 @@ from omegaconf import DictConfig, OmegaConf
 
 from warp_torchrl import checkpoint as checkpoints
 from warp_torchrl.api import policy_of
+from warp_torchrl.collectors import WorkerDied
 from warp_torchrl.config import (
     COMPONENTS,
     Record,
@@ -275,6 +276,8 @@ def _diagnose(error: Exception) -> tuple[int, str]:
         return UNSOUND, line
     if isinstance(error, NumericalFailure):
         return NUMERICAL, line
+    if isinstance(error, WorkerDied):
+        return 1, line
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO):
         return DISK, f"{error.filename or Path.cwd()}: {error.strerror}"
     if isinstance(error, (ConfigError, ValueError)):
