@@ -181,7 +181,7 @@ def _behaviour_lines(content: Mapping[str, Any]) -> list[str]:
         found = content["metrics"].get(name, {"mean": None})
         if found["mean"] is not None:
             low, high = found["ci95"]
-            lines.append(f"{name.replace('_', ' '):<22}{found['mean']:>8.3f}{f'{low:.3f} .. {high:.3f}':>16}")
+            lines.append(f"{name.replace('_', ' '):<22}{found['mean']:>8.3f}{f'{low:.3f} .. {high:.3f}':>18}")
     for agent, loss in content["left_out"].items():
         low, high = (100.0 * bound for bound in loss["ci95"])
         lines.append(f"without {agent:<14}{-100 * loss['saved_difference']:>+8.1f}{f'{-high:+.1f} .. {-low:+.1f}':>16}")

@@ -1,16 +1,22 @@
-"""Measures speed and calibrates scenarios: ``python -m warp_torchrl.benchmark [env train tasks rewards]``."""
+"""Measures speed and calibrates scenarios: ``python -m warp_torchrl.benchmark [tick|env|train|scaling|tasks|rewards]``.
+
+Several at once are measured one after the other.
+"""
 
 import argparse
 import json
-import platform
-import resource
-import sys
+import logging
+from argparse import Namespace
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
 
-import tensordict
-import torch
-import torchrl
-
-from warp_torchrl.benchmark.speed import environment_speed, speed_table, training_speed
+from warp_torchrl.benchmark.environments import LARGE, environment_speed, rate_table
+from warp_torchrl.benchmark.growth_figure import draw_growth
+from warp_torchrl.benchmark.machine import header, machine, peak_memory
+from warp_torchrl.benchmark.scaling import growth, growth_table
+from warp_torchrl.benchmark.shares import share_table
 from warp_torchrl.benchmark.tasks import (
     EPISODES,
     SCENARIOS,
@@ -20,54 +26,128 @@ from warp_torchrl.benchmark.tasks import (
     reward_table,
     task_table,
 )
+from warp_torchrl.benchmark.ticks import tick_cost, tick_table
+from warp_torchrl.benchmark.trainings import training_speed
+
+Rows = list[dict[str, Any]]
+_WORLDS = 256
 
 
-def _header() -> str:
-    return (
-        f"{platform.machine()}, {torch.get_num_threads()} threads, Python {platform.python_version()}, "
-        f"torch {torch.__version__}, torchrl {torchrl.__version__}, tensordict {tensordict.__version__}"
+def _speed(measure: Callable[..., Rows], options: Namespace, **more: Any) -> Rows:
+    """Measure each scenario asked for, or ``large`` as the targets have it."""
+    asked = [(name, ()) for name in options.scenario or ()] or [LARGE]
+    return [
+        row
+        for name, changes in asked
+        for row in measure(
+            name, _worlds(options), options.device, [*changes, *options.set], repeats=options.repeats, **more
+        )
+    ]
+
+
+def _worlds(options: Namespace) -> int:
+    return _WORLDS if options.worlds is None else options.worlds
+
+
+def _tick(options: Namespace) -> dict[str, Rows]:
+    return {"tick": _speed(tick_cost, options, compiled=not options.no_compile)}
+
+
+def _env(options: Namespace) -> dict[str, Rows]:
+    return {"env": _speed(environment_speed, options)}
+
+
+def _train(options: Namespace) -> dict[str, Rows]:
+    found: dict[str, Rows] = {"train": [], "profile": []}
+    common = [] if options.experiment is None else [f"experiment={options.experiment}"]
+    if options.experiment is None or options.worlds is not None:
+        common.append(f"n_worlds={_worlds(options)}")
+    if options.scenario is not None:
+        scenarios = [[f"scenario={name}"] for name in options.scenario]
+    else:
+        scenarios = [["scenario=default"] if options.experiment is None else []]
+    for scenario in scenarios:
+        overrides = [*common, *scenario, *options.set]
+        with_peer = options.experiment is not None
+        rates, shares = training_speed(overrides, options.device, options.repeats, with_peer)
+        found["train"] += rates
+        found["profile"] += shares
+    return found
+
+
+def _scaling(options: Namespace) -> dict[str, Rows]:
+    rows = _speed(growth, options)
+    if options.plot is not None:
+        found = machine(options.device)
+        draw_growth(rows, options.plot, f"{found['processor']}, threads: {found['threads']}")
+    return {"scaling": rows}
+
+
+def _tasks(options: Namespace) -> dict[str, Rows]:
+    names = options.scenario or SCENARIOS
+    return {"tasks": [calibrate(name, options.device, options.episodes, options.set) for name in names]}
+
+
+def _rewards(options: Namespace) -> dict[str, Rows]:
+    names = options.scenario or ["skirmish", "default"]
+    return {"rewards": [rank_rewards(name, options.device, options.episodes, options.set) for name in names]}
+
+
+_MEASURES = {"tick": _tick, "env": _env, "train": _train, "scaling": _scaling, "tasks": _tasks, "rewards": _rewards}
+_TABLES = {
+    "tick": tick_table,
+    "env": rate_table,
+    "train": rate_table,
+    "profile": share_table,
+    "scaling": growth_table,
+    "tasks": task_table,
+    "rewards": reward_table,
+}
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m warp_torchrl.benchmark", description=__doc__)
+    parser.add_argument("what", nargs="*", choices=[[], *_MEASURES], help="env and train by default")
+    parser.add_argument(
+        "--scenario",
+        nargs="+",
+        help="by default large with team.n_agents=4 steps_per_tick=1 for speed, but default for training; all for "
+        "tasks, two for rewards",
     )
+    parser.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE", help="overrides, as for train.py")
+    parser.add_argument("--experiment", help="for train: one of conf/experiment, also with Stable-Baselines3's PPO")
+    parser.add_argument("--worlds", type=int, help=f"{_WORLDS} by default, or the experiment's")
+    parser.add_argument("--repeats", type=int, default=7, help="times that each speed is measured")
+    parser.add_argument("--no-compile", action="store_true", help="for tick: leave the compiled tick out")
+    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="for scaling: draw it too")
+    parser.add_argument("--episodes", type=int, default=EPISODES)
+    parser.add_argument("--device", default="cpu")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
+    return parser
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Measure what the command line asks for, and print it."""
-    parser = argparse.ArgumentParser(prog="python -m warp_torchrl.benchmark", description=__doc__)
-    kinds = ["env", "train", "tasks", "rewards"]
-    parser.add_argument("what", nargs="*", choices=[[], *kinds], help="env and train by default")
-    parser.add_argument("--scenario", nargs="+", help="by default default for speed, all for tasks, two for rewards")
-    parser.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE", help="overrides, as for train.py")
-    parser.add_argument("--worlds", type=int, default=256)
-    parser.add_argument("--episodes", type=int, default=EPISODES)
-    parser.add_argument("--device", default="cpu")
-    parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
+    parser = _parser()
     options = parser.parse_args(arguments)
-    what = options.what or ["env", "train"]
-    speed = {"env": environment_speed, "train": training_speed}
-    rows = [
-        speed[each](scenario, options.worlds, options.device, options.set)
-        for each in what
-        if each in speed
-        for scenario in options.scenario or ["default"]
-    ]
-    names = (options.scenario or SCENARIOS) if "tasks" in what else ()
-    tasks = [calibrate(name, options.device, options.episodes, options.set) for name in names]
-    pay = [
-        rank_rewards(name, options.device, options.episodes, options.set)
-        for name in ((options.scenario or ["skirmish", "default"]) if "rewards" in what else ())
-    ]
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1 if sys.platform == "darwin" else 1024) / 1024
+    if options.plot is not None and find_spec("matplotlib") is None:
+        parser.error("--plot needs matplotlib (extra figures)")
+    logging.getLogger("torchrl").setLevel(logging.WARNING)  # it would tell the standard output of its buffers
+    described = machine(options.device)
+    if not options.json:
+        print(header(described), flush=True)
+    found: dict[str, Rows] = {}
+    for each in options.what or ["env", "train"]:
+        sections = _MEASURES[each](options)
+        found |= sections
+        for name, rows in sections.items() if not options.json else ():
+            print(f"\n{_TABLES[name](rows)}", flush=True)
     if options.json:
-        found = {"speed": rows, "tasks": tasks, "rewards": [mean_returns(row) for row in pay]}
-        print(json.dumps({"machine": _header(), **found, "peak_memory_gib": memory}, indent=1))
-        return
-    print(_header())
-    if rows:
-        print(speed_table(rows))
-    if tasks:
-        print(task_table(tasks))
-    if pay:
-        print(reward_table(pay))
-    print(f"peak memory of this process: {memory:.2f} GiB")
+        if "rewards" in found:
+            found["rewards"] = [mean_returns(row) for row in found["rewards"]]
+        print(json.dumps({"machine": described, **found, "peak_memory_gib": peak_memory()}, indent=1))
+    else:
+        print(f"\npeak memory of this process: {peak_memory():.2f} GiB")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,55 @@
+"""What was measured on: the machine, its threads, and the versions of what matters."""
+
+import os
+import platform
+import resource
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tensordict
+import torch
+import torchrl
+
+from warp_torchrl.benchmark.timing import is_alone
+
+
+def machine(device: str) -> dict[str, Any]:
+    """Return what a reader must know of the machine to compare figures with those of another."""
+    return {
+        "platform": platform.platform(),
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "threads": torch.get_num_threads(),
+        "device": device if device == "cpu" else torch.cuda.get_device_name(device),
+        "clock": "processor time" if is_alone(device) else "wall clock",
+        "python": platform.python_version(),
+        "torch": torch.__version__,
+        "torchrl": torchrl.__version__,
+        "tensordict": tensordict.__version__,
+        "numpy": np.__version__,
+    }
+
+
+def header(found: dict[str, Any]) -> str:
+    """Return the machine in two lines."""
+    libraries = ", ".join(f"{name} {found[name]}" for name in ("torch", "torchrl", "tensordict", "numpy"))
+    device = "" if found["device"] == "cpu" else f", {found['device']}"
+    return (
+        f"{found['platform']}, {found['processor']}, cores: {found['cores']}, threads: {found['threads']}{device}\n"
+        f"Python {found['python']}, {libraries}; times: {found['clock']}"
+    )
+
+
+def peak_memory() -> float:
+    """Return the most memory that this process has held so far [GiB]."""
+    unit = 1 if sys.platform == "darwin" else 1024  # bytes there, KiB elsewhere
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 2**30
+
+
+def _processor() -> str:
+    listing = Path("/proc/cpuinfo")
+    lines = listing.read_text().splitlines() if listing.exists() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()

@@ -1,0 +1,102 @@
+"""How the cost of a step grows with worlds, agents and cells, and how much memory a world takes."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import torch
+from tensordict import TensorDictBase
+
+from warp_torchrl.api import make_env
+from warp_torchrl.benchmark.machine import peak_memory
+from warp_torchrl.benchmark.tables import entry, spread_of, table
+from warp_torchrl.benchmark.timing import clock, spread
+
+if TYPE_CHECKING:
+    from warp_torchrl.env import WildfireEnv
+
+WORLDS = (1, 4, 16, 64, 256, 1024)
+AGENTS = (1, 2, 4, 8, 16)
+SIDES = (16, 32, 64, 128)
+_STEPS = 5  # in a repeat
+
+
+def growth(
+    scenario: str, n_worlds: int, device: str, overrides: Sequence[str] = (), repeats: int = 7
+) -> list[dict[str, Any]]:
+    """Measure a step of the environment for more and more worlds, then agents, then cells.
+
+    The steps are the first of episodes, at random: all worlds burn, and none is reset in them.
+
+    Args:
+        scenario: One of ``conf/scenario``: the map and the team of the first sweep.
+        n_worlds: B of the other two; the first goes to four times as many.
+        device: Where the worlds live.
+        overrides: In the command line's grammar.
+        repeats: Times that each is measured.
+
+    Returns:
+        A row for each size, with ``ms_per_step``, ``agent_steps_per_second``, ``kib_per_world``, the bytes of a world's
+        state and of what the environment shows of it, and ``peak_gib``, the most that the process has held until then.
+    """
+    sweeps = [("worlds", count, count, []) for count in WORLDS if count <= 4 * n_worlds]
+    sweeps += [("agents", count, n_worlds, [f"team.n_agents={count}"]) for count in AGENTS]
+    sweeps += [("cells", side, n_worlds, [f"landscape.size={side}"]) for side in SIDES]
+    return [
+        {"varies": varies} | _step_cost(scenario, worlds, device, [*overrides, *more], repeats)
+        for varies, _, worlds, more in sweeps
+    ]
+
+
+def growth_table(rows: list[dict[str, Any]]) -> str:
+    """Return the growth as a table for the terminal."""
+    columns = [
+        entry("varies"),
+        entry("worlds"),
+        entry("agents"),
+        entry("map", "size"),
+        entry("ms a step", "ms_per_step", "{:.2f}"),
+        spread_of("{:.2f}"),
+        entry("agent steps/s", "agent_steps_per_second", "{:,.0f}"),
+        entry("KiB a world", "kib_per_world", "{:,.0f}"),
+        entry("peak GiB", "peak_gib", "{:.2f}"),
+    ]
+    return table(columns, rows)
+
+
+def _step_cost(scenario: str, n_worlds: int, device: str, overrides: Sequence[str], repeats: int) -> dict[str, Any]:
+    env = make_env(scenario, n_worlds=n_worlds, device=device, overrides=overrides)
+    shown = env.step(env.rand_action(env.reset()))["next"]
+    memory = {
+        "kib_per_world": (_bytes(env.world_state.to_tensordict()) + _bytes(shown)) / n_worlds / 1024,
+        "peak_gib": peak_memory(),  # before the timing, which keeps a copy of the worlds
+    }
+    found = spread("ms_per_step", [1000.0 * seconds for seconds in _first_steps(env, device, repeats)])
+    height, width = env.world.size
+    return {
+        "scenario": scenario,
+        "worlds": n_worlds,
+        "agents": env.n_agents,
+        "cells": height * width,
+        "size": f"{height} x {width}",
+        **found,
+        "agent_steps_per_second": n_worlds * env.n_agents * 1000.0 / found["ms_per_step"],
+        **memory,
+    }
+
+
+def _first_steps(env: "WildfireEnv", device: str, repeats: int) -> list[float]:
+    """Return the time of a step [s], as often as asked, after steps that do not count."""
+    now, seconds = clock(device), []
+    start = env.world_state.clone()  # one step old
+    for _ in range(repeats + 1):
+        shown = env.set_state(start)
+        begin = now()
+        for _ in range(_STEPS):
+            shown = env.step(env.rand_action(shown))["next"]
+        seconds.append(max(now() - begin, 1e-9) / _STEPS)
+    return seconds[1:]
+
+
+def _bytes(worlds: TensorDictBase) -> int:
+    tensors = [value for value in worlds.flatten_keys(".").values() if isinstance(value, torch.Tensor)]
+    return sum(value.numel() * value.element_size() for value in tensors)

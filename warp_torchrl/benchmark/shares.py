@@ -1,0 +1,133 @@
+"""Where the time of the training loop goes."""
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Any
+
+import torch
+from tensordict import TensorDictBase
+
+from warp_torchrl.benchmark.tables import entry, table
+from warp_torchrl.benchmark.timing import Clock, clock
+from warp_torchrl.training import Training
+
+_PARTS = ("collector", "environment", "policy", "advantages", "sampling", "loss", "backward", "optimiser", "other")
+_COLLECTING = ("collector", "environment", "policy")
+
+
+class Stopwatch:
+    """Adds up the seconds of each part of what goes on.
+
+    Args:
+        now: Tells the time.
+    """
+
+    def __init__(self, now: Clock) -> None:
+        self.seconds: dict[str, float] = defaultdict(float)
+        self._now, self._last = now, now()
+
+    def lap(self, part: str) -> None:
+        """Count the time since the last lap as this part's."""
+        now = self._now()
+        self.seconds[part] += now - self._last
+        self._last = now
+
+
+def training_shares(training: Training, batches: Iterator[TensorDictBase], count: int) -> list[dict[str, Any]]:
+    """Measure where the time of some batches goes.
+
+    Args:
+        training: The run; it learns from the batches.
+        batches: Its collector's.
+        count: Batches to measure.
+
+    Returns:
+        A row for each part, with ``seconds`` a batch and its ``share``. The collector's are what the environment and
+        the policy leave to it; backward ends before the gradients are clipped, which is the optimiser's.
+    """
+    with _watched(training, clock(training.env.device.type)) as watch:
+        for _ in range(count):
+            batch = next(batches)
+            watch.lap("collector")
+            training._learn(batch)
+            watch.lap("other")
+    total = sum(watch.seconds.values())
+    collecting = sum(watch.seconds[part] for part in _COLLECTING)
+    seconds = {"collecting": collecting} | {part: watch.seconds[part] for part in _PARTS}
+    return [
+        {
+            "part": part,
+            "of": "collecting" if part in _COLLECTING else None,
+            "seconds": each / count,
+            "share": each / total,
+        }
+        for part, each in seconds.items()
+    ]
+
+
+def share_table(rows: list[dict[str, Any]]) -> str:
+    """Return the shares as a table for the terminal."""
+    columns = [
+        ("part of the training loop", lambda row: f"  {row['part']}" if row["of"] else row["part"]),
+        entry("scenario"),
+        entry("ms a batch", "milliseconds", "{:,.1f}"),
+        entry("share", "share", "{:.1%}"),
+    ]
+    return table(columns, [row | {"milliseconds": 1000.0 * row["seconds"]} for row in rows])
+
+
+@contextmanager
+def _watched(training: Training, now: Clock) -> Iterator[Stopwatch]:
+    """Let a stopwatch run over a training's parts; all is as it was when the context ends."""
+    watch, learner = Stopwatch(now), training.learner
+    samples = learner.samples
+
+    def timed_samples() -> Iterator[TensorDictBase]:
+        left = iter(samples())
+        while True:
+            watch.lap("other")
+            sample = next(left, None)
+            watch.lap("sampling")
+            if sample is None:
+                return
+            yield sample
+
+    with ExitStack() as stack:
+        for owner, name, before, after in (
+            (training.env, "step_and_maybe_reset", "collector", "environment"),
+            (learner.explore, "forward", "collector", "policy"),
+            (learner, "store", "other", "advantages"),
+            (learner.loss, "forward", "other", "loss"),
+            (torch.nn.utils, "clip_grad_norm_", "backward", "optimiser"),
+            (learner.optimizer, "step", "optimiser", "optimiser"),
+        ):
+            stack.enter_context(_replaced(owner, name, _timed(watch, getattr(owner, name), before, after)))
+        stack.enter_context(_replaced(learner, "samples", timed_samples))
+        yield watch
+
+
+def _timed(watch: Stopwatch, call: Callable[..., Any], before: str, after: str) -> Callable[..., Any]:
+    """Return a function whose time counts as ``after``, and the time until then as ``before``."""
+
+    def timed(*args: Any, **kwargs: Any) -> Any:
+        watch.lap(before)
+        found = call(*args, **kwargs)
+        watch.lap(after)
+        return found
+
+    return timed
+
+
+@contextmanager
+def _replaced(owner: Any, name: str, other: Any) -> Iterator[None]:
+    """Put something in an attribute's place until the context ends."""
+    own = vars(owner).get(name)
+    setattr(owner, name, other)
+    try:
+        yield
+    finally:
+        if own is None:
+            delattr(owner, name)
+        else:
+            setattr(owner, name, own)

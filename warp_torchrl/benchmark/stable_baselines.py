@@ -1,0 +1,66 @@
+"""The paper's training: Stable-Baselines3's PPO, through SuperSuit, on the NumPy environment."""
+
+from collections.abc import Callable
+from importlib.util import find_spec
+
+import torch
+
+from warp_torchrl.algorithms.ppo import Ppo
+from warp_torchrl.benchmark.environments import paper_stack
+from warp_torchrl.config import Settings
+from warp_torchrl.models import Mlp
+
+NAME = "SuperSuit + SB3 PPO"
+
+
+def reason_against(plan: Settings) -> str | None:
+    """Return why a plan cannot be trained with Stable-Baselines3, or None where it can."""
+    missing = [name for name in ("supersuit", "stable_baselines3") if find_spec(name) is None]
+    if missing:
+        return f"{' and '.join(missing)} not installed (extra interop)"
+    if not isinstance(plan.algorithm, Ppo) or type(plan.model) is not Mlp:
+        return "it trains algorithms mappo, ippo and ppo with model mlp"
+    return None
+
+
+def open_stable_baselines(plan: Settings) -> tuple[Callable[[], object], Callable[[], None]]:
+    """Return what learns from one batch of a plan's size, and what closes the worlds.
+
+    Networks, epochs, minibatch, worlds and steps are the plan's; each agent has its own sample, as SB3 counts them.
+
+    Args:
+        plan: Of an algorithm ``Ppo`` and a model ``Mlp``.
+    """
+    import stable_baselines3
+    import supersuit
+
+    algorithm, model, n_agents = plan.algorithm, plan.model, plan.world.team.n_agents
+    one = supersuit.pettingzoo_env_to_vec_env_v1(paper_stack(plan.world, plan.observation.radius))
+    processes = min(torch.get_num_threads(), plan.n_worlds)  # 1: in this process
+    worlds = supersuit.concat_vec_envs_v1(one, plan.n_worlds, num_cpus=processes, base_class="stable_baselines3")
+    learner = stable_baselines3.PPO(
+        "MlpPolicy",
+        worlds,
+        learning_rate=algorithm.learning_rate,
+        n_steps=plan.collector.steps,
+        batch_size=min(algorithm.minibatch_size * n_agents, plan.collector.steps * worlds.num_envs),
+        n_epochs=algorithm.epochs,
+        gamma=algorithm.gamma,
+        gae_lambda=algorithm.lmbda,
+        clip_range=algorithm.clip_epsilon,
+        ent_coef=algorithm.entropy_coeff,
+        vf_coef=algorithm.critic_coeff,
+        max_grad_norm=algorithm.max_grad_norm,
+        policy_kwargs={
+            "net_arch": {"pi": list(model.actor_hidden), "vf": list(model.critic_hidden)},
+            "activation_fn": {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}[model.activation],
+        },
+        seed=None,
+        device=plan.device,
+    )
+    total = plan.collector.steps * worlds.num_envs
+
+    def learn() -> object:
+        return learner.learn(total, reset_num_timesteps=False)
+
+    return learn, worlds.close

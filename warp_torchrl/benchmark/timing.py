@@ -1,0 +1,49 @@
+"""How times are taken: contenders turn and turn about, so that a busy machine slows all alike, and medians of repeats.
+
+On one thread it is the process's own processor time, which another's load does not change; else the wall clock.
+"""
+
+import statistics
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import torch
+
+Clock = Callable[[], float]
+
+
+def is_alone(device: str) -> bool:
+    """Return whether all work happens on one thread of the processor."""
+    return device == "cpu" and torch.get_num_threads() == 1
+
+
+def clock(device: str) -> Clock:
+    """Return what tells the time [s], after all work that a device was given."""
+    if device == "cpu":
+        return time.process_time if is_alone(device) else time.perf_counter
+
+    def after_all_work() -> float:
+        torch.cuda.synchronize()
+        return time.perf_counter()
+
+    return after_all_work
+
+
+def take_turns(contenders: Mapping[str, Callable[[], object]], repeats: int, device: str) -> dict[str, list[float]]:
+    """Return the time of each of ``repeats`` calls of each contender [s], after one call that does not count."""
+    now = clock(device)
+    for contender in contenders.values():
+        contender()
+    seconds: dict[str, list[float]] = {name: [] for name in contenders}
+    for _ in range(repeats):
+        for name, contender in contenders.items():
+            start = now()
+            contender()
+            seconds[name].append(max(now() - start, 1e-9))
+    return seconds
+
+
+def spread(name: str, values: Sequence[float]) -> dict[str, Any]:
+    """Return the median of some values under a name, and the lowest and the highest of them."""
+    return {name: statistics.median(values), "lowest": min(values), "highest": max(values)}

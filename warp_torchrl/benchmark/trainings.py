@@ -1,0 +1,52 @@
+"""How fast training is: collecting and learning, as ``train.py`` does, and with the paper's software."""
+
+import tempfile
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from warp_torchrl.benchmark.shares import training_shares
+from warp_torchrl.benchmark.stable_baselines import NAME, open_stable_baselines, reason_against
+from warp_torchrl.benchmark.timing import spread, take_turns
+from warp_torchrl.config import Record, compose_config, plain, settings
+from warp_torchrl.training import Training
+
+
+def training_speed(
+    overrides: Sequence[str], device: str, repeats: int = 7, with_peer: bool = False
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Measure agent steps a second of training: collecting and learning, as ``train.py`` does.
+
+    Args:
+        overrides: Of ``train.py``, in the command line's grammar.
+        device: Where all of it happens.
+        repeats: Batches that are measured.
+        with_peer: Whether to train with Stable-Baselines3 on the NumPy environment as well.
+
+    Returns:
+        A row for each way to train, with ``agent_steps_per_second``; and the shares of our training loop.
+    """
+    plan = settings(plain(compose_config("train", [*overrides, f"device={device}"])))
+    agents = plan.world.team.n_agents
+    common = {"scenario": plan.scenario, "size": "{} x {}".format(*plan.world.size), "agents": agents}
+    common["worlds"] = plan.n_worlds
+    reason = reason_against(plan) if with_peer else None
+    with ExitStack() as stack:
+        training = Training(plan, Record(), Path(stack.enter_context(tempfile.TemporaryDirectory())))
+        stack.callback(training.close)
+        batches = iter(training.collection)
+        contenders = {"training": lambda: training._learn(next(batches))}
+        if with_peer and reason is None:
+            contenders[NAME], close = open_stable_baselines(plan)
+            stack.callback(close)
+        agent_steps = training.frames_per_batch * agents
+        rows = [
+            {"what": name, **common} | spread("agent_steps_per_second", [agent_steps / second for second in seconds])
+            for name, seconds in take_turns(contenders, repeats, device).items()
+        ]
+        shares = training_shares(training, batches, repeats)
+    if len(rows) > 1:
+        rows = [row | {"ratio": row["agent_steps_per_second"] / rows[1]["agent_steps_per_second"]} for row in rows]
+    skipped = [{"what": NAME, "skipped": reason}] if reason else []
+    return rows + skipped, [{"scenario": plan.scenario, **row} for row in shares]
