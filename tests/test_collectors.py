@@ -9,8 +9,9 @@ import torch
 
 from warp_torchrl.checkpoint import newest
 from warp_torchrl.collectors import Process, WorkerDied
-from warp_torchrl.config import Record, compose_config, plain, settings
+from warp_torchrl.config import Record, compose_config, plain
 from warp_torchrl.construction import ConfigError
+from warp_torchrl.settings import settings
 from warp_torchrl.training import Training
 
 TINY = [

@@ -6,18 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from warp_torchrl.config import (
-    COMPONENTS,
-    Record,
-    compose_config,
-    conf_folder,
-    is_sweep,
-    plain,
-    recompose,
-    settings,
-    without_targets,
-)
+from warp_torchrl.config import Record, compose_config, conf_folder, is_sweep, plain, recompose, without_targets
 from warp_torchrl.construction import ConfigError, build
+from warp_torchrl.settings import COMPONENTS, settings
 from warp_torchrl.world.array import Array
 from warp_torchrl.world.gridded import Gridded
 from warp_torchrl.world.raster import Raster

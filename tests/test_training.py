@@ -11,8 +11,9 @@ import torch
 from warp_torchrl import checkpoint as checkpoints
 from warp_torchrl.api import policy_of
 from warp_torchrl.checkpoint import CheckpointError, newest
-from warp_torchrl.config import Record, compose_config, plain, settings, without_targets
+from warp_torchrl.config import Record, compose_config, plain, without_targets
 from warp_torchrl.models import ACTION
+from warp_torchrl.settings import settings
 from warp_torchrl.training import NumericalFailure, Stopped, Training
 
 TINY = [

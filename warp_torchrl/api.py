@@ -6,10 +6,11 @@ from pathlib import Path
 import torch
 
 from warp_torchrl import checkpoint as checkpoints
-from warp_torchrl.config import build_components, compose_config, plain, recompose
+from warp_torchrl.config import compose_config, plain, recompose
 from warp_torchrl.construction import build
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.policy import TrainedPolicy
+from warp_torchrl.settings import build_components
 
 
 def make_env(

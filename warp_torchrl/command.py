@@ -16,18 +16,7 @@ from omegaconf import DictConfig, OmegaConf
 from warp_torchrl import checkpoint as checkpoints
 from warp_torchrl.api import policy_of
 from warp_torchrl.collectors import WorkerDied
-from warp_torchrl.config import (
-    COMPONENTS,
-    Record,
-    Settings,
-    compose_config,
-    conf_folder,
-    is_sweep,
-    plain,
-    recompose,
-    settings,
-    without_targets,
-)
+from warp_torchrl.config import Record, compose_config, conf_folder, is_sweep, plain, recompose, without_targets
 from warp_torchrl.construction import ConfigError
 from warp_torchrl.evaluation import (
     MODES,
@@ -42,6 +31,7 @@ from warp_torchrl.evaluation import (
 )
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import Signature, signature
+from warp_torchrl.settings import COMPONENTS, Settings, settings
 from warp_torchrl.sweep import SweepSummary, jobs, method, note_failure
 from warp_torchrl.training import NumericalFailure, Stopped, Training
 

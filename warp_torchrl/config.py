@@ -1,4 +1,4 @@
-"""Configuration: composes the yaml files of ``conf/``, checks every value, builds the components.
+"""Configuration: composes the yaml files of ``conf/``, and lays out what run folders keep of it.
 
 A component's types, defaults and rules stand in its dataclass and nowhere else. The yaml files name the class, always
 one of this package's own; nothing that is read from a run folder is ever instantiated by name.
@@ -7,11 +7,10 @@ one of this package's own; nothing that is read from a run folder is ever instan
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-import torch
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 from hydra.errors import HydraException
@@ -19,133 +18,10 @@ from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from warp_torchrl.construction import ConfigError, build, construct
-from warp_torchrl.env import WildfireEnv
-from warp_torchrl.world.fusion import check_compiler
-from warp_torchrl.world.world import World
-
-COMPONENTS = (
-    "landscape",
-    "wind",
-    "fire",
-    "team",
-    "ignition",
-    "observation",
-    "reward",
-    "model",
-    "algorithm",
-    "collector",
-    "logger",
-)
-"""Groups whose options are classes."""
-WORLD_KEYS = ("scenario", "landscape", "wind", "fire", "team", "ignition", "steps_per_tick", "horizon", "cell_size")
-"""What a scenario sets."""
-TRAINING_SEEDS = 4096
-"""Seeds that one training seed owns: world i of seed s draws with 4096 s + i."""
+from warp_torchrl.construction import ConfigError
+from warp_torchrl.settings import COMPONENTS, WORLD_KEYS
 
 OmegaConf.register_new_resolver("pid", os.getpid, replace=True)
-
-
-@dataclass(frozen=True, kw_only=True)
-class CheckpointPlan:
-    """When training saves.
-
-    Attributes:
-        interval: Frames between checkpoints.
-        keep: Checkpoints that stay.
-
-    Raises:
-        ValueError: If the interval is not positive or fewer than two are kept.
-    """
-
-    interval: int = 500_000
-    keep: int = 2
-
-    def __post_init__(self) -> None:
-        if self.interval < 1:
-            raise ValueError(f"interval must be at least 1 frame, got {self.interval}")
-        if not 2 <= self.keep <= 10_000:
-            raise ValueError(f"keep must be in 2..10000, got {self.keep}")
-
-
-@dataclass(frozen=True, kw_only=True)
-class EvaluationPlan:
-    """How policies are evaluated.
-
-    Attributes:
-        interval: Frames between evaluations during training; 0 evaluates only at the end.
-        episodes: Worlds.
-        first_seed: Seed of the first; training seeds lie below 1 000 000.
-        mode: ``sampled``, ``deterministic``, or ``best``: whichever did better on training seeds.
-        leave_one_out: Play once more for each agent, without it, to see what it is worth.
-
-    Raises:
-        ValueError: If a value is out of its range.
-    """
-
-    interval: int = 0
-    episodes: int = 256
-    first_seed: int = 1_000_000
-    mode: Literal["sampled", "deterministic", "best"] = "best"
-    leave_one_out: bool = False
-
-    def __post_init__(self) -> None:
-        if self.interval < 0:
-            raise ValueError(f"interval must be 0 or more frames, got {self.interval}")
-        if not 1 <= self.episodes <= 1_000_000:
-            raise ValueError(f"episodes must be in 1..1000000, got {self.episodes}")
-        if not 0 <= self.first_seed < 2**62:
-            raise ValueError(f"first_seed must be in 0..2**62, got {self.first_seed}")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Settings:
-    """Everything that a run needs, checked: the components, built, and the run's own numbers.
-
-    Raises:
-        ValueError: If a value is out of its range.
-    """
-
-    scenario: str
-    world: World
-    observation: Any
-    reward: Any
-    model: Any
-    algorithm: Any
-    collector: Any
-    logger: Any
-    n_worlds: int
-    total_frames: int
-    seed: int
-    device: str
-    compile: bool
-    checkpoint: CheckpointPlan
-    evaluation: EvaluationPlan
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.n_worlds <= TRAINING_SEEDS:
-            raise ValueError(f"n_worlds must be in 1..{TRAINING_SEEDS}, got {self.n_worlds}")
-        if not 1 <= self.total_frames <= 10**15:
-            raise ValueError(f"total_frames must be in 1..1e15, got {self.total_frames}")
-        if not 0 <= self.seed < 244:
-            raise ValueError(
-                f"seed must be in 0..243, so that no training world has an evaluation seed, got {self.seed}"
-            )
-        _check_device(self.device)
-        if self.compile:
-            check_compiler(torch.device(self.device))
-
-    def make_env(self, n_worlds: int, seed: int) -> WildfireEnv:
-        """Return an environment of the run's scenario, on the run's device."""
-        return WildfireEnv(
-            self.world,
-            observation=self.observation,
-            reward=self.reward,
-            n_worlds=n_worlds,
-            seed=seed,
-            device=self.device,
-            fuse=self.compile,
-        )
 
 
 def conf_folder() -> Path:
@@ -188,65 +64,6 @@ def _compose(name: str, overrides: Sequence[str], with_hydra: bool = False) -> D
         raise ConfigError(_one_line(error)) from None
     except ValueError as error:
         raise ConfigError(f"{_one_line(error)}, in {' '.join(overrides)}") from None
-
-
-def settings(config: Mapping[str, Any]) -> Settings:
-    """Check a composed configuration and build what it describes.
-
-    Raises:
-        ConfigError: With key, value and rule.
-    """
-    known = {each.name for each in fields(Settings)} | {*COMPONENTS, *WORLD_KEYS, "resume", "debug", "policy"}
-    for key in config:
-        if key not in known:
-            raise ConfigError(f"{key} is not a key of the configuration; it has {', '.join(sorted(known - {'world'}))}")
-    built = build_components(config)
-    values = {each.name: built.get(each.name, config.get(each.name)) for each in fields(Settings)}
-    values["world"] = built["world"]
-    values["checkpoint"] = construct(CheckpointPlan, config["checkpoint"], "checkpoint")
-    values["evaluation"] = construct(EvaluationPlan, config["evaluation"], "evaluation")
-    _check_together(config)
-    made = construct(Settings, values, "")
-    try:
-        made.algorithm.check_batch(made.n_worlds * made.collector.steps)
-    except ValueError as error:
-        raise ConfigError(f"algorithm.{error}") from None
-    try:
-        made.collector.check_worlds(made.n_worlds)
-    except ValueError as error:
-        raise ConfigError(f"collector.{error}") from None
-    return made
-
-
-def build_components(config: Mapping[str, Any]) -> dict[str, Any]:
-    """Build every component of a composed configuration, and the ``world`` of those that make one.
-
-    Raises:
-        ConfigError: With key, value and rule.
-    """
-    built = {name: build(config[name], name) for name in COMPONENTS}
-    world = {each.name: built.get(each.name, config.get(each.name)) for each in fields(World)}
-    return {**built, "world": construct(World, world, "")}
-
-
-def _check_together(config: Mapping[str, Any]) -> None:
-    reward, algorithm = config["reward"], config["algorithm"]
-    if reward["shaping"] > 0.0 and reward["gamma"] != algorithm["gamma"]:
-        raise ConfigError(
-            f"reward.gamma must be algorithm.gamma, {algorithm['gamma']}, for shaping to leave optimal policies as "
-            f"they are, got {reward['gamma']}"
-        )
-
-
-def _check_device(name: str) -> None:
-    try:
-        device = torch.device(name)
-    except RuntimeError:
-        raise ValueError(f"device must be cpu, cuda or cuda:<number>, got {name}") from None
-    if device.type not in ("cpu", "cuda"):
-        raise ValueError(f"device must be cpu, cuda or cuda:<number>, got {name}")
-    if device.type == "cuda" and (device.index or 0) >= torch.cuda.device_count():
-        raise ValueError(f"device must be one of this machine's {torch.cuda.device_count()} CUDA devices, got {name}")
 
 
 def _one_line(error: Exception) -> str:

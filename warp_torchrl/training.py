@@ -16,12 +16,13 @@ from tqdm import tqdm
 from warp_torchrl import checkpoint as checkpoints
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.collectors import WorkerDied
-from warp_torchrl.config import TRAINING_SEEDS, Record, Settings
+from warp_torchrl.config import Record
 from warp_torchrl.env import EPISODE_METRICS
 from warp_torchrl.evaluation import MODES, play
 from warp_torchrl.logging import MetricsFile
 from warp_torchrl.models import signature
 from warp_torchrl.reward_scale import RewardScale
+from warp_torchrl.settings import TRAINING_SEEDS, Settings
 
 log = logging.getLogger("warp_torchrl")
 _SECONDS_BETWEEN_LINES = 15.0
