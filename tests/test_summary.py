@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from warp_torchrl.summary import draw, gather, table
+from warp_torchrl.summary import draw, gather, main, table
 
 
 def write(folder, policy, saved, scenario="tiny", configuration="", seeds=None):
@@ -51,6 +51,19 @@ def test_policies_on_other_fires_are_not_compared(sweep):
     write(sweep / "4", "greedy", [0.1, 0.1, 0.1], seeds=[7, 8, 9])
     row = next(line for line in table(gather(sweep)).splitlines() if "greedy" in line)
     assert row.endswith("| - | - | - |")
+
+
+def test_any_runs_are_compared_with_any_of_them(sweep, capsys):
+    main([str(sweep / "0"), str(sweep / "1"), str(sweep / "2"), "--against", "local"])
+    header, _, first, second = capsys.readouterr().out.splitlines()
+    assert "to local" in header
+    assert "| +16.7 |" in first and first.endswith("| 75 % |") and second.endswith("| - | - | - |")
+
+
+def test_folders_without_evaluations_are_refused(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        main([str(tmp_path)])
+    assert "no evaluation.json under" in capsys.readouterr().err
 
 
 def test_the_figure_is_drawn(sweep, tmp_path):

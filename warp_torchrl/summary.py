@@ -1,5 +1,9 @@
-"""What the jobs of a sweep came to: one table and one figure from their ``evaluation.json`` files."""
+"""What runs came to: one table and one figure from their ``evaluation.json`` files.
 
+A sweep ends with them; ``python -m warp_torchrl.summary FOLDER ...`` makes them of any runs.
+"""
+
+import argparse
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -22,10 +26,10 @@ class Entry(NamedTuple):
     seeds: tuple[int, ...]
 
 
-def gather(folder: Path) -> list[Entry]:
-    """Return what the ``evaluation.json`` files under a folder hold, runs that differ in their seed alone together."""
+def gather(*folders: Path) -> list[Entry]:
+    """Return what the ``evaluation.json`` files under folders hold, runs that differ in their seed alone together."""
     found: dict[tuple[str, str, str, tuple[int, ...]], list[Mapping[str, Any]]] = {}
-    for path in sorted(folder.glob("**/evaluation.json")):
+    for path in (path for folder in folders for path in sorted(folder.glob("**/evaluation.json"))):
         content = json.loads(path.read_text(encoding="utf-8"))
         key = (content["scenario"], content["method"], content["configuration"], tuple(content["seeds"]))
         found.setdefault(key, []).append(content)
@@ -48,14 +52,20 @@ def _differ(found: Mapping[tuple, Any], scenario: str, method: str) -> bool:
     return len({key[2] for key in found if key[:2] == (scenario, method)}) > 1
 
 
-def table(entries: Sequence[Entry]) -> str:
-    """Return the entries as a Markdown table, best first in each scenario, each compared with the best."""
+def table(entries: Sequence[Entry], against: str | None = None) -> str:
+    """Return the entries as a Markdown table, best first in each scenario, each compared with one of them.
+
+    Args:
+        entries: Policies on scenarios.
+        against: With which policy; by default, and where a scenario lacks it, with the best.
+    """
     lines = [
-        "| scenario | policy | runs | fires | saved % | 95 % | iqm % | success % | to the best | 95 % | better on |",
+        f"| scenario | policy | runs | fires | saved % | 95 % | iqm % | success % | to {against or 'the best'} | 95 % "
+        "| better on |",
         "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for group in _by_scenario(entries):
-        best = group[0]
+        other = next((entry for entry in group if entry.policy == against), group[0])
         for entry in group:
             saved = summarise(entry.saved)
             cells = [
@@ -68,10 +78,10 @@ def table(entries: Sequence[Entry]) -> str:
                 f"{100 * saved['iqm']:.1f}",
                 f"{100 * entry.success.mean():.1f}",
             ]
-            if entry is best or entry.seeds != best.seeds:
+            if entry is other or entry.seeds != other.seeds:
                 cells += ["-", "-", "-"]
             else:
-                gap = compare(entry.saved, best.saved)
+                gap = compare(entry.saved, other.saved)
                 cells += [
                     f"{100 * gap['saved_difference']:+.1f}",
                     _range(gap["ci95"], "+"),
@@ -139,3 +149,22 @@ def _by_scenario(entries: Sequence[Entry]) -> list[list[Entry]]:
 def _range(bounds: Sequence[float], sign: str = "") -> str:
     low, high = (100.0 * bound for bound in bounds)
     return f"{low:{sign}.1f} .. {high:{sign}.1f}"
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Print the table of the runs that the command line names, and draw the figure where it says so."""
+    parser = argparse.ArgumentParser(prog="python -m warp_torchrl.summary", description=__doc__)
+    parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER", help="runs, or folders of runs")
+    parser.add_argument("--against", metavar="POLICY", help="compare with this policy instead of the best")
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="draw them as well")
+    options = parser.parse_args(arguments)
+    entries = gather(*options.folders)
+    if not entries:
+        parser.error(f"no evaluation.json under {', '.join(map(str, options.folders))}")
+    print(table(entries, options.against))
+    if options.plot is not None:
+        draw(entries, options.plot)
+
+
+if __name__ == "__main__":
+    main()
