@@ -1,16 +1,36 @@
 """What the documentation shows must run."""
 
+import os
 import re
+import shlex
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
-DOCS = Path(__file__).parent.parent / "docs"
-PAGES = sorted(DOCS.glob("*.md"))
+ROOT = Path(__file__).parent.parent
+DOCS = ROOT / "docs"
+SITE = ROOT / ".mkdocs.yml"
+PAGES = [*sorted(DOCS.glob("*.md")), ROOT / "README.md", ROOT / ".github" / "CONTRIBUTING.md"]
 
 
-def blocks(page: str) -> list[str]:
-    return re.findall(r"```python\n(.*?)```", (DOCS / page).read_text(), flags=re.DOTALL)
+def blocks(page: str, language: str = "python") -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", (DOCS / page).read_text(), flags=re.DOTALL)
+
+
+def run(*command: str, folder: Path, **environment: str) -> subprocess.CompletedProcess:
+    """Run one of Python's modules or programs in a folder, with this project or the copy that ``PYTHONPATH`` names."""
+    return subprocess.run(
+        [sys.executable, *command],
+        cwd=folder,
+        env={**os.environ, "OMP_NUM_THREADS": "1", "NO_MKDOCS_2_WARNING": "1", **environment},
+        capture_output=True,
+        text=True,
+        timeout=580,
+        check=False,
+    )
 
 
 def test_the_example_of_the_fire_alone_runs(capsys):
@@ -29,3 +49,129 @@ def test_every_link_and_picture_of_a_page_is_there(page):
     for target in re.findall(r"\]\(([^)#]+)\)", page.read_text()):
         if not target.startswith("http"):
             assert (page.parent / target).exists(), target
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.name)
+def test_a_page_links_to_nothing_outside_of_the_site(page):
+    assert not re.findall(r"\]\((\.\.[^)]*)\)", page.read_text()), "such a link works on GitHub alone"
+
+
+# The site
+
+
+def test_every_page_is_in_the_navigation():
+    navigation = SITE.read_text().partition("\nnav:\n")[2].partition("\n\n")[0]
+    assert sorted(re.findall(r": (\S+\.md)", navigation)) == sorted(page.name for page in DOCS.glob("*.md"))
+
+
+def test_the_site_builds_without_warnings(tmp_path):
+    pytest.importorskip("material", reason="the site needs the extra docs")
+    pytest.importorskip("mkdocstrings", reason="the site needs the extra docs")
+    done = run("-m", "mkdocs", "build", "--strict", "-f", str(SITE), "-d", str(tmp_path / "site"), folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    built = {path.stem for path in (tmp_path / "site").glob("*.html")}
+    assert built >= {page.stem for page in DOCS.glob("*.md")}
+    assert 'id="warp_torchrl.api.make_env"' in (tmp_path / "site" / "api.html").read_text()
+    assert "concat_vec_envs_v1" in (tmp_path / "site" / "interop.html").read_text(), "the examples stand in the page"
+
+
+# The tutorial
+
+
+SMALL = {
+    r"total_frames=\S+": "total_frames=64",
+    r"n_worlds=\S+": "n_worlds=4 collector.steps=8 algorithm.minibatch_size=16",
+    r"evaluation\.episodes=\S+": "evaluation.episodes=3 horizon=16",
+}
+
+
+@pytest.mark.slow
+def test_the_tutorial_runs_from_its_first_command_to_its_last(tmp_path, monkeypatch, capsys):
+    for program in ("train.py", "evaluate.py"):
+        shutil.copy(ROOT / program, tmp_path)
+    commands = [line for block in blocks("tutorial.md", "bash") for line in block.replace("\\\n", "").splitlines()]
+    commands = [line for line in commands if re.match(r"python (train|evaluate)\.py ", line)]
+    for line in commands:
+        for pattern, smaller in SMALL.items():
+            line = re.sub(pattern, smaller, line)
+        done = run(*shlex.split(line)[1:], folder=tmp_path)
+        is_mistake = line.endswith("team.n_agents=0")
+        assert done.returncode == (2 if is_mistake else 0), f"{line}\n{done.stderr}"
+        assert not is_mistake or done.stderr.splitlines()[-1] in (DOCS / "tutorial.md").read_text()
+    assert (tmp_path / "outputs" / "sweep" / "summary.md").exists() and len(commands) > 7
+    monkeypatch.chdir(tmp_path)
+    names: dict = {}
+    there = next(block for block in blocks("interop.md") if "load_policy" in block)
+    for block in [*blocks("tutorial.md"), there]:
+        exec(block, names)
+    first, second = capsys.readouterr().out.splitlines()
+    assert re.fullmatch(r"\d+ episodes, \d+% of the trees saved", first)
+    assert re.fullmatch(r"\d+% of the trees saved", second)
+
+
+# Interop
+
+
+def test_every_example_is_shown_and_linked_once():
+    page = (DOCS / "interop.md").read_text()
+    examples = sorted(path.name for path in (DOCS / "examples").glob("*.py"))
+    assert sorted(re.findall(r'--8<-- "examples/(\S+)"', page)) == examples
+    assert sorted(re.findall(r"\]\(examples/(\S+)\)", page)) == examples
+
+
+def test_the_views_of_pettingzoo_and_gymnasium_are_as_shown(capsys):
+    names: dict = {}
+    for block in blocks("interop.md")[:2]:
+        exec(block, names)
+    assert re.fullmatch(r"\d+% of the trees saved\n", capsys.readouterr().out)
+    assert names["central"].shape == (9, 16, 16) and names["frame"].dtype == "uint8"
+    assert names["rewards"].shape == (64,) and names["infos"]["saved"].shape == (64,)
+
+
+# Extending
+
+
+@pytest.fixture(scope="module")
+def extended(tmp_path_factory):
+    """A copy of the project with the files that docs/extending.md shows."""
+    copy = tmp_path_factory.mktemp("extended")
+    for folder in ("warp_torchrl", "conf", "tests"):
+        shutil.copytree(ROOT / folder, copy / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "pyproject.toml", copy)
+    files = re.findall(r'```\w+ title="(\S+)"\n(.*?)```', (DOCS / "extending.md").read_text(), flags=re.DOTALL)
+    for path, text in files:
+        assert not (copy / path).exists(), "an extension changes no file that is there"
+        (copy / path).write_text(text)
+    return copy, [path for path, _ in files]
+
+
+def test_an_extension_is_one_module_one_yaml_and_one_test(extended):
+    _, files = extended
+    assert [Path(path).parts[0] for path in files] == ["warp_torchrl", "conf", "tests"] * 3
+
+
+def test_the_extensions_keep_to_their_own_tests_and_the_configuration_s(extended):
+    copy, files = extended
+    tests = [path for path in files if path.startswith("tests/")]
+    passes(copy, *tests, "tests/test_conf.py")
+
+
+@pytest.mark.slow
+def test_the_extensions_keep_to_what_is_asked_of_all(extended):
+    passes(extended[0], "tests/algorithms/test_every_algorithm.py", "tests/test_architecture.py")
+
+
+def test_the_extensions_are_written_as_the_rest_is(extended):
+    pytest.importorskip("ruff", reason="needs the extra dev")
+    copy, files = extended
+    modules = [path for path in files if path.endswith(".py")]
+    for check in (("check", "--no-cache"), ("format", "--check", "--no-cache")):
+        done = run("-m", "ruff", *check, *modules, folder=copy)
+        assert done.returncode == 0, done.stdout
+
+
+def passes(copy: Path, *tests: str) -> None:
+    new = ["-k", "alight or cold_front or surrogate"]
+    done = run("-m", "pytest", "-n", "0", "-p", "no:cacheprovider", *tests, *new, folder=copy, PYTHONPATH=str(copy))
+    assert done.returncode == 0, done.stdout
+    assert " passed" in done.stdout

@@ -10,7 +10,7 @@ from warp_torchrl.config import compose_config, plain, recompose
 from warp_torchrl.construction import build
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.policy import TrainedPolicy
-from warp_torchrl.settings import build_components
+from warp_torchrl.settings import ENVIRONMENT, build_components
 
 
 def make_env(
@@ -43,7 +43,7 @@ def make_env(
         ConfigError: A ``ValueError``, with key, value and rule.
     """
     config = plain(compose_config("train", [f"scenario={scenario}", *overrides]))
-    parts = build_components(config)
+    parts = build_components(config, ENVIRONMENT)
     return WildfireEnv(
         parts["world"],
         observation=parts["observation"],

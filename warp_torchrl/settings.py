@@ -1,6 +1,6 @@
 """The settings of a run: every value checked, every component built, from a composed configuration as plain values."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Literal
 
@@ -25,6 +25,8 @@ COMPONENTS = (
     "logger",
 )
 """Groups whose options are classes."""
+ENVIRONMENT = COMPONENTS[: COMPONENTS.index("reward") + 1]
+"""Those that make an environment."""
 WORLD_KEYS = ("scenario", "landscape", "wind", "fire", "team", "ignition", "steps_per_tick", "horizon", "cell_size")
 """What a scenario sets."""
 TRAINING_SEEDS = 4096
@@ -161,13 +163,17 @@ def settings(config: Mapping[str, Any]) -> Settings:
     return made
 
 
-def build_components(config: Mapping[str, Any]) -> dict[str, Any]:
-    """Build every component of a composed configuration, and the ``world`` of those that make one.
+def build_components(config: Mapping[str, Any], names: Sequence[str] = COMPONENTS) -> dict[str, Any]:
+    """Build components of a composed configuration, and the ``world`` of those that make one.
+
+    Args:
+        config: As plain values.
+        names: Which; those of the world must be among them.
 
     Raises:
         ConfigError: With key, value and rule.
     """
-    built = {name: build(config[name], name) for name in COMPONENTS}
+    built = {name: build(config[name], name) for name in names}
     world = {each.name: built.get(each.name, config.get(each.name)) for each in fields(World)}
     return {**built, "world": construct(World, world, "")}
 

@@ -30,7 +30,7 @@ def simulate(
     Args:
         cells: The paper's codes, uint8 [B, H, W]: 0 empty, 1..10 tree age, 11..15 fire.
         cover: Land cover, uint8 [B, H, W]: 0 lake, 1 wetland, 2 grassland, 3 forest, 4 bare.
-        elevation: float32 [B, H, W] [m]; None is flat.
+        elevation: In metres, float32 [B, H, W]; None is flat.
         wind: (u east, v north) of the air's motion [m/s], or a wind component.
         fire: One of ``conf/fire``, ``paper`` being the complete automaton, or a ``Fire``.
         ticks: Fire ticks to run.

@@ -42,7 +42,7 @@ def learn(learner, batch):
 
 
 def test_the_contract_s_algorithms_are_there():
-    assert set(NAMES) == {"mappo", "ippo", "ppo", "a2c", *REPLAYS}
+    assert set(NAMES) >= {"mappo", "ippo", "ppo", "a2c", *REPLAYS}
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -33,7 +33,7 @@ class Array:
         path: An ``.npz`` file with ``cover`` [H, W] of codes 0..4, and optionally ``elevation`` [m], ``age`` 0..10 and
             ``assets``; or None where the arrays are passed.
         cover: Land cover codes [H, W], anything ``numpy.asarray`` takes.
-        elevation: Elevation [H, W] [m]; None makes a flat world.
+        elevation: In metres, [H, W]; None makes a flat world.
         age: Tree age [H, W]; None draws it for each episode.
         assets: What each cell is worth [H, W], 0 or more in any unit, for rewards that ask; None leaves all alike.
         size: Side of the world, or (rows, columns) [cells]: a window of the array. None, or the array's own shape,

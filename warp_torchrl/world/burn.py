@@ -31,7 +31,7 @@ class FireHistory:
         return torch.where(self.arrival >= 0, self.arrival, torch.nan).nanmean(dim=0)
 
     def burned_area(self) -> Tensor:
-        """Return the area that has caught fire by each tick, float32 [B, T + 1] [hectares]."""
+        """Return the area that has caught fire by each tick, in hectares, float32 [B, T + 1]."""
         ticks = self.alight.shape[1]
         first = torch.zeros(len(self.arrival), ticks + 1, dtype=torch.int64, device=self.arrival.device)
         slot = torch.where(self.arrival >= 0, self.arrival, ticks).flatten(1).to(torch.int64)

@@ -1,0 +1,37 @@
+"""The worked examples of docs/examples run as scripts, for a few steps."""
+
+import re
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parent.parent / "docs" / "examples"
+QUICK = {"pettingzoo_round_trip", "frame_stack_torchrl"}
+CASES = {  # packages that it needs, steps, what it prints
+    "supersuit_sb3_ppo": (("supersuit", "stable_baselines3"), 1024, r"1024 agent steps, \d+\.\d% of the trees saved"),
+    "sb3_dqn": (("stable_baselines3",), 200, r"200 steps, \d+\.\d% of the trees saved"),
+    "pettingzoo_round_trip": ((), 40, "40 steps, the same rewards: True"),
+    "frame_stack_torchrl": ((), 256, r"views \[16, 2, 44, 11, 11\], \d\.\d\d nats of entropy left"),
+    "frame_stack_supersuit": (("supersuit", "stable_baselines3"), 1024, "147 numbers became 588; 1024 agent steps"),
+    "benchmarl_task": (("benchmarl",), 512, "512 world steps"),
+}
+
+
+def test_every_example_is_run():
+    assert {path.stem for path in EXAMPLES.glob("*.py")} == set(CASES)
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name in QUICK else pytest.mark.slow) for name in CASES]
+)
+def test_an_example_runs(name, tmp_path, monkeypatch, capsys):
+    packages, steps, says = CASES[name]
+    for package in packages:
+        pytest.importorskip(package, reason=f"{name}.py needs {package}")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [f"{name}.py", "--steps", str(steps)])
+    runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
+    last = capsys.readouterr().out.strip().splitlines()[-1]
+    assert re.fullmatch(says, last), last
