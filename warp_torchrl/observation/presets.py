@@ -81,7 +81,7 @@ class Surroundings(Local):
 class Paper:
     """The paper's view: terrain class, tree age and fire stage about the agent, flattened.
 
-    Off the map the terrain class is 0 and the others too; covers are (code + 1) / 5, ages / 10, fire stages / 5.
+    Off the map the terrain class is 0 and the others too; covers are (code + 1) / 5, ages / 10.2, fire stages / 5.
 
     Attributes:
         radius: r of the view [cells]; the vector has 3 (2 r + 1)^2 entries.
