@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 from pathlib import Path
 
 import pytest
@@ -107,3 +108,9 @@ def test_workers_must_share_the_worlds():
         settings(plain(compose_config("train", [*TINY, "collector=process", "collector.workers=3"])))
     with pytest.raises(ValueError, match="workers must be in"):
         Process(workers=0)
+
+
+def test_a_missing_ray_is_told(monkeypatch):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(ConfigError, match=r"collector\.workers need Ray: pip install"):
+        settings(plain(compose_config("train", [*TINY, "collector=ray"])))

@@ -146,7 +146,7 @@ class Ray(Process):
         try:
             import ray  # noqa: F401
         except ImportError:
-            raise ValueError('collector=ray needs Ray: pip install "warp_torchrl[ray]"') from None
+            raise ValueError('workers need Ray: pip install "warp_torchrl[ray]"') from None
 
     def backend(self) -> dict[str, Any]:
         """Return what TorchRL's collector is told of where it works."""
