@@ -1,6 +1,7 @@
 """What a sweep came to: runs that are gathered, the table, the figure."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -64,6 +65,14 @@ def test_folders_without_evaluations_are_refused(tmp_path, capsys):
     with pytest.raises(SystemExit):
         main([str(tmp_path)])
     assert "no evaluation.json under" in capsys.readouterr().err
+
+
+def test_a_missing_matplotlib_is_told_after_the_table(sweep, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(SystemExit):
+        main([str(sweep), "--plot", str(sweep / "figure.png")])
+    printed = capsys.readouterr()
+    assert "| mappo |" in printed.out and "--plot needs Matplotlib: pip install" in printed.err
 
 
 def test_the_figure_is_drawn(sweep, tmp_path):

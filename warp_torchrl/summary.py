@@ -163,7 +163,10 @@ def main(arguments: list[str] | None = None) -> None:
         parser.error(f"no evaluation.json under {', '.join(map(str, options.folders))}")
     print(table(entries, options.against))
     if options.plot is not None:
-        draw(entries, options.plot)
+        try:
+            draw(entries, options.plot)
+        except ImportError:
+            parser.error('--plot needs Matplotlib: pip install "warp_torchrl[figures]"')
 
 
 if __name__ == "__main__":

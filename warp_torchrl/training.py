@@ -125,7 +125,8 @@ class Training:
         try:
             yield from self.collection
         except WorkerDied:
-            self.save()
+            if self.frames > self.saved_at:
+                self.save()
             if signals.received:  # which workers of the same terminal get too
                 raise Stopped(signals.received) from None
             raise

@@ -136,10 +136,9 @@ def ignition_chance(
         rows = [_in_a_row(burning * wind[:, direction], margin) for direction in range(8)]
         wind = torch.ones_like(wind[..., :1, :1])
     target = _in_a_row(susceptible, margin)
-    chance, at_source = _sum_over_directions(
+    return _sum_over_directions(
         law, rows, target, wind[:, :, :, 0], slope, tuple(susceptible.shape), neighbours, diagonal, expected
     )
-    return chance, at_source
 
 
 @fusible
