@@ -77,7 +77,7 @@ def test_a_history_cut_in_two_is_the_whole(fire: str, wind: str) -> None:
 def test_a_certain_fire_arrives_with_its_distance() -> None:
     # alpha 1, calm, flat, unit diagonal: one king's move a tick; a cell is 1 ha, and (2 t + 1)^2 have caught fire.
     fire = Fire(diagonal="unit")
-    history = trace(draw("TTTTT TTTTT TTaTT TTTTT TTTTT"), fire, Uniform(), 3, 100.0)
+    history = trace(draw("TTTTT TTTTT TTaTT TTTTT TTTTT", fire=fire), fire, Uniform(), 3, 100.0)
     assert history.arrival[0].tolist() == [
         [2, 2, 2, 2, 2],
         [2, 1, 1, 1, 2],
@@ -93,7 +93,7 @@ def test_a_certain_fire_arrives_with_its_distance() -> None:
 def test_what_never_burned_never_was_reached() -> None:
     # Fire in the west of one world of two; a lake between, so the east never burns.
     fire = Fire(diagonal="unit")
-    both = draw("T~T", worlds=2)
+    both = draw("T~T", worlds=2, fire=fire)
     both.cells[1, 0, 0] = 11
     history = trace(both, fire, Uniform(), 6, 30.0)
     assert history.arrival.tolist() == [[[-1, -1, -1]], [[0, -1, -1]]]

@@ -65,7 +65,7 @@ def start_burning(
         state = state.replace(stage_age=stage_age)
     for tick in range(1, first_tick + 1 if wind.changes else 1):
         state = state.replace(tick=torch.full_like(state.tick, tick))
-        state = state.replace(wind=wind.after_tick(state))
+        state = fire.in_wind(state, wind.after_tick(state))
     return state.replace(tick=torch.full_like(state.tick, first_tick))
 
 

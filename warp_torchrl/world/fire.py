@@ -14,9 +14,12 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.flags import as_mask, at_least, at_most, below, byte, choose, clear, equal, number
+from warp_torchrl.world.fusion import is_fusing
 from warp_torchrl.world.kernel import alexandridis, ellipse, slope_factor
 from warp_torchrl.world.landscape import holds_trees
-from warp_torchrl.world.spread import Clipped, Law, ignition_chance
+from warp_torchrl.world.law import Clipped, Law
+from warp_torchrl.world.pattern import chance_by_pattern, pattern_table
+from warp_torchrl.world.spread import expected_ignitions, gains, ignition_chance
 from warp_torchrl.world.state import EMBER, FIRST_FIRE, OLDEST, WorldState, is_burning, is_tree
 
 
@@ -118,35 +121,47 @@ class Fire:
             return ellipse(wind, self.head_gain)
         return alexandridis(wind, self.wind_gain, self.wind_focus)
 
-    def spread(self, state: WorldState, expected: bool = False) -> tuple[Tensor, Tensor | None]:
-        """Return each tree's chance to be ignited by its neighbours in one tick; see ``ignition_chance``.
+    def in_wind(self, state: WorldState, wind: Tensor) -> WorldState:
+        """Return worlds in another wind, float32 [B, 2, 1, 1] or [B, 2, H, W] [m/s], with all that follows from it."""
+        gain = gains(self.wind_factor(wind), self.diagonal)
+        if gain.shape[2:] != (1, 1):
+            return state.replace(wind=wind)
+        if state.slope is not None:
+            return state.replace(wind=wind, gain=gain)
+        kinds = self._law().susceptibility(_constant(tuple(self.alpha), wind.device))
+        return state.replace(wind=wind, gain=gain, chances=pattern_table(self._law(), kinds, gain, self.neighbours))
 
-        Args:
-            state: The worlds.
-            expected: Whether to sum each chance at its source as well.
+    def spread(self, state: WorldState) -> Tensor:
+        """Return each tree's chance to be ignited by its neighbours in one tick, float32 [B, H, W]; 0 elsewhere."""
+        spreading = is_burning(state.cells) & at_most(state.cells, self.last_spreading)
+        if state.chances is not None and not is_fusing():
+            kind = (state.landscape.cover + 1) * byte(self.is_fuel(state))
+            return chance_by_pattern(state.chances, spreading, kind, self.neighbours)
+        susceptible = self._susceptible(state)
+        return ignition_chance(self._law(), spreading, susceptible, self._gain(state), state.slope, self.neighbours)
 
-        Returns:
-            Chance float32 [B, H, W], 0 where nothing can ignite; and the number of neighbours that each burning cell
-            is expected to ignite, float32 [B, H, W], or None.
+    def expected_ignitions(self, state: WorldState) -> Tensor:
+        """Return how many neighbours each spreading cell is expected to ignite in one tick, float32 [B, H, W].
+
+        It is 0 where nothing spreads.
         """
-        law = self._law()
-        return ignition_chance(
-            law,
-            is_burning(state.cells) & at_most(state.cells, self.last_spreading),
-            law.susceptibility(state.alpha) * number(self.is_fuel(state)),
-            self.wind_factor(state.wind),
-            state.slope,
-            neighbours=self.neighbours,
-            diagonal=self.diagonal,
-            expected=expected,
-        )
+        spreading = is_burning(state.cells) & at_most(state.cells, self.last_spreading)
+        susceptible, gain = self._susceptible(state), self._gain(state)
+        expected = expected_ignitions(self._law(), susceptible, gain, state.slope, self.neighbours)
+        return expected.mul_(number(spreading))
+
+    def _gain(self, state: WorldState) -> Tensor:
+        return gains(self.wind_factor(state.wind), self.diagonal) if state.gain is None else state.gain
+
+    def _susceptible(self, state: WorldState) -> Tensor:
+        return self._law().susceptibility(state.alpha) * number(self.is_fuel(state))
 
     def chance_to_ignite(self, state: WorldState) -> Tensor:
         """Return each tree's chance to ignite in the next tick, q = p_spont + (1 - p_spont) p_spread.
 
         float32 [B, H, W], 0 where nothing can ignite.
         """
-        return self._join(state, self.spread(state)[0])
+        return self._join(state, self.spread(state))
 
     def threat(self, state: WorldState) -> Tensor:
         """Return where the fire is about to grow, float32 [B, H, W] in 0..1.
@@ -154,9 +169,8 @@ class Fire:
         Of a burning cell, the neighbours that it is expected to ignite in a tick, / 4, at most 1; of a tree, its
         chance to ignite in the next tick.
         """
-        q, expected = self.spread(state, expected=True)
         # A cell has one or the other: only burning cells are expected to ignite others, and they cannot ignite.
-        return (expected * 0.25).clamp_(max=1.0).add_(self._join(state, q))
+        return self.expected_ignitions(state).mul_(0.25).clamp_(max=1.0).add_(self.chance_to_ignite(state))
 
     def _join(self, state: WorldState, spread: Tensor) -> Tensor:
         """Join the chance to be ignited by neighbours with that of spontaneous ignition."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.spread import Hazard, Law
+from warp_torchrl.world.law import Hazard, Law
 
 
 @dataclass(frozen=True, kw_only=True)

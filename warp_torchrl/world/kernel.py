@@ -91,7 +91,8 @@ def slope_factor(elevation: Tensor, cell_size: float, gain: float) -> Tensor:
 
 def _speed_and_part_along(wind: Tensor) -> tuple[Tensor, Tensor]:
     """Return the wind's speed [B, 1, h, w] and its part along each direction V cos theta [B, 8, h, w] [m/s]."""
-    speed = torch.linalg.vector_norm(wind, dim=1, keepdim=True)
+    # Not torch's norm, whose last bits depend on the batch.
+    speed = torch.sqrt(wind[:, :1].square() + wind[:, 1:].square())
     east, north = _directions(wind.device)
     return speed, wind[:, :1] * east[:, None, None] + wind[:, 1:] * north[:, None, None]
 

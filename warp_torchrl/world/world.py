@@ -193,6 +193,8 @@ def quiet_state(
         wet=none.clone(),
         slope=None if ground.elevation is None else fire.slope_factor(ground.elevation, cell_size),
         wind=wind,
+        gain=None,
+        chances=None,
         vehicles=vehicles,
         tally=Tally(*[zero] * 7, batch_size=key.shape),
         key=key,
@@ -203,7 +205,7 @@ def quiet_state(
         truncated=zero > 0,
         batch_size=key.shape,
     )
-    return state.replace(tally=count_trees(state))
+    return fire.in_wind(state.replace(tally=count_trees(state)), wind)
 
 
 def advance_some(state: WorldState, fire: Fire, wind: Wind, due: Tensor) -> WorldState:
@@ -214,13 +216,14 @@ def advance_some(state: WorldState, fire: Fire, wind: Wind, due: Tensor) -> Worl
     if not len(index):
         return state
     after = advance(state[index], fire, wind, due[index])
-    moved = {name: getattr(after, name) for name in _MOVED}
+    moved = {name: getattr(after, name) for name in (*_MOVED, *(_BLOWN if wind.changes else ()))}
     return state.replace(
         **{name: getattr(state, name).index_copy(0, index, value) for name, value in moved.items() if value is not None}
     )
 
 
-_MOVED = ("cells", "age", "stage_age", "burned", "wet", "tick", "wind")  # what a tick changes
+_MOVED = ("cells", "age", "stage_age", "burned", "wet", "tick")  # what a tick changes
+_BLOWN = ("wind", "gain", "chances")  # and what a wind does
 
 
 def advance(state: WorldState, fire: Fire, wind: Wind, due: Tensor) -> WorldState:
@@ -229,4 +232,4 @@ def advance(state: WorldState, fire: Fire, wind: Wind, due: Tensor) -> WorldStat
     after = fire.tick(state, draws, due)
     if not wind.changes:
         return after
-    return after.replace(wind=torch.where(due[:, None, None, None], wind.after_tick(after), state.wind))
+    return fire.in_wind(after, torch.where(due[:, None, None, None], wind.after_tick(after), state.wind))
