@@ -11,7 +11,7 @@ from warp_torchrl.observation.coarse import (
 )
 from warp_torchrl.observation.own import SELF_SIZE, WIND_SCALE, own_vector
 from warp_torchrl.observation.presets import Local, Observation, Paper, Space, Surroundings
-from warp_torchrl.observation.view import CHANNELS, ELEVATION_SCALE, crop, egocentric_view
+from warp_torchrl.observation.view import CHANNELS, ELEVATION_SCALE, egocentric_view, window
 
 __all__ = [
     "CHANNELS",
@@ -29,8 +29,8 @@ __all__ = [
     "Surroundings",
     "block_means",
     "central_state",
-    "crop",
     "egocentric_view",
     "own_vector",
     "picture",
+    "window",
 ]

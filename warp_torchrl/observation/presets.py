@@ -11,7 +11,7 @@ from torch import Tensor
 
 from warp_torchrl.observation.coarse import PICTURE, PICTURE_SIDE, picture
 from warp_torchrl.observation.own import SELF_SIZE, own_vector
-from warp_torchrl.observation.view import CHANNELS, age_plane, crop, egocentric_view, stage_plane
+from warp_torchrl.observation.view import CHANNELS, ages, egocentric_view, stages, window
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.world import World
@@ -101,10 +101,11 @@ class Paper:
 
     def __call__(self, state: WorldState, world: World) -> dict[str, Tensor]:
         """Return one entry, float32 [B, A, 3 (2 r + 1)^2]."""
-        cover = (state.landscape.cover + 1) * 51
-        planes = torch.stack((cover, age_plane(state), stage_plane(state)), dim=1)
-        crops = crop(planes, state.vehicles.position, self.radius)
-        return {"": crops.flatten(2).to(torch.float32).mul_(1.0 / 255.0)}
+        seen = window(state.vehicles.position, tuple(state.cells.shape[1:]), self.radius)
+        cells = seen.of(state.cells)
+        cover = (seen.of(state.landscape.cover) + seen.inside) * 51
+        view = torch.stack((cover, ages(cells), stages(cells)), dim=2)
+        return {"": view.flatten(2).to(torch.float32).mul_(1.0 / 255.0)}
 
 
 Observation = Surroundings | Local | Paper

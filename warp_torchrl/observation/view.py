@@ -1,8 +1,10 @@
 """What an agent sees about itself: its own square of the map, north up."""
 
+from typing import NamedTuple
+
 import torch
 from torch import Tensor
-from torch.nn.functional import one_hot, pad
+from torch.nn.functional import one_hot
 
 from warp_torchrl.world.flags import byte, equal
 from warp_torchrl.world.role import ROLE_NAMES
@@ -27,81 +29,80 @@ ELEVATION_SCALE = 100.0
 """Difference in height that an observation shows as 1 [m]."""
 
 
-def crop(planes: Tensor, position: Tensor, radius: int) -> Tensor:
-    """Cut the square about each agent out of its world's maps; beyond the border it is 0.
+class Window(NamedTuple):
+    """The squares of cells about the agents."""
+
+    index: Tensor
+    """Flat index of each cell, moved to the border where it is off the map, int64 [B, A V V]."""
+    inside: Tensor
+    """1 on the map and 0 beyond, uint8 [B, A, V, V]."""
+
+    def of(self, plane: Tensor) -> Tensor:
+        """Return what a plane [B, H, W] of numbers shows, [B, A, V, V]; 0 beyond the map."""
+        return plane.flatten(1).gather(1, self.index).view_as(self.inside).mul_(self.inside)
+
+
+def window(position: Tensor, size: tuple[int, int], radius: int) -> Window:
+    """Return the squares about the agents.
 
     Args:
-        planes: Any type, [B, C, H, W].
         position: int64 [B, A, 2] [cells].
-        radius: r [cells].
-
-    Returns:
-        [B, A, C, V, V], V = 2 r + 1.
+        size: (H, W) of the map [cells].
+        radius: r [cells]; V = 2 r + 1.
     """
-    worlds, channels = planes.shape[:2]
-    side = 2 * radius + 1
-    padded = pad(planes, (radius, radius, radius, radius))
-    height, width = padded.shape[2:]
-    rows = padded.flatten().as_strided((padded.numel() - side + 1, side), (1, 1))
-    device = planes.device
-    plane = torch.arange(worlds * channels, device=device).view(worlds, 1, channels, 1) * height
-    row = position[..., 0, None, None] + torch.arange(side, device=device)
-    start = (plane + row) * width + position[..., 1, None, None]
-    return rows.index_select(0, start.flatten()).view(*start.shape, side)
+    height, width = size
+    away = torch.arange(-radius, radius + 1, device=position.device)
+    row, column = position[..., 0, None] + away, position[..., 1, None] + away
+    on_row, on_column = (row >= 0) & (row < height), (column >= 0) & (column < width)
+    index = row.clamp(0, height - 1)[..., None] * width + column.clamp(0, width - 1)[..., None, :]
+    return Window(index.flatten(1), byte(on_row[..., None] & on_column[..., None, :]))
 
 
 def egocentric_view(state: WorldState, world: World, radius: int) -> Tensor:
     """Return the agents' own views in the channels ``CHANNELS``, uint8 [B, A, C, V, V]."""
-    cells, vehicles = state.cells, state.vehicles
-    empty = equal(cells, 0)
-    ugv, uav = _occupancy(state, world)
-    planes = torch.stack(
-        (
-            torch.full_like(cells, 255),
-            (state.alpha * 255.0).to(torch.uint8),
-            age_plane(state),
-            stage_plane(state),
-            byte(state.burned & empty) * 255,
-            byte(state.firebreak) * 255,
-            state.wet.clamp(max=10) * 25,
-            torch.full_like(cells, 128),
-            (world.threat(state) * 255.0).to(torch.uint8),
-            ugv,
-            uav,
-        ),
-        dim=1,
-    )
-    view = crop(planes, vehicles.position, radius)
-    view[:, :, 0].neg_().sub_(1)  # on the map 255 -> 0, beyond it 0 -> 255
-    if state.landscape.elevation is not None:
-        view[:, :, 7] = _relative_elevation(state, radius)
+    vehicles, size = state.vehicles, tuple(state.cells.shape[1:])
+    seen = window(vehicles.position, size, radius)
+    cells = seen.of(state.cells)
     role = world.team.table(cells.device).index
+    channels = (
+        (1 - seen.inside) * 255,
+        (seen.of(state.alpha) * 255.0).to(torch.uint8),
+        ages(cells),
+        stages(cells),
+        seen.of(byte(state.burned)) * byte(equal(cells, 0)) * 255,
+        seen.of(byte(state.firebreak)) * 255,
+        seen.of(state.wet).clamp_(max=10) * 25,
+        seen.inside * 128 if state.landscape.elevation is None else _relative_elevation(state, seen),
+        (seen.of(world.threat(state)) * 255.0).to(torch.uint8),
+        *(seen.of(plane) for plane in _occupancy(state, role)),
+    )
+    view = torch.stack(channels, dim=2)
     others = view[:, :, -len(ROLE_NAMES) :, radius, radius]
     others -= one_hot(role, len(ROLE_NAMES)).to(torch.uint8) * 63
     return view
 
 
-def age_plane(state: WorldState) -> Tensor:
-    """Return the ages of trees, 25 a year of ten, uint8 [B, H, W]."""
-    return state.cells * byte(is_tree(state.cells)) * 25
+def ages(cells: Tensor) -> Tensor:
+    """Return the ages of trees, 25 a year of ten, uint8, shape of the cells."""
+    return cells * byte(is_tree(cells)) * 25
 
 
-def stage_plane(state: WorldState) -> Tensor:
-    """Return the stages of fires, 51 each, uint8 [B, H, W]."""
-    return (state.cells - (FIRST_FIRE - 1)) * byte(is_burning(state.cells)) * 51
+def stages(cells: Tensor) -> Tensor:
+    """Return the stages of fires, 51 each, uint8, shape of the cells."""
+    return (cells - (FIRST_FIRE - 1)) * byte(is_burning(cells)) * 51
 
 
-def _relative_elevation(state: WorldState, radius: int) -> Tensor:
-    heights = crop(state.landscape.elevation[:, None], state.vehicles.position, radius)[:, :, 0]
-    own = heights[:, :, radius, radius, None, None]
+def _relative_elevation(state: WorldState, seen: Window) -> Tensor:
+    heights = seen.of(state.landscape.elevation)
+    middle = heights.shape[-1] // 2
+    own = heights[:, :, middle, middle, None, None]
     return ((heights - own) / ELEVATION_SCALE).clamp_(-1.0, 1.0).mul_(127.0).add_(128.0).to(torch.uint8)
 
 
-def _occupancy(state: WorldState, world: World) -> tuple[Tensor, Tensor]:
+def _occupancy(state: WorldState, role: Tensor) -> tuple[Tensor, ...]:
     """Return where the agents of each role are, 63 each, at most 4 to a cell, uint8 [B, H, W] each."""
     worlds, height, width = state.cells.shape
     position = state.vehicles.position
-    role = world.team.table(position.device).index
     index = (role * height + position[..., 0]) * width + position[..., 1]
     count = torch.zeros(worlds, len(ROLE_NAMES) * height * width, dtype=torch.uint8, device=position.device)
     count.scatter_add_(1, index, torch.ones_like(index, dtype=torch.uint8))
