@@ -12,6 +12,7 @@ from warp_torchrl.metrics import METRICS, metrics
 from warp_torchrl.observation import STATE, STATE_SIDE, Observation, Surroundings, central_state
 from warp_torchrl.render import render
 from warp_torchrl.reward import Efficiency, Reward
+from warp_torchrl.starts import Start, Starts
 from warp_torchrl.world.fusion import check_compiler, fusing
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.state import Transition, WorldState
@@ -75,6 +76,7 @@ class WildfireEnv(EnvBase):
         self.group_map = {"agents": list(names)}
         self.role_map = {role: [n for n, r in zip(names, roles) if r == role] for role in ROLES if role in roles}
         self._state: WorldState | None = None
+        self._starts = Starts(self._start)
         self.watcher: Callable[[Transition], None] | None = None
         """Is shown every step's transition, for those who study behaviour."""
         self._episode_reward = torch.zeros(n_worlds, device=self.device)
@@ -119,6 +121,7 @@ class WildfireEnv(EnvBase):
             raise ValueError(f"seed must be in 0..2**62, got {min(seeds)}..{max(seeds)}")
         self._seeds = torch.tensor(list(seeds), dtype=torch.int64, device=self.device)
         self._episodes = torch.full_like(self._seeds, first_episode)
+        self._starts.forget()
 
     def set_state(self, state: WorldState) -> TensorDictBase:
         """Go on from given worlds, and return what a reset would have returned for them.
@@ -162,24 +165,27 @@ class WildfireEnv(EnvBase):
         self._episodes = state_dict["episodes"].to(self.device).clone()
         self._episode_reward = state_dict["episode_reward"].to(self.device).clone()
         self._state = state
+        self._starts.forget()
 
     # What TorchRL asks for
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
         mask = None if tensordict is None else tensordict.get("_reset", None)
         if mask is None or self._state is None or mask.all():
+            self._starts.forget()
             self._state = self.world.reset(self._seeds, self._episodes)
             self._episodes = self._episodes + 1
             self._episode_reward = torch.zeros_like(self._episode_reward)
             return self._observe(self._state)
         index = mask.flatten().nonzero()[:, 0]
-        fresh = self.world.reset(self._seeds[index], self._episodes[index])
-        self._state[index] = fresh
+        self._state[index], seen = self._starts.take(index, self._seeds, self._episodes)
         self._episodes = self._episodes.index_add(0, index, torch.ones_like(index))
         self._episode_reward = self._episode_reward.index_fill(0, index, 0.0)
-        out = self.full_observation_spec.zero().update(self.full_done_spec.zero())
-        out[index] = self._observe(fresh, self._episode_reward[index])
-        return out
+        return seen
+
+    def _start(self, seeds: Tensor, episodes: Tensor) -> Start:
+        worlds = self.world.reset(seeds, episodes)
+        return worlds, self._observe(worlds, torch.zeros(len(seeds), device=self.device))
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         action = self._checked(tensordict.get(("agents", "action"), None))

@@ -1,0 +1,56 @@
+"""Starts of episodes, made for many worlds at once before they are needed.
+
+A start is a pure function of a world's seed and episode. A few worlds end at almost every step, and what a start costs
+is mostly the same for one world and for many.
+"""
+
+from collections.abc import Callable
+
+import torch
+from tensordict import TensorDict
+from torch import Tensor
+
+from warp_torchrl.world.state import WorldState
+
+Start = tuple[WorldState, TensorDict]
+"""Worlds at the start of an episode, and what is observed there."""
+
+
+class Starts:
+    """The next start of each world of a batch.
+
+    Args:
+        make: Returns the starts of seeds and episodes, int64 [n] each.
+    """
+
+    def __init__(self, make: Callable[[Tensor, Tensor], Start]) -> None:
+        self._make = make
+        self._next: Start | None = None
+        self._made = torch.zeros(0, dtype=torch.bool)
+
+    def forget(self) -> None:
+        """Drop what was made: the worlds get other seeds or episodes."""
+        self._next = None
+
+    def take(self, index: Tensor, seeds: Tensor, episodes: Tensor) -> Start:
+        """Return the starts of some worlds; where one is missing, all that are missing are made.
+
+        Args:
+            index: Which worlds start, int64 [n].
+            seeds: Of all worlds, int64 [B].
+            episodes: Numbers of their next episodes, int64 [B].
+
+        Returns:
+            The worlds [n], and what is observed [B], of which only the rows in ``index`` mean anything.
+        """
+        if self._next is None:
+            self._next = self._make(seeds, episodes)
+            self._made = torch.ones_like(seeds, dtype=torch.bool)
+        elif not self._made[index].all():
+            missing = (~self._made).nonzero()[:, 0]
+            worlds, seen = self._make(seeds[missing], episodes[missing])
+            self._next[0][missing], self._next[1][missing] = worlds, seen
+            self._made[missing] = True
+        self._made[index] = False
+        worlds, seen = self._next
+        return worlds[index], seen.clone()
