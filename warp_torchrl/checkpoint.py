@@ -162,7 +162,7 @@ def newest(path: Path | str) -> tuple[Checkpoint, list[str]]:
         return _verified(path), []
     if not path.is_dir():
         raise CheckpointError(f"{path} is not a run folder: nothing there")
-    skipped = []
+    skipped: list[str] = []
     for folder in _listed(path):
         try:
             return _verified(folder), skipped

@@ -72,7 +72,8 @@ def _train_job(config: DictConfig) -> None:
             raise ConfigError(
                 f"hydra.run.dir: {folder} holds a run already; go on with resume={folder}, or take another"
             )
-        (folder / "config.yaml").exists() or _write_config(folder / "config.yaml", config)
+        if not (folder / "config.yaml").exists():
+            _write_config(folder / "config.yaml", config)
         training = Training(plan, record, folder)
         if found is not None:
             training.load_state_dict(found.training())
@@ -85,7 +86,7 @@ def _train_job(config: DictConfig) -> None:
         finally:
             training.close()
         found, _ = checkpoints.newest(folder)
-        _report(plan, folder, found=found)
+        _report(plan, folder, found)
     finally:
         lock.release()
 
@@ -94,28 +95,26 @@ def _evaluate_job(config: DictConfig) -> None:
     folder = Path(HydraConfig.get().runtime.output_dir)
     given, name = config.checkpoint, config.policy
     if given is None:
-        _report(settings(_without_checkpoint(config)), folder, heuristic=name)
+        _report(settings(_without_checkpoint(config)), folder, name)
         return
     found, skipped = checkpoints.newest(given)
     for line in skipped:
         log.warning("skipped: %s", line)
     overrides = [each for each in HydraConfig.get().overrides.task if not each.startswith(("checkpoint=", "policy="))]
-    _report(settings(plain(recompose(found.record(), overrides))), folder, found=found)
+    _report(settings(plain(recompose(found.record(), overrides))), folder, found)
 
 
-def _report(
-    plan: Settings, folder: Path, found: checkpoints.Checkpoint | None = None, heuristic: str | None = None
-) -> None:
+def _report(plan: Settings, folder: Path, found: checkpoints.Checkpoint | str) -> None:
     """Evaluate a checkpoint or a heuristic beside the yardsticks: table, ``evaluation.json`` and ``episode.gif``."""
     first, folder = plan.evaluation.first_seed, folder.resolve()
     env = plan.make_env(plan.evaluation.episodes, first)
     one = plan.make_env(1, first)
-    if found is not None:
+    if isinstance(found, checkpoints.Checkpoint):
         _check_fits(found, env)
-    others, other_modes = play_heuristics(env, first, [each for each in YARDSTICKS if each != heuristic]), {}
-    if found is None:
-        name, mode, policy = heuristic, "sampled", HEURISTICS[heuristic](one)
-        actor = HEURISTICS[heuristic](env)
+    others, other_modes = play_heuristics(env, first, [each for each in YARDSTICKS if each != found]), {}
+    if isinstance(found, str):
+        name, mode, policy = found, "sampled", HEURISTICS[found](one)
+        actor = HEURISTICS[found](env)
         episodes = play(env, actor, first, mode, watch=True)
     else:
         policy = policy_of(found, plan.evaluation.mode).to(plan.device)
@@ -127,7 +126,7 @@ def _report(
     left_out = {}
     if plan.evaluation.leave_one_out:
         left_out = {agent: play(env, LeftOut(actor, index), first, mode) for index, agent in enumerate(env.agent_names)}
-    learner, digest = (None, "") if found is None else method(found.record())
+    learner, digest = (None, "") if isinstance(found, str) else method(found.record())
     content = report(plan.scenario, name, first, episodes, others, other_modes, left_out, learner, digest)
     write_json(folder / "evaluation.json", content)
     print(table(content), flush=True)

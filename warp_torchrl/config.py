@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
@@ -100,7 +100,7 @@ class Record:
 
 def plain(config: DictConfig) -> dict[str, Any]:
     """Return a configuration as plain, resolved values."""
-    return OmegaConf.to_container(config, resolve=True)
+    return cast("dict[str, Any]", OmegaConf.to_container(config, resolve=True))
 
 
 def without_targets(node: Any) -> Any:

@@ -93,8 +93,9 @@ def _try_fit(value: object, hint: object) -> tuple[bool, object]:
     if hint is int:
         return isinstance(value, int) and not isinstance(value, bool), value
     if hint is float:
-        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        return is_number, float(value) if is_number else value
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            return False, value
+        return True, float(value)
     kind = origin or hint
     return isinstance(kind, type) and isinstance(value, kind), value
 
@@ -118,5 +119,5 @@ def _describe(hint: object) -> str:
     if origin is tuple:
         items = get_args(hint)
         return f"a list of {_describe(items[0])}" if items[-1] is Ellipsis else f"a list of {len(items)} values"
-    names = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}
+    names: dict[object, str] = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}
     return names.get(hint, getattr(hint, "__name__", str(hint)))

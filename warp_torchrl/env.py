@@ -1,6 +1,7 @@
 """The environment: joins world, observation, reward and metrics to TorchRL. It has no physics of its own."""
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import torch
 from tensordict import TensorDict, TensorDictBase
@@ -9,7 +10,7 @@ from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
 from warp_torchrl.metrics import METRICS, metrics
-from warp_torchrl.observation import STATE, STATE_SIDE, Observation, Surroundings, central_state
+from warp_torchrl.observation import STATE, STATE_SIDE, Observation, Space, Surroundings, central_state
 from warp_torchrl.render import render
 from warp_torchrl.reward import Efficiency, Reward
 from warp_torchrl.starts import Start, Starts
@@ -137,7 +138,7 @@ class WildfireEnv(EnvBase):
         self._episode_reward.zero_()
         return self._observe(self._state)
 
-    def state_dict(self, *args: object, **kwargs: object) -> dict[str, object]:
+    def state_dict(self, *args: object, **kwargs: object) -> dict[str, Any]:
         """Return all that changes in the environment: seeds, episodes, worlds, returns."""
         worlds = {} if self._state is None else self._state.to_tensordict().flatten_keys(".").to_dict()
         return {
@@ -147,7 +148,7 @@ class WildfireEnv(EnvBase):
             "worlds": {name: value.clone() for name, value in worlds.items() if isinstance(value, Tensor)},
         }
 
-    def load_state_dict(self, state_dict: dict[str, object], *args: object, **kwargs: object) -> None:
+    def load_state_dict(self, state_dict: dict[str, Any], *args: object, **kwargs: object) -> None:
         """Restore what ``state_dict`` returned, all or nothing.
 
         Raises:
@@ -250,7 +251,7 @@ class WildfireEnv(EnvBase):
         batch, team = self.batch_size, (*self.batch_size, self.n_agents)
         device, n_actions = self.device, self.world.team.n_actions
 
-        def entry(space: object) -> Bounded:
+        def entry(space: Space) -> Bounded:
             return Bounded(space.low, space.high, shape=(*team, *space.shape), dtype=space.dtype, device=device)
 
         spaces = {name: entry(space) for name, space in self.observation.spaces(self.world).items()}

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from contextlib import nullcontext
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import torch
@@ -71,7 +71,7 @@ class NumpyPolicy:
 
     def __call__(
         self, observation: AgentObservation | Mapping[str, AgentObservation], info: Mapping[str, Any] | None = None
-    ) -> int | np.ndarray | dict[str, int]:
+    ) -> int | np.ndarray | dict[str, Any]:
         """Choose actions.
 
         Args:
@@ -87,7 +87,7 @@ class NumpyPolicy:
                 policy needs the whole team or an agent's role and was not given it.
         """
         alone = self._is_of_one(observation)
-        team = {"": observation} if alone else observation
+        team: Mapping[str, Any] = {"": observation} if alone else cast("Mapping[str, Any]", observation)
         infos = {"": info or {}} if alone else (info or {})
         if not team:
             return {}
@@ -110,7 +110,7 @@ class NumpyPolicy:
             )
         return True
 
-    def _of_agent(self, name: str, seen: AgentObservation, info: Mapping[str, Any]) -> dict[Any, np.ndarray]:
+    def _of_agent(self, name: str, seen: Any, info: Mapping[str, Any]) -> dict[Any, np.ndarray]:
         """Return what the policy reads of one agent, by key."""
         entries = {"": seen, **info} if "" in self._entries else {**info, **seen}
         who = f" of {name}" if name else ""
@@ -119,7 +119,7 @@ class NumpyPolicy:
             where = "info" if "" in self._entries else "observation"
             raise ValueError(f"{where}{who} must have {', '.join(missing)}, got {', '.join(entries) or 'nothing'}")
         mask = np.asarray(entries["action_mask"], dtype=bool)
-        read = {ACTION_MASK: mask}
+        read: dict[Any, np.ndarray] = {ACTION_MASK: mask}
         for entry, (shape, dtype) in self._entries.items():
             value, expected = np.asarray(entries[entry]), (*mask.shape[:-1], *shape)
             if value.shape != expected or value.dtype != dtype:

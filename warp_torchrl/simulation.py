@@ -120,8 +120,7 @@ def _start(
             raise ValueError(f"{name} must be 0 or more, got {number}")
     if not 0.0 < cell_size < math.inf:
         raise ValueError(f"cell_size must be over 0 m, got {cell_size}")
-    node = plain(compose_config("train", [f"fire={fire}"]))["fire"] if isinstance(fire, str) else None
-    automaton = fire if node is None else build(node, "fire")
+    automaton = _automaton(fire)
     if stage_age is not None and int(stage_age.max()) >= automaton.ticks_per_stage:
         raise ValueError(f"stage_age must be under {automaton.ticks_per_stage} ticks, got {int(stage_age.max())}")
     air = constant_wind(*wind) if isinstance(wind, tuple | list) else wind
@@ -137,3 +136,10 @@ def _start(
         cell_size=cell_size,
     )
     return state, automaton, air
+
+
+def _automaton(fire: str | Fire) -> Fire:
+    """Return the automaton that a name of ``conf/fire`` stands for."""
+    if isinstance(fire, str):
+        return build(plain(compose_config("train", [f"fire={fire}"]))["fire"], "fire")
+    return fire

@@ -14,6 +14,7 @@ import numpy as np
 from warp_torchrl.statistics import compare, performance_profile, summarise
 
 LEVELS = np.linspace(0.0, 1.0, 101)
+_Key = tuple[str, str, str, tuple[int, ...]]  # scenario, method, configuration, seeds
 
 
 class Entry(NamedTuple):
@@ -28,7 +29,7 @@ class Entry(NamedTuple):
 
 def gather(*folders: Path) -> list[Entry]:
     """Return what the ``evaluation.json`` files under folders hold, runs that differ in their seed alone together."""
-    found: dict[tuple[str, str, str, tuple[int, ...]], list[Mapping[str, Any]]] = {}
+    found: dict[_Key, list[Mapping[str, Any]]] = {}
     for path in (path for folder in folders for path in sorted(folder.glob("**/evaluation.json"))):
         content = json.loads(path.read_text(encoding="utf-8"))
         key = (content["scenario"], content["method"], content["configuration"], tuple(content["seeds"]))
@@ -38,17 +39,20 @@ def gather(*folders: Path) -> list[Entry]:
         Entry(
             scenario,
             f"{method} {configuration[:6]}" if (scenario, method) in several else method,
-            *(
-                np.array([[episode[name] for episode in run["episodes"]] for run in runs])
-                for name in ("saved", "success")
-            ),
+            _of_episodes(runs, "saved"),
+            _of_episodes(runs, "success"),
             seeds,
         )
         for (scenario, method, configuration, seeds), runs in found.items()
     ]
 
 
-def _differ(found: Mapping[tuple, Any], scenario: str, method: str) -> bool:
+def _of_episodes(runs: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
+    """Return a metric of each episode of each run, [runs, n]."""
+    return np.array([[episode[name] for episode in run["episodes"]] for run in runs])
+
+
+def _differ(found: Mapping[_Key, Any], scenario: str, method: str) -> bool:
     return len({key[2] for key in found if key[:2] == (scenario, method)}) > 1
 
 

@@ -51,7 +51,7 @@ def jobs(overrides: Sequence[str]) -> list[list[str]]:
     choices = [
         [f"{each.get_key_element()}={value}" for value in each.sweep_string_iterator()]
         if each.is_sweep_override()
-        else [each.input_line]
+        else [str(each.input_line)]
         for each in parsed
     ]
     return [list(job) for job in product(*choices)]

@@ -292,8 +292,9 @@ def _line(row: Mapping[str, float | None], total: int) -> str:
     def show(name: str, pattern: str) -> str:
         return "-" if row[name] is None else pattern.format(row[name])
 
+    frames = row["time/frames"] or 0
     return (
-        f"{100 * row['time/frames'] / total:5.1f} %  {row['time/frames']} frames  {row['time/seconds']:.0f} s  "
+        f"{100 * frames / total:5.1f} %  {frames} frames  {row['time/seconds']:.0f} s  "
         f"{row['time/fps']:.0f} frames/s  saved {show('world/saved', '{:.3f}')}  "
         f"reward {show('rollout/ep_rew_mean', '{:.2f}')}  loss {show('train/loss', '{:.3f}')}"
     )

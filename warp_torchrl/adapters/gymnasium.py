@@ -1,7 +1,7 @@
 """The environment of one agent as a Gymnasium ``Env``, and a batch of it as a ``VectorEnv``."""
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -37,7 +37,9 @@ class FireExtinguishingEnv(gymnasium.Env[Observation, int]):
         RuntimeError: If a window is asked for where there is no display or no matplotlib.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": FRAMES_PER_SECOND}
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": FRAMES_PER_SECOND}  # noqa: RUF012
+    observation_space: spaces.Space[Any]
+    action_space: spaces.Space[Any]
 
     def __init__(
         self,
@@ -140,7 +142,7 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
             the seed is no whole number in 0..2**62.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
+    metadata: dict[str, Any] = {  # noqa: RUF012
         "render_modes": ["rgb_array"],
         "render_fps": FRAMES_PER_SECOND,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
@@ -186,7 +188,7 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
         if options is not None and "reset_mask" in options:
             raise ValueError("options['reset_mask'] must be left out: finished worlds start anew by themselves")
         now = self._worlds.reset(seed)
-        super().reset(seed=None if seed is None or np.ndim(seed) else int(seed))
+        super().reset(seed=None if seed is None or np.ndim(seed) else whole_number("seed", seed))
         return now.of_agent(slice(None), 0), self._info(now)
 
     def step(self, actions: np.ndarray) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:

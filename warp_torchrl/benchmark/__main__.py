@@ -7,7 +7,7 @@ import argparse
 import json
 import logging
 from argparse import Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -35,7 +35,7 @@ _WORLDS = 256
 
 def _speed(measure: Callable[..., Rows], options: Namespace, **more: Any) -> Rows:
     """Measure each scenario asked for, or ``large`` as the targets have it."""
-    asked = [(name, ()) for name in options.scenario or ()] or [LARGE]
+    asked: list[tuple[str, Sequence[str]]] = [(name, ()) for name in options.scenario or ()] or [LARGE]
     return [
         row
         for name, changes in asked

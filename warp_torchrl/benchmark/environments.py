@@ -46,7 +46,7 @@ def environment_speed(
     contenders = {"environment": partial(ours, _STEPS), "numpy, PettingZoo": partial(theirs, _NUMPY_STEPS)}
     worlds = {"environment": (n_worlds, _STEPS), "numpy, PettingZoo": (1, _NUMPY_STEPS)}
     common = {"scenario": scenario, "agents": env.n_agents, "size": "{} x {}".format(*env.world.size)}
-    rows = []
+    rows: list[dict[str, Any]] = []
     for name, seconds in take_turns(contenders, repeats, device).items():
         count, steps = worlds[name]
         rates = [steps * count * env.n_agents / second for second in seconds]

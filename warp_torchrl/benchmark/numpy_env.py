@@ -103,7 +103,7 @@ class NumpyFireEnv(ParallelEnv[str, np.ndarray, int]):
         )
 
     def _draws(self) -> np.ndarray:
-        return self._rng.random(self.world.cells.size, dtype=np.float32)
+        return self._rng.random(self.world.cells.size, dtype=np.float32)  # type: ignore[union-attr]
 
     def _by_agent(self, seen: np.ndarray) -> dict[str, np.ndarray]:
         return dict(zip(self.possible_agents, seen, strict=True))

@@ -75,7 +75,7 @@ class NumpyTeam:
             cells[hit], world.extinguished[hit], world.wet[hit] = world.age[hit], True, world.fire.wet_for
             world.age[hit] = 0
         cells[cut], world.firebreak[cut] = 0, True
-        return np.count_nonzero(wants_water | wants_clear)
+        return int(np.count_nonzero(wants_water | wants_clear))
 
     def observe(self) -> np.ndarray:
         """Return what the agents see, float32 [A, 3 (2 r + 1)^2]: see ``warp_torchrl.observation.Paper``."""

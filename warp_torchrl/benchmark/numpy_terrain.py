@@ -1,11 +1,14 @@
 """New ground for the NumPy world: terrain, forest and fires as in ``conf/scenario/large.yaml``, in NumPy alone."""
 
+from dataclasses import asdict
+from typing import Any
+
 import numpy as np
 
 from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.state import OLDEST, Cover
 
-_PERLIN = Perlin()
+_PERLIN: dict[str, Any] = asdict(Perlin())
 
 
 def new_ground(rng: np.random.Generator, size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
@@ -19,10 +22,10 @@ def new_ground(rng: np.random.Generator, size: tuple[int, int]) -> tuple[np.ndar
         Cover uint8 [H, W] and tree age uint8 [H, W], 0 on lakes.
     """
     noise = sum(
-        _PERLIN.persistence**octave * _noise(rng, size, _PERLIN.lacunarity**octave / _PERLIN.scale)
-        for octave in range(_PERLIN.octaves)
+        _PERLIN["persistence"] ** octave * _noise(rng, size, _PERLIN["lacunarity"] ** octave / _PERLIN["scale"])
+        for octave in range(_PERLIN["octaves"])
     )
-    levels = np.sort(noise, axis=None)[[int(level * noise.size + 0.5) for level in _PERLIN.levels]]
+    levels = np.sort(noise, axis=None)[[int(level * noise.size + 0.5) for level in _PERLIN["levels"]]]
     cover = np.digitize(noise, levels).astype(np.uint8)
     age = np.rint(rng.random(size, dtype=np.float32) * OLDEST).astype(np.uint8)
     return cover, age * (cover != Cover.LAKE)

@@ -68,7 +68,7 @@ class NumpyWorld:
     @property
     def n_initial(self) -> int:
         """Return N0."""
-        return np.count_nonzero(self.initial)
+        return int(np.count_nonzero(self.initial))
 
     def on_map(self, row: np.ndarray) -> np.ndarray:
         """Return one of the arrays as a view [H, W]."""
@@ -123,10 +123,10 @@ class NumpyWorld:
         """Return T_p, T_e, T_c and T_b: the initial trees untouched, put out, cleared and burned."""
         unburned = self.initial & ~self.burned
         alive = unburned & (self.cells > 0) & (self.cells <= OLDEST)
-        extinguished = np.count_nonzero(alive & self.extinguished)
-        cleared = np.count_nonzero(unburned & self.firebreak)
-        burned = self.n_initial - np.count_nonzero(unburned)
-        return np.count_nonzero(alive) - extinguished, extinguished, cleared, burned
+        extinguished = int(np.count_nonzero(alive & self.extinguished))
+        cleared = int(np.count_nonzero(unburned & self.firebreak))
+        burned = self.n_initial - int(np.count_nonzero(unburned))
+        return int(np.count_nonzero(alive)) - extinguished, extinguished, cleared, burned
 
     @property
     def is_alight(self) -> bool:

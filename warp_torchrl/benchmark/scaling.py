@@ -38,7 +38,8 @@ def growth(
         A row for each size, with ``ms_per_step``, ``agent_steps_per_second``, ``kib_per_world``, the bytes of a world's
         state and of what the environment shows of it, and ``peak_gib``, the most that the process has held until then.
     """
-    sweeps = [("worlds", count, count, []) for count in WORLDS if count <= 4 * n_worlds]
+    none: list[str] = []
+    sweeps = [("worlds", count, count, none) for count in WORLDS if count <= 4 * n_worlds]
     sweeps += [("agents", count, n_worlds, [f"team.n_agents={count}"]) for count in AGENTS]
     sweeps += [("cells", side, n_worlds, [f"landscape.size={side}"]) for side in SIDES]
     return [

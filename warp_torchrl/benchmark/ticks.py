@@ -55,7 +55,7 @@ def tick_cost(
         skipped.append({"what": "numpy", "skipped": "it plays law paper in a wind that stays as it is"})
     seconds = take_turns(contenders, repeats, device)
     scale = {name: 1e9 / (_TICKS * count * height * width) for name, count in cells.items()}
-    rows = [
+    rows: list[dict[str, Any]] = [
         {"what": name, "scenario": scenario, "worlds": cells[name], "size": f"{height} x {width}"}
         | spread("ns_per_cell", [second * scale[name] for second in seconds[name]])
         for name in contenders

@@ -1,7 +1,7 @@
 """How fast training is: collecting and learning, as ``train.py`` does, and with the paper's software."""
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -37,12 +37,12 @@ def training_speed(
         training = Training(plan, Record(), Path(stack.enter_context(tempfile.TemporaryDirectory())))
         stack.callback(training.close)
         batches = iter(training.collection)
-        contenders = {"training": lambda: training._learn(next(batches))}
+        contenders: dict[str, Callable[[], object]] = {"training": lambda: training._learn(next(batches))}
         if with_peer and reason is None:
             contenders[NAME], close = open_stable_baselines(plan)
             stack.callback(close)
         agent_steps = training.frames_per_batch * agents
-        rows = [
+        rows: list[dict[str, Any]] = [
             {"what": name, **common} | spread("agent_steps_per_second", [agent_steps / second for second in seconds])
             for name, seconds in take_turns(contenders, repeats, device).items()
         ]

@@ -143,7 +143,7 @@ def draw_figure(draw: Callable[[], "Figure"], path: Path) -> Path:
 
 
 def _first_line(draw: Callable[..., "Figure"]) -> str:
-    return draw.__doc__.splitlines()[0]
+    return str(draw.__doc__).splitlines()[0]
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ Matplotlib is imported here alone, and only when something is drawn. A map has i
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
@@ -16,7 +16,7 @@ from PIL import Image
 from torch import Tensor
 
 from warp_torchrl.render import _ASH, _FIRE, _GROUND, render
-from warp_torchrl.world.state import Cover, WorldState
+from warp_torchrl.world.state import Cover, Landscape, WorldState
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -169,6 +169,17 @@ def wind_arrow(axes: "Axes", u: float, v: float, place: tuple[float, float] = (0
     )  # fmt: skip
 
 
+def relief(ground: Landscape) -> Tensor:
+    """Return the elevation of world 0, float32 [H, W] [m].
+
+    Raises:
+        ValueError: If the worlds are flat.
+    """
+    if ground.elevation is None:
+        raise ValueError("landscape must have an elevation to draw, got a flat one")
+    return ground.elevation[0]
+
+
 def hillshade(elevation: Tensor, cell_size: float = CELL, exaggeration: float = 1.0) -> Tensor:
     """Return how light the ground is under a sun in the north-west, 45 degrees high; float32 [H, W] in 0..1.
 
@@ -236,7 +247,7 @@ def fire_legend(
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    def strip(colours: Sequence[Sequence[float]]) -> tuple[Patch, ...]:
+    def strip(colours: Iterable[Sequence[float] | np.ndarray]) -> tuple[Patch, ...]:
         return tuple(Patch(facecolor=np.divide(colour, 255.0), edgecolor="none") for colour in colours)
 
     entries = {}

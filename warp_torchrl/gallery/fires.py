@@ -6,7 +6,18 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from warp_torchrl.gallery.drawing import CELL, INK, SOFT, contours, fire_image, fire_legend, places, sheet, show_map
+from warp_torchrl.gallery.drawing import (
+    CELL,
+    INK,
+    SOFT,
+    contours,
+    fire_image,
+    fire_legend,
+    places,
+    relief,
+    sheet,
+    show_map,
+)
 from warp_torchrl.gallery.measures import snapshots
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.landscape import Perlin
@@ -47,7 +58,7 @@ def fire_terrain_wind(size: int = 100, seed: int = 6, at: tuple[int, ...] = (350
     for tick, state in zip(at, snapshots(ground, AUTOMATON, Paper(), at, seed, CELL)):
         panel = axes[str(tick)]
         show_map(panel, fire_image(state))
-        contours(panel, ground.elevation[0], levels=[35.0, 65.0], colors="white", linewidths=0.5, alpha=0.5)
+        contours(panel, relief(ground), levels=[35.0, 65.0], colors="white", linewidths=0.5, alpha=0.5)
         fastest = _arrows(panel, state.wind[0])
         panel.set_title(_burning(tick, state.cells))
     covers = (Cover.LAKE, Cover.WETLAND, Cover.GRASSLAND, Cover.FOREST)

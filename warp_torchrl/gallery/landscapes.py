@@ -14,6 +14,7 @@ from warp_torchrl.gallery.drawing import (
     cover_legend,
     hillshade,
     ramp,
+    relief,
     round_length,
     sheet,
     show_map,
@@ -55,7 +56,7 @@ def burn_probability(landscape: str | Path, size: int = 128, worlds: int = 200, 
     ground = source(world_key(torch.arange(worlds)))
     lit = ignition(ground.cover[0])
     history = fires_from(ground, lit, ticks, source.cell_size)
-    light = hillshade(ground.elevation[0], source.cell_size)
+    light = hillshade(relief(ground), source.cell_size)
     figure, axes = sheet([["cover", "probability"]], (7.2, 4.4), f"{worlds} fires from one ignition on real ground")
     step = _draw_cover(axes["cover"], ground, light, source.cell_size)
     _draw_probability(figure, axes["probability"], history, light)
@@ -74,7 +75,7 @@ def burn_probability(landscape: str | Path, size: int = 128, worlds: int = 200, 
 
 def _draw_cover(axes: "Axes", ground: Landscape, light: Tensor, cell_size: float) -> float:
     """Draw land cover and contours; return the height between these [m]."""
-    elevation = ground.elevation[0]
+    elevation = relief(ground)
     low, high = (bound.item() for bound in elevation.aminmax())
     step = round_length(max(8.0, high - low) / 8.0)
     levels = [step * number for number in range(int(low // step), int(high // step) + 1)]
@@ -111,8 +112,8 @@ def ignition(cover: Tensor) -> tuple[int, int]:
     height, width = cover.shape
     down, across = torch.arange(height)[:, None] - height // 2, torch.arange(width)[None, :] - width // 3
     fuel = (cover == Cover.FOREST) | (cover == Cover.GRASSLAND)
-    nearest = torch.where(fuel, down.square() + across.square(), height**2 + width**2).argmin().item()
-    return nearest // width, nearest % width
+    nearest = torch.where(fuel, down.square() + across.square(), height**2 + width**2).argmin()
+    return divmod(int(nearest), width)
 
 
 def fires_from(ground: Landscape, lit: tuple[int, int], ticks: int, cell_size: float) -> FireHistory:

@@ -1,6 +1,7 @@
 """The numbers behind the figures, measured on the automaton itself; nothing here draws."""
 
 import math
+from typing import Literal
 
 import torch
 from torch import Tensor
@@ -13,11 +14,14 @@ from warp_torchrl.world.random import Stream, uniform, world_key
 from warp_torchrl.world.state import FIRST_FIRE, OLDEST, Cover, Landscape, WorldState, is_burning, is_tree
 from warp_torchrl.world.wind import Calm, Wind
 
+Kernel = Literal["alexandridis", "ellipse"]
 CALM_HAZARD = 0.05
 """Hazard that a burning cell sets on a neighbour in a tick without wind, where ellipses are measured."""
 
 
-def snapshots(ground: Landscape, fire: Fire, wind: Wind, at: tuple[int, ...], seed: int, cell_size: float) -> list:
+def snapshots(
+    ground: Landscape, fire: Fire, wind: Wind, at: tuple[int, ...], seed: int, cell_size: float
+) -> list[WorldState]:
     """Return one world at each of these ticks, from a forest in which nothing burns yet.
 
     Args:
@@ -86,13 +90,15 @@ def diagonal_over_axis(arrival: Tensor, near: int, far: int) -> float:
 # Fires in the wind
 
 
-def steady_fire(kernel: str, refinement: int = 6) -> HazardFire:
+def steady_fire(kernel: Kernel, refinement: int = 6) -> HazardFire:
     """Return a fire whose cells spread for five times ``refinement`` ticks, with calm hazard 0.05 a tick."""
     alpha = -math.expm1(-CALM_HAZARD * refinement)
     return HazardFire(kernel=kernel, refinement=refinement, burning_stages=5, alpha=(0.0, 0.0, 0.0, alpha, 0.0))
 
 
-def fires_in_wind(speed: float, kernel: str, reach: int, worlds: int, seed: int = 0) -> tuple[Tensor, tuple[int, int]]:
+def fires_in_wind(
+    speed: float, kernel: Kernel, reach: int, worlds: int, seed: int = 0
+) -> tuple[Tensor, tuple[int, int]]:
     """Return how likely each cell is to have burned when a fire's head has come ``reach`` cells to the east.
 
     Args:
@@ -175,7 +181,8 @@ def strike_and_burn(
         seed=seed, cell_size=30.0,
     )  # fmt: skip
     certain = torch.full(cells.shape, 0.5)  # every chance is 0 or 1: any number will do
-    all_worlds, trees, sizes = torch.ones(worlds, dtype=torch.bool), is_tree(cells).sum((1, 2)), []
+    all_worlds, trees = torch.ones(worlds, dtype=torch.bool), is_tree(cells).sum((1, 2))
+    sizes: list[int] = []
     struck = torch.zeros(worlds, dtype=torch.bool)
     while len(sizes) < fires + discard:
         out = ~is_burning(state.cells).flatten(1).any(dim=1)

@@ -1,11 +1,11 @@
 """The ground: noise, its scales, and land cover."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import torch
 from torch import Tensor
 
-from warp_torchrl.gallery.drawing import CELL, contours, cover_image, cover_legend, hillshade, sheet, show_map
+from warp_torchrl.gallery.drawing import CELL, contours, cover_image, cover_legend, hillshade, relief, sheet, show_map
 from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.state import Cover
@@ -14,6 +14,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _COVERS = (Cover.LAKE, Cover.WETLAND, Cover.GRASSLAND, Cover.FOREST)
+_READINGS: dict[Literal["quantile", "minmax", "printed"], str] = {
+    "quantile": "quantile (default): lowest 6, 16, 36 % of the map",
+    "minmax": "minmax: noise under 0.06, 0.16, 0.36",
+    "printed": "printed: noise under 0.01, 0.2, 0.01",
+}
 
 
 def noise(size: int = 256, seed: int = 3) -> "Figure":
@@ -41,13 +46,9 @@ def cover(size: int = 160, seed: int = 3) -> "Figure":
     """Land cover of one terrain under the three readings of the paper's thresholds (WARP-CA, terrain types)."""
     layout = [["quantile", "quantile", "minmax"], ["quantile", "quantile", "printed"]]
     figure, axes = sheet(layout, (6.6, 4.75), "Land cover from one noise map, by the thresholds on it")
-    for name, meaning in (
-        ("quantile", "quantile (default): lowest 6, 16, 36 % of the map"),
-        ("minmax", "minmax: noise under 0.06, 0.16, 0.36"),
-        ("printed", "printed: noise under 0.01, 0.2, 0.01"),
-    ):
+    for name, meaning in _READINGS.items():
         ground = Perlin(size=size, relief=100.0, thresholds=name)(world_key(torch.tensor([seed])))
-        elevation = ground.elevation[0]
+        elevation = relief(ground)
         show_map(axes[name], cover_image(ground.cover[0], hillshade(elevation, exaggeration=2.5)))
         if name == "quantile":
             contours(axes[name], elevation, levels=[20.0, 40.0, 60.0, 80.0], colors="black", linewidths=0.35, alpha=0.5)

@@ -23,8 +23,8 @@ class Ring(Coordinated):
 
     def __init__(self, env: WildfireEnv) -> None:
         super().__init__(env)
-        self._plan: Tensor | None = None  # bool [B, H, W], the ring
-        self._inside: Tensor | None = None  # bool [B, H, W], what it encloses
+        self._plan = torch.zeros(0, dtype=torch.bool)  # [B, H, W], the ring; empty before the first step
+        self._inside = torch.zeros(0, dtype=torch.bool)  # [B, H, W], what it encloses
 
     def diggers(self, state: WorldState) -> Tensor:
         """Return which agents work on the ring, bool [A]."""
@@ -49,7 +49,7 @@ class Ring(Coordinated):
     def _revise(self, state: WorldState) -> None:
         """Plan a ring in worlds that begin, and where the fire has got over the one there was."""
         burning = is_burning(state.cells)
-        if self._plan is None or self._plan.shape != burning.shape:
+        if self._plan.shape != burning.shape:
             self._plan, self._inside = torch.zeros_like(burning), torch.zeros_like(burning)
         stale = (state.step == 0) | (burning & ~self._inside).flatten(1).any(dim=1)
         index = stale.nonzero()[:, 0]
@@ -62,8 +62,8 @@ class Ring(Coordinated):
         reach = max(burning.shape[1:]) // 2
         away = torch.full(burning.shape, reach, device=burning.device)  # king's moves to the fire, ``reach`` at most
         fire = burning
-        for distance in range(reach):
-            away = torch.where(fire & (away == reach), distance, away)
+        for moves in range(reach):
+            away = torch.where(fire & (away == reach), moves, away)
             fire = grow(fire)
         fuel = is_tree(state.cells) & (state.alpha > 0.0)
         cells = torch.zeros(len(burning), reach + 1, device=burning.device)

@@ -98,7 +98,8 @@ class Mlp:
             central: Whether it reads the state too.
             judges: Whether it reads the action that was chosen too, and that of the team where it is central.
         """
-        entries, keys = list(signature.observation.values()), list(signature.observation_keys())
+        entries = list(signature.observation.values())
+        keys: list[str | tuple[str, ...]] = list(signature.observation_keys())
         if judges:
             entries.append(Entry((signature.n_actions,), "float32"))
             keys.append(ACTION_ONE_HOT)

@@ -1,12 +1,21 @@
 """Networks: encoders of observations, heads, and who of a team shares which."""
 
-from functools import lru_cache
+import operator
+from functools import lru_cache, reduce
 
 import torch
 from torch import Tensor, nn
 from torchrl.modules import MLP, ConvNet
 
 from warp_torchrl.models.signature import Entry
+
+
+class _Linear(nn.Linear):
+    def forward(self, given: Tensor) -> Tensor:
+        if given.dtype != torch.uint8:
+            return super().forward(given)
+        # Scaling the weights is far cheaper than scaling the many bytes.
+        return nn.functional.linear(_cast(given, self.weight), self.weight * (1.0 / 255.0), self.bias)
 
 
 class LinearEncoder(nn.Module):
@@ -23,25 +32,21 @@ class LinearEncoder(nn.Module):
         super().__init__()
         self.entries = entries
         counts = [count(entry) for entry in entries]
-        self.parts = nn.ModuleList(nn.Linear(each, size, bias=index == 0) for index, each in enumerate(counts))
+        parts = [_Linear(each, size, bias=index == 0) for index, each in enumerate(counts)]
         joined = torch.empty(size, sum(counts))
         nn.init.orthogonal_(joined, 2.0**0.5)
-        for part, weight in zip(self.parts, joined.split(counts, dim=1), strict=True):
+        for part, weight in zip(parts, joined.split(counts, dim=1), strict=True):
             part.weight.data.copy_(weight)
-        nn.init.zeros_(self.parts[0].bias)
+        nn.init.zeros_(parts[0].bias)
+        self.parts = nn.ModuleList(parts)
 
     def forward(self, *inputs: Tensor) -> Tensor:
         """Return features, float [..., size]."""
-        total = None
-        for part, entry, tensor in zip(self.parts, self.entries, inputs, strict=True):
-            flat = tensor.flatten(-len(entry.shape)) if len(entry.shape) > 1 else tensor
-            if flat.dtype == torch.uint8:
-                # Scaling the weights is far cheaper than scaling the many bytes.
-                features = nn.functional.linear(_cast(flat, part.weight), part.weight * (1.0 / 255.0), part.bias)
-            else:
-                features = part(flat)
-            total = features if total is None else total + features
-        return total
+        features = (
+            part(tensor.flatten(-len(entry.shape)) if len(entry.shape) > 1 else tensor)
+            for part, entry, tensor in zip(self.parts, self.entries, inputs, strict=True)
+        )
+        return reduce(operator.add, features)
 
 
 class ConvolutionalEncoder(nn.Module):
@@ -195,11 +200,12 @@ class AgentNetworks(nn.Module):
     def __init__(self, networks: list[Network]) -> None:
         super().__init__()
         self.networks = nn.ModuleList(networks)
+        self._entries = networks[0].encoder.entries
 
     def forward(self, *inputs: Tensor) -> Tensor:
         """Return float32 [..., A, out] from entries [..., A, ...]; one that all share may be [..., 1, ...]."""
         split = []
-        for given, entry in zip(inputs, self.networks[0].encoder.entries, strict=True):
+        for given, entry in zip(inputs, self._entries, strict=True):
             each = given.unbind(-1 - len(entry.shape))
             split.append(each * len(self.networks) if len(each) == 1 else each)
         own = zip(self.networks, *split, strict=True)

@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from torchrl.data import TensorSpec
 from torchrl.envs import EnvBase
 
 ACTION = ("agents", "action")
@@ -46,7 +47,7 @@ def signature(env: EnvBase) -> Signature:
     seen = specs[OBSERVATION]
     named = dict(seen.items()) if hasattr(seen, "items") else {"": seen}
 
-    def entry(spec: object, skip: int) -> Entry:
+    def entry(spec: TensorSpec, skip: int) -> Entry:
         return Entry(tuple(spec.shape[skip:]), str(spec.dtype).removeprefix("torch."))
 
     n_agents, n_actions = specs[ACTION_MASK].shape

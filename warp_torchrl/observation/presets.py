@@ -101,7 +101,7 @@ class Paper:
 
     def __call__(self, state: WorldState, world: World) -> dict[str, Tensor]:
         """Return one entry, float32 [B, A, 3 (2 r + 1)^2]."""
-        seen = window(state.vehicles.position, tuple(state.cells.shape[1:]), self.radius)
+        seen = window(state.vehicles.position, state.cells.shape[1:], self.radius)
         cells = seen.of(state.cells)
         cover = (seen.of(state.landscape.cover) + seen.inside) * 51
         view = torch.stack((cover, ages(cells), stages(cells)), dim=2)

@@ -1,6 +1,7 @@
 """What an agent sees about itself: its own square of the map, north up."""
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
@@ -29,7 +30,8 @@ ELEVATION_SCALE = 100.0
 """Difference in height that an observation shows as 1 [m]."""
 
 
-class Window(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Window:
     """The squares of cells about the agents."""
 
     index: Tensor
@@ -42,7 +44,7 @@ class Window(NamedTuple):
         return plane.flatten(1).gather(1, self.index).view_as(self.inside).mul_(self.inside)
 
 
-def window(position: Tensor, size: tuple[int, int], radius: int) -> Window:
+def window(position: Tensor, size: Sequence[int], radius: int) -> Window:
     """Return the squares about the agents.
 
     Args:
@@ -60,8 +62,7 @@ def window(position: Tensor, size: tuple[int, int], radius: int) -> Window:
 
 def egocentric_view(state: WorldState, world: World, radius: int) -> Tensor:
     """Return the agents' own views in the channels ``CHANNELS``, uint8 [B, A, C, V, V]."""
-    vehicles, size = state.vehicles, tuple(state.cells.shape[1:])
-    seen = window(vehicles.position, size, radius)
+    seen, elevation = window(state.vehicles.position, state.cells.shape[1:], radius), state.landscape.elevation
     cells = seen.of(state.cells)
     role = world.team.table(cells.device).index
     channels = (
@@ -72,7 +73,7 @@ def egocentric_view(state: WorldState, world: World, radius: int) -> Tensor:
         seen.of(byte(state.burned)) * byte(equal(cells, 0)) * 255,
         seen.of(byte(state.firebreak)) * 255,
         seen.of(state.wet).clamp_(max=10) * 25,
-        seen.inside * 128 if state.landscape.elevation is None else _relative_elevation(state, seen),
+        seen.inside * 128 if elevation is None else _relative_elevation(elevation, seen),
         (seen.of(world.threat(state)) * 255.0).to(torch.uint8),
         *(seen.of(plane) for plane in _occupancy(state, role)),
     )
@@ -92,8 +93,8 @@ def stages(cells: Tensor) -> Tensor:
     return (cells - (FIRST_FIRE - 1)) * byte(is_burning(cells)) * 51
 
 
-def _relative_elevation(state: WorldState, seen: Window) -> Tensor:
-    heights = seen.of(state.landscape.elevation)
+def _relative_elevation(elevation: Tensor, seen: Window) -> Tensor:
+    heights = seen.of(elevation)
     middle = heights.shape[-1] // 2
     own = heights[:, :, middle, middle, None, None]
     return ((heights - own) / ELEVATION_SCALE).clamp_(-1.0, 1.0).mul_(127.0).add_(128.0).to(torch.uint8)

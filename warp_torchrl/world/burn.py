@@ -4,6 +4,7 @@ import torch
 from tensordict import tensorclass
 from torch import Tensor
 
+from warp_torchrl.world.batch import Batch
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.state import Landscape, WorldState, is_burning
@@ -13,7 +14,7 @@ from warp_torchrl.world.world import advance, quiet_state
 
 
 @tensorclass(nocast=True)
-class FireHistory:
+class FireHistory(Batch):
     """A fire from its first to its last tick, in each world; batch size [B]."""
 
     cells: Tensor  # uint8 [B,H,W], the codes after the last tick
@@ -59,7 +60,7 @@ def start_burning(
     key = world_key(seeds, torch.zeros_like(seeds))
     ground = Landscape(cover=cover, age=cells, elevation=elevation, batch_size=key.shape)
     nobody = Team(n_agents=1).place(key, cover, is_burning(cells))
-    air = wind(key, tuple(cells.shape[1:]))
+    air = wind(key, (cells.shape[1], cells.shape[2]))
     state = quiet_state(ground, fire, air, key, nobody, cell_size)
     if state.stage_age is not None and stage_age is not None:
         state = state.replace(stage_age=stage_age)

@@ -51,8 +51,8 @@ class Crop:
         corners = self._find_corners()
         ground = slice(None), slice(None)
         if len(corners) == 1:  # the only window, so every world gets the same ground: cut it out once
-            ends = zip(divmod(int(corners), self.cover.shape[1]), map_size(self.size))
-            ground = tuple(slice(first, first + side) for first, side in ends)
+            (row, column), (height, width) = divmod(int(corners), self.cover.shape[1]), map_size(self.size)
+            ground = slice(row, row + height), slice(column, column + width)
         layers = [
             None if each is None else each[ground] for each in (self.cover, self.elevation, self.age, self.assets)
         ]
@@ -69,13 +69,22 @@ class Crop:
         if key.device not in self._maps:
             maps = self._maps[torch.device("cpu")]
             self._maps[key.device] = [each if each is None else each.to(key.device) for each in maps]
-        corners, *layers = self._maps[key.device]
+        corners, cover, elevation, age, assets = self._maps[key.device]
         draw = uniform(key, 0, Stream.CROP, (1, 1))[:, 0, 0].double()  # float32 cannot count past 2^24 windows
         window, across = corners[(draw * len(corners)).long()], self.cover.shape[1]
         corner = torch.stack((window // across, window % across), dim=1)
-        cover, elevation, age, assets = (layer if layer is None else self._cut(layer, corner) for layer in layers)
-        age = self._fill_age(key, cover, age)
-        return Landscape(cover=cover, age=age, elevation=elevation, assets=assets, corner=corner, batch_size=key.shape)
+        elevation, age, assets = (
+            layer if layer is None else self._cut(layer, corner) for layer in (elevation, age, assets)
+        )
+        cover = self._cut(cover, corner)
+        return Landscape(
+            cover=cover,
+            age=self._fill_age(key, cover, age),
+            elevation=elevation,
+            assets=assets,
+            corner=corner,
+            batch_size=key.shape,
+        )
 
     @property
     def extent(self) -> tuple[int, int]:
@@ -102,7 +111,7 @@ class Crop:
 
     def _fill_age(self, key: Tensor, cover: Tensor, age: Tensor | None) -> Tensor:
         """Return the age of each cell, drawn where the map has none; 0 where no tree can stand."""
-        if not self._draws_age:
+        if age is not None and not self._draws_age:
             return age * holds_trees(cover)
         drawn = draw_age(key, cover)
         return drawn if age is None else torch.where(age == DRAWN, drawn, age * holds_trees(cover))
@@ -116,7 +125,8 @@ class Crop:
         known = np.ones(self.cover.shape, bool) if self.known is None else self.known
         whole = _sum_windows(torch.from_numpy(~known), height, width) == 0
         if self.row is not None or self.column is not None:
-            return torch.tensor([self._fixed_row(whole) * columns + self.column])
+            row, column = self._fixed_corner(whole)
+            return torch.tensor([row * columns + column])
         least = max(1, math.ceil(self.min_fuel * height * width - 1e-6))
         fuel = _sum_windows(holds_trees(torch.from_numpy(self.cover)), height, width)
         window = (whole & (fuel >= least)).flatten().nonzero().squeeze(1)
@@ -126,15 +136,18 @@ class Crop:
         across = whole.shape[1]
         return window // across * columns + window % across
 
-    def _fixed_row(self, whole: Tensor) -> int:
-        """Return ``row`` if it and ``column`` name a window without nodata."""
+    def _fixed_corner(self, whole: Tensor) -> tuple[int, int]:
+        """Return ``row`` and ``column`` if they name a window without nodata."""
+        corner = []
         for name, count in zip(("row", "column"), whole.shape):
             value = getattr(self, name)
             if type(value) is not int or not 0 <= value < count:
                 raise ValueError(f"{name} must be whole, in 0..{count - 1} for a window in the map, got {value}")
-        if not whole[self.row, self.column]:
-            raise ValueError(f"row, column must name a window without nodata, got {self.row}, {self.column}")
-        return self.row
+            corner.append(value)
+        row, column = corner
+        if not whole[row, column]:
+            raise ValueError(f"row, column must name a window without nodata, got {row}, {column}")
+        return row, column
 
 
 def _sum_windows(mask: Tensor, height: int, width: int) -> Tensor:

@@ -89,9 +89,11 @@ def block_shares(mask: Tensor, among: Tensor, side: int = 8) -> Tensor:
 
     Blocks at the south and east border may be smaller; one with no cell of ``among`` has share 0.
     """
-    options = {"kernel_size": side, "ceil_mode": True, "divisor_override": 1}
-    count = avg_pool2d(among.to(torch.float32)[:, None], **options)[:, 0]
-    return avg_pool2d((mask & among).to(torch.float32)[:, None], **options)[:, 0] / count.clamp(min=1.0)
+
+    def count(cells: Tensor) -> Tensor:
+        return avg_pool2d(cells.to(torch.float32)[:, None], side, ceil_mode=True, divisor_override=1)[:, 0]
+
+    return count(mask & among) / count(among).clamp(min=1.0)
 
 
 @lru_cache(maxsize=16)

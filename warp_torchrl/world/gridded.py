@@ -60,15 +60,15 @@ class Gridded(Wind):
         check_fields(self, ticks_per_field=(1, 1_000_000))
         if (self.speed is None) != (self.bearing is None):
             raise ValueError(f"bearing must be given with speed, got {self.bearing} and {self.speed}")
-        grid = None
-        if self.path is None:
-            u, v = self.u, self.v
-        elif Path(self.path).is_dir():
+        grid: Grid | None = None
+        u: str | Numbers | None = self.u
+        v: str | Numbers | None = self.v
+        if self.path is not None and Path(self.path).is_dir():
             grid, u, v = self._read_layers(Path(self.path))
-        else:
+        elif self.path is not None:
             layers = read_npz(self.path, ("u", "v"))
             u, v = layers.get("u"), layers.get("v")
-        if any(part is None or isinstance(part, str) for part in (u, v)):
+        if u is None or v is None or isinstance(u, str) or isinstance(v, str):
             raise ValueError(f"path must name a folder of rasters or an .npz file with u and v, got {self.path}")
         self._keep(grid, _stack(u, v))
 
@@ -89,7 +89,7 @@ class Gridded(Wind):
             if self.resample == "refuse":
                 check_grid("wind", self._grid, "the landscape", ground)
             wind = copy(self)
-            wind._keep(ground, np.stack([self._resampled(part, ground) for part in (0, 1)], axis=-1)[None])
+            wind._keep(ground, np.stack([self._resampled(part, self._grid, ground) for part in (0, 1)], axis=-1)[None])
         extent = getattr(landscape, "extent", None) or map_size(landscape.size)
         if wind._fields.shape[1:3] != extent:
             shape = list(wind._fields.shape[1:3])
@@ -107,9 +107,9 @@ class Gridded(Wind):
     def after_tick(self, state: WorldState) -> Tensor:
         """Return the field that follows each world's tick number ``state.tick``, float32 [B, 2, H, W] [m/s]."""
         index = (state.tick.to(torch.int64) // self.ticks_per_field).clamp(max=len(self._fields) - 1)
-        return self._window(index, tuple(state.cells.shape[1:]), state.landscape.corner)
+        return self._window(index, state.cells.shape[1:], state.landscape.corner)
 
-    def _window(self, index: Tensor, size: tuple[int, int], corner: Tensor | None) -> Tensor:
+    def _window(self, index: Tensor, size: Sequence[int], corner: Tensor | None) -> Tensor:
         device = index.device
         if device not in self._maps:
             self._maps[device] = torch.from_numpy(self._fields).to(device)
@@ -124,15 +124,15 @@ class Gridded(Wind):
         object.__setattr__(self, "_fields", fields)
         object.__setattr__(self, "_maps", {})
 
-    def _resampled(self, part: int, ground: Grid) -> np.ndarray:
+    def _resampled(self, part: int, own: Grid, ground: Grid) -> np.ndarray:
         values = self._fields[0, ..., part]
-        values, known = resample("wind", values, ~np.isnan(values), self._grid, ground, "bilinear")
+        values, known = resample("wind", values, ~np.isnan(values), own, ground, "bilinear")
         return np.where(known, values, np.nan).astype(np.float32)
 
     def _read_layers(self, folder: Path) -> tuple[Grid, np.ndarray, np.ndarray]:
         """Return the grid of the layers and u and v on it; NaN where they are not known."""
         polar = self.speed is not None
-        names = {"speed": self.speed, "bearing": self.bearing} if polar else {"u": self.u, "v": self.v}
+        names: dict[str, Any] = {"speed": self.speed, "bearing": self.bearing} if polar else {"u": self.u, "v": self.v}
         paths = {name: find_layer(name, folder, pattern) for name, pattern in names.items()}
         grids = [read_grid(name, path, metric=self.resample == "refuse") for name, path in paths.items()]
         first, second = names

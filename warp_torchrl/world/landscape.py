@@ -6,7 +6,7 @@ A source has a ``size`` (H, W) and, called with world keys, returns the ``Landsc
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol, runtime_checkable
+from typing import Literal, Protocol, TypeVar, runtime_checkable
 
 import torch
 from torch import Tensor
@@ -40,11 +40,12 @@ def map_size(size: tuple[int, int] | int) -> tuple[int, int]:
     Raises:
         ValueError: If a side is not in 4..4096.
     """
-    sides = (size, size) if type(size) is int else size
+    sides = (size, size) if isinstance(size, int) else size
     fits = isinstance(sides, Sequence) and not isinstance(sides, str) and len(sides) == 2
     if not fits or not all(type(side) is int and 4 <= side <= LARGEST_SIDE for side in sides):
         raise ValueError(f"size must be one side or [rows, columns], each in 4..{LARGEST_SIDE} cells, got {size}")
-    return tuple(sides)
+    height, width = sides
+    return height, width
 
 
 def draw_age(key: Tensor, cover: Tensor) -> Tensor:
@@ -70,9 +71,13 @@ _PRINTED = (0.01, 0.2, 0.01)
 _RANGES = ("scale", "octaves", "persistence", "lacunarity", "relief")
 
 
-def _ends(value: float | tuple[float, float]) -> tuple[float, float]:
+_Number = TypeVar("_Number", int, float)
+
+
+def _ends(value: _Number | tuple[_Number, _Number]) -> tuple[_Number, _Number]:
     """Return the lowest and the highest value of a number or a pair."""
-    return tuple(value) if isinstance(value, Sequence) else (value, value)
+    low, high = value if isinstance(value, Sequence) else (value, value)
+    return low, high
 
 
 def _powers(base: Tensor, count: int) -> Tensor:
@@ -186,15 +191,16 @@ class Perlin:
         return [1.0 / (scale * low**octave) for octave in octaves]
 
     def _cover(self, noise: Tensor) -> Tensor:
-        if self.thresholds == "quantile":
-            ordered = noise.flatten(1).sort(dim=1).values
-            cells = ordered.shape[1]
-            lake, wetland, grassland = (
-                ordered[:, min(cells - 1, math.floor(level * cells + 0.5)), None, None] for level in self.levels
-            )
-        else:
-            lake, wetland, grassland = _PRINTED if self.thresholds == "printed" else self.levels
+        lake, wetland, grassland = self._levels_of(noise)
         cover = torch.full_like(noise, Cover.FOREST, dtype=torch.uint8)
         for code, level in ((Cover.GRASSLAND, grassland), (Cover.WETLAND, wetland), (Cover.LAKE, lake)):
             cover.masked_fill_(noise < level, code)
         return cover
+
+    def _levels_of(self, noise: Tensor) -> Sequence[Tensor | float]:
+        """Return L, W and G as values of the noise."""
+        if self.thresholds != "quantile":
+            return _PRINTED if self.thresholds == "printed" else self.levels
+        ordered = noise.flatten(1).sort(dim=1).values
+        cells = ordered.shape[1]
+        return [ordered[:, min(cells - 1, math.floor(level * cells + 0.5)), None, None] for level in self.levels]

@@ -1,6 +1,7 @@
 """Batched fractal gradient noise after Perlin (2002), for the terrain of WARP-CA."""
 
 import math
+from collections.abc import Sequence
 from itertools import accumulate
 
 import torch
@@ -40,15 +41,15 @@ def fractal_noise(
         float32 [B, H, W], about zero, not normalised.
     """
     device = key.device
-    finest = frequencies if finest is None else finest
+    bounds: Sequence[float] | Tensor = frequencies if finest is None else finest
     frequency, amplitude = (
         torch.as_tensor(each, dtype=torch.float32, device=device) for each in (frequencies, amplitudes)
     )
     frequency = frequency[..., None]
-    offsets = uniform(key, 0, stream, (len(finest), 2))
+    offsets = uniform(key, 0, stream, (len(bounds), 2))
     rows, row_part = _locate(size[0], frequency, offsets[..., 0])
     columns, column_part = _locate(size[1], frequency, offsets[..., 1])
-    lattices = [tuple(math.ceil((length - 1) * f) + 3 for length in size) for f in finest]
+    lattices = [tuple(math.ceil((length - 1) * f) + 3 for length in size) for f in bounds]
     widths = torch.tensor([width for _, width in lattices], device=device)[:, None, None]
     starts = [0, *accumulate(height * width for height, width in lattices)]
     angle = uniform(key, 1, stream, (starts[-1],)).mul_(2.0 * math.pi)
@@ -69,7 +70,7 @@ def fractal_noise(
     bottom = bottom_left + column_fade * (corner(1, 1) - bottom_left)
     octaves = top + row_fade * (bottom - top)
     total = torch.zeros(key.shape[0], *size, device=device)
-    for octave in range(len(finest)):  # one after the other: a sum's order must not depend on the batch
+    for octave in range(len(bounds)):  # one after the other: a sum's order must not depend on the batch
         total += amplitude[..., octave, None, None] * octaves[:, octave]
     return total
 

@@ -88,16 +88,24 @@ class Raster:
         if "elevation" in layers:
             elevation = _to_metres(layers["elevation"], known["elevation"])
             whole = whole & known["elevation"]
-        for name, top in (("age", self.full_age), ("canopy", 100.0)):
-            if name in layers:
-                age = _to_age(name, layers[name], known[name], top)
+        if "age" in layers:
+            age = _to_age("age", layers["age"], known["age"], self.full_age)
         if "canopy" in layers:
+            age = _to_age("canopy", layers["canopy"], known["canopy"], 100.0)
             age = np.where((cover == Cover.FOREST) & (age != DRAWN), np.maximum(age, 1), np.uint8(DRAWN))
         assets = _to_worth(layers["assets"], known["assets"]) if "assets" in layers else None
-        window = {"size": self.size, "row": self.row, "column": self.column, "min_fuel": self.min_fuel}
-        object.__setattr__(
-            self, "_crop", Crop(cover=cover, elevation=elevation, age=age, assets=assets, known=whole, **window)
+        crop = Crop(
+            cover=cover,
+            elevation=elevation,
+            age=age,
+            assets=assets,
+            known=whole,
+            size=self.size,
+            row=self.row,
+            column=self.column,
+            min_fuel=self.min_fuel,
         )
+        object.__setattr__(self, "_crop", crop)
 
     def __call__(self, key: Tensor) -> Landscape:
         """Return the landscape of each world's window, with its ``corner`` in ``grid``, batch size [B]."""
@@ -127,7 +135,7 @@ class Raster:
             exists = isinstance(self.path, str | PathLike) and self.path and Path(self.path).exists()
         except OSError:  # a name too long
             exists = False
-        if not exists:
+        if self.path is None or not exists:
             raise ValueError(f"path must name a folder of rasters, or a raster, that exists, got {self.path!r}")
         path = Path(self.path)
         folder = path if path.is_dir() else path.parent
@@ -154,8 +162,8 @@ class Raster:
             if grids[name].differs_in(grid) is None:
                 layers[name], known[name] = read_layer(name, path)
             else:
-                method = self.resample if name == "fuel" else "bilinear"
-                layers[name], known[name] = resample_layer(name, path, grid, method)
+                method = self.resample if name == "fuel" else "bilinear"  # "refuse" has raised by now
+                layers[name], known[name] = resample_layer(name, path, grid, method)  # type: ignore[arg-type]
         return layers, known
 
 

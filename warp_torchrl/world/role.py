@@ -1,5 +1,6 @@
 """The kinds of vehicle."""
 
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -24,7 +25,8 @@ ROLES = {
 ROLE_NAMES = tuple(ROLES)
 
 
-class RoleTable(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class RoleTable:
     """The roles of a team's agents and what they can do."""
 
     index: Tensor  # int64 [A], into ROLE_NAMES

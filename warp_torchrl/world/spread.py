@@ -15,7 +15,7 @@ from warp_torchrl.world.fusion import fusible
 from warp_torchrl.world.geometry import DIRECTIONS, DISTANCES
 from warp_torchrl.world.law import Law
 
-Shape = tuple[int, int, int]
+Shape = tuple[int, ...]
 
 
 def gains(wind: Tensor, diagonal: str) -> Tensor:

@@ -8,6 +8,7 @@ from enum import IntEnum
 from tensordict import tensorclass
 from torch import Tensor
 
+from warp_torchrl.world.batch import Batch
 from warp_torchrl.world.flags import at_least, at_most, count
 
 
@@ -48,7 +49,7 @@ EMBER = 15
 
 
 @tensorclass(nocast=True)
-class Landscape:
+class Landscape(Batch):
     """The ground of each world, fixed for an episode."""
 
     cover: Tensor  # uint8 [B,H,W], a Cover code
@@ -59,7 +60,7 @@ class Landscape:
 
 
 @tensorclass(nocast=True)
-class Tally:
+class Tally(Batch):
     """Counts of the initial trees by fate; they add up to ``initial`` (trees that regrow are counted apart)."""
 
     initial: Tensor  # int32 [B], N0, trees before ignition
@@ -76,7 +77,7 @@ class Tally:
 
 
 @tensorclass(nocast=True)
-class Vehicles:
+class Vehicles(Batch):
     """The team on the map."""
 
     position: Tensor  # int64 [B,A,2], (row, column) [cells]
@@ -89,7 +90,7 @@ class Vehicles:
 
 
 @tensorclass(nocast=True)
-class WorldState:
+class WorldState(Batch):
     """Everything that a step reads or changes; batch size [B]."""
 
     landscape: Landscape
@@ -127,7 +128,7 @@ class WorldState:
 
 
 @tensorclass(nocast=True)
-class Outcome:
+class Outcome(Batch):
     """What each agent's action of one step came to."""
 
     action: Tensor  # int64 [B,A], as chosen
@@ -139,7 +140,7 @@ class Outcome:
 
 
 @tensorclass(nocast=True)
-class Transition:
+class Transition(Batch):
     """One step of every world: all that rewards, metrics and pictures read."""
 
     before: WorldState

@@ -110,11 +110,11 @@ class Paper(Wind):
         """Return the field of each world, float32 [B, 2, H, W] [m/s]."""
         north = torch.linspace(3.0, -3.0, size[0], device=key.device)[None, :, None]
         east = torch.linspace(-3.0, 3.0, size[1], device=key.device)[None, None, :]
+        cosine = torch.ones_like(key[:, None, None], dtype=torch.float32)
+        sine: Tensor | float = 0.0
         if self.rotate:
             angle = (uniform(key, 0, Stream.WIND, (1, 1)) * (2.0 * math.pi)).to(torch.float32)
             cosine, sine = angle.cos(), angle.sin()
-        else:
-            cosine, sine = torch.ones_like(key[:, None, None], dtype=torch.float32), 0.0
         x, y = cosine * east + sine * north, cosine * north - sine * east
         u, v = -1.0 - x * x + x + y, (1.0 + x * x - y * y) / 10.0
         return self.scale * torch.stack((cosine * u - sine * v, sine * u + cosine * v), dim=1)
