@@ -1,0 +1,62 @@
+"""What an installation has: the wheel's files, and its programs."""
+
+import importlib
+import os
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """The wheel, built without a network."""
+    pytest.importorskip("hatchling", reason="needs the extra dev")
+    from hatchling.builders.wheel import WheelBuilder
+
+    folder = tmp_path_factory.mktemp("wheel")
+    return Path(next(WheelBuilder(str(ROOT)).build(directory=str(folder), versions=["standard"])))
+
+
+def test_the_wheel_has_every_module_and_every_option(wheel):
+    files = set(ZipFile(wheel).namelist())
+    package = [path for path in (ROOT / "warp_torchrl").rglob("*") if path.suffix == ".py" or path.name == "py.typed"]
+    options = list((ROOT / "conf").rglob("*.yaml"))
+    assert {path.relative_to(ROOT).as_posix() for path in package} <= files
+    assert {f"warp_torchrl/{path.relative_to(ROOT).as_posix()}" for path in options} <= files and len(options) > 50
+    assert not [name for name in files if not name.startswith(("warp_torchrl/", "warp_torchrl-"))]
+
+
+@pytest.mark.slow
+def test_the_wheel_runs_from_any_folder(wheel, tmp_path):
+    ZipFile(wheel).extractall(tmp_path / "installed")
+    (tmp_path / "empty").mkdir()
+    code = "import warp_torchrl as w; print(w.__file__); print(len(w.make_env('default', n_worlds=2).reset()))"
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path / "empty",
+        env={**os.environ, "PYTHONPATH": str(tmp_path / "installed")},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines() == [str(tmp_path / "installed" / "warp_torchrl" / "__init__.py"), "2"]
+
+
+@pytest.mark.parametrize("name", PROJECT["scripts"])
+def test_a_program_s_function_is_there(name):
+    module, _, function = PROJECT["scripts"][name].partition(":")
+    assert callable(getattr(importlib.import_module(module), function))
+
+
+def test_an_extra_that_others_hold_is_held_whole():
+    extras = PROJECT["optional-dependencies"]
+    assert set(extras["docs"]) <= set(extras["dev"]) and set(extras["figures"]) <= set(extras["interop"])
