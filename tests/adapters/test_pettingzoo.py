@@ -2,11 +2,15 @@
 
 import copy
 import pickle
+import re
+import sys
+from itertools import count
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from pettingzoo import ParallelEnv
-from pettingzoo.test import api_test, max_cycles_test, parallel_api_test, parallel_seed_test
+from pettingzoo.test import api_test, max_cycles_test, parallel_api_test, parallel_seed_test, performance_benchmark
 
 from warp_torchrl.adapters import FireExtinguishingEnvParallel, parallel_env, pettingzoo
 
@@ -39,6 +43,13 @@ def test_pettingzoo_finds_the_number_of_cycles_kept():
 @pytest.mark.filterwarnings("ignore:Observation")
 def test_pettingzoo_finds_the_interface_of_taking_turns_kept():
     api_test(pettingzoo.env("skirmish", max_cycles=3), num_cycles=6)
+
+
+def test_pettingzoo_measures_its_speed(monkeypatch, capsys):
+    hurried = SimpleNamespace(time=count(step=0.5).__next__)  # its five seconds are over at once
+    monkeypatch.setattr(sys.modules["pettingzoo.test.performance_benchmark"], "time", hurried)
+    performance_benchmark(pettingzoo.env("skirmish", max_cycles=3))
+    assert re.search(r"\n\d\.\d+ turns per second\n\d\.\d+ cycles per second\n", capsys.readouterr().out)
 
 
 def test_it_is_the_paper_s_class_with_the_paper_s_names():
