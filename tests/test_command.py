@@ -128,7 +128,7 @@ def test_a_run_stopped_by_a_signal_resumes_to_what_it_would_have_been(trained):
     started.send_signal(signal.SIGTERM)
     _, errors = started.communicate(timeout=120)
     assert started.returncode == 128 + signal.SIGTERM, errors
-    assert "go on with resume=" in errors.strip().splitlines()[-1]
+    assert errors.strip().splitlines()[-1].endswith(f"; go on with resume={cut}")
     assert command("train.py", "resume=cut", folder=run.parent).returncode == 0
     ours, theirs = (
         [row.split(",")[3:] for row in (folder / "metrics.csv").read_text().splitlines()] for folder in (cut, run)

@@ -50,8 +50,8 @@ class Stopped(Exception):  # noqa: N818
         number: The signal's.
     """
 
-    def __init__(self, number: int) -> None:
-        super().__init__(f"stopped by signal {signal.Signals(number).name}; go on with resume=")
+    def __init__(self, number: int, run: Path) -> None:
+        super().__init__(f"stopped by signal {signal.Signals(number).name}; go on with resume={run}")
         self.number = number
 
 
@@ -111,7 +111,7 @@ class Training:
                     if signals.received or self.frames - self.saved_at >= self.settings.checkpoint.interval:
                         self.save()
                     if signals.received:
-                        raise Stopped(signals.received)
+                        raise Stopped(signals.received, self.run)
         finally:
             bar.close()
             tracker.close()
@@ -128,7 +128,7 @@ class Training:
             if self.frames > self.saved_at:
                 self.save()
             if signals.received:  # which workers of the same terminal get too
-                raise Stopped(signals.received) from None
+                raise Stopped(signals.received, self.run) from None
             raise
 
     def _learn(self, batch: TensorDictBase) -> dict[str, float | None]:
