@@ -118,6 +118,13 @@ def test_cuda_burns_as_the_cpu_does_for_100_ticks(world: World) -> None:
             assert torch.equal(getattr(ours, name), getattr(theirs, name).cpu()), (tick, name)
 
 
+def test_many_worlds_start_in_parts(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = start(world, range(7))
+    rows, columns = world.size
+    monkeypatch.setattr("warp_torchrl.world.world._CELLS_AT_ONCE", 3 * rows * columns)  # parts of 3, 3 and 1
+    assert differing(start(world, range(7)), whole) == []
+
+
 def test_a_reset_repeats(world: World) -> None:
     assert differing(start(world, range(8)), start(world, range(8))) == []
     assert differing(start(world, range(8), episode=5), start(world, range(8), episode=5)) == []

@@ -3,7 +3,7 @@
 # ruff: noqa: D102  they are tensordict's methods
 
 from dataclasses import field
-from typing import TYPE_CHECKING, Any, Self, dataclass_transform
+from typing import TYPE_CHECKING, Any, Self, TypeVar, cast, dataclass_transform
 
 import torch
 from torch import Tensor
@@ -27,3 +27,11 @@ if TYPE_CHECKING:
 
 else:
     Batch = object
+
+
+Batched = TypeVar("Batched", bound=Batch)
+
+
+def concatenated(parts: list[Batched]) -> Batched:
+    """Return batches one after the other."""
+    return cast(Batched, torch.cat(cast(Any, parts)))
