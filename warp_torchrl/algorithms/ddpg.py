@@ -79,6 +79,11 @@ class Ddpg(EpsilonGreedy):
         )
         return TensorDictSequential(model.actor(shape), choose)
 
+    def explorer(self, policy: TensorDictModuleBase, shape: Signature) -> TensorDictSequential:
+        """Return the policy, some of whose actions are drawn anew, with the one-hot of what is done in the end."""
+        told = TensorDictModule(_OneHot(shape.n_actions), in_keys=[ACTION], out_keys=[ACTION_ONE_HOT])
+        return TensorDictSequential(policy, self.epsilon_greedy(shape, self.epsilon), told)
+
     def loss(self, policy: TensorDictModuleBase, shape: Signature, model: Mlp, device: torch.device) -> DDPGLoss:
         """Return TorchRL's loss with its value estimator."""
         critic = model.action_critic(shape, self.central_critic).to(device)
