@@ -11,6 +11,7 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
+from warp_torchrl import disk
 from warp_torchrl.behaviour import BEHAVIOUR, Behaviour
 from warp_torchrl.env import EPISODE_METRICS, WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS, idle_action
@@ -204,6 +205,4 @@ def record_episode(
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
     """Write a file whole or not at all."""
-    draft = path.with_name(f".{path.name}.tmp")
-    draft.write_text(json.dumps(content, indent=1), encoding="utf-8")
-    draft.replace(path)
+    disk.replace(path, json.dumps(content, indent=1))

@@ -1,14 +1,18 @@
 """Where a run's numbers go: ``metrics.csv`` always, and a tracker where one is asked for."""
 
 import csv
+import io
 import logging
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Literal, Protocol
 
 from torchrl.record.loggers import get_logger
+
+from warp_torchrl import disk
 
 log = logging.getLogger("warp_torchrl")
 
@@ -21,6 +25,9 @@ class MetricsFile:
     Args:
         path: The file.
         keep_rows: Rows that stay when it exists; the others were written after the checkpoint.
+
+    Raises:
+        ValueError: If there are fewer.
     """
 
     def __init__(self, path: Path, keep_rows: int = 0) -> None:
@@ -28,10 +35,7 @@ class MetricsFile:
         self.rows = keep_rows
         self._columns: list[str] | None = None
         if keep_rows:
-            with path.open(newline="", encoding="utf-8") as file:
-                lines = list(csv.reader(file))
-            self._columns = lines[0]
-            self._write("w", lines[: keep_rows + 1])
+            self._columns = self._cut(keep_rows)
 
     def add(self, row: Mapping[str, float | None]) -> None:
         """Append a row; it is on its way to the disk when this returns.
@@ -49,12 +53,28 @@ class MetricsFile:
             raise ValueError(f"metrics.csv has no columns {sorted(unknown)}")
         values = [row.get(column) for column in self._columns]
         lines.append(["" if value is None else repr(value) for value in values])
-        self._write("w" if len(lines) > 1 else "a", lines)
+        mode = "w" if len(lines) > 1 else "a"
+        with disk.telling(self.path), self.path.open(mode, newline="", encoding="utf-8") as file:
+            csv.writer(file).writerows(lines)
         self.rows += 1
 
-    def _write(self, mode: str, lines: list[list[str]]) -> None:
-        with self.path.open(mode, newline="", encoding="utf-8") as file:
-            csv.writer(file).writerows(lines)
+    def sync(self) -> None:
+        """Wait until every row is on the disk."""
+        if self.rows:
+            disk.sync(self.path)
+
+    def _cut(self, rows: int) -> list[str]:
+        """Drop all but the first rows, and return the columns."""
+        lines = []
+        if self.path.exists():
+            with self.path.open(newline="", encoding="utf-8", errors="replace") as file:  # the last row may be torn
+                lines = list(islice(csv.reader(file), rows + 1))
+        if len(lines) <= rows:
+            raise ValueError(f"{self.path} must hold the {rows} rows of the checkpoint, got {max(len(lines) - 1, 0)}")
+        kept = io.StringIO(newline="")
+        csv.writer(kept).writerows(lines)
+        disk.replace(self.path, kept.getvalue())
+        return lines[0]
 
 
 class Tracker(Protocol):
