@@ -1,14 +1,18 @@
 """Checkpoints are complete or invisible, and verified before they are read."""
 
+import io
 import json
+import pickle
 import shutil
 
 import pytest
 import torch
 
+from tests.forgery import forge
 from warp_torchrl import checkpoint as checkpoints
 from warp_torchrl.checkpoint import CheckpointError, RunFolderInUse, RunFolderLock, newest
-from warp_torchrl.config import Record
+from warp_torchrl.config import Record, recompose
+from warp_torchrl.construction import ConfigError
 from warp_torchrl.models import Entry, Signature
 
 SIGNATURE = Signature({"view": Entry((3, 5, 5), "uint8")}, Entry((9, 16, 16), "float32"), 2, 11, 2)
@@ -37,7 +41,7 @@ def test_what_was_saved_comes_back(tmp_path):
 
 
 def test_the_newest_is_found_by_number_and_old_ones_go(tmp_path):
-    for frames in (900, 1000, 20, 99_999):
+    for frames in (20, 900, 1000, 99_999):
         saved(tmp_path, frames, keep=3)
     assert newest(tmp_path)[0].manifest.frames == 99_999
     assert sorted(int(each.name) for each in (tmp_path / "checkpoints").iterdir()) == [900, 1000, 99_999]
@@ -56,15 +60,48 @@ def test_an_altered_file_is_noticed_and_the_one_before_taken(tmp_path, name, har
         half = len(content) // 2
         flipped = content[:half] + bytes([content[half] ^ 1]) + content[half + 1 :]
         path.write_bytes({"flip": flipped, "cut": content[:half], "empty": b"", "append": content + b" x"}[harm])
-    found, skipped = newest(tmp_path)
-    assert found.manifest.frames == 1 or (name == "manifest.json" and _same_meaning(found))
-    if found.manifest.frames == 1:
-        assert len(skipped) == 1 and "\n" not in skipped[0] and "2" in skipped[0]
+    found, (line,) = newest(tmp_path)
+    assert found.manifest.frames == 1 and "\n" not in line and "checkpoints/2" in line
 
 
-def _same_meaning(found):
-    """A flipped bit in the manifest may fall on white space or on a version's name and change nothing that is used."""
-    return found.manifest.signature == SIGNATURE and found.policy()["weight"].tolist() == [0, 1, 2, 3]
+def test_every_byte_of_a_manifest_counts(tmp_path):
+    saved(tmp_path, 1)
+    path = saved(tmp_path, 2) / "manifest.json"
+    content = path.read_bytes()
+    for place in range(0, len(content), 7):
+        path.write_bytes(content[:place] + bytes([content[place] ^ (1 << place % 8)]) + content[place + 1 :])
+        assert newest(tmp_path)[0].manifest.frames == 1, content[max(place - 20, 0) : place + 20]
+    path.write_bytes(content)
+    assert newest(tmp_path)[0].manifest.frames == 2
+
+
+def test_checkpoints_that_change_places_are_noticed(tmp_path):
+    first, second = saved(tmp_path, 1), saved(tmp_path, 2)
+    first.rename(tmp_path / "aside")
+    second.rename(first)
+    (tmp_path / "aside").rename(second)
+    with pytest.raises(CheckpointError, match="2 holds a checkpoint of 1 frames"):
+        newest(tmp_path)
+    assert newest(second)[0].manifest.frames == 1, "a single checkpoint may be anywhere"
+
+
+@pytest.mark.parametrize("keep", [2, 3])
+def test_a_run_that_fell_back_never_loses_what_it_then_saves(tmp_path, keep):
+    """Two unsound checkpoints are newer: they must neither stand for the new one nor push it out."""
+    saved(tmp_path, 100)
+    for frames in (200, 300):
+        (saved(tmp_path, frames, keep=9) / "policy.pt").write_bytes(b"rotten")
+    assert newest(tmp_path)[0].manifest.frames == 100 and len(newest(tmp_path)[1]) == 2
+    saved(tmp_path, 200, keep)
+    assert newest(tmp_path)[0].manifest.frames == 200 and newest(tmp_path)[1] == []
+    assert sorted(each.name for each in (tmp_path / "checkpoints").iterdir()) == ["100", "200"]
+
+
+def test_a_sound_checkpoint_is_never_written_again(tmp_path):
+    path = saved(tmp_path, 1) / "training.pt"
+    before = path.stat()
+    saved(tmp_path, 1)
+    assert path.stat() == before
 
 
 def test_nothing_sound_is_one_line(tmp_path):
@@ -82,30 +119,93 @@ def test_another_format_is_refused_by_name(tmp_path):
         newest(tmp_path)
 
 
-def test_a_pickle_in_place_of_weights_does_not_run(tmp_path):
-    import hashlib
-    import pickle
+class Poison:
+    """Unpickled, it writes the file that its tests look for."""
 
-    class Poison:
-        def __reduce__(self):
-            return (open, (str(tmp_path / "canary"), "w"))
+    def __init__(self, canary):
+        self.canary = canary
 
-    folder = saved(tmp_path, 1)
-    poison = pickle.dumps(Poison())
-    (folder / "policy.pt").write_bytes(poison)
-    manifest = json.loads((folder / "manifest.json").read_text())
-    manifest["files"]["policy.pt"] = {"size": len(poison), "sha256": hashlib.sha256(poison).hexdigest()}
-    (folder / "manifest.json").write_text(json.dumps(manifest))
-    found, _ = newest(tmp_path)
+    def __reduce__(self):
+        return (open, (str(self.canary), "w"))
+
+
+def read_all(run):
+    found, _ = newest(run)
+    return found.record(), found.policy(), found.training()
+
+
+@pytest.mark.parametrize("name", ["policy.pt", "training.pt", "config.json", "manifest.json"])
+@pytest.mark.parametrize("as_archive", [False, True])
+def test_a_pickle_in_place_of_any_file_does_not_run(tmp_path, name, as_archive):
+    folder, canary = saved(tmp_path, 1), tmp_path / "canary"
+    poison = io.BytesIO()
+    torch.save({"weight": Poison(canary)}, poison) if as_archive else pickle.dump(Poison(canary), poison)
+    (folder / name).write_bytes(poison.getvalue())
+    if name != "manifest.json":
+        forge(folder)
     with pytest.raises(CheckpointError, match="cannot be read"):
-        found.policy()
-    assert not (tmp_path / "canary").exists()
+        read_all(tmp_path)
+    assert not canary.exists()
+    poison.seek(0)
+    torch.load(poison, weights_only=False) if as_archive else pickle.load(poison)
+    assert canary.exists(), "it works where it is let in"
+
+
+FORGED = [
+    {"frames": "1"},
+    {"frames": True},
+    {"mode": "lucky"},
+    {"files": []},
+    {"files": {}},
+    {"files": {"policy.pt": {}}},
+    {"signature": None},
+    {"signature": {}},
+    {"signature": {"observation": {}, "state": {"shape": ["x"], "dtype": "uint8"}, "n_agents": 2, "n_actions": 11}},
+    {"signature": {"observation": {}, "state": {"shape": [1e400], "dtype": "uint8"}, "n_agents": 2, "n_actions": 11}},
+    {"versions": None, "more": 1},
+    {"format": None},
+    {"format": [2]},
+]
+
+
+@pytest.mark.parametrize("changes", FORGED, ids=str)
+def test_a_forged_manifest_is_refused_in_one_line(tmp_path, changes):
+    forge(saved(tmp_path, 1), **changes)
+    with pytest.raises(CheckpointError) as error:
+        newest(tmp_path)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("content", ["{}", "[]", '{"choices": 1, "values": {}}', "[" * 100_000, "\xff"])
+def test_a_forged_configuration_is_refused_in_one_line(tmp_path, content):
+    folder = saved(tmp_path, 1)
+    (folder / "config.json").write_bytes(content.encode("latin-1"))
+    forge(folder)
+    with pytest.raises(CheckpointError, match=r"config\.json") as error:
+        newest(tmp_path)[0].record()
+    assert "\n" not in str(error.value)
+
+
+def test_a_configuration_that_reads_the_environment_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match="must be a plain value"):
+        recompose(Record(choices={}, values={"landscape": {"path": "${oc.env:HOME}"}}))
+
+
+def test_the_format_before_the_seal_is_read(tmp_path):
+    folder = saved(tmp_path, 1)
+    manifest = json.loads((folder / "manifest.json").read_text())
+    del manifest["sha256"]
+    (folder / "manifest.json").write_text(json.dumps(manifest | {"format": 1}))
+    assert newest(tmp_path)[0].policy()["weight"].tolist() == [0, 1, 2, 3]
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(CheckpointError, match="altered"):
+        newest(tmp_path)
 
 
 def test_a_crash_while_saving_leaves_what_was_there(tmp_path, monkeypatch):
     saved(tmp_path, 1)
     calls = {"left": 0}
-    real = checkpoints._sync
+    real = checkpoints.disk.sync
 
     def fails(path):
         calls["left"] -= 1
@@ -113,7 +213,7 @@ def test_a_crash_while_saving_leaves_what_was_there(tmp_path, monkeypatch):
             raise OSError(28, "No space left on device", str(path))
         real(path)
 
-    monkeypatch.setattr(checkpoints, "_sync", fails)
+    monkeypatch.setattr(checkpoints.disk, "sync", fails)
     for allowed in range(5):
         calls["left"] = allowed
         with pytest.raises(OSError, match="No space"):
@@ -122,9 +222,11 @@ def test_a_crash_while_saving_leaves_what_was_there(tmp_path, monkeypatch):
         assert newest(tmp_path)[0].manifest.frames == 1
 
 
-def test_a_draft_of_a_killed_run_is_not_a_checkpoint(tmp_path):
-    shutil.copytree(saved(tmp_path, 1), tmp_path / "checkpoints" / ".5.77.tmp")
+def test_a_draft_of_a_killed_save_is_not_a_checkpoint_and_goes_with_the_next(tmp_path):
+    shutil.copytree(saved(tmp_path, 1), tmp_path / "checkpoints" / ".5.tmp")
     assert newest(tmp_path)[0].manifest.frames == 1
+    saved(tmp_path, 2)
+    assert sorted(each.name for each in (tmp_path / "checkpoints").iterdir()) == ["1", "2"]
 
 
 def test_a_run_folder_has_one_writer(tmp_path):

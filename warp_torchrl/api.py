@@ -84,10 +84,11 @@ def policy_of(found: checkpoints.Checkpoint, mode: str = "best") -> TrainedPolic
         raise ValueError(f"mode must be best, sampled or deterministic, got {mode}")
     config = plain(recompose(found.record()))
     algorithm, model = build(config["algorithm"], "algorithm"), build(config["model"], "model")
-    policy = algorithm.policy(found.manifest.signature, model)
+    weights = found.policy()
     try:
-        policy.load_state_dict(found.policy())
-    except (RuntimeError, TypeError, AttributeError) as error:
+        policy = algorithm.policy(found.manifest.signature, model)
+        policy.load_state_dict(weights)
+    except Exception as error:  # whatever a signature or weights that do not fit make torch and TorchRL raise
         reason = " ".join(str(error).split())
         raise checkpoints.CheckpointError(f"{found.path} is of another architecture: {reason}") from None
     chosen = (found.manifest.mode or "sampled") if mode == "best" else mode

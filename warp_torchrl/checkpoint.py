@@ -1,13 +1,12 @@
 """Checkpoints: complete or invisible, verified before they are read, the newest found by listing.
 
 ``checkpoints/<frames>/`` holds ``policy.pt`` and ``training.pt`` (tensors and plain values, read with
-``weights_only=True``), ``config.json``, and ``manifest.json`` with the size and sha256 of each.
+``weights_only=True``), ``config.json``, and ``manifest.json`` with the size and sha256 of each, and its own sha256.
 """
 
 import fcntl
 import hashlib
 import json
-import os
 import shutil
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -18,10 +17,13 @@ import tensordict
 import torch
 import torchrl
 
+from warp_torchrl import disk
 from warp_torchrl.config import Record
 from warp_torchrl.models import Entry, Signature
 
-FORMAT = 1
+FORMAT = 2
+"""Version of the layout that is written."""
+_READ = (1, FORMAT)  # 1 had no seal
 MANIFEST = "manifest.json"
 _FILES = ("policy.pt", "training.pt", "config.json")
 _LARGEST_JSON = 1_000_000
@@ -57,6 +59,10 @@ class Manifest:
     versions: dict[str, str]
     files: dict[str, dict[str, Any]]
 
+    def __post_init__(self) -> None:
+        if type(self.frames) is not int or self.mode not in (None, "sampled", "deterministic"):
+            raise ValueError(f"frames must be whole and mode one of ours, got {self.frames!r}, {self.mode!r}")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Checkpoint:
@@ -73,7 +79,10 @@ class Checkpoint:
     def record(self) -> Record:
         """Return the configuration it was trained with."""
         content = _json(self.path / "config.json")
-        return Record(choices=content["choices"], values=content["values"])
+        parts = [content.get("choices"), content.get("values")]
+        if not all(isinstance(part, dict) for part in parts):
+            raise CheckpointError(f"{self.path / 'config.json'} must hold choices and values")
+        return Record(choices=parts[0], values=parts[1])
 
     def policy(self) -> dict[str, torch.Tensor]:
         """Return the policy's parameters."""
@@ -104,7 +113,8 @@ def save(
 ) -> Path:
     """Write a checkpoint, then drop the oldest ones over ``keep``.
 
-    It appears under its name only when every file is on the disk: temporary folder, fsync, one rename, fsync.
+    It appears under its name only when every file is on the disk: temporary folder, fsync, one rename, fsync. What a
+    killed save left goes first; unsound ones that the run went past go when this one is safe.
 
     Returns:
         Its folder.
@@ -113,36 +123,29 @@ def save(
         OSError: If the disk refuses; the checkpoints that were there stay.
     """
     parent = run / "checkpoints"
-    parent.mkdir(parents=True, exist_ok=True)
-    final = parent / f"{frames}"
-    if final.exists():
-        return final
-    draft = parent / f".{frames}.{os.getpid()}.tmp"
-    shutil.rmtree(draft, ignore_errors=True)
-    draft.mkdir()
-    try:
-        torch.save(dict(policy), draft / "policy.pt")
-        torch.save(dict(training), draft / "training.pt")
-        _write_json(draft / "config.json", asdict(record))
-        manifest = Manifest(
-            format=FORMAT,
-            frames=frames,
-            scenario=scenario,
-            signature=signature,
-            mode=mode,
-            versions={"torch": torch.__version__, "torchrl": torchrl.__version__, "tensordict": tensordict.__version__},
-            files={name: _describe(draft / name) for name in _FILES},
-        )
-        _write_json(draft / MANIFEST, asdict(manifest) | {"signature": _signature_to_json(signature)})
-        for path in (*draft.iterdir(), draft):
-            _sync(path)
-        draft.rename(final)
-        _sync(parent)
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
-    for old in _listed(run)[keep:]:
-        shutil.rmtree(old, ignore_errors=True)
+    final, draft = parent / f"{frames}", parent / f".{frames}.tmp"
+    with disk.telling(parent):
+        parent.mkdir(parents=True, exist_ok=True)
+    for leftover in parent.glob(".*.tmp"):
+        shutil.rmtree(leftover, ignore_errors=True)
+    if not _is_sound(final):
+        try:
+            with disk.telling(draft):
+                draft.mkdir()
+                disk.save_tensors(draft / "policy.pt", dict(policy))
+                disk.save_tensors(draft / "training.pt", dict(training))
+                (draft / "config.json").write_text(json.dumps(asdict(record), indent=1), encoding="utf-8")
+                _write_manifest(draft, frames, scenario, signature, mode)
+                _publish(draft, final)
+        finally:
+            shutil.rmtree(draft, ignore_errors=True)
+    _drop(run, final, keep)
     return final
+
+
+def holds_any(run: Path) -> bool:
+    """Return whether a run folder holds checkpoints, sound or not."""
+    return bool(_listed(run))
 
 
 def newest(path: Path | str) -> tuple[Checkpoint, list[str]]:
@@ -165,7 +168,7 @@ def newest(path: Path | str) -> tuple[Checkpoint, list[str]]:
     skipped: list[str] = []
     for folder in _listed(path):
         try:
-            return _verified(folder), skipped
+            return _verified(folder, frames=int(folder.name)), skipped
         except CheckpointError as error:
             skipped.append(str(error))
     reason = f": {skipped[0]}" if skipped else f": no folder in {path / 'checkpoints'}"
@@ -193,6 +196,23 @@ class RunFolderLock:
         self._file.close()
 
 
+def _publish(draft: Path, final: Path) -> None:
+    for path in (*draft.iterdir(), draft):
+        disk.sync(path)
+    shutil.rmtree(final, ignore_errors=True)  # an unsound one
+    draft.rename(final)
+    for path in (final.parent, final.parent.parent):  # which may be new too
+        disk.sync(path)
+
+
+def _drop(run: Path, newest: Path, keep: int) -> None:
+    """Keep so many checkpoints up to the newest: those beyond it are unsound, or a run would have gone on from them."""
+    listed = _listed(run)
+    place = listed.index(newest)
+    for folder in (*listed[:place], *listed[place + keep :]):
+        shutil.rmtree(folder, ignore_errors=True)
+
+
 def _listed(run: Path) -> list[Path]:
     """Return the checkpoint folders, newest first."""
     parent = run / "checkpoints"
@@ -200,26 +220,54 @@ def _listed(run: Path) -> list[Path]:
     return sorted(folders, key=lambda each: int(each.name), reverse=True)
 
 
-def _verified(folder: Path) -> Checkpoint:
+def _verified(folder: Path, frames: int | None = None) -> Checkpoint:
     """Check every file of a checkpoint against its manifest before any of them is parsed."""
-    content = _json(folder / MANIFEST)
-    if content.get("format") != FORMAT:
-        raise CheckpointError(f"{folder} has format {content.get('format')!r}, this version reads {FORMAT}")
+    manifest = _manifest(folder)
+    if frames not in (None, manifest.frames):
+        raise CheckpointError(f"{folder} holds a checkpoint of {manifest.frames} frames")
+    for name, entry in manifest.files.items():
+        path, size = folder / name, entry["size"]
+        if not path.is_file() or path.stat().st_size != size:
+            raise CheckpointError(f"{path} is missing or was cut: {size} bytes are expected")
+        if _sha256(path) != entry["sha256"]:
+            raise CheckpointError(f"{path} was altered: its sha256 is not the manifest's")
+    return Checkpoint(path=folder, manifest=manifest)
+
+
+def _is_sound(folder: Path) -> bool:
+    try:
+        _verified(folder)
+    except CheckpointError:
+        return False
+    return True
+
+
+def _manifest(folder: Path) -> Manifest:
+    path = folder / MANIFEST
+    content = _json(path)
+    if content.get("format") not in _READ:
+        raise CheckpointError(
+            f"{folder} has format {content.get('format')!r}, this version reads {', '.join(map(str, _READ))}"
+        )
+    if content["format"] == FORMAT:
+        content.pop("sha256", None)
+        if path.read_bytes() != _sealed(content):
+            raise CheckpointError(f"{path} was altered: its sha256 is not its own")
     try:
         signature = _signature_from_json(content.pop("signature"))
         manifest = Manifest(signature=signature, **content)
         files = {name: (entry["size"], entry["sha256"]) for name, entry in manifest.files.items()}
-    except (TypeError, KeyError, ValueError, AttributeError):
-        raise CheckpointError(f"{folder / MANIFEST} is not a manifest of format {FORMAT}") from None
+    except (TypeError, KeyError, ValueError, AttributeError, OverflowError):
+        raise CheckpointError(f"{path} is not a manifest of format {content['format']}") from None
     if set(files) != set(_FILES):
-        raise CheckpointError(f"{folder / MANIFEST} must list {', '.join(_FILES)}")
-    for name, (size, digest) in files.items():
-        path = folder / name
-        if not path.is_file() or path.stat().st_size != size:
-            raise CheckpointError(f"{path} is missing or was cut: {size} bytes are expected")
-        if _sha256(path) != digest:
-            raise CheckpointError(f"{path} was altered: its sha256 is not the manifest's")
-    return Checkpoint(path=folder, manifest=manifest)
+        raise CheckpointError(f"{path} must list {', '.join(_FILES)}")
+    return manifest
+
+
+def _sealed(content: Mapping[str, Any]) -> bytes:
+    """Return the one text that a manifest with this content has: any other byte in the file is an alteration."""
+    digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()
+    return json.dumps({**content, "sha256": digest}, indent=1).encode()
 
 
 def _json(path: Path) -> dict[str, Any]:
@@ -234,8 +282,18 @@ def _json(path: Path) -> dict[str, Any]:
     return content
 
 
-def _write_json(path: Path, content: object) -> None:
-    path.write_text(json.dumps(content, indent=1), encoding="utf-8")
+def _write_manifest(folder: Path, frames: int, scenario: str, signature: Signature, mode: str | None) -> None:
+    libraries = {"torch": torch, "torchrl": torchrl, "tensordict": tensordict}
+    manifest = Manifest(
+        format=FORMAT,
+        frames=frames,
+        scenario=scenario,
+        signature=signature,
+        mode=mode,
+        versions={name: library.__version__ for name, library in libraries.items()},
+        files={name: _describe(folder / name) for name in _FILES},
+    )
+    (folder / MANIFEST).write_bytes(_sealed(asdict(manifest) | {"signature": _signature_to_json(signature)}))
 
 
 def _describe(path: Path) -> dict[str, Any]:
@@ -245,14 +303,6 @@ def _describe(path: Path) -> dict[str, Any]:
 def _sha256(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def _sync(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def _first_line(error: Exception) -> str:

@@ -132,6 +132,8 @@ def recompose(record: Record, overrides: Sequence[str] = ()) -> DictConfig:
     choices = [f"{group}={option}" for group, option in record.choices.items() if group not in touched]
     config = compose_config("train", [*choices, *overrides])
     for path, value in _leaves(record.values):
+        if "${" in str(value):  # what is recorded was resolved: this one was put there to read what is ours
+            raise ConfigError(f"{path} in the run folder must be a plain value, got {value!r}")
         if any(path == key or path.startswith(f"{key}.") for key in touched):
             continue
         try:

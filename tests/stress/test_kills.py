@@ -1,0 +1,59 @@
+"""A run killed at random moments, and resumed each time, ends with the weights of a run that no one touched."""
+
+import random
+import shutil
+import signal
+import time
+from functools import partial
+
+import pytest
+import torch
+
+from tests.stress.processes import TINY, finish, rows, start, wait_for
+from warp_torchrl.checkpoint import CheckpointError, newest
+
+pytestmark = pytest.mark.stress
+KILLS = 10
+ITERATIONS = 400
+
+
+def grown(run, before):
+    return rows(run) > before
+
+
+@pytest.mark.parametrize("algorithm", ["mappo", "dqn"])
+def test_random_kills_change_nothing(tmp_path, algorithm):
+    overrides = [*TINY, f"algorithm={algorithm}", f"total_frames={32 * ITERATIONS}", "checkpoint.interval=32"]
+    if algorithm == "dqn":
+        overrides += ["algorithm.capacity=500", "algorithm.warm_up=64", "algorithm.updates=2"]
+    finish(tmp_path, *overrides, "hydra.run.dir=whole")
+    draws, run, survived, at = random.Random(8), tmp_path / "cut", 0, []
+    for _ in range(KILLS):
+        has_checkpoint = (run / "checkpoints").is_dir() and any(
+            each.name.isdigit() for each in (run / "checkpoints").iterdir()
+        )
+        process = start(tmp_path, *(["resume=cut"] if has_checkpoint else [*overrides, "hydra.run.dir=cut"]))
+        wait_for(partial(grown, run, rows(run)), process)
+        time.sleep(draws.uniform(0.0, 1.0))
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        try:
+            found, skipped = newest(run)
+            assert not skipped
+            at.append(found.manifest.frames // 32)
+            survived += 1
+        except CheckpointError as error:
+            assert "no folder in" in str(error)
+            shutil.rmtree(run / "checkpoints", ignore_errors=True)
+            at.append(0)
+            survived += 1
+    finish(tmp_path, "resume=cut")
+    ours, theirs = (newest(tmp_path / name)[0] for name in ("cut", "whole"))
+    assert ours.manifest.frames == theirs.manifest.frames == 32 * ITERATIONS
+    for name, value in theirs.training()["loss"].items():
+        assert torch.equal(ours.training()["loss"][name], value), name
+    assert rows(run) == ITERATIONS
+    print(
+        f"\n{algorithm}: kills survived / tried: {survived} / {KILLS}, final weights equal; "
+        f"last checkpoints at iterations {at} of {ITERATIONS}"
+    )
