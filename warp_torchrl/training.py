@@ -1,11 +1,10 @@
 """The one training loop. It names no algorithm: what differs between them is data of the learner."""
 
 import logging
-import signal
 import time
 from collections.abc import Iterator, Mapping
+from copy import deepcopy
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 import torch
@@ -19,10 +18,11 @@ from warp_torchrl.collectors import WorkerDied
 from warp_torchrl.config import Record
 from warp_torchrl.env import EPISODE_METRICS
 from warp_torchrl.evaluation import MODES, play
-from warp_torchrl.logging import MetricsFile
-from warp_torchrl.models import signature
+from warp_torchrl.logging import MetricsFile, Tracker
+from warp_torchrl.models import REWARD, signature
 from warp_torchrl.reward_scale import RewardScale
 from warp_torchrl.settings import TRAINING_SEEDS, Settings
+from warp_torchrl.signals import Noted, Stopped
 
 log = logging.getLogger("warp_torchrl")
 _SECONDS_BETWEEN_LINES = 15.0
@@ -40,19 +40,7 @@ TRAIN_COLUMNS = (
 
 
 class NumericalFailure(Exception):  # noqa: N818
-    """A loss or a gradient is not finite; the weights were not touched."""
-
-
-class Stopped(Exception):  # noqa: N818
-    """A signal asked the run to stop; it has saved.
-
-    Attributes:
-        number: The signal's.
-    """
-
-    def __init__(self, number: int, run: Path) -> None:
-        super().__init__(f"stopped by signal {signal.Signals(number).name}; go on with resume={run}")
-        self.number = number
+    """A reward, a loss or a gradient is not finite; the weights were not touched."""
 
 
 class Training:
@@ -86,41 +74,49 @@ class Training:
 
         Raises:
             Stopped: By a signal, after saving.
-            NumericalFailure: If a loss or gradient is not finite.
+            NumericalFailure: If a reward, loss or gradient is not finite.
         """
-        total, tracker = self.settings.total_frames, self.settings.logger.open(self.run)
+        with Noted() as signals:
+            tracker = self.settings.logger.open(self.run)
+            try:
+                self._train(signals, tracker)
+                self.mode = self.mode or self._better_mode()
+                self.save()
+            finally:
+                tracker.close()  # after the last save: a server may keep it waiting
+            if signals.received:
+                raise Stopped(signals.received, self.run)
+
+    def _train(self, signals: Noted, tracker: Tracker) -> None:
+        total = self.settings.total_frames
         bar = tqdm(total=total, initial=self.frames, unit="frame", disable=None, dynamic_ncols=True)
         start, next_line = time.perf_counter() - self.seconds, 0.0
         try:
-            with _Signals() as signals:
-                for batch in self._batches(signals) if self.frames < total else ():
-                    row = self._learn(batch)
-                    self.seconds = time.perf_counter() - start
-                    rate = batch.numel() / max(self.seconds - self._last_seconds, 1e-9)
-                    self._last_seconds = self.seconds
-                    row = {"time/frames": self.frames, "time/seconds": self.seconds, "time/fps": rate, **row}
-                    self.metrics.add(row)
-                    tracker.log(row, self.frames)
-                    bar.update(batch.numel())
-                    bar.set_postfix(saved=row["world/saved"], refresh=False)
-                    if bar.disable and (self.seconds >= next_line or self.frames >= total):
-                        next_line = self.seconds + _SECONDS_BETWEEN_LINES
-                        log.info(_line(row, total))
-                    if self.frames >= total:
-                        break
-                    if signals.received or self.frames - self.saved_at >= self.settings.checkpoint.interval:
-                        self.save()
-                    if signals.received:
-                        raise Stopped(signals.received, self.run)
+            for batch in self._batches(signals) if self.frames < total else ():
+                row = self._learn(batch)
+                self.seconds = time.perf_counter() - start
+                rate = batch.numel() / max(self.seconds - self._last_seconds, 1e-9)
+                self._last_seconds = self.seconds
+                row = {"time/frames": self.frames, "time/seconds": self.seconds, "time/fps": rate, **row}
+                self.metrics.add(row)
+                tracker.log(row, self.frames)
+                bar.update(batch.numel())
+                bar.set_postfix(saved=row["world/saved"], refresh=False)
+                if bar.disable and (self.seconds >= next_line or self.frames >= total):
+                    next_line = self.seconds + _SECONDS_BETWEEN_LINES
+                    log.info(_line(row, total))
+                if self.frames >= total:
+                    break
+                if signals.received or self.frames - self.saved_at >= self.settings.checkpoint.interval:
+                    self.save()
+                if signals.received:
+                    raise Stopped(signals.received, self.run)
         finally:
             bar.close()
-            tracker.close()
-        self.mode = self.mode or self._better_mode()
-        self.save()
 
     _last_seconds = 0.0
 
-    def _batches(self, signals: "_Signals") -> Iterator[TensorDictBase]:
+    def _batches(self, signals: Noted) -> Iterator[TensorDictBase]:
         """Yield batches; where a worker dies, save first what was learnt."""
         try:
             yield from self.collection
@@ -135,6 +131,8 @@ class Training:
         """Learn from one batch [B, T] and return the row of metrics."""
         learner = self.learner
         row = _episode_columns(batch)
+        if not batch["next", *REWARD].isfinite().all():
+            raise NumericalFailure(f"after {self.frames} frames a reward is not finite; the last checkpoint stands")
         if self.reward_scale is not None:
             self.reward_scale(batch)
         learner.store(batch)
@@ -164,13 +162,12 @@ class Training:
         terms = learner.loss(sample)
         loss = sum(terms[key] for key in learner.loss_keys)
         loss.backward()
-        try:
-            torch.nn.utils.clip_grad_norm_(learner.loss.parameters(), learner.max_grad_norm, error_if_nonfinite=True)
-        except RuntimeError:
+        norm = torch.nn.utils.clip_grad_norm_(learner.loss.parameters(), learner.max_grad_norm)
+        if not torch.isfinite(norm + loss.detach()):  # one look at the device for both
             raise NumericalFailure(
-                f"after {self.frames} frames the gradient is not finite, loss {float(loss.detach()):g}; the weights "
-                f"were left as they were, and the last checkpoint stands"
-            ) from None
+                f"after {self.frames} frames the loss, {float(loss.detach()):g}, or its gradient, of norm "
+                f"{float(norm):g}, is not finite; the weights were left as they were, and the last checkpoint stands"
+            )
         learner.optimizer.step()
         learner.optimizer.zero_grad()
         learner.after_step(sample)
@@ -197,6 +194,7 @@ class Training:
 
     def save(self) -> Path:
         """Write a checkpoint of everything."""
+        self.metrics.sync()
         path = checkpoints.save(
             self.run,
             frames=self.frames,
@@ -218,6 +216,7 @@ class Training:
             "keeps": {name: each.state_dict() for name, each in self.learner.keeps.items()},
             "optimizer": self.learner.optimizer.state_dict(),
             "random": torch.get_rng_state(),
+            "random_cuda": torch.cuda.get_rng_state(self.env.device) if self.env.device.type == "cuda" else None,
             "collection": self.collection.state_dict(),
             "reward_scale": {} if self.reward_scale is None else self.reward_scale.state_dict(),
             "frames": self.frames,
@@ -226,56 +225,41 @@ class Training:
         }
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Restore what ``state_dict`` returned.
+        """Restore what ``state_dict`` returned, all or nothing.
 
         Raises:
             CheckpointError: If an entry does not fit this configuration.
+            OSError: If the disk refuses to cut ``metrics.csv``.
         """
+        before = deepcopy(self.state_dict())
         try:
-            self.learner.loss.load_state_dict(state["loss"])
-            self.learner.optimizer.load_state_dict(state["optimizer"])
-            for name, each in self.learner.keeps.items():
-                each.load_state_dict(state["keeps"][name])
-            self.collection.load_state_dict(state["collection"])
-            if self.reward_scale is not None:
-                self.reward_scale.load_state_dict(state["reward_scale"])
-            self.frames, self.seconds = int(state["frames"]), float(state["seconds"])
-            self.saved_at, self._last_seconds = self.frames, self.seconds
+            self._restore(state)
             self.metrics = MetricsFile(self.run / "metrics.csv", keep_rows=int(state["rows"]))
-            self._schedule()
-            torch.set_rng_state(state["random"])
-        except (KeyError, ValueError, RuntimeError, TypeError) as error:
+        except Exception as error:  # whatever a state that does not fit makes torch and TorchRL raise
+            self._restore(before)
+            if isinstance(error, OSError):
+                raise
             reason = " ".join(str(error).split())
             raise checkpoints.CheckpointError(f"the checkpoint does not fit this configuration: {reason}") from None
+
+    def _restore(self, state: Mapping[str, Any]) -> None:
+        self.learner.loss.load_state_dict(state["loss"])
+        self.learner.optimizer.load_state_dict(state["optimizer"])
+        for name, each in self.learner.keeps.items():
+            each.load_state_dict(state["keeps"][name])
+        self.collection.load_state_dict(state["collection"])
+        if self.reward_scale is not None:
+            self.reward_scale.load_state_dict(state["reward_scale"])
+        self.frames, self.seconds = int(state["frames"]), float(state["seconds"])
+        self.saved_at, self._last_seconds = self.frames, self.seconds
+        self._schedule()
+        torch.set_rng_state(state["random"])
+        if state.get("random_cuda") is not None:
+            torch.cuda.set_rng_state(state["random_cuda"], self.env.device)
 
     def close(self) -> None:
         """Shut the collector down."""
         self.collection.close()
-
-
-class _Signals:
-    """Notes SIGTERM, SIGINT and SIGUSR1; a second one acts as it would have."""
-
-    _WATCHED = (signal.SIGTERM, signal.SIGINT, signal.SIGUSR1)
-
-    def __init__(self) -> None:
-        self.received = 0
-
-    def __enter__(self) -> "_Signals":
-        try:
-            self._before = {number: signal.signal(number, self._note) for number in self._WATCHED}
-        except ValueError:  # not in the main thread, where signals cannot be watched
-            self._before = {}
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        for number, handler in self._before.items():
-            signal.signal(number, handler)
-
-    def _note(self, number: int, frame: FrameType | None) -> None:
-        if self.received:
-            raise SystemExit(128 + number)
-        self.received = number
 
 
 def _episode_columns(batch: TensorDictBase) -> dict[str, float | None]:

@@ -1,0 +1,75 @@
+"""What asks a command to stop: noted where a run can save first, obeyed at once elsewhere."""
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+_WATCHED = (signal.SIGTERM, signal.SIGINT, signal.SIGUSR1)
+
+
+class Stopped(Exception):  # noqa: N818
+    """A signal asked the run to stop; it has saved.
+
+    Attributes:
+        number: The signal's.
+    """
+
+    def __init__(self, number: int, run: Path) -> None:
+        super().__init__(f"stopped by signal {signal.Signals(number).name}; go on with resume={run}")
+        self.number = number
+
+
+class Noted:
+    """Within it the first signal is only noted; a second one ends the process.
+
+    Attributes:
+        received: The first signal's number; 0 before.
+    """
+
+    def __init__(self) -> None:
+        self.received = 0
+
+    def __enter__(self) -> "Noted":
+        self._before = _watch(self._note)
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        _restore(self._before)
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        if self.received:
+            _leave(number, frame)
+        self.received = number
+
+
+@contextmanager
+def obeyed() -> Iterator[None]:
+    """Within it a signal ends the process with its exit code, in one line."""
+    before = _watch(_leave)
+    try:
+        yield
+    finally:
+        _restore(before)
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    # Not print(): what was interrupted may be in the middle of one.
+    os.write(sys.__stderr__.fileno(), f"error: stopped by signal {signal.Signals(number).name}\n".encode())
+    raise SystemExit(128 + number)
+
+
+def _watch(handler: Callable[[int, FrameType | None], None]) -> dict[int, Any]:
+    try:
+        return {number: signal.signal(number, handler) for number in _WATCHED}
+    except ValueError:  # not in the main thread, where signals cannot be watched
+        return {}
+
+
+def _restore(handlers: Mapping[int, Any]) -> None:
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
