@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -10,8 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from warp_torchrl import load_policy, make_env
+from warp_torchrl import checkpoint, load_policy, make_env
+from warp_torchrl import command as command_module
 from warp_torchrl.command import evaluate, train
+from warp_torchrl.training import Training
 
 ROOT = Path(__file__).parent.parent
 TINY = [
@@ -138,6 +141,122 @@ def test_a_run_stopped_by_a_signal_resumes_to_what_it_would_have_been(trained):
     assert ours["episodes"] == theirs["episodes"]
 
 
+@pytest.fixture
+def run_here(tmp_path, monkeypatch, capfd):
+    """Run a command in this process, in a folder of its own; returns its exit code and the lines of stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(program, *arguments):
+        monkeypatch.setattr(sys, "argv", [program, *arguments])
+        with pytest.raises(SystemExit) as end:
+            {"train.py": train, "evaluate.py": evaluate}[program]()
+        return end.value.code, capfd.readouterr().err.strip().splitlines()
+
+    return run
+
+
+def signalled(function, number, when=1):
+    """The function, whose process is sent a signal when it is called for the so many'th time."""
+    calls = []
+
+    def wrapped(*args, **options):
+        calls.append(1)
+        if len(calls) == when:
+            os.kill(os.getpid(), number)
+        return function(*args, **options)
+
+    return wrapped
+
+
+SHORT = [*TINY, "total_frames=64", "evaluation.episodes=2", "evaluation.mode=sampled", "hydra.run.dir=run"]
+
+
+@pytest.mark.parametrize(
+    ("owner", "name", "when", "number", "frames"),
+    [
+        (checkpoint.disk, "save_tensors", 1, signal.SIGTERM, [32]),
+        pytest.param(checkpoint, "_drop", 2, signal.SIGUSR1, [32, 64], marks=pytest.mark.stress),
+        pytest.param(Training, "_learn", 2, signal.SIGINT, [32, 64], marks=pytest.mark.stress),
+        (command_module, "_report", 1, signal.SIGINT, [32, 64]),
+    ],
+    ids=["in a save", "in the last save", "in the last iteration", "in the evaluation"],
+)
+def test_a_signal_anywhere_leaves_sound_checkpoints_and_the_way_on(
+    tmp_path, run_here, monkeypatch, owner, name, when, number, frames
+):
+    with monkeypatch.context() as patched:
+        patched.setattr(owner, name, signalled(getattr(owner, name), number, when))
+        code, errors = run_here("train.py", *SHORT)
+    assert code == 128 + number and f"stopped by signal {number.name}" in errors[-1]
+    assert sorted(int(each.name) for each in (tmp_path / "run" / "checkpoints").iterdir()) == frames
+    assert checkpoint.newest(tmp_path / "run")[1] == []
+    code, errors = run_here("train.py", "resume=run")
+    assert code == 0, errors
+    assert (tmp_path / "run" / "evaluation.json").exists()
+
+
+def test_a_signal_ends_a_sweep(tmp_path, run_here, monkeypatch):
+    monkeypatch.setattr(Training, "_learn", signalled(Training._learn, signal.SIGTERM))
+    code, _ = run_here("train.py", *SHORT[:-1], "-m", "seed=0,1", "hydra.sweep.dir=sweep")
+    assert code == 128 + signal.SIGTERM
+    assert (tmp_path / "sweep" / "0" / "checkpoints" / "32").is_dir() and not (tmp_path / "sweep" / "1").exists()
+
+
+def test_a_second_run_in_a_folder_is_refused_and_the_first_goes_on(tmp_path, run_here):
+    lock = checkpoint.RunFolderLock(tmp_path / "run")
+    code, errors = run_here("train.py", *SHORT)
+    lock.release()
+    assert code == 3 and "in use" in errors[-1]
+    assert not (tmp_path / "run" / "metrics.csv").exists() and not (tmp_path / "run" / "config.yaml").exists()
+
+
+def test_a_run_that_died_before_its_first_checkpoint_may_start_again(tmp_path, run_here, monkeypatch):
+    (tmp_path / "run" / "checkpoints" / ".32.tmp").mkdir(parents=True)
+    (tmp_path / "run" / "config.yaml").write_text("old: 1")
+    monkeypatch.setattr(command_module, "_report", lambda *args, **options: None)
+    code, errors = run_here("train.py", *SHORT)
+    assert code == 0, errors
+    assert "old: 1" not in (tmp_path / "run" / "config.yaml").read_text()
+
+
+def test_a_checkpoint_is_no_run_folder_to_resume(trained, run_here):
+    path = checkpoint.newest(trained[0])[0].path
+    code, (line,) = run_here("train.py", f"resume={path}")
+    assert code == 2 and "resume must be a run folder" in line
+    assert sorted(each.name for each in path.iterdir()) == ["config.json", "manifest.json", "policy.pt", "training.pt"]
+
+
+def test_an_unsound_checkpoint_is_told_and_the_one_before_taken(trained, run_here, tmp_path):
+    shutil.copytree(trained[0], tmp_path / "run")
+    newest, *_ = sorted((tmp_path / "run" / "checkpoints").iterdir(), key=lambda each: -int(each.name))
+    (newest / "policy.pt").write_bytes(b"")
+    code, errors = run_here("train.py", "resume=run")
+    assert code == 0, errors
+    skipped = [line for line in (tmp_path / "run" / "train.log").read_text().splitlines() if "skipped: " in line]
+    assert len(skipped) == 1 and "policy.pt is missing or was cut" in skipped[0]
+    ours, theirs = (json.loads((each / "evaluation.json").read_text()) for each in (tmp_path / "run", trained[0]))
+    assert ours["episodes"] == theirs["episodes"]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+def test_a_full_disk_ends_with_its_path_and_reason(tmp_path, run_here):
+    (tmp_path / "run").mkdir()
+    for name in ("metrics.csv", "train.log"):
+        (tmp_path / "run" / name).symlink_to("/dev/full")
+    code, errors = run_here("train.py", *SHORT)
+    assert code == 6 and errors[-1] == f"error: {tmp_path / 'run' / 'metrics.csv'}: No space left on device"
+    assert "Traceback" not in "".join(errors)
+
+
+@pytest.mark.parametrize("program", ["train.py", "evaluate.py"])
+def test_a_run_folder_that_cannot_be_made_is_told_with_its_path(tmp_path, run_here, program):
+    (tmp_path / "file").touch()
+    what = SHORT[:-1] if program == "train.py" else ["policy=noop", "evaluation.episodes=1"]
+    code, errors = run_here(program, *what, "hydra.run.dir=file/run")
+    assert code == 6 and "file/run: Not a directory" in errors[-1]
+    assert "Traceback" not in "".join(errors)
+
+
 def test_a_loaded_policy_plays(trained):
     env = make_env("skirmish", n_worlds=2, overrides=["landscape.size=12"])
     rollout = env.rollout(4, load_policy(trained[0]), break_when_any_done=False)
@@ -168,7 +287,7 @@ def test_a_job_that_fails_beside_others_is_named_at_the_end_and_they_go_on(tmp_p
         "seed=0,1",
         "hydra/launcher=joblib",
     )
-    (tmp_path / "sweep" / "0" / "checkpoints").mkdir(parents=True)
+    (tmp_path / "sweep" / "0" / "checkpoints" / "1").mkdir(parents=True)
     done = command("train.py", *arguments, "hydra.sweep.dir=sweep", folder=tmp_path)
     assert done.returncode == 2
     *_, last = done.stderr.strip().splitlines()

@@ -2,6 +2,7 @@
 
 import errno
 import logging
+import os
 import sys
 import traceback
 from collections.abc import Callable, Sequence
@@ -10,10 +11,13 @@ from typing import Any
 
 import hydra
 from hydra.core.hydra_config import HydraConfig
+from hydra.errors import HydraException
 from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
 
 from warp_torchrl import checkpoint as checkpoints
+from warp_torchrl import disk
 from warp_torchrl.api import policy_of
 from warp_torchrl.collectors import WorkerDied
 from warp_torchrl.config import Record, compose_config, conf_folder, is_sweep, plain, recompose, without_targets
@@ -32,11 +36,13 @@ from warp_torchrl.evaluation import (
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import Signature, signature
 from warp_torchrl.settings import COMPONENTS, Settings, settings
+from warp_torchrl.signals import Stopped, obeyed
 from warp_torchrl.sweep import SweepSummary, jobs, method, note_failure
-from warp_torchrl.training import NumericalFailure, Stopped, Training
+from warp_torchrl.training import NumericalFailure, Training
 
 log = logging.getLogger("warp_torchrl")
 
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 DONE, MISTAKE, IN_USE, UNSOUND, NUMERICAL, DISK = 0, 2, 3, 4, 5, 6
 _RECORDED = (*COMPONENTS, "scenario")
 _MULTIRUN = ("-m", "--multirun")
@@ -57,38 +63,51 @@ def evaluate() -> None:
 
 
 def _train_job(config: DictConfig) -> None:
-    folder, found = Path(HydraConfig.get().runtime.output_dir), None
-    record = Record(choices=_choices(), values=_values(config))
-    if config.resume is not None:
-        folder = Path(config.resume)
-        found, skipped = checkpoints.newest(folder)
-        for line in skipped:
-            log.warning("skipped: %s", line)
-        record = found.record()
-    plan = settings(plain(recompose(record)) if found else plain(config))
+    resumed = config.resume is not None
+    folder = Path(config.resume if resumed else HydraConfig.get().runtime.output_dir)
     lock = checkpoints.RunFolderLock(folder)
     try:
-        if found is None and (folder / "checkpoints").exists():
-            raise ConfigError(
-                f"hydra.run.dir: {folder} holds a run already; go on with resume={folder}, or take another"
-            )
-        if not (folder / "config.yaml").exists():
-            _write_config(folder / "config.yaml", config)
-        training = Training(plan, record, folder)
-        if found is not None:
-            training.load_state_dict(found.training())
-            log.info("resumed %s at %d frames", found.path, training.frames)
-            if found.manifest.mode is not None and (folder / "evaluation.json").exists():
-                log.info("%s is finished", folder)
-                return
-        try:
-            training.train()
-        finally:
-            training.close()
-        found, _ = checkpoints.newest(folder)
-        _report(plan, folder, found)
+        if resumed:
+            _resume(folder)
+        else:
+            _start(folder, config)
     finally:
         lock.release()
+
+
+def _start(folder: Path, config: DictConfig) -> None:
+    if checkpoints.holds_any(folder):
+        raise ConfigError(f"hydra.run.dir: {folder} holds a run already; go on with resume={folder}, or take another")
+    disk.replace(folder / "config.yaml", OmegaConf.to_yaml(config, resolve=True))
+    record = Record(choices=_choices(), values=_values(config))
+    _finish(Training(settings(plain(config)), record, folder))
+
+
+def _resume(folder: Path) -> None:
+    found = _newest(folder)
+    if found.manifest.mode is not None and (folder / "evaluation.json").exists():
+        log.info("%s is finished", folder)
+        return
+    training = Training(settings(plain(recompose(found.record()))), found.record(), folder)
+    training.load_state_dict(found.training())
+    log.info("resumed %s at %d frames", found.path, training.frames)
+    _finish(training)
+
+
+def _finish(training: Training) -> None:
+    try:
+        training.train()
+    finally:
+        training.close()
+    _report(training.settings, training.run, checkpoints.newest(training.run)[0])
+
+
+def _newest(path: str | Path) -> checkpoints.Checkpoint:
+    """Return the newest sound checkpoint, and say which were skipped."""
+    found, skipped = checkpoints.newest(path)
+    for line in skipped:
+        log.warning("skipped: %s", line)
+    return found
 
 
 def _evaluate_job(config: DictConfig) -> None:
@@ -97,9 +116,7 @@ def _evaluate_job(config: DictConfig) -> None:
     if given is None:
         _report(settings(_without_checkpoint(config)), folder, name)
         return
-    found, skipped = checkpoints.newest(given)
-    for line in skipped:
-        log.warning("skipped: %s", line)
+    found = _newest(given)
     overrides = [each for each in HydraConfig.get().overrides.task if not each.startswith(("checkpoint=", "policy="))]
     _report(settings(plain(recompose(found.record(), overrides))), folder, found)
 
@@ -130,7 +147,8 @@ def _report(plan: Settings, folder: Path, found: checkpoints.Checkpoint | str) -
     content = report(plan.scenario, name, first, episodes, others, other_modes, left_out, learner, digest)
     write_json(folder / "evaluation.json", content)
     print(table(content), flush=True)
-    record_episode(folder / "episode.gif", one, policy, f"{plan.scenario}\n{name}", first, mode)
+    with disk.telling(folder / "episode.gif"):
+        record_episode(folder / "episode.gif", one, policy, f"{plan.scenario}\n{name}", first, mode)
     log.info("wrote evaluation.json and episode.gif into %s", folder)
 
 
@@ -166,10 +184,6 @@ def _values(config: DictConfig) -> dict[str, Any]:
     return {key: value for key, value in without_targets(plain(config)).items() if key not in _NOT_RECORDED}
 
 
-def _write_config(path: Path, config: DictConfig) -> None:
-    path.write_text(OmegaConf.to_yaml(config, resolve=True), encoding="utf-8")
-
-
 def _without_checkpoint(config: DictConfig) -> dict[str, Any]:
     return plain(config) | {"checkpoint": plain(compose_config("train"))["checkpoint"]}
 
@@ -180,10 +194,18 @@ def _without_checkpoint(config: DictConfig) -> dict[str, Any]:
 def _run(name: str, job: Callable[[DictConfig], None]) -> None:
     arguments = sys.argv[1:]
     debug = "debug=true" in [each.lower() for each in arguments]
-    try:
-        _check_first(name, arguments)
-    except Exception as error:
-        sys.exit(_fail(error, debug)[0])
+    logging.raiseExceptions = debug  # a log that cannot be written is no second failure
+    os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra's own errors come to _fail
+    with obeyed():
+        try:
+            _check_first(name, arguments)
+            _start_hydra(name, job, arguments, debug)
+        except Exception as error:
+            sys.exit(_fail(error, debug)[0])
+        sys.exit(SweepSummary.exit_code)
+
+
+def _start_hydra(name: str, job: Callable[[DictConfig], None], arguments: list[str], debug: bool) -> None:
     if name == "train":
         arguments = _with_run_folder(arguments)
     sys.argv[1:] = sorted(arguments, key=lambda each: each not in _MULTIRUN)  # Hydra wants -m before the overrides
@@ -193,14 +215,11 @@ def _run(name: str, job: Callable[[DictConfig], None]) -> None:
             job(config)
         except Exception as error:
             code, line = _fail(error, debug)
-            if HydraConfig.get().mode != RunMode.MULTIRUN:
+            if HydraConfig.get().mode != RunMode.MULTIRUN or isinstance(error, Stopped):
                 sys.exit(code)
-            if isinstance(error, Stopped):
-                raise
             note_failure(code, line)  # the other jobs go on
 
     hydra.main(version_base="1.3", config_path=str(conf_folder()), config_name=name)(guarded)()
-    sys.exit(SweepSummary.exit_code)
 
 
 def _check_first(name: str, arguments: Sequence[str]) -> None:
@@ -225,7 +244,11 @@ def _check_training(config: DictConfig, overrides: Sequence[str]) -> None:
     others = [each for each in overrides if each.split("=")[0] not in ("resume", "debug")]
     if others:
         raise ConfigError(f"resume goes on with the folder's own configuration; leave out {', '.join(others)}")
-    checkpoints.newest(Path(str(config.resume)))
+    folder = Path(str(config.resume))
+    if (folder / checkpoints.MANIFEST).exists():
+        raise ConfigError(f"resume must be a run folder, got one of its checkpoints: {folder}")
+    found, _ = checkpoints.newest(folder)
+    settings(plain(recompose(found.record())))
 
 
 def _check_evaluation(config: DictConfig, overrides: Sequence[str]) -> None:
@@ -267,8 +290,8 @@ def _diagnose(error: Exception) -> tuple[int, str]:
         return NUMERICAL, line
     if isinstance(error, WorkerDied):
         return 1, line
-    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO):
+    if isinstance(error, OSError) and (error.filename is not None or error.errno in _NO_ROOM):
         return DISK, f"{error.filename or Path.cwd()}: {error.strerror}"
-    if isinstance(error, (ConfigError, ValueError)):
+    if isinstance(error, (ConfigError, ValueError, HydraException, OmegaConfBaseException)):
         return MISTAKE, line
     return 1, f"{type(error).__name__}: {line} (debug=true shows where)"
