@@ -1,0 +1,68 @@
+"""The checkpoints of every release load, act and go on as they did; one of an unknown format is refused by name."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+import torch
+
+from tests.forgery import forge
+from warp_torchrl import load_policy, make_env
+from warp_torchrl.checkpoint import CheckpointError, newest
+from warp_torchrl.config import plain, recompose
+from warp_torchrl.evaluation import play
+from warp_torchrl.models import ACTION
+from warp_torchrl.settings import settings
+from warp_torchrl.training import Training
+
+GOLDEN = Path(__file__).parent / "golden"
+RELEASES = sorted(path.name for path in GOLDEN.iterdir() if path.is_dir())
+
+
+def found_now(release):
+    """What a golden policy does on four fires."""
+    run = GOLDEN / release
+    plan = settings(plain(recompose(newest(run)[0].record())))
+    policy, env = load_policy(run), plan.make_env(plan.evaluation.episodes, plan.evaluation.first_seed)
+    episodes = play(env, policy, plan.evaluation.first_seed, policy.mode)
+    actions = load_policy(run, "deterministic")(env.reset())[ACTION]
+    return {"actions": actions.tolist(), "saved": episodes["saved"].tolist()}
+
+
+@pytest.mark.parametrize("release", RELEASES)
+def test_a_golden_policy_acts_as_it_did(release):
+    expected, now = json.loads((GOLDEN / release / "expected.json").read_text()), found_now(release)
+    assert now["actions"] == expected["actions"]
+    assert now["saved"] == pytest.approx(expected["saved"], abs=1e-6)
+
+
+@pytest.mark.parametrize("release", RELEASES)
+def test_a_golden_run_goes_on(release, tmp_path):
+    run = shutil.copytree(GOLDEN / release, tmp_path / "run")
+    found, skipped = newest(run)
+    training = Training(settings(plain(recompose(found.record(), ["total_frames=96"]))), found.record(), run)
+    training.load_state_dict(found.training())
+    assert not skipped and training.frames == 64
+    training.train()
+    assert newest(run)[0].manifest.frames == 96
+    assert all(value.isfinite().all() for value in newest(run)[0].policy().values())
+
+
+@pytest.mark.parametrize("release", RELEASES)
+def test_an_unknown_format_is_refused_by_name(release, tmp_path):
+    run = shutil.copytree(GOLDEN / release, tmp_path / "run")
+    forge(run / "checkpoints" / "64", format=3)
+    with pytest.raises(CheckpointError, match="has format 3, this version reads 1, 2"):
+        load_policy(run)
+
+
+@pytest.mark.parametrize("release", RELEASES)
+def test_a_golden_run_is_small(release):
+    assert sum(path.stat().st_size for path in (GOLDEN / release).rglob("*")) < 100_000
+
+
+def test_golden_policies_play_in_make_env():
+    env = make_env("skirmish", n_worlds=2, overrides=["landscape.size=8", "observation=local", "observation.radius=1"])
+    rollout = env.rollout(3, load_policy(GOLDEN / RELEASES[-1]), break_when_any_done=False)
+    assert rollout[ACTION].shape == (2, 3, 2) and rollout[ACTION].dtype == torch.int64
