@@ -1,0 +1,82 @@
+"""A disk that fills at every stage of a run, and one that is read-only: exit code 6, and what was saved stays sound."""
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.stress.processes import TINY
+from warp_torchrl.checkpoint import CheckpointError, newest
+from warp_torchrl.command import train
+
+pytestmark = pytest.mark.stress
+DISK = 4 * 2**20
+SHORT = [*TINY, "total_frames=256", "checkpoint.interval=64", "evaluation.episodes=2"]
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of 4 MiB."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", f"size={DISK}", "tmpfs", str(folder)], capture_output=True, check=False
+    )
+    if mounted.returncode:
+        pytest.skip(f"no file system can be mounted here: {mounted.stderr.decode().strip()}")
+    yield folder
+    subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+@pytest.fixture
+def run_here(monkeypatch, capfd):
+    def run(*arguments):
+        monkeypatch.setattr("sys.argv", ["train.py", *arguments])
+        with pytest.raises(SystemExit) as end:
+            train()
+        return end.value.code, capfd.readouterr().err.strip().splitlines()
+
+    return run
+
+
+def test_a_disk_that_fills_at_every_stage(small_disk, run_here, monkeypatch, capfd):
+    monkeypatch.chdir(small_disk)
+    stages, filler = [], small_disk / "filler"
+    room = 0
+    while True:
+        filler.write_bytes(bytes(DISK - room))
+        run = f"run{room}"
+        code, errors = run_here(*SHORT, f"hydra.run.dir={run}")
+        if code == 0:
+            break
+        assert code == 6 and errors[-1].endswith("No space left on device"), errors
+        assert "Traceback" not in "".join(errors)
+        path = errors[-1].removeprefix("error: ").partition(": ")[0]
+        try:
+            found, skipped = newest(small_disk / run)
+            assert not skipped
+            filler.unlink()
+            code, errors = run_here(f"resume={run}")
+            assert code == 0, errors
+        except CheckpointError as error:
+            assert "no folder in" in str(error) or "nothing there" in str(error)
+            found = None
+        stages.append(f"{Path(path).name} ({'nothing' if found is None else found.manifest.frames} saved)")
+        subprocess.run(["rm", "-rf", str(small_disk / run)], check=True)
+        room += 48 * 1024
+    with capfd.disabled():
+        print(f"\nfull disks told and survived: {len(stages)} / {len(stages)}: {', '.join(stages)}")
+    assert len(stages) > 5
+
+
+def test_a_read_only_folder(small_disk, run_here, monkeypatch):
+    monkeypatch.chdir(small_disk)
+    code, _ = run_here(*SHORT, "total_frames=64", "hydra.run.dir=run")
+    assert code == 0
+    (small_disk / "run" / "evaluation.json").unlink()
+    subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
+    for arguments in ([*SHORT, "hydra.run.dir=other"], ["resume=run"]):
+        code, errors = run_here(*arguments)
+        assert code == 6 and errors[-1].startswith("error: ") and errors[-1].endswith("Read-only file system")
+        assert "Traceback" not in "".join(errors)
+    assert newest(small_disk / "run")[1] == []
