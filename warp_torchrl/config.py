@@ -37,6 +37,11 @@ def compose_config(name: str, overrides: Sequence[str] = ()) -> DictConfig:
     Raises:
         ConfigError: If an override does not fit, in one line.
     """
+    for override in overrides:
+        group, _, option = override.partition("=")
+        if group in (*COMPONENTS, "scenario") and not _OPTION.fullmatch(option.strip("'\"")):
+            # Hydra merges lists of options and follows paths; a run folder could not tell them, nor resume.
+            raise ConfigError(f"{group} must be one of the files of conf/{group}, got {option}")
     config = _compose(name, overrides)
     try:
         OmegaConf.resolve(config)

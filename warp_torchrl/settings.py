@@ -145,6 +145,9 @@ def settings(config: Mapping[str, Any]) -> Settings:
     for key in config:
         if key not in known:
             raise ConfigError(f"{key} is not a key of the configuration; it has {', '.join(sorted(known - {'world'}))}")
+    for key in (*COMPONENTS, "checkpoint", "evaluation"):
+        if key not in config:
+            raise ConfigError(f"{key} must be given")
     built = build_components(config)
     values = {each.name: built.get(each.name, config.get(each.name)) for each in fields(Settings)}
     values["world"] = built["world"]
