@@ -63,7 +63,7 @@ def test_a_disk_that_fills_at_every_stage(small_disk, run_here, monkeypatch, cap
             found = None
         stages.append(f"{Path(path).name} ({'nothing' if found is None else found.manifest.frames} saved)")
         subprocess.run(["rm", "-rf", str(small_disk / run)], check=True)
-        room += 48 * 1024
+        room += 160 * 1024
     with capfd.disabled():
         print(f"\nfull disks told and survived: {len(stages)} / {len(stages)}: {', '.join(stages)}")
     assert len(stages) > 5

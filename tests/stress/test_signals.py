@@ -45,17 +45,17 @@ def test_a_signal_in_training(tmp_path, number, collector, capfd):
 
 @pytest.mark.parametrize("collector", COLLECTORS)
 def test_a_second_signal_exits_at_once(tmp_path, collector, capfd):
-    process = start(tmp_path, *LONG, *COLLECTORS[collector], "algorithm.epochs=10000")  # a step that takes a while
+    process = start(tmp_path, *LONG, *COLLECTORS[collector], "collector.steps=10000")  # takes minutes
     wait_for(lambda: (tmp_path / "run" / "config.yaml").exists(), process)
     time.sleep(8.0)
     process.send_signal(signal.SIGTERM)
     time.sleep(0.5)
-    assert process.poll() is None, "the first is obeyed after the step"
+    assert process.poll() is None, "the first is obeyed after the batch"
     process.send_signal(signal.SIGTERM)
     seconds = ended(process, tmp_path, signal.SIGTERM)
     with capfd.disabled():
         print(f"\na second SIGTERM, {collector}: {seconds:.2f} s to the exit")
-    assert seconds < 10.0
+    assert seconds < 30.0  # TorchRL gives workers in mid-batch ten seconds
 
 
 def test_a_signal_in_evaluation(tmp_path, capfd):
