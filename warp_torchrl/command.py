@@ -290,6 +290,8 @@ def _diagnose(error: Exception) -> tuple[int, str]:
         return NUMERICAL, line
     if isinstance(error, WorkerDied):
         return 1, line
+    if isinstance(error.__cause__, OSError):  # logging says that a handler cannot be configured, and not why
+        error = error.__cause__
     if isinstance(error, OSError) and (error.filename is not None or error.errno in _NO_ROOM):
         return DISK, f"{error.filename or Path.cwd()}: {error.strerror}"
     if isinstance(error, (ConfigError, ValueError, HydraException, OmegaConfBaseException)):
