@@ -42,7 +42,7 @@ def test_no_power_cut_costs_a_checkpoint(tmp_path, loses_names):
     print(
         f"\npower cuts survived / tried: {survived + (not loss)} / {survived + 1} (unsynced names lost: {loses_names})"
     )
-    assert not loss and survived > 20
+    assert not loss and survived > 20, loss
 
 
 def in_place(run):
