@@ -79,10 +79,10 @@ class Checkpoint:
     def record(self) -> Record:
         """Return the configuration it was trained with."""
         content = _json(self.path / "config.json")
-        parts = [content.get("choices"), content.get("values")]
-        if not all(isinstance(part, dict) for part in parts):
+        choices, values = content.get("choices"), content.get("values")
+        if not (isinstance(choices, dict) and isinstance(values, dict)):
             raise CheckpointError(f"{self.path / 'config.json'} must hold choices and values")
-        return Record(choices=parts[0], values=parts[1])
+        return Record(choices=choices, values=values)
 
     def policy(self) -> dict[str, torch.Tensor]:
         """Return the policy's parameters."""

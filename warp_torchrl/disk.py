@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, cast
 
 import torch
 
@@ -44,7 +44,7 @@ def save_tensors(path: Path, content: Any) -> None:
     with telling(path), path.open("wb") as file:
         writer = _Writer(file)
         try:
-            torch.save(content, writer)
+            torch.save(content, cast(BinaryIO, writer))
         except RuntimeError:
             if writer.refusal is None:
                 raise

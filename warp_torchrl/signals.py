@@ -2,13 +2,13 @@
 
 import os
 import signal
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
+_STDERR = 2
 _WATCHED = (signal.SIGTERM, signal.SIGINT, signal.SIGUSR1)
 
 
@@ -59,7 +59,7 @@ def obeyed() -> Iterator[None]:
 
 def _leave(number: int, frame: FrameType | None) -> None:
     # Not print(): what was interrupted may be in the middle of one.
-    os.write(sys.__stderr__.fileno(), f"error: stopped by signal {signal.Signals(number).name}\n".encode())
+    os.write(_STDERR, f"error: stopped by signal {signal.Signals(number).name}\n".encode())
     raise SystemExit(128 + number)
 
 
