@@ -1,11 +1,10 @@
 """Checkpoints: complete or invisible, verified before they are read, the newest found by listing.
 
 ``checkpoints/<frames>/`` holds ``policy.pt`` and ``training.pt`` (tensors and plain values, read with
-``weights_only=True``), ``config.json``, and ``manifest.json`` with the size and sha256 of each, and its own sha256.
+``weights_only=True``), ``config.json``, and ``manifest.json``, see ``warp_torchrl.manifest``.
 """
 
 import fcntl
-import hashlib
 import json
 import shutil
 from collections.abc import Mapping
@@ -13,55 +12,35 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import tensordict
 import torch
-import torchrl
 
 from warp_torchrl import disk
 from warp_torchrl.config import Record
-from warp_torchrl.models import Entry, Signature
+from warp_torchrl.manifest import (
+    MANIFEST,
+    CheckpointError,
+    Manifest,
+    first_line,
+    read_json,
+    read_manifest,
+    write_manifest,
+)
+from warp_torchrl.models import Signature
 
-FORMAT = 2
-"""Version of the layout that is written."""
-_READ = (1, FORMAT)  # 1 had no seal
-MANIFEST = "manifest.json"
-_FILES = ("policy.pt", "training.pt", "config.json")
-_LARGEST_JSON = 1_000_000
-
-
-class CheckpointError(Exception):
-    """No sound checkpoint, told in one line."""
+__all__ = [
+    "MANIFEST",
+    "Checkpoint",
+    "CheckpointError",
+    "RunFolderInUse",
+    "RunFolderLock",
+    "holds_any",
+    "newest",
+    "save",
+]
 
 
 class RunFolderInUse(Exception):  # noqa: N818
     """Another process writes into the run folder."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Manifest:
-    """What a checkpoint says of itself.
-
-    Attributes:
-        format: Version of the layout.
-        frames: World steps trained.
-        scenario: Name of the scenario.
-        signature: Inputs and outputs of the policy.
-        mode: How the policy acts best on training seeds, ``sampled`` or ``deterministic``; None before that is known.
-        versions: Of the libraries that wrote it.
-        files: Size and sha256 by file name.
-    """
-
-    format: int
-    frames: int
-    scenario: str
-    signature: Signature
-    mode: str | None
-    versions: dict[str, str]
-    files: dict[str, dict[str, Any]]
-
-    def __post_init__(self) -> None:
-        if type(self.frames) is not int or self.mode not in (None, "sampled", "deterministic"):
-            raise ValueError(f"frames must be whole and mode one of ours, got {self.frames!r}, {self.mode!r}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,7 +57,7 @@ class Checkpoint:
 
     def record(self) -> Record:
         """Return the configuration it was trained with."""
-        content = _json(self.path / "config.json")
+        content = read_json(self.path / "config.json")
         choices, values = content.get("choices"), content.get("values")
         if not (isinstance(choices, dict) and isinstance(values, dict)):
             raise CheckpointError(f"{self.path / 'config.json'} must hold choices and values")
@@ -96,7 +75,7 @@ class Checkpoint:
         try:
             return torch.load(self.path / name, weights_only=True, map_location="cpu")
         except Exception as error:
-            raise CheckpointError(f"{self.path / name} cannot be read: {_first_line(error)}") from None
+            raise CheckpointError(f"{self.path / name} cannot be read: {first_line(error)}") from None
 
 
 def save(
@@ -135,7 +114,7 @@ def save(
                 disk.save_tensors(draft / "policy.pt", dict(policy))
                 disk.save_tensors(draft / "training.pt", dict(training))
                 (draft / "config.json").write_text(json.dumps(asdict(record), indent=1), encoding="utf-8")
-                _write_manifest(draft, frames, scenario, signature, mode)
+                write_manifest(draft, frames, scenario, signature, mode)
                 _publish(draft, final)
         finally:
             shutil.rmtree(draft, ignore_errors=True)
@@ -222,15 +201,9 @@ def _listed(run: Path) -> list[Path]:
 
 def _verified(folder: Path, frames: int | None = None) -> Checkpoint:
     """Check every file of a checkpoint against its manifest before any of them is parsed."""
-    manifest = _manifest(folder)
+    manifest = read_manifest(folder)
     if frames not in (None, manifest.frames):
         raise CheckpointError(f"{folder} holds a checkpoint of {manifest.frames} frames")
-    for name, entry in manifest.files.items():
-        path, size = folder / name, entry["size"]
-        if not path.is_file() or path.stat().st_size != size:
-            raise CheckpointError(f"{path} is missing or was cut: {size} bytes are expected")
-        if _sha256(path) != entry["sha256"]:
-            raise CheckpointError(f"{path} was altered: its sha256 is not the manifest's")
     return Checkpoint(path=folder, manifest=manifest)
 
 
@@ -240,86 +213,3 @@ def _is_sound(folder: Path) -> bool:
     except CheckpointError:
         return False
     return True
-
-
-def _manifest(folder: Path) -> Manifest:
-    path = folder / MANIFEST
-    content = _json(path)
-    if content.get("format") not in _READ:
-        raise CheckpointError(
-            f"{folder} has format {content.get('format')!r}, this version reads {', '.join(map(str, _READ))}"
-        )
-    if content["format"] == FORMAT:
-        content.pop("sha256", None)
-        if path.read_bytes() != _sealed(content):
-            raise CheckpointError(f"{path} was altered: its sha256 is not its own")
-    try:
-        signature = _signature_from_json(content.pop("signature"))
-        manifest = Manifest(signature=signature, **content)
-        files = {name: (entry["size"], entry["sha256"]) for name, entry in manifest.files.items()}
-    except (TypeError, KeyError, ValueError, AttributeError, OverflowError):
-        raise CheckpointError(f"{path} is not a manifest of format {content['format']}") from None
-    if set(files) != set(_FILES):
-        raise CheckpointError(f"{path} must list {', '.join(_FILES)}")
-    return manifest
-
-
-def _sealed(content: Mapping[str, Any]) -> bytes:
-    """Return the one text that a manifest with this content has: any other byte in the file is an alteration."""
-    digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()
-    return json.dumps({**content, "sha256": digest}, indent=1).encode()
-
-
-def _json(path: Path) -> dict[str, Any]:
-    try:
-        if path.stat().st_size > _LARGEST_JSON:
-            raise CheckpointError(f"{path} is too large to be one of ours")
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise CheckpointError(f"{path} cannot be read: {_first_line(error)}") from None
-    if not isinstance(content, dict):
-        raise CheckpointError(f"{path} must hold a mapping")
-    return content
-
-
-def _write_manifest(folder: Path, frames: int, scenario: str, signature: Signature, mode: str | None) -> None:
-    libraries = {"torch": torch, "torchrl": torchrl, "tensordict": tensordict}
-    manifest = Manifest(
-        format=FORMAT,
-        frames=frames,
-        scenario=scenario,
-        signature=signature,
-        mode=mode,
-        versions={name: library.__version__ for name, library in libraries.items()},
-        files={name: _describe(folder / name) for name in _FILES},
-    )
-    (folder / MANIFEST).write_bytes(_sealed(asdict(manifest) | {"signature": _signature_to_json(signature)}))
-
-
-def _describe(path: Path) -> dict[str, Any]:
-    return {"size": path.stat().st_size, "sha256": _sha256(path)}
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).splitlines() or [type(error).__name__])[0]
-
-
-def _signature_to_json(signature: Signature) -> dict[str, Any]:
-    return signature._asdict() | {
-        "observation": {name: entry._asdict() for name, entry in signature.observation.items()},
-        "state": signature.state._asdict(),
-    }
-
-
-def _signature_from_json(content: dict[str, Any]) -> Signature:
-    def entry(node: dict[str, Any]) -> Entry:
-        return Entry(tuple(int(side) for side in node["shape"]), str(node["dtype"]))
-
-    observation = {str(name): entry(node) for name, node in content["observation"].items()}
-    counts = (int(content["n_agents"]), int(content["n_actions"]), int(content.get("n_roles", 2)))
-    return Signature(observation, entry(content["state"]), *counts)
