@@ -60,7 +60,7 @@ def test_learning_knows_specs_and_not_the_world(module):
 
 
 def test_the_environment_knows_no_learning():
-    allowed = {"observation", "reward", "metrics", "render", "starts"}
+    allowed = {"observation", "reward", "metrics", "render", "specs", "starts"}
     assert all(name.split("/")[0] in {"world", *allowed} for name in ours("env"))
 
 

@@ -6,21 +6,18 @@ from typing import Any
 import torch
 from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
-from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
-from warp_torchrl.metrics import METRICS, metrics
-from warp_torchrl.observation import STATE, STATE_SIDE, Observation, Space, Surroundings, central_state
+from warp_torchrl.metrics import metrics
+from warp_torchrl.observation import Observation, Surroundings, central_state
 from warp_torchrl.render import render
 from warp_torchrl.reward import Efficiency, Reward
+from warp_torchrl.specs import make_specs
 from warp_torchrl.starts import Start, Starts
 from warp_torchrl.world.fusion import check_compiler, fusing
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.state import Transition, WorldState
 from warp_torchrl.world.world import World
-
-EPISODE_METRICS = (*METRICS, "episode_reward", "episode_length")
-"""Entries of ``info``: the metrics, the team's mean return so far, and the steps so far."""
 
 
 class WildfireEnv(EnvBase):
@@ -82,7 +79,9 @@ class WildfireEnv(EnvBase):
         """Is shown every step's transition, for those who study behaviour."""
         self._episode_reward = torch.zeros(n_worlds, device=self.device)
         self.set_seeds(range(seed, seed + n_worlds) if seeds is None else seeds)
-        self._make_specs()
+        specs = make_specs(self.world, self.observation, n_worlds, self.device)
+        self.observation_spec, self.action_spec = specs.observation, specs.action
+        self.reward_spec, self.done_spec = specs.reward, specs.done
 
     # What users ask for
 
@@ -246,41 +245,6 @@ class WildfireEnv(EnvBase):
             batch_size=batch,
             device=self.device,
         )
-
-    def _make_specs(self) -> None:
-        batch, team = self.batch_size, (*self.batch_size, self.n_agents)
-        device, n_actions = self.device, self.world.team.n_actions
-
-        def entry(space: Space) -> Bounded:
-            return Bounded(space.low, space.high, shape=(*team, *space.shape), dtype=space.dtype, device=device)
-
-        spaces = {name: entry(space) for name, space in self.observation.spaces(self.world).items()}
-        seen = spaces[""] if "" in spaces else Composite(spaces, shape=team, device=device)
-        mask = Binary(n_actions, shape=(*team, n_actions), dtype=torch.bool, device=device)
-        role = Categorical(len(ROLES), shape=team, dtype=torch.int64, device=device)
-        state_shape = (*batch, len(STATE), STATE_SIDE, STATE_SIDE)
-        self.observation_spec = Composite(
-            agents=Composite(observation=seen, action_mask=mask, role=role, shape=team, device=device),
-            state=Bounded(-3.0, 256.0, shape=state_shape, device=device),
-            info=Composite(
-                {name: Unbounded(shape=(*batch, 1), device=device) for name in EPISODE_METRICS}, shape=batch
-            ),
-            shape=batch,
-            device=device,
-        )
-        action = Categorical(n_actions, shape=team, dtype=torch.int64, device=device)
-        self.action_spec = Composite(
-            agents=Composite(action=action, shape=team, device=device), shape=batch, device=device
-        )
-        reward = Unbounded(shape=(*team, 1), device=device)
-        self.reward_spec = Composite(
-            agents=Composite(reward=reward, shape=team, device=device), shape=batch, device=device
-        )
-        flag = {n: Categorical(2, shape=(*batch, 1), dtype=torch.bool, device=device) for n in _FLAGS}
-        self.done_spec = Composite(flag, shape=batch, device=device)
-
-
-_FLAGS = ("done", "terminated", "truncated")
 
 
 def _fill(template: WorldState, entries: dict[str, Tensor]) -> WorldState:

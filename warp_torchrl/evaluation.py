@@ -13,10 +13,11 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from warp_torchrl import disk
 from warp_torchrl.behaviour import BEHAVIOUR, Behaviour
-from warp_torchrl.env import EPISODE_METRICS, WildfireEnv
+from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS, idle_action
 from warp_torchrl.models import ACTION, ACTION_MASK
 from warp_torchrl.render import EpisodeRecorder
+from warp_torchrl.specs import EPISODE_METRICS
 from warp_torchrl.statistics import compare, summarise
 
 SHOWN = ("averted", *BEHAVIOUR)

@@ -16,13 +16,13 @@ from warp_torchrl import checkpoint as checkpoints
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.collectors import WorkerDied
 from warp_torchrl.config import Record
-from warp_torchrl.env import EPISODE_METRICS
 from warp_torchrl.evaluation import MODES, play
 from warp_torchrl.logging import MetricsFile, Tracker
 from warp_torchrl.models import REWARD, signature
 from warp_torchrl.reward_scale import RewardScale
 from warp_torchrl.settings import TRAINING_SEEDS, Settings
 from warp_torchrl.signals import Noted, Stopped
+from warp_torchrl.specs import EPISODE_METRICS
 
 log = logging.getLogger("warp_torchrl")
 _SECONDS_BETWEEN_LINES = 15.0
