@@ -143,6 +143,15 @@ def test_other_values_under_the_same_names_are_told_apart(tmp_path):
     assert all(len(label) == len("mappo 012345") for label in (first.label, second.label))
 
 
+def test_a_learner_keeps_its_colour_and_a_scenario_its_width(tmp_path, matplotlib):
+    runs = [("ppo", "single"), ("mappo", "single"), ("mappo", "skirmish"), ("dqn", "skirmish")]
+    drawn = lines(*(write_run(tmp_path / f"{a}-{s}", algorithm=a, scenario=s) for a, s in runs))
+    looks = {line.label: (line.look["color"], line.look["linestyle"], line.look["linewidth"]) for line in drawn}
+    assert looks["mappo single"][:2] == looks["mappo skirmish"][:2]
+    assert len({look[:2] for look in looks.values()}) == 3 and len(set(looks.values())) == 4
+    assert looks["dqn skirmish"][2] == looks["mappo skirmish"][2] != looks["ppo single"][2]
+
+
 def test_a_run_without_a_checkpoint_has_its_folder_s_name(tmp_path):
     early = write_metrics(tmp_path / "early_run")
     (early / "config.yaml").write_text("team: {n_agents: 1}\nscenario: single\n")

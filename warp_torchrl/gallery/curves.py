@@ -6,7 +6,7 @@ is smoothed, but that files of many rows are averaged over bins, which the figur
 
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -114,11 +114,22 @@ def gather(runs: Sequence[Run]) -> list[Line]:
     told = [place for place, names in enumerate(zip(*recorded)) if place == 0 or len(set(names)) > 1]
     names = [_name(alike[0].names, told) for alike in found.values()]
     count = Counter(names)
-    lines = []
-    for index, (name, alike) in enumerate(zip(names, found.values())):
-        label = f"{name} {alike[0].mark}" if count[name] > 1 else name
-        lines.append(Line(label + _how_many(alike), _look(index), alike))
+    seen: Counter[tuple[str, ...]] = Counter()
+    lines, looks, scenarios = [], _Places(), _Places()
+    for name, alike in zip(names, found.values()):
+        run = alike[0]
+        seen[run.names] += 1
+        look = _look(looks.of((run.names[:-1] or run.names, seen[run.names])), scenarios.of(run.scenario))
+        lines.append(Line((f"{name} {run.mark}" if count[name] > 1 else name) + _how_many(alike), look, alike))
     return lines
+
+
+class _Places(dict[Hashable, int]):
+    """Numbers things in the order in which they are first asked for."""
+
+    def of(self, thing: Hashable) -> int:
+        """Return a thing's number."""
+        return self.setdefault(thing, len(self))
 
 
 def _name(names: tuple[str, ...], told: Sequence[int]) -> str:
@@ -137,9 +148,10 @@ def _how_many(runs: Sequence[Run]) -> str:
 _DASHES = ("-", (0, (5, 1.5)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (3, 1.2, 1, 1.2, 1, 1.2)))
 
 
-def _look(index: int) -> dict[str, Any]:
-    """Return a line's colour and dashes; both change from one to the next, so that grey keeps them apart."""
-    return {"color": line_style(index)["color"], "linestyle": _DASHES[index % len(_DASHES)], "linewidth": 1.1}
+def _look(learner: int, scenario: int) -> dict[str, Any]:
+    """Return a line's look: its learner's colour and dashes, which grey keeps apart, and its scenario's width."""
+    dashes = _DASHES[learner % len(_DASHES)]
+    return {"color": line_style(learner)["color"], "linestyle": dashes, "linewidth": 1.1 + 0.6 * scenario}
 
 
 def learning_curves(lines: Sequence[Line], panels: Sequence[Sequence[str]], title: str) -> "Figure":
