@@ -14,7 +14,6 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.flags import as_mask, at_least, at_most, below, byte, choose, clear, equal, number
-from warp_torchrl.world.fusion import is_fusing
 from warp_torchrl.world.kernel import alexandridis, ellipse, slope_factor
 from warp_torchrl.world.landscape import holds_trees
 from warp_torchrl.world.law import Clipped, Law
@@ -134,7 +133,7 @@ class Fire:
     def spread(self, state: WorldState) -> Tensor:
         """Return each tree's chance to be ignited by its neighbours in one tick, float32 [B, H, W]; 0 elsewhere."""
         spreading = is_burning(state.cells) & at_most(state.cells, self.last_spreading)
-        if state.chances is not None and not is_fusing():
+        if state.chances is not None:
             kind = (state.landscape.cover + 1) * byte(self.is_fuel(state))
             return chance_by_pattern(state.chances, spreading, kind, self.neighbours)
         susceptible = self._susceptible(state)
