@@ -162,6 +162,20 @@ def test_set_state_goes_on_from_given_worlds(make_small_env):
         other.set_state(_reset_state(make_small_env(1)))
 
 
+def test_a_state_whose_wind_was_changed_burns_in_that_wind(make_small_env):
+    env = make_small_env(2)
+    env.reset()
+    before = env.world.threat(env.world_state)
+    gale = torch.full_like(env.world_state.wind, 15.0)
+    env.set_state(env.world_state.replace(wind=gale))
+    spread = env.world.fire.spread(env.world_state)
+    assert not torch.equal(env.world.threat(env.world_state), before)
+    rows, columns = env.world.size
+    env.set_state(env.world_state.replace(wind=gale.expand(2, 2, rows, columns).clone()))  # the same, cell by cell
+    assert env.world_state.chances is None
+    torch.testing.assert_close(env.world.fire.spread(env.world_state), spread)
+
+
 def _reset_state(env):
     env.reset()
     return env.world_state

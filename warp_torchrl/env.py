@@ -133,7 +133,8 @@ class WildfireEnv(EnvBase):
         got = (*state.cells.shape, state.vehicles.position.shape[1])
         if got != expected:
             raise ValueError(f"state must have [worlds, rows, columns, agents] {list(expected)}, got {list(got)}")
-        self._state = state.to(self.device).clone()
+        given = state.to(self.device).clone()
+        self._state = self.world.fire.in_wind(given, given.wind)  # which may have been changed by hand
         self._episode_reward.zero_()
         return self._observe(self._state)
 

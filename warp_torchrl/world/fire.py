@@ -124,9 +124,9 @@ class Fire:
         """Return worlds in another wind, float32 [B, 2, 1, 1] or [B, 2, H, W] [m/s], with all that follows from it."""
         gain = gains(self.wind_factor(wind), self.diagonal)
         if gain.shape[2:] != (1, 1):
-            return state.replace(wind=wind)
+            return state.replace(wind=wind, gain=None, chances=None)
         if state.slope is not None:
-            return state.replace(wind=wind, gain=gain)
+            return state.replace(wind=wind, gain=gain, chances=None)
         kinds = self._law().susceptibility(_constant(tuple(self.alpha), wind.device))
         return state.replace(wind=wind, gain=gain, chances=pattern_table(self._law(), kinds, gain, self.neighbours))
 
