@@ -3,11 +3,12 @@
 import pytest
 import torch
 from torchrl.collectors import Collector
+from torchrl.objectives.value import MultiAgentGAE
 
 from tests.conftest import small_world
 from warp_torchrl.algorithms.on_policy import ADVANTAGE, VALUE_TARGET, with_advantages
 from warp_torchrl.algorithms.ppo import Ppo
-from warp_torchrl.models import VALUE, Mlp
+from warp_torchrl.models import REWARD, VALUE, Mlp
 
 
 def collected(env, learner, steps):
@@ -64,6 +65,24 @@ def test_gae_by_hand():
     assert advantage[0, :, 0].tolist() == pytest.approx([0.96875, 0.875, 0.5], abs=1e-5)
     assert advantage[1, -1, 0].item() == pytest.approx(0.75, abs=1e-5)
     assert (advantage[..., 0] == advantage[..., 1]).all()
+
+
+def test_one_pass_of_the_critic_values_what_two_would(make_small_env):
+    """Episodes end at the horizon of 5 and the batch at 8: what a step led to is not always the next step's state."""
+    env = make_small_env(6, small_world(horizon=5))
+    learner = Ppo().build(env, Mlp(actor_hidden=(8,), critic_hidden=(8,)), 48)
+    batch, loss = collected(env, learner, 8), learner.loss
+    assert 0 < int(batch["next", "done"][:, :-1].sum()), "an episode ends before the batch does"
+    two = MultiAgentGAE(gamma=0.99, lmbda=0.95, value_network=loss.critic_network)
+    two.set_keys(value=VALUE, reward=REWARD, done="done", terminated="terminated", advantage=ADVANTAGE)
+    two.set_keys(value_target=VALUE_TARGET)
+    with torch.no_grad():
+        twice = two(
+            batch.clone(), params=loss.critic_network_params, target_params=loss.target_critic_network_params
+        )
+    once = with_advantages(loss, batch.clone()).view(6, 8)
+    for key in (ADVANTAGE, VALUE_TARGET):
+        torch.testing.assert_close(once[key], twice[key], rtol=1e-5, atol=1e-6)
 
 
 def test_the_schedule_falls_linearly(make_small_env):

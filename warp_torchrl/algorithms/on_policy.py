@@ -72,6 +72,7 @@ class OnPolicy(Algorithm):
         shape = signature(env)
         policy = self.policy(shape, model).to(env.device)
         loss = self.loss(policy, model.critic(shape, self.central_critic).to(env.device)).to(env.device)
+        loss.value_estimator.value_network = None  # it reads the values that ``with_advantages`` adds
         optimizer = torch.optim.Adam(loss.parameters(), lr=self.learning_rate, eps=1e-5)
 
         def schedule(progress: float) -> dict[str, float]:
@@ -92,6 +93,7 @@ class OnPolicy(Algorithm):
             policy=policy,
             explore=policy,
             loss=loss,
+            terms=loss,
             loss_keys=("loss_objective", "loss_critic", "loss_entropy"),
             columns=self.columns(),
             optimizer=optimizer,
@@ -126,5 +128,23 @@ class OnPolicy(Algorithm):
 def with_advantages(loss: LossModule, batch: TensorDictBase) -> TensorDictBase:
     """Add advantages and value targets over time, then drop what the loss does not read; [B, T] -> [B T]."""
     with torch.no_grad():
-        loss.value_estimator(batch, params=loss.critic_network_params, target_params=loss.target_critic_network_params)
+        _add_values(loss, batch)
+        loss.value_estimator(batch)
     return batch.exclude("next", "info", LOGITS, VALUE).reshape(-1)
+
+
+def _add_values(loss: LossModule, batch: TensorDictBase) -> None:
+    """Add the values of each step's state and of the one that it led to, in one pass of the critic and a little.
+
+    What a step led to is the next step's state, but where an episode or the batch ended.
+    """
+    keys = loss.critic_network.in_keys
+    ends = batch["next", "done"][..., 0].clone()
+    ends[:, -1] = True
+    with loss.critic_network_params.to_module(loss.critic_network):
+        value = loss.critic_network(batch.select(*keys))[VALUE]
+        last = loss.critic_network(batch["next"].select(*keys)[ends])[VALUE]
+    following = value.roll(-1, dims=1)
+    following[ends] = last
+    batch.set(VALUE, value)
+    batch.set(("next", *VALUE), following)
