@@ -78,6 +78,7 @@ LAST = 6  # iterations of a tiny run
 RUNS = {
     "all that moves": ["reward.normalise=true", "model.sharing=role", "team.roles=[ugv,uav]", "fire=hazard",
                        "wind=wandering", "reward=collaborative", "team.tank=3"],
+    "taught": ["imitation.teacher=greedy", "imitation.until=0.7"],
     **{name: [f"algorithm={name}", *(REPLAY if name in REPLAYS else [])] for name in ALGORITHMS},
 }  # fmt: skip
 RUNS["dqn"] += ["algorithm.target_interval=3"]
@@ -100,7 +101,13 @@ def never_stopped(tmp_path_factory):
     return get
 
 
-FAST = {("all that moves", 1), ("mappo", LAST), ("dqn", 1), *((name, 3) for name in ("ippo", "a2c", *REPLAYS[1:]))}
+FAST = {
+    ("all that moves", 1),
+    ("taught", 3),
+    ("mappo", LAST),
+    ("dqn", 1),
+    *((name, 3) for name in ("ippo", "a2c", *REPLAYS[1:])),
+}
 
 
 @pytest.mark.parametrize(

@@ -80,7 +80,10 @@ def _start(folder: Path, config: DictConfig) -> None:
         raise ConfigError(f"hydra.run.dir: {folder} holds a run already; go on with resume={folder}, or take another")
     disk.replace(folder / "config.yaml", OmegaConf.to_yaml(config, resolve=True))
     record = Record(choices=_choices(), values=_values(config))
-    _finish(Training(settings(plain(config)), record, folder))
+    training = Training(settings(plain(config)), record, folder)
+    if config.start_from is not None:
+        training.start_from(_newest(config.start_from))
+    _finish(training)
 
 
 def _resume(folder: Path) -> None:
@@ -240,6 +243,8 @@ def _check_first(name: str, arguments: Sequence[str]) -> None:
 def _check_training(config: DictConfig, overrides: Sequence[str]) -> None:
     if config.resume is None:
         settings(plain(config))
+        if config.start_from is not None:
+            checkpoints.newest(config.start_from)
         return
     others = [each for each in overrides if each.split("=")[0] not in ("resume", "debug")]
     if others:

@@ -1,6 +1,7 @@
 """The settings of a run: every value checked, every component built, from a composed configuration as plain values."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from typing import Any, Literal
 
@@ -8,6 +9,7 @@ import torch
 
 from warp_torchrl.construction import ConfigError, build, construct
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.imitation import Imitation
 from warp_torchrl.world.fusion import check_compiler
 from warp_torchrl.world.world import World
 
@@ -108,6 +110,7 @@ class Settings:
     compile: bool
     checkpoint: CheckpointPlan
     evaluation: EvaluationPlan
+    imitation: Imitation
 
     def __post_init__(self) -> None:
         if not 1 <= self.n_worlds <= TRAINING_SEEDS:
@@ -141,11 +144,11 @@ def settings(config: Mapping[str, Any]) -> Settings:
     Raises:
         ConfigError: With key, value and rule.
     """
-    known = {each.name for each in fields(Settings)} | {*COMPONENTS, *WORLD_KEYS, "resume", "debug", "policy"}
+    known = {each.name for each in fields(Settings)} | {*COMPONENTS, *WORLD_KEYS, "resume", "start_from", "debug", "policy"}
     for key in config:
         if key not in known:
             raise ConfigError(f"{key} is not a key of the configuration; it has {', '.join(sorted(known - {'world'}))}")
-    for key in (*COMPONENTS, "checkpoint", "evaluation"):
+    for key in (*COMPONENTS, "checkpoint", "evaluation", "imitation"):
         if key not in config:
             raise ConfigError(f"{key} must be given")
     built = build_components(config)
@@ -153,17 +156,25 @@ def settings(config: Mapping[str, Any]) -> Settings:
     values["world"] = built["world"]
     values["checkpoint"] = construct(CheckpointPlan, config["checkpoint"], "checkpoint")
     values["evaluation"] = construct(EvaluationPlan, config["evaluation"], "evaluation")
+    values["imitation"] = construct(Imitation, config["imitation"], "imitation")
     _check_together(config)
     made = construct(Settings, values, "")
-    try:
+    with _told("algorithm"):
         made.algorithm.check_batch(made.n_worlds * made.collector.steps)
-    except ValueError as error:
-        raise ConfigError(f"algorithm.{error}") from None
-    try:
+    with _told("collector"):
         made.collector.check_worlds(made.n_worlds)
-    except ValueError as error:
-        raise ConfigError(f"collector.{error}") from None
+    with _told("imitation"):
+        made.imitation.check_fits(made.algorithm, made.collector)
     return made
+
+
+@contextmanager
+def _told(section: str) -> Iterator[None]:
+    """Let a mistake name the section of the configuration that it is in."""
+    try:
+        yield
+    except ValueError as error:
+        raise ConfigError(f"{section}.{error}") from None
 
 
 def build_components(config: Mapping[str, Any], names: Sequence[str] = COMPONENTS) -> dict[str, Any]:

@@ -57,7 +57,8 @@ class Training:
         self.settings, self.record, self.run = settings, record, run
         self.env = settings.make_env(settings.n_worlds, TRAINING_SEEDS * settings.seed)
         self.frames_per_batch = settings.collector.steps * settings.n_worlds
-        self.learner: Learner = settings.algorithm.build(self.env, settings.model, self.frames_per_batch)
+        learner = settings.algorithm.build(self.env, settings.model, self.frames_per_batch)
+        self.learner: Learner = settings.imitation.taught(learner, self.env)
         self.reward_scale = RewardScale(settings.reward.gamma) if settings.reward.normalise else None
         self.collection = settings.collector.open(
             self.env, self.learner, settings.make_env, TRAINING_SEEDS * settings.seed
@@ -159,7 +160,7 @@ class Training:
     def _update(self, sample: TensorDictBase) -> dict[str, Tensor]:
         """Take one optimiser step and return the loss's terms; nothing is read back from the device but finiteness."""
         learner = self.learner
-        terms = learner.loss(sample)
+        terms = learner.terms(sample)
         loss = sum(terms[key] for key in learner.loss_keys)
         loss.backward()
         norm = torch.nn.utils.clip_grad_norm_(learner.loss.parameters(), learner.max_grad_norm)
@@ -208,6 +209,18 @@ class Training:
         )
         self.saved_at = self.frames
         return path
+
+    def start_from(self, found: checkpoints.Checkpoint) -> None:
+        """Begin with another run's networks, and their value normalisation, and with nothing else of it.
+
+        Raises:
+            CheckpointError: If it trained by another kind of loss or other networks.
+        """
+        own, theirs = self.learner.loss.state_dict(), found.training()["loss"]
+        mine, given = ({name: each for name, each in state.items() if _is_learnt(name)} for state in (own, theirs))
+        if {name: each.shape for name, each in mine.items()} != {name: each.shape for name, each in given.items()}:
+            raise checkpoints.CheckpointError(f"{found.path} was trained by another algorithm or other networks")
+        self.learner.loss.load_state_dict({**own, **given})
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything that a run needs to go on exactly as if never stopped."""
@@ -270,6 +283,11 @@ def _episode_columns(batch: TensorDictBase) -> dict[str, float | None]:
     means = {name: float(info[name][..., 0][done].mean()) if count else None for name in EPISODE_METRICS}
     row = {"rollout/ep_rew_mean": means.pop("episode_reward"), "rollout/ep_len_mean": means.pop("episode_length")}
     return row | {f"world/{name}": value for name, value in means.items()}
+
+
+def _is_learnt(name: str) -> bool:
+    """Return whether an entry of a loss's state is a parameter or the running scale of values, and not a setting."""
+    return "_params." in name or name.startswith("value_norm.")
 
 
 def _line(row: Mapping[str, float | None], total: int) -> str:

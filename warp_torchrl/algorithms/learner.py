@@ -30,8 +30,9 @@ class Learner:
         policy: Observation and mask in, action out: what is saved and evaluated.
         explore: What the collector runs.
         loss: TorchRL's loss module; it holds every parameter that is trained.
-        loss_keys: Entries of its output that are summed and minimised.
-        columns: Names of ``metrics.csv`` by entry of the loss's output.
+        terms: Called with a sample, returns what is minimised and shown: the loss, and what may be added to it.
+        loss_keys: Entries of the terms that are summed and minimised.
+        columns: Names of ``metrics.csv`` by entry of the terms.
         optimizer: Over the loss's parameters.
         max_grad_norm: Gradients are clipped to this norm.
         store: Takes in a collected batch [B, T].
@@ -44,6 +45,7 @@ class Learner:
     policy: TensorDictModuleBase
     explore: TensorDictModuleBase
     loss: LossModule
+    terms: Callable[[TensorDictBase], TensorDictBase]
     loss_keys: tuple[str, ...]
     columns: dict[str, str]
     optimizer: torch.optim.Optimizer

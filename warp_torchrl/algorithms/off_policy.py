@@ -107,6 +107,7 @@ class OffPolicy(Algorithm):
             policy=policy,
             explore=explore,
             loss=loss,
+            terms=loss,
             loss_keys=self.loss_keys(),
             columns=self.columns(),
             optimizer=optimizer,

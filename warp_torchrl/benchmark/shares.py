@@ -98,7 +98,7 @@ def _watched(training: Training, now: Clock) -> Iterator[Stopwatch]:
             (training.env, "step_and_maybe_reset", "collector", "environment"),
             (learner.explore, "forward", "collector", "policy"),
             (learner, "store", "other", "advantages"),
-            (learner.loss, "forward", "other", "loss"),
+            (learner, "terms", "other", "loss"),
             (torch.nn.utils, "clip_grad_norm_", "backward", "optimiser"),
             (learner.optimizer, "step", "optimiser", "optimiser"),
         ):

@@ -1,6 +1,7 @@
 """What all heuristics share: how they are called, and what they see and do."""
 
 import math
+from typing import ClassVar
 
 import torch
 from tensordict import TensorDictBase
@@ -22,6 +23,8 @@ class Heuristic(TensorDictModuleBase):
 
     in_keys = [("agents", "action_mask")]  # noqa: RUF012
     out_keys = [("agents", "action")]  # noqa: RUF012
+    remembers: ClassVar[bool] = False
+    """Whether what it does depends on more than the state."""
 
     def __init__(self, env: WildfireEnv) -> None:
         super().__init__()

@@ -18,6 +18,7 @@ class Ring(Coordinated):
     can be, agents that have water attack the front as ``Coordinated`` does, and so do those that cannot clear.
     """
 
+    remembers = True
     pace = 1.0  # cells that a front makes in one of the paper's ticks
     effort = 2.0  # steps for each cell of the ring: go there, clear it
 

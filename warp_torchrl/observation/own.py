@@ -1,5 +1,7 @@
 """What an agent knows of itself."""
 
+import math
+
 import torch
 from torch import Tensor
 from torch.nn.functional import one_hot
@@ -8,6 +10,8 @@ from warp_torchrl.world.role import ROLE_NAMES
 from warp_torchrl.world.state import Action, WorldState
 from warp_torchrl.world.world import World
 
+IDENTITY_SIZE = 4
+"""Entries of ``self`` that tell an agent from its team-mates, see ``identity``."""
 SELF_SIZE = 9 + len(ROLE_NAMES) + len(Action)
 """Entries of ``self``: row, column, time left, wind east and north, steps to the tick, tank, whether it has a tank,
 whether it may refill here, role (one-hot), last action (one-hot, zeros before the first)."""
@@ -37,6 +41,15 @@ def own_vector(state: WorldState, world: World) -> Tensor:
         (vehicles.position == vehicles.base[:, None]).all(-1).to(torch.float32),
     ]
     return torch.cat((torch.stack(columns, dim=-1), roles, last), dim=-1)
+
+
+def identity(n_agents: int, device: torch.device) -> Tensor:
+    """Return each agent's place in its team, float32 [A, 4], the same for teams of any size that divide each other.
+
+    The place t = (i + 1/2) / A is given as cos 2 pi t, sin 2 pi t, cos 4 pi t, sin 4 pi t.
+    """
+    turn = 2.0 * math.pi * (torch.arange(n_agents, device=device) + 0.5) / n_agents
+    return torch.stack((turn.cos(), turn.sin(), (2.0 * turn).cos(), (2.0 * turn).sin()), dim=-1)
 
 
 def time_left(state: WorldState, world: World) -> Tensor:

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.observation.coarse import PICTURE, PICTURE_SIDE, picture
-from warp_torchrl.observation.own import SELF_SIZE, own_vector
+from warp_torchrl.observation.own import IDENTITY_SIZE, SELF_SIZE, identity, own_vector
 from warp_torchrl.observation.view import CHANNELS, ages, egocentric_view, stages, window
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.state import WorldState
@@ -36,12 +36,15 @@ class Local:
 
     Attributes:
         radius: r [cells].
+        identity: Whether ``self`` ends with the agent's place in its team, see ``identity``: agents that stand together
+            and see the same can then part.
 
     Raises:
         ValueError: If the radius is not in 1..32.
     """
 
     radius: int = 5
+    identity: bool = False
 
     def __post_init__(self) -> None:
         check_fields(self, radius=(1, 32))
@@ -51,12 +54,16 @@ class Local:
         side = 2 * self.radius + 1
         return {
             "view": Space((len(CHANNELS), side, side), torch.uint8, 0, 255),
-            "self": Space((SELF_SIZE,), torch.float32, -3.0, 3.0),
+            "self": Space((SELF_SIZE + IDENTITY_SIZE * self.identity,), torch.float32, -3.0, 3.0),
         }
 
     def __call__(self, state: WorldState, world: World) -> dict[str, Tensor]:
         """Return ``view`` uint8 [B, A, C, V, V] and ``self`` float32 [B, A, F]."""
-        return {"view": egocentric_view(state, world, self.radius), "self": own_vector(state, world)}
+        own = own_vector(state, world)
+        if self.identity:
+            who = identity(own.shape[1], own.device)
+            own = torch.cat((own, who.expand(len(own), -1, -1)), dim=-1)
+        return {"view": egocentric_view(state, world, self.radius), "self": own}
 
 
 @dataclass(frozen=True, kw_only=True)
