@@ -31,6 +31,8 @@ ENVIRONMENT = COMPONENTS[: COMPONENTS.index("reward") + 1]
 """Those that make an environment."""
 WORLD_KEYS = ("scenario", "landscape", "wind", "fire", "team", "ignition", "steps_per_tick", "horizon", "cell_size")
 """What a scenario sets."""
+COMMAND_KEYS = ("resume", "start_from", "debug", "policy")
+"""What the commands read themselves."""
 TRAINING_SEEDS = 4096
 """Seeds that one training seed owns: world i of seed s draws with 4096 s + i."""
 
@@ -144,7 +146,7 @@ def settings(config: Mapping[str, Any]) -> Settings:
     Raises:
         ConfigError: With key, value and rule.
     """
-    known = {each.name for each in fields(Settings)} | {*COMPONENTS, *WORLD_KEYS, "resume", "start_from", "debug", "policy"}
+    known = {each.name for each in fields(Settings)} | {*COMPONENTS, *WORLD_KEYS, *COMMAND_KEYS}
     for key in config:
         if key not in known:
             raise ConfigError(f"{key} is not a key of the configuration; it has {', '.join(sorted(known - {'world'}))}")

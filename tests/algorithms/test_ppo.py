@@ -72,14 +72,12 @@ def test_one_pass_of_the_critic_values_what_two_would(make_small_env):
     env = make_small_env(6, small_world(horizon=5))
     learner = Ppo().build(env, Mlp(actor_hidden=(8,), critic_hidden=(8,)), 48)
     batch, loss = collected(env, learner, 8), learner.loss
-    assert 0 < int(batch["next", "done"][:, :-1].sum()), "an episode ends before the batch does"
+    assert int(batch["next", "done"][:, :-1].sum()) > 0, "an episode ends before the batch does"
     two = MultiAgentGAE(gamma=0.99, lmbda=0.95, value_network=loss.critic_network)
     two.set_keys(value=VALUE, reward=REWARD, done="done", terminated="terminated", advantage=ADVANTAGE)
     two.set_keys(value_target=VALUE_TARGET)
     with torch.no_grad():
-        twice = two(
-            batch.clone(), params=loss.critic_network_params, target_params=loss.target_critic_network_params
-        )
+        twice = two(batch.clone(), params=loss.critic_network_params, target_params=loss.target_critic_network_params)
     once = with_advantages(loss, batch.clone()).view(6, 8)
     for key in (ADVANTAGE, VALUE_TARGET):
         torch.testing.assert_close(once[key], twice[key], rtol=1e-5, atol=1e-6)
