@@ -341,3 +341,29 @@ def test_keep_bounds_the_checkpoints(tmp_path):
     tiny(tmp_path, "checkpoint.interval=32", "checkpoint.keep=2").train()
     assert sorted(int(each.name) for each in (tmp_path / "checkpoints").iterdir()) == [160, 192]
     assert checkpoints.newest(tmp_path)[0].manifest.frames == 192
+
+
+def test_a_run_starts_from_another_ones_networks_and_its_own_settings(finished, tmp_path):
+    found, _ = newest(finished[0])
+    training = tiny(tmp_path, "algorithm.gamma=0.9", "algorithm.clip_epsilon=0.1", "landscape.size=16", "n_worlds=3")
+    before = training.learner.loss.state_dict()
+    training.start_from(found)
+    now, theirs = training.learner.loss.state_dict(), found.training()["loss"]
+    learnt = {name for name in now if "_params." in name or "value_norm" in name}
+    assert len(learnt) > 10 and all(torch.equal(now[name], theirs[name]) for name in learnt)
+    for name in set(now) - learnt:
+        assert torch.equal(now[name], before[name]), name
+    assert float(now["clip_epsilon"]) == pytest.approx(0.1) and training.frames == 0
+    seen = training.env.reset()
+    logits = [each.learner.policy[0](seen.clone())["agents", "logits"] for each in (training, finished[1])]
+    assert torch.equal(*logits), "the policy is the other run's"
+
+
+@pytest.mark.parametrize("change", ["model.actor_hidden=[8]", "algorithm=ippo", "algorithm=dqn"])
+def test_networks_of_another_kind_are_no_start(finished, tmp_path, change):
+    training = tiny(tmp_path, change)
+    before = flattened(training.state_dict())
+    with pytest.raises(CheckpointError, match="was trained by another algorithm or other networks"):
+        training.start_from(newest(finished[0])[0])
+    assert all(torch.equal(value, before[name]) for name, value in flattened(training.state_dict()).items()
+               if isinstance(value, torch.Tensor))  # fmt: skip

@@ -18,6 +18,7 @@ from warp_torchrl import disk
 from warp_torchrl.config import Record
 from warp_torchrl.manifest import (
     MANIFEST,
+    TRAINING,
     CheckpointError,
     Manifest,
     first_line,
@@ -33,6 +34,7 @@ __all__ = [
     "CheckpointError",
     "RunFolderInUse",
     "RunFolderLock",
+    "export",
     "holds_any",
     "newest",
     "save",
@@ -69,7 +71,9 @@ class Checkpoint:
 
     def training(self) -> dict[str, Any]:
         """Return everything a run needs to go on."""
-        return self._load("training.pt")
+        if TRAINING not in self.manifest.files:
+            raise CheckpointError(f"{self.path} holds a policy alone: it acts, and nothing goes on from it")
+        return self._load(TRAINING)
 
     def _load(self, name: str) -> dict[str, Any]:
         try:
@@ -112,7 +116,7 @@ def save(
             with disk.telling(draft):
                 draft.mkdir()
                 disk.save_tensors(draft / "policy.pt", dict(policy))
-                disk.save_tensors(draft / "training.pt", dict(training))
+                disk.save_tensors(draft / TRAINING, dict(training))
                 (draft / "config.json").write_text(json.dumps(asdict(record), indent=1), encoding="utf-8")
                 write_manifest(draft, frames, scenario, signature, mode)
                 _publish(draft, final)
@@ -120,6 +124,26 @@ def save(
             shutil.rmtree(draft, ignore_errors=True)
     _drop(run, final, keep)
     return final
+
+
+def export(found: Checkpoint, folder: Path) -> None:
+    """Write a checkpoint's policy, and nothing that only training needs, into a new folder.
+
+    Raises:
+        FileExistsError: If there is such a folder.
+        OSError: If the disk refuses.
+    """
+    manifest, draft = found.manifest, folder.with_name(f".{folder.name}.tmp")
+    if folder.exists():
+        raise FileExistsError(f"{folder} exists")
+    shutil.rmtree(draft, ignore_errors=True)
+    with disk.telling(draft):
+        draft.mkdir(parents=True)
+        for name in manifest.files:
+            if name != TRAINING:
+                shutil.copyfile(found.path / name, draft / name)
+        write_manifest(draft, manifest.frames, manifest.scenario, manifest.signature, manifest.mode)
+        _publish(draft, folder)
 
 
 def holds_any(run: Path) -> bool:

@@ -17,7 +17,9 @@ FORMAT = 2
 """Version of the layout that is written."""
 _READ = (1, FORMAT)  # 1 had no seal
 MANIFEST = "manifest.json"
-_FILES = ("policy.pt", "training.pt", "config.json")
+TRAINING = "training.pt"
+_POLICY = ("policy.pt", "config.json")  # what acting takes
+_FILES = ("policy.pt", TRAINING, "config.json")
 _LARGEST_JSON = 1_000_000
 
 
@@ -85,8 +87,8 @@ def _told(folder: Path) -> Manifest:
         files = {name: (entry["size"], entry["sha256"]) for name, entry in manifest.files.items()}
     except (TypeError, KeyError, ValueError, AttributeError, OverflowError):
         raise CheckpointError(f"{path} is not a manifest of format {content['format']}") from None
-    if set(files) != set(_FILES):
-        raise CheckpointError(f"{path} must list {', '.join(_FILES)}")
+    if set(files) not in (set(_FILES), set(_POLICY)):
+        raise CheckpointError(f"{path} must list {', '.join(_FILES)}; a policy alone lists no {TRAINING}")
     return manifest
 
 
@@ -123,7 +125,7 @@ def write_manifest(folder: Path, frames: int, scenario: str, signature: Signatur
         signature=signature,
         mode=mode,
         versions={name: library.__version__ for name, library in libraries.items()},
-        files={name: _describe(folder / name) for name in _FILES},
+        files={name: _describe(folder / name) for name in _FILES if (folder / name).exists()},
     )
     (folder / MANIFEST).write_bytes(_sealed(asdict(manifest) | {"signature": _signature_to_json(signature)}))
 

@@ -75,6 +75,8 @@ def failures(folder: Path) -> list[Failure]:
 def method(record: Record) -> tuple[str, str]:
     """Return what a trained policy is called in a sweep, and a digest of its configuration but for the seed."""
     names = [record.choices[group] for group in ("algorithm", "reward", "observation")]
+    teacher = record.values.get("imitation", {}).get("teacher")
+    names += [f"taught by {teacher}"] if teacher else []
     values = {key: value for key, value in record.values.items() if key not in ("seed", "device", "evaluation")}
     return " ".join(names), sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 

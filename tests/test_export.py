@@ -1,0 +1,78 @@
+"""A policy that is handed on acts as it did, is verified, and does not pretend to be a run."""
+
+import shutil
+
+import pytest
+import torch
+
+from tests.test_checkpoint import SIGNATURE
+from tests.test_training import tiny
+from warp_torchrl import checkpoint as checkpoints
+from warp_torchrl import load_policy
+from warp_torchrl.checkpoint import CheckpointError, newest
+from warp_torchrl.export import main
+from warp_torchrl.models import ACTION
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run")
+    training = tiny(folder, "total_frames=64")
+    training.train()
+    return folder
+
+
+@pytest.fixture
+def exported(run, tmp_path, capsys):
+    main([str(run), str(tmp_path / "policies" / "tiny")])
+    assert "skirmish, 64 frames" in capsys.readouterr().out
+    return tmp_path / "policies" / "tiny"
+
+
+def test_it_acts_as_it_did(run, exported):
+    env = newest(run)[0]
+    assert load_policy(exported).mode == load_policy(run).mode == env.manifest.mode
+    now = tiny(exported.parent / "other").env.reset()
+    ours, theirs = (load_policy(each, "deterministic")(now.clone())[ACTION] for each in (exported, run))
+    assert torch.equal(ours, theirs)
+
+
+def test_it_holds_nothing_of_training_and_says_so(exported):
+    assert sorted(each.name for each in exported.iterdir()) == ["config.json", "manifest.json", "policy.pt"]
+    found, _ = newest(exported)
+    assert found.record().values["total_frames"] == 64 and found.manifest.signature != SIGNATURE
+    with pytest.raises(CheckpointError, match="holds a policy alone: it acts, and nothing goes on from it"):
+        found.training()
+
+
+@pytest.mark.parametrize("name", ["policy.pt", "config.json"])
+def test_it_is_verified(exported, name):
+    (exported / name).write_bytes((exported / name).read_bytes()[:-1] + b"?")
+    with pytest.raises(CheckpointError, match="altered"):
+        load_policy(exported)
+
+
+def test_a_folder_that_exists_is_left_alone(run, exported, capsys):
+    before = (exported / "policy.pt").read_bytes()
+    with pytest.raises(SystemExit) as refused:
+        main([str(run), str(exported)])
+    assert refused.value.code == 2 and "exists" in capsys.readouterr().err
+    assert (exported / "policy.pt").read_bytes() == before
+
+
+def test_a_checkpoint_that_lost_its_training_is_no_policy_alone(run, tmp_path):
+    shutil.copytree(run / "checkpoints", tmp_path / "checkpoints")
+    for each in (tmp_path / "checkpoints").iterdir():
+        (each / "training.pt").unlink()
+    with pytest.raises(CheckpointError, match="missing or was cut"):
+        newest(tmp_path)
+
+
+def test_a_disk_that_refuses_leaves_nothing(run, tmp_path, monkeypatch):
+    def refuses(*args):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(checkpoints.shutil, "copyfile", refuses)
+    with pytest.raises(SystemExit):
+        main([str(run), str(tmp_path / "policy")])
+    assert not (tmp_path / "policy").exists()
