@@ -154,3 +154,17 @@ def test_block_means_are_those_of_pooling(shape):
     for side in (8, 16):
         if min(shape) >= side:
             torch.testing.assert_close(block_means(maps, side), torch.nn.functional.adaptive_avg_pool2d(maps, side))
+
+
+@pytest.mark.parametrize("preset", [Local, Surroundings])
+def test_agents_know_their_place_in_the_team_where_asked(preset):
+    state, world = drawn([[5] * 6] * 6, [[2, 2], [2, 2], [2, 2], [2, 2]])
+    without, told = (preset(radius=1, identity=asked) for asked in (False, True))
+    assert told.spaces(world)["self"].shape == (without.spaces(world)["self"].shape[0] + 4,)
+    own = told(state, world)["self"]
+    assert own.shape == (1, 4, *told.spaces(world)["self"].shape)
+    assert torch.equal(own[..., :-4], without(state, world)["self"])
+    half = 0.5**0.5  # places 1/8, 3/8, 5/8 and 7/8 of a turn
+    by_hand = [[half, half, 0.0, 1.0], [-half, half, 0.0, -1.0], [-half, -half, 0.0, 1.0], [half, -half, 0.0, -1.0]]
+    torch.testing.assert_close(own[0, :, -4:], torch.tensor(by_hand), atol=1e-6, rtol=0.0)
+    assert torch.equal(own[0, 0, :-4], own[0, 1, :-4]), "nothing else tells them apart here"

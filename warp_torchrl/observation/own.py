@@ -44,9 +44,9 @@ def own_vector(state: WorldState, world: World) -> Tensor:
 
 
 def identity(n_agents: int, device: torch.device) -> Tensor:
-    """Return each agent's place in its team, float32 [A, 4], the same for teams of any size that divide each other.
+    """Return each agent's place in its team, float32 [A, 4].
 
-    The place t = (i + 1/2) / A is given as cos 2 pi t, sin 2 pi t, cos 4 pi t, sin 4 pi t.
+    The place t = (i + 1/2) / A is told as cos 2 pi t, sin 2 pi t, cos 4 pi t, sin 4 pi t, whatever the team's size.
     """
     turn = 2.0 * math.pi * (torch.arange(n_agents, device=device) + 0.5) / n_agents
     return torch.stack((turn.cos(), turn.sin(), (2.0 * turn).cos(), (2.0 * turn).sin()), dim=-1)
