@@ -124,7 +124,7 @@ def test_the_views_of_pettingzoo_and_gymnasium_are_as_shown(capsys):
     for block in blocks("interop.md")[:2]:
         exec(block, names)
     assert re.fullmatch(r"\d+% of the trees saved\n", capsys.readouterr().out)
-    assert names["central"].shape == (9, 16, 16) and names["frame"].dtype == "uint8"
+    assert names["central"].shape == (8, 16, 16) and names["frame"].dtype == "uint8"
     assert names["rewards"].shape == (64,) and names["infos"]["saved"].shape == (64,)
 
 

@@ -42,7 +42,7 @@ def test_keys_are_those_of_the_contract(make_small_env):
     assert rollout["agents", "action_mask"].shape == (2, 5, 2, 11)
     assert rollout["agents", "action"].dtype == torch.int64
     assert rollout["next", "agents", "reward"].shape == (2, 5, 2, 1)
-    assert rollout["state"].shape == (2, 5, 9, 16, 16)
+    assert rollout["state"].shape == (2, 5, 8, 16, 16)
     assert rollout["next", "info", "saved"].shape == (2, 5, 1)
     assert env.group_map == {"agents": ["bulldozer_0", "bulldozer_1"]}
     assert env.reward_keys == [("agents", "reward")] and set(env.done_keys) == {"done", "terminated", "truncated"}

@@ -117,7 +117,40 @@ def test_the_critic_sees_every_agent_and_the_clock():
     state, world = drawn([[5] * 16] * 16, [[8, 8], [0, 15]])
     seen = central_state(state, world)[0]
     assert seen[STATE.index("ugv")].nonzero().tolist() == [[0, 15], [8, 8]]
-    assert (seen[STATE.index("time_left")] == 1).all() and (seen[STATE.index("wind_east")] == 0.5).all()
+    clock = seen[STATE.index("clock_and_wind")]
+    assert (clock[:8] == 1).all(), "the time left, the steps to the tick"
+    torch.testing.assert_close(clock[8:, :8], torch.full((8, 8), 0.5))  # 10 of 20 m/s to the east
+    torch.testing.assert_close(clock[8:, 8:], torch.zeros(8, 8))
+
+
+def test_the_critic_sees_where_fire_is_about_to_grow():
+    # As the threat of a view: axial 0.8, diagonal 0.8 / sqrt 2; a fire will ignite 4 x 0.8 + 4 x 0.566, at most 4.
+    cells = torch.full((16, 16), 5)
+    cells[4, 6], cells[10, 10] = 11, 15
+    state, world = drawn(cells.tolist(), [[0, 0]], wind=Uniform(speed=0.0))
+    seen = dict(zip(STATE, central_state(state, world)[0], strict=True))
+    assert seen["fire"].nonzero().tolist() == [[4, 6], [10, 10]]
+    assert seen["front"].nonzero().tolist() == [[4, 6]] and seen["front"][4, 6] == 1.0, "an ember spreads no more"
+    assert seen["threat"][4, 7] == pytest.approx(0.8) and seen["threat"][5, 7] == pytest.approx(0.8 / 2**0.5)
+    assert seen["threat"].count_nonzero() == 8 and seen["threat"][4, 6] == 0.0
+
+
+@pytest.mark.parametrize("size", [16, 32, 20])
+def test_a_centred_picture_is_the_picture_seen_from_the_agent(size):
+    cells = torch.full((size, size), 5)
+    cells[1, size - 1], cells[size // 2, 3] = 11, 12
+    places = [[0, 0], [size - 1, 2], [size // 2, size // 2], [size // 2, size // 2]]
+    state, world = drawn(cells.tolist(), places)
+    plain, centred = Surroundings(radius=1), Surroundings(radius=1, centred=True)
+    assert centred.spaces(world)["picture"].shape == (3, 15, 15)
+    flat, seen = plain(state, world)["picture"][0], centred(state, world)["picture"][0]
+    assert seen.dtype == torch.uint8 and seen.shape == (4, 3, 15, 15)
+    for agent, place in enumerate(places):
+        row, column = (each * 8 // size for each in place)
+        window_of_map = seen[agent, :, 7 - row : 15 - row, 7 - column : 15 - column].to(torch.float32)
+        assert window_of_map.sum() == seen[agent].to(torch.float32).sum(), "nothing is beyond the map"
+        torch.testing.assert_close(window_of_map[:2] / 255.0, flat[agent, :2], atol=1.0 / 255.0, rtol=0.0)
+        torch.testing.assert_close(window_of_map[2] / 63.0, flat[agent, 2] * 4.0)
 
 
 def test_the_paper_preset_is_three_channels_flattened():

@@ -187,6 +187,14 @@ class _Here:
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Go on as if never stopped."""
         self.env.load_state_dict(state["env"])
+        here = self._collector._carrier.flatten_keys(".")
+        other = [
+            f"{name} {list(value.shape)}"
+            for name, value in state["carrier"].items()
+            if name in here.keys() and here[name].shape != value.shape
+        ]
+        if other:
+            raise ValueError(f"the worlds must have the entries that the run had, and lack {', '.join(other)}")
         carrier = TensorDict(state["carrier"], batch_size=self.env.batch_size).unflatten_keys(".")
         shaped = self._collector._carrier.empty(recurse=True)  # keeps the batch sizes of the nested parts
         self._collector._carrier = shaped.update(carrier.to(self.env.device))

@@ -17,7 +17,7 @@ def test_torchrl_reads_it_back(scenario, observation):
     env = PettingZooWrapper(parallel_env(scenario, horizon=4, observation=observation), return_state=True)
     check_env_specs(env)
     rollout = env.rollout(6, break_when_any_done=False)
-    assert rollout["next", "done"].sum() == 1 and rollout["next", "state"].shape == (6, 9, 16, 16)
+    assert rollout["next", "done"].sum() == 1 and rollout["next", "state"].shape == (6, 8, 16, 16)
     assert rollout["bulldozer", "action_mask"].shape[-1] == 11 and (rollout["bulldozer", "info", "saved"] > 0).all()
 
 

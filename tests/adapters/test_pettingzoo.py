@@ -66,7 +66,7 @@ def test_observations_state_and_infos_are_as_their_spaces_say(observation):
     for _ in range(3):
         assert set(seen) == set(infos) == set(env.possible_agents)
         assert all(seen[name] in env.observation_space(name) for name in seen)
-        assert env.state() in env.state_space and env.state().shape == (9, 16, 16)
+        assert env.state() in env.state_space and env.state().shape == (8, 16, 16)
         seen, rewards, _, _, infos = env.step(idle(env))
     assert all(type(reward) is float for reward in rewards.values())
     info = infos["bulldozer_0"]

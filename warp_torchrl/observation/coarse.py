@@ -5,7 +5,7 @@ from torch import Tensor
 from torch.nn.functional import adaptive_avg_pool2d, one_hot
 
 from warp_torchrl.observation.own import WIND_SCALE, steps_to_tick, time_left
-from warp_torchrl.observation.view import ELEVATION_SCALE
+from warp_torchrl.observation.view import ELEVATION_SCALE, window
 from warp_torchrl.world.flags import number
 from warp_torchrl.world.state import WorldState, is_burning, is_tree
 from warp_torchrl.world.world import World
@@ -13,8 +13,10 @@ from warp_torchrl.world.world import World
 PICTURE = ("fire", "fuel", "team_mates")
 """Channels of ``picture``."""
 PICTURE_SIDE = 8
-STATE = ("fire", "fuel", "ugv", "uav", "elevation", "time_left", "steps_to_tick", "wind_east", "wind_north")
-"""Channels of the critic's ``state``."""
+STATE = ("fire", "fuel", "front", "threat", "ugv", "uav", "elevation", "clock_and_wind")
+"""Channels of the critic's ``state``: ``front`` is what fire is expected to ignite in a tick, ``threat`` the chance of
+trees to ignite, and the quarters of ``clock_and_wind`` are filled with the time left, the steps to the tick, and the
+wind to the east and to the north."""
 STATE_SIDE = 16
 
 
@@ -53,12 +55,34 @@ def picture(state: WorldState) -> Tensor:
     return torch.cat((pooled[:, None].expand(-1, shape[1], -1, -1, -1), mates), dim=2)
 
 
+def centred_picture(state: WorldState) -> Tensor:
+    """Return the picture with the agent's own block in the middle, uint8 [B, A, 3, 15, 15]; 0 off the map.
+
+    What it tells is what ``picture`` does; where things are is told from where the agent is.
+    """
+    height, width = state.cells.shape[1:]
+    position, sides = state.vehicles.position, (PICTURE_SIDE, PICTURE_SIDE)
+    maps = torch.stack((number(is_burning(state.cells)), _fuel(state)), dim=1)
+    pooled = block_means(maps, PICTURE_SIDE)
+    pooled[:, 0].sqrt_()
+    pooled = (pooled * 255.0).to(torch.uint8)
+    block = torch.stack((position[..., 0] * PICTURE_SIDE // height, position[..., 1] * PICTURE_SIDE // width), dim=-1)
+    seen = window(block, sides, PICTURE_SIDE - 1)
+    team = one_hot(block[..., 0] * PICTURE_SIDE + block[..., 1], PICTURE_SIDE**2).sum(1).view(-1, *sides)
+    mates = seen.of(team)
+    mates[..., PICTURE_SIDE - 1, PICTURE_SIDE - 1] -= 1
+    mates = (mates.clamp_(max=4) * 63).to(torch.uint8)
+    return torch.stack((seen.of(pooled[:, 0]), seen.of(pooled[:, 1]), mates), dim=2)
+
+
 def central_state(state: WorldState, world: World) -> Tensor:
     """Return what the central critic sees, float32 [B, C, 16, 16] in the channels ``STATE``, for any map size."""
     height, width = state.cells.shape[1:]
     worlds = state.cells.shape[0]
     elevation = state.landscape.elevation
-    maps = [number(is_burning(state.cells)), _fuel(state)]
+    burning, threat = number(is_burning(state.cells)), world.threat(state)
+    front = threat * burning
+    maps = [burning, _fuel(state), front, threat - front]
     if elevation is not None:
         maps.append((elevation - elevation.mean((1, 2), keepdim=True)) / ELEVATION_SCALE)
     pooled = block_means(torch.stack(maps, dim=1), STATE_SIDE)
@@ -66,14 +90,15 @@ def central_state(state: WorldState, world: World) -> Tensor:
     row, column = position[..., 0] * STATE_SIDE // height, position[..., 1] * STATE_SIDE // width
     index = (role * STATE_SIDE + row) * STATE_SIDE + column
     out = torch.zeros(worlds, len(STATE), STATE_SIDE, STATE_SIDE, device=pooled.device)
-    out[:, :2] = pooled[:, :2]
-    agents = out[:, 2:4].reshape(worlds, -1)
-    out[:, 2:4] = agents.scatter_add(1, index, torch.ones_like(index, dtype=torch.float32)).view_as(out[:, 2:4])
+    out[:, :4] = pooled[:, :4]
+    agents = out[:, 4:6].reshape(worlds, -1)
+    out[:, 4:6] = agents.scatter_add(1, index, torch.ones_like(index, dtype=torch.float32)).view_as(out[:, 4:6])
     if elevation is not None:
-        out[:, 4] = pooled[:, 2].clamp(-3.0, 3.0)
+        out[:, 6] = pooled[:, 4].clamp(-3.0, 3.0)
     wind = (state.wind.mean((2, 3)) / WIND_SCALE).clamp(-3.0, 3.0)
     constants = (time_left(state, world), steps_to_tick(state, world), wind[:, 0], wind[:, 1])
-    out[:, 5:] = torch.stack(constants, dim=1)[..., None, None]
+    quarters = out[:, 7].view(worlds, 2, STATE_SIDE // 2, 2, STATE_SIDE // 2)
+    quarters[:] = torch.stack(constants, dim=1).view(worlds, 2, 1, 2, 1)
     return out
 
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from warp_torchrl.observation.coarse import PICTURE, PICTURE_SIDE, picture
+from warp_torchrl.observation.coarse import PICTURE, PICTURE_SIDE, centred_picture, picture
 from warp_torchrl.observation.own import IDENTITY_SIZE, SELF_SIZE, identity, own_vector
 from warp_torchrl.observation.view import CHANNELS, ages, egocentric_view, stages, window
 from warp_torchrl.validation import check_fields
@@ -72,16 +72,26 @@ class Surroundings(Local):
 
     As ``Local``, and ``picture``: what a dispatcher would radio, the whole map's fire (square root of the share of
     each block that burns), fuel and team-mates in 8 x 8 blocks.
+
+    Attributes:
+        centred: Whether the agent's own block is the middle of the picture, which then has 15 x 15 blocks, uint8.
+
+    Raises:
+        ValueError: If the radius is not in 1..32.
     """
+
+    centred: bool = False
 
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
-        shape = (len(PICTURE), PICTURE_SIDE, PICTURE_SIDE)
-        return {**super().spaces(world), "picture": Space(shape, torch.float32, 0.0, 1.0)}
+        side = 2 * PICTURE_SIDE - 1 if self.centred else PICTURE_SIDE
+        dtype, high = (torch.uint8, 255) if self.centred else (torch.float32, 1.0)
+        return {**super().spaces(world), "picture": Space((len(PICTURE), side, side), dtype, 0, high)}
 
     def __call__(self, state: WorldState, world: World) -> dict[str, Tensor]:
         """Return ``view``, ``self``, and ``picture`` float32 [B, A, 3, 8, 8]."""
-        return {**super().__call__(state, world), "picture": picture(state)}
+        shown = centred_picture(state) if self.centred else picture(state)
+        return {**super().__call__(state, world), "picture": shown}
 
 
 @dataclass(frozen=True, kw_only=True)

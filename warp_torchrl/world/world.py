@@ -148,7 +148,7 @@ class World:
 
     def threat(self, state: WorldState) -> Tensor:
         """Return where the fire is about to grow, float32 [B, H, W] in 0..1; see ``Fire.threat``."""
-        return self.fire.threat(state)
+        return self.fire.threat(state) if state.threat is None else state.threat
 
     def action_mask(self, state: WorldState) -> Tensor:
         """Return which actions would do something, bool [B, A, 10 or 11]."""
