@@ -1,25 +1,20 @@
 """The two commands: checks first, works, and ends with one line and an exit code when something fails."""
 
-import errno
 import logging
 import os
 import sys
-import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import hydra
 from hydra.core.hydra_config import HydraConfig
-from hydra.errors import HydraException
 from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
-from omegaconf.errors import OmegaConfBaseException
 
 from warp_torchrl import checkpoint as checkpoints
 from warp_torchrl import disk
 from warp_torchrl.api import policy_of
-from warp_torchrl.collectors import WorkerDied
 from warp_torchrl.config import Record, compose_config, conf_folder, is_sweep, plain, recompose, without_targets
 from warp_torchrl.construction import ConfigError
 from warp_torchrl.evaluation import (
@@ -33,17 +28,16 @@ from warp_torchrl.evaluation import (
     table,
     write_json,
 )
+from warp_torchrl.failure import fail
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import Signature, signature
 from warp_torchrl.settings import COMPONENTS, Settings, settings
 from warp_torchrl.signals import Stopped, obeyed
 from warp_torchrl.sweep import SweepSummary, jobs, method, note_failure
-from warp_torchrl.training import NumericalFailure, Training
+from warp_torchrl.training import Training
 
 log = logging.getLogger("warp_torchrl")
 
-_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
-DONE, MISTAKE, IN_USE, UNSOUND, NUMERICAL, DISK = 0, 2, 3, 4, 5, 6
 _RECORDED = (*COMPONENTS, "scenario")
 _MULTIRUN = ("-m", "--multirun")
 _NOT_RECORDED = ("resume", "debug", "policy", "hydra")
@@ -198,13 +192,13 @@ def _run(name: str, job: Callable[[DictConfig], None]) -> None:
     arguments = sys.argv[1:]
     debug = "debug=true" in [each.lower() for each in arguments]
     logging.raiseExceptions = debug  # a log that cannot be written is no second failure
-    os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra's own errors come to _fail
+    os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra's own errors come to fail
     with obeyed():
         try:
             _check_first(name, arguments)
             _start_hydra(name, job, arguments, debug)
         except Exception as error:
-            sys.exit(_fail(error, debug)[0])
+            sys.exit(fail(error, debug)[0])
         sys.exit(SweepSummary.exit_code)
 
 
@@ -217,7 +211,7 @@ def _start_hydra(name: str, job: Callable[[DictConfig], None], arguments: list[s
         try:
             job(config)
         except Exception as error:
-            code, line = _fail(error, debug)
+            code, line = fail(error, debug)
             if HydraConfig.get().mode != RunMode.MULTIRUN or isinstance(error, Stopped):
                 sys.exit(code)
             note_failure(code, line)  # the other jobs go on
@@ -272,33 +266,3 @@ def _with_run_folder(arguments: Sequence[str]) -> list[str]:
     """Let a resumed run write into its own folder."""
     resumed = [each.removeprefix("resume=") for each in arguments if each.startswith("resume=")]
     return [*arguments, *(f"hydra.run.dir={folder}" for folder in resumed if folder != "null")]
-
-
-def _fail(error: Exception, debug: bool) -> tuple[int, str]:
-    """Say what failed in one line, the last of stderr, and return the exit code and the line."""
-    if debug:
-        traceback.print_exc()
-    code, line = _diagnose(error)
-    print(f"error: {line}", file=sys.stderr, flush=True)
-    return code, line
-
-
-def _diagnose(error: Exception) -> tuple[int, str]:
-    line = " ".join(str(error).split()) or type(error).__name__
-    if isinstance(error, Stopped):
-        return 128 + error.number, line
-    if isinstance(error, checkpoints.RunFolderInUse):
-        return IN_USE, line
-    if isinstance(error, checkpoints.CheckpointError):
-        return UNSOUND, line
-    if isinstance(error, NumericalFailure):
-        return NUMERICAL, line
-    if isinstance(error, WorkerDied):
-        return 1, line
-    if isinstance(error.__cause__, OSError):  # logging says that a handler cannot be configured, and not why
-        error = error.__cause__
-    if isinstance(error, OSError) and (error.filename is not None or error.errno in _NO_ROOM):
-        return DISK, f"{error.filename or Path.cwd()}: {error.strerror}"
-    if isinstance(error, (ConfigError, ValueError, HydraException, OmegaConfBaseException)):
-        return MISTAKE, line
-    return 1, f"{type(error).__name__}: {line} (debug=true shows where)"

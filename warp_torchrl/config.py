@@ -22,6 +22,8 @@ from warp_torchrl.construction import ConfigError
 from warp_torchrl.settings import COMPONENTS, WORLD_KEYS
 
 OmegaConf.register_new_resolver("pid", os.getpid, replace=True)
+HYDRA_ERRORS = (HydraException, OmegaConfBaseException)
+"""What Hydra raises where a configuration has a mistake."""
 
 
 def conf_folder() -> Path:

@@ -19,24 +19,13 @@ from warp_torchrl.config import Record
 from warp_torchrl.evaluation import MODES, play
 from warp_torchrl.logging import MetricsFile, Tracker
 from warp_torchrl.models import REWARD, signature
+from warp_torchrl.progress import TRAIN_COLUMNS, episode_columns, line
 from warp_torchrl.reward_scale import RewardScale
 from warp_torchrl.settings import TRAINING_SEEDS, Settings
 from warp_torchrl.signals import Noted, Stopped
-from warp_torchrl.specs import EPISODE_METRICS
 
 log = logging.getLogger("warp_torchrl")
 _SECONDS_BETWEEN_LINES = 15.0
-TRAIN_COLUMNS = (
-    "train/policy_gradient_loss",
-    "train/value_loss",
-    "train/entropy_loss",
-    "train/approx_kl",
-    "train/clip_fraction",
-    "train/clip_range",
-    "train/explained_variance",
-    "train/learning_rate",
-)
-"""Columns of ``metrics.csv`` that every run has; empty where an algorithm has no value for them."""
 
 
 class NumericalFailure(Exception):  # noqa: N818
@@ -105,7 +94,7 @@ class Training:
                 bar.set_postfix(saved=row["world/saved"], refresh=False)
                 if bar.disable and (self.seconds >= next_line or self.frames >= total):
                     next_line = self.seconds + _SECONDS_BETWEEN_LINES
-                    log.info(_line(row, total))
+                    log.info(line(row, total))
                 if self.frames >= total:
                     break
                 if signals.received or self.frames - self.saved_at >= self.settings.checkpoint.interval:
@@ -131,7 +120,7 @@ class Training:
     def _learn(self, batch: TensorDictBase) -> dict[str, float | None]:
         """Learn from one batch [B, T] and return the row of metrics."""
         learner = self.learner
-        row = _episode_columns(batch)
+        row = episode_columns(batch)
         if not batch["next", *REWARD].isfinite().all():
             raise NumericalFailure(f"after {self.frames} frames a reward is not finite; the last checkpoint stands")
         if self.reward_scale is not None:
@@ -275,28 +264,6 @@ class Training:
         self.collection.close()
 
 
-def _episode_columns(batch: TensorDictBase) -> dict[str, float | None]:
-    """Return the means over the episodes that ended in a batch, None where none did."""
-    done = batch["next", "done"][..., 0]
-    info = batch["next", "info"]
-    count = int(done.sum())
-    means = {name: float(info[name][..., 0][done].mean()) if count else None for name in EPISODE_METRICS}
-    row = {"rollout/ep_rew_mean": means.pop("episode_reward"), "rollout/ep_len_mean": means.pop("episode_length")}
-    return row | {f"world/{name}": value for name, value in means.items()}
-
-
 def _is_learnt(name: str) -> bool:
     """Return whether an entry of a loss's state is a parameter or the running scale of values, and not a setting."""
     return "_params." in name or name.startswith("value_norm.")
-
-
-def _line(row: Mapping[str, float | None], total: int) -> str:
-    def show(name: str, pattern: str) -> str:
-        return "-" if row[name] is None else pattern.format(row[name])
-
-    frames = row["time/frames"] or 0
-    return (
-        f"{100 * frames / total:5.1f} %  {frames} frames  {row['time/seconds']:.0f} s  "
-        f"{row['time/fps']:.0f} frames/s  saved {show('world/saved', '{:.3f}')}  "
-        f"reward {show('rollout/ep_rew_mean', '{:.2f}')}  loss {show('train/loss', '{:.3f}')}"
-    )

@@ -42,17 +42,10 @@ def _sum(parts: tuple[Tensor, ...]) -> Tensor:
 
 def picture(state: WorldState) -> Tensor:
     """Return the state of the fire in 8 x 8 blocks of the map, float32 [B, A, 3, 8, 8]."""
-    height, width = state.cells.shape[1:]
-    position = state.vehicles.position
-    shape = position.shape[:2]
-    maps = torch.stack((number(is_burning(state.cells)), _fuel(state)), dim=1)
-    pooled = block_means(maps, PICTURE_SIDE)
-    pooled[:, 0].sqrt_()
-    block = (position[..., 0] * PICTURE_SIDE // height) * PICTURE_SIDE + position[..., 1] * PICTURE_SIDE // width
-    place = one_hot(block, PICTURE_SIDE**2).to(torch.float32)
+    seen, place = _fire_and_fuel(state), one_hot(_block(state, PICTURE_SIDE), PICTURE_SIDE**2).to(torch.float32)
     mates = ((place.sum(1, keepdim=True) - place) * 0.25).clamp_(max=1.0)
-    mates = mates.view(*shape, 1, PICTURE_SIDE, PICTURE_SIDE)
-    return torch.cat((pooled[:, None].expand(-1, shape[1], -1, -1, -1), mates), dim=2)
+    mates = mates.view(*place.shape[:2], 1, PICTURE_SIDE, PICTURE_SIDE)
+    return torch.cat((seen[:, None].expand(-1, place.shape[1], -1, -1, -1), mates), dim=2)
 
 
 def centred_picture(state: WorldState) -> Tensor:
@@ -60,24 +53,17 @@ def centred_picture(state: WorldState) -> Tensor:
 
     What it tells is what ``picture`` does; where things are is told from where the agent is.
     """
-    height, width = state.cells.shape[1:]
-    position, sides = state.vehicles.position, (PICTURE_SIDE, PICTURE_SIDE)
-    maps = torch.stack((number(is_burning(state.cells)), _fuel(state)), dim=1)
-    pooled = block_means(maps, PICTURE_SIDE)
-    pooled[:, 0].sqrt_()
-    pooled = (pooled * 255.0).to(torch.uint8)
-    block = torch.stack((position[..., 0] * PICTURE_SIDE // height, position[..., 1] * PICTURE_SIDE // width), dim=-1)
-    seen = window(block, sides, PICTURE_SIDE - 1)
-    team = one_hot(block[..., 0] * PICTURE_SIDE + block[..., 1], PICTURE_SIDE**2).sum(1).view(-1, *sides)
-    mates = seen.of(team)
-    mates[..., PICTURE_SIDE - 1, PICTURE_SIDE - 1] -= 1
-    mates = (mates.clamp_(max=4) * 63).to(torch.uint8)
-    return torch.stack((seen.of(pooled[:, 0]), seen.of(pooled[:, 1]), mates), dim=2)
+    sides, middle = (PICTURE_SIDE, PICTURE_SIDE), PICTURE_SIDE - 1
+    fire, fuel = (_fire_and_fuel(state) * 255.0).to(torch.uint8).unbind(1)
+    block = _block(state, PICTURE_SIDE)
+    about = window(torch.stack((block // PICTURE_SIDE, block % PICTURE_SIDE), dim=-1), sides, middle)
+    mates = about.of(one_hot(block, PICTURE_SIDE**2).sum(1).view(-1, *sides))
+    mates[..., middle, middle] -= 1
+    return torch.stack((about.of(fire), about.of(fuel), (mates.clamp_(max=4) * 63).to(torch.uint8)), dim=2)
 
 
 def central_state(state: WorldState, world: World) -> Tensor:
     """Return what the central critic sees, float32 [B, C, 16, 16] in the channels ``STATE``, for any map size."""
-    height, width = state.cells.shape[1:]
     worlds = state.cells.shape[0]
     elevation = state.landscape.elevation
     burning, threat = number(is_burning(state.cells)), world.threat(state)
@@ -86,9 +72,7 @@ def central_state(state: WorldState, world: World) -> Tensor:
     if elevation is not None:
         maps.append((elevation - elevation.mean((1, 2), keepdim=True)) / ELEVATION_SCALE)
     pooled = block_means(torch.stack(maps, dim=1), STATE_SIDE)
-    position, role = state.vehicles.position, world.team.table(state.cells.device).index
-    row, column = position[..., 0] * STATE_SIDE // height, position[..., 1] * STATE_SIDE // width
-    index = (role * STATE_SIDE + row) * STATE_SIDE + column
+    index = world.team.table(state.cells.device).index * STATE_SIDE**2 + _block(state, STATE_SIDE)
     out = torch.zeros(worlds, len(STATE), STATE_SIDE, STATE_SIDE, device=pooled.device)
     out[:, :4] = pooled[:, :4]
     agents = out[:, 4:6].reshape(worlds, -1)
@@ -104,3 +88,17 @@ def central_state(state: WorldState, world: World) -> Tensor:
 
 def _fuel(state: WorldState) -> Tensor:
     return state.alpha * number(is_tree(state.cells))
+
+
+def _fire_and_fuel(state: WorldState) -> Tensor:
+    """Return the whole map's fire (square root of the share that burns) and fuel in blocks, float32 [B, 2, 8, 8]."""
+    pooled = block_means(torch.stack((number(is_burning(state.cells)), _fuel(state)), dim=1), PICTURE_SIDE)
+    pooled[:, 0].sqrt_()
+    return pooled
+
+
+def _block(state: WorldState, side: int) -> Tensor:
+    """Return in which of side x side blocks of the map each agent is, int64 [B, A]."""
+    height, width = state.cells.shape[1:]
+    row, column = state.vehicles.position.unbind(-1)
+    return (row * side // height) * side + column * side // width

@@ -1,0 +1,47 @@
+"""The policies that ship: they are whole, small, of no one's machine, and save what docs/skill.md says."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from warp_torchrl import load_policy
+from warp_torchrl.checkpoint import newest
+from warp_torchrl.config import compose_config, plain, recompose, without_targets
+from warp_torchrl.evaluation import play, play_heuristics
+from warp_torchrl.settings import settings
+
+SHIPPED = Path(__file__).parent.parent / "docs" / "policies"
+SCENARIOS = ("default", "skirmish", "single")
+
+
+def test_there_is_one_for_each_scenario():
+    assert sorted(each.name for each in SHIPPED.iterdir()) == sorted(SCENARIOS)
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_it_is_small_and_tells_of_no_machine(scenario):
+    folder = SHIPPED / scenario
+    assert sum(each.stat().st_size for each in folder.iterdir()) < 2_000_000
+    values = json.loads((folder / "config.json").read_text())["values"]
+    assert values["start_from"] is None and values["landscape"].get("path") is None
+    assert newest(folder)[0].manifest.scenario == scenario
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_it_is_trained_by_the_experiment_of_its_name(scenario):
+    values = newest(SHIPPED / scenario)[0].record().values
+    config = compose_config("train", [f"experiment={scenario}", f"seed={values['seed']}"])
+    expected = without_targets(plain(config))
+    assert values == {name: expected[name] for name in values}
+    assert {"reward", "observation", "imitation", "algorithm", "model", "total_frames"} <= set(values)
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_it_saves_far_more_than_local(scenario):
+    """On 48 fires the difference's standard error is below 3 points; its expectation is 15 and more."""
+    policy, found = load_policy(SHIPPED / scenario), newest(SHIPPED / scenario)[0]
+    env = settings(plain(recompose(found.record()))).make_env(48, 1_000_000)
+    saved = play(env, policy, 1_000_000, policy.mode)["saved"].mean()
+    local = play_heuristics(env, 1_000_000, ["local"])["local"]["saved"].mean()
+    assert saved > local + 0.05, (saved, local)
