@@ -226,6 +226,35 @@ def test_a_checkpoint_is_no_run_folder_to_resume(trained, run_here):
     assert sorted(each.name for each in path.iterdir()) == ["config.json", "manifest.json", "policy.pt", "training.pt"]
 
 
+def test_a_run_starts_from_another_ones_networks_on_another_scenario(trained, run_here, tmp_path):
+    run, _ = trained
+    arguments = [each for each in SHORT if "landscape" not in each]
+    code, errors = run_here("train.py", *arguments, "scenario=shift", "landscape.size=14", f"start_from={run}")
+    assert code == 0, errors
+    shutil.move(tmp_path / "run", tmp_path / "moved")
+    code, errors = run_here("evaluate.py", "checkpoint=moved", "hydra.run.dir=seen")
+    assert code == 0, errors  # where it started from is recorded, and no longer needed
+
+
+@pytest.mark.parametrize(
+    ("path", "said", "expected"),
+    [("nowhere", "nowhere is not a run folder", 4), ("alone", "holds a policy alone", 4)],
+)
+def test_a_start_that_is_none_is_refused_before_anything_is_written(trained, run_here, tmp_path, path, said, expected):
+    checkpoint.export(checkpoint.newest(trained[0])[0], tmp_path / "alone")
+    code, errors = run_here("train.py", *SHORT, f"start_from={path}")
+    assert code == expected and said in errors[-1] and len(errors) == 1
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_policy_alone_is_evaluated_as_its_run_was(trained, run_here, tmp_path):
+    checkpoint.export(checkpoint.newest(trained[0])[0], tmp_path / "alone")
+    code, errors = run_here("evaluate.py", "checkpoint=alone", "hydra.run.dir=seen")
+    assert code == 0, errors
+    ours, theirs = (json.loads((each / "evaluation.json").read_text()) for each in (tmp_path / "seen", trained[0]))
+    assert ours["episodes"] == theirs["episodes"]
+
+
 def test_an_unsound_checkpoint_is_told_and_the_one_before_taken(trained, run_here, tmp_path):
     shutil.copytree(trained[0], tmp_path / "run")
     newest, *_ = sorted((tmp_path / "run" / "checkpoints").iterdir(), key=lambda each: -int(each.name))

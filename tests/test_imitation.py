@@ -12,6 +12,7 @@ from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.imitation import TEACHER_ACTION, TEACHERS, Imitation
 from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS
 from warp_torchrl.settings import settings
+from warp_torchrl.sweep import method
 from warp_torchrl.training import Training
 
 TINY = [
@@ -130,3 +131,9 @@ def test_teachers_do_not_remember():
 def test_without_a_teacher_the_learner_is_as_it_was(tmp_path):
     training = Training(configured(), Record(), tmp_path)
     assert Imitation().taught(training.learner, training.env) is training.learner
+
+
+def test_a_policy_with_a_teacher_is_called_so():
+    record = Record(choices={"algorithm": "mappo", "reward": "time", "observation": "local"}, values={"seed": 1})
+    taught = Record(choices=record.choices, values={"seed": 2, "imitation": {"teacher": "greedy", "until": 0.3}})
+    assert method(record)[0] == "mappo time local" and method(taught)[0] == "mappo time local taught by greedy"

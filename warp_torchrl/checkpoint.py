@@ -71,9 +71,17 @@ class Checkpoint:
 
     def training(self) -> dict[str, Any]:
         """Return everything a run needs to go on."""
+        self.check_goes_on()
+        return self._load(TRAINING)
+
+    def check_goes_on(self) -> None:
+        """Check that training can go on from here.
+
+        Raises:
+            CheckpointError: If it is a policy alone, see ``export``.
+        """
         if TRAINING not in self.manifest.files:
             raise CheckpointError(f"{self.path} holds a policy alone: it acts, and nothing goes on from it")
-        return self._load(TRAINING)
 
     def _load(self, name: str) -> dict[str, Any]:
         try:

@@ -238,7 +238,7 @@ def _check_training(config: DictConfig, overrides: Sequence[str]) -> None:
     if config.resume is None:
         settings(plain(config))
         if config.start_from is not None:
-            checkpoints.newest(config.start_from)
+            checkpoints.newest(config.start_from)[0].check_goes_on()
         return
     others = [each for each in overrides if each.split("=")[0] not in ("resume", "debug")]
     if others:
