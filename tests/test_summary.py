@@ -33,6 +33,17 @@ def test_runs_that_were_trained_alike_are_gathered(sweep):
     assert other.scenario == "other"
 
 
+def test_yardsticks_are_those_of_any_evaluation_that_holds_them(sweep):
+    path = sweep / "0" / "evaluation.json"
+    held = {"saved": [0.2, 0.3, 0.4], "success": [0.0, 0.0, 1.0]}
+    content = json.loads(path.read_text()) | {"yardstick_episodes": {"noop": held, "local": held}}
+    path.write_text(json.dumps(content))
+    entries = {(entry.scenario, entry.policy): entry for entry in gather(sweep)}
+    assert entries["tiny", "noop"].saved.tolist() == [[0.2, 0.3, 0.4]]
+    assert entries["tiny", "noop"].success.tolist() == [[0.0, 0.0, 1.0]] and ("other", "noop") not in entries
+    assert entries["tiny", "local"].saved.tolist() == [[0.5, 0.5, 0.6]], "its own evaluation comes first"
+
+
 def test_runs_that_were_trained_differently_are_told_apart(sweep):
     write(sweep / "4", "mappo", [0.1, 0.1, 0.1], configuration="bbbbbbbb")
     assert [entry.policy for entry in gather(sweep)] == ["mappo aaaaaa", "local", "local", "mappo bbbbbb"]

@@ -139,6 +139,9 @@ def report(
         "episodes": rows,
         "versus": {name: compare(episodes["saved"], other["saved"]) for name, other in others.items()},
         "yardsticks": {name: _summaries(other) for name, other in others.items()},
+        "yardstick_episodes": {
+            name: {metric: other[metric].tolist() for metric in ("saved", "success")} for name, other in others.items()
+        },
         "other_modes": {name: _summaries(other) for name, other in (other_modes or {}).items()},
         "left_out": {agent: compare(episodes["saved"], other["saved"]) for agent, other in (left_out or {}).items()},
     }

@@ -28,14 +28,26 @@ class Entry(NamedTuple):
 
 
 def gather(*folders: Path) -> list[Entry]:
-    """Return what the ``evaluation.json`` files under folders hold, runs that differ in their seed alone together."""
+    """Return what the ``evaluation.json`` files under folders hold, the yardsticks that they were measured by included.
+
+    Runs that differ in their seed alone are one entry.
+    """
     found: dict[_Key, list[Mapping[str, Any]]] = {}
     for path in (path for folder in folders for path in sorted(folder.glob("**/evaluation.json"))):
         content = json.loads(path.read_text(encoding="utf-8"))
         key = (content["scenario"], content["method"], content["configuration"], tuple(content["seeds"]))
         found.setdefault(key, []).append(content)
+    held = {}  # of the yardsticks, which every evaluation holds, those that have no evaluation of their own
+    for (scenario, _, _, seeds), runs in found.items():
+        for name, episodes in runs[0].get("yardstick_episodes", {}).items():
+            if (scenario, name, "", seeds) not in found:
+                held[scenario, name, seeds] = episodes
     several = {(scenario, method) for scenario, method, *_ in found if _differ(found, scenario, method)}
-    return [
+    yardsticks = [
+        Entry(scenario, name, np.array([episodes["saved"]]), np.array([episodes["success"]]), seeds)
+        for (scenario, name, seeds), episodes in held.items()
+    ]
+    return yardsticks + [
         Entry(
             scenario,
             f"{method} {configuration[:6]}" if (scenario, method) in several else method,
