@@ -44,6 +44,17 @@ def test_yardsticks_are_those_of_any_evaluation_that_holds_them(sweep):
     assert entries["tiny", "local"].saved.tolist() == [[0.5, 0.5, 0.6]], "its own evaluation comes first"
 
 
+def test_yardsticks_that_met_other_worlds_are_left_out(sweep):
+    for run, saved in (("0", 0.2), ("1", 0.4)):
+        path = sweep / run / "evaluation.json"
+        held = {
+            "noop": {"saved": [saved] * 3, "success": [0.0] * 3},
+            "random": {"saved": [0.1] * 3, "success": [0.0] * 3},
+        }
+        path.write_text(json.dumps(json.loads(path.read_text()) | {"yardstick_episodes": held}))
+    assert [entry.policy for entry in gather(sweep)] == ["random", "mappo", "local", "local"]
+
+
 def test_runs_that_were_trained_differently_are_told_apart(sweep):
     write(sweep / "4", "mappo", [0.1, 0.1, 0.1], configuration="bbbbbbbb")
     assert [entry.policy for entry in gather(sweep)] == ["mappo aaaaaa", "local", "local", "mappo bbbbbb"]

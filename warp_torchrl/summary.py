@@ -37,17 +37,8 @@ def gather(*folders: Path) -> list[Entry]:
         content = json.loads(path.read_text(encoding="utf-8"))
         key = (content["scenario"], content["method"], content["configuration"], tuple(content["seeds"]))
         found.setdefault(key, []).append(content)
-    held = {}  # of the yardsticks, which every evaluation holds, those that have no evaluation of their own
-    for (scenario, _, _, seeds), runs in found.items():
-        for name, episodes in runs[0].get("yardstick_episodes", {}).items():
-            if (scenario, name, "", seeds) not in found:
-                held[scenario, name, seeds] = episodes
     several = {(scenario, method) for scenario, method, *_ in found if _differ(found, scenario, method)}
-    yardsticks = [
-        Entry(scenario, name, np.array([episodes["saved"]]), np.array([episodes["success"]]), seeds)
-        for (scenario, name, seeds), episodes in held.items()
-    ]
-    return yardsticks + [
+    return _yardsticks(found) + [
         Entry(
             scenario,
             f"{method} {configuration[:6]}" if (scenario, method) in several else method,
@@ -56,6 +47,24 @@ def gather(*folders: Path) -> list[Entry]:
             seeds,
         )
         for (scenario, method, configuration, seeds), runs in found.items()
+    ]
+
+
+def _yardsticks(found: Mapping[_Key, Sequence[Mapping[str, Any]]]) -> list[Entry]:
+    """Return the yardsticks that have no evaluation of their own, as others hold them.
+
+    Those that did not save the same in each met other worlds, under the scenario's name, and are left out.
+    """
+    held: dict[tuple[str, str, tuple[int, ...]], list[Mapping[str, Any]]] = {}
+    for (scenario, _, _, seeds), runs in found.items():
+        for run in runs:
+            for name, episodes in run.get("yardstick_episodes", {}).items():
+                if (scenario, name, "", seeds) not in found:
+                    held.setdefault((scenario, name, seeds), []).append(episodes)
+    return [
+        Entry(scenario, name, np.array([episodes[0]["saved"]]), np.array([episodes[0]["success"]]), seeds)
+        for (scenario, name, seeds), episodes in held.items()
+        if all(each == episodes[0] for each in episodes)
     ]
 
 
