@@ -136,4 +136,7 @@ def test_without_a_teacher_the_learner_is_as_it_was(tmp_path):
 def test_a_policy_with_a_teacher_is_called_so():
     record = Record(choices={"algorithm": "mappo", "reward": "time", "observation": "local"}, values={"seed": 1})
     taught = Record(choices=record.choices, values={"seed": 2, "imitation": {"teacher": "greedy", "until": 0.3}})
+    as_floats = Record(choices=record.choices, values={"seed": 1, "sizes": [1.0], "reward": {"act": 0.0}, "on": True})
+    as_integers = Record(choices=record.choices, values={"seed": 2, "sizes": [1], "reward": {"act": 0}, "on": True})
+    assert method(as_floats) == method(as_integers) != method(record)
     assert method(record)[0] == "mappo time local" and method(taught)[0] == "mappo time local taught by greedy"

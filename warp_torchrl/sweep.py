@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from itertools import product
@@ -78,7 +78,16 @@ def method(record: Record) -> tuple[str, str]:
     teacher = record.values.get("imitation", {}).get("teacher")
     names += [f"taught by {teacher}"] if teacher else []
     values = {key: value for key, value in record.values.items() if key not in ("seed", "device", "evaluation")}
-    return " ".join(names), sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
+    return " ".join(names), sha256(json.dumps(_with_floats(values), sort_keys=True).encode()).hexdigest()
+
+
+def _with_floats(node: Any) -> Any:
+    """Return plain values with every number as a float: 0 and 0.0 say the same."""
+    if isinstance(node, Mapping):
+        return {key: _with_floats(value) for key, value in node.items()}
+    if isinstance(node, list):
+        return [_with_floats(value) for value in node]
+    return float(node) if isinstance(node, int) and not isinstance(node, bool) else node
 
 
 class SweepSummary(Callback):
