@@ -75,10 +75,15 @@ def failures(folder: Path) -> list[Failure]:
 def method(record: Record) -> tuple[str, str]:
     """Return what a trained policy is called in a sweep, and a digest of its configuration but for the seed."""
     names = [record.choices[group] for group in ("algorithm", "reward", "observation")]
-    teacher = record.values.get("imitation", {}).get("teacher")
-    names += [f"taught by {teacher}"] if teacher else []
+    names += taught(record)
     values = {key: value for key, value in record.values.items() if key not in ("seed", "device", "evaluation")}
     return " ".join(names), sha256(json.dumps(_with_floats(values), sort_keys=True).encode()).hexdigest()
+
+
+def taught(record: Record) -> list[str]:
+    """Return how a policy that had a teacher must be called, in one piece; none where it had none."""
+    teacher = record.values.get("imitation", {}).get("teacher")
+    return [f"taught by {teacher}"] if teacher else []
 
 
 def _with_floats(node: Any) -> Any:

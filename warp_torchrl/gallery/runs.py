@@ -13,7 +13,7 @@ import yaml
 
 from warp_torchrl.checkpoint import Checkpoint, CheckpointError, newest
 from warp_torchrl.config import Record
-from warp_torchrl.sweep import method
+from warp_torchrl.sweep import method, taught
 
 FRAMES, SECONDS = "time/frames", "time/seconds"
 MOST_ROWS = 400
@@ -28,7 +28,7 @@ class Run:
     Attributes:
         columns: Columns of ``metrics.csv``, [rows] each, NaN where a value is missing.
         rows_per_bin: Rows that one of these stands for.
-        names: Algorithm, reward, observation and scenario; the folder's own name alone where nothing is recorded.
+        names: Algorithm and teacher, reward, observation and scenario; the folder's own name where nothing is recorded.
         alike: The same for runs that differ in their seed alone.
         mark: What tells it from others of the same names.
         scenario: Its name.
@@ -121,7 +121,10 @@ def _check_time(columns: Mapping[str, np.ndarray]) -> None:
 
 def _recorded(found: Checkpoint, record: Record) -> dict[str, Any]:
     try:
-        names = tuple(str(record.choices[group]) for group in ("algorithm", "reward", "observation"))
+        algorithm, reward, observation = (
+            str(record.choices[group]) for group in ("algorithm", "reward", "observation")
+        )
+        names = (" ".join((algorithm, *taught(record))), reward, observation)
         _, digest = method(record)
         n_agents, seed = record.values["team"]["n_agents"], str(record.values["seed"])
     except (KeyError, TypeError, AttributeError):
