@@ -9,6 +9,7 @@ from warp_torchrl.observation.coarse import (
     central_state,
     picture,
 )
+from warp_torchrl.observation.frame import Frame, facing
 from warp_torchrl.observation.own import SELF_SIZE, WIND_SCALE, own_vector
 from warp_torchrl.observation.presets import Local, Observation, Paper, Space, Surroundings
 from warp_torchrl.observation.view import CHANNELS, ELEVATION_SCALE, egocentric_view, window
@@ -22,6 +23,7 @@ __all__ = [
     "STATE",
     "STATE_SIDE",
     "WIND_SCALE",
+    "Frame",
     "Local",
     "Observation",
     "Paper",
@@ -30,6 +32,7 @@ __all__ = [
     "block_means",
     "central_state",
     "egocentric_view",
+    "facing",
     "own_vector",
     "picture",
     "window",
