@@ -83,6 +83,28 @@ def test_any_runs_are_compared_with_any_of_them(sweep, capsys):
     assert "| +16.7 |" in first and first.endswith("| 75 % |") and second.endswith("| - | - | - |")
 
 
+def test_other_metrics_are_shown_where_they_were_evaluated(sweep, capsys):
+    for run, numbers in (("0", [1.0, None, 2.0]), ("1", [0.0, 3.0, None]), ("2", [None, None, None])):
+        path = sweep / run / "evaluation.json"
+        content = json.loads(path.read_text())
+        for episode, number in zip(content["episodes"], numbers, strict=True):
+            episode["division"] = number
+        path.write_text(
+            json.dumps(content | {"yardstick_episodes": {"noop": {"saved": [0.1] * 3, "success": [0.0] * 3}}})
+        )
+    main([str(sweep), "--show", "division", "saved"])
+    header, _, *rows = capsys.readouterr().out.splitlines()
+    assert header == "| scenario | policy | runs | fires | division | saved |"
+    assert rows == [
+        "| tiny | mappo | 2 | 3 | 1.500 | 0.700 |",  # (1 + 2 + 0 + 3) / 4
+        "| tiny | local | 1 | 3 | - | 0.533 |",
+        "| other | local | 1 | 3 | - | 0.200 |",
+    ]
+    with pytest.raises(SystemExit):
+        main([str(sweep), "--show", "divisoin"])
+    assert "divisoin is not evaluated; saved, success, division are" in capsys.readouterr().err
+
+
 def test_folders_without_evaluations_are_refused(tmp_path, capsys):
     with pytest.raises(SystemExit):
         main([str(tmp_path)])

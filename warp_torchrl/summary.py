@@ -25,6 +25,7 @@ class Entry(NamedTuple):
     saved: np.ndarray  # [runs, n]
     success: np.ndarray  # [runs, n]
     seeds: tuple[int, ...]
+    metrics: Mapping[str, np.ndarray] = {}  # by name, [runs, n], NaN where an episode has none; a yardstick's are none
 
 
 def gather(*folders: Path) -> list[Entry]:
@@ -45,6 +46,7 @@ def gather(*folders: Path) -> list[Entry]:
             _of_episodes(runs, "saved"),
             _of_episodes(runs, "success"),
             seeds,
+            {name: _of_episodes(runs, name) for name in runs[0]["episodes"][0] if name != "seed"},
         )
         for (scenario, method, configuration, seeds), runs in found.items()
     ]
@@ -70,7 +72,7 @@ def _yardsticks(found: Mapping[_Key, Sequence[Mapping[str, Any]]]) -> list[Entry
 
 def _of_episodes(runs: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
     """Return a metric of each episode of each run, [runs, n]."""
-    return np.array([[episode[name] for episode in run["episodes"]] for run in runs])
+    return np.array([[episode.get(name) for episode in run["episodes"]] for run in runs], dtype=np.float64)
 
 
 def _differ(found: Mapping[_Key, Any], scenario: str, method: str) -> bool:
@@ -114,6 +116,29 @@ def table(entries: Sequence[Entry], against: str | None = None) -> str:
                 ]
             lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
+
+
+def metrics_table(entries: Sequence[Entry], names: Sequence[str]) -> str:
+    """Return means of metrics as a Markdown table, best first in each scenario; a dash where no episode has one.
+
+    Raises:
+        ValueError: If no policy was evaluated with a metric.
+    """
+    known = list(dict.fromkeys(name for entry in entries for name in entry.metrics))
+    for name in names:
+        if name not in known:
+            raise ValueError(f"{name} is not evaluated; {', '.join(known)} are")
+    lines = ["| scenario | policy | runs | fires | " + " | ".join(names) + " |", "|---" * (4 + len(names)) + "|"]
+    for entry in (entry for group in _by_scenario(entries) for entry in group if entry.metrics):
+        runs, fires = entry.saved.shape
+        means = (_mean_of_known(entry.metrics.get(name)) for name in names)
+        lines.append(f"| {entry.scenario} | {entry.policy} | {runs} | {fires} | " + " | ".join(means) + " |")
+    return "\n".join(lines)
+
+
+def _mean_of_known(values: np.ndarray | None) -> str:
+    known = np.empty(0) if values is None else values[~np.isnan(values)]
+    return f"{known.mean():.3f}" if known.size else "-"
 
 
 def draw(entries: Sequence[Entry], path: Path) -> None:
@@ -181,12 +206,16 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m warp_torchrl.summary", description=__doc__)
     parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER", help="runs, or folders of runs")
     parser.add_argument("--against", metavar="POLICY", help="compare with this policy instead of the best")
+    parser.add_argument("--show", nargs="+", metavar="METRIC", help="means of these, of what evaluation.json holds")
     parser.add_argument("--plot", type=Path, metavar="FILE", help="draw them as well")
     options = parser.parse_args(arguments)
     entries = gather(*options.folders)
     if not entries:
         parser.error(f"no evaluation.json under {', '.join(map(str, options.folders))}")
-    print(table(entries, options.against))
+    try:
+        print(metrics_table(entries, options.show) if options.show else table(entries, options.against))
+    except ValueError as error:
+        parser.error(str(error))
     if options.plot is not None:
         try:
             draw(entries, options.plot)
