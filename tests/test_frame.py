@@ -18,7 +18,7 @@ from warp_torchrl.world.wind import Uniform
 
 TURNS = list(itertools.product((1, -1), (1, -1), (False, True)))
 """Whether rows, then columns, are mirrored, and whether they change places after that."""
-PRESETS = (Local(facing="fire", identity=True), Surroundings(facing="fire", centred=True, ranked=True))
+PRESETS = (Local(facing="fire", identity=True), Surroundings(facing="fire", centred=True))
 SIZE = 16
 
 

@@ -135,21 +135,6 @@ def test_the_critic_sees_where_fire_is_about_to_grow():
     assert seen["threat"].count_nonzero() == 8 and seen["threat"][4, 6] == 0.0
 
 
-def test_a_ranked_view_shows_who_comes_before():
-    state, world = drawn([[5] * 16] * 16, [[2, 2], [2, 3], [2, 2], [12, 2]])
-    plain, ranked = Surroundings(radius=1, centred=True), Surroundings(radius=1, centred=True, ranked=True)
-    seen, usual = ranked(state, world), plain(state, world)
-    for entry in ("view", "picture"):
-        assert seen[entry].shape[2:] == ranked.spaces(world)[entry].shape
-        assert torch.equal(seen[entry][:, :, :-1], usual[entry])
-    first, second, third, fourth = seen["view"][0, :, -1]
-    assert not first.any() and not fourth.any(), "none is before the first, none is near the fourth"
-    assert second.tolist() == [[0, 0, 0], [63, 0, 0], [0, 0, 0]]
-    assert third.tolist() == [[0, 0, 0], [0, 63, 63], [0, 0, 0]]
-    assert seen["picture"][0, 3, -1].nonzero().tolist() == [[2, 7]] and seen["picture"][0, 3, -1, 2, 7] == 3 * 63
-    assert not seen["picture"][0, 0, -1].any() and seen["picture"][0, 1, -1, 7, 7] == 63
-
-
 @pytest.mark.parametrize("size", [16, 32, 20])
 def test_a_centred_picture_is_the_picture_seen_from_the_agent(size):
     cells = torch.full((size, size), 5)

@@ -6,7 +6,7 @@ from torch.nn.functional import adaptive_avg_pool2d, one_hot
 
 from warp_torchrl.observation.frame import Frame, facing
 from warp_torchrl.observation.own import WIND_SCALE, steps_to_tick, time_left
-from warp_torchrl.observation.view import ELEVATION_SCALE, mates_before, window
+from warp_torchrl.observation.view import ELEVATION_SCALE, window
 from warp_torchrl.world.flags import number
 from warp_torchrl.world.state import WorldState, is_burning, is_tree
 from warp_torchrl.world.world import World
@@ -58,23 +58,18 @@ def frame_by_picture(state: WorldState) -> Frame:
     return facing(fire, middle - state.vehicles.position[:, :, None])
 
 
-def centred_picture(state: WorldState, frame: Frame | None = None, ranked: bool = False) -> Tensor:
-    """Return the picture with the agent's own block in the middle, uint8 [B, A, 3 or 4, 15, 15]; 0 off the map.
+def centred_picture(state: WorldState, frame: Frame | None = None) -> Tensor:
+    """Return the picture with the agent's own block in the middle, uint8 [B, A, 3, 15, 15]; 0 off the map.
 
-    What it tells is what ``picture`` does; where things are is told from where the agent is, in its frame. A fourth
-    channel, where asked, shows the team-mates who come before the agent alone.
+    What it tells is what ``picture`` does; where things are is told from where the agent is, in its frame.
     """
     sides, middle = (PICTURE_SIDE, PICTURE_SIDE), PICTURE_SIDE - 1
     fire, fuel = (_fire_and_fuel(state) * 255.0).to(torch.uint8).unbind(1)
     block = _block(state, PICTURE_SIDE)
-    place = torch.stack((block // PICTURE_SIDE, block % PICTURE_SIDE), dim=-1)
-    about = window(place, sides, middle, frame)
+    about = window(torch.stack((block // PICTURE_SIDE, block % PICTURE_SIDE), dim=-1), sides, middle, frame)
     mates = about.of(one_hot(block, PICTURE_SIDE**2).sum(1).view(-1, *sides))
     mates[..., middle, middle] -= 1
-    planes = [about.of(fire), about.of(fuel), (mates.clamp_(max=4) * 63).to(torch.uint8)]
-    if ranked:
-        planes.append(mates_before(place, middle, frame))
-    return torch.stack(planes, dim=2)
+    return torch.stack((about.of(fire), about.of(fuel), (mates.clamp_(max=4) * 63).to(torch.uint8)), dim=2)
 
 
 def central_state(state: WorldState, world: World) -> Tensor:

@@ -12,7 +12,7 @@ from torch import Tensor
 from warp_torchrl.observation.coarse import PICTURE, PICTURE_SIDE, centred_picture, frame_by_picture, picture
 from warp_torchrl.observation.frame import Frame
 from warp_torchrl.observation.own import IDENTITY_SIZE, SELF_SIZE, identity, own_vector
-from warp_torchrl.observation.view import CHANNELS, ages, egocentric_view, frame_by_view, mates_before, stages, window
+from warp_torchrl.observation.view import CHANNELS, ages, egocentric_view, frame_by_view, stages, window
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.world import World
@@ -41,8 +41,6 @@ class Local:
             and see the same can then part.
         facing: ``north``, or ``fire``: each agent holds the map in a ``Frame`` of its own, in which the fire that it
             sees lies between its east and its south-east, and what it sees, knows and does is told in that frame.
-        ranked: Whether a last channel of the view shows the team-mates who come before the agent in the team, 63 each:
-            who gives way to whom can then be agreed on.
 
     Raises:
         ValueError: If the radius is not in 1..32.
@@ -51,7 +49,6 @@ class Local:
     radius: int = 5
     identity: bool = False
     facing: Literal["north", "fire"] = "north"
-    ranked: bool = False
 
     def __post_init__(self) -> None:
         check_fields(self, radius=(1, 32))
@@ -60,7 +57,7 @@ class Local:
         """Return the space of each entry."""
         side = 2 * self.radius + 1
         return {
-            "view": Space((len(CHANNELS) + self.ranked, side, side), torch.uint8, 0, 255),
+            "view": Space((len(CHANNELS), side, side), torch.uint8, 0, 255),
             "self": Space((SELF_SIZE + IDENTITY_SIZE * self.identity,), torch.float32, -3.0, 3.0),
         }
 
@@ -70,11 +67,7 @@ class Local:
         if self.identity:
             who = identity(own.shape[1], own.device)
             own = torch.cat((own, who.expand(len(own), -1, -1)), dim=-1)
-        view = egocentric_view(state, world, self.radius, frame)
-        if self.ranked:
-            before = mates_before(state.vehicles.position, self.radius, frame)
-            view = torch.cat((view, before[:, :, None]), dim=2)
-        return {"view": view, "self": own}
+        return {"view": egocentric_view(state, world, self.radius, frame), "self": own}
 
     def frame(self, state: WorldState) -> Frame | None:
         """Return how the agents hold the map; None where north is up for all."""
@@ -89,8 +82,7 @@ class Surroundings(Local):
     each block that burns), fuel and team-mates in 8 x 8 blocks.
 
     Attributes:
-        centred: Whether the agent's own block is the middle of the picture, which then has 15 x 15 blocks, uint8. Where
-            the view is ``ranked`` too, so is this picture.
+        centred: Whether the agent's own block is the middle of the picture, which then has 15 x 15 blocks, uint8.
 
     Raises:
         ValueError: If the radius is not in 1..32, or agents face the fire with a picture that is not centred.
@@ -107,12 +99,11 @@ class Surroundings(Local):
         """Return the space of each entry."""
         side = 2 * PICTURE_SIDE - 1 if self.centred else PICTURE_SIDE
         dtype, high = (torch.uint8, 255) if self.centred else (torch.float32, 1.0)
-        channels = len(PICTURE) + (self.centred and self.ranked)
-        return {**super().spaces(world), "picture": Space((channels, side, side), dtype, 0, high)}
+        return {**super().spaces(world), "picture": Space((len(PICTURE), side, side), dtype, 0, high)}
 
     def __call__(self, state: WorldState, world: World, frame: Frame | None = None) -> dict[str, Tensor]:
         """Return ``view``, ``self``, and ``picture`` float32 [B, A, 3, 8, 8], or as ``centred`` says."""
-        shown = centred_picture(state, frame, self.ranked) if self.centred else picture(state)
+        shown = centred_picture(state, frame) if self.centred else picture(state)
         return {**super().__call__(state, world, frame), "picture": shown}
 
     def frame(self, state: WorldState) -> Frame | None:

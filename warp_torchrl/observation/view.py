@@ -91,25 +91,6 @@ def egocentric_view(state: WorldState, world: World, radius: int, frame: Frame |
     return view
 
 
-def mates_before(place: Tensor, radius: int, frame: Frame | None = None) -> Tensor:
-    """Return where those are, seen from each agent, who come before it in the team: 63 each, uint8 [B, A, V, V].
-
-    Args:
-        place: (row, column) of the agents, int64 [B, A, 2].
-        radius: r; V = 2 r + 1.
-        frame: How each agent holds the map; north up where None.
-    """
-    worlds, agents = place.shape[:2]
-    side, order = 2 * radius + 1, torch.arange(agents, device=place.device)
-    gap = place.transpose(0, 1)[:, :, None] - place  # from an agent, the third, to another, the first
-    gap = gap if frame is None else frame.turned(gap)
-    shown = (gap.abs().amax(-1) <= radius) & (order[:, None, None] < order)
-    cell = ((gap[..., 0] + radius) * side + gap[..., 1] + radius) * shown
-    count = torch.zeros(worlds, agents, side * side, dtype=torch.uint8, device=place.device)
-    count.scatter_add_(2, cell.permute(1, 2, 0), byte(shown).permute(1, 2, 0))
-    return (count.clamp_(max=4) * 63).view(worlds, agents, side, side)
-
-
 def frame_by_view(state: WorldState, radius: int) -> Frame:
     """Return the frames in which the fire that each agent sees lies between its east and its south-east."""
     seen = window(state.vehicles.position, state.cells.shape[1:], radius).of(byte(is_burning(state.cells)))
