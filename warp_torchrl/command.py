@@ -14,6 +14,7 @@ from omegaconf import DictConfig, OmegaConf
 
 from warp_torchrl import checkpoint as checkpoints
 from warp_torchrl import disk
+from warp_torchrl.allocation import keep_freed_memory
 from warp_torchrl.api import policy_of
 from warp_torchrl.config import Record, compose_config, conf_folder, is_sweep, plain, recompose, without_targets
 from warp_torchrl.construction import ConfigError
@@ -193,6 +194,7 @@ def _run(name: str, job: Callable[[DictConfig], None]) -> None:
     debug = "debug=true" in [each.lower() for each in arguments]
     logging.raiseExceptions = debug  # a log that cannot be written is no second failure
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra's own errors come to fail
+    keep_freed_memory()
     with obeyed():
         try:
             _check_first(name, arguments)

@@ -12,6 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from warp_torchrl.allocation import keep_freed_memory
 from warp_torchrl.benchmark.environments import LARGE, environment_speed, rate_table
 from warp_torchrl.benchmark.growth_figure import draw_growth
 from warp_torchrl.benchmark.machine import header, machine, peak_memory
@@ -132,6 +133,7 @@ def main(arguments: list[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     if options.plot is not None and find_spec("matplotlib") is None:
         parser.error("--plot needs matplotlib (extra figures)")
+    keep_freed_memory()
     logging.getLogger("torchrl").setLevel(logging.WARNING)  # it would tell the standard output of its buffers
     described = machine(options.device)
     if not options.json:
