@@ -14,6 +14,9 @@ import pytest
 from warp_torchrl import checkpoint, load_policy, make_env
 from warp_torchrl import command as command_module
 from warp_torchrl.command import evaluate, train
+from warp_torchrl.config import compose_config, plain
+from warp_torchrl.evaluation import play_heuristics
+from warp_torchrl.settings import settings
 from warp_torchrl.training import Training
 
 ROOT = Path(__file__).parent.parent
@@ -87,6 +90,15 @@ def test_a_policy_is_refused_where_it_does_not_fit(trained, tmp_path):
     assert done.returncode == 2
     last = done.stderr.strip().splitlines()[-1]
     assert "view [11, 11, 11]" in last and "view [11, 9, 9]" in last
+
+
+def test_a_policy_is_refused_where_agents_do_not_face_as_it_was_trained(tmp_path):
+    policy = ROOT / "docs" / "policies" / "default"
+    was = "fire" if 'observation.facing="fire"' in load_policy(policy).overrides else "north"
+    other = "north" if was == "fire" else "fire"
+    done = command("evaluate.py", f"checkpoint={policy}", f"observation.facing={other}", folder=tmp_path)
+    assert done.returncode == 2
+    assert f"observation.facing must be {was}, as the policy in" in done.stderr.strip().splitlines()[-1]
 
 
 def test_evaluate_takes_a_policy_by_name(tmp_path):
@@ -363,6 +375,29 @@ def test_a_mistake_in_a_process_of_its_own(tmp_path, arguments, code, message):
     assert message in last and last.startswith("error: ")
     assert "Traceback" not in done.stderr
     assert not list(tmp_path.iterdir())
+
+
+def test_the_jobs_of_a_sweep_play_the_yardsticks_once(monkeypatch):
+    asked = []
+
+    def note(env, first_seed, names):
+        asked.append(list(names))
+        return play_heuristics(env, first_seed, names)
+
+    monkeypatch.setattr(command_module, "play_heuristics", note)
+    monkeypatch.setattr(command_module, "_PLAYED", {})
+
+    def yardsticks(names, *overrides):
+        plan = settings(plain(compose_config("train", ["evaluation.episodes=3", *TINY[:2], *overrides])))
+        return command_module._yardsticks(plan, plan.make_env(3, plan.evaluation.first_seed), names)
+
+    first = yardsticks(["noop", "local"])
+    again = yardsticks(["local", "noop"], "seed=7", "algorithm=ppo")
+    assert asked == [["noop", "local"], []] and again["local"] is first["local"]
+    more = yardsticks(["greedy", "local"], "seed=8")
+    assert asked[2] == ["greedy"] and list(more) == ["greedy", "local"]
+    yardsticks(["noop"], "wind.speed=9")
+    assert asked[3] == ["noop"], "other worlds"
 
 
 def test_a_sweep_of_evaluations_ends_in_one_table_and_one_figure(tmp_path):

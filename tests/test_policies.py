@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from warp_torchrl import load_policy
+from warp_torchrl import load_policy, make_env
 from warp_torchrl.checkpoint import newest
 from warp_torchrl.config import compose_config, plain, recompose, without_targets
 from warp_torchrl.evaluation import play, play_heuristics
@@ -45,3 +45,12 @@ def test_it_saves_far_more_than_local(scenario):
     saved = play(env, policy, 1_000_000, policy.mode)["saved"].mean()
     local = play_heuristics(env, 1_000_000, ["local"])["local"]["saved"].mean()
     assert saved > local + 0.05, (saved, local)
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_any_environment_shows_it_what_it_reads(scenario):
+    policy = load_policy(SHIPPED / scenario)
+    env = make_env("water", n_worlds=3, overrides=policy.overrides)
+    trained_in = settings(plain(recompose(newest(SHIPPED / scenario)[0].record()))).make_env(1, 0)
+    assert env.observation == trained_in.observation
+    assert env.rollout(3, policy)["agents", "action"].shape == (3, 3, 4)

@@ -1,5 +1,6 @@
 """What a user asks for by name: environments and trained policies."""
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -68,7 +69,7 @@ def load_policy(path: str | Path, mode: str = "best") -> TrainedPolicy:
 
     Returns:
         A ``TensorDictModule``; any number of worlds. Its ``mode`` says how it acts outside of TorchRL's
-        ``set_exploration_type``.
+        ``set_exploration_type``; with its ``overrides`` any environment shows what it was trained to read.
 
     Raises:
         CheckpointError: If there is no sound checkpoint, or it does not fit.
@@ -82,7 +83,8 @@ def policy_of(found: checkpoints.Checkpoint, mode: str = "best") -> TrainedPolic
     """Return the policy of a verified checkpoint; see ``load_policy``."""
     if mode not in ("best", "sampled", "deterministic"):
         raise ValueError(f"mode must be best, sampled or deterministic, got {mode}")
-    config = plain(recompose(found.record()))
+    record = found.record()
+    config = plain(recompose(record))
     algorithm, model = build(config["algorithm"], "algorithm"), build(config["model"], "model")
     weights = found.policy()
     try:
@@ -92,4 +94,7 @@ def policy_of(found: checkpoints.Checkpoint, mode: str = "best") -> TrainedPolic
         reason = " ".join(str(error).split())
         raise checkpoints.CheckpointError(f"{found.path} is of another architecture: {reason}") from None
     chosen = (found.manifest.mode or "sampled") if mode == "best" else mode
-    return TrainedPolicy(policy.requires_grad_(False).eval(), chosen)
+    seen = {name: value for name, value in config["observation"].items() if name != "_target_"}
+    overrides = [f"observation={name}" for group, name in record.choices.items() if group == "observation"]
+    overrides += [f"observation.{name}={json.dumps(value)}" for name, value in seen.items()]
+    return TrainedPolicy(policy.requires_grad_(False).eval(), chosen, overrides)

@@ -18,9 +18,11 @@ from warp_torchrl.allocation import keep_freed_memory
 from warp_torchrl.api import policy_of
 from warp_torchrl.config import Record, compose_config, conf_folder, is_sweep, plain, recompose, without_targets
 from warp_torchrl.construction import ConfigError
+from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation import (
     MODES,
     YARDSTICKS,
+    Episodes,
     LeftOut,
     play,
     play_heuristics,
@@ -126,7 +128,7 @@ def _report(plan: Settings, folder: Path, found: checkpoints.Checkpoint | str) -
     one = plan.make_env(1, first)
     if isinstance(found, checkpoints.Checkpoint):
         _check_fits(found, env)
-    others, other_modes = play_heuristics(env, first, [each for each in YARDSTICKS if each != found]), {}
+    others, other_modes = _yardsticks(plan, env, [each for each in YARDSTICKS if each != found]), {}
     if isinstance(found, str):
         name, mode, policy = found, "sampled", HEURISTICS[found](one)
         actor = HEURISTICS[found](env)
@@ -150,7 +152,18 @@ def _report(plan: Settings, folder: Path, found: checkpoints.Checkpoint | str) -
     log.info("wrote evaluation.json and episode.gif into %s", folder)
 
 
-def _check_fits(found: checkpoints.Checkpoint, env: Any) -> None:
+_PLAYED: dict[str, tuple[Settings, dict[str, Episodes]]] = {}
+
+
+def _yardsticks(plan: Settings, env: WildfireEnv, names: Sequence[str]) -> dict[str, Episodes]:
+    """Return the episodes of heuristics; the jobs of a sweep that meet the same worlds play them once."""
+    worlds = repr((plan.world, plan.observation, plan.reward, plan.evaluation, plan.device, plan.compile))
+    _, played = _PLAYED.setdefault(worlds, (plan, {}))  # the plan stays alive: no other can come to print the same
+    played |= play_heuristics(env, plan.evaluation.first_seed, [name for name in names if name not in played])
+    return {name: played[name] for name in names}
+
+
+def _check_fits(found: checkpoints.Checkpoint, env: WildfireEnv) -> None:
     here, there = signature(env), found.manifest.signature
     if (here.observation, here.n_actions) != (there.observation, there.n_actions):
         raise ConfigError(
@@ -158,6 +171,9 @@ def _check_fits(found: checkpoints.Checkpoint, env: Any) -> None:
             f"this environment has {_shapes(here)} and {here.n_actions}"
         )
 
+    facing = found.record().values.get("observation", {}).get("facing", "north")
+    if facing != getattr(env.observation, "facing", "north"):
+        raise ConfigError(f"observation.facing must be {facing}, as the policy in {found.path} was trained")
     own = found.record().values.get("model", {}).get("sharing") == "none"
     if own and here.n_agents != there.n_agents:
         raise ConfigError(

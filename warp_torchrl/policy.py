@@ -1,6 +1,6 @@
 """A trained policy, as it is handed to users: on TorchRL's tensordicts, and on the adapters' numpy observations."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from typing import Any, cast
 
@@ -29,12 +29,14 @@ class TrainedPolicy(TensorDictModuleBase):
     Args:
         module: Observation and mask in, action out.
         mode: ``sampled`` or ``deterministic``.
+        overrides: With which any environment shows what the policy was trained to read, and understands what it says:
+            ``make_env("large", overrides=policy.overrides)``.
     """
 
-    def __init__(self, module: TensorDictModuleBase, mode: str) -> None:
+    def __init__(self, module: TensorDictModuleBase, mode: str, overrides: Sequence[str] = ()) -> None:
         super().__init__()
         self.in_keys, self.out_keys = module.in_keys, module.out_keys
-        self.module, self.mode = module, mode
+        self.module, self.mode, self.overrides = module, mode, tuple(overrides)
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write the team's actions, int64 [B, A]."""
