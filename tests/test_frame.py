@@ -139,7 +139,7 @@ def test_the_frame_by_hand():
 
 
 def test_near_fires_count_for_more():
-    # 1 cell north weighs 1 / 27 and pulls 1 / 27; 4 cells south pull 4 / 216; 6 cells south 6 / 512.
+    # A fire 1 cell north pulls with 1 / (1 + 2)^3 = 0.037, one 4 cells south with 4 / (4 + 2)^3 = 0.019, three 0.056.
     away = torch.tensor([[[[-1.0, 0.0], [4.0, 0.0]]]])
     assert facing(torch.ones(1, 1, 2), away).sign[0, 0, 0] == -1
     assert facing(torch.tensor([[[1.0, 3.0]]]), away).sign[0, 0, 0] == 1, "three of them are more"
