@@ -48,6 +48,21 @@ def command(program, *arguments, folder):
     )
 
 
+@pytest.fixture
+def run_here(tmp_path, monkeypatch, capfd):
+    """Run a command in this process, in a folder of its own; returns its exit code, stderr's lines and stdout."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(program, *arguments):
+        monkeypatch.setattr(sys, "argv", [program, *arguments])
+        with pytest.raises(SystemExit) as end:
+            {"train.py": train, "evaluate.py": evaluate}[program]()
+        said, errors = capfd.readouterr()
+        return end.value.code, errors.strip().splitlines(), said
+
+    return run
+
+
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory):
     folder = tmp_path_factory.mktemp("trained")
@@ -76,52 +91,49 @@ def test_evaluate_repeats_what_training_found(trained, tmp_path):
     assert (tmp_path / "seen" / "episode.gif").exists()
 
 
-def test_evaluate_takes_another_scenario_for_the_same_policy(trained, tmp_path):
-    run, _ = trained
-    done = command(
-        "evaluate.py", f"checkpoint={run}", "scenario=single", "evaluation.episodes=3", "horizon=12", folder=tmp_path
-    )
-    assert done.returncode == 0, done.stderr
-    assert "single: 3 fires" in done.stdout
+def test_evaluate_takes_another_scenario_for_the_same_policy(trained, run_here):
+    what = (f"checkpoint={trained[0]}", "scenario=single", "evaluation.episodes=3", "horizon=12")
+    code, errors, said = run_here("evaluate.py", *what)
+    assert code == 0, errors
+    assert "single: 3 fires" in said
 
 
-def test_a_policy_is_refused_where_it_does_not_fit(trained, tmp_path):
-    done = command("evaluate.py", f"checkpoint={trained[0]}", "observation.radius=4", folder=tmp_path)
-    assert done.returncode == 2
-    last = done.stderr.strip().splitlines()[-1]
-    assert "view [11, 11, 11]" in last and "view [11, 9, 9]" in last
+def test_a_policy_is_refused_where_it_does_not_fit(trained, run_here):
+    code, errors, _ = run_here("evaluate.py", f"checkpoint={trained[0]}", "observation.radius=4")
+    assert code == 2
+    assert "view [11, 11, 11]" in errors[-1] and "view [11, 9, 9]" in errors[-1]
 
 
-def test_a_policy_is_refused_where_agents_do_not_face_as_it_was_trained(tmp_path):
+def test_a_policy_is_refused_where_agents_do_not_face_as_it_was_trained(run_here):
     policy = ROOT / "docs" / "policies" / "default"
     was = "fire" if 'observation.facing="fire"' in load_policy(policy).overrides else "north"
     other = "north" if was == "fire" else "fire"
-    done = command("evaluate.py", f"checkpoint={policy}", f"observation.facing={other}", folder=tmp_path)
-    assert done.returncode == 2
-    assert f"observation.facing must be {was}, as the policy in" in done.stderr.strip().splitlines()[-1]
+    code, errors, _ = run_here("evaluate.py", f"checkpoint={policy}", f"observation.facing={other}")
+    assert code == 2
+    assert f"observation.facing must be {was}, as the policy in" in errors[-1]
 
 
-def test_evaluate_takes_a_policy_by_name(tmp_path):
+def test_evaluate_takes_a_policy_by_name(tmp_path, run_here):
     arguments = ("policy=local", "scenario=skirmish", "horizon=12", "evaluation.episodes=4", "hydra.run.dir=seen")
-    done = command("evaluate.py", *arguments, folder=tmp_path)
-    assert done.returncode == 0, done.stderr
+    code, errors, _ = run_here("evaluate.py", *arguments)
+    assert code == 0, errors
     content = json.loads((tmp_path / "seen" / "evaluation.json").read_text())
     assert content["policy"] == "local" and "local" not in content["versus"]
 
 
-def test_a_finished_run_resumes_to_nothing_and_exits_0(trained):
+def test_a_finished_run_resumes_to_nothing_and_exits_0(trained, run_here):
     run, _ = trained
     before = (run / "metrics.csv").read_bytes()
-    done = command("train.py", f"resume={run}", folder=run.parent)
-    assert done.returncode == 0, done.stderr
+    code, errors, _ = run_here("train.py", f"resume={run}")
+    assert code == 0, errors
     assert (run / "metrics.csv").read_bytes() == before
 
 
-def test_a_run_folder_is_not_trained_into_twice(trained):
+def test_a_run_folder_is_not_trained_into_twice(trained, run_here):
     run, _ = trained
     before = (run / "metrics.csv").read_bytes()
-    done = command("train.py", *TINY, "hydra.run.dir=run", folder=run.parent)
-    assert done.returncode == 2 and "holds a run already" in done.stderr.strip().splitlines()[-1]
+    code, errors, _ = run_here("train.py", *TINY, f"hydra.run.dir={run}")
+    assert code == 2 and "holds a run already" in errors[-1]
     assert (run / "metrics.csv").read_bytes() == before
 
 
@@ -151,20 +163,6 @@ def test_a_run_stopped_by_a_signal_resumes_to_what_it_would_have_been(trained):
     assert ours == theirs
     ours, theirs = (json.loads((folder / "evaluation.json").read_text()) for folder in (cut, run))
     assert ours["episodes"] == theirs["episodes"]
-
-
-@pytest.fixture
-def run_here(tmp_path, monkeypatch, capfd):
-    """Run a command in this process, in a folder of its own; returns its exit code and the lines of stderr."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(program, *arguments):
-        monkeypatch.setattr(sys, "argv", [program, *arguments])
-        with pytest.raises(SystemExit) as end:
-            {"train.py": train, "evaluate.py": evaluate}[program]()
-        return end.value.code, capfd.readouterr().err.strip().splitlines()
-
-    return run
 
 
 def signalled(function, number, when=1):
@@ -198,25 +196,25 @@ def test_a_signal_anywhere_leaves_sound_checkpoints_and_the_way_on(
 ):
     with monkeypatch.context() as patched:
         patched.setattr(owner, name, signalled(getattr(owner, name), number, when))
-        code, errors = run_here("train.py", *SHORT)
+        code, errors, _ = run_here("train.py", *SHORT)
     assert code == 128 + number and f"stopped by signal {number.name}" in errors[-1]
     assert sorted(int(each.name) for each in (tmp_path / "run" / "checkpoints").iterdir()) == frames
     assert checkpoint.newest(tmp_path / "run")[1] == []
-    code, errors = run_here("train.py", "resume=run")
+    code, errors, _ = run_here("train.py", "resume=run")
     assert code == 0, errors
     assert (tmp_path / "run" / "evaluation.json").exists()
 
 
 def test_a_signal_ends_a_sweep(tmp_path, run_here, monkeypatch):
     monkeypatch.setattr(Training, "_learn", signalled(Training._learn, signal.SIGTERM))
-    code, _ = run_here("train.py", *SHORT[:-1], "-m", "seed=0,1", "hydra.sweep.dir=sweep")
+    code, *_ = run_here("train.py", *SHORT[:-1], "-m", "seed=0,1", "hydra.sweep.dir=sweep")
     assert code == 128 + signal.SIGTERM
     assert (tmp_path / "sweep" / "0" / "checkpoints" / "32").is_dir() and not (tmp_path / "sweep" / "1").exists()
 
 
 def test_a_second_run_in_a_folder_is_refused_and_the_first_goes_on(tmp_path, run_here):
     lock = checkpoint.RunFolderLock(tmp_path / "run")
-    code, errors = run_here("train.py", *SHORT)
+    code, errors, _ = run_here("train.py", *SHORT)
     lock.release()
     assert code == 3 and "in use" in errors[-1]
     assert not (tmp_path / "run" / "metrics.csv").exists() and not (tmp_path / "run" / "config.yaml").exists()
@@ -226,14 +224,14 @@ def test_a_run_that_died_before_its_first_checkpoint_may_start_again(tmp_path, r
     (tmp_path / "run" / "checkpoints" / ".32.tmp").mkdir(parents=True)
     (tmp_path / "run" / "config.yaml").write_text("old: 1")
     monkeypatch.setattr(command_module, "_report", lambda *args, **options: None)
-    code, errors = run_here("train.py", *SHORT)
+    code, errors, _ = run_here("train.py", *SHORT)
     assert code == 0, errors
     assert "old: 1" not in (tmp_path / "run" / "config.yaml").read_text()
 
 
 def test_a_checkpoint_is_no_run_folder_to_resume(trained, run_here):
     path = checkpoint.newest(trained[0])[0].path
-    code, (line,) = run_here("train.py", f"resume={path}")
+    code, (line,), _ = run_here("train.py", f"resume={path}")
     assert code == 2 and "resume must be a run folder" in line
     assert sorted(each.name for each in path.iterdir()) == ["config.json", "manifest.json", "policy.pt", "training.pt"]
 
@@ -241,10 +239,10 @@ def test_a_checkpoint_is_no_run_folder_to_resume(trained, run_here):
 def test_a_run_starts_from_another_ones_networks_on_another_scenario(trained, run_here, tmp_path):
     run, _ = trained
     arguments = [each for each in SHORT if "landscape" not in each]
-    code, errors = run_here("train.py", *arguments, "scenario=shift", "landscape.size=14", f"start_from={run}")
+    code, errors, _ = run_here("train.py", *arguments, "scenario=shift", "landscape.size=14", f"start_from={run}")
     assert code == 0, errors
     shutil.move(tmp_path / "run", tmp_path / "moved")
-    code, errors = run_here("evaluate.py", "checkpoint=moved", "hydra.run.dir=seen")
+    code, errors, _ = run_here("evaluate.py", "checkpoint=moved", "hydra.run.dir=seen")
     assert code == 0, errors  # where it started from is recorded, and no longer needed
 
 
@@ -254,14 +252,14 @@ def test_a_run_starts_from_another_ones_networks_on_another_scenario(trained, ru
 )
 def test_a_start_that_is_none_is_refused_before_anything_is_written(trained, run_here, tmp_path, path, said, expected):
     checkpoint.export(checkpoint.newest(trained[0])[0], tmp_path / "alone")
-    code, errors = run_here("train.py", *SHORT, f"start_from={path}")
+    code, errors, _ = run_here("train.py", *SHORT, f"start_from={path}")
     assert code == expected and said in errors[-1] and len(errors) == 1
     assert not (tmp_path / "run").exists()
 
 
 def test_a_policy_alone_is_evaluated_as_its_run_was(trained, run_here, tmp_path):
     checkpoint.export(checkpoint.newest(trained[0])[0], tmp_path / "alone")
-    code, errors = run_here("evaluate.py", "checkpoint=alone", "hydra.run.dir=seen")
+    code, errors, _ = run_here("evaluate.py", "checkpoint=alone", "hydra.run.dir=seen")
     assert code == 0, errors
     ours, theirs = (json.loads((each / "evaluation.json").read_text()) for each in (tmp_path / "seen", trained[0]))
     assert ours["episodes"] == theirs["episodes"]
@@ -271,7 +269,7 @@ def test_an_unsound_checkpoint_is_told_and_the_one_before_taken(trained, run_her
     shutil.copytree(trained[0], tmp_path / "run")
     newest, *_ = sorted((tmp_path / "run" / "checkpoints").iterdir(), key=lambda each: -int(each.name))
     (newest / "policy.pt").write_bytes(b"")
-    code, errors = run_here("train.py", "resume=run")
+    code, errors, _ = run_here("train.py", "resume=run")
     assert code == 0, errors
     skipped = [line for line in (tmp_path / "run" / "train.log").read_text().splitlines() if "skipped: " in line]
     assert len(skipped) == 1 and "policy.pt is missing or was cut" in skipped[0]
@@ -284,7 +282,7 @@ def test_a_full_disk_ends_with_its_path_and_reason(tmp_path, run_here):
     (tmp_path / "run").mkdir()
     for name in ("metrics.csv", "train.log"):
         (tmp_path / "run" / name).symlink_to("/dev/full")
-    code, errors = run_here("train.py", *SHORT)
+    code, errors, _ = run_here("train.py", *SHORT)
     assert code == 6 and errors[-1] == f"error: {tmp_path / 'run' / 'metrics.csv'}: No space left on device"
     assert "Traceback" not in "".join(errors)
 
@@ -293,7 +291,7 @@ def test_a_full_disk_ends_with_its_path_and_reason(tmp_path, run_here):
 def test_a_run_folder_that_cannot_be_made_is_told_with_its_path(tmp_path, run_here, program):
     (tmp_path / "file").touch()
     what = SHORT[:-1] if program == "train.py" else ["policy=noop", "evaluation.episodes=1"]
-    code, errors = run_here(program, *what, "hydra.run.dir=file/run")
+    code, errors, _ = run_here(program, *what, "hydra.run.dir=file/run")
     assert code == 6 and "file/run: Not a directory" in errors[-1]
     assert "Traceback" not in "".join(errors)
 
@@ -304,7 +302,7 @@ def test_a_loaded_policy_plays(trained):
     assert rollout["agents", "action"].shape == (2, 4, 2)
 
 
-def test_the_experiment_of_all_algorithms_is_a_sweep(tmp_path):
+def test_the_experiment_of_all_algorithms_is_a_sweep(tmp_path, run_here):
     arguments = (
         *TINY,
         "total_frames=32",
@@ -313,12 +311,12 @@ def test_the_experiment_of_all_algorithms_is_a_sweep(tmp_path):
         "algorithm=a2c,vdn",
         "seed=4",
     )
-    done = command("train.py", *arguments, "hydra.sweep.dir=sweep", folder=tmp_path)
-    assert done.returncode == 0, done.stderr
+    code, errors, _ = run_here("train.py", *arguments, "hydra.sweep.dir=sweep")
+    assert code == 0, errors
     assert "a2c" in (tmp_path / "sweep" / "summary.md").read_text() and (tmp_path / "sweep" / "1").is_dir()
 
 
-def test_a_job_that_fails_beside_others_is_named_at_the_end_and_they_go_on(tmp_path):
+def test_a_job_that_fails_beside_others_is_named_at_the_end_and_they_go_on(tmp_path, run_here):
     pytest.importorskip("hydra_plugins.hydra_joblib_launcher")
     arguments = (
         *TINY,
@@ -329,11 +327,11 @@ def test_a_job_that_fails_beside_others_is_named_at_the_end_and_they_go_on(tmp_p
         "hydra/launcher=joblib",
     )
     (tmp_path / "sweep" / "0" / "checkpoints" / "1").mkdir(parents=True)
-    done = command("train.py", *arguments, "hydra.sweep.dir=sweep", folder=tmp_path)
-    assert done.returncode == 2
-    *_, last = done.stderr.strip().splitlines()
+    code, errors, _ = run_here("train.py", *arguments, "hydra.sweep.dir=sweep")
+    assert code == 2
+    *_, last = errors
     assert last.startswith("error: job 0 (") and "seed=0) failed: " in last and "holds a run already" in last
-    assert "Traceback" not in done.stderr
+    assert "Traceback" not in "".join(errors)
     assert (tmp_path / "sweep" / "1" / "evaluation.json").exists()
     assert (tmp_path / "sweep" / "summary.md").exists()
 
@@ -400,14 +398,11 @@ def test_the_jobs_of_a_sweep_play_the_yardsticks_once(monkeypatch):
     assert asked[3] == ["noop"], "other worlds"
 
 
-def test_a_sweep_of_evaluations_ends_in_one_table_and_one_figure(tmp_path):
+def test_a_sweep_of_evaluations_ends_in_one_table_and_one_figure(tmp_path, run_here):
     pytest.importorskip("matplotlib")
-    sweep = tmp_path / "sweep"
-    done = command(
-        "evaluate.py", "-m", "policy=noop,greedy", "landscape.size=12", "horizon=20", "evaluation.episodes=4",
-        f"hydra.sweep.dir={sweep}", folder=tmp_path,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    text = (sweep / "summary.md").read_text()
-    assert "| skirmish | greedy | 1 | 4 |" in text and text.strip() in done.stdout
-    assert (sweep / "summary.png").stat().st_size > 10_000
+    what = ("policy=noop,greedy", "landscape.size=12", "horizon=20", "evaluation.episodes=4", "hydra.sweep.dir=sweep")
+    code, errors, said = run_here("evaluate.py", "-m", *what)
+    assert code == 0, errors
+    text = (tmp_path / "sweep" / "summary.md").read_text()
+    assert "| skirmish | greedy | 1 | 4 |" in text and text.strip() in said
+    assert (tmp_path / "sweep" / "summary.png").stat().st_size > 10_000
