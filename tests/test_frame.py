@@ -1,4 +1,4 @@
-"""Agents that face the fire: a map that is turned or mirrored looks the same to them, and they do the same there."""
+"""Frames: a map that is turned or mirrored looks the same to those who face the fire, and they do the same there."""
 
 import itertools
 
@@ -8,9 +8,30 @@ import torch
 from tests.conftest import small_world
 from tests.test_observation import drawn
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.evaluation import play
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.observation import CHANNELS, Frame, Local, Paper, Surroundings, facing, window
+from warp_torchrl.models import (
+    ACTION_ONE_HOT,
+    ACTION_VALUE,
+    LOGITS,
+    STATE_ACTION_VALUE,
+    VALUE,
+    Cnn,
+    Entry,
+    Mlp,
+    signature,
+)
+from warp_torchrl.observation import (
+    CHANNELS,
+    Frame,
+    Local,
+    Paper,
+    Surroundings,
+    can_be_held,
+    frame_of,
+    held,
+    held_state,
+)
+from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.state import Action
 from warp_torchrl.world.team import Team
@@ -18,7 +39,12 @@ from warp_torchrl.world.wind import Uniform
 
 TURNS = list(itertools.product((1, -1), (1, -1), (False, True)))
 """Whether rows, then columns, are mirrored, and whether they change places after that."""
-PRESETS = (Local(facing="fire", identity=True), Surroundings(facing="fire", centred=True))
+PRESETS = {
+    "whole map": Surroundings(),
+    "centred": Surroundings(centred=True, identity=True),
+    "local": Local(identity=True),
+    "paper": Paper(),
+}
 SIZE = 16
 
 
@@ -49,8 +75,10 @@ def turned_vector(vector, rows, columns, swapped):
 
 def turned_actions(action, turn):
     """Return actions on the map, int64 [...], as they are on the turned one."""
-    frame = Frame(sign=torch.tensor(turn[:2]).expand(*action.shape, 2), swapped=torch.full(action.shape, turn[2]))
-    return torch.where(action < 0, action, frame.steered(action.clamp(min=0)))
+    offsets = torch.tensor([*DIRECTIONS])
+    turned = [[*DIRECTIONS].index(tuple(each)) for each in turned_vector(offsets, *turn).tolist()]
+    names = torch.tensor([*turned, *range(len(turned), len(Action))])
+    return torch.where(action < 0, action, names[action.clamp(min=0)])
 
 
 def turned_world(state, turn):
@@ -71,116 +99,183 @@ def turned_world(state, turn):
     return state.replace(vehicles=vehicles, wind=wind, landscape=cover, **leaves)
 
 
-@pytest.mark.parametrize("preset", PRESETS, ids=lambda each: type(each).__name__)
-@pytest.mark.parametrize("turn", TURNS, ids=str)
-def test_a_turned_world_looks_the_same_and_the_same_acts_change_it_alike(preset, turn):
-    env, other = fighting(preset), fighting(preset)
-    before = env.world_state.clone()
-    here, there = env.set_state(before), other.set_state(turned_world(before, turn))
-    sees = pulled(preset, before)
-    assert sees.sum() >= 10
-    for entry, seen in here["agents", "observation"].items():
-        torch.testing.assert_close(there["agents", "observation", entry][sees], seen[sees], atol=1e-6, rtol=0.0)
-    assert torch.equal(here["agents", "action_mask"][sees], there["agents", "action_mask"][sees])
-    for first in (0, 5):  # every agent says something else
-        action = (torch.arange(18).view(6, 3) + first) % len(Action)
-        env.set_state(before)
-        other.set_state(turned_world(before, turn))
-        for each in (env, other):
-            each.step(each.set_state(each.world_state).set(("agents", "action"), action))
-        ours, theirs = turned_world(env.world_state, turn), other.world_state
-        assert torch.equal(ours.vehicles.position[sees], theirs.vehicles.position[sees]), first
-        assert torch.equal(ours.vehicles.last_action[sees], theirs.vehicles.last_action[sees]), first
+def seen(now):
+    """Return the entries of an observation by name."""
+    found = now["agents", "observation"]
+    return {"": found} if isinstance(found, torch.Tensor) else dict(found.items())
 
 
 def pulled(preset, state):
     """Return which agents see fire more on one side than on the other, bool [B, A]: their frames are not arbitrary."""
-    mirrored = turned_world(state, (-1, -1, False))
-    swapped = turned_world(state, (1, 1, True))
-    here, there, across = (preset.frame(each) for each in (state, mirrored, swapped))
-    return (here.sign == -there.sign).all(-1) & (here.swapped != across.swapped)
+    env = fighting(preset, steps=0)
+    here, across, mirrored = (
+        frame_of(seen(env.set_state(turned_world(state, turn)))).index
+        for turn in ((1, 1, False), (1, 1, True), (-1, -1, False))
+    )
+    return (here % 2 != across % 2) & (here // 2 == 3 - mirrored // 2)
 
 
-def test_worlds_really_are_turned():
-    """The check on the check: agents who do not face the fire see another map."""
-    env = fighting(Local())
-    before = env.world_state.clone()
-    seen = [env.set_state(turned_world(before, turn))["agents", "observation", "view"] for turn in TURNS]
-    assert not any(torch.equal(one, another) for one, another in itertools.combinations(seen, 2))
+def in_both(preset, turn):
+    """Return what is observed in worlds and in the same worlds turned, and whose frames are not arbitrary."""
+    env = fighting(preset)
+    state = env.world_state.clone()
+    here = env.set_state(state).clone()
+    there = env.set_state(turned_world(state, turn)).clone()
+    sees = pulled(preset, state)
+    assert sees.sum() >= 6
+    return here, there, sees
 
 
-@pytest.mark.parametrize("preset", PRESETS, ids=lambda each: type(each).__name__)
-def test_the_fire_lies_between_east_and_south_east(preset):
+@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("turn", TURNS, ids=str)
+def test_a_turned_world_looks_the_same(name, turn):
+    here, there, sees = in_both(PRESETS[name], turn)
+    before, after = seen(here), seen(there)
+    frames = frame_of(before), frame_of(after)
+    for entry in before:
+        ours, theirs = (held(entry, each[entry], frame) for each, frame in zip((before, after), frames))
+        torch.testing.assert_close(theirs[sees], ours[sees], atol=1e-6, rtol=0.0)
+    masks = [frame.actions(now["agents", "action_mask"]) for now, frame in zip((here, there), frames)]
+    assert torch.equal(masks[0][sees], masks[1][sees])
+    torch.testing.assert_close(held_state(there["state"]), held_state(here["state"]), atol=1e-5, rtol=0.0)
+
+
+@pytest.mark.parametrize(
+    "model", [Mlp(), Mlp(sharing="none"), Mlp(sharing="role"), Cnn()], ids=["team", "none", "role", "cnn"]
+)
+def test_networks_say_the_same_of_a_turned_world(model):
+    """Logits and values of acts turn with the map, and a state's value stays what it is, whatever the weights."""
+    preset, turn = PRESETS["whole map"], (-1, 1, True)
+    here, there, sees = in_both(preset, turn)
+    shape = signature(fighting(preset, steps=0))
+    for key, network in ((LOGITS, model.actor(shape)), (ACTION_VALUE, model.action_value(shape))):
+        ours, theirs = network(here)[key], network(there)[key]
+        expected = torch.empty_like(ours).index_copy_(2, turned_actions(torch.arange(11), turn), ours)
+        torch.testing.assert_close(theirs[sees], expected[sees], atol=1e-5, rtol=0.0)
+        assert not torch.allclose(theirs[sees], ours[sees], atol=1e-5), "another map, north up"
+    for central in (False, True):
+        critic = model.critic(shape, central)
+        torch.testing.assert_close(critic(there)[VALUE][sees], critic(here)[VALUE][sees], atol=1e-4, rtol=0.0)
+    action = torch.arange(18).view(6, 3) % 11
+    for now, said in ((here, action), (there, turned_actions(action, turn))):
+        now[ACTION_ONE_HOT] = torch.nn.functional.one_hot(said, 11).to(torch.float32)
+    judge = model.action_critic(shape, central=False)
+    ours, theirs = (judge(now)[STATE_ACTION_VALUE] for now in (here, there))
+    torch.testing.assert_close(theirs[sees], ours[sees], atol=1e-4, rtol=0.0)
+
+
+def test_networks_that_face_north_say_something_else():
+    """The check on the check."""
+    here, there, sees = in_both(PRESETS["whole map"], (-1, 1, True))
+    shape = signature(fighting(PRESETS["whole map"], steps=0))
+    critic = Mlp(facing="north").critic(shape, central=True)
+    assert not torch.allclose(critic(there)[VALUE][sees], critic(here)[VALUE][sees], atol=1e-3)
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_every_preset_can_be_held(name):
+    shapes = {entry: tuple(value.shape[2:]) for entry, value in seen(fighting(PRESETS[name], steps=0).reset()).items()}
+    assert can_be_held(shapes)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [{"view": (44, 11, 11)}, {"self": (96,)}, {"picture": (3, 8, 15)}, {"more": (2,)}, {"view": None}],
+    ids=str,
+)
+def test_what_is_of_no_preset_is_read_north_up(make_small_env, changed):
+    """Of observations that were stacked, cut or added to no one knows how they turn."""
+    shape = signature(make_small_env(2))
+    entries = {name: entry.shape for name, entry in shape.observation.items()} | changed
+    other = shape._replace(observation={name: Entry(size, "float32") for name, size in entries.items() if size})
+    with pytest.raises(ValueError, match="model.facing must be north where observations are of no preset, got fire"):
+        Mlp().actor(other)
+    assert Mlp(facing="north").actor(other) is not None
+
+
+@pytest.mark.parametrize("name", ["centred", "local"])
+def test_the_fire_lies_between_east_and_south_east(name):
     places = [[0, 0], [0, 9], [15, 15], [2, 15], [9, 11], [12, 2], [7, 4]]
     cells = torch.full((16, 16), 5)
     cells[8, 8] = 11
     state, world = drawn(cells.tolist(), places)
-    seen = preset(state, world, preset.frame(state))
-    shown = seen["view"][0, :, CHANNELS.index("fire_stage")] if preset is PRESETS[0] else seen["picture"][0, :, 0]
-    found = 0
-    for plane in shown:
+    entries = PRESETS[name](state, world)
+    frame, found = frame_of(entries), 0
+    what, channel = ("view", CHANNELS.index("fire_stage")) if name == "local" else ("picture", 0)
+    for plane in held(what, entries[what], frame)[0, :, channel]:
         for row, column in (plane.nonzero() - len(plane) // 2).tolist():
             assert 0 <= row <= column
             found += 1
-    assert found == (2 if preset is PRESETS[0] else len(places)), "what is within five cells, or all"
+    assert found == (2 if name == "local" else len(places)), "what is within five cells, or all"
 
 
-def test_the_frame_by_hand():
-    # From (2, 6), what burns at (0, 1) is two rows up and five columns to the left: mirrored both, it is (2, 5) away.
-    away = torch.tensor([[[[-2.0, -5.0]], [[-5.0, 2.0]], [[0.0, 0.0]]]])
-    frame = facing(torch.ones(1, 1, 1), away)
-    assert frame.sign.tolist() == [[[-1, -1], [-1, 1], [1, 1]]]
-    assert frame.swapped.tolist() == [[False, True, False]]
-    assert frame.turned(away[:, :, 0]).tolist() == [[[2.0, 5.0], [2.0, 5.0], [0.0, 0.0]]]
-    east = torch.full((1, 3), int(Action.EAST))
-    assert frame.on_map(east).tolist() == [[Action.WEST, Action.NORTH, Action.EAST]]
-    assert torch.equal(frame.steered(frame.on_map(east)), east)
-    assert frame.on_map(torch.full((1, 3), int(Action.CLEAR))).tolist() == [[Action.CLEAR] * 3]
+def framed(rows, columns, swapped):
+    return Frame(torch.tensor(4 * (rows < 0) + 2 * (columns < 0) + swapped))
+
+
+def test_vectors_maps_and_actions_by_hand():
+    # What is two rows up and five columns to the left of one: mirrored both, it is (2, 5) away.
+    mirrored, turned = framed(-1, -1, False), framed(-1, 1, True)
+    assert mirrored.vectors(torch.tensor([-2.0, -5.0])).tolist() == [2.0, 5.0]
+    assert turned.vectors(torch.tensor([-5.0, 2.0])).tolist() == [2.0, 5.0]
+    # Rows mirrored, 1 2 / 3 4 is 3 4 / 1 2; rows and columns swapped after that, 3 1 / 4 2.
+    one = torch.tensor([[[1, 2], [3, 4]]])
+    assert framed(-1, 1, False).maps(one).tolist() == [[[3, 4], [1, 2]]]
+    assert turned.maps(one).tolist() == [[[3, 1], [4, 2]]]
+    # Rows mirrored and then swapped with columns, east in the frame is what is north on the map, and south is east.
+    entries = torch.arange(11)
+    said = turned.actions(entries)
+    assert (
+        said[Action.EAST] == Action.NORTH and said[Action.SOUTH] == Action.EAST and said[Action.CLEAR] == Action.CLEAR
+    )
+    assert torch.equal(framed(1, 1, False).actions(entries), entries)
+
+
+@pytest.mark.parametrize("n_actions", [10, 11])
+def test_entries_by_action_come_back(n_actions):
+    frame, entries = Frame(torch.arange(8)), torch.randn(8, n_actions)
+    assert torch.equal(frame.actions_on_map(frame.actions(entries)), entries)
+    assert len({tuple(each) for each in frame.actions(torch.arange(n_actions).expand(8, -1)).tolist()}) == 8
 
 
 def test_near_fires_count_for_more():
-    # A fire 1 cell north pulls with 1 / (1 + 2)^3 = 0.037, one 4 cells south with 4 / (4 + 2)^3 = 0.019, three 0.056.
-    away = torch.tensor([[[[-1.0, 0.0], [4.0, 0.0]]]])
-    assert facing(torch.ones(1, 1, 2), away).sign[0, 0, 0] == -1
-    assert facing(torch.tensor([[[1.0, 3.0]]]), away).sign[0, 0, 0] == 1, "three of them are more"
+    """A fire one cell north pulls with 1 / (1 + 2)^3 = 0.037, one four cells south with 4 / (4 + 2)^3 = 0.019."""
+    view = torch.zeros(1, 1, len(CHANNELS), 11, 11, dtype=torch.uint8)
+    fire = view[0, 0, CHANNELS.index("fire_stage")]
+    fire[4, 5] = fire[9, 5] = 51
+    assert frame_of({"view": view}).index == framed(-1, 1, True).index
+    fire[9, 4] = fire[9, 6] = 204
+    assert frame_of({"view": view}).index == framed(1, 1, True).index, "three of them are more, whatever their stage"
 
 
-def test_entries_by_action_are_reordered_and_back():
-    frame = facing(torch.ones(4, 1, 1), torch.randn(4, 3, 1, 2))
-    for n_actions in (10, 11):
-        entries = torch.randn(4, 3, n_actions)
-        said = frame.reordered(entries)
-        assert torch.equal(frame.reordered_back(said), entries)
-        for action in range(n_actions):
-            meant = frame.on_map(torch.full((4, 3), action))
-            assert torch.equal(said[..., action], entries.gather(-1, meant[..., None])[..., 0])
+def test_a_tie_is_a_tie_in_any_batch():
+    """Fires at the corners of a diamond pull nowhere: north stays up, in one world and in a thousand."""
+    picture = torch.zeros(1000, 1, 3, 8, 8)
+    picture[:, :, 0, [1, 5, 3, 3], [3, 3, 1, 5]] = 0.3
+    own = torch.full((1000, 1, 24), 3.5 / 8)
+    for n_worlds in (1, 7, 1000):
+        assert (frame_of({"picture": picture[:n_worlds], "self": own[:n_worlds]}).index == 0).all()
 
 
-def test_a_window_in_a_frame_by_hand():
-    plane = torch.arange(1, 10).view(1, 3, 3)
-    place = torch.tensor([[[0, 1]]])
-    mirrored = Frame(sign=torch.tensor([[[-1, 1]]]), swapped=torch.tensor([[False]]))
-    turned = Frame(sign=torch.tensor([[[-1, 1]]]), swapped=torch.tensor([[True]]))
-    assert window(place, (3, 3), 1).of(plane)[0, 0].tolist() == [[0, 0, 0], [1, 2, 3], [4, 5, 6]]
-    assert window(place, (3, 3), 1, mirrored).of(plane)[0, 0].tolist() == [[4, 5, 6], [1, 2, 3], [0, 0, 0]]
-    assert window(place, (3, 3), 1, turned).of(plane)[0, 0].tolist() == [[4, 1, 0], [5, 2, 0], [6, 3, 0]]
+def test_the_critics_map_is_held_so_that_the_fire_lies_to_the_south_east(make_small_env):
+    env = make_small_env(1, world=small_world(landscape=Perlin(size=16)))
+    state = env.reset()["state"].zero_()
+    state[0, 0, 2, 3] = 1.0  # fire
+    state[0, 4, 10, 5] = state[0, 5, 12, 9] = 1.0  # a bulldozer, an aircraft: their middle is (11, 7)
+    state[0, 7, :8, :8], state[0, 7, :8, 8:], state[0, 7, 8:, :8], state[0, 7, 8:, 8:] = 0.9, 0.4, 0.1, -0.3
+    shown = held_state(state)[0]
+    # The fire is nine rows up and four columns to the left: mirrored both, rows and columns swapped.
+    assert shown[0].nonzero().tolist() == [[12, 13]]
+    assert shown[4].nonzero().tolist() == [[10, 5]] and shown[5].nonzero().tolist() == [[6, 3]]
+    # A wind 0.1 to the east and 0.3 to the south: 0.1 to the west and 0.3 to the north, then swapped.
+    quarters = shown[7].unflatten(1, (2, 8)).unflatten(0, (2, 8))[:, 0, :, 0]
+    torch.testing.assert_close(quarters, torch.tensor([[0.9, 0.4], [-0.3, 0.1]]))
+    assert (shown[7, 8:, :8] == shown[7, 8, 0]).all() and (shown[7, 8:, 8:] == shown[7, 8, 8]).all()
 
 
-@pytest.mark.parametrize("name", HEURISTICS)
-def test_heuristics_do_the_same_whichever_way_the_agents_face(make_small_env, name):
-    plain = make_small_env(4)
-    framed = make_small_env(4, observation=PRESETS[1])
-    ours, theirs = (play(env, HEURISTICS[name](env), 11) for env in (plain, framed))
-    assert all((ours[metric] == theirs[metric]).all() for metric in ours)
-
-
-def test_north_is_up_unless_asked(make_small_env):
-    env = make_small_env(2)
-    env.reset()
-    state = env.world_state
-    assert Local().frame(state) is Surroundings().frame(state) is Paper().frame(state) is None
-
-
-def test_agents_that_face_the_fire_need_a_picture_from_where_they_are():
-    with pytest.raises(ValueError, match="facing must be north where centred is false"):
-        Surroundings(facing="fire")
+def test_worlds_really_are_turned():
+    """The check on the check: north up, the eight maps differ."""
+    env = fighting(Local())
+    before = env.world_state.clone()
+    views = [env.set_state(turned_world(before, turn))["agents", "observation", "view"] for turn in TURNS]
+    assert not any(torch.equal(one, another) for one, another in itertools.combinations(views, 2))

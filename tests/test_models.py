@@ -109,7 +109,7 @@ def test_every_way_of_sharing_fits_and_learns(make_small_env, sharing, observati
 
 def test_networks_are_chosen_by_the_role_whatever_the_team(make_small_env):
     env = mixed_env(make_small_env)
-    actor, now = Mlp(sharing="role").actor(signature(env)), env.reset()
+    actor, now = Mlp(sharing="role", facing="north").actor(signature(env)), env.reset()
     assert now["agents", "role"].tolist() == [[0, 1, 0, 1]] * 3
     own = [network(*(now[key] for key in signature(env).observation_keys())) for network in actor.module.networks]
     logits = actor(now)[LOGITS]
@@ -121,7 +121,7 @@ def test_networks_are_chosen_by_the_role_whatever_the_team(make_small_env):
 
 def test_agents_without_sharing_have_a_network_each(make_small_env):
     env = mixed_env(make_small_env)
-    actor, now = Mlp(sharing="none").actor(signature(env)), env.reset()
+    actor, now = Mlp(sharing="none", facing="north").actor(signature(env)), env.reset()
     before = actor(now.clone())[LOGITS]
     nn.init.zeros_(actor.module.networks[2].body[-1].weight)
     after = actor(now)[LOGITS]

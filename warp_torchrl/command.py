@@ -171,9 +171,6 @@ def _check_fits(found: checkpoints.Checkpoint, env: WildfireEnv) -> None:
             f"this environment has {_shapes(here)} and {here.n_actions}"
         )
 
-    facing = found.record().values.get("observation", {}).get("facing", "north")
-    if facing != getattr(env.observation, "facing", "north"):
-        raise ConfigError(f"observation.facing must be {facing}, as the policy in {found.path} was trained")
     own = found.record().values.get("model", {}).get("sharing") == "none"
     if own and here.n_agents != there.n_agents:
         raise ConfigError(

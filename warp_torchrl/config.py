@@ -90,6 +90,8 @@ def _one_line(error: Exception) -> str:
 # What is written into a run folder, and read back
 
 _OPTION = re.compile(r"[A-Za-z0-9_]+")
+_BEFORE = {"model.facing": "north"}
+"""What runs did whose record has none of a key yet."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,7 +140,9 @@ def recompose(record: Record, overrides: Sequence[str] = ()) -> DictConfig:
         touched += WORLD_KEYS
     choices = [f"{group}={option}" for group, option in record.choices.items() if group not in touched]
     config = compose_config("train", [*choices, *overrides])
-    for path, value in _leaves(record.values):
+    recorded = dict(_leaves(record.values))
+    before = {key: value for key, value in _BEFORE.items() if key.split(".")[0] in record.values}
+    for path, value in {**before, **recorded}.items():
         if "${" in str(value):  # what is recorded was resolved: this one was put there to read what is ours
             raise ConfigError(f"{path} in the run folder must be a plain value, got {value!r}")
         if any(path == key or path.startswith(f"{key}.") for key in touched):

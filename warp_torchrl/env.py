@@ -191,8 +191,6 @@ class WildfireEnv(EnvBase):
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         action = self._checked(tensordict.get(("agents", "action"), None))
         with fusing(self._fuses):
-            frame = self.observation.frame(self.world_state)
-            action = action if frame is None else frame.on_map(action)
             transition = self.world.step(self.world_state, action)
             reward = self.reward_function(transition)
             self._state = transition.after
@@ -230,13 +228,10 @@ class WildfireEnv(EnvBase):
         batch = state.batch_size
         team = [*batch, self.n_agents]
         state = state.replace(threat=self.world.threat(state))  # once, for all who look
-        frame = self.observation.frame(state)
-        entries = self.observation(state, self.world, frame)
+        entries = self.observation(state, self.world)
         seen = entries[""] if "" in entries else TensorDict(entries, batch_size=team)
         roles = self.world.team.table(self.device).index.repeat(*batch, 1)
-        mask = self.world.action_mask(state)
-        mask = mask if frame is None else frame.reordered(mask)
-        agents = {"observation": seen, "action_mask": mask, "role": roles}
+        agents = {"observation": seen, "action_mask": self.world.action_mask(state), "role": roles}
         info = metrics(state, self.world.horizon)
         info["episode_reward"] = self._episode_reward if episode_reward is None else episode_reward
         info["episode_length"] = state.step.to(torch.float32)

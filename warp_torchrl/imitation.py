@@ -118,7 +118,8 @@ class _Pupil(TensorDictModuleBase):
         out = self.policy(tensordict)
         if not self._lesson.weight:
             return out.set(TEACHER_ACTION, out.get(ACTION))
-        return out.set(TEACHER_ACTION, self._teacher.advise(tensordict.get(ACTION_MASK)))
+        state = self._teacher.env.world_state
+        return out.set(TEACHER_ACTION, self._teacher.choose(state, tensordict.get(ACTION_MASK)))
 
 
 class _Cloning(BCLoss):

@@ -86,7 +86,7 @@ def test_a_share_of_the_actions_is_drawn_and_the_memory_holds_what_was_done(make
     assert [learner.schedule(p)["rollout/exploration_rate"] for p in (0.5, 0.0)] == pytest.approx([0.05, 0.8])
     for weight in learner.policy.parameters():
         weight.data.zero_()
-    learner.policy.module[0].module.body[-1].bias.data[10] = 100.0  # stays, whatever the noise
+    learner.policy.module[0].module.network.body[-1].bias.data[10] = 100.0  # stays, whatever the noise
     with torch.no_grad():
         batch = env.rollout(4, learner.explore, break_when_any_done=False)
     # 512 actions, all but a share 0.8 (1 - 1 / open actions) of them stay; at 4 to 11 open ones 0.6 to 0.73, +- 0.09.

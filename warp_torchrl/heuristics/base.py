@@ -37,18 +37,11 @@ class Heuristic(TensorDictModuleBase):
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write the team's actions, int64 [B, A]."""
-        return tensordict.set(("agents", "action"), self.advise(tensordict.get(("agents", "action_mask"))))
-
-    def advise(self, mask: Tensor) -> Tensor:
-        """Return what the agents should do now, int64 [B, A], for masks [B, A, 10 or 11]; both in their frames."""
-        state = self.env.world_state
-        frame = self.env.observation.frame(state)
-        if frame is None:
-            return self.choose(state, mask)
-        return frame.steered(self.choose(state, frame.reordered_back(mask)))
+        action = self.choose(self.env.world_state, tensordict.get(("agents", "action_mask")))
+        return tensordict.set(("agents", "action"), action)
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
-        """Return the actions on the map, int64 [B, A], for worlds and action masks [B, A, 10 or 11]."""
+        """Return the actions, int64 [B, A], for worlds and action masks [B, A, 10 or 11]."""
         raise TypeError(f"{type(self).__name__} does not say what to do: define choose()")
 
 

@@ -1,6 +1,7 @@
 """Networks over observations: encoders, and the heads of actors and critics.
 
-They know the shapes of what they read, from a ``Signature``, and nothing of the world.
+They know the shapes of what they read, from a ``Signature``, how it looks when a map is turned, and nothing of the
+world.
 """
 
 from warp_torchrl.models.model import Cnn, Mlp

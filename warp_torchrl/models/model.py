@@ -7,6 +7,7 @@ from typing import Literal
 from tensordict.nn import TensorDictModule
 from torch import nn
 
+from warp_torchrl.models.facing import FacingFire
 from warp_torchrl.models.networks import (
     AgentNetworks,
     Central,
@@ -26,6 +27,7 @@ from warp_torchrl.models.signature import (
     Entry,
     Signature,
 )
+from warp_torchrl.observation.frame import can_be_held
 
 _ACTIVATIONS = {"tanh": nn.Tanh, "relu": nn.ReLU}
 
@@ -40,17 +42,21 @@ class Mlp:
         actor_hidden: Sizes of the hidden layers of actors and of the action values that act.
         critic_hidden: Sizes of the critics'.
         activation: ``tanh`` or ``relu``.
+        facing: ``fire``, each network holds the map so that the fire that an agent sees lies between its east and its
+            south-east, see ``FacingFire``: what it learns of one case it knows of all eight. ``north``, as it is given.
         dtype: ``bfloat16`` computes the layers in half precision (weights stay float32), several times faster on
             processors that have it and several times slower on those that have not; ``auto`` takes it where they do.
 
     Raises:
-        ValueError: If a size is not in 1..8192 or there is no hidden layer.
+        ValueError: If a size is not in 1..8192 or there is no hidden layer, or, when networks are made, if they should
+            face a fire in observations that are of no preset.
     """
 
     sharing: Literal["team", "role", "none"] = "team"
     actor_hidden: tuple[int, ...] = (128, 128)
     critic_hidden: tuple[int, ...] = (128, 128)
     activation: Literal["tanh", "relu"] = "tanh"
+    facing: Literal["north", "fire"] = "fire"
     dtype: Literal["auto", "float32", "bfloat16"] = "float32"
 
     def __post_init__(self) -> None:
@@ -112,6 +118,10 @@ class Mlp:
             keys.append(ROLE)
         if central:
             network, keys = Central(network, len(signature.state.shape), action), [STATE, *keys]
+        if self.facing == "fire":
+            if not can_be_held({name: entry.shape for name, entry in signature.observation.items()}):
+                raise ValueError("model.facing must be north where observations are of no preset, got fire")
+            network = FacingFire(network, keys, chooses=key in (LOGITS, ACTION_VALUE))
         return TensorDictModule(network, in_keys=keys, out_keys=[key])
 
     def _shared(self, signature: Signature, make: Callable[[], Network]) -> nn.Module:

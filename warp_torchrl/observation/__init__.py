@@ -9,7 +9,7 @@ from warp_torchrl.observation.coarse import (
     central_state,
     picture,
 )
-from warp_torchrl.observation.frame import Frame, facing
+from warp_torchrl.observation.frame import Frame, can_be_held, frame_of, held, held_state
 from warp_torchrl.observation.own import SELF_SIZE, WIND_SCALE, own_vector
 from warp_torchrl.observation.presets import Local, Observation, Paper, Space, Surroundings
 from warp_torchrl.observation.view import CHANNELS, ELEVATION_SCALE, egocentric_view, window
@@ -30,9 +30,12 @@ __all__ = [
     "Space",
     "Surroundings",
     "block_means",
+    "can_be_held",
     "central_state",
     "egocentric_view",
-    "facing",
+    "frame_of",
+    "held",
+    "held_state",
     "own_vector",
     "picture",
     "window",

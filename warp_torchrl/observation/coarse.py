@@ -4,7 +4,6 @@ import torch
 from torch import Tensor
 from torch.nn.functional import adaptive_avg_pool2d, one_hot
 
-from warp_torchrl.observation.frame import Frame, facing
 from warp_torchrl.observation.own import WIND_SCALE, steps_to_tick, time_left
 from warp_torchrl.observation.view import ELEVATION_SCALE, window
 from warp_torchrl.world.flags import number
@@ -49,24 +48,15 @@ def picture(state: WorldState) -> Tensor:
     return torch.cat((seen[:, None].expand(-1, place.shape[1], -1, -1, -1), mates), dim=2)
 
 
-def frame_by_picture(state: WorldState) -> Frame:
-    """Return the frames in which the fire that the picture shows lies between each agent's east and south-east."""
-    height, width = state.cells.shape[1:]
-    fire = block_means(number(is_burning(state.cells))[:, None], PICTURE_SIDE).flatten(2)
-    block = torch.arange(PICTURE_SIDE, device=fire.device) + 0.5
-    middle = torch.cartesian_prod(block * (height / PICTURE_SIDE) - 0.5, block * (width / PICTURE_SIDE) - 0.5)
-    return facing(fire, middle - state.vehicles.position[:, :, None])
-
-
-def centred_picture(state: WorldState, frame: Frame | None = None) -> Tensor:
+def centred_picture(state: WorldState) -> Tensor:
     """Return the picture with the agent's own block in the middle, uint8 [B, A, 3, 15, 15]; 0 off the map.
 
-    What it tells is what ``picture`` does; where things are is told from where the agent is, in its frame.
+    What it tells is what ``picture`` does; where things are is told from where the agent is.
     """
     sides, middle = (PICTURE_SIDE, PICTURE_SIDE), PICTURE_SIDE - 1
     fire, fuel = (_fire_and_fuel(state) * 255.0).to(torch.uint8).unbind(1)
     block = _block(state, PICTURE_SIDE)
-    about = window(torch.stack((block // PICTURE_SIDE, block % PICTURE_SIDE), dim=-1), sides, middle, frame)
+    about = window(torch.stack((block // PICTURE_SIDE, block % PICTURE_SIDE), dim=-1), sides, middle)
     mates = about.of(one_hot(block, PICTURE_SIDE**2).sum(1).view(-1, *sides))
     mates[..., middle, middle] -= 1
     return torch.stack((about.of(fire), about.of(fuel), (mates.clamp_(max=4) * 63).to(torch.uint8)), dim=2)

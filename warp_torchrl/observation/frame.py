@@ -1,85 +1,201 @@
-"""Frames: how each agent holds the map, so that what it learns of a fire on one side it knows of all.
+"""Frames: how one may hold the map, so that what is learnt of a fire on one side is known of all.
 
-The fire's law is the same on a map that is turned or mirrored (with its wind), and so is what a team should do. An
-agent in a frame of its own sees the map turned and mirrored so that the fire lies between its east and its south-east,
-and steers in the same terms; the environment translates.
+The fire's law is the same on a map that is turned or mirrored (with its wind), and so is what a team should do. Whoever
+reads observations may hold each turned and mirrored so that the fire that it shows lies between the east and the
+south-east, and say what to do in the same terms: what is learnt of one case then holds for all eight (canonical inputs,
+as in Kaba et al., "Equivariance with learned canonicalization functions", 2023, with a rule in place of the learnt
+function). A frame is told by the observation alone, so agents that use one are as decentralised as any.
 """
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
 import torch
 from torch import Tensor
 
+from warp_torchrl.observation.coarse import PICTURE, PICTURE_SIDE, STATE
+from warp_torchrl.observation.own import IDENTITY_SIZE, LAST_ACTION, PLACE, SELF_SIZE, WIND
+from warp_torchrl.observation.view import CHANNELS
 from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.state import Action
 
-NEAR = 2.0
-"""Distance that is added to that of a fire, so that those at hand count alike [cells]."""
+NEAR_CELLS, NEAR_BLOCKS = 2.0, 0.5
+"""Distance that is added to that of a fire, so that those at hand count alike [cells of a view, blocks of a map]."""
+_PARTS = 2.0**16
+"""Pulls are whole numbers of such parts: sums are exact in any order, so that a tie is a tie in any batch."""
+_SYMMETRIES = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """The frames of the agents of a batch of worlds.
+    """How maps are held, one of the eight symmetries of the square each.
 
     Attributes:
-        sign: -1 where rows, columns are mirrored, else 1, int64 [B, A, 2].
-        swapped: Whether rows and columns change places after that, bool [B, A].
+        index: int64 [...]: 4 where rows are mirrored, and 2 where columns are, and 1 where rows and columns change
+            places after that.
     """
 
-    sign: Tensor
-    swapped: Tensor
+    index: Tensor
 
-    def turned(self, vector: Tensor) -> Tensor:
-        """Return vectors (rows, columns) of the map as each agent holds them, [B, A, 2]."""
-        signed = vector * self.sign
-        return torch.where(self.swapped[..., None], signed.flip(-1), signed)
+    def vectors(self, vector: Tensor) -> Tensor:
+        """Return vectors (rows, columns) [..., 2] of the map as they are in the frame."""
+        signed = vector * _signs(vector.device).to(vector.dtype)[self.index]
+        return torch.where((self.index % 2 == 1)[..., None], signed.flip(-1), signed)
 
-    def steered(self, action: Tensor) -> Tensor:
-        """Return actions on the map, int64 [B, A], as each agent would say them."""
-        return _table(False, action.device)[self._index(), action]
+    def maps(self, maps: Tensor) -> Tensor:
+        """Return square maps [..., C, S, S] as they are in the frame."""
+        cell = _cells(maps.shape[-1], maps.device)[self.index].unsqueeze(-2).expand(*maps.shape[:-2], -1)
+        return maps.flatten(-2).gather(-1, cell).view(maps.shape)
 
-    def on_map(self, action: Tensor) -> Tensor:
-        """Return what the actions that agents say, int64 [B, A], are on the map."""
-        return _table(True, action.device)[self._index(), action]
+    def actions(self, entries: Tensor) -> Tensor:
+        """Return an entry for each action on the map [..., 10 or 11] in the order of what they are in the frame."""
+        return entries.gather(-1, _actions(True, entries.device)[self.index, : entries.shape[-1]])
 
-    def reordered(self, entries: Tensor) -> Tensor:
-        """Return an entry for each action on the map, [B, A, 10 or 11], in the order in which each agent says them."""
-        return entries.gather(-1, _table(True, entries.device)[self._index(), : entries.shape[-1]])
-
-    def reordered_back(self, entries: Tensor) -> Tensor:
-        """Undo ``reordered``."""
-        return entries.gather(-1, _table(False, entries.device)[self._index(), : entries.shape[-1]])
-
-    def _index(self) -> Tensor:
-        mirrored = (self.sign < 0).to(torch.int64)
-        return mirrored[..., 0] * 4 + mirrored[..., 1] * 2 + self.swapped
+    def actions_on_map(self, entries: Tensor) -> Tensor:
+        """Undo ``actions``."""
+        return entries.gather(-1, _actions(False, entries.device)[self.index, : entries.shape[-1]])
 
 
-def facing(fire: Tensor, away: Tensor) -> Frame:
-    """Return the frames in which the fire lies between the agent's east and its south-east.
+def can_be_held(shapes: Mapping[str, tuple[int, ...]]) -> bool:
+    """Return whether observations of these shapes, by name, are of a preset that shows the fire."""
+    sides = {name: shape[-1] for name, shape in shapes.items()}
+    if set(shapes) == {""}:
+        side = math.isqrt(sides[""] // 3)
+        return sides[""] == 3 * side * side and side % 2 == 1
+    if set(shapes) not in ({"view", "self"}, {"view", "self", "picture"}):
+        return False
+    pictures = {(len(PICTURE), side, side) for side in (PICTURE_SIDE, 2 * PICTURE_SIDE - 1)}
+    return (
+        shapes["view"] == (len(CHANNELS), sides["view"], sides["view"])
+        and sides["self"] in (SELF_SIZE, SELF_SIZE + IDENTITY_SIZE)
+        and shapes.get("picture", (len(PICTURE), PICTURE_SIDE, PICTURE_SIDE)) in pictures
+    )
 
-    Where it lies is told by the sum of the offsets to what burns, each over (its king's moves + ``NEAR``)^3.
+
+def frame_of(observation: Mapping[str, Tensor]) -> Frame:
+    """Return how agents hold the map so that the fire that they see lies between their east and their south-east.
+
+    Where it lies is told by the picture where there is one, else by the view: by the sum of the offsets to what burns,
+    each over (its king's moves + a little)^3.
 
     Args:
-        fire: What burns, float32 [B, 1 or A, N].
-        away: Offset (rows, columns) of each [cells], float32 [B, A, N, 2].
+        observation: Entries of a preset, batch dimensions first, by name.
+
+    Returns:
+        Frames [...] of the batch dimensions.
     """
-    weight = fire / (away.abs().amax(-1) + NEAR) ** 3
-    pull = (weight[..., None] * away).sum(-2)
-    side = pull.abs()
-    return Frame(sign=1 - 2 * (pull < 0.0).to(torch.int64), swapped=side[..., 0] > side[..., 1])
+    if "picture" in observation:
+        fire = observation["picture"][..., PICTURE.index("fire"), :, :]
+        if fire.shape[-1] == PICTURE_SIDE:
+            return _facing(_pull_from(observation["self"][..., PLACE] * PICTURE_SIDE, fire))
+        return _facing(_pull(fire, NEAR_BLOCKS))
+    if "view" in observation:
+        return _facing(_pull(observation["view"][..., CHANNELS.index("fire_stage"), :, :] > 0, NEAR_CELLS))
+    return _facing(_pull(_planes(observation[""])[..., -1, :, :] > 0, NEAR_CELLS))
+
+
+def held(name: str, entry: Tensor, frame: Frame) -> Tensor:
+    """Return an entry of an observation, batch dimensions first, as it is in the frame."""
+    if name == "self":
+        place, clock, wind, others, last, more = entry.split([*_SELF_PARTS, entry.shape[-1] - sum(_SELF_PARTS)], dim=-1)
+        place, wind, last = frame.vectors(place - 0.5) + 0.5, _wind(wind, frame), frame.actions(last)
+        return torch.cat((place, clock, wind, others, last, more), dim=-1)
+    return frame.maps(_planes(entry)).flatten(-3) if name == "" else frame.maps(entry)
+
+
+def held_state(state: Tensor) -> Tensor:
+    """Return the critic's states [..., C, 16, 16] as the middle of the team holds them, facing the fire."""
+    side = state.shape[-1]
+    team = state[..., _AGENTS, :, :].sum(-3)
+    along = torch.arange(side, device=state.device) + 0.5
+    place = torch.stack([(each * along).sum(-1) for each in (team.sum(-1), team.sum(-2))], dim=-1)
+    frame = _facing(_pull_from(place / team.sum((-2, -1))[..., None], state[..., STATE.index("fire"), :, :]))
+    quarters = state[..., -1, :, :].unflatten(-1, (2, side // 2)).unflatten(-3, (2, side // 2))
+    clock, wind = quarters[..., 0, 0, :, 0], quarters[..., 1, 0, :, 0]
+    constants = torch.stack((clock, _wind(wind, frame)), dim=-2)[..., :, None, :, None].expand_as(quarters)
+    return torch.cat((frame.maps(state[..., :-1, :, :]), constants.reshape(state[..., -1:, :, :].shape)), dim=-3)
+
+
+_AGENTS = slice(STATE.index("ugv"), STATE.index("uav") + 1)
+_SELF_PARTS = [
+    PLACE.stop,
+    WIND.start - PLACE.stop,
+    WIND.stop - WIND.start,
+    LAST_ACTION.start - WIND.stop,
+    LAST_ACTION.stop - LAST_ACTION.start,
+]
+
+
+def _wind(wind: Tensor, frame: Frame) -> Tensor:
+    """Return winds (east, north) [..., 2] as they are in the frame."""
+    east, north = wind.unbind(-1)
+    south, east = frame.vectors(torch.stack((-north, east), dim=-1)).unbind(-1)
+    return torch.stack((east, -south), dim=-1)
+
+
+def _facing(pull: Tensor) -> Frame:
+    """Return the frames in which pulls (rows, columns), int64 [..., 2], point between east and south-east."""
+    mirrored, size = (pull < 0).to(torch.int64), pull.abs()
+    return Frame(mirrored[..., 0] * 4 + mirrored[..., 1] * 2 + (size[..., 0] > size[..., 1]))
+
+
+def _pull(fire: Tensor, near: float) -> Tensor:
+    """Return which way fire pulls whoever is in the middle of it, int64 [..., 2], of whole numbers [..., S, S]."""
+    return (fire.flatten(-2).to(torch.float64) @ _units(fire.shape[-1], near, fire.device)).to(torch.int64)
+
+
+def _pull_from(place: Tensor, fire: Tensor) -> Tensor:
+    """Return which way fire in blocks, float32 [..., S, S], pulls from places [blocks] [..., 2], int64 [..., 2]."""
+    side = fire.shape[-1]
+    along = torch.arange(side, device=fire.device) + 0.5
+    down, across = along - place[..., :1], along - place[..., 1:]
+    distance = torch.maximum(down.abs()[..., :, None], across.abs()[..., None, :]) + NEAR_BLOCKS
+    weight = fire * _PARTS / (distance * distance * distance)
+    pulls = weight * down[..., :, None], weight * across[..., None, :]
+    return torch.stack([each.round().to(torch.int64).sum((-2, -1)) for each in pulls], dim=-1)
+
+
+def _planes(entry: Tensor) -> Tensor:
+    """Return the planes of a flat view, [..., 3, V, V]."""
+    side = math.isqrt(entry.shape[-1] // 3)
+    return entry.unflatten(-1, (3, side, side))
+
+
+@lru_cache(maxsize=16)
+def _units(side: int, near: float, device: torch.device) -> Tensor:
+    """Return how fire at each cell about the middle pulls, whole numbers, float64 [S S, 2]."""
+    along = torch.arange(side, dtype=torch.float64) - side // 2
+    away = torch.cartesian_prod(along, along)
+    return (away * _PARTS / (away.abs().amax(-1, keepdim=True) + near) ** 3).round().to(device)
 
 
 @lru_cache(maxsize=8)
-def _table(on_map: bool, device: torch.device) -> Tensor:
-    """Return each action in each frame, on the map or as the agent says it, int64 [8, 11]."""
-    corner = torch.tensor([-1, 1])
-    sign = torch.cartesian_prod(-corner, -corner).repeat_interleave(2, dim=0)
-    swapped = torch.tensor([False, True]).repeat(4)
-    offsets = torch.tensor(DIRECTIONS).expand(8, -1, -1)
-    seen = Frame(sign=sign[:, None], swapped=swapped[:, None]).turned(offsets)
-    moves = (seen[:, :, None] == offsets[:, None]).all(-1).to(torch.int64).argmax(-1)
-    moves = moves.argsort(-1) if on_map else moves
-    others = torch.arange(len(DIRECTIONS), len(Action)).expand(8, -1)
-    return torch.cat((moves, others), dim=-1).to(device)
+def _signs(device: torch.device) -> Tensor:
+    """Return what each frame does to rows and columns before they change places, 1 or -1, int64 [8, 2]."""
+    corner = torch.tensor([1, -1])
+    return torch.cartesian_prod(corner, corner).repeat_interleave(2, dim=0).to(device)
+
+
+@lru_cache(maxsize=32)
+def _cells(side: int, device: torch.device) -> Tensor:
+    """Return the flat index of what each cell of a map shows in each frame, int64 [8, S S]."""
+    cell = torch.arange(side * side).view(side, side)
+    found = []
+    for index, signs in enumerate(_signs(cell.device).tolist()):
+        mirrored = cell.flip([axis for axis, sign in enumerate(signs) if sign < 0])
+        found.append((mirrored.T if index % 2 else mirrored).flatten())
+    return torch.stack(found).to(device)
+
+
+@lru_cache(maxsize=8)
+def _actions(in_frame: bool, device: torch.device) -> Tensor:
+    """Return which action on the map each one in a frame is, or the other way round, int64 [8, 11]."""
+    moves = torch.tensor(DIRECTIONS)
+    frames = Frame(torch.arange(_SYMMETRIES)[:, None].expand(-1, len(moves)))
+    turned = frames.vectors(moves.expand(_SYMMETRIES, -1, -1))
+    index = (turned[:, :, None] == moves).all(-1).to(torch.int64).argmax(-1)  # of each move on the map
+    index = index.argsort(-1) if in_frame else index
+    others = torch.arange(len(moves), len(Action)).expand(_SYMMETRIES, -1)
+    return torch.cat((index, others), dim=-1).to(device)

@@ -6,7 +6,6 @@ import torch
 from torch import Tensor
 from torch.nn.functional import one_hot
 
-from warp_torchrl.observation.frame import Frame
 from warp_torchrl.world.role import ROLE_NAMES
 from warp_torchrl.world.state import Action, WorldState
 from warp_torchrl.world.world import World
@@ -16,31 +15,28 @@ IDENTITY_SIZE = 4
 SELF_SIZE = 9 + len(ROLE_NAMES) + len(Action)
 """Entries of ``self``: row, column, time left, wind east and north, steps to the tick, tank, whether it has a tank,
 whether it may refill here, role (one-hot), last action (one-hot, zeros before the first)."""
+PLACE, WIND, LAST_ACTION = slice(0, 2), slice(3, 5), slice(9 + len(ROLE_NAMES), SELF_SIZE)
+"""Where ``self`` tells of the agent's row and column, of the wind, and of its last action."""
 WIND_SCALE = 20.0
 """Wind that an observation shows as 1 [m/s]."""
 
 
-def own_vector(state: WorldState, world: World, frame: Frame | None = None) -> Tensor:
-    """Return what each agent knows of itself, in its frame, float32 [B, A, F], see ``SELF_SIZE``."""
+def own_vector(state: WorldState, world: World) -> Tensor:
+    """Return what each agent knows of itself, float32 [B, A, F], see ``SELF_SIZE``."""
     height, width = state.cells.shape[1:]
     vehicles = state.vehicles
     row, column = vehicles.position.to(torch.float32).unbind(-1)
-    row, column = row / max(height - 1, 1), column / max(width - 1, 1)
     shape = row.shape
     roles = one_hot(world.team.table(row.device).index, len(ROLE_NAMES)).expand(*shape, -1)
     last = one_hot(vehicles.last_action + 1, len(Action) + 1)[..., 1:]
     full = world.team.tank or 1
-    east, north = _own_wind(state).unbind(-1)
-    if frame is not None:
-        row, column = (frame.turned(torch.stack((row, column), dim=-1) - 0.5) + 0.5).unbind(-1)
-        south, east = frame.turned(torch.stack((-north, east), dim=-1)).unbind(-1)
-        north, last = -south, frame.reordered(last)
+    wind = _own_wind(state)
     columns = [
-        row,
-        column,
+        row / max(height - 1, 1),
+        column / max(width - 1, 1),
         time_left(state, world)[:, None].expand(shape),
-        east,
-        north,
+        wind[..., 0],
+        wind[..., 1],
         steps_to_tick(state, world)[:, None].expand(shape),
         vehicles.tank.abs() / full,
         (vehicles.tank >= 0).to(torch.float32),

@@ -4,15 +4,14 @@ Its ``spaces`` tell the environment the shape, type and range of each entry, and
 """
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
-from warp_torchrl.observation.coarse import PICTURE, PICTURE_SIDE, centred_picture, frame_by_picture, picture
-from warp_torchrl.observation.frame import Frame
+from warp_torchrl.observation.coarse import PICTURE, PICTURE_SIDE, centred_picture, picture
 from warp_torchrl.observation.own import IDENTITY_SIZE, SELF_SIZE, identity, own_vector
-from warp_torchrl.observation.view import CHANNELS, ages, egocentric_view, frame_by_view, stages, window
+from warp_torchrl.observation.view import CHANNELS, ages, egocentric_view, stages, window
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.world import World
@@ -39,8 +38,6 @@ class Local:
         radius: r [cells].
         identity: Whether ``self`` ends with the agent's place in its team, see ``identity``: agents that stand together
             and see the same can then part.
-        facing: ``north``, or ``fire``: each agent holds the map in a ``Frame`` of its own, in which the fire that it
-            sees lies between its east and its south-east, and what it sees, knows and does is told in that frame.
 
     Raises:
         ValueError: If the radius is not in 1..32.
@@ -48,7 +45,6 @@ class Local:
 
     radius: int = 5
     identity: bool = False
-    facing: Literal["north", "fire"] = "north"
 
     def __post_init__(self) -> None:
         check_fields(self, radius=(1, 32))
@@ -61,17 +57,13 @@ class Local:
             "self": Space((SELF_SIZE + IDENTITY_SIZE * self.identity,), torch.float32, -3.0, 3.0),
         }
 
-    def __call__(self, state: WorldState, world: World, frame: Frame | None = None) -> dict[str, Tensor]:
-        """Return ``view`` uint8 [B, A, C, V, V] and ``self`` float32 [B, A, F], in the agents' frames."""
-        own = own_vector(state, world, frame)
+    def __call__(self, state: WorldState, world: World) -> dict[str, Tensor]:
+        """Return ``view`` uint8 [B, A, C, V, V] and ``self`` float32 [B, A, F]."""
+        own = own_vector(state, world)
         if self.identity:
             who = identity(own.shape[1], own.device)
             own = torch.cat((own, who.expand(len(own), -1, -1)), dim=-1)
-        return {"view": egocentric_view(state, world, self.radius, frame), "self": own}
-
-    def frame(self, state: WorldState) -> Frame | None:
-        """Return how the agents hold the map; None where north is up for all."""
-        return frame_by_view(state, self.radius) if self.facing == "fire" else None
+        return {"view": egocentric_view(state, world, self.radius), "self": own}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,15 +77,10 @@ class Surroundings(Local):
         centred: Whether the agent's own block is the middle of the picture, which then has 15 x 15 blocks, uint8.
 
     Raises:
-        ValueError: If the radius is not in 1..32, or agents face the fire with a picture that is not centred.
+        ValueError: If the radius is not in 1..32.
     """
 
     centred: bool = False
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.facing == "fire" and not self.centred:
-            raise ValueError("facing must be north where centred is false, got fire")
 
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
@@ -101,14 +88,10 @@ class Surroundings(Local):
         dtype, high = (torch.uint8, 255) if self.centred else (torch.float32, 1.0)
         return {**super().spaces(world), "picture": Space((len(PICTURE), side, side), dtype, 0, high)}
 
-    def __call__(self, state: WorldState, world: World, frame: Frame | None = None) -> dict[str, Tensor]:
-        """Return ``view``, ``self``, and ``picture`` float32 [B, A, 3, 8, 8], or as ``centred`` says."""
-        shown = centred_picture(state, frame) if self.centred else picture(state)
-        return {**super().__call__(state, world, frame), "picture": shown}
-
-    def frame(self, state: WorldState) -> Frame | None:
-        """Return how the agents hold the map; None where north is up for all."""
-        return frame_by_picture(state) if self.facing == "fire" else None
+    def __call__(self, state: WorldState, world: World) -> dict[str, Tensor]:
+        """Return ``view``, ``self``, and ``picture`` float32 [B, A, 3, 8, 8]."""
+        shown = centred_picture(state) if self.centred else picture(state)
+        return {**super().__call__(state, world), "picture": shown}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,10 +116,7 @@ class Paper:
         """Return the space of the one, nameless entry."""
         return {"": Space((3 * (2 * self.radius + 1) ** 2,), torch.float32, 0.0, 1.0)}
 
-    def frame(self, state: WorldState) -> None:
-        """Return None: north is up for all."""
-
-    def __call__(self, state: WorldState, world: World, frame: Frame | None = None) -> dict[str, Tensor]:
+    def __call__(self, state: WorldState, world: World) -> dict[str, Tensor]:
         """Return one entry, float32 [B, A, 3 (2 r + 1)^2]."""
         seen = window(state.vehicles.position, state.cells.shape[1:], self.radius)
         cells = seen.of(state.cells)

@@ -7,7 +7,6 @@ import torch
 from torch import Tensor
 from torch.nn.functional import one_hot
 
-from warp_torchrl.observation.frame import Frame, facing
 from warp_torchrl.world.flags import byte, equal
 from warp_torchrl.world.role import ROLE_NAMES
 from warp_torchrl.world.state import FIRST_FIRE, WorldState, is_burning, is_tree
@@ -45,32 +44,25 @@ class Window:
         return plane.flatten(1).gather(1, self.index).view_as(self.inside).mul_(self.inside)
 
 
-def window(position: Tensor, size: Sequence[int], radius: int, frame: Frame | None = None) -> Window:
+def window(position: Tensor, size: Sequence[int], radius: int) -> Window:
     """Return the squares about the agents.
 
     Args:
         position: int64 [B, A, 2] [cells].
         size: (H, W) of the map [cells].
         radius: r [cells]; V = 2 r + 1.
-        frame: How each agent holds the map; north up where None.
     """
     height, width = size
     away = torch.arange(-radius, radius + 1, device=position.device)
-    signed = away if frame is None else away * frame.sign[..., None]
-    row, column = (position[..., None] + signed).unbind(2)
+    row, column = position[..., 0, None] + away, position[..., 1, None] + away
     on_row, on_column = (row >= 0) & (row < height), (column >= 0) & (column < width)
-    down, across = row.clamp(0, height - 1) * width, column.clamp(0, width - 1)
-    index, inside = down[..., None] + across[..., None, :], on_row[..., None] & on_column[..., None, :]
-    if frame is not None:
-        swapped = frame.swapped[..., None, None]
-        index, inside = (torch.where(swapped, each.transpose(2, 3), each) for each in (index, inside))
-    return Window(index.flatten(1), byte(inside))
+    index = row.clamp(0, height - 1)[..., None] * width + column.clamp(0, width - 1)[..., None, :]
+    return Window(index.flatten(1), byte(on_row[..., None] & on_column[..., None, :]))
 
 
-def egocentric_view(state: WorldState, world: World, radius: int, frame: Frame | None = None) -> Tensor:
-    """Return the agents' own views in the channels ``CHANNELS``, uint8 [B, A, C, V, V], each in its frame."""
-    seen = window(state.vehicles.position, state.cells.shape[1:], radius, frame)
-    elevation = state.landscape.elevation
+def egocentric_view(state: WorldState, world: World, radius: int) -> Tensor:
+    """Return the agents' own views in the channels ``CHANNELS``, uint8 [B, A, C, V, V]."""
+    seen, elevation = window(state.vehicles.position, state.cells.shape[1:], radius), state.landscape.elevation
     cells = seen.of(state.cells)
     role = world.team.table(cells.device).index
     channels = (
@@ -89,13 +81,6 @@ def egocentric_view(state: WorldState, world: World, radius: int, frame: Frame |
     others = view[:, :, -len(ROLE_NAMES) :, radius, radius]
     others -= one_hot(role, len(ROLE_NAMES)).to(torch.uint8) * 63
     return view
-
-
-def frame_by_view(state: WorldState, radius: int) -> Frame:
-    """Return the frames in which the fire that each agent sees lies between its east and its south-east."""
-    seen = window(state.vehicles.position, state.cells.shape[1:], radius).of(byte(is_burning(state.cells)))
-    away = torch.arange(-radius, radius + 1, device=seen.device).to(torch.float32)
-    return facing(seen.flatten(2), torch.cartesian_prod(away, away).expand(*seen.shape[:2], -1, -1))
 
 
 def ages(cells: Tensor) -> Tensor:
