@@ -188,7 +188,7 @@ def test_what_is_of_no_preset_is_read_north_up(make_small_env, changed):
     shape = signature(make_small_env(2))
     entries = {name: entry.shape for name, entry in shape.observation.items()} | changed
     other = shape._replace(observation={name: Entry(size, "float32") for name, size in entries.items() if size})
-    with pytest.raises(ValueError, match="model.facing must be north where observations are of no preset, got fire"):
+    with pytest.raises(ValueError, match=r"model\.facing must be north where observations are of no preset, got fire"):
         Mlp().actor(other)
     assert Mlp(facing="north").actor(other) is not None
 
