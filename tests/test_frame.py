@@ -202,6 +202,8 @@ def test_the_fire_lies_between_east_and_south_east(name):
     entries = PRESETS[name](state, world)
     frame, found = frame_of(entries), 0
     what, channel = ("view", CHANNELS.index("fire_stage")) if name == "local" else ("picture", 0)
+    if name == "centred":
+        entries["view"].zero_()  # what an agent sees itself goes first, and is not in the middle of a block
     for plane in held(what, entries[what], frame)[0, :, channel]:
         for row, column in (plane.nonzero() - len(plane) // 2).tolist():
             assert 0 <= row <= column
@@ -252,9 +254,15 @@ def test_a_tie_is_a_tie_in_any_batch():
     """Fires at the corners of a diamond pull nowhere: north stays up, in one world and in a thousand."""
     picture = torch.zeros(1000, 1, 3, 8, 8)
     picture[:, :, 0, [1, 5, 3, 3], [3, 3, 1, 5]] = 0.3
-    own = torch.full((1000, 1, 24), 3.5 / 8)
+    entries = {
+        "picture": picture,
+        "self": torch.full((1000, 1, SELF_SIZE), 3.5 / 8),
+        "view": torch.zeros(1000, 1, len(CHANNELS), 11, 11, dtype=torch.uint8),
+    }
     for n_worlds in (1, 7, 1000):
-        assert (frame_of({"picture": picture[:n_worlds], "self": own[:n_worlds]}).index == 0).all()
+        assert (frame_of({name: entry[:n_worlds] for name, entry in entries.items()}).index == 0).all()
+    entries["view"][:, 0, CHANNELS.index("fire_stage"), 7, 4] = 51  # two cells down, one to the left
+    assert (frame_of(entries).index == framed(1, -1, True).index).all(), "what it sees itself goes first"
 
 
 def test_the_critics_map_is_held_so_that_the_fire_lies_to_the_south_east(make_small_env):

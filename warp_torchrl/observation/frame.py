@@ -77,8 +77,8 @@ def can_be_held(shapes: Mapping[str, tuple[int, ...]]) -> bool:
 def frame_of(observation: Mapping[str, Tensor]) -> Frame:
     """Return how agents hold the map so that the fire that they see lies between their east and their south-east.
 
-    Where it lies is told by the picture where there is one, else by the view: by the sum of the offsets to what burns,
-    each over (its king's moves + a little)^3.
+    Where it lies is told by the view where that shows any, else by the picture: by the sum of the offsets to what
+    burns, each over (its king's moves + a little)^3.
 
     Args:
         observation: Entries of a preset, batch dimensions first, by name.
@@ -86,14 +86,13 @@ def frame_of(observation: Mapping[str, Tensor]) -> Frame:
     Returns:
         Frames [...] of the batch dimensions.
     """
+    view = observation["view"] if "view" in observation else _planes(observation[""])
+    near = view[..., CHANNELS.index("fire_stage") if "view" in observation else -1, :, :] > 0
+    pull = _pull(near, NEAR_CELLS)
     if "picture" in observation:
-        fire = observation["picture"][..., PICTURE.index("fire"), :, :]
-        if fire.shape[-1] == PICTURE_SIDE:
-            return _facing(_pull_from(observation["self"][..., PLACE] * PICTURE_SIDE, fire))
-        return _facing(_pull(fire, NEAR_BLOCKS))
-    if "view" in observation:
-        return _facing(_pull(observation["view"][..., CHANNELS.index("fire_stage"), :, :] > 0, NEAR_CELLS))
-    return _facing(_pull(_planes(observation[""])[..., -1, :, :] > 0, NEAR_CELLS))
+        seen = near.flatten(-2).any(-1)[..., None]
+        pull = torch.where(seen, pull, _pull_of_picture(observation["picture"], observation["self"]))
+    return _facing(pull)
 
 
 def held(name: str, entry: Tensor, frame: Frame) -> Tensor:
@@ -144,6 +143,14 @@ def _facing(pull: Tensor) -> Frame:
 def _pull(fire: Tensor, near: float) -> Tensor:
     """Return which way fire pulls whoever is in the middle of it, int64 [..., 2], of whole numbers [..., S, S]."""
     return (fire.flatten(-2).to(torch.float64) @ _units(fire.shape[-1], near, fire.device)).to(torch.int64)
+
+
+def _pull_of_picture(picture: Tensor, own: Tensor) -> Tensor:
+    """Return which way the fire of pictures [..., 3, S, S] pulls, int64 [..., 2]; ``own`` tells where agents are."""
+    fire = picture[..., PICTURE.index("fire"), :, :]
+    if fire.shape[-1] == PICTURE_SIDE:
+        return _pull_from(own[..., PLACE] * PICTURE_SIDE, fire)
+    return _pull(fire, NEAR_BLOCKS)
 
 
 def _pull_from(place: Tensor, fire: Tensor) -> Tensor:
