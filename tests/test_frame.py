@@ -22,6 +22,7 @@ from warp_torchrl.models import (
 )
 from warp_torchrl.observation import (
     CHANNELS,
+    SELF_SIZE,
     Frame,
     Local,
     Paper,
