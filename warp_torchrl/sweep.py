@@ -75,9 +75,24 @@ def failures(folder: Path) -> list[Failure]:
 def method(record: Record) -> tuple[str, str]:
     """Return what a trained policy is called in a sweep, and a digest of its configuration but for the seed."""
     names = [record.choices[group] for group in ("algorithm", "reward", "observation")]
-    names += taught(record)
+    names += [*told(record), *taught(record)]
     values = {key: value for key, value in record.values.items() if key not in ("seed", "device", "evaluation")}
     return " ".join(names), sha256(json.dumps(_with_floats(values), sort_keys=True).encode()).hexdigest()
+
+
+_USUAL = {
+    ("model", "sharing"): ("team",),
+    ("model", "facing"): ("fire",),
+    ("observation", "radius"): (5, 3),  # 3 is the paper's
+    ("reward", "barrier_rule"): ("cut_off",),
+}
+"""What a policy's name does not tell, since most have it."""
+
+
+def told(record: Record) -> list[str]:
+    """Return what is unusual in how a policy was trained, as its overrides have it."""
+    found = {(group, key): record.values.get(group, {}).get(key) for group, key in _USUAL}
+    return [f"{key[1]}={value}" for key, value in found.items() if value is not None and value not in _USUAL[key]]
 
 
 def taught(record: Record) -> list[str]:

@@ -1,0 +1,29 @@
+"""What runs are called in the tables of a sweep."""
+
+import pytest
+
+from warp_torchrl.config import Record, compose_config, plain
+from warp_torchrl.sweep import method
+
+
+@pytest.mark.parametrize(
+    ("overrides", "named"),
+    [
+        ([], "mappo efficiency surroundings"),
+        (["algorithm=ippo", "model.sharing=none"], "ippo efficiency surroundings sharing=none"),
+        (["model.facing=north", "observation.radius=7"], "mappo efficiency surroundings facing=north radius=7"),
+        (["reward=paper", "reward.barrier_rule=printed"], "mappo paper surroundings barrier_rule=printed"),
+        (["observation=paper", "imitation.teacher=local"], "mappo efficiency paper taught by local"),
+    ],
+)
+def test_a_policy_is_called_by_what_is_unusual(overrides, named):
+    chosen = dict(each.split("=") for each in overrides)
+    usual = {"algorithm": "mappo", "reward": "efficiency", "observation": "surroundings"}
+    choices = {group: chosen.get(group, option) for group, option in usual.items()}
+    record = Record(choices=choices, values=plain(compose_config("train", overrides)))
+    assert method(record)[0] == named
+
+
+def test_a_record_from_before_a_key_tells_nothing_of_it():
+    choices = {"algorithm": "mappo", "reward": "time", "observation": "local"}
+    assert method(Record(choices=choices, values={"model": {"sharing": "team"}}))[0] == "mappo time local"
