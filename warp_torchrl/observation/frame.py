@@ -111,10 +111,12 @@ def held_state(state: Tensor) -> Tensor:
     along = torch.arange(side, device=state.device) + 0.5
     place = torch.stack([(each * along).sum(-1) for each in (team.sum(-1), team.sum(-2))], dim=-1)
     frame = _facing(_pull_from(place / team.sum((-2, -1))[..., None], state[..., STATE.index("fire"), :, :]))
+    shown = frame.maps(state)
     quarters = state[..., -1, :, :].unflatten(-1, (2, side // 2)).unflatten(-3, (2, side // 2))
     clock, wind = quarters[..., 0, 0, :, 0], quarters[..., 1, 0, :, 0]
-    constants = torch.stack((clock, _wind(wind, frame)), dim=-2)[..., :, None, :, None].expand_as(quarters)
-    return torch.cat((frame.maps(state[..., :-1, :, :]), constants.reshape(state[..., -1:, :, :].shape)), dim=-3)
+    constants = torch.stack((clock, _wind(wind, frame)), dim=-2)[..., :, None, :, None]
+    shown[..., -1, :, :] = constants.expand_as(quarters).reshape(state[..., -1, :, :].shape)
+    return shown
 
 
 _AGENTS = slice(STATE.index("ugv"), STATE.index("uav") + 1)
