@@ -1,5 +1,6 @@
 """Every yaml builds, says what its class says, and mistakes are told with key, value and rule."""
 
+import shutil
 from dataclasses import fields
 from pathlib import Path
 
@@ -163,3 +164,16 @@ def test_classes_never_come_from_a_record():
     for choices in ({"scenario": "../../evil"}, {"hydra": "x"}):
         with pytest.raises(ConfigError, match="not one of our options"):
             recompose(Record(choices=choices, values={}))
+
+
+def test_a_yaml_file_that_was_edited_is_read_anew(tmp_path, monkeypatch):
+    shutil.copytree(conf_folder(), tmp_path / "conf")
+    monkeypatch.setattr("warp_torchrl.config.conf_folder", lambda: tmp_path / "conf")
+    first = compose_config("train", ["wind=calm"])
+    first.horizon = 7  # the caller's own
+    assert compose_config("train", ["wind=calm"]).horizon == 128
+    (tmp_path / "conf" / "scenario" / "skirmish.yaml").write_text("# @package _global_\nhorizon: 99\n")
+    assert compose_config("train", ["wind=calm"]).horizon == 99
+    (tmp_path / "conf" / "wind" / "calm.yaml").unlink()
+    with pytest.raises(ConfigError, match="wind must be one of"):
+        compose_config("train", ["wind=calm"])

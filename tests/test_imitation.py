@@ -95,12 +95,12 @@ def test_the_learners_own_terms_and_state_stay_as_they_are(tmp_path):
 
 
 def test_a_pupil_comes_to_do_what_its_teacher_does(tmp_path):
-    training = pupil(tmp_path, "total_frames=3200", "imitation.until=1.0", "algorithm.epochs=4")
+    training = pupil(tmp_path, "total_frames=960", "imitation.until=1.0", "algorithm.epochs=4")
     agreed = []
     for batch in training.collection:
         agreed.append(float((batch[ACTION] == batch[TEACHER_ACTION]).float().mean()))
         training._learn(batch)
-        if training.frames >= 3200:
+        if training.frames >= 960:
             break
     early, late = sum(agreed[:5]) / 5, sum(agreed[-5:]) / 5
     assert early < 0.25 and late > 1.6 * early, (early, late)  # a policy without a teacher stays at one in nine

@@ -7,7 +7,9 @@ one of this package's own; nothing that is read from a run folder is ever instan
 import os
 import re
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, cast
 
@@ -63,14 +65,25 @@ def is_sweep(name: str, overrides: Sequence[str]) -> bool:
 
 
 def _compose(name: str, overrides: Sequence[str], with_hydra: bool = False) -> DictConfig:
-    GlobalHydra.instance().clear()
     try:
-        with initialize_config_dir(str(conf_folder()), version_base="1.3"):
-            return compose(name, overrides=list(overrides), return_hydra_config=with_hydra)
+        folder = conf_folder()
+        return deepcopy(_composed(folder, _last_change(folder), name, tuple(overrides), with_hydra))
     except (HydraException, OmegaConfBaseException) as error:
         raise ConfigError(_one_line(error)) from None
     except ValueError as error:
         raise ConfigError(f"{_one_line(error)}, in {' '.join(overrides)}") from None
+
+
+@lru_cache(maxsize=64)
+def _composed(folder: Path, last_change: int, name: str, overrides: tuple[str, ...], with_hydra: bool) -> DictConfig:
+    """Return a composed configuration, which takes Hydra a fifth of a second: once for each state of the files."""
+    GlobalHydra.instance().clear()
+    with initialize_config_dir(str(folder), version_base="1.3"):
+        return compose(name, overrides=list(overrides), return_hydra_config=with_hydra)
+
+
+def _last_change(folder: Path) -> int:
+    return max(path.stat().st_mtime_ns for path in (folder, *folder.glob("**/*")))
 
 
 def _one_line(error: Exception) -> str:
