@@ -75,7 +75,7 @@ def failures(folder: Path) -> list[Failure]:
 def method(record: Record) -> tuple[str, str]:
     """Return what a trained policy is called in a sweep, and a digest of its configuration but for the seed."""
     names = [record.choices[group] for group in ("algorithm", "reward", "observation")]
-    names += [*told(record), *taught(record)]
+    names += [*unusual(record), *taught(record)]
     values = {key: value for key, value in record.values.items() if key not in ("seed", "device", "evaluation")}
     return " ".join(names), sha256(json.dumps(_with_floats(values), sort_keys=True).encode()).hexdigest()
 
@@ -89,7 +89,7 @@ _USUAL = {
 """What a policy's name does not tell, since most have it."""
 
 
-def told(record: Record) -> list[str]:
+def unusual(record: Record) -> list[str]:
     """Return what is unusual in how a policy was trained, as its overrides have it."""
     found = {(group, key): record.values.get(group, {}).get(key) for group, key in _USUAL}
     return [f"{key[1]}={value}" for key, value in found.items() if value is not None and value not in _USUAL[key]]

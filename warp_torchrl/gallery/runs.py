@@ -13,7 +13,7 @@ import yaml
 
 from warp_torchrl.checkpoint import Checkpoint, CheckpointError, newest
 from warp_torchrl.config import Record
-from warp_torchrl.sweep import method, taught
+from warp_torchrl.sweep import method, taught, unusual
 
 FRAMES, SECONDS = "time/frames", "time/seconds"
 MOST_ROWS = 400
@@ -124,7 +124,7 @@ def _recorded(found: Checkpoint, record: Record) -> dict[str, Any]:
         algorithm, reward, observation = (
             str(record.choices[group]) for group in ("algorithm", "reward", "observation")
         )
-        names = (" ".join((algorithm, *taught(record))), reward, observation)
+        names = (" ".join((algorithm, *unusual(record), *taught(record))), reward, observation)
         _, digest = method(record)
         n_agents, seed = record.values["team"]["n_agents"], str(record.values["seed"])
     except (KeyError, TypeError, AttributeError):
