@@ -240,11 +240,16 @@ def test_a_run_starts_from_another_ones_networks_on_another_scenario(trained, ru
 
 @pytest.mark.parametrize(
     ("path", "said", "expected"),
-    [("nowhere", "nowhere is not a run folder", 4), ("alone", "holds a policy alone", 4)],
+    [
+        ("nowhere", "nowhere is not a run folder", 4),
+        ("alone", "holds a policy alone", 4),
+        ("run model.facing=north", "was trained by another algorithm or other networks", 4),
+    ],
 )
 def test_a_start_that_is_none_is_refused_before_anything_is_written(trained, run_here, tmp_path, path, said, expected):
     checkpoint.export(checkpoint.newest(trained[0])[0], tmp_path / "alone")
-    code, errors, _ = run_here("train.py", *SHORT, f"start_from={path}")
+    path, *others = path.replace("run", str(trained[0])).split()
+    code, errors, _ = run_here("train.py", *SHORT, f"start_from={path}", *others)
     assert code == expected and said in errors[-1] and len(errors) == 1
     assert not (tmp_path / "run").exists()
 

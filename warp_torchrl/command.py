@@ -38,6 +38,7 @@ from warp_torchrl.settings import COMPONENTS, Settings, settings
 from warp_torchrl.signals import Stopped, obeyed
 from warp_torchrl.sweep import SweepSummary, jobs, method, note_failure
 from warp_torchrl.training import Training
+from warp_torchrl.transfer import check_start
 
 log = logging.getLogger("warp_torchrl")
 
@@ -251,9 +252,9 @@ def _check_first(name: str, arguments: Sequence[str]) -> None:
 
 def _check_training(config: DictConfig, overrides: Sequence[str]) -> None:
     if config.resume is None:
-        settings(plain(config))
+        plan = settings(plain(config))
         if config.start_from is not None:
-            checkpoints.newest(config.start_from)[0].check_goes_on()
+            check_start(plan, checkpoints.newest(config.start_from)[0])
         return
     others = [each for each in overrides if each.split("=")[0] not in ("resume", "debug")]
     if others:

@@ -23,6 +23,7 @@ from warp_torchrl.progress import TRAIN_COLUMNS, episode_columns, line
 from warp_torchrl.reward_scale import RewardScale
 from warp_torchrl.settings import TRAINING_SEEDS, Settings
 from warp_torchrl.signals import Noted, Stopped
+from warp_torchrl.transfer import learnt
 
 log = logging.getLogger("warp_torchrl")
 _SECONDS_BETWEEN_LINES = 15.0
@@ -205,11 +206,8 @@ class Training:
         Raises:
             CheckpointError: If it trained by another kind of loss or other networks.
         """
-        own, theirs = self.learner.loss.state_dict(), found.training()["loss"]
-        mine, given = ({name: each for name, each in state.items() if _is_learnt(name)} for state in (own, theirs))
-        if {name: each.shape for name, each in mine.items()} != {name: each.shape for name, each in given.items()}:
-            raise checkpoints.CheckpointError(f"{found.path} was trained by another algorithm or other networks")
-        self.learner.loss.load_state_dict({**own, **given})
+        loss = self.learner.loss
+        loss.load_state_dict({**loss.state_dict(), **learnt(found, loss)})
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything that a run needs to go on exactly as if never stopped."""
@@ -262,8 +260,3 @@ class Training:
     def close(self) -> None:
         """Shut the collector down."""
         self.collection.close()
-
-
-def _is_learnt(name: str) -> bool:
-    """Return whether an entry of a loss's state is a parameter or the running scale of values, and not a setting."""
-    return "_params." in name or name.startswith("value_norm.")
