@@ -36,7 +36,10 @@ TINY = [
 
 
 REPLAYS = ("dqn", "vdn", "qmix", "sac", "ddpg", "maddpg")
-REPLAY = ["algorithm.capacity=100", "algorithm.warm_up=64", "algorithm.updates=2"]
+REPLAY = ["algorithm.capacity=60", "algorithm.warm_up=32", "algorithm.updates=2"]
+
+
+TINIER = ["horizon=10", "collector.steps=4", "total_frames=96", "checkpoint.interval=32", "evaluation.mode=sampled"]
 
 
 def tiny(run, *overrides):
@@ -93,7 +96,7 @@ def never_stopped(tmp_path_factory):
     def get(name):
         if name not in done:
             run = tmp_path_factory.mktemp("whole")
-            training = tiny(run, "evaluation.mode=sampled", *RUNS[name])
+            training = tiny(run, *TINIER, *RUNS[name])
             training.train()
             done[name] = run, training
         return done[name]
@@ -120,7 +123,7 @@ FAST = {
 def test_a_run_resumed_equals_a_run_not_interrupted(tmp_path, never_stopped, stop_after, name):
     folder, whole = never_stopped(name)
     (tmp_path / "cut").mkdir()
-    first = tiny(tmp_path / "cut", "evaluation.mode=sampled", *RUNS[name])
+    first = tiny(tmp_path / "cut", *TINIER, *RUNS[name])
     batches = iter(first.collection)
     for _ in range(stop_after):
         first.metrics.add({"time/frames": 0, "time/seconds": 0.0, "time/fps": 0.0, **first._learn(next(batches))})
@@ -128,7 +131,7 @@ def test_a_run_resumed_equals_a_run_not_interrupted(tmp_path, never_stopped, sto
     extra = first._learn(next(batches))  # lost with the crash that comes now
     first.metrics.add({"time/frames": 0, "time/seconds": 0.0, "time/fps": 0.0, **extra})
     torch.manual_seed(123)
-    second = tiny(tmp_path / "cut", "evaluation.mode=sampled", *RUNS[name])
+    second = tiny(tmp_path / "cut", *TINIER, *RUNS[name])
     second.load_state_dict(newest(tmp_path / "cut")[0].training())
     second.train()
     ours, theirs = flattened(second.state_dict()), flattened(whole.state_dict())

@@ -61,7 +61,7 @@ def is_sweep(name: str, overrides: Sequence[str]) -> bool:
         ConfigError: If there is no such experiment, in one line.
     """
     chosen = [each for each in overrides if each.startswith("experiment=")]
-    return _compose(name, chosen, with_hydra=True).hydra.mode == RunMode.MULTIRUN
+    return bool(chosen) and _compose(name, chosen, with_hydra=True).hydra.mode == RunMode.MULTIRUN
 
 
 def _compose(name: str, overrides: Sequence[str], with_hydra: bool = False) -> DictConfig:
