@@ -107,7 +107,7 @@ def test_evaluate_takes_another_scenario_for_the_same_policy(trained, run_here):
     what = (f"checkpoint={trained[0]}", "scenario=single", "evaluation.episodes=3", "horizon=12")
     code, errors, said = run_here("evaluate.py", *what)
     assert code == 0, errors
-    assert "single: 3 fires" in said
+    assert "single horizon=12: 3 fires" in said
 
 
 def test_a_policy_is_refused_where_it_does_not_fit(trained, run_here):
@@ -394,5 +394,5 @@ def test_a_sweep_of_evaluations_ends_in_one_table_and_one_figure(tmp_path, run_h
     code, errors, said = run_here("evaluate.py", "-m", *what)
     assert code == 0, errors
     text = (tmp_path / "sweep" / "summary.md").read_text()
-    assert "| skirmish | greedy | 1 | 4 |" in text and text.strip() in said
+    assert "| skirmish landscape.size=12 horizon=20 | greedy | 1 | 4 |" in text and text.strip() in said
     assert (tmp_path / "sweep" / "summary.png").stat().st_size > 10_000

@@ -7,7 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from warp_torchrl.config import Record, compose_config, conf_folder, is_sweep, plain, recompose, without_targets
+from warp_torchrl.config import (
+    Record,
+    compose_config,
+    conf_folder,
+    is_sweep,
+    plain,
+    recompose,
+    without_targets,
+    world_overrides,
+)
 from warp_torchrl.construction import ConfigError, build
 from warp_torchrl.settings import COMPONENTS, settings
 from warp_torchrl.world.array import Array
@@ -177,3 +186,18 @@ def test_a_yaml_file_that_was_edited_is_read_anew(tmp_path, monkeypatch):
     (tmp_path / "conf" / "wind" / "calm.yaml").unlink()
     with pytest.raises(ConfigError, match="wind must be one of"):
         compose_config("train", ["wind=calm"])
+
+
+@pytest.mark.parametrize(
+    ("overrides", "expected"),
+    [
+        ([], []),
+        (["scenario=large", "reward=time", "n_worlds=3"], []),
+        (["team.n_agents=4", "wind.speed=10"], ["wind.speed=10", "team.n_agents=4"]),
+        (["team.roles=[uav,ugv]", "fire=hazard"], ["fire=hazard", "team.roles=['uav','ugv']"]),
+        (["landscape=raster", "landscape.path=/tmp/land", "horizon=9"], ["landscape=raster", "horizon=9"]),
+        (["wind=calm", "fire=paper"], ["wind=calm", "fire.growth=True", "fire.beta=0.65", "fire.p_regrow=0.01"]),
+    ],
+)
+def test_worlds_are_told_by_what_differs_from_their_scenario(overrides, expected):
+    assert world_overrides(plain(compose_config("train", overrides))) == expected

@@ -55,6 +55,12 @@ def test_yardsticks_that_met_other_worlds_are_left_out(sweep):
     assert [entry.policy for entry in gather(sweep)] == ["random", "mappo", "local", "local"]
 
 
+def test_worlds_that_differ_from_their_scenario_s_are_a_place_of_their_own(sweep):
+    path = sweep / "2" / "evaluation.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"world_overrides": ["team.n_agents=4", "horizon=9"]}))
+    assert [entry.scenario for entry in gather(sweep)] == ["tiny", "tiny team.n_agents=4 horizon=9", "other"]
+
+
 def test_runs_that_were_trained_differently_are_told_apart(sweep):
     write(sweep / "4", "mappo", [0.1, 0.1, 0.1], configuration="bbbbbbbb")
     assert [entry.policy for entry in gather(sweep)] == ["mappo aaaaaa", "local", "local", "mappo bbbbbb"]

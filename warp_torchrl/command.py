@@ -16,7 +16,16 @@ from warp_torchrl import checkpoint as checkpoints
 from warp_torchrl import disk
 from warp_torchrl.allocation import keep_freed_memory
 from warp_torchrl.api import policy_of
-from warp_torchrl.config import Record, compose_config, conf_folder, is_sweep, plain, recompose, without_targets
+from warp_torchrl.config import (
+    Record,
+    compose_config,
+    conf_folder,
+    is_sweep,
+    plain,
+    recompose,
+    without_targets,
+    world_overrides,
+)
 from warp_torchrl.construction import ConfigError
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation import (
@@ -81,7 +90,7 @@ def _start(folder: Path, config: DictConfig) -> None:
     training = Training(settings(plain(config)), record, folder)
     if config.start_from is not None:
         training.start_from(_newest(config.start_from))
-    _finish(training)
+    _finish(training, world_overrides(plain(config)))
 
 
 def _resume(folder: Path) -> None:
@@ -89,18 +98,19 @@ def _resume(folder: Path) -> None:
     if found.manifest.mode is not None and (folder / "evaluation.json").exists():
         log.info("%s is finished", folder)
         return
-    training = Training(settings(plain(recompose(found.record()))), found.record(), folder)
+    values = plain(recompose(found.record()))
+    training = Training(settings(values), found.record(), folder)
     training.load_state_dict(found.training())
     log.info("resumed %s at %d frames", found.path, training.frames)
-    _finish(training)
+    _finish(training, world_overrides(values))
 
 
-def _finish(training: Training) -> None:
+def _finish(training: Training, worlds: Sequence[str]) -> None:
     try:
         training.train()
     finally:
         training.close()
-    _report(training.settings, training.run, checkpoints.newest(training.run)[0])
+    _report(training.settings, training.run, checkpoints.newest(training.run)[0], worlds)
 
 
 def _newest(path: str | Path) -> checkpoints.Checkpoint:
@@ -115,15 +125,23 @@ def _evaluate_job(config: DictConfig) -> None:
     folder = Path(HydraConfig.get().runtime.output_dir)
     given, name = config.checkpoint, config.policy
     if given is None:
-        _report(settings(_without_checkpoint(config)), folder, name)
+        _report(settings(_without_checkpoint(config)), folder, name, world_overrides(plain(config)))
         return
     found = _newest(given)
     overrides = [each for each in HydraConfig.get().overrides.task if not each.startswith(("checkpoint=", "policy="))]
-    _report(settings(plain(recompose(found.record(), overrides))), folder, found)
+    values = plain(recompose(found.record(), overrides))
+    _report(settings(values), folder, found, world_overrides(values))
 
 
-def _report(plan: Settings, folder: Path, found: checkpoints.Checkpoint | str) -> None:
-    """Evaluate a checkpoint or a heuristic beside the yardsticks: table, ``evaluation.json`` and ``episode.gif``."""
+def _report(plan: Settings, folder: Path, found: checkpoints.Checkpoint | str, worlds: Sequence[str]) -> None:
+    """Evaluate a checkpoint or a heuristic beside the yardsticks: table, ``evaluation.json`` and ``episode.gif``.
+
+    Args:
+        plan: Of the worlds.
+        folder: Where to.
+        found: What is evaluated.
+        worlds: How they differ from their scenario's, as overrides.
+    """
     first, folder = plan.evaluation.first_seed, folder.resolve()
     env = plan.make_env(plan.evaluation.episodes, first)
     one = plan.make_env(1, first)
@@ -145,7 +163,7 @@ def _report(plan: Settings, folder: Path, found: checkpoints.Checkpoint | str) -
     if plan.evaluation.leave_one_out:
         left_out = {agent: play(env, LeftOut(actor, index), first, mode) for index, agent in enumerate(env.agent_names)}
     learner, digest = (None, "") if isinstance(found, str) else method(found.record())
-    content = report(plan.scenario, name, first, episodes, others, other_modes, left_out, learner, digest)
+    content = report(plan.scenario, name, first, episodes, others, other_modes, left_out, learner, digest, worlds)
     write_json(folder / "evaluation.json", content)
     print(table(content), flush=True)
     with disk.telling(folder / "episode.gif"):

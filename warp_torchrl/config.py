@@ -132,6 +132,36 @@ def without_targets(node: Any) -> Any:
     return list(node) if isinstance(node, list) else node
 
 
+def world_overrides(values: Mapping[str, Any]) -> list[str]:
+    """Return how a configuration's worlds differ from those of its scenario, as overrides; files are not named.
+
+    Args:
+        values: Plain, with ``_target_``.
+    """
+    choices = [f"scenario={values['scenario']}"]
+    usual = _composed_worlds(choices)
+    for group, parts in values.items():
+        if group in usual and isinstance(parts, Mapping) and parts.get("_target_") != usual[group].get("_target_"):
+            options = (f"{group}={path.stem}" for path in sorted((conf_folder() / group).glob("*.yaml")))
+            of_its_class = (
+                each for each in options if _composed_worlds([*choices, each])[group]["_target_"] == parts["_target_"]
+            )
+            choices.append(next(of_its_class))
+            usual = _composed_worlds(choices)
+    usual = dict(_leaves(usual))
+    changed = [
+        f"{path}={value}".replace(" ", "")
+        for path, value in _leaves({key: values[key] for key in WORLD_KEYS if key in values})
+        if usual[path] != value and not path.endswith(".path")
+    ]
+    return choices[1:] + changed
+
+
+def _composed_worlds(choices: Sequence[str]) -> dict[str, Any]:
+    composed = plain(_compose("train", choices))
+    return {key: composed[key] for key in WORLD_KEYS}
+
+
 def recompose(record: Record, overrides: Sequence[str] = ()) -> DictConfig:
     """Compose the configuration of a record anew from this package's own files, and lay its values over it.
 

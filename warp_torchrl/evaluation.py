@@ -107,6 +107,7 @@ def report(
     left_out: Mapping[str, Episodes] | None = None,
     method: str | None = None,
     configuration: str = "",
+    world_overrides: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Return the content of ``evaluation.json``.
 
@@ -120,6 +121,7 @@ def report(
         left_out: The same policy's with an agent left out, by the agent's name.
         method: What the policy is called beside others; its name where None.
         configuration: Tells policies of one method that were trained differently apart.
+        world_overrides: How the worlds differ from the scenario's, as overrides.
     """
     if "noop" in others:
         episodes = episodes | {"averted": episodes["saved"] - others["noop"]["saved"]}
@@ -131,6 +133,7 @@ def report(
     ]
     return {
         "scenario": scenario,
+        "world_overrides": list(world_overrides),
         "policy": policy,
         "method": policy if method is None else method,
         "configuration": configuration,
@@ -160,7 +163,7 @@ def table(content: Mapping[str, Any]) -> str:
     header = (
         f"{'policy':<22}{'saved %':>8}{'95 % interval':>16}{'iqm %':>8}{'success %':>11}{'control':>9}{'cleared %':>11}"
     )
-    lines = [f"{content['scenario']}: {len(content['seeds'])} fires, seeds from {content['seeds'][0]}", header]
+    lines = [f"{place(content)}: {len(content['seeds'])} fires, seeds from {content['seeds'][0]}", header]
     rows = {**content["yardsticks"], **content["other_modes"], content["policy"]: content["metrics"]}
     for name, summary in rows.items():
         saved = summary["saved"]
@@ -178,6 +181,11 @@ def table(content: Mapping[str, Any]) -> str:
         )
     lines += _behaviour_lines(content)
     return "\n".join(lines)
+
+
+def place(content: Mapping[str, Any]) -> str:
+    """Return what the worlds of a report are called: their scenario, and how they differ from it."""
+    return " ".join((content["scenario"], *content.get("world_overrides", ())))
 
 
 def _behaviour_lines(content: Mapping[str, Any]) -> list[str]:

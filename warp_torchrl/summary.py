@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from warp_torchrl.evaluation import place
 from warp_torchrl.statistics import compare, performance_profile, summarise
 
 LEVELS = np.linspace(0.0, 1.0, 101)
@@ -36,7 +37,7 @@ def gather(*folders: Path) -> list[Entry]:
     found: dict[_Key, list[Mapping[str, Any]]] = {}
     for path in (path for folder in folders for path in sorted(folder.glob("**/evaluation.json"))):
         content = json.loads(path.read_text(encoding="utf-8"))
-        key = (content["scenario"], content["method"], content["configuration"], tuple(content["seeds"]))
+        key = (place(content), content["method"], content["configuration"], tuple(content["seeds"]))
         found.setdefault(key, []).append(content)
     several = {(scenario, method) for scenario, method, *_ in found if _differ(found, scenario, method)}
     return _yardsticks(found) + [
@@ -172,12 +173,12 @@ def draw(entries: Sequence[Entry], path: Path) -> None:
 
 
 def _draw_bars(axes: Any, group: Sequence[Entry], styles: Mapping[str, Mapping[str, Any]]) -> None:
-    for place, entry in enumerate(reversed(group)):
+    for row, entry in enumerate(reversed(group)):
         saved = summarise(entry.saved)
         mean, (low, high) = 100 * saved["mean"], (100 * bound for bound in saved["ci95"])
-        axes.barh(place, mean, height=0.7, color=styles[entry.policy]["color"], alpha=0.75)
-        axes.errorbar(mean, place, xerr=[[mean - low], [high - mean]], color="#222222", capsize=2.5, linewidth=1.0)
-        axes.text(min(high + 1.5, 93), place, f"{mean:.1f}", va="center", fontsize=7.0)
+        axes.barh(row, mean, height=0.7, color=styles[entry.policy]["color"], alpha=0.75)
+        axes.errorbar(mean, row, xerr=[[mean - low], [high - mean]], color="#222222", capsize=2.5, linewidth=1.0)
+        axes.text(min(high + 1.5, 93), row, f"{mean:.1f}", va="center", fontsize=7.0)
     axes.set(yticks=range(len(group)), yticklabels=[entry.policy for entry in reversed(group)], xlim=(0, 100))
     axes.set_title(f"{group[0].scenario}: mean, 95 % interval", fontsize=8.0)
 
