@@ -13,9 +13,6 @@ import pytest
 from warp_torchrl import checkpoint, load_policy, make_env
 from warp_torchrl import command as command_module
 from warp_torchrl.command import evaluate, train
-from warp_torchrl.config import compose_config, plain
-from warp_torchrl.evaluation import play_heuristics
-from warp_torchrl.settings import settings
 from warp_torchrl.training import Training
 
 ROOT = Path(__file__).parent.parent
@@ -168,7 +165,7 @@ SHORT = [*TINY, "total_frames=64", "evaluation.episodes=2", "evaluation.mode=sam
         (checkpoint.disk, "save_tensors", 1, signal.SIGTERM, [32]),
         pytest.param(checkpoint, "_drop", 2, signal.SIGUSR1, [32, 64], marks=pytest.mark.stress),
         pytest.param(Training, "_learn", 2, signal.SIGINT, [32, 64], marks=pytest.mark.stress),
-        (command_module, "_report", 1, signal.SIGINT, [32, 64]),
+        (command_module, "assess", 1, signal.SIGINT, [32, 64]),
     ],
     ids=["in a save", "in the last save", "in the last iteration", "in the evaluation"],
 )
@@ -204,7 +201,7 @@ def test_a_second_run_in_a_folder_is_refused_and_the_first_goes_on(tmp_path, run
 def test_a_run_that_died_before_its_first_checkpoint_may_start_again(tmp_path, run_here, monkeypatch):
     (tmp_path / "run" / "checkpoints" / ".32.tmp").mkdir(parents=True)
     (tmp_path / "run" / "config.yaml").write_text("old: 1")
-    monkeypatch.setattr(command_module, "_report", lambda *args, **options: None)
+    monkeypatch.setattr(command_module, "assess", lambda *args, **options: None)
     code, errors, _ = run_here("train.py", *SHORT)
     assert code == 0, errors
     assert "old: 1" not in (tmp_path / "run" / "config.yaml").read_text()
@@ -363,29 +360,6 @@ def test_a_mistake_in_a_process_of_its_own(tmp_path):
     assert message in last and last.startswith("error: ")
     assert "Traceback" not in done.stderr
     assert not list(tmp_path.iterdir())
-
-
-def test_the_jobs_of_a_sweep_play_the_yardsticks_once(monkeypatch):
-    asked = []
-
-    def note(env, first_seed, names):
-        asked.append(list(names))
-        return play_heuristics(env, first_seed, names)
-
-    monkeypatch.setattr(command_module, "play_heuristics", note)
-    monkeypatch.setattr(command_module, "_PLAYED", {})
-
-    def yardsticks(names, *overrides):
-        plan = settings(plain(compose_config("train", ["evaluation.episodes=3", *TINY[:2], *overrides])))
-        return command_module._yardsticks(plan, plan.make_env(3, plan.evaluation.first_seed), names)
-
-    first = yardsticks(["noop", "local"])
-    again = yardsticks(["local", "noop"], "seed=7", "algorithm=ppo")
-    assert asked == [["noop", "local"], []] and again["local"] is first["local"]
-    more = yardsticks(["greedy", "local"], "seed=8")
-    assert asked[2] == ["greedy"] and list(more) == ["greedy", "local"]
-    yardsticks(["noop"], "wind.speed=9")
-    assert asked[3] == ["noop"], "other worlds"
 
 
 def test_a_sweep_of_evaluations_ends_in_one_table_and_one_figure(tmp_path, run_here):

@@ -15,7 +15,7 @@ from omegaconf import DictConfig, OmegaConf
 from warp_torchrl import checkpoint as checkpoints
 from warp_torchrl import disk
 from warp_torchrl.allocation import keep_freed_memory
-from warp_torchrl.api import policy_of
+from warp_torchrl.assessment import assess
 from warp_torchrl.config import (
     Record,
     compose_config,
@@ -27,25 +27,11 @@ from warp_torchrl.config import (
     world_overrides,
 )
 from warp_torchrl.construction import ConfigError
-from warp_torchrl.env import WildfireEnv
-from warp_torchrl.evaluation import (
-    MODES,
-    YARDSTICKS,
-    Episodes,
-    LeftOut,
-    play,
-    play_heuristics,
-    record_episode,
-    report,
-    table,
-    write_json,
-)
 from warp_torchrl.failure import fail
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.models import Signature, signature
-from warp_torchrl.settings import COMPONENTS, Settings, settings
+from warp_torchrl.settings import COMPONENTS, settings
 from warp_torchrl.signals import Stopped, obeyed
-from warp_torchrl.sweep import SweepSummary, jobs, method, note_failure
+from warp_torchrl.sweep import SweepSummary, jobs, note_failure
 from warp_torchrl.training import Training
 from warp_torchrl.transfer import check_start
 
@@ -110,7 +96,7 @@ def _finish(training: Training, worlds: Sequence[str]) -> None:
         training.train()
     finally:
         training.close()
-    _report(training.settings, training.run, checkpoints.newest(training.run)[0], worlds)
+    assess(training.settings, training.run, checkpoints.newest(training.run)[0], worlds)
 
 
 def _newest(path: str | Path) -> checkpoints.Checkpoint:
@@ -125,81 +111,12 @@ def _evaluate_job(config: DictConfig) -> None:
     folder = Path(HydraConfig.get().runtime.output_dir)
     given, name = config.checkpoint, config.policy
     if given is None:
-        _report(settings(_without_checkpoint(config)), folder, name, world_overrides(plain(config)))
+        assess(settings(_without_checkpoint(config)), folder, name, world_overrides(plain(config)))
         return
     found = _newest(given)
     overrides = [each for each in HydraConfig.get().overrides.task if not each.startswith(("checkpoint=", "policy="))]
     values = plain(recompose(found.record(), overrides))
-    _report(settings(values), folder, found, world_overrides(values))
-
-
-def _report(plan: Settings, folder: Path, found: checkpoints.Checkpoint | str, worlds: Sequence[str]) -> None:
-    """Evaluate a checkpoint or a heuristic beside the yardsticks: table, ``evaluation.json`` and ``episode.gif``.
-
-    Args:
-        plan: Of the worlds.
-        folder: Where to.
-        found: What is evaluated.
-        worlds: How they differ from their scenario's, as overrides.
-    """
-    first, folder = plan.evaluation.first_seed, folder.resolve()
-    env = plan.make_env(plan.evaluation.episodes, first)
-    one = plan.make_env(1, first)
-    if isinstance(found, checkpoints.Checkpoint):
-        _check_fits(found, env)
-    others, other_modes = _yardsticks(plan, env, [each for each in YARDSTICKS if each != found]), {}
-    if isinstance(found, str):
-        name, mode, policy = found, "sampled", HEURISTICS[found](one)
-        actor = HEURISTICS[found](env)
-        episodes = play(env, actor, first, mode, watch=True)
-    else:
-        policy = policy_of(found, plan.evaluation.mode).to(plan.device)
-        name, mode = f"trained, {policy.mode}", policy.mode
-        actor, episodes = policy, play(env, policy, first, mode, watch=True)
-        other = next(each for each in MODES if each != mode)
-        other_modes = {f"trained, {other}": play(env, policy, first, other)}
-    folder.mkdir(parents=True, exist_ok=True)
-    left_out = {}
-    if plan.evaluation.leave_one_out:
-        left_out = {agent: play(env, LeftOut(actor, index), first, mode) for index, agent in enumerate(env.agent_names)}
-    learner, digest = (None, "") if isinstance(found, str) else method(found.record())
-    content = report(plan.scenario, name, first, episodes, others, other_modes, left_out, learner, digest, worlds)
-    write_json(folder / "evaluation.json", content)
-    print(table(content), flush=True)
-    with disk.telling(folder / "episode.gif"):
-        record_episode(folder / "episode.gif", one, policy, f"{plan.scenario}\n{name}", first, mode)
-    log.info("wrote evaluation.json and episode.gif into %s", folder)
-
-
-_PLAYED: dict[str, tuple[Settings, dict[str, Episodes]]] = {}
-
-
-def _yardsticks(plan: Settings, env: WildfireEnv, names: Sequence[str]) -> dict[str, Episodes]:
-    """Return the episodes of heuristics; the jobs of a sweep that meet the same worlds play them once."""
-    worlds = repr((plan.world, plan.observation, plan.reward, plan.evaluation, plan.device, plan.compile))
-    _, played = _PLAYED.setdefault(worlds, (plan, {}))  # the plan stays alive: no other can come to print the same
-    played |= play_heuristics(env, plan.evaluation.first_seed, [name for name in names if name not in played])
-    return {name: played[name] for name in names}
-
-
-def _check_fits(found: checkpoints.Checkpoint, env: WildfireEnv) -> None:
-    here, there = signature(env), found.manifest.signature
-    if (here.observation, here.n_actions) != (there.observation, there.n_actions):
-        raise ConfigError(
-            f"the policy in {found.path} was trained on observations {_shapes(there)} and {there.n_actions} actions, "
-            f"this environment has {_shapes(here)} and {here.n_actions}"
-        )
-
-    own = found.record().values.get("model", {}).get("sharing") == "none"
-    if own and here.n_agents != there.n_agents:
-        raise ConfigError(
-            f"the policy in {found.path} has a network for each of {there.n_agents} agents, this team has "
-            f"{here.n_agents}"
-        )
-
-
-def _shapes(shape: Signature) -> str:
-    return ", ".join(f"{name or 'vector'} {list(entry.shape)}" for name, entry in shape.observation.items())
+    assess(settings(values), folder, found, world_overrides(values))
 
 
 # What a run folder records
