@@ -7,9 +7,11 @@ import torch
 
 from tests.conftest import small_world
 from tests.test_observation import drawn
+from warp_torchrl.algorithms.ppo import Ppo
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import (
+    ACTION,
     ACTION_ONE_HOT,
     ACTION_VALUE,
     LOGITS,
@@ -18,6 +20,8 @@ from warp_torchrl.models import (
     Cnn,
     Entry,
     Mlp,
+    given_held,
+    hold,
     signature,
 )
 from warp_torchrl.observation import (
@@ -171,6 +175,34 @@ def test_networks_that_face_north_say_something_else():
     shape = signature(fighting(PRESETS["whole map"], steps=0))
     critic = Mlp(facing="north").critic(shape, central=True)
     assert not torch.allclose(critic(there)[VALUE][sees], critic(here)[VALUE][sees], atol=1e-3)
+
+
+@pytest.mark.parametrize("model", [Mlp(), Mlp(sharing="none"), Cnn()], ids=["team", "none", "cnn"])
+@pytest.mark.parametrize("name", PRESETS)
+def test_a_batch_that_is_held_once_is_learnt_from_as_if_it_were_turned_each_time(name, model):
+    env = fighting(PRESETS[name])
+    policy, critic = Ppo().policy(signature(env), model), model.critic(signature(env), central=True)
+    with torch.no_grad():
+        batch = policy(env.rollout(3, policy))
+    kept = batch.clone()
+    held_once = hold(batch)
+    assert (batch == kept).all(), "what was collected stays as it is"
+    assert (held_once[ACTION] != batch[ACTION]).any()
+    ours, theirs = given_held(policy).get_dist(held_once), policy.get_dist(batch)
+    torch.testing.assert_close(ours.log_prob(held_once[ACTION]), theirs.log_prob(batch[ACTION]))
+    torch.testing.assert_close(ours.entropy(), theirs.entropy())
+    assert torch.equal(given_held(critic)(held_once.clone())[VALUE], critic(batch.clone())[VALUE])
+    again = hold(held_once)
+    for key in held_once.keys(True, True):
+        if key[0] != "next":
+            assert torch.equal(again[key], held_once[key]), key
+
+
+def test_networks_given_what_is_held_have_the_same_weights_by_the_same_names():
+    env = fighting(PRESETS["centred"], steps=0)
+    policy = Ppo().policy(signature(env), Mlp())
+    ours, theirs = dict(given_held(policy).named_parameters()), dict(policy.named_parameters())
+    assert set(ours) == set(theirs) and all(ours[name] is weight for name, weight in theirs.items())
 
 
 @pytest.mark.parametrize("name", PRESETS)

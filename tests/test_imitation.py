@@ -9,8 +9,8 @@ from tensordict import TensorDict
 from warp_torchrl.config import Record, compose_config, plain
 from warp_torchrl.construction import ConfigError
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.imitation import TEACHER_ACTION, TEACHERS, Imitation
-from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS
+from warp_torchrl.imitation import TEACHERS, Imitation
+from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, TEACHER_ACTION
 from warp_torchrl.settings import settings
 from warp_torchrl.sweep import method
 from warp_torchrl.training import Training

@@ -7,7 +7,7 @@ from torch import nn
 from tests.conftest import small_world
 from warp_torchrl.algorithms.on_policy import with_advantages
 from warp_torchrl.algorithms.ppo import Ppo
-from warp_torchrl.models import ACTION, LOGITS, OBSERVATION, VALUE, Entry, Mlp, signature
+from warp_torchrl.models import ACTION, LOGITS, OBSERVATION, VALUE, Entry, Mlp, hold, signature
 from warp_torchrl.models.networks import LinearEncoder
 from warp_torchrl.observation import Local, Paper, Surroundings
 from warp_torchrl.world.team import Team
@@ -101,7 +101,7 @@ def test_every_way_of_sharing_fits_and_learns(make_small_env, sharing, observati
         learner = Ppo(central_critic=central, minibatch_size=12).build(env, model, 12)
         with torch.no_grad():
             batch = env.rollout(4, learner.explore, break_when_any_done=False)
-        terms = learner.loss(with_advantages(learner.loss, batch))
+        terms = learner.loss(with_advantages(learner.loss, batch, hold))
         sum(terms[key] for key in learner.loss_keys).backward()
         gradients = [p.grad for p in learner.loss.parameters() if p.requires_grad]
         assert all(g is not None and g.isfinite().all() for g in gradients)

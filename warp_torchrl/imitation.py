@@ -19,12 +19,11 @@ from warp_torchrl.algorithms.on_policy import OnPolicy
 from warp_torchrl.collectors import Direct, Process
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS, Heuristic
-from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS
+from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, TEACHER_ACTION, given_held
 from warp_torchrl.validation import check_fields
 
 TEACHERS = tuple(name for name, rule in HEURISTICS.items() if not rule.remembers)
 """Names of the heuristics that can teach: they tell what to do in any state, whoever led there."""
-TEACHER_ACTION = ("agents", "teacher_action")
 _LOSS, _COLUMN = "loss_bc", "train/cloning_loss"
 
 
@@ -88,7 +87,7 @@ class _Lesson:
 
     def __init__(self, plan: Imitation, learner: Learner) -> None:
         self.plan, self.learner, self.weight = plan, learner, plan.weight
-        self._cloning = _Cloning(learner.policy[0], loss_function=_log_loss)
+        self._cloning = _Cloning(given_held(learner.policy[0]), loss_function=_log_loss)
         self._cloning.set_keys(action=LOGITS)
 
     def terms(self, sample: TensorDictBase) -> TensorDictBase:

@@ -1,5 +1,6 @@
 """What the on-policy algorithms share: actors and critics, advantages over time, and what falls with progress."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
@@ -11,7 +12,19 @@ from torchrl.objectives import LossModule
 
 from warp_torchrl.algorithms.algorithm import Algorithm, falling, masked_actor
 from warp_torchrl.algorithms.learner import Learner
-from warp_torchrl.models import ACTION, LOG_PROB, LOGITS, REWARD, VALUE, Mlp, Signature, signature
+from warp_torchrl.models import (
+    ACTION,
+    LOG_PROB,
+    LOGITS,
+    REWARD,
+    VALUE,
+    Mlp,
+    Signature,
+    faces_fire,
+    given_held,
+    hold,
+    signature,
+)
 
 ADVANTAGE = ("agents", "advantage")
 VALUE_TARGET = ("agents", "value_target")
@@ -71,7 +84,8 @@ class OnPolicy(Algorithm):
         """
         shape = signature(env)
         policy = self.policy(shape, model).to(env.device)
-        loss = self.loss(policy, model.critic(shape, self.central_critic).to(env.device)).to(env.device)
+        critic = model.critic(shape, self.central_critic).to(env.device)
+        loss = self.loss(given_held(policy), given_held(critic)).to(env.device)
         loss.value_estimator.value_network = None  # it reads the values that ``with_advantages`` adds
         optimizer = torch.optim.Adam(loss.parameters(), lr=self.learning_rate, eps=1e-5)
 
@@ -87,7 +101,7 @@ class OnPolicy(Algorithm):
 
         def store(batch: TensorDictBase) -> None:
             buffer.empty()
-            buffer.extend(with_advantages(loss, batch))
+            buffer.extend(with_advantages(loss, batch, hold if faces_fire(policy) else _as_it_is))
 
         return Learner(
             policy=policy,
@@ -125,15 +139,24 @@ class OnPolicy(Algorithm):
         return {}
 
 
-def with_advantages(loss: LossModule, batch: TensorDictBase) -> TensorDictBase:
+Hold = Callable[[TensorDictBase], TensorDictBase]
+"""Makes what a loss's networks read of what was collected."""
+
+
+def with_advantages(loss: LossModule, batch: TensorDictBase, hold: Hold) -> TensorDictBase:
     """Add advantages and value targets over time, then drop what the loss does not read; [B, T] -> [B T]."""
     with torch.no_grad():
-        _add_values(loss, batch)
+        batch = hold(batch)
+        _add_values(loss, batch, hold)
         loss.value_estimator(batch)
     return batch.exclude("next", "info", LOGITS, VALUE).reshape(-1)
 
 
-def _add_values(loss: LossModule, batch: TensorDictBase) -> None:
+def _as_it_is(batch: TensorDictBase) -> TensorDictBase:
+    return batch
+
+
+def _add_values(loss: LossModule, batch: TensorDictBase, hold: Hold) -> None:
     """Add the values of each step's state and of the one that it led to, in one pass of the critic and a little.
 
     What a step led to is the next step's state, but where an episode or the batch ended.
@@ -143,7 +166,7 @@ def _add_values(loss: LossModule, batch: TensorDictBase) -> None:
     ends[:, -1] = True
     with loss.critic_network_params.to_module(loss.critic_network):
         value = loss.critic_network(batch.select(*keys))[VALUE]
-        last = loss.critic_network(batch["next"].select(*keys)[ends])[VALUE]
+        last = loss.critic_network(hold(batch["next"].select(*keys)[ends]))[VALUE]
     following = value.roll(-1, dims=1)
     following[ends] = last
     batch.set(VALUE, value)

@@ -4,6 +4,7 @@ They know the shapes of what they read, from a ``Signature``, how it looks when 
 world.
 """
 
+from warp_torchrl.models.facing import faces_fire, given_held, hold
 from warp_torchrl.models.model import Cnn, Mlp
 from warp_torchrl.models.signature import (
     ACTION,
@@ -18,6 +19,7 @@ from warp_torchrl.models.signature import (
     ROLE,
     STATE,
     STATE_ACTION_VALUE,
+    TEACHER_ACTION,
     VALUE,
     Entry,
     Signature,
@@ -37,10 +39,14 @@ __all__ = [
     "ROLE",
     "STATE",
     "STATE_ACTION_VALUE",
+    "TEACHER_ACTION",
     "VALUE",
     "Cnn",
     "Entry",
     "Mlp",
     "Signature",
+    "faces_fire",
+    "given_held",
+    "hold",
     "signature",
 ]

@@ -1,11 +1,17 @@
 """Networks that hold the map so that the fire lies before them."""
 
+from collections.abc import Iterable
+from copy import deepcopy
+from typing import TypeVar
+
+from tensordict import TensorDictBase
 from torch import Tensor, nn
 
-from warp_torchrl.models.signature import ACTION_ONE_HOT, OBSERVATION, STATE
+from warp_torchrl.models.signature import ACTION, ACTION_MASK, ACTION_ONE_HOT, OBSERVATION, STATE, TEACHER_ACTION
 from warp_torchrl.observation.frame import frame_of, held, held_state
 
 Key = str | tuple[str, ...]
+Module = TypeVar("Module", bound=nn.Module)
 
 
 class FacingFire(nn.Module):
@@ -23,7 +29,7 @@ class FacingFire(nn.Module):
     def __init__(self, network: nn.Module, keys: list[Key], chooses: bool) -> None:
         super().__init__()
         self.network, self.keys, self.chooses = network, keys, chooses
-        self._names = {key: "".join(key[len(OBSERVATION) :]) for key in keys if key[: len(OBSERVATION)] == OBSERVATION}
+        self._names = _observed(keys)
 
     def forward(self, *inputs: Tensor) -> Tensor:
         """Return float32 [..., A, out]."""
@@ -37,3 +43,56 @@ class FacingFire(nn.Module):
             given[ACTION_ONE_HOT] = frame.actions(given[ACTION_ONE_HOT])
         out = self.network(*given.values())
         return frame.actions_on_map(out) if self.chooses else out
+
+
+class _Held(nn.Module):
+    """Networks that are given entries as they hold them; their weights have the names that they have elsewhere."""
+
+    def __init__(self, network: nn.Module) -> None:
+        super().__init__()
+        self.network = network
+
+    def forward(self, *inputs: Tensor) -> Tensor:
+        return self.network(*inputs)
+
+
+def faces_fire(module: nn.Module) -> bool:
+    """Return whether networks of a module face the fire."""
+    return any(isinstance(each, FacingFire) for each in module.modules())
+
+
+def given_held(module: Module) -> Module:
+    """Return the same module over what ``hold`` returns, of the same weights: what is seen often is turned once."""
+    twin = deepcopy(module, {id(weight): weight for weight in module.parameters()})
+    for parent in list(twin.modules()):
+        for name, child in list(parent.named_children()):
+            if isinstance(child, FacingFire):
+                setattr(parent, name, _Held(child.network))
+    return twin
+
+
+def hold(batch: TensorDictBase) -> TensorDictBase:
+    """Return a batch as its agents hold it: observations, masks and actions, and the critic's state.
+
+    Args:
+        batch: As it was collected; what is in it of ``ACTION``, ``ACTION_MASK``, ``TEACHER_ACTION`` and ``STATE`` is
+            turned with what was seen. Entries of its ``next`` are not.
+    """
+    names = _observed(batch.keys(include_nested=True, leaves_only=True))
+    frame = frame_of({name: batch.get(key) for key, name in names.items()})
+    out = batch.copy()
+    for key, name in names.items():
+        out.set(key, held(name, batch.get(key), frame))
+    for key in (ACTION, TEACHER_ACTION):
+        if key in batch.keys(include_nested=True):
+            out.set(key, frame.action(batch.get(key)))
+    if ACTION_MASK in batch.keys(include_nested=True):
+        out.set(ACTION_MASK, frame.actions(batch.get(ACTION_MASK)))
+    if STATE in batch.keys():
+        out.set(STATE, held_state(batch.get(STATE)))
+    return out
+
+
+def _observed(keys: Iterable[Key]) -> dict[Key, str]:
+    """Return the names of the observation's entries by their keys."""
+    return {key: "".join(key[len(OBSERVATION) :]) for key in keys if key[: len(OBSERVATION)] == OBSERVATION}

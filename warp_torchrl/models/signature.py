@@ -17,6 +17,7 @@ REWARD = ("agents", "reward")
 ROLE = ("agents", "role")
 STATE = "state"
 STATE_ACTION_VALUE = ("agents", "state_action_value")
+TEACHER_ACTION = ("agents", "teacher_action")
 VALUE = ("agents", "state_value")
 
 

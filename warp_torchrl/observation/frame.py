@@ -53,6 +53,10 @@ class Frame:
         """Return an entry for each action on the map [..., 10 or 11] in the order of what they are in the frame."""
         return entries.gather(-1, _actions(True, entries.device)[self.index, : entries.shape[-1]])
 
+    def action(self, action: Tensor) -> Tensor:
+        """Return what actions on the map, int64 [...], are in the frame."""
+        return _actions(False, action.device)[self.index, action]
+
     def actions_on_map(self, entries: Tensor) -> Tensor:
         """Undo ``actions``."""
         return entries.gather(-1, _actions(False, entries.device)[self.index, : entries.shape[-1]])
