@@ -106,6 +106,7 @@ MISTAKES = [
     ("landscape.size=3", r"landscape\.size must be"),
     ("landscape.size=[8]", r"landscape\.size must be"),
     ("landscape.levels=[0.5,0.2,0.1]", r"landscape\.levels must be in order"),
+    ("landscape=raster landscape.table=fbfm", r"landscape\.table must be fbfm13 or .* or a mapping, got 'fbfm'"),
     ("landscape.thresholds=median", r"landscape\.thresholds must be quantile or minmax or printed"),
     ("wind.speed=-1", r"wind\.speed must be"),
     ("wind.speed=.nan", r"wind\.speed must be"),
@@ -132,7 +133,7 @@ MISTAKES = [
 @pytest.mark.parametrize(("override", "message"), MISTAKES)
 def test_mistakes_are_told_in_one_line(override, message):
     with pytest.raises(ConfigError, match=message) as error:
-        settings(plain(compose_config("train", [override])))
+        settings(plain(compose_config("train", override.split())))
     assert "\n" not in str(error.value)
 
 

@@ -119,5 +119,7 @@ def _describe(hint: object) -> str:
     if origin is tuple:
         items = get_args(hint)
         return f"a list of {_describe(items[0])}" if items[-1] is Ellipsis else f"a list of {len(items)} values"
+    if origin is Mapping:
+        return "a mapping"
     names: dict[object, str] = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}
     return names.get(hint, getattr(hint, "__name__", str(hint)))
