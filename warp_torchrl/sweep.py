@@ -81,18 +81,20 @@ def method(record: Record) -> tuple[str, str]:
 
 
 _USUAL = {
-    ("model", "sharing"): ("team",),
-    ("model", "facing"): ("fire",),
-    ("observation", "radius"): (5, 3),  # 3 is the paper's
-    ("reward", "barrier_rule"): ("cut_off",),
+    ("model", "sharing"): "team",
+    ("model", "facing"): "fire",
+    ("observation", "radius"): 5,
+    ("reward", "barrier_rule"): "cut_off",
 }
 """What a policy's name does not tell, since most have it."""
+_PAPERS_RADIUS = 3
 
 
 def unusual(record: Record) -> list[str]:
     """Return what is unusual in how a policy was trained, as its overrides have it."""
-    found = {(group, key): record.values.get(group, {}).get(key) for group, key in _USUAL}
-    return [f"{key[1]}={value}" for key, value in found.items() if value is not None and value not in _USUAL[key]]
+    usual = _USUAL | ({("observation", "radius"): _PAPERS_RADIUS} if record.choices["observation"] == "paper" else {})
+    found = {(group, key): record.values.get(group, {}).get(key) for group, key in usual}
+    return [f"{key[1]}={value}" for key, value in found.items() if value is not None and value != usual[key]]
 
 
 def taught(record: Record) -> list[str]:
