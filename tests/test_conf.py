@@ -197,6 +197,10 @@ def test_a_yaml_file_that_was_edited_is_read_anew(tmp_path, monkeypatch):
         (["team.n_agents=4", "wind.speed=10"], ["wind.speed=10", "team.n_agents=4"]),
         (["team.roles=[uav,ugv]", "fire=hazard"], ["fire=hazard", "team.roles=['uav','ugv']"]),
         (["landscape=raster", "landscape.path=/tmp/land", "horizon=9"], ["landscape=raster", "horizon=9"]),
+        (
+            ["landscape=raster", "landscape.table={11:3,98:0}"],
+            ["landscape=raster", "landscape.table.11=3", "landscape.table.98=0"],
+        ),
         (["wind=calm", "fire=paper"], ["wind=calm", "fire.growth=True", "fire.beta=0.65", "fire.p_regrow=0.01"]),
     ],
 )

@@ -152,7 +152,7 @@ def world_overrides(values: Mapping[str, Any]) -> list[str]:
     changed = [
         f"{path}={value}".replace(" ", "")
         for path, value in _leaves({key: values[key] for key in WORLD_KEYS if key in values})
-        if usual[path] != value and not path.endswith(".path")
+        if (path not in usual or usual[path] != value) and not path.endswith(".path")
     ]
     return choices[1:] + changed
 

@@ -26,7 +26,8 @@ def test_the_exposure_potential_pays_for_fuel_out_of_reach():
 
 
 @pytest.mark.parametrize("reward", [Efficiency, Time, Coverage, Collaborative, Adaptive, Paper])
-@pytest.mark.parametrize(("potential", "gamma"), [("distance", 0.9), ("exposure", 1.0)])
+@pytest.mark.parametrize("potential", ["distance", "exposure"])
+@pytest.mark.parametrize("gamma", [0.9, 1.0])
 def test_shaping_adds_minus_the_first_potential_to_the_return(make_small_env, reward, potential, gamma):
     """Sum of gamma^t F = -Phi(s0) for an episode that terminates (Ng, Harada and Russell 1999)."""
     quick = small_world(fire=Fire(alpha=(0.0, 0.0, 0.0, 1e-6, 0.0)), horizon=400)
