@@ -227,7 +227,7 @@ class WildfireEnv(EnvBase):
         """Return observations, mask, central state, flags and metrics of the worlds."""
         batch = state.batch_size
         team = [*batch, self.n_agents]
-        state = state.replace(threat=self.world.threat(state))  # once, for all who look
+        state = self.world.with_outlook(state)
         entries = self.observation(state, self.world)
         seen = entries[""] if "" in entries else TensorDict(entries, batch_size=team)
         roles = self.world.team.table(self.device).index.repeat(*batch, 1)

@@ -139,7 +139,7 @@ def test_the_threat_is_the_literal_loop_s(compared: tuple[Fire, WorldState, Lite
             burning = literal.cells[row][column] >= 11
             expected = min(1.0, literal.expected_to_ignite(row, column) / 4.0)
             wanted[row, column] = expected if burning else literal.chance_to_ignite(row, column)
-    torch.testing.assert_close(fire.threat(state)[0], wanted, atol=2e-6, rtol=0)
+    torch.testing.assert_close((fire.front(state) + fire.chance_to_ignite(state))[0], wanted, atol=2e-6, rtol=0)
 
 
 def counts_of_one_tick(fire: Fire, state: WorldState, trials: int) -> Tensor:

@@ -11,6 +11,7 @@ from warp_torchrl.world.geometry import (
     DISTANCES,
     FAR,
     chebyshev_distance,
+    distance_to_nearest,
     flood,
     grow,
     nearest,
@@ -64,6 +65,17 @@ def test_the_nearest_of_equals_is_the_first_in_reading_order() -> None:
 def test_where_nothing_is_marked_the_nearest_is_far() -> None:
     distance, _ = nearest(torch.tensor([[[1, 2]]]), marked("..... ....."))
     assert distance.tolist() == [[FAR]]
+
+
+@pytest.mark.parametrize("shape", [(5, 7), (255, 40), (40, 256), (300, 300)])
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.1])
+def test_the_distance_to_the_nearest_is_the_least_of_all(shape: tuple[int, int], share: float) -> None:
+    generator = torch.Generator().manual_seed(shape[0])
+    mask = torch.rand(3, *shape, generator=generator) < share
+    mask[0, -1, -1] = True  # from the opposite corner it is as far as it can be
+    position = torch.stack([torch.randint(side, (3, 2), generator=generator) for side in shape], dim=-1)
+    position[0, 0] = 0
+    assert torch.equal(distance_to_nearest(position, mask), nearest(position, mask)[0])
 
 
 def test_distances_over_the_largest_map_fit() -> None:

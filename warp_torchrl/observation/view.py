@@ -74,7 +74,7 @@ def egocentric_view(state: WorldState, world: World, radius: int) -> Tensor:
         seen.of(byte(state.firebreak)) * 255,
         seen.of(state.wet).clamp_(max=10) * 25,
         seen.inside * 128 if elevation is None else _relative_elevation(elevation, seen),
-        (seen.of(world.threat(state)) * 255.0).to(torch.uint8),
+        (seen.of(world.front(state)).add_(seen.of(world.chance(state))) * 255.0).to(torch.uint8),  # World.threat
         *(seen.of(plane) for plane in _occupancy(state, role)),
     )
     view = torch.stack(channels, dim=2)

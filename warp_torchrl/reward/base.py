@@ -7,7 +7,7 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.front import exposure
-from warp_torchrl.world.geometry import chebyshev_distance
+from warp_torchrl.world.geometry import distance_to_nearest
 from warp_torchrl.world.state import Transition, WorldState, is_burning
 
 
@@ -63,7 +63,7 @@ class Reward:
         if self.potential == "exposure":
             return (-0.5 * exposure(state))[:, None].expand(-1, state.vehicles.position.shape[1])
         height = state.cells.shape[1]
-        distance = chebyshev_distance(state.vehicles.position, is_burning(state.cells)).amin((2, 3))
+        distance = distance_to_nearest(state.vehicles.position, is_burning(state.cells))
         return -0.5 / height * distance * (state.tally.alight > 0)[:, None]
 
     def _shaping(self, transition: Transition) -> Tensor:

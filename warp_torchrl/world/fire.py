@@ -147,7 +147,7 @@ class Fire:
         spreading = is_burning(state.cells) & at_most(state.cells, self.last_spreading)
         susceptible, gain = self._susceptible(state), self._gain(state)
         expected = expected_ignitions(self._law(), susceptible, gain, state.slope, self.neighbours)
-        return expected.mul_(number(spreading))
+        return expected * number(spreading)
 
     def _gain(self, state: WorldState) -> Tensor:
         return gains(self.wind_factor(state.wind), self.diagonal) if state.gain is None else state.gain
@@ -162,14 +162,9 @@ class Fire:
         """
         return self._join(state, self.spread(state))
 
-    def threat(self, state: WorldState) -> Tensor:
-        """Return where the fire is about to grow, float32 [B, H, W] in 0..1.
-
-        Of a burning cell, the neighbours that it is expected to ignite in a tick, / 4, at most 1; of a tree, its
-        chance to ignite in the next tick.
-        """
-        # A cell has one or the other: only burning cells are expected to ignite others, and they cannot ignite.
-        return self.expected_ignitions(state).mul_(0.25).clamp_(max=1.0).add_(self.chance_to_ignite(state))
+    def front(self, state: WorldState) -> Tensor:
+        """Return the neighbours that each cell is expected to ignite in a tick, / 4, at most 1, float32 [B, H, W]."""
+        return self.expected_ignitions(state).mul_(0.25).clamp_(max=1.0)
 
     def _join(self, state: WorldState, spread: Tensor) -> Tensor:
         """Join the chance to be ignited by neighbours with that of spontaneous ignition."""

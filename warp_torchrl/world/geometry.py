@@ -48,6 +48,26 @@ def chebyshev_distance(position: Tensor, mask: Tensor) -> Tensor:
     return torch.maximum(distance, beyond[:, None])
 
 
+def distance_to_nearest(position: Tensor, mask: Tensor) -> Tensor:
+    """Return each agent's distance to the nearest marked cell, the number of king's moves to it.
+
+    Args:
+        position: (row, column) of the agents, int64 [B, A, 2] [cells].
+        mask: The cells that count, bool [B, H, W].
+
+    Returns:
+        int16 [B, A] [cells]; ``FAR`` where nothing is marked.
+    """
+    height, width = mask.shape[-2:]
+    dtype, far = (torch.uint8, 255) if max(height, width) <= 255 else (torch.int16, FAR)  # bytes are many times faster
+    rows = (torch.arange(height, device=mask.device) - position[..., :1]).abs_().to(dtype)
+    columns = (torch.arange(width, device=mask.device) - position[..., 1:]).abs_().to(dtype)
+    beyond = byte(~mask).to(dtype) * far
+    distance = torch.maximum(rows[..., :, None], columns[..., None, :])
+    distance = torch.maximum(distance, beyond[:, None]).flatten(2).amin(2)
+    return torch.where(distance == far, FAR, distance.to(torch.int16))
+
+
 def nearest(position: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
     """Return each agent's distance to the nearest marked cell and that cell's flat index.
 

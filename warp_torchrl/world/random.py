@@ -40,15 +40,15 @@ class Stream(IntEnum):
     TERRAIN = 12
 
 
-def _shift_right(word: Tensor, bits: int, width: int) -> Tensor:
-    """Shift a signed word right, filling with zeros as an unsigned one would."""
-    return (word >> bits).bitwise_and_((1 << (width - bits)) - 1)
+def _shift_right(word: Tensor, bits: int) -> Tensor:
+    """Shift a signed word of 64 bits right, filling with zeros as an unsigned one would."""
+    return (word >> bits).bitwise_and_((1 << (64 - bits)) - 1)
 
 
 def _splitmix64(word: Tensor) -> Tensor:
-    word = (word ^ _shift_right(word, 30, 64)) * _SPLITMIX[0]
-    word = (word ^ _shift_right(word, 27, 64)) * _SPLITMIX[1]
-    return word ^ _shift_right(word, 31, 64)
+    word = (word ^ _shift_right(word, 30)) * _SPLITMIX[0]
+    word = (word ^ _shift_right(word, 27)) * _SPLITMIX[1]
+    return word ^ _shift_right(word, 31)
 
 
 def world_key(seed: Tensor, episode: Tensor | int = 0) -> Tensor:
@@ -104,10 +104,15 @@ def uniform_at(key: Tensor, tick: Tensor | int, stream: Stream, index: Tensor) -
 def _mix(index: Tensor, low: Tensor, high: Tensor) -> Tensor:
     """Return the uniform of each index, int32 [B or 1, n], under two key words, int32 [B, 1]."""
     bits = (index * 0x1E3779B1) ^ low  # a distinct well-mixed word for each index
-    bits.bitwise_xor_(_shift_right(bits, 16, 32)).mul_(_MULTIPLIERS[0])
-    bits.bitwise_xor_(_shift_right(bits, 15, 32)).add_(high).mul_(_MULTIPLIERS[1])
-    bits.bitwise_xor_(_shift_right(bits, 15, 32)).mul_(_MULTIPLIERS[2])
-    bits.bitwise_xor_(_shift_right(bits, 16, 32))
+    spare = torch.empty_like(bits)  # memory that was just used is several times faster than fresh memory
+
+    def fold(shift: int) -> Tensor:
+        torch.bitwise_right_shift(bits, shift, out=spare).bitwise_and_((1 << (32 - shift)) - 1)
+        return bits.bitwise_xor_(spare)
+
+    fold(16).mul_(_MULTIPLIERS[0])
+    fold(15).add_(high).mul_(_MULTIPLIERS[1])
+    fold(15).mul_(_MULTIPLIERS[2])
     # The word is signed: a positive one is a small number as it stands, a negative one lies half a range higher.
-    fraction = bits.to(torch.float32).mul_(2.0**-32)
-    return fraction.sub_(fraction.floor()).clamp_(max=_LARGEST_BELOW_ONE)
+    fraction = fold(16).to(torch.float32).mul_(2.0**-32)
+    return fraction.sub_(torch.floor(fraction, out=spare.view(torch.float32))).clamp_(max=_LARGEST_BELOW_ONE)

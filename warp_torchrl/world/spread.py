@@ -109,7 +109,7 @@ def _chance(
         if slope is not None:
             strength *= _slope(slope, direction, shape, 0)
         law.join(total, strength, spare)
-    return _on_map(law.chance(total), shape)
+    return _on_map(law.chance(total), shape).contiguous()
 
 
 @fusible
@@ -128,14 +128,17 @@ def _expected(law: Law, susceptible: Tensor, gain: Tensor, slope: Tensor | None,
 
 def _in_a_row(maps: Tensor) -> Tensor:
     """Lay [B, H, W] maps out in one row, each with a zero column and row after it and a margin at both ends."""
-    margin = maps.shape[2] + 2
-    return pad(pad(maps, (0, 1, 0, 1)).flatten(), (margin, margin))
+    worlds, height, width = maps.shape
+    margin, cells = width + 2, worlds * (height + 1) * (width + 1)
+    row = maps.new_zeros(margin + cells + margin)
+    row[margin : margin + cells].view(worlds, height + 1, width + 1)[:, :height, :width] = maps
+    return row
 
 
 def _on_map(row: Tensor, shape: Shape) -> Tensor:
-    """Return the maps [B, H, W] of a row [B, (H + 1) (W + 1)] without its margins."""
+    """Return the maps [B, H, W], not contiguous, of a row [B, (H + 1) (W + 1)] without its margins."""
     worlds, height, width = shape
-    return row.view(worlds, height + 1, width + 1)[:, :height, :width].contiguous()
+    return row.view(worlds, height + 1, width + 1)[:, :height, :width]
 
 
 def _offset(direction: int, shape: Shape) -> int:

@@ -115,7 +115,8 @@ class WorldState(Batch):
     burning_area: Tensor  # float32 [B], sum over steps of burning initial trees / N0, the area under the fire's curve
     terminated: Tensor  # bool [B], no cell burns any more
     truncated: Tensor  # bool [B], the horizon was reached
-    threat: Tensor | None = None  # float32 [B,H,W], see ``World.threat``, where it is kept for all who ask
+    front: Tensor | None = None  # float32 [B,H,W], see ``World.front``, where it is kept for all who ask
+    chance: Tensor | None = None  # float32 [B,H,W], see ``World.chance``, likewise
 
     @property
     def cover(self) -> Tensor:

@@ -146,9 +146,24 @@ class World:
             before=state, outcome=outcome, after=self._advance_clock(after, active), batch_size=state.batch_size
         )
 
+    def with_outlook(self, state: WorldState) -> WorldState:
+        """Return worlds that keep ``front`` and ``chance`` for all who ask."""
+        return state.replace(front=self.front(state), chance=self.chance(state))
+
+    def front(self, state: WorldState) -> Tensor:
+        """Return what each cell is expected to ignite, float32 [B, H, W] in 0..1; see ``Fire.front``."""
+        return self.fire.front(state) if state.front is None else state.front
+
+    def chance(self, state: WorldState) -> Tensor:
+        """Return each tree's chance to ignite in the next tick, float32 [B, H, W]; see ``Fire.chance_to_ignite``."""
+        return self.fire.chance_to_ignite(state) if state.chance is None else state.chance
+
     def threat(self, state: WorldState) -> Tensor:
-        """Return where the fire is about to grow, float32 [B, H, W] in 0..1; see ``Fire.threat``."""
-        return self.fire.threat(state) if state.threat is None else state.threat
+        """Return where the fire is about to grow, float32 [B, H, W] in 0..1.
+
+        Of a burning cell its ``front``, and of a tree its ``chance``: no cell has both.
+        """
+        return self.front(state) + self.chance(state)
 
     def action_mask(self, state: WorldState) -> Tensor:
         """Return which actions would do something, bool [B, A, 10 or 11]."""
