@@ -8,7 +8,7 @@ from torch import Tensor
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics.base import approach, claim_cells, extinguish_or, list_cells, or_refill
 from warp_torchrl.heuristics.coordinated import Coordinated
-from warp_torchrl.world.geometry import grow, nearest
+from warp_torchrl.world.geometry import distance_to_nearest, grow
 from warp_torchrl.world.state import Action, WorldState, is_burning, is_tree
 
 
@@ -70,7 +70,8 @@ class Ring(Coordinated):
         cells = torch.zeros(len(burning), reach + 1, device=burning.device)
         cells.scatter_add_(1, away.flatten(1), fuel.flatten(1).to(cells.dtype))
         distance = torch.arange(1, reach, device=burning.device)
-        way = nearest(state.vehicles.position, burning)[0].amax(dim=1)[:, None] - distance  # of who is farthest out
+        farthest = distance_to_nearest(state.vehicles.position, burning).amax(dim=1)
+        way = farthest[:, None] - distance
         workers = self.diggers(state).sum().clamp(min=1)
         need = way.clamp(min=0) + self.effort * cells[:, 1:reach] / workers
         steps = world.steps_per_tick * world.fire.ticks_per_stage / self.pace

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.reward.base import Reward
-from warp_torchrl.world.geometry import flood, nearest
+from warp_torchrl.world.geometry import distance_to_nearest, flood
 from warp_torchrl.world.state import Action, Transition, is_burning, is_tree
 
 
@@ -45,7 +45,7 @@ class Paper(Reward):
         """Return each agent's part, float32 [B, A]."""
         outcome, before = transition.outcome, transition.before
         action, cleared = outcome.action, outcome.cleared
-        distance, _ = nearest(transition.after.vehicles.position, is_burning(before.cells))
+        distance = distance_to_nearest(transition.after.vehicles.position, is_burning(before.cells))
         is_near = distance <= self.near
         failed = (action == Action.EXTINGUISH) & ~outcome.extinguished
         failed |= (action == Action.CLEAR) & ~cleared

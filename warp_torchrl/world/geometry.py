@@ -37,14 +37,19 @@ def chebyshev_distance(position: Tensor, mask: Tensor) -> Tensor:
     Returns:
         int16 [B, A, H, W] [cells]; ``FAR`` where the mask is False.
     """
+    return _moves(position, mask, torch.int16, FAR)
+
+
+def _moves(position: Tensor, mask: Tensor, dtype: torch.dtype, far: int) -> Tensor:
+    """Return what ``chebyshev_distance`` does, of another type and ``far`` where the mask is False."""
     height, width = mask.shape[-2:]
     place = position.to(torch.int16)
     rows = torch.arange(height, dtype=torch.int16, device=mask.device)
     columns = torch.arange(width, dtype=torch.int16, device=mask.device)
-    row_distance = (rows - place[..., :1]).abs_()[..., :, None]
-    column_distance = (columns - place[..., 1:]).abs_()[..., None, :]
-    distance = torch.maximum(row_distance, column_distance)
-    beyond = byte(~mask).to(torch.int16) * FAR  # a maximum is many times faster than masked_fill
+    row_distance = (rows - place[..., :1]).abs_().to(dtype)
+    column_distance = (columns - place[..., 1:]).abs_().to(dtype)
+    distance = torch.maximum(row_distance[..., :, None], column_distance[..., None, :])
+    beyond = byte(~mask).to(dtype) * far  # a maximum is many times faster than masked_fill
     return torch.maximum(distance, beyond[:, None])
 
 
@@ -58,14 +63,10 @@ def distance_to_nearest(position: Tensor, mask: Tensor) -> Tensor:
     Returns:
         int16 [B, A] [cells]; ``FAR`` where nothing is marked.
     """
-    height, width = mask.shape[-2:]
-    dtype, far = (torch.uint8, 255) if max(height, width) <= 255 else (torch.int16, FAR)  # bytes are many times faster
-    rows = (torch.arange(height, device=mask.device) - position[..., :1]).abs_().to(dtype)
-    columns = (torch.arange(width, device=mask.device) - position[..., 1:]).abs_().to(dtype)
-    beyond = byte(~mask).to(dtype) * far
-    distance = torch.maximum(rows[..., :, None], columns[..., None, :])
-    distance = torch.maximum(distance, beyond[:, None]).flatten(2).amin(2)
-    return torch.where(distance == far, FAR, distance.to(torch.int16))
+    if max(mask.shape[-2:]) > 255:
+        return chebyshev_distance(position, mask).amin((2, 3))
+    distance = _moves(position, mask, torch.uint8, 255).amin((2, 3))  # bytes are many times faster
+    return torch.where(distance == 255, FAR, distance.to(torch.int16))
 
 
 def nearest(position: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
