@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 
 import torch
 from tensordict import TensorDictBase
-from tensordict.nn import TensorDictModuleBase, TensorDictParams
-from torch import Tensor
+from tensordict.nn import TensorDictModuleBase
+from torch import Tensor, nn
 from torch.nn.functional import cross_entropy
-from torchrl.objectives import BCLoss
 
 from warp_torchrl.algorithms.algorithm import Algorithm
 from warp_torchrl.algorithms.learner import Learner
@@ -19,7 +18,7 @@ from warp_torchrl.algorithms.on_policy import OnPolicy
 from warp_torchrl.collectors import Direct, Process
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS, Heuristic
-from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, TEACHER_ACTION, given_held
+from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, TEACHER_ACTION
 from warp_torchrl.validation import check_fields
 
 TEACHERS = tuple(name for name, rule in HEURISTICS.items() if not rule.remembers)
@@ -83,20 +82,25 @@ class Imitation:
 
 
 class _Lesson:
-    """A learner's loss with the cloning loss beside it."""
+    """A learner's loss with the cloning loss beside it.
+
+    It is what TorchRL's ``BCLoss`` says of the teacher's choices, of the logits that the learner's own loss has just
+    worked out of the same sample: cloning takes no pass of its own.
+    """
 
     def __init__(self, plan: Imitation, learner: Learner) -> None:
         self.plan, self.learner, self.weight = plan, learner, plan.weight
-        self._cloning = _Cloning(given_held(learner.policy[0]), loss_function=_log_loss)
-        self._cloning.set_keys(action=LOGITS)
+        learner.loss.actor_network[0].register_forward_hook(self._overhear)
+
+    def _overhear(self, actor: nn.Module, given: object, said: TensorDictBase) -> None:
+        self._logits = said.get(LOGITS)
 
     def terms(self, sample: TensorDictBase) -> TensorDictBase:
         """Return the learner's terms, and the cloning loss of the teacher's choices."""
         terms = self.learner.terms(sample)
         if not self.weight:
             return terms.set(_LOSS, torch.zeros((), device=sample.device))
-        shown = sample.select(*self._cloning.actor_network.in_keys).set(LOGITS, sample.get(TEACHER_ACTION))
-        return terms.set(_LOSS, self.weight * self._cloning(shown)[_LOSS])
+        return terms.set(_LOSS, self.weight * _log_loss(self._logits, sample.get(TEACHER_ACTION)))
 
     def schedule(self, progress: float) -> dict[str, float]:
         """Set what changes with progress in 0..1."""
@@ -119,12 +123,6 @@ class _Pupil(TensorDictModuleBase):
             return out.set(TEACHER_ACTION, out.get(ACTION))
         state = self._teacher.env.world_state
         return out.set(TEACHER_ACTION, self._teacher.choose(state, tensordict.get(ACTION_MASK)))
-
-
-class _Cloning(BCLoss):
-    """TorchRL's, whose declarations lack an entry that it warns of."""
-
-    target_actor_network_params: TensorDictParams
 
 
 def _log_loss(logits: Tensor, action: Tensor) -> Tensor:
