@@ -5,13 +5,14 @@ from dataclasses import dataclass
 
 import torch
 from tensordict import TensorDictBase
-from torchrl.data import LazyTensorStorage, SamplerWithoutReplacement, TensorDictReplayBuffer
+from torchrl.data import SamplerWithoutReplacement, TensorDictReplayBuffer
 from torchrl.envs import EnvBase
 from torchrl.modules import ProbabilisticActor
 from torchrl.objectives import LossModule
 
 from warp_torchrl.algorithms.algorithm import Algorithm, falling, masked_actor
 from warp_torchrl.algorithms.learner import Learner
+from warp_torchrl.algorithms.storage import RowStorage
 from warp_torchrl.models import (
     ACTION,
     LOG_PROB,
@@ -94,7 +95,7 @@ class OnPolicy(Algorithm):
             return {"train/learning_rate": self.rate_at(progress, optimizer), **self.constants()}
 
         buffer = TensorDictReplayBuffer(
-            storage=LazyTensorStorage(frames_per_batch, device=env.device),
+            storage=RowStorage(frames_per_batch, device=env.device),
             sampler=SamplerWithoutReplacement(),
             batch_size=min(self.minibatch_size, frames_per_batch),
         )

@@ -6,12 +6,13 @@ from typing import Any
 import torch
 from tensordict import TensorDict, TensorDictBase, is_tensor_collection
 from torchrl.data import (
-    LazyTensorStorage,
     ReplayBuffer,
     TensorDictPrioritizedReplayBuffer,
     TensorDictReplayBuffer,
 )
 from torchrl.data.replay_buffers import PrioritizedSampler
+
+from warp_torchrl.algorithms.storage import RowStorage
 
 _TREES = {"_sum_tree", "_min_tree"}  # where TorchRL's prioritised sampler keeps the priorities
 _ALPHA, _BETA = 0.6, 0.4  # Schaul et al., 2016, proportional prioritisation
@@ -26,7 +27,7 @@ def replay_buffer(kind: str, capacity: int, minibatch_size: int, device: torch.d
         minibatch_size: World steps in a sample.
         device: Where it holds them.
     """
-    storage = LazyTensorStorage(capacity, device=device)
+    storage = RowStorage(capacity, device=device)
     if kind == "uniform":
         return TensorDictReplayBuffer(storage=storage, batch_size=minibatch_size)
     # A generator of its own: without one the sampler draws from NumPy's, which no seed of ours reaches.

@@ -1,0 +1,56 @@
+"""Samples are what TorchRL's storage gives."""
+
+import pytest
+import torch
+from tensordict import TensorDict
+from torchrl.data import LazyTensorStorage
+
+from warp_torchrl.algorithms.storage import RowStorage
+
+TRANSITIONS = TensorDict(
+    agents=TensorDict(
+        view=torch.randint(256, (6, 3, 2, 5), dtype=torch.uint8), reward=torch.rand(6, 3), batch_size=[6, 3]
+    ),
+    done=torch.tensor([[False], [True]] * 3),
+    batch_size=[6],
+)
+
+
+def filled(kind, capacity):
+    storage = kind(capacity)
+    storage.set(range(6), TRANSITIONS)
+    return storage
+
+
+@pytest.mark.parametrize("capacity", [6, 9])
+@pytest.mark.parametrize(
+    "index",
+    [
+        torch.tensor([4, 0, 0, 5]),
+        torch.tensor([], dtype=torch.int64),
+        torch.tensor([True, False, False, True, True, False]),
+        torch.tensor([[1, 2], [3, 4]]),
+        torch.tensor(3),
+        slice(1, 4),
+        [5, 2],
+        2,
+    ],
+    ids=str,
+)
+def test_samples_are_what_torchrls_storage_gives(capacity, index):
+    theirs, ours = filled(LazyTensorStorage, capacity).get(index), filled(RowStorage, capacity).get(index)
+    assert ours.batch_size == theirs.batch_size and ours["agents"].batch_size == theirs["agents"].batch_size
+    assert set(ours.keys(True, True)) == set(theirs.keys(True, True))
+    for key in theirs.keys(True, True):
+        assert torch.equal(ours[key], theirs[key]) and ours[key].dtype == theirs[key].dtype, key
+
+
+def test_a_sample_is_a_copy():
+    storage = filled(RowStorage, 6)
+    storage.get(torch.tensor([1, 2]))["agents", "view"].zero_()
+    assert torch.equal(storage.get(torch.arange(6))["agents", "view"], TRANSITIONS["agents", "view"])
+
+
+def test_nothing_is_taken_of_an_empty_storage():
+    with pytest.raises(RuntimeError):
+        RowStorage(6).get(torch.tensor([0]))
