@@ -45,6 +45,30 @@ def test_samples_are_what_torchrls_storage_gives(capacity, index):
         assert torch.equal(ours[key], theirs[key]) and ours[key].dtype == theirs[key].dtype, key
 
 
+@pytest.mark.parametrize(
+    "cursor",
+    [torch.arange(6), torch.tensor([7, 8, 0, 1, 2, 3]), torch.tensor([5, 4, 3, 2, 1, 0]), torch.arange(3, 9)],
+    ids=str,
+)
+def test_what_is_put_in_lies_where_torchrls_storage_puts_it(cursor):
+    theirs, ours = LazyTensorStorage(9), RowStorage(9)
+    later = TRANSITIONS.clone()
+    later["done"] = ~later["done"]
+    for storage in (theirs, ours):
+        storage.set(range(9), torch.cat((TRANSITIONS, TRANSITIONS[:3])))
+        storage.set(cursor, later)
+    assert len(ours) == len(theirs)
+    for key in theirs[:].keys(True, True):
+        assert torch.equal(ours[:][key], theirs[:][key]), key
+
+
+def test_what_was_put_in_is_a_copy():
+    storage, given = RowStorage(6), TRANSITIONS.clone()
+    storage.set(torch.arange(6), given)
+    given["agents", "view"].zero_()
+    assert torch.equal(storage[:]["agents", "view"], TRANSITIONS["agents", "view"])
+
+
 def test_a_sample_is_a_copy():
     storage = filled(RowStorage, 6)
     storage.get(torch.tensor([1, 2]))["agents", "view"].zero_()

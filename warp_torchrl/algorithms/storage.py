@@ -1,4 +1,4 @@
-"""Where batches and replayed transitions are held: TorchRL's storage, from which samples are taken a row at a time."""
+"""Where batches and replayed transitions are held: TorchRL's storage, written and read a row at a time."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -10,10 +10,19 @@ from torchrl.data import LazyTensorStorage
 
 
 class RowStorage(LazyTensorStorage):
-    """TorchRL's storage, which gives a sample's transitions as ``index_select`` does.
+    """TorchRL's storage, which copies transitions whole.
 
-    Indexed by a tensor, torch copies number by number, which for observations in bytes takes several times as long.
+    Where a tensor says which, torch copies number by number, which for observations in bytes takes several times as
+    long as a slice, or ``index_select``, does.
     """
+
+    def set(self, cursor: int | Sequence[int] | slice | Tensor, data: Any, *, set_cursor: bool = True) -> None:
+        """Put transitions at ``cursor``."""
+        if isinstance(cursor, Tensor) and cursor.is_cpu and cursor.ndim == 1 and len(cursor):
+            first = int(cursor[0])
+            if torch.equal(cursor, torch.arange(len(cursor)) + first):
+                cursor = slice(first, first + len(cursor))
+        super().set(cursor, data, set_cursor=set_cursor)
 
     def get(self, index: int | Sequence[int] | slice | Tensor) -> Any:
         """Return the transitions at ``index``, in a tensor int64 [n] where there are several of no order."""
