@@ -27,7 +27,7 @@ class RowStorage(LazyTensorStorage):
     def get(self, index: int | Sequence[int] | slice | Tensor) -> Any:
         """Return the transitions at ``index``, in a tensor int64 [n] where there are several of no order."""
         if self.initialized and isinstance(index, Tensor) and index.dtype == torch.int64 and index.ndim == 1:
-            return _rows(self._storage, index)
+            return _rows(self._storage, index if self._storage.device is None else index.to(self._storage.device))
         return super().get(index)
 
 
