@@ -44,7 +44,7 @@ class OffPolicy(Algorithm):
     capacity: int = 50_000
     warm_up: int = 8192
     minibatch_size: int = 256
-    updates: int = 64
+    updates: int = 128
     replay: Literal["uniform", "prioritised"] = "uniform"
     target_interval: int = 0
     tau: float = 0.01
