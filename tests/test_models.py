@@ -7,7 +7,18 @@ from torch import nn
 from tests.conftest import small_world
 from warp_torchrl.algorithms.on_policy import with_advantages
 from warp_torchrl.algorithms.ppo import Ppo
-from warp_torchrl.models import ACTION, LOGITS, OBSERVATION, VALUE, Entry, Mlp, hold, signature
+from warp_torchrl.models import (
+    ACTION,
+    ACTION_ONE_HOT,
+    LOGITS,
+    OBSERVATION,
+    STATE_ACTION_VALUE,
+    VALUE,
+    Entry,
+    Mlp,
+    hold,
+    signature,
+)
 from warp_torchrl.models.networks import LinearEncoder
 from warp_torchrl.observation import Local, Paper, Surroundings
 from warp_torchrl.world.team import Team
@@ -44,6 +55,23 @@ def test_a_central_critic_sees_the_state_and_what_each_agent_sees(make_small_env
         other = now.clone()
         other[(*OBSERVATION, "self")][:, 1] += 1.0
         assert (critic(other)[VALUE][:, 0] == before[:, 0]).all() and (critic(other)[VALUE][:, 1] != before[:, 1]).all()
+
+
+@pytest.mark.parametrize("sharing", ["team", "role", "none"])
+@pytest.mark.parametrize(("observation", "reads"), [(Surroundings(), False), (Local(), True)], ids=["picture", "none"])
+def test_a_central_critic_does_without_views_where_there_is_a_picture(make_small_env, sharing, observation, reads):
+    env = make_small_env(3, observation=observation)
+    now = env.reset()
+    other = now.clone()
+    other[(*OBSERVATION, "view")] = 255 - other[(*OBSERVATION, "view")]
+    model = Mlp(sharing=sharing, facing="north")
+    shape = signature(env)
+    central = model.critic(shape, central=True)
+    assert torch.equal(central(now.clone())[VALUE], central(other.clone())[VALUE]) is not reads
+    now[ACTION_ONE_HOT] = other[ACTION_ONE_HOT] = torch.zeros(3, 2, 11)
+    own, judge = model.critic(shape, central=False), model.action_critic(shape, central=True)
+    for critic, key in ((own, VALUE), (judge, STATE_ACTION_VALUE)):
+        assert (critic(now.clone())[key] != critic(other.clone())[key]).all()
 
 
 def test_an_actor_sees_only_its_own_observation(make_small_env):

@@ -72,7 +72,10 @@ class Mlp:
         return self._of_agents(signature, self.actor_hidden, signature.n_actions, 0.01, ACTION_VALUE)
 
     def critic(self, signature: Signature, central: bool) -> TensorDictModule:
-        """Return the module that writes values [..., A, 1] from each agent's observation, and the state if central."""
+        """Return the module that writes values [..., A, 1] from each agent's observation, and the state if central.
+
+        A central critic that has the state and each agent's picture does without its view.
+        """
         return self._of_agents(signature, self.critic_hidden, 1, 1.0, VALUE, central=central)
 
     def action_critic(self, signature: Signature, central: bool) -> TensorDictModule:
@@ -110,6 +113,9 @@ class Mlp:
             entries.append(Entry((signature.n_actions,), "float32"))
             keys.append(ACTION_ONE_HOT)
         action = len(keys) - 1 if judges else None
+        unread = _unread(list(signature.observation)) if central and not judges else None
+        if unread is not None:
+            del entries[unread]
         if central:
             joint = [Entry((signature.n_agents * signature.n_actions,), "float32")] if judges else []
             entries = [signature.state, *joint, *entries]
@@ -117,7 +123,7 @@ class Mlp:
         if self.sharing == "role":
             keys.append(ROLE)
         if central:
-            network, keys = Central(network, len(signature.state.shape), action), [STATE, *keys]
+            network, keys = Central(network, len(signature.state.shape), action, unread), [STATE, *keys]
         if self.facing == "fire":
             if not can_be_held({name: entry.shape for name, entry in signature.observation.items()}):
                 raise ValueError("model.facing must be north where observations are of no preset, got fire")
@@ -165,6 +171,11 @@ class Cnn(Mlp):
         return ConvolutionalEncoder(
             entries, size, tuple(self.channels), self.kernel_size, _ACTIVATIONS[self.activation]
         )
+
+
+def _unread(names: list[str]) -> int | None:
+    """Return the place of the entry that a central critic of a state does without, a view beside a picture."""
+    return names.index("view") if {"view", "picture"} <= set(names) else None
 
 
 def check_sizes(name: str, sizes: tuple[int, ...]) -> None:

@@ -109,13 +109,20 @@ def held(name: str, entry: Tensor, frame: Frame) -> Tensor:
 
 
 def held_state(state: Tensor) -> Tensor:
-    """Return the critic's states [..., C, 16, 16] as the middle of the team holds them, facing the fire."""
+    """Return the critic's states [..., C, 16, 16] facing the fire, as the middle of the team would, and about it.
+
+    The middle of the box that holds all fire is in the middle of the planes, so that where it burns on the map makes no
+    difference. Off the map there is nothing; agents further away than the border are shown at the border.
+    """
     side = state.shape[-1]
     team = state[..., _AGENTS, :, :].sum(-3)
     along = torch.arange(side, device=state.device) + 0.5
     place = torch.stack([(each * along).sum(-1) for each in (team.sum(-1), team.sum(-2))], dim=-1)
-    frame = _facing(_pull_from(place / team.sum((-2, -1))[..., None], state[..., STATE.index("fire"), :, :]))
-    shown = frame.maps(state)
+    frame = _facing(_pull_from(place / team.sum((-2, -1))[..., None], state[..., _FIRE, :, :]))
+    turned = frame.maps(state)
+    start = _corner(turned[..., _FIRE, :, :] > 0)
+    shown = _moved(turned, start)
+    shown[..., _AGENTS, :, :] = _crowded(turned[..., _AGENTS, :, :], start)
     quarters = state[..., -1, :, :].unflatten(-1, (2, side // 2)).unflatten(-3, (2, side // 2))
     clock, wind = quarters[..., 0, 0, :, 0], quarters[..., 1, 0, :, 0]
     constants = torch.stack((clock, _wind(wind, frame)), dim=-2)[..., :, None, :, None]
@@ -123,6 +130,39 @@ def held_state(state: Tensor) -> Tensor:
     return shown
 
 
+def _corner(fire: Tensor) -> Tensor:
+    """Return the row and column, int64 [..., 2], of maps bool [..., S, S] at which a map about their fire begins."""
+    side = fire.shape[-1]
+    along = torch.arange(side, device=fire.device)
+    found = []
+    for lines in (fire.any(-1), fire.any(-2)):
+        first = torch.where(lines, along, side).amin(-1)
+        last = torch.where(lines, along, -1).amax(-1)
+        found.append((first + last + 1) // 2 - side // 2)  # 0 where nothing burns
+    return torch.stack(found, dim=-1)
+
+
+def _moved(maps: Tensor, start: Tensor) -> Tensor:
+    """Return maps [..., C, S, S] from the row and column ``start`` on, int64 [..., 2]; 0 off the map."""
+    side = maps.shape[-1]
+    lines = start[..., None] + torch.arange(side, device=maps.device)
+    row, column = lines.clamp(0, side - 1).unbind(-2)
+    cell = (row[..., :, None] * side + column[..., None, :]).flatten(-2)
+    shown = maps.flatten(-2).gather(-1, cell.unsqueeze(-2).expand(*maps.shape[:-2], -1)).view(maps.shape)
+    down, across = ((lines >= 0) & (lines < side)).unbind(-2)
+    return shown * (down[..., :, None] & across[..., None, :]).unsqueeze(-3)
+
+
+def _crowded(maps: Tensor, start: Tensor) -> Tensor:
+    """Return maps as ``_moved`` does, what would be lost added to the border."""
+    side = maps.shape[-1]
+    along = torch.arange(side, device=maps.device)
+    line = (along - start[..., None]).clamp(0, side - 1)
+    down, across = (line[..., None, :] == along[:, None]).to(maps.dtype).unsqueeze(-4).unbind(-3)
+    return down @ maps @ across.mT
+
+
+_FIRE = STATE.index("fire")
 _AGENTS = slice(STATE.index("ugv"), STATE.index("uav") + 1)
 _SELF_PARTS = [
     PLACE.stop,
