@@ -5,6 +5,8 @@ import math
 import pytest
 import torch
 from tensordict import TensorDict
+from torch.nn.functional import cross_entropy
+from torchrl.objectives import BCLoss
 
 from warp_torchrl.config import Record, compose_config, plain
 from warp_torchrl.construction import ConfigError
@@ -82,6 +84,23 @@ def test_the_cloning_loss_by_hand(tmp_path):
     terms["loss_bc"].backward()
     moved = {name for name, each in training.learner.loss.named_parameters() if each.grad is not None}
     assert moved and all(name.startswith("actor") for name in moved), "critics have no teacher"
+
+
+@pytest.mark.filterwarnings("ignore")  # TorchRL's, of a target network that it declares and does not make
+def test_the_cloning_loss_is_torchrls(tmp_path):
+    """Of the same network and choices: its value and its gradients, though it takes no pass of its own."""
+    training = pupil(tmp_path, "model.facing=north")
+    sample, actor = sample_of(training), training.learner.policy[0]
+    theirs = BCLoss(actor, loss_function=lambda said, chosen: cross_entropy(said.flatten(0, -2), chosen.flatten()))
+    theirs.set_keys(action=LOGITS)
+    expected = theirs(sample.select(*actor.in_keys).set(LOGITS, sample[TEACHER_ACTION]))["loss_bc"]
+    ours = training.learner.terms(sample)["loss_bc"]
+    assert float(ours) == pytest.approx(float(expected), rel=1e-6)
+    ours.backward()
+    learnt = dict(training.learner.loss.actor_network_params.flatten_keys(".").items())
+    expected.backward()
+    for name, weight in theirs.actor_network_params.flatten_keys(".").items():
+        torch.testing.assert_close(learnt["module.0." + name].grad, weight.grad, rtol=1e-5, atol=1e-7)
 
 
 def test_the_learners_own_terms_and_state_stay_as_they_are(tmp_path):
