@@ -61,8 +61,8 @@ def test_a_few_hundred_updates_raise_the_return_of_a_bandit(make_small_env, name
             return (learner.policy(env.reset())[ACTION] == wanted).float().mean().item()
 
     before = share()
-    for iteration in range(30):
-        learner.schedule(iteration / 30)
+    for iteration in range(45):
+        learner.schedule(iteration / 45)
         batch = collected(env, learner, 8)
         batch["next", *REWARD] = (batch[ACTION] == wanted).float()[..., None]
         batch["next", "terminated"] = batch["next", "done"] = torch.ones_like(batch["done"])

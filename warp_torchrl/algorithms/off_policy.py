@@ -86,7 +86,7 @@ class OffPolicy(Algorithm):
         shape = signature(env)
         policy = self.policy(shape, model).to(env.device)
         loss = self.loss(policy, shape, model, env.device).to(env.device)
-        optimizer = torch.optim.Adam(loss.parameters(), lr=self.learning_rate, eps=1e-5)
+        optimizer = torch.optim.Adam(loss.parameters(), lr=self.learning_rate, eps=1e-5, fused=True)
         memory = self.memory(env.device)
         targets = self.targets(loss)
         explore = self.explorer(policy, shape).to(env.device)

@@ -88,7 +88,7 @@ class OnPolicy(Algorithm):
         critic = model.critic(shape, self.central_critic).to(env.device)
         loss = self.loss(given_held(policy), given_held(critic)).to(env.device)
         loss.value_estimator.value_network = None  # it reads the values that ``with_advantages`` adds
-        optimizer = torch.optim.Adam(loss.parameters(), lr=self.learning_rate, eps=1e-5)
+        optimizer = torch.optim.Adam(loss.parameters(), lr=self.learning_rate, eps=1e-5, fused=True)
 
         def schedule(progress: float) -> dict[str, float]:
             loss.entropy_coeff.fill_(falling(self.entropy_coeff, self.entropy_coeff_end, progress))
