@@ -109,10 +109,10 @@ def held(name: str, entry: Tensor, frame: Frame) -> Tensor:
 
 
 def held_state(state: Tensor) -> Tensor:
-    """Return the critic's states [..., C, 16, 16] facing the fire, as the middle of the team would, and about it.
+    """Return the critic's states [..., C, 16, 16] as the middle of the team holds them, facing the fire.
 
-    The middle of the box that holds all fire is in the middle of the planes, so that where it burns on the map makes no
-    difference. Off the map there is nothing; agents further away than the border are shown at the border.
+    The box that holds all fire and all agents is in the middle of the planes, so that where it is on the map makes no
+    difference; off the map there is nothing.
     """
     side = state.shape[-1]
     team = state[..., _AGENTS, :, :].sum(-3)
@@ -120,9 +120,7 @@ def held_state(state: Tensor) -> Tensor:
     place = torch.stack([(each * along).sum(-1) for each in (team.sum(-1), team.sum(-2))], dim=-1)
     frame = _facing(_pull_from(place / team.sum((-2, -1))[..., None], state[..., _FIRE, :, :]))
     turned = frame.maps(state)
-    start = _corner(turned[..., _FIRE, :, :] > 0)
-    shown = _moved(turned, start)
-    shown[..., _AGENTS, :, :] = _crowded(turned[..., _AGENTS, :, :], start)
+    shown = _moved(turned, _corner((turned[..., _HAPPENING, :, :] > 0).any(-3)))
     quarters = state[..., -1, :, :].unflatten(-1, (2, side // 2)).unflatten(-3, (2, side // 2))
     clock, wind = quarters[..., 0, 0, :, 0], quarters[..., 1, 0, :, 0]
     constants = torch.stack((clock, _wind(wind, frame)), dim=-2)[..., :, None, :, None]
@@ -130,15 +128,19 @@ def held_state(state: Tensor) -> Tensor:
     return shown
 
 
-def _corner(fire: Tensor) -> Tensor:
-    """Return the row and column, int64 [..., 2], of maps bool [..., S, S] at which a map about their fire begins."""
-    side = fire.shape[-1]
-    along = torch.arange(side, device=fire.device)
+def _corner(marked: Tensor) -> Tensor:
+    """Return the row and column, int64 [..., 2], from which on a map shows the box of what is marked in its middle.
+
+    Args:
+        marked: bool [..., S, S].
+    """
+    side = marked.shape[-1]
+    along = torch.arange(side, device=marked.device)
     found = []
-    for lines in (fire.any(-1), fire.any(-2)):
+    for lines in (marked.any(-1), marked.any(-2)):
         first = torch.where(lines, along, side).amin(-1)
         last = torch.where(lines, along, -1).amax(-1)
-        found.append((first + last + 1) // 2 - side // 2)  # 0 where nothing burns
+        found.append((first + last + 1) // 2 - side // 2)
     return torch.stack(found, dim=-1)
 
 
@@ -153,17 +155,9 @@ def _moved(maps: Tensor, start: Tensor) -> Tensor:
     return shown * (down[..., :, None] & across[..., None, :]).unsqueeze(-3)
 
 
-def _crowded(maps: Tensor, start: Tensor) -> Tensor:
-    """Return maps as ``_moved`` does, what would be lost added to the border."""
-    side = maps.shape[-1]
-    along = torch.arange(side, device=maps.device)
-    line = (along - start[..., None]).clamp(0, side - 1)
-    down, across = (line[..., None, :] == along[:, None]).to(maps.dtype).unsqueeze(-4).unbind(-3)
-    return down @ maps @ across.mT
-
-
 _FIRE = STATE.index("fire")
 _AGENTS = slice(STATE.index("ugv"), STATE.index("uav") + 1)
+_HAPPENING = [_FIRE, *range(_AGENTS.start, _AGENTS.stop)]
 _SELF_PARTS = [
     PLACE.stop,
     WIND.start - PLACE.stop,
