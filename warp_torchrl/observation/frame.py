@@ -120,7 +120,8 @@ def held_state(state: Tensor) -> Tensor:
     place = torch.stack([(each * along).sum(-1) for each in (team.sum(-1), team.sum(-2))], dim=-1)
     frame = _facing(_pull_from(place / team.sum((-2, -1))[..., None], state[..., _FIRE, :, :]))
     turned = frame.maps(state)
-    shown = _moved(turned, _corner((turned[..., _HAPPENING, :, :] > 0).any(-3)))
+    happening = (turned[..., _FIRE, :, :] > 0) | (turned[..., _AGENTS, :, :] > 0).any(-3)
+    shown = _moved(turned, _corner(happening))
     quarters = state[..., -1, :, :].unflatten(-1, (2, side // 2)).unflatten(-3, (2, side // 2))
     clock, wind = quarters[..., 0, 0, :, 0], quarters[..., 1, 0, :, 0]
     constants = torch.stack((clock, _wind(wind, frame)), dim=-2)[..., :, None, :, None]
@@ -157,7 +158,6 @@ def _moved(maps: Tensor, start: Tensor) -> Tensor:
 
 _FIRE = STATE.index("fire")
 _AGENTS = slice(STATE.index("ugv"), STATE.index("uav") + 1)
-_HAPPENING = [_FIRE, *range(_AGENTS.start, _AGENTS.stop)]
 _SELF_PARTS = [
     PLACE.stop,
     WIND.start - PLACE.stop,
