@@ -4,9 +4,11 @@ import itertools
 
 import pytest
 import torch
+from tensordict import TensorDict
 
 from tests.conftest import small_world
 from tests.test_observation import drawn
+from warp_torchrl.algorithms.dqn import Dqn
 from warp_torchrl.algorithms.ppo import Ppo
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
@@ -14,6 +16,7 @@ from warp_torchrl.models import (
     ACTION,
     ACTION_ONE_HOT,
     ACTION_VALUE,
+    CHOSEN_ACTION_VALUE,
     LOGITS,
     STATE_ACTION_VALUE,
     VALUE,
@@ -175,6 +178,21 @@ def test_networks_that_face_north_say_something_else():
     shape = signature(fighting(PRESETS["whole map"], steps=0))
     critic = Mlp(facing="north").critic(shape, central=True)
     assert not torch.allclose(critic(there)[VALUE][sees], critic(here)[VALUE][sees], atol=1e-3)
+
+
+def test_a_mixer_says_the_same_of_a_turned_world():
+    here, there, _ = in_both(PRESETS["whole map"], (-1, 1, True))
+    env = fighting(PRESETS["whole map"], steps=0)
+    said = {}
+    for facing in ("fire", "north"):
+        mixer = Dqn(mixer="qmix").build(env, Mlp(facing=facing), 8).loss.mixer_network
+        own = torch.arange(18.0).view(6, 3, 1)
+        said[facing] = [
+            mixer(TensorDict({CHOSEN_ACTION_VALUE: own, "state": now["state"]}, [6]))["chosen_action_value"]
+            for now in (here, there)
+        ]
+    torch.testing.assert_close(*said["fire"], atol=1e-4, rtol=0.0)
+    assert not torch.allclose(*said["north"], atol=1e-3)
 
 
 @pytest.mark.parametrize("model", [Mlp(), Mlp(sharing="none"), Cnn()], ids=["team", "none", "cnn"])

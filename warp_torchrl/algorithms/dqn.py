@@ -73,7 +73,9 @@ class Dqn(EpsilonGreedy):
             )
             loss.set_keys(action=ACTION, action_value=ACTION_VALUE, value=CHOSEN_ACTION_VALUE, **AGENT_KEYS)
         else:
-            loss = QMixerLoss(values, self._mixer(shape, device), action_space="categorical", loss_function="smooth_l1")
+            loss = QMixerLoss(
+                values, self._mixer(shape, model, device), action_space="categorical", loss_function="smooth_l1"
+            )
             loss.set_keys(
                 action=ACTION,
                 action_value=ACTION_VALUE,
@@ -84,10 +86,10 @@ class Dqn(EpsilonGreedy):
         loss.make_value_estimator(ValueEstimators.TD0, gamma=self.gamma)
         return loss
 
-    def _mixer(self, shape: Signature, device: torch.device) -> TensorDictModule:
+    def _mixer(self, shape: Signature, model: Mlp, device: torch.device) -> TensorDictModule:
         if self.mixer == "vdn":
             return TensorDictModule(
                 VDNMixer(n_agents=shape.n_agents, device=device), in_keys=[CHOSEN_ACTION_VALUE], out_keys=[TEAM_VALUE]
             )
-        mixer = QMixer(shape.state.shape, self.mixer_hidden, shape.n_agents, device)
+        mixer = model.of_state(QMixer(shape.state.shape, self.mixer_hidden, shape.n_agents, device))
         return TensorDictModule(mixer, in_keys=[CHOSEN_ACTION_VALUE, STATE], out_keys=[TEAM_VALUE])

@@ -45,6 +45,23 @@ class FacingFire(nn.Module):
         return frame.actions_on_map(out) if self.chooses else out
 
 
+class StateFacingFire(nn.Module):
+    """A network of the team that holds the state as its middle does, see ``held_state``.
+
+    Args:
+        network: Reads whatever it reads, and the state last.
+    """
+
+    def __init__(self, network: nn.Module) -> None:
+        super().__init__()
+        self.network = network
+
+    def forward(self, *inputs: Tensor) -> Tensor:
+        """Return what the network writes."""
+        *others, state = inputs
+        return self.network(*others, held_state(state))
+
+
 class _Held(nn.Module):
     """Networks that are given entries as they hold them; their weights have the names that they have elsewhere."""
 

@@ -7,7 +7,7 @@ from typing import Literal
 from tensordict.nn import TensorDictModule
 from torch import nn
 
-from warp_torchrl.models.facing import FacingFire
+from warp_torchrl.models.facing import FacingFire, StateFacingFire
 from warp_torchrl.models.networks import (
     AgentNetworks,
     Central,
@@ -84,6 +84,10 @@ class Mlp:
         It reads each agent's observation and own action, and the state and the whole team's actions if central.
         """
         return self._of_agents(signature, self.critic_hidden, 1, 1.0, STATE_ACTION_VALUE, central=central, judges=True)
+
+    def of_state(self, network: nn.Module) -> nn.Module:
+        """Return a network whose last input is the state as one that is given the state as these networks hold it."""
+        return StateFacingFire(network) if self.facing == "fire" else network
 
     def _of_agents(
         self,
