@@ -266,6 +266,19 @@ def test_a_checkpoint_of_another_configuration_is_refused_in_one_line(finished, 
         assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize("change", ["renamed", "missing", "more"])
+def test_networks_of_other_names_are_refused(finished, tmp_path, change):
+    """tensordict would take them as they come and go on with weights that nothing reads."""
+    state = newest(finished[0])[0].training()
+    name = next(each for each in state["loss"] if each.endswith("weight"))
+    if change != "missing":
+        state["loss"][name + "s"] = state["loss"][name]
+    if change != "more":
+        del state["loss"][name]
+    with pytest.raises(CheckpointError, match=f"does not fit this configuration: .*{name}s? is in one"):
+        tiny(tmp_path).load_state_dict(state)
+
+
 @pytest.mark.parametrize("entry", ["loss", "optimizer", "keeps", "collection", "random", "frames", "rows"])
 @pytest.mark.parametrize("harm", ["missing", "of another type"])
 def test_a_load_that_fails_leaves_the_run_as_it_was(make_dqn, finished, entry, harm):

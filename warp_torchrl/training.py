@@ -243,6 +243,9 @@ class Training:
             raise checkpoints.CheckpointError(f"the checkpoint does not fit this configuration: {reason}") from None
 
     def _restore(self, state: Mapping[str, Any]) -> None:
+        differing = self.learner.loss.state_dict().keys() ^ state["loss"].keys()
+        if differing:  # tensordict loads what it is given by any names, and says that all were met
+            raise ValueError(f"{min(differing)} is in one of the two alone")
         self.learner.loss.load_state_dict(state["loss"])
         self.learner.optimizer.load_state_dict(state["optimizer"])
         for name, each in self.learner.keeps.items():
