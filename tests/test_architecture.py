@@ -54,13 +54,18 @@ def test_what_reads_the_state_knows_only_the_world(module):
     assert "torchrl" not in {name.split("/")[0] for name in imports(module)}
 
 
+READ_OF_OBSERVATIONS = {
+    "models/facing": "observation/frame",  # how they are turned
+    "models/model": "observation/frame",
+    "models/memory": "observation/own",  # whether an episode begins
+}
+
+
 @pytest.mark.parametrize("module", [name for name in MODULES if name.split("/")[0] in ("models", "algorithms")])
 def test_learning_knows_specs_and_not_the_world(module):
     known = ("models", "algorithms", *GROUND)
-    turned = (
-        {"observation/frame"} if module in ("models/facing", "models/model") else set()
-    )  # how observations are turned
-    assert all(name.split("/")[0] in known or name in turned for name in ours(module))
+    read = READ_OF_OBSERVATIONS.get(module)
+    assert all(name.split("/")[0] in known or name == read for name in ours(module))
 
 
 def test_the_environment_knows_no_learning():

@@ -82,6 +82,7 @@ RUNS = {
     "all that moves": ["reward.normalise=true", "model.sharing=role", "team.roles=[ugv,uav]", "fire=hazard",
                        "wind=wandering", "reward=collaborative", "team.tank=3"],
     "taught": ["imitation.teacher=greedy", "imitation.until=0.7"],
+    "remembers": ["model.memory=8"],
     **{name: [f"algorithm={name}", *(REPLAY if name in REPLAYS else [])] for name in ALGORITHMS},
 }  # fmt: skip
 RUNS["dqn"] += ["algorithm.target_interval=3"]
@@ -107,6 +108,7 @@ def never_stopped(tmp_path_factory):
 FAST = {
     ("all that moves", 1),
     ("taught", 3),
+    ("remembers", 3),
     ("mappo", LAST),
     ("dqn", 1),
     *((name, 3) for name in ("ippo", "a2c", *REPLAYS[1:])),

@@ -15,7 +15,7 @@ from warp_torchrl import disk
 from warp_torchrl.behaviour import BEHAVIOUR, Behaviour
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS, idle_action
-from warp_torchrl.models import ACTION, ACTION_MASK
+from warp_torchrl.models import ACTION, ACTION_MASK, memory_apart
 from warp_torchrl.render import EpisodeRecorder
 from warp_torchrl.specs import EPISODE_METRICS
 from warp_torchrl.statistics import compare, summarise
@@ -39,7 +39,8 @@ def play(
 ) -> Episodes:
     """Play one episode in each world of an environment, without resets, until all have ended.
 
-    The draws of a sampled policy are seeded by ``first_seed``; the global generator is left as it was.
+    The draws of a sampled policy are seeded by ``first_seed``; the global generator is left as it was, and so is what
+    a policy remembers.
 
     Args:
         env: Its worlds become episode 0 of ``first_seed``, ``first_seed + 1``, ...
@@ -53,7 +54,7 @@ def play(
         The metrics of each world.
     """
     behaviour = None
-    with torch.random.fork_rng(), torch.no_grad(), set_exploration_type(MODES[mode]):
+    with torch.random.fork_rng(), torch.no_grad(), set_exploration_type(MODES[mode]), memory_apart(policy):
         torch.manual_seed(first_seed)
         env.set_seed(first_seed, static_seed=True)
         now = env.reset()

@@ -8,10 +8,11 @@ import numpy as np
 import torch
 from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
 from torchrl.envs.utils import exploration_type, set_exploration_type
 
 from warp_torchrl.evaluation import MODES
-from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, ROLE
+from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, ROLE, recurrent_actors
 from warp_torchrl.models.networks import AgentNetworks, Network
 from warp_torchrl.observation import SELF_SIZE
 from warp_torchrl.world.role import ROLE_NAMES, ROLES
@@ -55,7 +56,9 @@ class NumpyPolicy:
     It is decentralised: each agent's action comes from its own observation and mask. So one agent may ask alone, a
     team together, a batch of worlds too; but a policy with a network for each agent (``sharing: none``) must be given
     the whole team, in the order of ``possible_agents``. A policy with a network for each role (``sharing: role``)
-    reads an agent's role off its name (``bulldozer_0``) or, where it has none, off its ``self``.
+    reads an agent's role off its name (``bulldozer_0``) or, where it has none, off its ``self``. A policy that
+    remembers (``memory``) does so for each name that it is given; agents without names that are asked one by one need
+    a ``numpy_policy()`` each.
 
     Args:
         policy: What acts, in its own mode; where it samples, it draws from torch's generator.
@@ -69,6 +72,8 @@ class NumpyPolicy:
         self._entries = {"".join(key[len(OBSERVATION) :]): entry for key, entry in zip(keys, network.encoder.entries)}
         self._n_agents = next((len(each.networks) for each in modules if isinstance(each, AgentNetworks)), None)
         self._by_role = ROLE in policy.in_keys
+        self._recurrent = recurrent_actors(policy)
+        self._memory: dict[str, Tensor] = {}  # float32 [B, M] of each agent
         self._device = next(policy.parameters()).device
 
     def __call__(
@@ -98,7 +103,8 @@ class NumpyPolicy:
                 f"this policy has a network for each of {self._n_agents} agents: observations must be of all of them "
                 f"at once, got {len(team)}"
             )
-        actions = self._act([self._of_agent(name, seen, infos.get(name, {})) for name, seen in team.items()])
+        agents = [self._of_agent(name, seen, infos.get(name, {})) for name, seen in team.items()]
+        actions = self._act(list(team), agents)
         numbers = [each if each.ndim else int(each) for each in actions]
         return numbers[0] if alone else dict(zip(team, numbers))
 
@@ -133,7 +139,7 @@ class NumpyPolicy:
         return read
 
     @torch.no_grad()
-    def _act(self, agents: list[dict[Any, np.ndarray]]) -> Iterable[np.ndarray]:
+    def _act(self, names: list[str], agents: list[dict[Any, np.ndarray]]) -> Iterable[np.ndarray]:
         """Return each agent's actions, int64 [] or [B]."""
         worlds = agents[0][ACTION_MASK].shape[:-1]
         stacked = {key: np.stack([each[key] for each in agents], axis=len(worlds)) for key in agents[0]}
@@ -141,8 +147,18 @@ class NumpyPolicy:
         for key, value in stacked.items():
             tensor = torch.from_numpy(value).to(self._device)
             read.set(key, tensor if worlds else tensor[None])
+        for actor in self._recurrent:
+            actor.remembered = self._recall(names, read.batch_size, actor.size[1])
         action = self._policy(read)[ACTION].numpy(force=True)
+        for actor in self._recurrent:
+            self._memory |= dict(zip(names, actor.remembered.unbind(-2), strict=True))
         return np.moveaxis(action if worlds else action[0], -1, 0)
+
+    def _recall(self, names: list[str], worlds: Sequence[int], size: int) -> Tensor:
+        """Return what each agent remembers, float32 [B, A, M]; 0 where it has not acted in these worlds."""
+        nothing = torch.zeros(*worlds, size, device=self._device)
+        known = [self._memory.get(name, nothing) for name in names]
+        return torch.stack([each if each.shape == nothing.shape else nothing for each in known], dim=-2)
 
 
 def _role(name: str, own: np.ndarray | None) -> int:

@@ -163,6 +163,8 @@ def settings(config: Mapping[str, Any]) -> Settings:
     made = construct(Settings, values, "")
     with _told("algorithm"):
         made.algorithm.check_batch(made.n_worlds * made.collector.steps)
+    with _told("model"):
+        made.algorithm.check_model(made.model)
     with _told("collector"):
         made.collector.check_worlds(made.n_worlds)
     with _told("imitation"):

@@ -49,6 +49,13 @@ class Algorithm:
             ValueError: If not.
         """
 
+    def check_model(self, model: Mlp) -> None:
+        """Check that networks of a model can be learnt.
+
+        Raises:
+            ValueError: If not.
+        """
+
     def rate_at(self, progress: float, optimizer: torch.optim.Optimizer) -> float:
         """Set the optimiser's learning rate to that of progress in 0..1, and return it."""
         rate = self.learning_rate * falling(1.0, self.learning_rate_end, progress)

@@ -71,6 +71,17 @@ class OffPolicy(Algorithm):
                 f"got {self.capacity}"
             )
 
+    def check_model(self, model: Mlp) -> None:
+        """Check that nothing need be remembered: transitions are replayed one by one.
+
+        Raises:
+            ValueError: If actors should remember.
+        """
+        if model.memory:
+            raise ValueError(
+                f"memory must be 0 where the algorithm replays, got {model.memory}: choose mappo, ippo, ppo or a2c"
+            )
+
     def build(self, env: EnvBase, model: Mlp, frames_per_batch: int) -> Learner:
         """Return a learner for an environment.
 

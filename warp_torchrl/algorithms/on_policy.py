@@ -20,6 +20,7 @@ from warp_torchrl.models import (
     REWARD,
     VALUE,
     Mlp,
+    Recollection,
     Signature,
     faces_fire,
     given_held,
@@ -52,7 +53,8 @@ class OnPolicy(Algorithm):
         entropy_coeff: Weight of the entropy bonus at the start.
         entropy_coeff_end: At the end; it falls linearly.
         critic_coeff: Weight of the value loss.
-        minibatch_size: World steps in a minibatch (each has one sample an agent).
+        minibatch_size: World steps in a minibatch (each has one sample an agent); where actors remember, in as many
+            whole sequences as fit, one at least.
 
     Raises:
         ValueError: If a value is out of its range.
@@ -94,15 +96,18 @@ class OnPolicy(Algorithm):
             loss.entropy_coeff.fill_(falling(self.entropy_coeff, self.entropy_coeff_end, progress))
             return {"train/learning_rate": self.rate_at(progress, optimizer), **self.constants()}
 
+        memory = Recollection(policy)
+        steps = frames_per_batch // env.batch_size[0] if memory.actors else 1  # in a row of the buffer
         buffer = TensorDictReplayBuffer(
-            storage=RowStorage(frames_per_batch, device=env.device),
+            storage=RowStorage(frames_per_batch // steps, device=env.device),
             sampler=SamplerWithoutReplacement(),
-            batch_size=min(self.minibatch_size, frames_per_batch),
+            batch_size=max(1, min(self.minibatch_size, frames_per_batch) // steps),
         )
 
         def store(batch: TensorDictBase) -> None:
             buffer.empty()
-            buffer.extend(with_advantages(loss, batch, hold if faces_fire(policy) else _as_it_is))
+            valued = with_advantages(loss, batch, hold if faces_fire(policy) else _as_it_is, whole=bool(memory.actors))
+            buffer.extend(valued)
 
         return Learner(
             policy=policy,
@@ -117,6 +122,7 @@ class OnPolicy(Algorithm):
             samples=lambda: (sample for _ in range(self.passes()) for sample in buffer),
             after_step=lambda sample: None,
             schedule=schedule,
+            keeps={"memory": memory} if memory.actors else {},
         )
 
     def loss(self, policy: ProbabilisticActor, critic: torch.nn.Module) -> LossModule:
@@ -144,13 +150,21 @@ Hold = Callable[[TensorDictBase], TensorDictBase]
 """Makes what a loss's networks read of what was collected."""
 
 
-def with_advantages(loss: LossModule, batch: TensorDictBase, hold: Hold) -> TensorDictBase:
-    """Add advantages and value targets over time, then drop what the loss does not read; [B, T] -> [B T]."""
+def with_advantages(loss: LossModule, batch: TensorDictBase, hold: Hold, whole: bool = False) -> TensorDictBase:
+    """Add advantages and value targets over time, then drop what the loss does not read.
+
+    Args:
+        loss: Whose values and estimator they are of.
+        batch: As it was collected, [B, T].
+        hold: Makes what is read of it.
+        whole: Whether to return sequences [B, T], and not steps [B T].
+    """
     with torch.no_grad():
         batch = hold(batch)
         _add_values(loss, batch, hold)
         loss.value_estimator(batch)
-    return batch.exclude("next", "info", LOGITS, VALUE).reshape(-1)
+    batch = batch.exclude("next", "info", LOGITS, VALUE)
+    return batch if whole else batch.reshape(-1)
 
 
 def _as_it_is(batch: TensorDictBase) -> TensorDictBase:

@@ -5,6 +5,7 @@ world.
 """
 
 from warp_torchrl.models.facing import faces_fire, given_held, hold
+from warp_torchrl.models.memory import Recollection, RecurrentActor, memory_apart, recurrent_actors
 from warp_torchrl.models.model import Cnn, Mlp
 from warp_torchrl.models.signature import (
     ACTION,
@@ -14,6 +15,7 @@ from warp_torchrl.models.signature import (
     CHOSEN_ACTION_VALUE,
     LOG_PROB,
     LOGITS,
+    MEMORY,
     OBSERVATION,
     REWARD,
     ROLE,
@@ -34,6 +36,7 @@ __all__ = [
     "CHOSEN_ACTION_VALUE",
     "LOGITS",
     "LOG_PROB",
+    "MEMORY",
     "OBSERVATION",
     "REWARD",
     "ROLE",
@@ -44,9 +47,13 @@ __all__ = [
     "Cnn",
     "Entry",
     "Mlp",
+    "Recollection",
+    "RecurrentActor",
     "Signature",
     "faces_fire",
     "given_held",
     "hold",
+    "memory_apart",
+    "recurrent_actors",
     "signature",
 ]

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from copy import deepcopy
 from typing import TypeVar
 
+import torch
 from tensordict import TensorDictBase
 from torch import Tensor, nn
 
@@ -23,12 +24,12 @@ class FacingFire(nn.Module):
     Args:
         network: Reads entries [..., A, ...] and, where it is central, the state; writes [..., A, out].
         keys: Of what is read, in order.
-        chooses: Whether what it writes is an entry for each action.
+        actions: How many of the entries that it writes, the first, are one for each action.
     """
 
-    def __init__(self, network: nn.Module, keys: list[Key], chooses: bool) -> None:
+    def __init__(self, network: nn.Module, keys: list[Key], actions: int) -> None:
         super().__init__()
-        self.network, self.keys, self.chooses = network, keys, chooses
+        self.network, self.keys, self.actions = network, keys, actions
         self._names = _observed(keys)
 
     def forward(self, *inputs: Tensor) -> Tensor:
@@ -42,7 +43,10 @@ class FacingFire(nn.Module):
         if ACTION_ONE_HOT in given:
             given[ACTION_ONE_HOT] = frame.actions(given[ACTION_ONE_HOT])
         out = self.network(*given.values())
-        return frame.actions_on_map(out) if self.chooses else out
+        if not self.actions:
+            return out
+        turned = frame.actions_on_map(out[..., : self.actions])
+        return turned if out.shape[-1] == self.actions else torch.cat((turned, out[..., self.actions :]), dim=-1)
 
 
 class StateFacingFire(nn.Module):

@@ -8,6 +8,7 @@ from tensordict.nn import TensorDictModule
 from torch import nn
 
 from warp_torchrl.models.facing import FacingFire, StateFacingFire
+from warp_torchrl.models.memory import BEGINS, RecurrentActor, RecurrentNetwork
 from warp_torchrl.models.networks import (
     AgentNetworks,
     Central,
@@ -20,6 +21,7 @@ from warp_torchrl.models.signature import (
     ACTION_ONE_HOT,
     ACTION_VALUE,
     LOGITS,
+    MEMORY,
     ROLE,
     STATE,
     STATE_ACTION_VALUE,
@@ -28,6 +30,7 @@ from warp_torchrl.models.signature import (
     Signature,
 )
 from warp_torchrl.observation.frame import can_be_held
+from warp_torchrl.validation import check_fields
 
 _ACTIVATIONS = {"tanh": nn.Tanh, "relu": nn.ReLU}
 
@@ -44,12 +47,14 @@ class Mlp:
         activation: ``tanh`` or ``relu``.
         facing: ``fire``, each network holds the map so that the fire that an agent sees lies between its east and its
             south-east, see ``FacingFire``: what it learns of one case it knows of all eight. ``north``, as it is given.
+        memory: Units of the recurrent layer by which actors remember what they saw since their episode began, see
+            ``RecurrentNetwork``; 0, they act on what they see now. On-policy algorithms learn it.
         dtype: ``bfloat16`` computes the layers in half precision (weights stay float32), several times faster on
             processors that have it and several times slower on those that have not; ``auto`` takes it where they do.
 
     Raises:
-        ValueError: If a size is not in 1..8192 or there is no hidden layer, or, when networks are made, if they should
-            face a fire in observations that are of no preset.
+        ValueError: If a size is out of range or there is no hidden layer, or, when networks are made, if they should
+            face a fire in observations that are of no preset, or remember where those have no clock.
     """
 
     sharing: Literal["team", "role", "none"] = "team"
@@ -57,15 +62,19 @@ class Mlp:
     critic_hidden: tuple[int, ...] = (128, 128)
     activation: Literal["tanh", "relu"] = "tanh"
     facing: Literal["north", "fire"] = "fire"
+    memory: int = 0
     dtype: Literal["auto", "float32", "bfloat16"] = "float32"
 
     def __post_init__(self) -> None:
         for name in ("actor_hidden", "critic_hidden"):
             check_sizes(name, getattr(self, name))
+        check_fields(self, memory=(0, 8192))
 
     def actor(self, signature: Signature) -> TensorDictModule:
-        """Return the module that writes logits [..., A, actions] from each agent's own observation."""
-        return self._of_agents(signature, self.actor_hidden, signature.n_actions, 0.01, LOGITS)
+        """Return the module that writes logits [..., A, actions] from each agent's own observation, and memory."""
+        if self.memory and "self" not in signature.observation:
+            raise ValueError(f"model.memory must be 0 where observations have no clock, got {self.memory}")
+        return self._of_agents(signature, self.actor_hidden, signature.n_actions, 0.01, LOGITS, memory=self.memory)
 
     def action_value(self, signature: Signature) -> TensorDictModule:
         """Return the module that writes each action's value [..., A, actions] from each agent's own observation."""
@@ -99,7 +108,8 @@ class Mlp:
         *,
         central: bool = False,
         judges: bool = False,
-    ) -> TensorDictModule:
+        memory: int = 0,
+    ) -> TensorDictModule | RecurrentActor:
         """Return the module that writes [..., A, out] from each agent's entries.
 
         Args:
@@ -110,6 +120,7 @@ class Mlp:
             key: Where it writes.
             central: Whether it reads the state too.
             judges: Whether it reads the action that was chosen too, and that of the team where it is central.
+            memory: Units that it remembers by.
         """
         entries = list(signature.observation.values())
         keys: list[str | tuple[str, ...]] = list(signature.observation_keys())
@@ -123,7 +134,9 @@ class Mlp:
         if central:
             joint = [Entry((signature.n_agents * signature.n_actions,), "float32")] if judges else []
             entries = [signature.state, *joint, *entries]
-        network = self._shared(signature, lambda: self._network(entries, hidden, out, head_gain))
+        network = self._shared(signature, lambda: self._network(entries, hidden, out, head_gain, memory))
+        if memory:
+            keys += [BEGINS, MEMORY]
         if self.sharing == "role":
             keys.append(ROLE)
         if central:
@@ -131,7 +144,9 @@ class Mlp:
         if self.facing == "fire":
             if not can_be_held({name: entry.shape for name, entry in signature.observation.items()}):
                 raise ValueError("model.facing must be north where observations are of no preset, got fire")
-            network = FacingFire(network, keys, chooses=key in (LOGITS, ACTION_VALUE))
+            network = FacingFire(network, keys, actions=out if key in (LOGITS, ACTION_VALUE) else 0)
+        if memory:
+            return RecurrentActor(network, [key for key in keys if key not in (BEGINS, MEMORY)], out, memory)
         return TensorDictModule(network, in_keys=keys, out_keys=[key])
 
     def _shared(self, signature: Signature, make: Callable[[], Network]) -> nn.Module:
@@ -142,9 +157,13 @@ class Mlp:
             return RoleNetworks([make() for _ in range(signature.n_roles)])
         return AgentNetworks([make() for _ in range(signature.n_agents)])
 
-    def _network(self, entries: list[Entry], hidden: tuple[int, ...], out: int, head_gain: float) -> Network:
-        activation = _ACTIVATIONS[self.activation]
-        return Network(self._encoder(entries, hidden[0]), tuple(hidden), out, activation, head_gain, self.dtype)
+    def _network(
+        self, entries: list[Entry], hidden: tuple[int, ...], out: int, head_gain: float, memory: int
+    ) -> Network:
+        encoder, activation = self._encoder(entries, hidden[0]), _ACTIVATIONS[self.activation]
+        if memory:
+            return RecurrentNetwork(encoder, tuple(hidden), out, activation, head_gain, self.dtype, memory)
+        return Network(encoder, tuple(hidden), out, activation, head_gain, self.dtype)
 
     def _encoder(self, entries: list[Entry], size: int) -> LinearEncoder | ConvolutionalEncoder:
         return LinearEncoder(entries, size)

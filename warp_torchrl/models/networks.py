@@ -132,12 +132,20 @@ class Network(nn.Module):
         self.body = nn.Sequential(activation(), *layers)
         self.dtype = dtype
 
+    @property
+    def entries(self) -> list[Entry]:
+        """What it reads."""
+        return self.encoder.entries
+
     def forward(self, *inputs: Tensor) -> Tensor:
         """Return float32 [..., out]."""
-        device = inputs[0].device.type
-        half = self.dtype == "bfloat16" or (self.dtype == "auto" and computes_in_half(device))
-        with torch.autocast(device, dtype=torch.bfloat16, enabled=half, cache_enabled=False):
+        with self.arithmetic(inputs[0].device.type):
             return self.body(self.encoder(*inputs)).to(torch.float32)
+
+    def arithmetic(self, device: str) -> torch.autocast:
+        """Return the context in which the layers compute on a kind of device."""
+        half = self.dtype == "bfloat16" or (self.dtype == "auto" and computes_in_half(device))
+        return torch.autocast(device, dtype=torch.bfloat16, enabled=half, cache_enabled=False)
 
 
 @lru_cache(maxsize=4)
@@ -202,7 +210,7 @@ class AgentNetworks(nn.Module):
     def __init__(self, networks: list[Network]) -> None:
         super().__init__()
         self.networks = nn.ModuleList(networks)
-        self._entries = networks[0].encoder.entries
+        self._entries = networks[0].entries
 
     def forward(self, *inputs: Tensor) -> Tensor:
         """Return float32 [..., A, out] from entries [..., A, ...]; one that all share may be [..., 1, ...]."""

@@ -15,8 +15,8 @@ IDENTITY_SIZE = 4
 SELF_SIZE = 9 + len(ROLE_NAMES) + len(Action)
 """Entries of ``self``: row, column, time left, wind east and north, steps to the tick, tank, whether it has a tank,
 whether it may refill here, role (one-hot), last action (one-hot, zeros before the first)."""
-PLACE, WIND, LAST_ACTION = slice(0, 2), slice(3, 5), slice(9 + len(ROLE_NAMES), SELF_SIZE)
-"""Where ``self`` tells of the agent's row and column, of the wind, and of its last action."""
+PLACE, TIME_LEFT, WIND, LAST_ACTION = slice(0, 2), 2, slice(3, 5), slice(9 + len(ROLE_NAMES), SELF_SIZE)
+"""Where ``self`` tells of the agent's row and column, of the time left, of the wind, and of its last action."""
 WIND_SCALE = 20.0
 """Wind that an observation shows as 1 [m/s]."""
 
@@ -43,6 +43,11 @@ def own_vector(state: WorldState, world: World) -> Tensor:
         (vehicles.position == vehicles.base[:, None]).all(-1).to(torch.float32),
     ]
     return torch.cat((torch.stack(columns, dim=-1), roles, last), dim=-1)
+
+
+def begins(own: Tensor) -> Tensor:
+    """Return whether the first step of an episode is to come, bool [...], from ``self`` [..., F]."""
+    return own[..., TIME_LEFT] == 1.0
 
 
 def identity(n_agents: int, device: torch.device) -> Tensor:

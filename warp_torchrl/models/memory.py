@@ -1,0 +1,163 @@
+"""Actors with a memory: a recurrent layer, and what is remembered from one step to the next."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from torch import Tensor, nn
+
+from warp_torchrl.models.networks import ConvolutionalEncoder, LinearEncoder, Network
+from warp_torchrl.models.signature import LOGITS, MEMORY, OBSERVATION, ROLE, Entry
+from warp_torchrl.observation.own import begins
+
+BEGINS = "begins"
+"""Whether an episode begins, among what a network with a memory reads."""
+
+
+class RecurrentNetwork(Network):
+    """A network with a gated recurrent unit (Cho et al. 2014) beside its first layer: what it sees reaches the layers
+    above as it does without, and what it remembers is added to that.
+
+    Args:
+        encoder: As for ``Network``, and so are the others but the last.
+        hidden: See ``Network``.
+        out: See ``Network``.
+        activation: See ``Network``.
+        head_gain: See ``Network``.
+        dtype: See ``Network``; the recurrent layer is float32.
+        memory: Units of the recurrent layer.
+    """
+
+    def __init__(
+        self,
+        encoder: LinearEncoder | ConvolutionalEncoder,
+        hidden: tuple[int, ...],
+        out: int,
+        activation: type[nn.Module],
+        head_gain: float,
+        dtype: str,
+        memory: int,
+    ) -> None:
+        super().__init__(encoder, hidden, out, activation, head_gain, dtype)
+        self.memory = memory
+        self.cell = nn.GRUCell(hidden[0], memory)
+        self.recall = nn.Linear(memory, hidden[0], bias=False)
+        for weight in (self.cell.weight_ih, self.cell.weight_hh, self.recall.weight):
+            nn.init.orthogonal_(weight)
+        nn.init.zeros_(self.cell.bias_ih)
+        nn.init.zeros_(self.cell.bias_hh)
+
+    @property
+    def entries(self) -> list[Entry]:
+        """What it reads: that of its encoder, whether an episode begins, and the memory."""
+        return [*super().entries, Entry((), "bool"), Entry((self.memory,), "float32")]
+
+    def forward(self, *inputs: Tensor) -> Tensor:
+        """Return its output and what is remembered then, float32 [..., out + M].
+
+        Args:
+            inputs: Entries [...], whether an episode begins bool [...], and the memory before, float32 [..., M]; or,
+                for a sequence, entries and beginnings with time as dimension 1 and the memory before the first.
+        """
+        *seen, fresh, memory = inputs
+        device = fresh.device.type
+        with self.arithmetic(device):
+            features = self.body[0](self.encoder(*seen))
+        with torch.autocast(device, enabled=False):
+            remembered = self._remember(features.to(torch.float32), (~fresh)[..., None], memory)
+        with self.arithmetic(device):
+            out = self.body[1:](features + self.recall(remembered))
+        return torch.cat((out.to(torch.float32), remembered), dim=-1)
+
+    def _remember(self, features: Tensor, kept: Tensor, memory: Tensor) -> Tensor:
+        """Return the memory after each step, of which only what is ``kept`` goes on."""
+        if features.ndim == memory.ndim:
+            return self._step(features, kept * memory)
+        after = []
+        for now, stays in zip(features.unbind(1), kept.unbind(1), strict=True):
+            memory = self._step(now, stays * memory)
+            after.append(memory)
+        return torch.stack(after, dim=1)
+
+    def _step(self, features: Tensor, memory: Tensor) -> Tensor:
+        return self.cell(features.flatten(0, -2), memory.flatten(0, -2)).view(memory.shape)
+
+
+class RecurrentActor(TensorDictModuleBase):
+    """The module of a team whose agents remember, each for itself, what they saw since their episode began.
+
+    Called with the tensordict [B] of one step it goes on from the step before, which must have been of the same
+    worlds, and forgets where an episode begins, as the agents' own clock tells. Called with sequences [B, T] it goes on
+    from the memory that each of them was recorded with, and leaves its own as it was.
+
+    Args:
+        network: Reads the observation's entries, ``BEGINS`` and the memory, and the role if there is one for each;
+            writes logits and memory, float32 [..., A, actions + M].
+        keys: Of the observation's entries, and of the role.
+        n_actions: Entries of the logits.
+        memory: M.
+    """
+
+    def __init__(self, network: nn.Module, keys: list[Any], n_actions: int, memory: int) -> None:
+        super().__init__()
+        self.in_keys, self.out_keys = [*keys, MEMORY], [LOGITS, MEMORY]
+        self.network, self.size, self._seen = network, [n_actions, memory], [key for key in keys if key != ROLE]
+        self.remembered = torch.zeros(0, 0, memory)  # [B, A, M], of the last step's worlds
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Write logits, and the memory before the step."""
+        fresh = begins(tensordict.get((*OBSERVATION, "self")))
+        whole = tensordict.ndim == 2
+        before = tensordict.get(MEMORY)[:, 0] if whole else self._before(fresh)
+        seen = [tensordict.get(key) for key in self._seen]
+        role = [tensordict.get(ROLE)] if ROLE in self.in_keys else []
+        logits, after = self.network(*seen, fresh, before, *role).split(self.size, dim=-1)
+        if not whole:
+            tensordict.set(MEMORY, before)
+            self.remembered = after.detach()
+        return tensordict.set(LOGITS, logits)
+
+    def _before(self, fresh: Tensor) -> Tensor:
+        """Return what is remembered of the step before by these agents, float32 [B, A, M]; 0 by others."""
+        if self.remembered.shape[:-1] != fresh.shape or self.remembered.device != fresh.device:
+            return torch.zeros(*fresh.shape, self.size[1], device=fresh.device)
+        return self.remembered
+
+
+class Recollection:
+    """What a checkpoint keeps of the memory of actors, besides their weights.
+
+    Args:
+        policy: Of which they are a part; none need be.
+    """
+
+    def __init__(self, policy: nn.Module) -> None:
+        self.actors = recurrent_actors(policy)
+
+    def state_dict(self) -> dict[str, Tensor]:
+        """Return the memory of each."""
+        return {str(index): actor.remembered.clone() for index, actor in enumerate(self.actors)}
+
+    def load_state_dict(self, state_dict: Mapping[str, Tensor]) -> None:
+        """Remember it."""
+        for index, actor in enumerate(self.actors):
+            actor.remembered = state_dict[str(index)].to(next(actor.parameters()).device)
+
+
+def recurrent_actors(policy: nn.Module) -> list[RecurrentActor]:
+    """Return the parts of a policy that remember."""
+    return [each for each in policy.modules() if isinstance(each, RecurrentActor)]
+
+
+@contextmanager
+def memory_apart(policy: nn.Module) -> Iterator[None]:
+    """Let a policy act elsewhere for a while, and remember then what it did before."""
+    memory = Recollection(policy)
+    before = memory.state_dict()
+    try:
+        yield
+    finally:
+        memory.load_state_dict(before)
