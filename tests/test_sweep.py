@@ -13,6 +13,7 @@ from warp_torchrl.sweep import method
         (["algorithm=ippo", "model.sharing=none"], "ippo efficiency surroundings sharing=none"),
         (["model.facing=north", "observation.radius=7"], "mappo efficiency surroundings facing=north radius=7"),
         (["observation=local", "observation.radius=3"], "mappo efficiency local radius=3"),
+        (["model.memory=64"], "mappo efficiency surroundings memory=64"),
         (["observation=paper", "observation.radius=5"], "mappo efficiency paper radius=5"),
         (["reward=paper", "reward.barrier_rule=printed"], "mappo paper surroundings barrier_rule=printed"),
         (["observation=paper", "imitation.teacher=local"], "mappo efficiency paper taught by local"),
