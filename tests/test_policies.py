@@ -30,11 +30,11 @@ def test_it_is_small_and_tells_of_no_machine(scenario):
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_it_is_trained_by_the_experiment_of_its_name(scenario):
-    values = newest(SHIPPED / scenario)[0].record().values
-    config = compose_config("train", [f"experiment={scenario}", f"seed={values['seed']}"])
-    expected = without_targets(plain(config))
-    assert values == {name: expected[name] for name in values}
-    assert {"reward", "observation", "imitation", "algorithm", "model", "total_frames"} <= set(values)
+    record = newest(SHIPPED / scenario)[0].record()
+    config = compose_config("train", [f"experiment={scenario}", f"seed={record.values['seed']}"])
+    expected, values = (without_targets(plain(each)) for each in (config, recompose(record)))
+    assert {name: values[name] for name in record.values} == {name: expected[name] for name in record.values}
+    assert {"reward", "observation", "imitation", "algorithm", "model", "total_frames"} <= set(record.values)
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
