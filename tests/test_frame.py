@@ -113,9 +113,9 @@ def seen(now):
     return {"": found} if isinstance(found, torch.Tensor) else dict(found.items())
 
 
-def pulled(preset, state):
+def pulled(preset, state, n_worlds=6):
     """Return which agents see fire more on one side than on the other, bool [B, A]: their frames are not arbitrary."""
-    env = fighting(preset, steps=0)
+    env = fighting(preset, n_worlds, steps=0)
     here, across, mirrored = (
         frame_of(seen(env.set_state(turned_world(state, turn)))).index
         for turn in ((1, 1, False), (1, 1, True), (-1, -1, False))
@@ -170,6 +170,38 @@ def test_networks_say_the_same_of_a_turned_world(model):
     judge = model.action_critic(shape, central=False)
     ours, theirs = (judge(now)[STATE_ACTION_VALUE] for now in (here, there))
     torch.testing.assert_close(theirs[sees], ours[sees], atol=1e-4, rtol=0.0)
+
+
+@pytest.mark.parametrize("turn", TURNS, ids=str)
+def test_what_is_remembered_of_a_turned_world_is_turned(turn):
+    """Three steps of a world and of the same world turned; frames change on the way."""
+    preset = PRESETS["local"]
+    env, rule = fighting(preset, n_worlds=24), HEURISTICS["local"](fighting(preset, n_worlds=24, steps=0))
+    actors = [lively(Mlp(memory=16), fighting(preset, steps=0)) for _ in range(2)]
+    faced, sees = [], True
+    for _ in range(3):
+        state = env.world_state.clone()
+        here, there = (env.set_state(each).clone() for each in (state, turned_world(state, turn)))
+        sees = sees & pulled(preset, state, 24)
+        faced.append(frame_of(seen(here)).index)
+        ours, theirs = (actor(now)[LOGITS] for actor, now in zip(actors, (here, there)))
+        fresh = lively(Mlp(memory=16), fighting(preset, steps=0))(here.clone())[LOGITS]
+        expected = torch.empty_like(ours).index_copy_(2, turned_actions(torch.arange(11), turn), ours)
+        torch.testing.assert_close(theirs[sees], expected[sees], atol=1e-5, rtol=0.0)
+        now = env.set_state(state)
+        env.step(rule(now))
+    assert ((faced[0] != faced[1]) | (faced[1] != faced[2]))[sees].any()
+    assert not torch.allclose(ours[sees], fresh[sees], atol=1e-3), "the memory has a say"
+
+
+def lively(model, env):
+    """Return an actor whose weights tell, the same each time."""
+    torch.manual_seed(0)
+    actor = model.actor(signature(env))
+    with torch.no_grad():
+        for weight in actor.parameters():
+            weight += 0.1 * torch.randn_like(weight)
+    return actor.requires_grad_(False)
 
 
 def test_networks_that_face_north_say_something_else():
@@ -289,6 +321,25 @@ def test_entries_by_action_come_back(n_actions):
     frame, entries = Frame(torch.arange(8)), torch.randn(8, n_actions)
     assert torch.equal(frame.actions_on_map(frame.actions(entries)), entries)
     assert len({tuple(each) for each in frame.actions(torch.arange(n_actions).expand(8, -1)).tolist()}) == 8
+
+
+def test_units_change_places_with_the_ways_to_hold_a_map():
+    """From one frame to another they move as they do between what these are of any turned map, and come back."""
+    frames, features = Frame(torch.arange(8)), torch.randn(8, 16)
+    assert torch.equal(frames.units_on_map(frames.units(features)), features)
+    assert torch.equal(framed(1, 1, False).units(features), features)
+    basis = torch.eye(2).expand(8, -1, -1)
+    matrices = Frame(torch.arange(8)[:, None].expand(-1, 2)).vectors(basis).transpose(-1, -2)
+
+    def of_turned(frame, turn):
+        return (matrices == matrices[frame] @ matrices[turn]).flatten(1).all(1).nonzero().item()
+
+    def moved(first, then):
+        return Frame(torch.tensor(then)).units(Frame(torch.tensor(first)).units_on_map(features[0])).tolist()
+
+    for first, then, turn in itertools.product(range(8), repeat=3):
+        assert moved(first, then) == moved(of_turned(first, turn), of_turned(then, turn))
+    assert len({tuple(moved(0, then)) for then in range(8)}) == 8
 
 
 def test_near_fires_count_for_more():

@@ -8,7 +8,16 @@ import torch
 from tensordict import TensorDictBase
 from torch import Tensor, nn
 
-from warp_torchrl.models.signature import ACTION, ACTION_MASK, ACTION_ONE_HOT, OBSERVATION, STATE, TEACHER_ACTION
+from warp_torchrl.models.signature import (
+    ACTION,
+    ACTION_MASK,
+    ACTION_ONE_HOT,
+    FRAME,
+    MEMORY,
+    OBSERVATION,
+    STATE,
+    TEACHER_ACTION,
+)
 from warp_torchrl.observation.frame import frame_of, held, held_state
 
 Key = str | tuple[str, ...]
@@ -40,6 +49,8 @@ class FacingFire(nn.Module):
             given[key] = held(name, given[key], frame)
         if STATE in given:
             given[STATE] = held_state(given[STATE])
+        if FRAME in given:
+            given[FRAME] = frame.index
         if ACTION_ONE_HOT in given:
             given[ACTION_ONE_HOT] = frame.actions(given[ACTION_ONE_HOT])
         out = self.network(*given.values())
@@ -97,7 +108,8 @@ def hold(batch: TensorDictBase) -> TensorDictBase:
 
     Args:
         batch: As it was collected; what is in it of ``ACTION``, ``ACTION_MASK``, ``TEACHER_ACTION`` and ``STATE`` is
-            turned with what was seen. Entries of its ``next`` are not.
+            turned with what was seen. Entries of its ``next`` are not. Where its agents remember, how each holds the
+            map is added as ``FRAME``.
     """
     names = _observed(batch.keys(include_nested=True, leaves_only=True))
     frame = frame_of({name: batch.get(key) for key, name in names.items()})
@@ -109,6 +121,8 @@ def hold(batch: TensorDictBase) -> TensorDictBase:
             out.set(key, frame.action(batch.get(key)))
     if ACTION_MASK in batch.keys(include_nested=True):
         out.set(ACTION_MASK, frame.actions(batch.get(ACTION_MASK)))
+    if MEMORY in batch.keys(include_nested=True):
+        out.set(FRAME, frame.index)
     if STATE in batch.keys():
         out.set(STATE, held_state(batch.get(STATE)))
     return out

@@ -10,7 +10,8 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor, nn
 
 from warp_torchrl.models.networks import ConvolutionalEncoder, LinearEncoder, Network
-from warp_torchrl.models.signature import LOGITS, MEMORY, OBSERVATION, ROLE, Entry
+from warp_torchrl.models.signature import FRAME, LOGITS, MEMORY, OBSERVATION, ROLE, Entry
+from warp_torchrl.observation.frame import Frame
 from warp_torchrl.observation.own import begins
 
 BEGINS = "begins"
@@ -21,6 +22,10 @@ class RecurrentNetwork(Network):
     """A network with a gated recurrent unit (Cho et al. 2014) beside its first layer: what it sees reaches the layers
     above as it does without, and what it remembers is added to that.
 
+    Who faces the fire holds the map another way each few steps. A memory has units for each of the eight ways, which
+    change places with them (the regular representation of the square's symmetries, as in Cohen and Welling, "Group
+    equivariant convolutional networks", 2016): what was remembered of the map stays true of it.
+
     Args:
         encoder: As for ``Network``, and so are the others but the last.
         hidden: See ``Network``.
@@ -28,7 +33,7 @@ class RecurrentNetwork(Network):
         activation: See ``Network``.
         head_gain: See ``Network``.
         dtype: See ``Network``; the recurrent layer is float32.
-        memory: Units of the recurrent layer.
+        memory: Units of the recurrent layer, a multiple of 8.
     """
 
     def __init__(
@@ -52,34 +57,36 @@ class RecurrentNetwork(Network):
 
     @property
     def entries(self) -> list[Entry]:
-        """What it reads: that of its encoder, whether an episode begins, and the memory."""
-        return [*super().entries, Entry((), "bool"), Entry((self.memory,), "float32")]
+        """What it reads: that of its encoder, whether an episode begins, its frame, and the memory."""
+        return [*super().entries, Entry((), "bool"), Entry((), "int64"), Entry((self.memory,), "float32")]
 
     def forward(self, *inputs: Tensor) -> Tensor:
         """Return its output and what is remembered then, float32 [..., out + M].
 
         Args:
-            inputs: Entries [...], whether an episode begins bool [...], and the memory before, float32 [..., M]; or,
-                for a sequence, entries and beginnings with time as dimension 1 and the memory before the first.
+            inputs: Entries [...], whether an episode begins bool [...], the index of the ``Frame`` that they are held
+                in int64 [...], and the memory before, float32 [..., M], of the map as it is; or, for a sequence, the
+                former with time as dimension 1 and the memory before the first.
         """
-        *seen, fresh, memory = inputs
+        *seen, fresh, index, memory = inputs
         device = fresh.device.type
         with self.arithmetic(device):
             features = self.body[0](self.encoder(*seen))
         with torch.autocast(device, enabled=False):
-            remembered = self._remember(features.to(torch.float32), (~fresh)[..., None], memory)
+            remembered = self._remember(features.to(torch.float32), (~fresh)[..., None], index, memory)
         with self.arithmetic(device):
             out = self.body[1:](features + self.recall(remembered))
-        return torch.cat((out.to(torch.float32), remembered), dim=-1)
+        return torch.cat((out.to(torch.float32), Frame(index).units_on_map(remembered)), dim=-1)
 
-    def _remember(self, features: Tensor, kept: Tensor, memory: Tensor) -> Tensor:
-        """Return the memory after each step, of which only what is ``kept`` goes on."""
+    def _remember(self, features: Tensor, kept: Tensor, index: Tensor, memory: Tensor) -> Tensor:
+        """Return the memory after each step as it is held there; of what was before only what is ``kept`` goes on."""
         if features.ndim == memory.ndim:
-            return self._step(features, kept * memory)
+            return self._step(features, Frame(index).units(kept * memory))
         after = []
-        for now, stays in zip(features.unbind(1), kept.unbind(1), strict=True):
-            memory = self._step(now, stays * memory)
-            after.append(memory)
+        for now, stays, way in zip(features.unbind(1), kept.unbind(1), index.unbind(1), strict=True):
+            held = self._step(now, Frame(way).units(stays * memory))
+            memory = Frame(way).units_on_map(held)
+            after.append(held)
         return torch.stack(after, dim=1)
 
     def _step(self, features: Tensor, memory: Tensor) -> Tensor:
@@ -91,11 +98,12 @@ class RecurrentActor(TensorDictModuleBase):
 
     Called with the tensordict [B] of one step it goes on from the step before, which must have been of the same
     worlds, and forgets where an episode begins, as the agents' own clock tells. Called with sequences [B, T] it goes on
-    from the memory that each of them was recorded with, and leaves its own as it was.
+    from the memory that each of them was recorded with, and leaves its own as it was. Observations that are held
+    already come with ``FRAME``.
 
     Args:
-        network: Reads the observation's entries, ``BEGINS`` and the memory, and the role if there is one for each;
-            writes logits and memory, float32 [..., A, actions + M].
+        network: Reads the observation's entries, ``BEGINS``, ``FRAME`` and the memory, and the role if there is one
+            for each; writes logits and memory, float32 [..., A, actions + M].
         keys: Of the observation's entries, and of the role.
         n_actions: Entries of the logits.
         memory: M.
@@ -114,7 +122,9 @@ class RecurrentActor(TensorDictModuleBase):
         before = tensordict.get(MEMORY)[:, 0] if whole else self._before(fresh)
         seen = [tensordict.get(key) for key in self._seen]
         role = [tensordict.get(ROLE)] if ROLE in self.in_keys else []
-        logits, after = self.network(*seen, fresh, before, *role).split(self.size, dim=-1)
+        frame = tensordict.get(FRAME, None)
+        frame = torch.zeros_like(fresh, dtype=torch.int64) if frame is None else frame
+        logits, after = self.network(*seen, fresh, frame, before, *role).split(self.size, dim=-1)
         if not whole:
             tensordict.set(MEMORY, before)
             self.remembered = after.detach()

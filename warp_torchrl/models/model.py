@@ -20,6 +20,7 @@ from warp_torchrl.models.networks import (
 from warp_torchrl.models.signature import (
     ACTION_ONE_HOT,
     ACTION_VALUE,
+    FRAME,
     LOGITS,
     MEMORY,
     ROLE,
@@ -48,7 +49,7 @@ class Mlp:
         facing: ``fire``, each network holds the map so that the fire that an agent sees lies between its east and its
             south-east, see ``FacingFire``: what it learns of one case it knows of all eight. ``north``, as it is given.
         memory: Units of the recurrent layer by which actors remember what they saw since their episode began, see
-            ``RecurrentNetwork``; 0, they act on what they see now. On-policy algorithms learn it.
+            ``RecurrentNetwork``, a multiple of 8; 0, they act on what they see now. On-policy algorithms learn it.
         dtype: ``bfloat16`` computes the layers in half precision (weights stay float32), several times faster on
             processors that have it and several times slower on those that have not; ``auto`` takes it where they do.
 
@@ -69,6 +70,8 @@ class Mlp:
         for name in ("actor_hidden", "critic_hidden"):
             check_sizes(name, getattr(self, name))
         check_fields(self, memory=(0, 8192))
+        if self.memory % 8:
+            raise ValueError(f"memory must be a multiple of 8, got {self.memory}")
 
     def actor(self, signature: Signature) -> TensorDictModule:
         """Return the module that writes logits [..., A, actions] from each agent's own observation, and memory."""
@@ -136,7 +139,7 @@ class Mlp:
             entries = [signature.state, *joint, *entries]
         network = self._shared(signature, lambda: self._network(entries, hidden, out, head_gain, memory))
         if memory:
-            keys += [BEGINS, MEMORY]
+            keys += [BEGINS, FRAME, MEMORY]
         if self.sharing == "role":
             keys.append(ROLE)
         if central:
@@ -146,7 +149,7 @@ class Mlp:
                 raise ValueError("model.facing must be north where observations are of no preset, got fire")
             network = FacingFire(network, keys, actions=out if key in (LOGITS, ACTION_VALUE) else 0)
         if memory:
-            return RecurrentActor(network, [key for key in keys if key not in (BEGINS, MEMORY)], out, memory)
+            return RecurrentActor(network, [key for key in keys if key not in (BEGINS, FRAME, MEMORY)], out, memory)
         return TensorDictModule(network, in_keys=keys, out_keys=[key])
 
     def _shared(self, signature: Signature, make: Callable[[], Network]) -> nn.Module:

@@ -57,6 +57,22 @@ class Frame:
         """Return what actions on the map, int64 [...], are in the frame."""
         return _actions(False, action.device)[self.index, action]
 
+    def units(self, features: Tensor) -> Tensor:
+        """Return features [..., 8 m], m for each of the eight ways to hold the map, as they are in the frame.
+
+        They change places as the ways do: what was kept of the map under one is found under the same when the map is
+        held in another.
+        """
+        return self._moved_units(features, _products(features.device)[self.index])
+
+    def units_on_map(self, features: Tensor) -> Tensor:
+        """Undo ``units``."""
+        return self._moved_units(features, _products(features.device).argsort(-1)[self.index])
+
+    def _moved_units(self, features: Tensor, place: Tensor) -> Tensor:
+        units = features.unflatten(-1, (_SYMMETRIES, -1))
+        return units.gather(-2, place[..., None].expand(units.shape)).flatten(-2)
+
     def actions_on_map(self, entries: Tensor) -> Tensor:
         """Undo ``actions``."""
         return entries.gather(-1, _actions(False, entries.device)[self.index, : entries.shape[-1]])
@@ -234,6 +250,16 @@ def _cells(side: int, device: torch.device) -> Tensor:
         mirrored = cell.flip([axis for axis, sign in enumerate(signs) if sign < 0])
         found.append((mirrored.T if index % 2 else mirrored).flatten())
     return torch.stack(found).to(device)
+
+
+@lru_cache(maxsize=8)
+def _products(device: torch.device) -> Tensor:
+    """Return which way of holding the map each one is of a map that is held in a frame, int64 [8, 8]."""
+    ways = Frame(torch.arange(_SYMMETRIES)[:, None].expand(-1, 2))
+    matrix = ways.vectors(torch.eye(2, dtype=torch.int64).expand(_SYMMETRIES, -1, -1))  # [way, of the map's axis, axis]
+    product = torch.einsum("gij,kjl->gkil", matrix, matrix)
+    same = (product[:, :, None] == matrix).flatten(-2).all(-1)
+    return same.to(torch.int64).argmax(-1).to(device)
 
 
 @lru_cache(maxsize=8)
