@@ -226,6 +226,12 @@ def test_where_there_is_no_clock_there_is_no_memory(make_small_env):
         Ppo().policy(signature(env), MODELS["north"])
 
 
+@pytest.mark.parametrize("memory", [-8, 12, 8200])
+def test_sizes_of_a_memory_that_are_refused(memory):
+    with pytest.raises(ValueError, match=r"^memory must be "):
+        Mlp(memory=memory)
+
+
 def test_who_replays_does_not_remember():
     rule = "^model.memory must be 0 where the algorithm replays, got 8: choose mappo, ippo, ppo or a2c$"
     for name in ("dqn", "vdn", "qmix", "sac", "ddpg", "maddpg"):
