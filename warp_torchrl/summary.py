@@ -7,6 +7,7 @@ import argparse
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -155,7 +156,7 @@ def draw(entries: Sequence[Entry], path: Path) -> None:
     policies = list(dict.fromkeys(entry.policy for group in groups for entry in group))
     styles = {policy: line_style(index) for index, policy in enumerate(policies)}
     with rc_context({"font.size": 8.0, "axes.spines.top": False, "axes.spines.right": False}):
-        rows = [max(1.2, 0.28 * len(group) + 0.7) for group in groups]
+        rows = [max(1.2, 0.3 * len(group) + 0.6) for group in groups]
         figure = Figure(figsize=(8.0, sum(rows) + 0.6), dpi=140, layout="constrained")
         axes = figure.subplots(len(groups), 2, squeeze=False, height_ratios=rows)
         for (bars, profile), group in zip(axes, groups, strict=True):
@@ -164,12 +165,15 @@ def draw(entries: Sequence[Entry], path: Path) -> None:
                 shares = 100.0 * performance_profile(entry.saved, LEVELS)
                 profile.plot(100.0 * LEVELS, shares, label=entry.policy, linewidth=1.4, **styles[entry.policy])
             profile.set(xlim=(0, 100), ylim=(0, 102), ylabel="fires, %")
-            profile.set_title(f"{group[0].scenario}: share of fires with at least so much saved", fontsize=8.0)
-        for each in axes[-1]:
-            each.set_xlabel("forest saved, %")
+        axes[-1, 0].set_xlabel("forest saved: mean, 95 % interval, %")
+        axes[-1, 1].set_xlabel("forest saved on so many fires, at least, %")
         handles = {h.get_label(): h for row in axes for h in row[1].get_lines()}
         figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=4, frameon=False)
         figure.savefig(path, metadata={"Software": None})
+
+
+_LABEL_WIDTH = 32  # characters in a line
+_ROOM_BESIDE = 87.0  # a bar's number stands beside it up to here, and in it beyond
 
 
 def _draw_bars(axes: Any, group: Sequence[Entry], styles: Mapping[str, Mapping[str, Any]]) -> None:
@@ -178,9 +182,11 @@ def _draw_bars(axes: Any, group: Sequence[Entry], styles: Mapping[str, Mapping[s
         mean, (low, high) = 100 * saved["mean"], (100 * bound for bound in saved["ci95"])
         axes.barh(row, mean, height=0.7, color=styles[entry.policy]["color"], alpha=0.75)
         axes.errorbar(mean, row, xerr=[[mean - low], [high - mean]], color="#222222", capsize=2.5, linewidth=1.0)
-        axes.text(min(high + 1.5, 93), row, f"{mean:.1f}", va="center", fontsize=7.0)
-    axes.set(yticks=range(len(group)), yticklabels=[entry.policy for entry in reversed(group)], xlim=(0, 100))
-    axes.set_title(f"{group[0].scenario}: mean, 95 % interval", fontsize=8.0)
+        place, side = (high + 1.5, "left") if high < _ROOM_BESIDE else (low - 1.5, "right")
+        axes.text(place, row, f"{mean:.1f}", va="center", ha=side, fontsize=7.0)
+    labels = [fill(entry.policy, _LABEL_WIDTH, break_long_words=False) for entry in reversed(group)]
+    axes.set(yticks=range(len(group)), yticklabels=labels, xlim=(0, 100))
+    axes.set_title(group[0].scenario, fontsize=8.0, loc="left")
 
 
 def line_style(index: int) -> dict[str, Any]:
