@@ -188,8 +188,7 @@ def test_what_is_remembered_of_a_turned_world_is_turned(turn):
         fresh = lively(Mlp(memory=16), fighting(preset, steps=0))(here.clone())[LOGITS]
         expected = torch.empty_like(ours).index_copy_(2, turned_actions(torch.arange(11), turn), ours)
         torch.testing.assert_close(theirs[sees], expected[sees], atol=1e-5, rtol=0.0)
-        now = env.set_state(state)
-        env.step(rule(now))
+        env.step(rule(env.set_state(state)))
     assert ((faced[0] != faced[1]) | (faced[1] != faced[2]))[sees].any()
     assert not torch.allclose(ours[sees], fresh[sees], atol=1e-3), "the memory has a say"
 

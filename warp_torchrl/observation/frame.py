@@ -63,11 +63,11 @@ class Frame:
         They change places as the ways do: what was kept of the map under one is found under the same when the map is
         held in another.
         """
-        return self._moved_units(features, _products(features.device)[self.index])
+        return self._moved_units(features, _products(True, features.device)[self.index])
 
     def units_on_map(self, features: Tensor) -> Tensor:
         """Undo ``units``."""
-        return self._moved_units(features, _products(features.device).argsort(-1)[self.index])
+        return self._moved_units(features, _products(False, features.device)[self.index])
 
     def _moved_units(self, features: Tensor, place: Tensor) -> Tensor:
         units = features.unflatten(-1, (_SYMMETRIES, -1))
@@ -253,13 +253,14 @@ def _cells(side: int, device: torch.device) -> Tensor:
 
 
 @lru_cache(maxsize=8)
-def _products(device: torch.device) -> Tensor:
-    """Return which way of holding the map each one is of a map that is held in a frame, int64 [8, 8]."""
+def _products(in_frame: bool, device: torch.device) -> Tensor:
+    """Return which way of holding the map each one is of a map that is held in a frame, or back, int64 [8, 8]."""
     ways = Frame(torch.arange(_SYMMETRIES)[:, None].expand(-1, 2))
     matrix = ways.vectors(torch.eye(2, dtype=torch.int64).expand(_SYMMETRIES, -1, -1))  # [way, of the map's axis, axis]
     product = torch.einsum("gij,kjl->gkil", matrix, matrix)
     same = (product[:, :, None] == matrix).flatten(-2).all(-1)
-    return same.to(torch.int64).argmax(-1).to(device)
+    way = same.to(torch.int64).argmax(-1)
+    return (way if in_frame else way.argsort(-1)).to(device)
 
 
 @lru_cache(maxsize=8)
