@@ -13,13 +13,15 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
+from warp_torchrl.world.edge import ByPattern, ByStrength, Edge, EdgeChances, edge_of, expected_from_edge
 from warp_torchrl.world.flags import as_mask, at_least, at_most, below, byte, choose, clear, equal, number
+from warp_torchrl.world.fusion import is_fusing
 from warp_torchrl.world.kernel import alexandridis, ellipse, slope_factor
 from warp_torchrl.world.landscape import holds_trees
 from warp_torchrl.world.law import Clipped, Law
 from warp_torchrl.world.pattern import chance_by_pattern, pattern_table
 from warp_torchrl.world.spread import expected_ignitions, gains, ignition_chance
-from warp_torchrl.world.state import EMBER, FIRST_FIRE, OLDEST, WorldState, is_burning, is_tree
+from warp_torchrl.world.state import EMBER, FIRST_FIRE, OLDEST, WorldState, is_burning
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,6 +108,14 @@ class Fire:
         """Return whether a world without fire stays so: an episode may end early."""
         return self.beta == 0.0
 
+    def keeps_to_its_edge(self, state: WorldState) -> bool:
+        """Return whether a tick is worked out at the fire's edge alone: ``edge``, ``tick_at_edge`` and ``outlook``.
+
+        It is so where trees neither grow nor ignite by themselves, on a CPU; fused functions take whole maps.
+        """
+        spreads_only = not self.growth and self.beta == 0.0 and self.p_regrow == 0.0
+        return spreads_only and state.cells.device.type == "cpu" and not is_fusing()
+
     def flammability(self, cover: Tensor) -> Tensor:
         """Return alpha of the ground, float32, shape of ``cover`` (WARP-CA, terrain table)."""
         return _constant(tuple(self.alpha), cover.device)[cover.to(torch.int64)]
@@ -132,7 +142,7 @@ class Fire:
 
     def spread(self, state: WorldState) -> Tensor:
         """Return each tree's chance to be ignited by its neighbours in one tick, float32 [B, H, W]; 0 elsewhere."""
-        spreading = is_burning(state.cells) & at_most(state.cells, self.last_spreading)
+        spreading = self._spreading(state)
         if state.chances is not None:
             kind = (state.landscape.cover + 1) * byte(self.is_fuel(state))
             return chance_by_pattern(state.chances, spreading, kind, self.neighbours)
@@ -144,10 +154,29 @@ class Fire:
 
         It is 0 where nothing spreads.
         """
-        spreading = is_burning(state.cells) & at_most(state.cells, self.last_spreading)
         susceptible, gain = self._susceptible(state), self._gain(state)
         expected = expected_ignitions(self._law(), susceptible, gain, state.slope, self.neighbours)
-        return expected * number(spreading)
+        return expected * number(self._spreading(state))
+
+    def edge(self, state: WorldState) -> Edge:
+        """Return the trees that a burning neighbour may ignite in the next tick."""
+        return edge_of(self._spreading(state), self.is_fuel(state), self.neighbours)
+
+    def outlook(self, state: WorldState) -> tuple[Tensor, Tensor]:
+        """Return ``front`` and ``chance_to_ignite``, to the bit, by the fire's edge alone."""
+        edge = self.edge(state)
+        chances = self._chances_at(edge, state)
+        return _as_front(expected_from_edge(edge, chances)), edge.on_map(chances.joined())
+
+    def _chances_at(self, edge: Edge, state: WorldState) -> EdgeChances:
+        """Return what tells the chances to ignite of the fire's edge, as ``spread`` does, to the bit."""
+        if state.chances is not None:
+            return ByPattern(edge, state.chances, edge.of(state.cover).to(torch.int64) + 1)
+        law = self._law()
+        return ByStrength(law, edge, law.susceptibility(edge.of(state.alpha)), self._gain(state), state.slope)
+
+    def _spreading(self, state: WorldState) -> Tensor:
+        return at_most(state.cells - FIRST_FIRE, self.last_spreading - FIRST_FIRE)  # uint8: a tree's code wraps
 
     def _gain(self, state: WorldState) -> Tensor:
         return gains(self.wind_factor(state.wind), self.diagonal) if state.gain is None else state.gain
@@ -164,7 +193,7 @@ class Fire:
 
     def front(self, state: WorldState) -> Tensor:
         """Return the neighbours that each cell is expected to ignite in a tick, / 4, at most 1, float32 [B, H, W]."""
-        return self.expected_ignitions(state).mul_(0.25).clamp_(max=1.0)
+        return _as_front(self.expected_ignitions(state))
 
     def _join(self, state: WorldState, spread: Tensor) -> Tensor:
         """Join the chance to be ignited by neighbours with that of spontaneous ignition."""
@@ -177,7 +206,8 @@ class Fire:
 
     def is_fuel(self, state: WorldState) -> Tensor:
         """Return which trees can ignite now: age >= A_min, dry; bool [B, H, W]."""
-        return is_tree(state.cells) & at_least(state.cells, self.youngest_fuel) & equal(state.wet, 0)
+        old_enough = at_most(state.cells - self.youngest_fuel, OLDEST - self.youngest_fuel)  # uint8: below, it wraps
+        return old_enough & equal(state.wet, 0)
 
     def tick(self, state: WorldState, u: Tensor, due: Tensor) -> WorldState:
         """Advance the fire by one tick where it is due.
@@ -194,27 +224,49 @@ class Fire:
             The worlds after it, with new ``cells``, ``age``, ``burned``, ``wet`` and ``tick``.
         """
         cells = state.cells
-        due_cells = as_mask(byte(due)[:, None, None].expand(cells.shape).contiguous())
-        burning = is_burning(cells) & due_cells
         q = self.chance_to_ignite(state)
-        ignite = below(u, q) & due_cells
-        waited = None if state.stage_age is None else state.stage_age + burning
-        stage_ends = burning if waited is None else equal(waited, self.ticks_per_stage)
-        to_ash = stage_ends & equal(cells, EMBER)
-        after = cells + byte(stage_ends)
+        grows = None
         if self.growth:
             stays = 1.0 - (1.0 - q) * self._look_up(self._growth(), cells)  # u < 1: none grows where p is 0
-            after += byte(~below(u, stays) & due_cells)
-        after = clear(to_ash, choose(ignite, FIRST_FIRE, after))
+            grows = ~below(u, stays)
         if self.p_regrow > 0.0:
-            bare = equal(cells, 0) & holds_trees(state.landscape.cover) & ~state.firebreak & due_cells
-            after += byte(bare & (u < self._in_a_tick(self.p_regrow)))
+            bare = equal(cells, 0) & holds_trees(state.landscape.cover) & ~state.firebreak
+            regrows = bare & (u < self._in_a_tick(self.p_regrow))
+            grows = regrows if grows is None else grows | regrows
+        state, due_cells = self._age_fires(state, due), byte(due)[:, None, None]
+        ignite = as_mask(byte(below(u, q)) * due_cells)
+        after = choose(ignite, FIRST_FIRE, state.cells)
+        if grows is not None:
+            after += byte(grows) * due_cells
+        waited = None if state.stage_age is None else clear(ignite, state.stage_age)
+        return state.replace(cells=after, age=choose(ignite, cells, state.age), stage_age=waited)
+
+    def tick_at_edge(self, state: WorldState, edge: Edge, u: Tensor, due: Tensor) -> WorldState:
+        """Return what ``tick`` does, to the bit, from the draws at the fire's edge alone, float32 [N]."""
+        lit = edge.cell[(u < self._chances_at(edge, state).joined()) & due.index_select(0, edge.world)]
+        after = self._age_fires(state, due)
+        after.cells.flatten().index_fill_(0, lit, FIRST_FIRE)
+        after.age.flatten().index_copy_(0, lit, state.cells.flatten().index_select(0, lit))
+        if after.stage_age is not None:
+            after.stage_age.flatten().index_fill_(0, lit, 0)
+        return after
+
+    def _age_fires(self, state: WorldState, due: Tensor) -> WorldState:
+        """Return the worlds after a tick, where it is due, that ignites nothing and lets nothing grow."""
+        cells, due_cells = state.cells, byte(due)[:, None, None]
+        stage_ends, waited = byte(is_burning(cells)) * due_cells, None
+        if state.stage_age is not None:
+            waited = state.stage_age + stage_ends
+            stage_ends = byte(equal(waited, self.ticks_per_stage))
+            waited = clear(as_mask(stage_ends), waited)
+        after = cells + stage_ends
+        to_ash = equal(after, EMBER + 1)
         return state.replace(
-            cells=after,
-            age=clear(to_ash, choose(ignite, cells, state.age)),
-            stage_age=None if waited is None else clear(ignite | stage_ends, waited),
+            cells=after.bitwise_and_(EMBER),
+            age=clear(to_ash, state.age),
+            stage_age=waited,
             burned=state.burned | to_ash,
-            wet=state.wet - byte(at_least(state.wet, 1) & due_cells),
+            wet=state.wet - byte(at_least(state.wet, 1)) * due_cells,
             tick=state.tick + due,
         )
 
@@ -246,6 +298,11 @@ class Fire:
 
     def _look_up(self, table: tuple[float, ...], cells: Tensor) -> Tensor:
         return _constant(table, cells.device)[cells.to(torch.int64)]
+
+
+def _as_front(expected: Tensor) -> Tensor:
+    """Return a quarter of what is expected, at most 1, in its own memory."""
+    return expected.mul_(0.25).clamp_(max=1.0)
 
 
 @lru_cache(maxsize=64)

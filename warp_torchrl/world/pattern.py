@@ -54,10 +54,26 @@ def chance_by_pattern(table: Tensor, spreading: Tensor, kind: Tensor, neighbours
 
 def burning_neighbours(spreading: Tensor, neighbours: int = 8) -> Tensor:
     """Return which neighbours of each cell spread fire, uint8 [B, H, W]: one bit for each direction it comes in."""
-    _, height, width = spreading.shape
-    around = pad(byte(spreading), (1, 1, 1, 1))
-    pattern = torch.zeros_like(spreading, dtype=torch.uint8)
+    worlds, height, width = spreading.shape
+    cells = height * width
+    sources = {column: _all_but_one_column(byte(spreading), column) for column in (-1, 0, 1)}
+    pattern = torch.zeros(worlds, cells, dtype=torch.uint8, device=spreading.device)
     for bit, direction in enumerate(directions(neighbours)):
         row, column = DIRECTIONS[direction]
-        pattern.add_(around[:, 1 - row : 1 - row + height, 1 - column : 1 - column + width], alpha=1 << bit)
-    return pattern
+        rows = (height - abs(row)) * width  # a world's cells that have a neighbour in that row: one slice of it
+        source = sources[column].as_strided((worlds, rows), (cells, 1), 1 + max(-row, 0) * width - column)
+        pattern[:, max(row, 0) * width :][:, :rows].add_(source, alpha=1 << bit)
+    return pattern.view_as(spreading)
+
+
+def _all_but_one_column(mask: Tensor, column: int) -> Tensor:
+    """Return maps, uint8 [B, H, W], in a row with a zero at both ends, [B H W + 2], without what travels off the map.
+
+    That is their last column for travel to the east, column 1, and their first for travel to the west, column -1.
+    """
+    row = mask.new_empty(mask.numel() + 2)
+    row[0] = row[-1] = 0
+    maps = row[1:-1].view_as(mask).copy_(mask)
+    if column:
+        maps[:, :, -1 if column > 0 else 0] = 0
+    return row

@@ -95,14 +95,37 @@ def uniform_at(key: Tensor, tick: Tensor | int, stream: Stream, index: Tensor) -
     Returns:
         float32 [B, n].
     """
+    low, high = _key_words(key, tick, stream)
+    return _mix(index, low[:, None], high[:, None])
+
+
+def uniform_among(key: Tensor, tick: Tensor | int, stream: Stream, world: Tensor, index: Tensor) -> Tensor:
+    """Draw what ``uniform`` draws, at listed places of listed worlds.
+
+    Args:
+        key: World keys, int64 [B], from ``world_key``.
+        tick: Counter of the draw, int64 [B] or one number.
+        stream: What the draw is for.
+        world: The world of each draw, int64 [n].
+        index: Flat index of each draw within its world's, int64 [n].
+
+    Returns:
+        float32 [n].
+    """
+    low, high = _key_words(key, tick, stream)
+    return _mix(index.to(torch.int32), low.index_select(0, world), high.index_select(0, world))
+
+
+def _key_words(key: Tensor, tick: Tensor | int, stream: Stream) -> tuple[Tensor, Tensor]:
+    """Return the two words that a world's draws are hashed with, int32 [B] each."""
     counter = torch.zeros_like(key).add_(tick).mul_(64).add_(int(stream))
     word = _splitmix64(key + counter * _GOLDEN)
-    return _mix(index, word.to(torch.int32)[:, None], (word >> 32).to(torch.int32)[:, None])
+    return word.to(torch.int32), (word >> 32).to(torch.int32)
 
 
 @fusible
 def _mix(index: Tensor, low: Tensor, high: Tensor) -> Tensor:
-    """Return the uniform of each index, int32 [B or 1, n], under two key words, int32 [B, 1]."""
+    """Return the uniform of each index under two key words, int32 of shapes that go together."""
     bits = (index * 0x1E3779B1) ^ low  # a distinct well-mixed word for each index
     spare = torch.empty_like(bits)  # memory that was just used is several times faster than fresh memory
 

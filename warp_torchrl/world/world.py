@@ -13,7 +13,7 @@ from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.fusion import is_fusing
 from warp_torchrl.world.ignition import Ignition
 from warp_torchrl.world.landscape import LandscapeSource, Perlin, map_size
-from warp_torchrl.world.random import Stream, uniform, world_key
+from warp_torchrl.world.random import Stream, uniform, uniform_among, world_key
 from warp_torchrl.world.state import (
     EMBER,
     FIRST_FIRE,
@@ -148,6 +148,9 @@ class World:
 
     def with_outlook(self, state: WorldState) -> WorldState:
         """Return worlds that keep ``front`` and ``chance`` for all who ask."""
+        if self.fire.keeps_to_its_edge(state):
+            front, chance = self.fire.outlook(state)
+            return state.replace(front=front, chance=chance)
         return state.replace(front=self.front(state), chance=self.chance(state))
 
     def front(self, state: WorldState) -> Tensor:
@@ -253,8 +256,13 @@ _BLOWN = ("wind", "gain", "chances")  # and what a wind does
 
 def advance(state: WorldState, fire: Fire, wind: Wind, due: Tensor) -> WorldState:
     """Advance fire and wind by one tick where it is due, bool [B]."""
-    draws = uniform(state.key, state.tick, Stream.FIRE, tuple(state.cells.shape[1:]))
-    after = fire.tick(state, draws, due)
+    if fire.keeps_to_its_edge(state):
+        edge = fire.edge(state)
+        draws = uniform_among(state.key, state.tick, Stream.FIRE, edge.world, edge.place)
+        after = fire.tick_at_edge(state, edge, draws, due)
+    else:
+        draws = uniform(state.key, state.tick, Stream.FIRE, tuple(state.cells.shape[1:]))
+        after = fire.tick(state, draws, due)
     if not wind.changes:
         return after
     return fire.in_wind(after, torch.where(due[:, None, None, None], wind.after_tick(after), state.wind))

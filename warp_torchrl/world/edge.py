@@ -1,0 +1,187 @@
+"""The fire's edge: the trees that a burning neighbour may ignite in the next tick, listed.
+
+Where trees neither grow nor catch fire by themselves, nothing else is drawn for. They are a few cells in a hundred, so
+that chances and draws at them alone cost a fraction of those of whole maps, and come to the same bits. How many they
+are is read back, which a CPU does for nothing and a CUDA device does not.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.world.geometry import DIRECTIONS
+from warp_torchrl.world.law import Law
+from warp_torchrl.world.pattern import burning_neighbours
+from warp_torchrl.world.spread import directions
+
+_WORD = 8  # bytes
+
+
+@dataclass(frozen=True, eq=False)
+class Edge:
+    """Trees next to burning cells, world after world and row after row."""
+
+    shape: torch.Size
+    """(B, H, W)."""
+    neighbours: int
+    """8 or 4."""
+    cell: Tensor
+    """Flat index of each in [B, H, W], int64 [N]."""
+    pattern: Tensor
+    """Of ``pattern.burning_neighbours``, int64 [N]."""
+
+    @cached_property
+    def world(self) -> Tensor:
+        """Return the world that each lies in, int64 [N]."""
+        return self.cell.div(self.shape[1] * self.shape[2], rounding_mode="floor")
+
+    @cached_property
+    def place(self) -> Tensor:
+        """Return the flat index of each within its world, int64 [N]."""
+        return self.cell - self.world * (self.shape[1] * self.shape[2])
+
+    def of(self, plane: Tensor) -> Tensor:
+        """Return what a plane [B, H, W] holds there, [N]."""
+        return plane.flatten().index_select(0, self.cell)
+
+    def source(self, direction: int) -> Tensor:
+        """Return the flat index of each one's neighbour that fire in a direction comes from, int64 [N].
+
+        It means a cell only where that neighbour burns, as ``burns`` tells.
+        """
+        row, column = DIRECTIONS[direction]
+        return self.cell - (row * self.shape[2] + column)
+
+    def burns(self, bit: int) -> Tensor:
+        """Return 1.0 where the neighbour of this bit burns and 0.0 elsewhere, float32 [N]."""
+        return (self.pattern >> bit).bitwise_and_(1).to(torch.float32)
+
+    def on_map(self, values: Tensor) -> Tensor:
+        """Return maps [B, H, W] that hold these values there, [N], and 0 elsewhere."""
+        return values.new_zeros(self.shape.numel()).scatter_(0, self.cell, values).view(self.shape)
+
+
+def edge_of(spreading: Tensor, fuel: Tensor, neighbours: int) -> Edge:
+    """Return the fire's edge.
+
+    Args:
+        spreading: The burning cells that ignite others, bool [B, H, W].
+        fuel: The trees that can ignite, bool [B, H, W].
+        neighbours: 8 or 4.
+    """
+    pattern = burning_neighbours(spreading, neighbours)
+    cell = places((pattern * fuel).flatten())
+    return Edge(spreading.shape, neighbours, cell, pattern.flatten().index_select(0, cell).to(torch.int64))
+
+
+class EdgeChances(Protocol):
+    """The chances of the trees of an edge to be ignited in one tick."""
+
+    def joined(self) -> Tensor:
+        """Return the chance to be ignited by all the neighbours that burn, float32 [N]."""
+        ...
+
+    def alone(self, bit: int, direction: int) -> Tensor:
+        """Return the chance to be ignited by the one neighbour that fire in a direction comes from, as if it burned.
+
+        float32 [N], of a direction and its bit; where there is no such neighbour it means nothing.
+        """
+        ...
+
+
+class ByPattern:
+    """Chances of level worlds with one wind each.
+
+    Args:
+        edge: The trees.
+        table: Of ``pattern.pattern_table``, float32 [B, G + 1, 2^neighbours].
+        kind: Row of the table, int64 [N].
+    """
+
+    def __init__(self, edge: Edge, table: Tensor, kind: Tensor) -> None:
+        _, kinds, patterns = table.shape
+        self._edge, self._table = edge, table.flatten()
+        self._row = (edge.world * kinds).add_(kind).mul_(patterns)
+
+    def joined(self) -> Tensor:
+        """See ``EdgeChances``."""
+        return self._table.index_select(0, self._row + self._edge.pattern)
+
+    def alone(self, bit: int, direction: int) -> Tensor:
+        """See ``EdgeChances``."""
+        return self._table.index_select(0, self._row + (1 << bit))
+
+
+class ByStrength:
+    """Chances of any worlds.
+
+    Args:
+        law: What makes chances of strengths.
+        edge: The trees.
+        susceptible: The ground's part of a strength, float32 [N].
+        gain: As of ``spread.ignition_chance``, and so is the slope.
+        slope: float32 [B, 8, H + 2, W + 1] or None.
+    """
+
+    def __init__(self, law: Law, edge: Edge, susceptible: Tensor, gain: Tensor, slope: Tensor | None) -> None:
+        self._law, self._edge, self._susceptible, self._gain, self._slope = law, edge, susceptible, gain, slope
+
+    def joined(self) -> Tensor:
+        """See ``EdgeChances``."""
+        total = torch.zeros_like(self._susceptible)
+        spare = torch.empty_like(total)
+        for bit, direction in enumerate(directions(self._edge.neighbours)):
+            self._law.join(total, self._strength(direction).mul_(self._edge.burns(bit)), spare)
+        return self._law.chance(total)
+
+    def alone(self, bit: int, direction: int) -> Tensor:
+        """See ``EdgeChances``."""
+        return self._law.chance_of(self._strength(direction))
+
+    def _strength(self, direction: int) -> Tensor:
+        edge, gain = self._edge, self._gain[:, direction].flatten()
+        differs = self._gain.shape[2:] != (1, 1)
+        source = edge.source(direction).clamp_(0, edge.shape.numel() - 1) if differs else edge.world
+        strength = gain.index_select(0, source).mul_(self._susceptible)
+        if self._slope is not None:
+            strength.mul_(self._slope[:, direction].flatten().index_select(0, self._target))
+        return strength
+
+    @cached_property
+    def _target(self) -> Tensor:
+        """Return where each tree stands in a direction's slopes: they have a row before the map, a column after it."""
+        _, height, width = self._edge.shape
+        place = self._edge.place
+        row = place.div(width, rounding_mode="floor")
+        return self._edge.world * ((height + 2) * (width + 1)) + (row + 1) * (width + 1) + (place - row * width)
+
+
+def expected_from_edge(edge: Edge, chances: EdgeChances) -> Tensor:
+    """Return how many neighbours each burning cell is expected to ignite in one tick, float32 [B, H, W]; 0 elsewhere.
+
+    Args:
+        edge: The trees.
+        chances: Theirs.
+    """
+    margin = edge.shape[2] + 1  # where no neighbour burns 0 is added, maybe beside the batch
+    total = torch.zeros(edge.shape.numel() + 2 * margin, device=edge.cell.device)
+    for bit, direction in enumerate(directions(edge.neighbours)):
+        source = edge.source(direction).add_(margin)
+        total.scatter_add_(0, source, edge.burns(bit).mul_(chances.alone(bit, direction)))
+    return total[margin:-margin].view(edge.shape)
+
+
+def places(codes: Tensor) -> Tensor:
+    """Return where codes are not 0, int64 [N]; codes are uint8 [n].
+
+    Most words of eight codes hold none, and are passed over as words.
+    """
+    if codes.numel() % _WORD:
+        return codes.nonzero()[:, 0]
+    words = codes.view(torch.int64)
+    word = words.nonzero()[:, 0]
+    found = words.index_select(0, word).view(torch.uint8).nonzero()[:, 0]
+    return word.index_select(0, found >> 3).mul_(_WORD).add_(found & (_WORD - 1))
