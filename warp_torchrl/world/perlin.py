@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from itertools import accumulate
 
 import torch
 from torch import Tensor
@@ -40,39 +39,57 @@ def fractal_noise(
     Returns:
         float32 [B, H, W], about zero, not normalised.
     """
-    device = key.device
+    device, worlds = key.device, len(key)
     bounds: Sequence[float] | Tensor = frequencies if finest is None else finest
     frequency, amplitude = (
-        torch.as_tensor(each, dtype=torch.float32, device=device) for each in (frequencies, amplitudes)
+        torch.as_tensor(each, dtype=torch.float32, device=device).expand(worlds, -1)
+        for each in (frequencies, amplitudes)
     )
-    frequency = frequency[..., None]
-    offsets = uniform(key, 0, stream, (len(bounds), 2))
-    rows, row_part = _locate(size[0], frequency, offsets[..., 0])
-    columns, column_part = _locate(size[1], frequency, offsets[..., 1])
     lattices = [tuple(math.ceil((length - 1) * f) + 3 for length in size) for f in bounds]
-    widths = torch.tensor([width for _, width in lattices], device=device)[:, None, None]
-    starts = [0, *accumulate(height * width for height, width in lattices)]
-    angle = uniform(key, 1, stream, (starts[-1],)).mul_(2.0 * math.pi)
-    gradients = torch.stack((angle.sin(), angle.cos()))
-    first = (
-        torch.tensor(starts[:-1], device=device)[:, None, None] + rows[..., :, None] * widths + columns[..., None, :]
-    )
-    row_part, column_part = row_part[..., :, None], column_part[..., None, :]
-    row_fade, column_fade = fade(row_part), fade(column_part)
+    offsets = uniform(key, 0, stream, (len(lattices), 2))
+    rows, row_parts = _locate(size[0], frequency[..., None], offsets[..., 0])
+    columns, column_parts = _locate(size[1], frequency[..., None], offsets[..., 1])
+    points = sum(height * width for height, width in lattices)
+    angle = uniform(key, 1, stream, (points,)).mul_(2.0 * math.pi)
+    gradients = angle.sin().flatten(), angle.cos_().flatten()
+    first = torch.arange(worlds, device=key.device)[:, None] * points  # of an octave's gradients in each world
+    total = torch.zeros(worlds, *size, device=key.device)
+    for octave, (height, width) in enumerate(lattices):  # one after the other: a sum's order is always the same
+        index = (first + rows[:, octave] * width)[:, :, None] + columns[:, octave, None, :]
+        parts = row_parts[:, octave, :, None], column_parts[:, octave, None, :]
+        total += _octave(gradients, index, width, *parts).mul_(amplitude[:, octave, None, None])
+        first += height * width
+    return total
+
+
+def _octave(
+    gradients: tuple[Tensor, Tensor], index: Tensor, width: int, row_part: Tensor, column_part: Tensor
+) -> Tensor:
+    """Return gradient noise of one octave, float32 [B, H, W].
+
+    Args:
+        gradients: Their parts along the rows' axis and along the columns', float32 [n] each.
+        index: Where the gradient at each cell's north-west lattice point stands among them, int64 [B, H, W].
+        width: Columns of the lattice.
+        row_part: Place of each row between lattice points in [0, 1), float32 [B, H, 1].
+        column_part: Likewise, float32 [B, 1, W].
+    """
 
     def corner(down: int, right: int) -> Tensor:
-        index = (first + (down * widths + right)).flatten(1)
-        along_row, along_column = gradients.gather(2, index.expand(2, -1, -1)).view(2, *first.shape)
-        return along_row * (row_part - down) + along_column * (column_part - right)
+        along_row, along_column = (
+            gradient[down * width + right :].index_select(0, index.flatten()).view(index.shape)
+            for gradient in gradients
+        )
+        return along_row.mul_(row_part - down).add_(along_column.mul_(column_part - right))
 
-    top_left, bottom_left = corner(0, 0), corner(1, 0)
-    top = top_left + column_fade * (corner(0, 1) - top_left)
-    bottom = bottom_left + column_fade * (corner(1, 1) - bottom_left)
-    octaves = top + row_fade * (bottom - top)
-    total = torch.zeros(key.shape[0], *size, device=device)
-    for octave in range(len(bounds)):  # one after the other: a sum's order must not depend on the batch
-        total += amplitude[..., octave, None, None] * octaves[:, octave]
-    return total
+    across = fade(column_part)
+    top = _blend(corner(0, 0), corner(0, 1), across)
+    return _blend(top, _blend(corner(1, 0), corner(1, 1), across), fade(row_part))
+
+
+def _blend(one: Tensor, other: Tensor, share: Tensor) -> Tensor:
+    """Return one + share (other - one), in the other's memory."""
+    return other.sub_(one).mul_(share).add_(one)
 
 
 def _locate(length: int, frequency: Tensor, offset: Tensor) -> tuple[Tensor, Tensor]:
