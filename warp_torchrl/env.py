@@ -179,7 +179,31 @@ class WildfireEnv(EnvBase):
             self._episode_reward = torch.zeros_like(self._episode_reward)
             return self._observe(self._state)
         index = mask.flatten().nonzero()[:, 0]
-        self._state[index], seen = self._starts.take(index, self._seeds, self._episodes)
+        seen = self._start_again(index)
+        rows = torch.zeros(len(mask), dtype=torch.int64, device=self.device).index_copy_(
+            0, index, torch.arange(len(index), device=self.device)
+        )
+        return seen[rows]  # TorchRL reads those of the worlds that were reset
+
+    def maybe_reset(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Reset the worlds that have ended, as TorchRL would: what it does with masks is done to their rows alone."""
+        index = tensordict.get("done").flatten().nonzero()[:, 0]
+        if len(index) == self.batch_size[0]:
+            return super().maybe_reset(tensordict)
+        if not len(index):
+            return tensordict
+        seen, out = self._start_again(index), tensordict.clone()
+        started = dict(seen.items(include_nested=True, leaves_only=True))
+        for key, value in out.items(include_nested=True, leaves_only=True):
+            if key in started:
+                value.index_copy_(0, index, started[key])
+            else:
+                value.index_fill_(0, index, 0)
+        return out
+
+    def _start_again(self, index: Tensor) -> TensorDict:
+        """Start the next episode of some worlds, and return what is observed in them."""
+        self.world_state[index], seen = self._starts.take(index, self._seeds, self._episodes)
         self._episodes = self._episodes.index_add(0, index, torch.ones_like(index))
         self._episode_reward = self._episode_reward.index_fill(0, index, 0.0)
         return seen

@@ -41,7 +41,7 @@ class Starts:
             episodes: Numbers of their next episodes, int64 [B].
 
         Returns:
-            The worlds [n], and what is observed [B], of which only the rows in ``index`` mean anything.
+            The worlds and what is observed, [n] each.
         """
         if self._next is None:
             self._next = self._make(seeds, episodes)
@@ -53,4 +53,4 @@ class Starts:
             self._made[missing] = True
         self._made[index] = False
         worlds, seen = self._next
-        return worlds[index], seen.clone()
+        return worlds[index], seen[index]

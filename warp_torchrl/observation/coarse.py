@@ -6,8 +6,8 @@ from torch.nn.functional import adaptive_avg_pool2d, one_hot
 
 from warp_torchrl.observation.own import WIND_SCALE, steps_to_tick, time_left
 from warp_torchrl.observation.view import ELEVATION_SCALE, window
-from warp_torchrl.world.flags import byte, number
-from warp_torchrl.world.state import WorldState, is_burning, is_tree
+from warp_torchrl.world.flags import byte
+from warp_torchrl.world.state import WorldState, is_burning
 from warp_torchrl.world.world import World
 
 PICTURE = ("fire", "fuel", "team_mates")
@@ -44,27 +44,27 @@ def block_means(maps: Tensor, side: int) -> Tensor:
 
 
 def _sum(parts: tuple[Tensor, ...]) -> Tensor:
-    total = parts[0]
-    for part in parts[1:]:
-        total = total + part
+    total = parts[0] + parts[1]
+    for part in parts[2:]:
+        total += part
     return total
 
 
-def picture(state: WorldState) -> Tensor:
+def picture(state: WorldState, world: World) -> Tensor:
     """Return the state of the fire in 8 x 8 blocks of the map, float32 [B, A, 3, 8, 8]."""
-    seen, place = _fire_and_fuel(state), one_hot(_block(state, PICTURE_SIDE), PICTURE_SIDE**2).to(torch.float32)
+    seen, place = _fire_and_fuel(state, world), one_hot(_block(state, PICTURE_SIDE), PICTURE_SIDE**2).to(torch.float32)
     mates = ((place.sum(1, keepdim=True) - place) * 0.25).clamp_(max=1.0)
     mates = mates.view(*place.shape[:2], 1, PICTURE_SIDE, PICTURE_SIDE)
     return torch.cat((seen[:, None].expand(-1, place.shape[1], -1, -1, -1), mates), dim=2)
 
 
-def centred_picture(state: WorldState) -> Tensor:
+def centred_picture(state: WorldState, world: World) -> Tensor:
     """Return the picture with the agent's own block in the middle, uint8 [B, A, 3, 15, 15]; 0 off the map.
 
     What it tells is what ``picture`` does; where things are is told from where the agent is.
     """
     sides, middle = (PICTURE_SIDE, PICTURE_SIDE), PICTURE_SIDE - 1
-    fire, fuel = (_fire_and_fuel(state) * 255.0).to(torch.uint8).unbind(1)
+    fire, fuel = (_fire_and_fuel(state, world) * 255.0).to(torch.uint8).unbind(1)
     block = _block(state, PICTURE_SIDE)
     about = window(torch.stack((block // PICTURE_SIDE, block % PICTURE_SIDE), dim=-1), sides, middle)
     mates = about.of(one_hot(block, PICTURE_SIDE**2).sum(1).view(-1, *sides))
@@ -77,8 +77,9 @@ def central_state(state: WorldState, world: World) -> Tensor:
     worlds = state.cells.shape[0]
     elevation = state.landscape.elevation
     out = torch.zeros(worlds, len(STATE), STATE_SIDE, STATE_SIDE, device=state.cells.device)
-    for channel, maps in enumerate((is_burning(state.cells), _fuel(state), world.front(state), world.chance(state))):
-        out[:, channel] = block_means(maps, STATE_SIDE)
+    maps = is_burning(state.cells), world.fuel(state), world.front(state), world.chance(state)
+    for channel, each in enumerate(maps):
+        out[:, channel] = block_means(each, STATE_SIDE)
     index = world.team.table(state.cells.device).index * STATE_SIDE**2 + _block(state, STATE_SIDE)
     agents = out[:, 4:6].reshape(worlds, -1)
     out[:, 4:6] = agents.scatter_add(1, index, torch.ones_like(index, dtype=torch.float32)).view_as(out[:, 4:6])
@@ -92,13 +93,9 @@ def central_state(state: WorldState, world: World) -> Tensor:
     return out
 
 
-def _fuel(state: WorldState) -> Tensor:
-    return state.alpha * number(is_tree(state.cells))
-
-
-def _fire_and_fuel(state: WorldState) -> Tensor:
+def _fire_and_fuel(state: WorldState, world: World) -> Tensor:
     """Return the whole map's fire (square root of the share that burns) and fuel in blocks, float32 [B, 2, 8, 8]."""
-    fire, fuel = (block_means(maps, PICTURE_SIDE) for maps in (is_burning(state.cells), _fuel(state)))
+    fire, fuel = (block_means(maps, PICTURE_SIDE) for maps in (is_burning(state.cells), world.fuel(state)))
     return torch.stack((fire.sqrt_(), fuel), dim=1)
 
 

@@ -90,7 +90,7 @@ class Surroundings(Local):
 
     def __call__(self, state: WorldState, world: World) -> dict[str, Tensor]:
         """Return ``view``, ``self``, and ``picture`` float32 [B, A, 3, 8, 8]."""
-        shown = centred_picture(state) if self.centred else picture(state)
+        shown = centred_picture(state, world) if self.centred else picture(state, world)
         return {**super().__call__(state, world), "picture": shown}
 
 

@@ -57,7 +57,7 @@ def window(position: Tensor, size: Sequence[int], radius: int) -> Window:
     row, column = position[..., 0, None] + away, position[..., 1, None] + away
     on_row, on_column = (row >= 0) & (row < height), (column >= 0) & (column < width)
     index = row.clamp(0, height - 1)[..., None] * width + column.clamp(0, width - 1)[..., None, :]
-    return Window(index.flatten(1), byte(on_row[..., None] & on_column[..., None, :]))
+    return Window(index.flatten(1), byte(on_row)[..., None] * byte(on_column)[..., None, :])
 
 
 def egocentric_view(state: WorldState, world: World, radius: int) -> Tensor:
@@ -67,14 +67,14 @@ def egocentric_view(state: WorldState, world: World, radius: int) -> Tensor:
     role = world.team.table(cells.device).index
     channels = (
         (1 - seen.inside) * 255,
-        (seen.of(state.alpha) * 255.0).to(torch.uint8),
+        _as_byte(seen.of(state.alpha)),
         ages(cells),
         stages(cells),
         seen.of(byte(state.burned)) * byte(equal(cells, 0)) * 255,
         seen.of(byte(state.firebreak)) * 255,
         seen.of(state.wet).clamp_(max=10) * 25,
         seen.inside * 128 if elevation is None else _relative_elevation(elevation, seen),
-        (seen.of(world.front(state)).add_(seen.of(world.chance(state))) * 255.0).to(torch.uint8),  # World.threat
+        _as_byte(seen.of(world.front(state)).add_(seen.of(world.chance(state)))),  # World.threat
         *(seen.of(plane) for plane in _occupancy(state, role)),
     )
     view = torch.stack(channels, dim=2)
@@ -91,6 +91,11 @@ def ages(cells: Tensor) -> Tensor:
 def stages(cells: Tensor) -> Tensor:
     """Return the stages of fires, 51 each, uint8, shape of the cells."""
     return (cells - (FIRST_FIRE - 1)) * byte(is_burning(cells)) * 51
+
+
+def _as_byte(fractions: Tensor) -> Tensor:
+    """Return 255 times numbers in 0..1, cut to whole ones, uint8; the numbers are used up."""
+    return fractions.mul_(255.0).to(torch.int32).to(torch.uint8)  # at once it takes twice the time
 
 
 def _relative_elevation(elevation: Tensor, seen: Window) -> Tensor:

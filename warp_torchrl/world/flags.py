@@ -9,6 +9,8 @@ import torch
 from torch import Tensor
 from torch.compiler import is_compiling
 
+_WORDS = 128
+
 
 def at_least(codes: Tensor, bound: int) -> Tensor:
     """Return ``codes >= bound``, bool; codes are uint8."""
@@ -68,7 +70,14 @@ def clear(mask: Tensor, values: Tensor) -> Tensor:
 
 
 def count(mask: Tensor) -> Tensor:
-    """Return how many cells of each world a bool mask [B, H, W] marks, int32 [B]."""
+    """Return how many cells of each map bool masks [..., H, W] mark, int32 [...]."""
     if is_compiling():
-        return mask.sum((1, 2), dtype=torch.int32)
-    return mask.view(torch.uint8).sum((1, 2), dtype=torch.int32)
+        return mask.sum((-2, -1), dtype=torch.int32)
+    codes = mask.view(torch.uint8).flatten(-2)
+    if codes.shape[-1] % 8:
+        return codes.sum(-1, dtype=torch.int32)
+    # Eight bytes are added at a time, as parts of a word; 128 ones at most, so that none runs into its neighbour.
+    words = codes.view(torch.int64)
+    whole = words.shape[-1] // _WORDS * _WORDS
+    sums = words[..., :whole].unflatten(-1, (-1, _WORDS)).sum(-1), words[..., whole:].sum(-1, keepdim=True)
+    return torch.cat(sums, dim=-1).view(torch.uint8).sum(-1, dtype=torch.int32)

@@ -5,6 +5,7 @@ Letters, everywhere: B worlds, A agents, H rows, W columns.
 
 from enum import IntEnum
 
+import torch
 from tensordict import tensorclass
 from torch import Tensor
 
@@ -117,6 +118,7 @@ class WorldState(Batch):
     truncated: Tensor  # bool [B], the horizon was reached
     front: Tensor | None = None  # float32 [B,H,W], see ``World.front``, where it is kept for all who ask
     chance: Tensor | None = None  # float32 [B,H,W], see ``World.chance``, likewise
+    fuel: Tensor | None = None  # float32 [B,H,W], see ``World.fuel``, likewise
 
     @property
     def cover(self) -> Tensor:
@@ -170,15 +172,23 @@ def count_trees(state: WorldState) -> Tally:
     burning = is_burning(state.cells)
     alive = state.initial & is_tree(state.cells) & ~state.burned
     unburned = state.initial & ~state.burned
-
-    extinguished = count(alive & state.extinguished)
+    fates = (
+        state.initial,
+        alive,
+        alive & state.extinguished,
+        unburned & state.firebreak,
+        state.initial & state.burned,
+        unburned & burning,
+        burning,
+    )
+    initial, standing, extinguished, cleared, burned, aflame, alight = count(torch.stack(fates)).unbind()
     return Tally(
-        initial=count(state.initial),
-        preserved=count(alive) - extinguished,
+        initial=initial,
+        preserved=standing - extinguished,
         extinguished=extinguished,
-        cleared=count(unburned & state.firebreak),
-        burned=count(state.initial & state.burned),
-        burning=count(unburned & burning),
-        alight=count(burning),
+        cleared=cleared,
+        burned=burned,
+        burning=aflame,
+        alight=alight,
         batch_size=state.batch_size,
     )

@@ -10,6 +10,7 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.batch import concatenated
 from warp_torchrl.world.fire import Fire
+from warp_torchrl.world.flags import number
 from warp_torchrl.world.fusion import is_fusing
 from warp_torchrl.world.ignition import Ignition
 from warp_torchrl.world.landscape import LandscapeSource, Perlin, map_size
@@ -24,6 +25,7 @@ from warp_torchrl.world.state import (
     Vehicles,
     WorldState,
     count_trees,
+    is_tree,
 )
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.wind import Uniform, Wind
@@ -147,11 +149,12 @@ class World:
         )
 
     def with_outlook(self, state: WorldState) -> WorldState:
-        """Return worlds that keep ``front`` and ``chance`` for all who ask."""
+        """Return worlds that keep ``front``, ``chance`` and ``fuel`` for all who ask."""
         if self.fire.keeps_to_its_edge(state):
             front, chance = self.fire.outlook(state)
-            return state.replace(front=front, chance=chance)
-        return state.replace(front=self.front(state), chance=self.chance(state))
+        else:
+            front, chance = self.front(state), self.chance(state)
+        return state.replace(front=front, chance=chance, fuel=self.fuel(state))
 
     def front(self, state: WorldState) -> Tensor:
         """Return what each cell is expected to ignite, float32 [B, H, W] in 0..1; see ``Fire.front``."""
@@ -160,6 +163,10 @@ class World:
     def chance(self, state: WorldState) -> Tensor:
         """Return each tree's chance to ignite in the next tick, float32 [B, H, W]; see ``Fire.chance_to_ignite``."""
         return self.fire.chance_to_ignite(state) if state.chance is None else state.chance
+
+    def fuel(self, state: WorldState) -> Tensor:
+        """Return the flammability of each tree that does not burn, float32 [B, H, W]; 0 elsewhere."""
+        return state.alpha * number(is_tree(state.cells)) if state.fuel is None else state.fuel
 
     def threat(self, state: WorldState) -> Tensor:
         """Return where the fire is about to grow, float32 [B, H, W] in 0..1.
