@@ -6,9 +6,10 @@ from torchrl.collectors import Collector
 from torchrl.objectives.value import MultiAgentGAE
 
 from tests.conftest import small_world
-from warp_torchrl.algorithms.on_policy import ADVANTAGE, VALUE_TARGET, with_advantages
+from warp_torchrl.algorithms.on_policy import ADVANTAGE, VALUE_TARGET, narrowed, with_advantages
 from warp_torchrl.algorithms.ppo import Ppo
-from warp_torchrl.models import REWARD, VALUE, Mlp, hold
+from warp_torchrl.models import REWARD, STATE, VALUE, Cnn, Mlp, hold
+from warp_torchrl.observation import Paper, Surroundings
 
 
 def collected(env, learner, steps):
@@ -34,6 +35,31 @@ def test_advantages_have_a_value_for_each_agent(make_small_env, central):
     assert prepared.batch_size == (32,)
     assert prepared[ADVANTAGE].shape == prepared[VALUE_TARGET].shape == (32, 2, 1)
     assert not {"next", "info"} & set(prepared.keys())
+
+
+@pytest.mark.parametrize(("model", "observation"), [(Mlp, Surroundings()), (Mlp, Paper()), (Cnn, Surroundings())])
+def test_a_state_kept_in_half_precision_changes_no_bit_of_what_is_learnt(make_small_env, model, observation):
+    env = make_small_env(3, observation=observation)
+    learner = Ppo(minibatch_size=12).build(env, model(dtype="bfloat16", facing="north"), 12)
+    wide = with_advantages(learner.loss, collected(env, learner, 4), lambda batch: batch)
+    narrow = narrowed(wide, torch.bfloat16)
+    assert narrow[STATE].dtype == torch.bfloat16 != wide[STATE].dtype
+    found = []
+    for batch in (wide, narrow):
+        terms = learner.loss(batch.copy())
+        sum(terms[key] for key in learner.loss_keys).backward()
+        found.append([parameter.grad.clone() for parameter in learner.loss.parameters() if parameter.requires_grad])
+        learner.optimizer.zero_grad()
+    assert all(torch.equal(one, other) for one, other in zip(*found, strict=True))
+
+
+def test_what_is_learnt_from_is_kept_as_the_networks_compute(make_small_env):
+    env, kept = make_small_env(3), {}
+    for dtype in ("float32", "bfloat16"):
+        learner = Ppo(epochs=1, minibatch_size=12).build(env, Mlp(dtype=dtype, actor_hidden=(8,)), 12)
+        learner.store(collected(env, learner, 4))
+        kept[dtype] = next(iter(learner.samples()))[STATE].dtype
+    assert kept == {"float32": torch.float32, "bfloat16": torch.bfloat16}
 
 
 def test_gae_by_hand():

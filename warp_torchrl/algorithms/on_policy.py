@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import torch
 from tensordict import TensorDictBase
+from torch import Tensor
 from torchrl.data import SamplerWithoutReplacement, TensorDictReplayBuffer
 from torchrl.envs import EnvBase
 from torchrl.modules import ProbabilisticActor
@@ -17,11 +18,14 @@ from warp_torchrl.models import (
     ACTION,
     LOG_PROB,
     LOGITS,
+    OBSERVATION,
     REWARD,
+    STATE,
     VALUE,
     Mlp,
     Recollection,
     Signature,
+    arithmetic_of,
     faces_fire,
     given_held,
     hold,
@@ -107,7 +111,7 @@ class OnPolicy(Algorithm):
         def store(batch: TensorDictBase) -> None:
             buffer.empty()
             valued = with_advantages(loss, batch, hold if faces_fire(policy) else _as_it_is, whole=bool(memory.actors))
-            buffer.extend(valued)
+            buffer.extend(narrowed(valued, arithmetic_of(critic, env.device.type)))
 
         return Learner(
             policy=policy,
@@ -165,6 +169,16 @@ def with_advantages(loss: LossModule, batch: TensorDictBase, hold: Hold, whole: 
         loss.value_estimator(batch)
     batch = batch.exclude("next", "info", LOGITS, VALUE)
     return batch if whole else batch.reshape(-1)
+
+
+def narrowed(batch: TensorDictBase, dtype: torch.dtype) -> TensorDictBase:
+    """Return a batch whose state, and observation where it is one vector, have the type that networks compute in.
+
+    They would be made so at every pass, and most of what a minibatch copies is the state.
+    """
+    wide = {key: batch.get(key, None) for key in (STATE, OBSERVATION)}
+    found = {key: value for key, value in wide.items() if isinstance(value, Tensor) and value.dtype == torch.float32}
+    return batch.copy().update({key: value.to(dtype) for key, value in found.items()}) if found else batch
 
 
 def _as_it_is(batch: TensorDictBase) -> TensorDictBase:

@@ -7,6 +7,7 @@ world.
 from warp_torchrl.models.facing import faces_fire, given_held, hold
 from warp_torchrl.models.memory import Recollection, RecurrentActor, memory_apart, recurrent_actors
 from warp_torchrl.models.model import Cnn, Mlp
+from warp_torchrl.models.networks import arithmetic_of
 from warp_torchrl.models.signature import (
     ACTION,
     ACTION_MASK,
@@ -50,6 +51,7 @@ __all__ = [
     "Recollection",
     "RecurrentActor",
     "Signature",
+    "arithmetic_of",
     "faces_fire",
     "given_held",
     "hold",

@@ -144,8 +144,11 @@ class Network(nn.Module):
 
     def arithmetic(self, device: str) -> torch.autocast:
         """Return the context in which the layers compute on a kind of device."""
-        half = self.dtype == "bfloat16" or (self.dtype == "auto" and computes_in_half(device))
-        return torch.autocast(device, dtype=torch.bfloat16, enabled=half, cache_enabled=False)
+        return torch.autocast(device, dtype=torch.bfloat16, enabled=self.is_half(device), cache_enabled=False)
+
+    def is_half(self, device: str) -> bool:
+        """Return whether the layers compute in bfloat16 on a kind of device."""
+        return self.dtype == "bfloat16" or (self.dtype == "auto" and computes_in_half(device))
 
 
 @lru_cache(maxsize=4)
@@ -155,6 +158,12 @@ def computes_in_half(device: str) -> bool:
         return torch.cuda.is_bf16_supported(including_emulation=False)
     supported = getattr(torch.cpu, "_is_avx512_bf16_supported", None)  # no public question says it
     return device == "cpu" and supported is not None and bool(supported())
+
+
+def arithmetic_of(module: nn.Module, device: str) -> torch.dtype:
+    """Return the type that all networks of a module compute in on a kind of device."""
+    networks = [each for each in module.modules() if isinstance(each, Network)]
+    return torch.bfloat16 if networks and all(each.is_half(device) for each in networks) else torch.float32
 
 
 class Central(nn.Module):
