@@ -15,7 +15,6 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.edge import ByPattern, ByStrength, Edge, EdgeChances, edge_of, expected_from_edge
 from warp_torchrl.world.flags import as_mask, at_least, at_most, below, byte, choose, clear, equal, number
-from warp_torchrl.world.fusion import is_fusing
 from warp_torchrl.world.kernel import alexandridis, ellipse, slope_factor
 from warp_torchrl.world.landscape import holds_trees
 from warp_torchrl.world.law import Clipped, Law
@@ -111,10 +110,9 @@ class Fire:
     def keeps_to_its_edge(self, state: WorldState) -> bool:
         """Return whether a tick is worked out at the fire's edge alone: ``edge``, ``tick_at_edge`` and ``outlook``.
 
-        It is so where trees neither grow nor ignite by themselves, on a CPU; fused functions take whole maps.
+        It is so where trees neither grow nor ignite by themselves, on a CPU.
         """
-        spreads_only = not self.growth and self.beta == 0.0 and self.p_regrow == 0.0
-        return spreads_only and state.cells.device.type == "cpu" and not is_fusing()
+        return not self.growth and self.beta == 0.0 and self.p_regrow == 0.0 and state.cells.device.type == "cpu"
 
     def flammability(self, cover: Tensor) -> Tensor:
         """Return alpha of the ground, float32, shape of ``cover`` (WARP-CA, terrain table)."""

@@ -96,7 +96,7 @@ def uniform_at(key: Tensor, tick: Tensor | int, stream: Stream, index: Tensor) -
         float32 [B, n].
     """
     low, high = _key_words(key, tick, stream)
-    return _mix(index, low[:, None], high[:, None])
+    return _mix_all(index, low[:, None], high[:, None])
 
 
 def uniform_among(key: Tensor, tick: Tensor | int, stream: Stream, world: Tensor, index: Tensor) -> Tensor:
@@ -123,7 +123,6 @@ def _key_words(key: Tensor, tick: Tensor | int, stream: Stream) -> tuple[Tensor,
     return word.to(torch.int32), (word >> 32).to(torch.int32)
 
 
-@fusible
 def _mix(index: Tensor, low: Tensor, high: Tensor) -> Tensor:
     """Return the uniform of each index under two key words, int32 of shapes that go together."""
     bits = (index * 0x1E3779B1) ^ low  # a distinct well-mixed word for each index
@@ -139,3 +138,6 @@ def _mix(index: Tensor, low: Tensor, high: Tensor) -> Tensor:
     # The word is signed: a positive one is a small number as it stands, a negative one lies half a range higher.
     fraction = fold(16).to(torch.float32).mul_(2.0**-32)
     return fraction.sub_(torch.floor(fraction, out=spare.view(torch.float32))).clamp_(max=_LARGEST_BELOW_ONE)
+
+
+_mix_all = fusible(_mix)  # not of a list, which is of another length each time
