@@ -9,7 +9,7 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor, nn
 
-from warp_torchrl.models.networks import ConvolutionalEncoder, LinearEncoder, Network
+from warp_torchrl.models.networks import Network
 from warp_torchrl.models.signature import FRAME, LOGITS, MEMORY, OBSERVATION, ROLE, Entry
 from warp_torchrl.observation.frame import Frame
 from warp_torchrl.observation.own import begins
@@ -18,7 +18,7 @@ BEGINS = "begins"
 """Whether an episode begins, among what a network with a memory reads."""
 
 
-class RecurrentNetwork(Network):
+class RecurrentNetwork(nn.Module):
     """A network with a gated recurrent unit (Cho et al. 2014) beside its first layer: what it sees reaches the layers
     above as it does without, and what it remembers is added to that.
 
@@ -27,29 +27,16 @@ class RecurrentNetwork(Network):
     equivariant convolutional networks", 2016): what was remembered of the map stays true of it.
 
     Args:
-        encoder: As for ``Network``, and so are the others but the last.
-        hidden: See ``Network``.
-        out: See ``Network``.
-        activation: See ``Network``.
-        head_gain: See ``Network``.
-        dtype: See ``Network``; the recurrent layer is float32.
+        network: The network without it; the recurrent layer is float32 whatever its arithmetic.
+        size: Features of its first layer.
         memory: Units of the recurrent layer, a multiple of 8.
     """
 
-    def __init__(
-        self,
-        encoder: LinearEncoder | ConvolutionalEncoder,
-        hidden: tuple[int, ...],
-        out: int,
-        activation: type[nn.Module],
-        head_gain: float,
-        dtype: str,
-        memory: int,
-    ) -> None:
-        super().__init__(encoder, hidden, out, activation, head_gain, dtype)
-        self.memory = memory
-        self.cell = nn.GRUCell(hidden[0], memory)
-        self.recall = nn.Linear(memory, hidden[0], bias=False)
+    def __init__(self, network: Network, size: int, memory: int) -> None:
+        super().__init__()
+        self.network, self.memory = network, memory
+        self.cell = nn.GRUCell(size, memory)
+        self.recall = nn.Linear(memory, size, bias=False)
         for weight in (self.cell.weight_ih, self.cell.weight_hh, self.recall.weight):
             nn.init.orthogonal_(weight)
         nn.init.zeros_(self.cell.bias_ih)
@@ -57,8 +44,8 @@ class RecurrentNetwork(Network):
 
     @property
     def entries(self) -> list[Entry]:
-        """What it reads: that of its encoder, whether an episode begins, its frame, and the memory."""
-        return [*super().entries, Entry((), "bool"), Entry((), "int64"), Entry((self.memory,), "float32")]
+        """What it reads: what its network does, whether an episode begins, its frame, and the memory."""
+        return [*self.network.entries, Entry((), "bool"), Entry((), "int64"), Entry((self.memory,), "float32")]
 
     def forward(self, *inputs: Tensor) -> Tensor:
         """Return its output and what is remembered then, float32 [..., out + M].
@@ -69,13 +56,13 @@ class RecurrentNetwork(Network):
                 former with time as dimension 1 and the memory before the first.
         """
         *seen, fresh, index, memory = inputs
-        device = fresh.device.type
-        with self.arithmetic(device):
-            features = self.body[0](self.encoder(*seen))
+        device, network = fresh.device.type, self.network
+        with network.arithmetic(device):
+            features = network.body[0](network.encoder(*seen))
         with torch.autocast(device, enabled=False):
             remembered = self._remember(features.to(torch.float32), (~fresh)[..., None], index, memory)
-        with self.arithmetic(device):
-            out = self.body[1:](features + self.recall(remembered))
+        with network.arithmetic(device):
+            out = network.body[1:](features + self.recall(remembered))
         return torch.cat((out.to(torch.float32), Frame(index).units_on_map(remembered)), dim=-1)
 
     def _remember(self, features: Tensor, kept: Tensor, index: Tensor, memory: Tensor) -> Tensor:

@@ -152,21 +152,21 @@ class Mlp:
             return RecurrentActor(network, [key for key in keys if key not in (BEGINS, FRAME, MEMORY)], out, memory)
         return TensorDictModule(network, in_keys=keys, out_keys=[key])
 
-    def _shared(self, signature: Signature, make: Callable[[], Network]) -> nn.Module:
+    def _shared(self, signature: Signature, make: Callable[[], Network | RecurrentNetwork]) -> nn.Module:
         """Return as many networks as the team has."""
         if self.sharing == "team":
             return make()
         if self.sharing == "role":
             return RoleNetworks([make() for _ in range(signature.n_roles)])
-        return AgentNetworks([make() for _ in range(signature.n_agents)])
+        networks = [make() for _ in range(signature.n_agents)]
+        return AgentNetworks(networks, networks[0].entries)
 
     def _network(
         self, entries: list[Entry], hidden: tuple[int, ...], out: int, head_gain: float, memory: int
-    ) -> Network:
+    ) -> Network | RecurrentNetwork:
         encoder, activation = self._encoder(entries, hidden[0]), _ACTIVATIONS[self.activation]
-        if memory:
-            return RecurrentNetwork(encoder, tuple(hidden), out, activation, head_gain, self.dtype, memory)
-        return Network(encoder, tuple(hidden), out, activation, head_gain, self.dtype)
+        network = Network(encoder, tuple(hidden), out, activation, head_gain, self.dtype)
+        return RecurrentNetwork(network, hidden[0], memory) if memory else network
 
     def _encoder(self, entries: list[Entry], size: int) -> LinearEncoder | ConvolutionalEncoder:
         return LinearEncoder(entries, size)

@@ -1,6 +1,7 @@
 """Networks: encoders of observations, heads, and who of a team shares which."""
 
 import operator
+from collections.abc import Sequence
 from functools import lru_cache, reduce
 
 import torch
@@ -196,7 +197,7 @@ class RoleNetworks(nn.Module):
         networks: By role index.
     """
 
-    def __init__(self, networks: list[Network]) -> None:
+    def __init__(self, networks: Sequence[nn.Module]) -> None:
         super().__init__()
         self.networks = nn.ModuleList(networks)
 
@@ -214,12 +215,13 @@ class AgentNetworks(nn.Module):
 
     Args:
         networks: By agent.
+        entries: What each of them reads.
     """
 
-    def __init__(self, networks: list[Network]) -> None:
+    def __init__(self, networks: Sequence[nn.Module], entries: list[Entry]) -> None:
         super().__init__()
         self.networks = nn.ModuleList(networks)
-        self._entries = networks[0].entries
+        self._entries = entries
 
     def forward(self, *inputs: Tensor) -> Tensor:
         """Return float32 [..., A, out] from entries [..., A, ...]; one that all share may be [..., 1, ...]."""
