@@ -14,7 +14,7 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.edge import ByPattern, ByStrength, Edge, EdgeChances, edge_of, expected_from_edge
-from warp_torchrl.world.flags import as_mask, at_least, at_most, below, byte, choose, clear, equal, number
+from warp_torchrl.world.flags import above, as_mask, at_least, at_most, below, byte, choose, clear, equal, number
 from warp_torchrl.world.kernel import alexandridis, ellipse, slope_factor
 from warp_torchrl.world.landscape import holds_trees
 from warp_torchrl.world.law import Clipped, Law
@@ -197,10 +197,9 @@ class Fire:
         """Join the chance to be ignited by neighbours with that of spontaneous ignition."""
         if self.beta == 0.0:
             return spread
-        cells = state.cells
-        fuel = self.is_fuel(state) & (state.alpha > 0.0)
-        spontaneous = self._look_up(self._spontaneous(cells.shape[1] * cells.shape[2]), cells) * fuel
-        return spontaneous + (1.0 - spontaneous) * spread
+        spontaneous = self._look_up(self._spontaneous(state.cells[0].numel()), state.cells)
+        spontaneous.mul_(number(self.is_fuel(state) & above(state.alpha, 0.0)))
+        return (1.0 - spontaneous).mul_(spread).add_(spontaneous)
 
     def is_fuel(self, state: WorldState) -> Tensor:
         """Return which trees can ignite now: age >= A_min, dry; bool [B, H, W]."""
@@ -225,11 +224,11 @@ class Fire:
         q = self.chance_to_ignite(state)
         grows = None
         if self.growth:
-            stays = 1.0 - (1.0 - q) * self._look_up(self._growth(), cells)  # u < 1: none grows where p is 0
-            grows = ~below(u, stays)
+            leaves = self._look_up(self._growth(), cells).mul_(1.0 - q)
+            grows = ~below(u, torch.sub(1.0, leaves, out=leaves))  # u < 1: none grows where p is 0
         if self.p_regrow > 0.0:
             bare = equal(cells, 0) & holds_trees(state.landscape.cover) & ~state.firebreak
-            regrows = bare & (u < self._in_a_tick(self.p_regrow))
+            regrows = bare & below(u, self._in_a_tick(self.p_regrow))
             grows = regrows if grows is None else grows | regrows
         state, due_cells = self._age_fires(state, due), byte(due)[:, None, None]
         ignite = as_mask(byte(below(u, q)) * due_cells)
@@ -295,7 +294,7 @@ class Fire:
         return tuple(chance(code) for code in range(EMBER + 1))
 
     def _look_up(self, table: tuple[float, ...], cells: Tensor) -> Tensor:
-        return _constant(table, cells.device)[cells.to(torch.int64)]
+        return _constant(table, cells.device).index_select(0, cells.flatten().to(torch.int32)).view(cells.shape)
 
 
 def _as_front(expected: Tensor) -> Tensor:

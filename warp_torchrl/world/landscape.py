@@ -13,6 +13,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
+from warp_torchrl.world.flags import equal
 from warp_torchrl.world.perlin import fractal_noise
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import OLDEST, Cover, Landscape
@@ -65,7 +66,7 @@ def draw_age(key: Tensor, cover: Tensor) -> Tensor:
 
 def holds_trees(cover: Tensor) -> Tensor:
     """Return where a tree can stand (wetland, grassland, forest), bool, shape of the input."""
-    return (cover != Cover.LAKE) & (cover != Cover.BARE)
+    return ~(equal(cover, Cover.LAKE) | equal(cover, Cover.BARE))
 
 
 _PRINTED = (0.01, 0.2, 0.01)
