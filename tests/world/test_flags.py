@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from warp_torchrl.world.flags import at_least, at_most, choose, clear, count, equal, number
+from warp_torchrl.world.flags import above, at_least, at_most, below, choose, clear, count, equal, number
 
 codes = torch.arange(256, dtype=torch.uint8).view(1, 16, 16)
 
@@ -14,6 +14,19 @@ def test_comparisons(bound):
     assert torch.equal(at_most(codes, bound), codes <= bound)
     assert torch.equal(equal(codes, bound), codes == bound)
     assert at_least(codes, bound).dtype == torch.bool
+
+
+def test_comparisons_of_numbers():
+    numbers = torch.linspace(-1.0, 1.0, 33).view(1, 3, 11)
+    bounds = numbers.flip(2)
+    assert torch.equal(below(numbers, bounds), numbers < bounds) and torch.equal(below(numbers, 0.0), numbers < 0.0)
+    assert torch.equal(above(numbers, 0.0), numbers > 0.0) and above(numbers, 0.0).sum() == 16
+
+
+@pytest.mark.parametrize("shape", [(2, 3, 5), (2, 8, 8), (3, 2, 24, 43), (1, 64, 129)])
+def test_counts_of_maps_of_any_size(shape):
+    mask = torch.rand(shape, generator=torch.Generator().manual_seed(0)) < 0.7
+    assert torch.equal(count(mask), mask.sum((-2, -1), dtype=torch.int32))
 
 
 def test_comparisons_of_parts_and_of_spread_out_planes():
