@@ -187,9 +187,10 @@ class WildfireEnv(EnvBase):
 
     def maybe_reset(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Reset the worlds that have ended, as TorchRL would: what it does with masks is done to their rows alone."""
-        index = tensordict.get("done").flatten().nonzero()[:, 0]
-        if len(index) == self.batch_size[0]:
+        done = tensordict.get("done", None)
+        if done is None or done.all():
             return super().maybe_reset(tensordict)
+        index = done.flatten().nonzero()[:, 0]
         if not len(index):
             return tensordict
         seen, out = self._start_again(index), tensordict.clone()
@@ -197,7 +198,7 @@ class WildfireEnv(EnvBase):
         for key, value in out.items(include_nested=True, leaves_only=True):
             if key in started:
                 value.index_copy_(0, index, started[key])
-            else:
+            elif isinstance(value, Tensor):
                 value.index_fill_(0, index, 0)
         return out
 

@@ -56,6 +56,20 @@ def test_the_edge_comes_to_what_whole_maps_do(fire: Fire, relief: float, wind: W
     assert listed > 300
 
 
+def test_planes_may_lie_in_memory_as_they_like() -> None:
+    world = World(landscape=Perlin(size=16), steps_per_tick=1)
+    state = world.reset(torch.arange(3), torch.zeros(3, dtype=torch.int64))
+    spread_out = state.replace(
+        **{name: getattr(state, name).mT.contiguous().mT for name in ("cells", "age", "wet", "burned", "alpha")}
+    )
+    stay = torch.full((3, world.team.n_agents), 10)
+    assert not spread_out.cells.is_contiguous()
+    for _ in range(5):
+        state, spread_out = (world.step(each, stay).after for each in (state, spread_out))
+        assert differing(spread_out, state) == []
+    assert (state.cells == 11).any()
+
+
 @pytest.mark.parametrize("fire", [Fire(growth=True), Fire(beta=1.0), Fire(p_regrow=0.1)])
 def test_a_fire_that_may_start_anywhere_does_not_keep_to_its_edge(fire: Fire) -> None:
     state = draw("5a", fire=fire)

@@ -6,7 +6,6 @@ state and of one uniform draw a cell.
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Literal
 
 import torch
@@ -14,7 +13,21 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.edge import ByPattern, ByStrength, Edge, EdgeChances, edge_of, expected_from_edge
-from warp_torchrl.world.flags import above, as_mask, at_least, at_most, below, byte, choose, clear, equal, number
+from warp_torchrl.world.flags import (
+    above,
+    as_mask,
+    at_least,
+    at_most,
+    below,
+    byte,
+    choose,
+    clear,
+    equal,
+    look_up,
+    number,
+    numbers,
+    put,
+)
 from warp_torchrl.world.kernel import alexandridis, ellipse, slope_factor
 from warp_torchrl.world.landscape import holds_trees
 from warp_torchrl.world.law import Clipped, Law
@@ -116,7 +129,7 @@ class Fire:
 
     def flammability(self, cover: Tensor) -> Tensor:
         """Return alpha of the ground, float32, shape of ``cover`` (WARP-CA, terrain table)."""
-        return _constant(tuple(self.alpha), cover.device)[cover.to(torch.int64)]
+        return look_up(tuple(self.alpha), cover)
 
     def slope_factor(self, elevation: Tensor, cell_size: float) -> Tensor:
         """Return the slope's factor of an episode, float32 [B, 8, H + 2, W + 1]; see ``kernel.slope_factor``."""
@@ -135,7 +148,7 @@ class Fire:
             return state.replace(wind=wind, gain=None, chances=None)
         if state.slope is not None:
             return state.replace(wind=wind, gain=gain, chances=None)
-        kinds = self._law().susceptibility(_constant(tuple(self.alpha), wind.device))
+        kinds = self._law().susceptibility(numbers(tuple(self.alpha), wind.device))
         return state.replace(wind=wind, gain=gain, chances=pattern_table(self._law(), kinds, gain, self.neighbours))
 
     def spread(self, state: WorldState) -> Tensor:
@@ -197,7 +210,7 @@ class Fire:
         """Join the chance to be ignited by neighbours with that of spontaneous ignition."""
         if self.beta == 0.0:
             return spread
-        spontaneous = self._look_up(self._spontaneous(state.cells[0].numel()), state.cells)
+        spontaneous = look_up(self._spontaneous(state.cells[0].numel()), state.cells)
         spontaneous.mul_(number(self.is_fuel(state) & above(state.alpha, 0.0)))
         return (1.0 - spontaneous).mul_(spread).add_(spontaneous)
 
@@ -224,7 +237,7 @@ class Fire:
         q = self.chance_to_ignite(state)
         grows = None
         if self.growth:
-            leaves = self._look_up(self._growth(), cells).mul_(1.0 - q)
+            leaves = look_up(self._growth(), cells).mul_(1.0 - q)
             grows = ~below(u, torch.sub(1.0, leaves, out=leaves))  # u < 1: none grows where p is 0
         if self.p_regrow > 0.0:
             bare = equal(cells, 0) & holds_trees(state.landscape.cover) & ~state.firebreak
@@ -242,10 +255,10 @@ class Fire:
         """Return what ``tick`` does, to the bit, from the draws at the fire's edge alone, float32 [N]."""
         lit = edge.cell[(u < self._chances_at(edge, state).joined()) & due.index_select(0, edge.world)]
         after = self._age_fires(state, due)
-        after.cells.flatten().index_fill_(0, lit, FIRST_FIRE)
-        after.age.flatten().index_copy_(0, lit, state.cells.flatten().index_select(0, lit))
+        after.cells = put(after.cells, lit, FIRST_FIRE)
+        after.age = put(after.age, lit, state.cells.flatten().index_select(0, lit))
         if after.stage_age is not None:
-            after.stage_age.flatten().index_fill_(0, lit, 0)
+            after.stage_age = put(after.stage_age, lit, 0)
         return after
 
     def _age_fires(self, state: WorldState, due: Tensor) -> WorldState:
@@ -293,15 +306,7 @@ class Fire:
 
         return tuple(chance(code) for code in range(EMBER + 1))
 
-    def _look_up(self, table: tuple[float, ...], cells: Tensor) -> Tensor:
-        return _constant(table, cells.device).index_select(0, cells.flatten().to(torch.int32)).view(cells.shape)
-
 
 def _as_front(expected: Tensor) -> Tensor:
     """Return a quarter of what is expected, at most 1, in its own memory."""
     return expected.mul_(0.25).clamp_(max=1.0)
-
-
-@lru_cache(maxsize=64)
-def _constant(values: tuple[float, ...], device: torch.device) -> Tensor:
-    return torch.tensor(values, dtype=torch.float32, device=device)

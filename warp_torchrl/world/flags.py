@@ -1,9 +1,11 @@
-"""Comparisons and choices on planes of bytes, at the speed of byte arithmetic.
+"""Comparisons, choices and look-ups on planes of bytes, at the speed of byte arithmetic.
 
 On CPUs a comparison that writes bool, ``where`` and ``masked_fill`` are many times slower than arithmetic on bytes: a
 comparison that writes its own type is vectorised, and a bool is a byte of 0 or 1. A compiler that fuses these planes
 wants them plain.
 """
+
+from functools import lru_cache
 
 import torch
 from torch import Tensor
@@ -93,3 +95,21 @@ def count(mask: Tensor) -> Tensor:
     whole = words.shape[-1] // _WORDS * _WORDS
     sums = words[..., :whole].unflatten(-1, (-1, _WORDS)).sum(-1), words[..., whole:].sum(-1, keepdim=True)
     return torch.cat(sums, dim=-1).view(torch.uint8).sum(-1, dtype=torch.int32)
+
+
+def put(plane: Tensor, place: Tensor, values: Tensor | int) -> Tensor:
+    """Return a plane [B, H, W] that holds values, or one, at flat places int64 [N]; the plane is used up."""
+    flat = plane.flatten()
+    flat = flat.index_copy_(0, place, values) if isinstance(values, Tensor) else flat.index_fill_(0, place, values)
+    return flat.view(plane.shape)
+
+
+def look_up(table: tuple[float, ...], codes: Tensor) -> Tensor:
+    """Return what a table holds for each code, float32, shape of the codes; they are uint8 and within it."""
+    return numbers(table, codes.device).index_select(0, codes.flatten().to(torch.int32)).view(codes.shape)
+
+
+@lru_cache(maxsize=64)
+def numbers(values: tuple[float, ...], device: torch.device) -> Tensor:
+    """Return some numbers as a tensor, float32 [n], kept for the next time."""
+    return torch.tensor(values, dtype=torch.float32, device=device)
