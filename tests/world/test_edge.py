@@ -9,7 +9,7 @@ from warp_torchrl.world.hazard import HazardFire
 from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.random import Stream, uniform, uniform_among
 from warp_torchrl.world.wind import Paper, Uniform, Wandering, Wind
-from warp_torchrl.world.world import World
+from warp_torchrl.world.world import World, advance
 
 from .drawing import differing, draw
 
@@ -62,10 +62,10 @@ def test_planes_may_lie_in_memory_as_they_like() -> None:
     spread_out = state.replace(
         **{name: getattr(state, name).mT.contiguous().mT for name in ("cells", "age", "wet", "burned", "alpha")}
     )
-    stay = torch.full((3, world.team.n_agents), 10)
     assert not spread_out.cells.is_contiguous()
+    everywhere = torch.ones(3, dtype=torch.bool)
     for _ in range(5):
-        state, spread_out = (world.step(each, stay).after for each in (state, spread_out))
+        state, spread_out = (advance(each, world.fire, world.air, everywhere) for each in (state, spread_out))
         assert differing(spread_out, state) == []
     assert (state.cells == 11).any()
 
