@@ -37,6 +37,16 @@ def test_the_tick_is_compared_with_numpy(capsys):
     assert "numpy was skipped: it plays law paper in a wind that stays as it is" in out
 
 
+@pytest.mark.parametrize("mistake", [["--scenario", "larg"], ["--set", "landscape.size=2"]])
+@pytest.mark.parametrize("what", ["tick", "train"])
+def test_a_mistake_is_told_in_one_line(capsys, what, mistake):
+    with pytest.raises(SystemExit) as end:
+        main([what, *mistake])
+    assert end.value.code == 2
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) == 1 and told[0].startswith("error: ")
+
+
 @pytest.mark.slow
 def test_the_tick_is_compiled_too(capsys):
     assert "\ncompiled " in output(capsys, "tick", *TINY)

@@ -29,6 +29,7 @@ from warp_torchrl.benchmark.tasks import (
 )
 from warp_torchrl.benchmark.ticks import tick_cost, tick_table
 from warp_torchrl.benchmark.trainings import training_speed
+from warp_torchrl.construction import ConfigError
 
 Rows = list[dict[str, Any]]
 _WORLDS = 256
@@ -140,7 +141,10 @@ def main(arguments: list[str] | None = None) -> None:
         print(header(described), flush=True)
     found: dict[str, Rows] = {}
     for each in options.what or ["env", "train"]:
-        sections = _MEASURES[each](options)
+        try:
+            sections = _MEASURES[each](options)
+        except ConfigError as error:
+            parser.exit(2, f"error: {error}\n")
         found |= sections
         for name, rows in sections.items() if not options.json else ():
             print(f"\n{_TABLES[name](rows)}", flush=True)
