@@ -1,7 +1,7 @@
 """The environment: joins world, observation, reward and metrics to TorchRL. It has no physics of its own."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 from tensordict import TensorDict, TensorDictBase
@@ -14,9 +14,9 @@ from warp_torchrl.render import render
 from warp_torchrl.reward import Efficiency, Reward
 from warp_torchrl.specs import make_specs
 from warp_torchrl.starts import Start, Starts
-from warp_torchrl.world.fusion import check_compiler, fusing
+from warp_torchrl.world.fusion import check_compiler, fusible, fusible_in_parts, fusing
 from warp_torchrl.world.role import ROLES
-from warp_torchrl.world.state import Transition, WorldState
+from warp_torchrl.world.state import Outcome, Transition, WorldState, in_bytes, in_flags
 from warp_torchrl.world.world import World
 
 
@@ -215,16 +215,26 @@ class WildfireEnv(EnvBase):
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         action = self._checked(tensordict.get(("agents", "action"), None))
-        with fusing(self._fuses):
-            transition = self.world.step(self.world_state, action)
-            reward = self.reward_function(transition)
-            self._state = transition.after
-            self._episode_reward = self._episode_reward + reward.mean(1)[:, 0]
-            out = self._observe(transition.after)
+        transition, seen = self._play(action)
+        reward = self.reward_function(transition)
+        self._state = transition.after
+        self._episode_reward = self._episode_reward + reward.mean(1)[:, 0]
+        out = self._told(transition.after, seen, self._episode_reward)
         if self.watcher is not None:
             self.watcher(transition)
         out.set(("agents", "reward"), reward)
         return out
+
+    def _play(self, action: Tensor) -> tuple[Transition, "_Seen"]:
+        """Take a step, and return it and what is seen after it."""
+        before = self.world_state
+        if not self._fuses:
+            transition = self.world.step(before, action)
+            return transition, _see(self.world, self.observation, self.world.with_outlook(transition.after))
+        with fusing(True):
+            after, outcome, outlook = _step(self.world, in_bytes(before), action)
+            seen = _see(self.world, self.observation, after.replace(**outlook))
+        return Transition(before=before, outcome=outcome, after=in_flags(after), batch_size=self.batch_size), seen
 
     def _set_seed(self, seed: int | None) -> None:
         if seed is None:
@@ -250,20 +260,21 @@ class WildfireEnv(EnvBase):
 
     def _observe(self, state: WorldState, episode_reward: Tensor | None = None) -> TensorDict:
         """Return observations, mask, central state, flags and metrics of the worlds."""
+        seen = _see(self.world, self.observation, self.world.with_outlook(state))
+        return self._told(state, seen, self._episode_reward if episode_reward is None else episode_reward)
+
+    def _told(self, state: WorldState, seen: "_Seen", episode_reward: Tensor) -> TensorDict:
+        """Return what is seen of worlds as TorchRL wants it."""
         batch = state.batch_size
         team = [*batch, self.n_agents]
-        state = self.world.with_outlook(state)
-        entries = self.observation(state, self.world)
-        seen = entries[""] if "" in entries else TensorDict(entries, batch_size=team)
+        views = seen.views[""] if "" in seen.views else TensorDict(seen.views, batch_size=team)
         roles = self.world.team.table(self.device).index.repeat(*batch, 1)
-        agents = {"observation": seen, "action_mask": self.world.action_mask(state), "role": roles}
-        info = metrics(state, self.world.horizon)
-        info["episode_reward"] = self._episode_reward if episode_reward is None else episode_reward
-        info["episode_length"] = state.step.to(torch.float32)
+        agents = {"observation": views, "action_mask": seen.action_mask, "role": roles}
+        info = seen.metrics | {"episode_reward": episode_reward, "episode_length": state.step.to(torch.float32)}
         return TensorDict(
             {
                 "agents": TensorDict(agents, batch_size=team),
-                "state": central_state(state, self.world),
+                "state": seen.state,
                 "info": TensorDict({name: value[:, None] for name, value in info.items()}, batch_size=batch),
                 "done": state.done[:, None],
                 "terminated": state.terminated[:, None].clone(),
@@ -272,6 +283,33 @@ class WildfireEnv(EnvBase):
             batch_size=batch,
             device=self.device,
         )
+
+
+class _Seen(NamedTuple):
+    """What is seen of worlds after a step."""
+
+    views: dict[str, Tensor]
+    action_mask: Tensor
+    metrics: dict[str, Tensor]
+    state: Tensor
+
+
+@fusible
+def _step(world: World, state: WorldState, action: Tensor) -> tuple[WorldState, Outcome, dict[str, Tensor]]:
+    """Return the worlds after a step, what the actions came to, and what the worlds keep for all who look."""
+    transition = world.step(state, action)
+    seen = world.with_outlook(transition.after)
+    return transition.after, transition.outcome, {"front": seen.front, "chance": seen.chance, "fuel": seen.fuel}
+
+
+@fusible_in_parts
+def _see(world: World, observation: Observation, state: WorldState) -> _Seen:
+    return _Seen(
+        observation(state, world),
+        world.action_mask(state),
+        metrics(state, world.horizon),
+        central_state(state, world),
+    )
 
 
 def _fill(template: WorldState, entries: dict[str, Tensor]) -> WorldState:

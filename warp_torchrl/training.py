@@ -48,6 +48,8 @@ class Training:
         self.env = settings.make_env(settings.n_worlds, TRAINING_SEEDS * settings.seed)
         self.frames_per_batch = settings.collector.steps * settings.n_worlds
         learner = settings.algorithm.build(self.env, settings.model, self.frames_per_batch)
+        if settings.compile:
+            learner.terms = torch.compile(learner.terms, dynamic=False)
         self.learner: Learner = settings.imitation.taught(learner, self.env)
         self.reward_scale = RewardScale(settings.reward.gamma) if settings.reward.normalise else None
         self.collection = settings.collector.open(

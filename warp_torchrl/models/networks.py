@@ -152,9 +152,14 @@ class Network(nn.Module):
         return self.dtype == "bfloat16" or (self.dtype == "auto" and computes_in_half(device))
 
 
-@lru_cache(maxsize=4)
+@torch.compiler.assume_constant_result
 def computes_in_half(device: str) -> bool:
     """Return whether a kind of device computes in bfloat16 itself; where it does not, emulation is far slower."""
+    return _computes_in_half(device)
+
+
+@lru_cache(maxsize=4)
+def _computes_in_half(device: str) -> bool:
     if device == "cuda":
         return torch.cuda.is_bf16_supported(including_emulation=False)
     supported = getattr(torch.cpu, "_is_avx512_bf16_supported", None)  # no public question says it

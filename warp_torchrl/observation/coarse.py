@@ -2,11 +2,13 @@
 
 import torch
 from torch import Tensor
+from torch.compiler import is_compiling
 from torch.nn.functional import adaptive_avg_pool2d, one_hot
 
 from warp_torchrl.observation.own import WIND_SCALE, steps_to_tick, time_left
 from warp_torchrl.observation.view import ELEVATION_SCALE, window
 from warp_torchrl.world.flags import byte
+from warp_torchrl.world.role import ROLE_NAMES
 from warp_torchrl.world.state import WorldState, is_burning
 from warp_torchrl.world.world import World
 
@@ -36,7 +38,9 @@ def block_means(maps: Tensor, side: int) -> Tensor:
     rows, columns = height // side, width // side
     if rows > 1:
         cells = cells.to(torch.int32) if cells.dtype == torch.uint8 and rows > 255 else cells
-        cells = _sum(cells.unflatten(-2, (side, rows)).unbind(-2))
+        blocks = cells.unflatten(-2, (side, rows))
+        # A function that is fused keeps this sum, and would not keep that of the slices.
+        cells = blocks.sum(-2, dtype=blocks.dtype) if is_compiling() else _sum(blocks.unbind(-2))
     cells = cells.to(torch.float32)
     if columns > 1:
         cells = _sum(cells.unflatten(-1, (side, columns)).unbind(-1))
@@ -74,23 +78,31 @@ def centred_picture(state: WorldState, world: World) -> Tensor:
 
 def central_state(state: WorldState, world: World) -> Tensor:
     """Return what the central critic sees, float32 [B, C, 16, 16] in the channels ``STATE``, for any map size."""
-    worlds = state.cells.shape[0]
-    elevation = state.landscape.elevation
-    out = torch.zeros(worlds, len(STATE), STATE_SIDE, STATE_SIDE, device=state.cells.device)
+    worlds, blocks = state.cells.shape[0], (STATE_SIDE, STATE_SIDE)
     maps = is_burning(state.cells), world.fuel(state), world.front(state), world.chance(state)
-    for channel, each in enumerate(maps):
-        out[:, channel] = block_means(each, STATE_SIDE)
     index = world.team.table(state.cells.device).index * STATE_SIDE**2 + _block(state, STATE_SIDE)
-    agents = out[:, 4:6].reshape(worlds, -1)
-    out[:, 4:6] = agents.scatter_add(1, index, torch.ones_like(index, dtype=torch.float32)).view_as(out[:, 4:6])
-    if elevation is not None:
-        relative = (elevation - elevation.mean((1, 2), keepdim=True)) / ELEVATION_SCALE
-        out[:, 6] = block_means(relative, STATE_SIDE).clamp(-3.0, 3.0)
+    agents = torch.zeros(worlds, len(ROLE_NAMES) * STATE_SIDE**2, device=state.cells.device)
+    agents = agents.scatter_add(1, index, torch.ones_like(index, dtype=torch.float32)).view(worlds, -1, *blocks)
     wind = (state.wind.mean((2, 3)) / WIND_SCALE).clamp(-3.0, 3.0)
-    constants = (time_left(state, world), steps_to_tick(state, world), wind[:, 0], wind[:, 1])
-    quarters = out[:, 7].view(worlds, 2, STATE_SIDE // 2, 2, STATE_SIDE // 2)
-    quarters[:] = torch.stack(constants, dim=1).view(worlds, 2, 1, 2, 1)
-    return out
+    constants = torch.stack((time_left(state, world), steps_to_tick(state, world), wind[:, 0], wind[:, 1]), dim=1)
+    quarters = constants.view(worlds, 2, 1, 2, 1).expand(-1, -1, STATE_SIDE // 2, -1, STATE_SIDE // 2)
+    return torch.stack(
+        (
+            *(block_means(each, STATE_SIDE) for each in maps),
+            *agents.unbind(1),
+            _elevation(state.landscape.elevation, agents[:, 0]),
+            quarters.reshape(worlds, *blocks),
+        ),
+        dim=1,
+    )
+
+
+def _elevation(elevation: Tensor | None, blocks: Tensor) -> Tensor:
+    """Return the elevation over the map's mean in blocks, float32, shape of the blocks; 0 on a flat map."""
+    if elevation is None:
+        return torch.zeros_like(blocks)
+    relative = (elevation - elevation.mean((1, 2), keepdim=True)) / ELEVATION_SCALE
+    return block_means(relative, STATE_SIDE).clamp(-3.0, 3.0)
 
 
 def _fire_and_fuel(state: WorldState, world: World) -> Tensor:

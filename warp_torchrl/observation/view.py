@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import one_hot
 
-from warp_torchrl.world.flags import byte, equal
+from warp_torchrl.world.flags import byte, equal, narrow
 from warp_torchrl.world.role import ROLE_NAMES
 from warp_torchrl.world.state import FIRST_FIRE, WorldState, is_burning, is_tree
 from warp_torchrl.world.world import World
@@ -57,7 +57,7 @@ def window(position: Tensor, size: Sequence[int], radius: int) -> Window:
     row, column = position[..., 0, None] + away, position[..., 1, None] + away
     on_row, on_column = (row >= 0) & (row < height), (column >= 0) & (column < width)
     index = row.clamp(0, height - 1)[..., None] * width + column.clamp(0, width - 1)[..., None, :]
-    return Window(index.flatten(1), byte(on_row)[..., None] * byte(on_column)[..., None, :])
+    return Window(index.flatten(1), narrow(byte(on_row)[..., None] * byte(on_column)[..., None, :]))
 
 
 def egocentric_view(state: WorldState, world: World, radius: int) -> Tensor:
@@ -75,12 +75,9 @@ def egocentric_view(state: WorldState, world: World, radius: int) -> Tensor:
         seen.of(state.wet).clamp_(max=10) * 25,
         seen.inside * 128 if elevation is None else _relative_elevation(elevation, seen),
         _as_byte(seen.of(world.front(state)).add_(seen.of(world.chance(state)))),  # World.threat
-        *(seen.of(plane) for plane in _occupancy(state, role)),
+        *_others(state.vehicles.position, role, radius).unbind(2),
     )
-    view = torch.stack(channels, dim=2)
-    others = view[:, :, -len(ROLE_NAMES) :, radius, radius]
-    others -= one_hot(role, len(ROLE_NAMES)).to(torch.uint8) * 63
-    return view
+    return narrow(torch.stack(channels, dim=2))
 
 
 def ages(cells: Tensor) -> Tensor:
@@ -105,11 +102,13 @@ def _relative_elevation(elevation: Tensor, seen: Window) -> Tensor:
     return ((heights - own) / ELEVATION_SCALE).clamp_(-1.0, 1.0).mul_(127.0).add_(128.0).to(torch.uint8)
 
 
-def _occupancy(state: WorldState, role: Tensor) -> tuple[Tensor, ...]:
-    """Return where the agents of each role are, 63 each, at most 4 to a cell, uint8 [B, H, W] each."""
-    worlds, height, width = state.cells.shape
-    position = state.vehicles.position
-    index = (role * height + position[..., 0]) * width + position[..., 1]
-    count = torch.zeros(worlds, len(ROLE_NAMES) * height * width, dtype=torch.uint8, device=position.device)
-    count.scatter_add_(1, index, torch.ones_like(index, dtype=torch.uint8))
-    return (count.clamp_(max=4) * 63).view(worlds, len(ROLE_NAMES), height, width).unbind(1)
+def _others(position: Tensor, role: Tensor, radius: int) -> Tensor:
+    """Return where the other agents of each role are, 63 each, at most 4 to a cell, uint8 [B, A, R, V, V]."""
+    side, roles = 2 * radius + 1, len(ROLE_NAMES)
+    row, column = (position[:, None] - position[:, :, None] + radius).unbind(-1)  # of each in each other's square
+    is_near = (row >= 0) & (row < side) & (column >= 0) & (column < side)
+    index = torch.where(is_near, (role * side + row) * side + column, roles * side**2)
+    count = torch.zeros(*row.shape[:2], roles * side**2 + 1, dtype=torch.uint8, device=role.device)
+    count = count.scatter_add(2, index, torch.ones_like(index, dtype=torch.uint8))[..., :-1]
+    middle = one_hot((role * side + radius) * side + radius, roles * side**2).to(torch.uint8)  # the agent's own
+    return (count.clamp(max=4) - middle).mul_(63).unflatten(-1, (roles, side, side))

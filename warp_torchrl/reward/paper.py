@@ -47,8 +47,8 @@ class Paper(Reward):
         action, cleared = outcome.action, outcome.cleared
         distance = distance_to_nearest(transition.after.vehicles.position, is_burning(before.cells))
         is_near = distance <= self.near
-        failed = (action == Action.EXTINGUISH) & ~outcome.extinguished
-        failed |= (action == Action.CLEAR) & ~cleared
+        failed = (action == int(Action.EXTINGUISH)) & ~outcome.extinguished
+        failed |= (action == int(Action.CLEAR)) & ~cleared
         award = (
             self.move * (action <= Action.NORTH_WEST)
             + self.extinguish * outcome.extinguished

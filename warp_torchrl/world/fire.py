@@ -10,6 +10,7 @@ from typing import Literal
 
 import torch
 from torch import Tensor
+from torch.compiler import is_compiling
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.edge import ByPattern, ByStrength, Edge, EdgeChances, edge_of, expected_from_edge
@@ -17,17 +18,21 @@ from warp_torchrl.world.flags import (
     above,
     as_mask,
     at_least,
-    at_most,
     below,
+    between,
     byte,
     choose,
     clear,
     equal,
+    like,
     look_up,
+    narrow,
     number,
     numbers,
     put,
+    wide,
 )
+from warp_torchrl.world.fusion import is_fusing
 from warp_torchrl.world.kernel import alexandridis, ellipse, slope_factor
 from warp_torchrl.world.landscape import holds_trees
 from warp_torchrl.world.law import Clipped, Law
@@ -123,9 +128,10 @@ class Fire:
     def keeps_to_its_edge(self, state: WorldState) -> bool:
         """Return whether a tick is worked out at the fire's edge alone: ``edge``, ``tick_at_edge`` and ``outlook``.
 
-        It is so where trees neither grow nor ignite by themselves, on a CPU.
+        It is so where trees neither grow nor ignite by themselves, on a CPU, unless whole maps are fused.
         """
-        return not self.growth and self.beta == 0.0 and self.p_regrow == 0.0 and state.cells.device.type == "cpu"
+        burns_alone = not self.growth and self.beta == 0.0 and self.p_regrow == 0.0
+        return burns_alone and state.cells.device.type == "cpu" and not is_fusing()
 
     def flammability(self, cover: Tensor) -> Tensor:
         """Return alpha of the ground, float32, shape of ``cover`` (WARP-CA, terrain table)."""
@@ -154,7 +160,7 @@ class Fire:
     def spread(self, state: WorldState) -> Tensor:
         """Return each tree's chance to be ignited by its neighbours in one tick, float32 [B, H, W]; 0 elsewhere."""
         spreading = self._spreading(state)
-        if state.chances is not None:
+        if state.chances is not None and not is_compiling():  # a look-up costs more than what it spares there
             kind = (state.landscape.cover + 1) * byte(self.is_fuel(state))
             return chance_by_pattern(state.chances, spreading, kind, self.neighbours)
         susceptible = self._susceptible(state)
@@ -187,7 +193,7 @@ class Fire:
         return ByStrength(law, edge, law.susceptibility(edge.of(state.alpha)), self._gain(state), state.slope)
 
     def _spreading(self, state: WorldState) -> Tensor:
-        return at_most(state.cells - FIRST_FIRE, self.last_spreading - FIRST_FIRE)  # uint8: a tree's code wraps
+        return between(state.cells, FIRST_FIRE, self.last_spreading)
 
     def _gain(self, state: WorldState) -> Tensor:
         return gains(self.wind_factor(state.wind), self.diagonal) if state.gain is None else state.gain
@@ -216,8 +222,7 @@ class Fire:
 
     def is_fuel(self, state: WorldState) -> Tensor:
         """Return which trees can ignite now: age >= A_min, dry; bool [B, H, W]."""
-        old_enough = at_most(state.cells - self.youngest_fuel, OLDEST - self.youngest_fuel)  # uint8: below, it wraps
-        return old_enough & equal(state.wet, 0)
+        return between(state.cells, self.youngest_fuel, OLDEST) & equal(state.wet, 0)
 
     def tick(self, state: WorldState, u: Tensor, due: Tensor) -> WorldState:
         """Advance the fire by one tick where it is due.
@@ -240,7 +245,7 @@ class Fire:
             leaves = look_up(self._growth(), cells).mul_(1.0 - q)
             grows = ~below(u, torch.sub(1.0, leaves, out=leaves))  # u < 1: none grows where p is 0
         if self.p_regrow > 0.0:
-            bare = equal(cells, 0) & holds_trees(state.landscape.cover) & ~state.firebreak
+            bare = equal(cells, 0) & holds_trees(state.landscape.cover) & ~as_mask(byte(state.firebreak))
             regrows = bare & below(u, self._in_a_tick(self.p_regrow))
             grows = regrows if grows is None else grows | regrows
         state, due_cells = self._age_fires(state, due), byte(due)[:, None, None]
@@ -249,7 +254,11 @@ class Fire:
         if grows is not None:
             after += byte(grows) * due_cells
         waited = None if state.stage_age is None else clear(ignite, state.stage_age)
-        return state.replace(cells=after, age=choose(ignite, cells, state.age), stage_age=waited)
+        return state.replace(
+            cells=narrow(after),
+            age=narrow(choose(ignite, cells, state.age)),
+            stage_age=waited if waited is None else narrow(waited),
+        )
 
     def tick_at_edge(self, state: WorldState, edge: Edge, u: Tensor, due: Tensor) -> WorldState:
         """Return what ``tick`` does, to the bit, from the draws at the fire's edge alone, float32 [N]."""
@@ -262,11 +271,14 @@ class Fire:
         return after
 
     def _age_fires(self, state: WorldState, due: Tensor) -> WorldState:
-        """Return the worlds after a tick, where it is due, that ignites nothing and lets nothing grow."""
-        cells, due_cells = state.cells, byte(due)[:, None, None]
+        """Return the worlds after a tick, where it is due, that ignites nothing and lets nothing grow.
+
+        What it may yet ignite, ``cells``, ``age`` and ``stage_age``, is ``wide``.
+        """
+        cells, due_cells = wide(state.cells), byte(due)[:, None, None]
         stage_ends, waited = byte(is_burning(cells)) * due_cells, None
         if state.stage_age is not None:
-            waited = state.stage_age + stage_ends
+            waited = wide(state.stage_age) + stage_ends
             stage_ends = byte(equal(waited, self.ticks_per_stage))
             waited = clear(as_mask(stage_ends), waited)
         after = cells + stage_ends
@@ -275,8 +287,8 @@ class Fire:
             cells=after.bitwise_and_(EMBER),
             age=clear(to_ash, state.age),
             stage_age=waited,
-            burned=state.burned | to_ash,
-            wet=state.wet - byte(at_least(state.wet, 1)) * due_cells,
+            burned=like(state.burned, byte(state.burned) | byte(to_ash)),
+            wet=narrow(wide(state.wet) - byte(at_least(state.wet, 1)) * due_cells),
             tick=state.tick + due,
         )
 

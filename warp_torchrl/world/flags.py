@@ -1,8 +1,9 @@
 """Comparisons, choices and look-ups on planes of bytes, at the speed of byte arithmetic.
 
 On CPUs a comparison that writes bool, ``where`` and ``masked_fill`` are many times slower than arithmetic on bytes: a
-comparison that writes its own type is vectorised, and a bool is a byte of 0 or 1. A compiler that fuses these planes
-wants them plain.
+comparison that writes its own type is vectorised, and a bool is a byte of 0 or 1. In a function that is fused,
+comparisons and ``where`` cost nothing; there bools in memory and arithmetic on bytes are slow, and planes are read as
+``wide`` numbers and written as bytes.
 """
 
 from functools import lru_cache
@@ -14,24 +15,35 @@ from torch.compiler import is_compiling
 _WORDS = 128
 
 
+def wide(codes: Tensor) -> Tensor:
+    """Return uint8 codes in the type to compute in: int32 in a function that is fused, and as they are elsewhere."""
+    return codes.to(torch.int32) if is_compiling() else codes
+
+
+def narrow(codes: Tensor) -> Tensor:
+    """Return codes that were made ``wide`` as uint8."""
+    return codes.to(torch.uint8) if is_compiling() else codes
+
+
 def at_least(codes: Tensor, bound: int) -> Tensor:
     """Return ``codes >= bound``, bool; codes are uint8."""
     if is_compiling():
-        return codes >= bound
+        return wide(codes) >= bound
     return torch.ge(codes, bound, out=torch.empty_like(codes)).view(torch.bool)
 
 
-def at_most(codes: Tensor, bound: int) -> Tensor:
-    """Return ``codes <= bound``, bool; codes are uint8."""
+def between(codes: Tensor, low: int, high: int) -> Tensor:
+    """Return which codes, uint8, are at least ``low`` and at most ``high``, bool."""
     if is_compiling():
-        return codes <= bound
-    return torch.le(codes, bound, out=torch.empty_like(codes)).view(torch.bool)
+        return (wide(codes) >= low) & (wide(codes) <= high)
+    above_low = codes - low  # a lower code wraps round to a high one
+    return torch.le(above_low, high - low, out=above_low).view(torch.bool)
 
 
 def equal(codes: Tensor, code: int) -> Tensor:
     """Return ``codes == code``, bool; codes are uint8."""
     if is_compiling():
-        return codes == code
+        return wide(codes) == code
     return torch.eq(codes, code, out=torch.empty_like(codes)).view(torch.bool)
 
 
@@ -55,46 +67,51 @@ def _as_flags(numbers: Tensor) -> Tensor:
 
 
 def byte(mask: Tensor) -> Tensor:
-    """Return a bool mask as 0 and 1, uint8, maybe in the mask's own memory."""
-    return mask.to(torch.uint8) if is_compiling() else mask.view(torch.uint8)
+    """Return a bool mask as 0 and 1, uint8 and maybe in the mask's own memory, or ``wide`` ones."""
+    return mask.to(torch.int32) if is_compiling() else mask.view(torch.uint8)
 
 
 def as_mask(codes: Tensor) -> Tensor:
-    """Return codes 0 and 1, uint8, as a bool mask, maybe in their own memory."""
-    return codes.to(torch.bool) if is_compiling() else codes.view(torch.bool)
+    """Return codes 0 and 1 of ``byte`` as a bool mask, maybe in their own memory."""
+    return codes != 0 if is_compiling() else codes.view(torch.bool)
+
+
+def like(plane: Tensor, codes: Tensor) -> Tensor:
+    """Return codes 0 and 1 of ``byte`` in the type of a plane of flags, maybe in their own memory."""
+    return codes.to(plane.dtype) if is_compiling() else codes.view(plane.dtype)
 
 
 def number(mask: Tensor) -> Tensor:
     """Return a bool mask as 0 and 1, float32."""
-    return byte(mask).to(torch.float32)
+    return mask.to(torch.float32) if is_compiling() else mask.view(torch.uint8).to(torch.float32)
 
 
 def choose(mask: Tensor, one: Tensor | int, other: Tensor) -> Tensor:
-    """Return ``where(mask, one, other)``, uint8, for a bool mask of the shape of ``other``."""
+    """Return ``where(mask, one, other)``, uint8 or ``wide``, for a bool mask of the shape of ``other``."""
     if is_compiling():
-        return torch.where(mask, one, other)
+        return torch.where(mask, wide(one) if isinstance(one, Tensor) else one, wide(other))
     return (one - other).mul_(mask.view(torch.uint8)).add_(other)
 
 
 def clear(mask: Tensor, values: Tensor) -> Tensor:
-    """Return ``values`` with 0 where the bool mask is set, uint8; the mask has their shape."""
+    """Return ``values`` with 0 where the bool mask is set, uint8 or ``wide``; the mask has their shape."""
     if is_compiling():
-        return torch.where(mask, 0, values)
+        return torch.where(mask, 0, wide(values))
     return values * (~mask).view(torch.uint8)
 
 
-def count(mask: Tensor) -> Tensor:
-    """Return how many cells of each map bool masks [..., H, W] mark, int32 [...]."""
+def counts(*codes: Tensor) -> tuple[Tensor, ...]:
+    """Return how many cells of each map codes 0 and 1 of ``byte``, [B, H, W] each, mark, int32 [B] each."""
     if is_compiling():
-        return mask.sum((-2, -1), dtype=torch.int32)
-    codes = mask.view(torch.uint8).flatten(-2)
-    if codes.shape[-1] % 8:
-        return codes.sum(-1, dtype=torch.int32)
+        return tuple(each.sum((-2, -1), dtype=torch.int32) for each in codes)
+    maps = torch.stack(codes).flatten(-2)
+    if maps.shape[-1] % 8:
+        return maps.sum(-1, dtype=torch.int32).unbind()
     # Eight bytes are added at a time, as parts of a word; 128 ones at most, so that none runs into its neighbour.
-    words = codes.view(torch.int64)
+    words = maps.view(torch.int64)
     whole = words.shape[-1] // _WORDS * _WORDS
     sums = words[..., :whole].unflatten(-1, (-1, _WORDS)).sum(-1), words[..., whole:].sum(-1, keepdim=True)
-    return torch.cat(sums, dim=-1).view(torch.uint8).sum(-1, dtype=torch.int32)
+    return torch.cat(sums, dim=-1).view(torch.uint8).sum(-1, dtype=torch.int32).unbind()
 
 
 def put(plane: Tensor, place: Tensor, values: Tensor | int) -> Tensor:

@@ -4,18 +4,26 @@ Eager, each of their operations passes over every cell; fused, one loop does the
 same, and on the CPU every bit.
 """
 
-from collections.abc import Callable, Iterator
+import warnings
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache, wraps
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import torch
+from torch.compiler import is_compiling
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
 _SHAPES = 256  # that one function may be compiled for; torch stops at 8
+_IN_REGISTERS = {
+    "realize_opcount_threshold": 100_000,
+    "realize_reads_threshold": 1000,
+    "realize_acc_reads_threshold": 1000,
+}
+_IN_PARTS = {"max_pointwise_cat_inputs": 0}  # else each element of a stack asks which of its parts it is of
 _fusing: ContextVar[bool] = ContextVar("fusing", default=False)
 
 
@@ -30,24 +38,37 @@ def fusing(enabled: bool) -> Iterator[None]:
 
 
 def is_fusing() -> bool:
-    """Return whether functions marked ``fusible`` are fused now."""
-    return _fusing.get()
+    """Return whether functions marked ``fusible`` are fused now, or one of them is being so."""
+    return is_compiling() or _fusing.get()
 
 
 def fusible(function: Callable[P, T]) -> Callable[P, T]:
-    """Mark a function of tensors that changes nothing as one that may be fused, for each shape anew."""
+    """Mark a function of tensors that changes nothing as one that may be fused, for each shape anew.
+
+    What is computed of a cell is computed again for each who asks and kept for none: on the CPU a mask in memory costs
+    more than the comparisons that made it.
+    """
+    return _fusible(function, _IN_REGISTERS)
+
+
+def fusible_in_parts(function: Callable[P, T]) -> Callable[P, T]:
+    """Mark a function as ``fusible`` does, one that keeps in memory what is asked for often."""
+    return _fusible(function, _IN_PARTS)
+
+
+def _fusible(function: Callable[P, T], options: Mapping[str, Any]) -> Callable[P, T]:
+    @cache
+    def fused() -> Callable[P, T]:
+        torch._dynamo.config.recompile_limit = max(torch._dynamo.config.recompile_limit, _SHAPES)
+        warnings.filterwarnings("ignore", message="Dynamo detected a call to a `functools.lru_cache`-wrapped function")
+        return torch.compile(function, fullgraph=True, dynamic=False, options=dict(options))
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> T:
-        return (_fused(function) if _fusing.get() else function)(*args, **kwargs)
+        fuse = not is_compiling() and _fusing.get()  # what is called inside of a function that is fused is a part of it
+        return (fused() if fuse else function)(*args, **kwargs)
 
     return call
-
-
-@cache
-def _fused(function: Callable[P, T]) -> Callable[P, T]:
-    torch._dynamo.config.recompile_limit = max(torch._dynamo.config.recompile_limit, _SHAPES)
-    return torch.compile(function, fullgraph=True, dynamic=False)
 
 
 def check_compiler(device: torch.device) -> None:

@@ -66,7 +66,7 @@ def draw_age(key: Tensor, cover: Tensor) -> Tensor:
 
 def holds_trees(cover: Tensor) -> Tensor:
     """Return where a tree can stand (wetland, grassland, forest), bool, shape of the input."""
-    return ~(equal(cover, Cover.LAKE) | equal(cover, Cover.BARE))
+    return ~(equal(cover, int(Cover.LAKE)) | equal(cover, int(Cover.BARE)))
 
 
 _PRINTED = (0.01, 0.2, 0.01)

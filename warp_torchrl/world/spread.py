@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import torch
 from torch import Tensor
+from torch.compiler import is_compiling
 from torch.nn.functional import pad
 
 from warp_torchrl.world.flags import number
@@ -62,7 +63,8 @@ def ignition_chance(
     if gain.shape[2:] != (1, 1):
         rows = [_in_a_row(burning * gain[:, direction]) for direction in range(8)]
         gain = torch.ones_like(gain[..., :1, :1])
-    return _chance(law, rows, _in_a_row(susceptible), gain[..., 0], slope, shape, directions(neighbours))
+    target = susceptible if is_compiling() else _shifted(_in_a_row(susceptible), shape, 0)
+    return _chance(law, rows, target, gain, slope, shape, directions(neighbours))
 
 
 def expected_ignitions(
@@ -81,26 +83,26 @@ def expected_ignitions(
         float32 [B, H, W].
     """
     shape = tuple(susceptible.shape)
-    at_source = gain[..., 0] if gain.shape[2:] == (1, 1) else pad(gain, (0, 1, 0, 1)).flatten(2)
-    return _expected(law, _in_a_row(susceptible), at_source, slope, shape, directions(neighbours))
+    if gain.shape[2:] != (1, 1) and not is_compiling():
+        gain = pad(gain, (0, 1, 0, 1))
+    return _expected(law, _in_a_row(susceptible), gain, slope, shape, directions(neighbours))
 
 
 @fusible
 def _chance(
-    law: Law, rows: list[Tensor], susceptible: Tensor, gain: Tensor, slope: Tensor | None, shape: Shape, over: range
+    law: Law, rows: list[Tensor], target: Tensor, gain: Tensor, slope: Tensor | None, shape: Shape, over: range
 ) -> Tensor:
     """Return what ``ignition_chance`` does.
 
     Args:
         law: As there.
         rows: The burning cells in a row: one, or one a direction, times its gain.
-        susceptible: In a row.
-        gain: float32 [B, 8, 1].
+        target: The susceptible ones, of ``_shifted``.
+        gain: float32 [B, 8, 1, 1].
         slope: As there.
         shape: (B, H, W).
         over: The directions.
     """
-    target = _shifted(susceptible, shape, 0)
     total, strength, spare = torch.zeros_like(target), torch.empty_like(target), torch.empty_like(target)
     for direction in over:
         source = _shifted(rows[direction % len(rows)], shape, -_offset(direction, shape))
@@ -109,12 +111,13 @@ def _chance(
         if slope is not None:
             strength *= _slope(slope, direction, shape, 0)
         law.join(total, strength, spare)
-    return _on_map(law.chance(total), shape).contiguous()
+    chance = law.chance(total)
+    return chance if is_compiling() else _on_map(chance).contiguous()
 
 
 @fusible
 def _expected(law: Law, susceptible: Tensor, gain: Tensor, slope: Tensor | None, shape: Shape, over: range) -> Tensor:
-    """Return what ``expected_ignitions`` does, of a row, and gains float32 [B, 8, 1] or [B, 8, (H + 1) (W + 1)]."""
+    """Return what ``expected_ignitions`` does, of a row, and gains with a margin after them unless they are one."""
     total = torch.zeros_like(_shifted(susceptible, shape, 0))
     strength = torch.empty_like(total)
     for direction in over:
@@ -123,22 +126,33 @@ def _expected(law: Law, susceptible: Tensor, gain: Tensor, slope: Tensor | None,
         if slope is not None:
             strength *= _slope(slope, direction, shape, offset)
         total += law.chance_of(strength)
-    return _on_map(total, shape)
+    return total if is_compiling() else _on_map(total)
 
 
 def _in_a_row(maps: Tensor) -> Tensor:
     """Lay [B, H, W] maps out in one row, each with a zero column and row after it and a margin at both ends."""
+    return _row_in_memory(maps) if is_compiling() else _row(maps)
+
+
+def _row(maps: Tensor) -> Tensor:
     worlds, height, width = maps.shape
     margin, cells = width + 2, worlds * (height + 1) * (width + 1)
-    row = maps.new_zeros(margin + cells + margin)
-    row[margin : margin + cells].view(worlds, height + 1, width + 1)[:, :height, :width] = maps
+    row = maps.new_empty(margin + cells + margin)
+    row[:margin] = row[margin + cells :] = 0
+    inner = row[margin : margin + cells].view(worlds, height + 1, width + 1)
+    inner[:, height] = inner[:, :, width] = 0
+    inner[:, :height, :width] = maps
     return row
 
 
-def _on_map(row: Tensor, shape: Shape) -> Tensor:
-    """Return the maps [B, H, W], not contiguous, of a row [B, (H + 1) (W + 1)] without its margins."""
-    worlds, height, width = shape
-    return row.view(worlds, height + 1, width + 1)[:, :height, :width]
+# A compiler would ask of every neighbour anew whether it is on the map, and that one by one.
+_row_in_memory = torch.library.custom_op("warp_torchrl::in_a_row", _row, mutates_args=(), schema="(Tensor maps) -> Tensor")
+
+
+@_row_in_memory.register_fake
+def _(maps: Tensor) -> Tensor:
+    worlds, height, width = maps.shape
+    return maps.new_empty(2 * (width + 2) + worlds * (height + 1) * (width + 1))
 
 
 def _offset(direction: int, shape: Shape) -> int:
@@ -148,14 +162,26 @@ def _offset(direction: int, shape: Shape) -> int:
 
 
 def _shifted(row: Tensor, shape: Shape, offset: int) -> Tensor:
-    """Return what a row holds so far along from each cell, [B, (H + 1) (W + 1)]."""
-    worlds, height, width = shape
-    start, cells = width + 2 + offset, (height + 1) * (width + 1)
-    return row[start : start + worlds * cells].view(worlds, cells)
+    """Return what a row holds so far along from each cell: of maps with their margins, [B, H + 1, W + 1].
+
+    They lie one after the other without a gap, which is fast; a function that is fused reads the maps alone, [B, H, W].
+    """
+    start, cells = shape[2] + 2 + offset, shape[0] * (shape[1] + 1) * (shape[2] + 1)
+    return _maps(row[start : start + cells], shape)
 
 
 def _slope(slope: Tensor, direction: int, shape: Shape, offset: int) -> Tensor:
-    """Return the slope's factor into the cell so far along from each cell, [B, (H + 1) (W + 1)]."""
+    """Return the slope's factor into the cell so far along from each cell, as ``_shifted`` does."""
     _, height, width = shape
     first = (direction * (height + 2) + 1) * (width + 1) + offset
-    return slope.flatten(1)[:, first : first + (height + 1) * (width + 1)]
+    return _maps(slope.flatten(1)[:, first : first + (height + 1) * (width + 1)], shape)
+
+
+def _maps(row: Tensor, shape: Shape) -> Tensor:
+    maps = row.view(shape[0], shape[1] + 1, shape[2] + 1)
+    return _on_map(maps) if is_compiling() else maps
+
+
+def _on_map(maps: Tensor) -> Tensor:
+    """Return maps [B, H, W] without the margin after them."""
+    return maps[:, :-1, :-1]

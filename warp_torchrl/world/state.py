@@ -10,7 +10,7 @@ from tensordict import tensorclass
 from torch import Tensor
 
 from warp_torchrl.world.batch import Batch
-from warp_torchrl.world.flags import at_least, at_most, count
+from warp_torchrl.world.flags import at_least, between, byte, counts
 
 
 class Cover(IntEnum):
@@ -152,6 +152,19 @@ class Transition(Batch):
     after: WorldState
 
 
+_FLAGS = ("initial", "extinguished", "burned", "firebreak")
+
+
+def in_bytes(state: WorldState) -> WorldState:
+    """Return worlds whose planes of flags are read as uint8, 0 and 1, as functions that are fused need them."""
+    return state.replace(**{name: getattr(state, name).view(torch.uint8) for name in _FLAGS})
+
+
+def in_flags(state: WorldState) -> WorldState:
+    """Return the worlds of ``in_bytes`` as they are elsewhere."""
+    return state.replace(**{name: getattr(state, name).view(torch.bool) for name in _FLAGS})
+
+
 def is_burning(cells: Tensor) -> Tensor:
     """Return which cells, uint8 codes, burn (11..15), bool, shape of the input."""
     return at_least(cells, FIRST_FIRE)
@@ -159,7 +172,7 @@ def is_burning(cells: Tensor) -> Tensor:
 
 def is_tree(cells: Tensor) -> Tensor:
     """Return which cells, uint8 codes, hold a tree that does not burn (1..10), bool, shape of the input."""
-    return at_most(cells - 1, OLDEST - 1)  # uint8: code 0 wraps round to 255
+    return between(cells, 1, OLDEST)
 
 
 def count_trees(state: WorldState) -> Tally:
@@ -169,25 +182,24 @@ def count_trees(state: WorldState) -> Tally:
 
     A tree that has once burned to ash stays counted as burned when the ground regrows.
     """
-    burning = is_burning(state.cells)
-    alive = state.initial & is_tree(state.cells) & ~state.burned
-    unburned = state.initial & ~state.burned
-    fates = (
-        state.initial,
+    initial, burned, burning = byte(state.initial), byte(state.burned), byte(is_burning(state.cells))
+    unburned = initial & (burned ^ 1)
+    alive = unburned & byte(is_tree(state.cells))
+    trees, standing, extinguished, cleared, ash, aflame, alight = counts(
+        initial,
         alive,
-        alive & state.extinguished,
-        unburned & state.firebreak,
-        state.initial & state.burned,
+        alive & byte(state.extinguished),
+        unburned & byte(state.firebreak),
+        initial & burned,
         unburned & burning,
         burning,
     )
-    initial, standing, extinguished, cleared, burned, aflame, alight = count(torch.stack(fates)).unbind()
     return Tally(
-        initial=initial,
+        initial=trees,
         preserved=standing - extinguished,
         extinguished=extinguished,
         cleared=cleared,
-        burned=burned,
+        burned=ash,
         burning=aflame,
         alight=alight,
         batch_size=state.batch_size,

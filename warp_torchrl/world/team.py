@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.flags import as_mask, byte
+from warp_torchrl.world.flags import as_mask, byte, like
 from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.role import ROLES, RoleTable, role_table
@@ -104,7 +104,7 @@ class Team:
         index = _flat_index(target, height, width)
         index = index.flatten(1)
         ground, cells = (plane.flatten(1).gather(1, index) for plane in (state.landscape.cover, state.cells))
-        blocked = ((ground == Cover.LAKE) | is_burning(cells)).view_as(inside)
+        blocked = ((ground == int(Cover.LAKE)) | is_burning(cells)).view_as(inside)
         return inside & (~blocked | roles.flies[:, None])
 
     def nearby_fire(self, state: WorldState, last_spreading: int) -> tuple[Tensor, Tensor]:
@@ -167,8 +167,8 @@ class Team:
         fire_index, has_fire = self.nearby_fire(state, last_spreading)
         own_index = self._own_index(state)
         own = state.cells.flatten(1).gather(1, own_index)
-        wants_water = (action == Action.EXTINGUISH) & active
-        wants_clear = (action == Action.CLEAR) & active
+        wants_water = (action == int(Action.EXTINGUISH)) & active
+        wants_clear = (action == int(Action.CLEAR)) & active
         has_water = state.vehicles.tank != 0
         hit = wants_water & has_fire & has_water & self._succeeds(state)
         cut = wants_clear & is_tree(own) & self.table(own.device).clears
@@ -221,7 +221,7 @@ class Team:
         around = position[:, :, None] + _neighbourhood(tank.device)
         index = _flat_index(around, height, width)
         cover = state.landscape.cover.flatten(1).gather(1, index.flatten(1)).view_as(index)
-        by_lake = ((cover == Cover.LAKE) & _inside(around, height, width)).any(dim=-1)
+        by_lake = ((cover == int(Cover.LAKE)) & _inside(around, height, width)).any(dim=-1)
         at_base = (position == state.vehicles.base[:, None]).all(dim=-1)
         return torch.where(by_lake | at_base, self.tank, tank)
 
@@ -234,12 +234,12 @@ class Team:
 
         old = state.cells.flatten(1).gather(1, target)
         age = state.age.flatten(1).gather(1, target)
-        put_out_before = state.extinguished.flatten(1).gather(1, target).to(torch.uint8)
+        put_out_before = as_mask(byte(state.extinguished.flatten(1).gather(1, target)))
         return state.replace(
             cells=add(state.cells, hit * (age - old) - cut * old),
             age=add(state.age, -(hit * age)),
-            extinguished=as_mask(add(byte(state.extinguished), hit * (1 - put_out_before))),
-            firebreak=as_mask(add(byte(state.firebreak), byte(cut))),
+            extinguished=like(state.extinguished, add(byte(state.extinguished), byte(hit & ~put_out_before))),
+            firebreak=like(state.firebreak, add(byte(state.firebreak), byte(cut))),
             wet=add(state.wet, hit * (wet_ticks - state.wet.flatten(1).gather(1, target))),
         )
 
