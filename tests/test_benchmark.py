@@ -52,13 +52,19 @@ def test_the_tick_is_compiled_too(capsys):
     assert "\ncompiled " in output(capsys, "tick", *TINY)
 
 
-def test_the_environment_is_compared_with_pettingzoo(capsys):
+@pytest.mark.slow
+def test_the_environment_is_compiled_too(capsys):
     out = output(capsys, "env", *TINY)
+    assert "\nenvironment " in out and "\ncompiled " in out and "\nnumpy, PettingZoo " in out
+
+
+def test_the_environment_is_compared_with_pettingzoo(capsys):
+    out = output(capsys, "env", "--no-compile", *TINY)
     assert "\nenvironment " in out and "\nnumpy, PettingZoo " in out and "x peer" in out
 
 
 def test_environment_and_training_are_measured_by_default(capsys):
-    out = output(capsys, *TINY)
+    out = output(capsys, "--no-compile", *TINY)
     assert "\nenvironment " in out and "\ntraining " in out
     for part in ("collecting", "  environment", "  policy", "sampling", "loss", "backward", "optimiser"):
         assert f"\n{part} " in out

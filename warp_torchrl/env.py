@@ -14,7 +14,7 @@ from warp_torchrl.render import render
 from warp_torchrl.reward import Efficiency, Reward
 from warp_torchrl.specs import make_specs
 from warp_torchrl.starts import Start, Starts
-from warp_torchrl.world.fusion import check_compiler, fusible, fusible_in_parts, fusing
+from warp_torchrl.world.fusion import check_compiler, fused
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.state import Outcome, Transition, WorldState, in_bytes, in_flags
 from warp_torchrl.world.world import World
@@ -231,9 +231,8 @@ class WildfireEnv(EnvBase):
         if not self._fuses:
             transition = self.world.step(before, action)
             return transition, _see(self.world, self.observation, self.world.with_outlook(transition.after))
-        with fusing(True):
-            after, outcome, outlook = _step(self.world, in_bytes(before), action)
-            seen = _see(self.world, self.observation, after.replace(**outlook))
+        after, outcome, outlook = fused(_step)(self.world, in_bytes(before), action)
+        seen = fused(_see, in_parts=True)(self.world, self.observation, after.replace(**outlook))
         return Transition(before=before, outcome=outcome, after=in_flags(after), batch_size=self.batch_size), seen
 
     def _set_seed(self, seed: int | None) -> None:
@@ -294,15 +293,13 @@ class _Seen(NamedTuple):
     state: Tensor
 
 
-@fusible
-def _step(world: World, state: WorldState, action: Tensor) -> tuple[WorldState, Outcome, dict[str, Tensor]]:
+def _step(world: World, state: WorldState, action: Tensor) -> tuple[WorldState, Outcome, dict[str, Tensor | None]]:
     """Return the worlds after a step, what the actions came to, and what the worlds keep for all who look."""
     transition = world.step(state, action)
     seen = world.with_outlook(transition.after)
     return transition.after, transition.outcome, {"front": seen.front, "chance": seen.chance, "fuel": seen.fuel}
 
 
-@fusible_in_parts
 def _see(world: World, observation: Observation, state: WorldState) -> _Seen:
     return _Seen(
         observation(state, world),

@@ -40,9 +40,9 @@ def test_comparisons_of_parts_and_of_spread_out_planes():
 def test_choices():
     mask = torch.rand(1, 16, 16) < 0.5
     other = codes.flip(1)
-    assert torch.equal(choose(mask, codes, other), torch.where(mask, codes, other))
-    assert torch.equal(choose(mask, 11, other), torch.where(mask, torch.tensor(11, dtype=torch.uint8), other))
-    assert torch.equal(clear(mask, codes), codes.masked_fill(mask, 0))
+    assert torch.equal(choose(byte(mask), codes, other), torch.where(mask, codes, other))
+    assert torch.equal(choose(byte(mask), 11, other), torch.where(mask, torch.tensor(11, dtype=torch.uint8), other))
+    assert torch.equal(clear(byte(mask), codes), codes.masked_fill(mask, 0))
     assert torch.equal(number(mask), mask.to(torch.float32))
     assert counts(byte(mask).expand(2, -1, -1))[0].tolist() == [int(mask.sum())] * 2
     assert counts(torch.ones(1, 300, 300, dtype=torch.uint8))[0].item() == 90_000

@@ -56,7 +56,7 @@ def _tick(options: Namespace) -> dict[str, Rows]:
 
 
 def _env(options: Namespace) -> dict[str, Rows]:
-    return {"env": _speed(environment_speed, options)}
+    return {"env": _speed(environment_speed, options, compiled=not options.no_compile)}
 
 
 def _train(options: Namespace) -> dict[str, Rows]:
@@ -120,7 +120,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--experiment", help="for train: one of conf/experiment, also with Stable-Baselines3's PPO")
     parser.add_argument("--worlds", type=int, help=f"{_WORLDS} by default, or the experiment's")
     parser.add_argument("--repeats", type=int, default=7, help="times that each speed is measured")
-    parser.add_argument("--no-compile", action="store_true", help="for tick: leave the compiled tick out")
+    parser.add_argument("--no-compile", action="store_true", help="for tick and env: leave what is compiled out")
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="for scaling: draw it too")
     parser.add_argument("--episodes", type=int, default=EPISODES)
     parser.add_argument("--device", default="cpu")

@@ -17,12 +17,13 @@ if TYPE_CHECKING:
 
 LARGE = ("large", ("team.n_agents=4", "steps_per_tick=1"))
 """The scenario that is measured where none is asked for, and what is changed in it."""
+_EAGER, _COMPILED, _PEER = "environment", "compiled", "numpy, PettingZoo"
 _STEPS, _NUMPY_STEPS = 25, 200  # in a repeat
 _WARM_UP = 128  # steps at most, until worlds end at different times
 
 
 def environment_speed(
-    scenario: str, n_worlds: int, device: str, overrides: Sequence[str] = (), repeats: int = 7
+    scenario: str, n_worlds: int, device: str, overrides: Sequence[str] = (), repeats: int = 7, compiled: bool = True
 ) -> list[dict[str, Any]]:
     """Measure agent steps a second of the environment alone, and of the paper's stack for the same map and team.
 
@@ -35,16 +36,25 @@ def environment_speed(
         device: Where the worlds live.
         overrides: In the command line's grammar.
         repeats: Times that each is measured.
+        compiled: Whether to measure fused steps too, which take a while to compile.
 
     Returns:
         A row for each, with ``agent_steps_per_second`` and how many times faster than the paper's stack it is.
     """
     env = make_env(scenario, n_worlds=n_worlds, device=device, overrides=overrides)
-    ours = random_play(env)
-    ours(min(env.world.horizon // 2, _WARM_UP))
+    ways, skipped = {_EAGER: env}, []
+    if compiled:
+        try:
+            ways[_COMPILED] = make_env(scenario, n_worlds=n_worlds, device=device, overrides=overrides, compile=True)
+        except ValueError as error:
+            skipped.append({"what": _COMPILED, "skipped": str(error)})
+    contenders, worlds = {}, {name: (n_worlds, _STEPS) for name in ways} | {_PEER: (1, _NUMPY_STEPS)}
+    for name, way in ways.items():
+        play = random_play(way)
+        play(min(env.world.horizon // 2, _WARM_UP))
+        contenders[name] = partial(play, _STEPS)
     theirs = _random_numpy_play(paper_stack(env.world, env.observation.radius, seed=0))
-    contenders = {"environment": partial(ours, _STEPS), "numpy, PettingZoo": partial(theirs, _NUMPY_STEPS)}
-    worlds = {"environment": (n_worlds, _STEPS), "numpy, PettingZoo": (1, _NUMPY_STEPS)}
+    contenders[_PEER] = partial(theirs, _NUMPY_STEPS)
     common = {"scenario": scenario, "agents": env.n_agents, "size": "{} x {}".format(*env.world.size)}
     rows: list[dict[str, Any]] = []
     for name, seconds in take_turns(contenders, repeats, device).items():
@@ -52,7 +62,7 @@ def environment_speed(
         rates = [steps * count * env.n_agents / second for second in seconds]
         rows.append({"what": name, "worlds": count, **common} | spread("agent_steps_per_second", rates))
     peer = rows[-1]["agent_steps_per_second"]
-    return [row | {"ratio": row["agent_steps_per_second"] / peer} for row in rows]
+    return [row | {"ratio": row["agent_steps_per_second"] / peer} for row in rows] + skipped
 
 
 def random_play(env: "WildfireEnv") -> Callable[[int], None]:

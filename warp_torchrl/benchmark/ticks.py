@@ -12,8 +12,8 @@ from warp_torchrl.benchmark.tables import entry, spread_of, table
 from warp_torchrl.benchmark.timing import spread, take_turns
 from warp_torchrl.world.burn import burn
 from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.fusion import check_compiler, fusing
-from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.fusion import check_compiler, fused
+from warp_torchrl.world.state import WorldState, in_bytes
 from warp_torchrl.world.world import World, advance
 
 _TICKS = 10  # in a repeat, and before
@@ -98,13 +98,13 @@ def tick_table(rows: list[dict[str, Any]]) -> str:
 
 
 def _ours(world: World, state: WorldState, fuse: bool) -> Callable[[], None]:
-    due = torch.ones_like(state.terminated)
+    due, tick = torch.ones_like(state.terminated), fused(advance) if fuse else advance
+    first = in_bytes(state) if fuse else state
 
     def ticks() -> None:
-        now = state
-        with fusing(fuse):
-            for _ in range(_TICKS):
-                now = advance(now, world.fire, world.air, due)
+        now = first
+        for _ in range(_TICKS):
+            now = tick(now, world.fire, world.air, due)
 
     return ticks
 

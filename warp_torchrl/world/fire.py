@@ -32,7 +32,6 @@ from warp_torchrl.world.flags import (
     put,
     wide,
 )
-from warp_torchrl.world.fusion import is_fusing
 from warp_torchrl.world.kernel import alexandridis, ellipse, slope_factor
 from warp_torchrl.world.landscape import holds_trees
 from warp_torchrl.world.law import Clipped, Law
@@ -131,7 +130,7 @@ class Fire:
         It is so where trees neither grow nor ignite by themselves, on a CPU, unless whole maps are fused.
         """
         burns_alone = not self.growth and self.beta == 0.0 and self.p_regrow == 0.0
-        return burns_alone and state.cells.device.type == "cpu" and not is_fusing()
+        return burns_alone and state.cells.device.type == "cpu" and not is_compiling()
 
     def flammability(self, cover: Tensor) -> Tensor:
         """Return alpha of the ground, float32, shape of ``cover`` (WARP-CA, terrain table)."""
@@ -249,7 +248,7 @@ class Fire:
             regrows = bare & below(u, self._in_a_tick(self.p_regrow))
             grows = regrows if grows is None else grows | regrows
         state, due_cells = self._age_fires(state, due), byte(due)[:, None, None]
-        ignite = as_mask(byte(below(u, q)) * due_cells)
+        ignite = narrow(byte(below(u, q)) * due_cells)
         after = choose(ignite, FIRST_FIRE, state.cells)
         if grows is not None:
             after += byte(grows) * due_cells
@@ -280,14 +279,14 @@ class Fire:
         if state.stage_age is not None:
             waited = wide(state.stage_age) + stage_ends
             stage_ends = byte(equal(waited, self.ticks_per_stage))
-            waited = clear(as_mask(stage_ends), waited)
+            waited = clear(stage_ends, waited)
         after = cells + stage_ends
-        to_ash = equal(after, EMBER + 1)
+        to_ash = byte(equal(after, EMBER + 1))
         return state.replace(
             cells=after.bitwise_and_(EMBER),
             age=clear(to_ash, state.age),
             stage_age=waited,
-            burned=like(state.burned, byte(state.burned) | byte(to_ash)),
+            burned=like(state.burned, byte(state.burned) | to_ash),
             wet=narrow(wide(state.wet) - byte(at_least(state.wet, 1)) * due_cells),
             tick=state.tick + due,
         )

@@ -86,18 +86,18 @@ def number(mask: Tensor) -> Tensor:
     return mask.to(torch.float32) if is_compiling() else mask.view(torch.uint8).to(torch.float32)
 
 
-def choose(mask: Tensor, one: Tensor | int, other: Tensor) -> Tensor:
-    """Return ``where(mask, one, other)``, uint8 or ``wide``, for a bool mask of the shape of ``other``."""
+def choose(flags: Tensor, one: Tensor | int, other: Tensor) -> Tensor:
+    """Return one, uint8 or ``wide``, where flags of ``byte`` are 1 and the other where they are 0."""
     if is_compiling():
-        return torch.where(mask, wide(one) if isinstance(one, Tensor) else one, wide(other))
-    return (one - other).mul_(mask.view(torch.uint8)).add_(other)
+        return torch.where(as_mask(wide(flags)), wide(one) if isinstance(one, Tensor) else one, wide(other))
+    return (one - other).mul_(flags).add_(other)
 
 
-def clear(mask: Tensor, values: Tensor) -> Tensor:
-    """Return ``values`` with 0 where the bool mask is set, uint8 or ``wide``; the mask has their shape."""
+def clear(flags: Tensor, values: Tensor) -> Tensor:
+    """Return values, uint8 or ``wide``, but 0 where flags of ``byte`` are 1."""
     if is_compiling():
-        return torch.where(mask, 0, wide(values))
-    return values * (~mask).view(torch.uint8)
+        return torch.where(as_mask(wide(flags)), 0, wide(values))
+    return values * (flags ^ 1)
 
 
 def counts(*codes: Tensor) -> tuple[Tensor, ...]:

@@ -1,74 +1,41 @@
-"""Fuses the world's pure functions with ``torch.compile`` for those who ask for it: ``compile=true``.
+"""Fuses pure functions of worlds with ``torch.compile`` for those who ask for it: ``compile=true``.
 
 Eager, each of their operations passes over every cell; fused, one loop does them all. The law and the draws are the
-same, and on the CPU every bit.
+same, and on the CPU every bit of a world, but for the last places of exponentials: law ``hazard``, changing winds.
 """
 
 import warnings
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from contextvars import ContextVar
-from functools import cache, wraps
+from collections.abc import Callable
+from functools import cache
 from typing import Any, ParamSpec, TypeVar
 
 import torch
-from torch.compiler import is_compiling
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
 _SHAPES = 256  # that one function may be compiled for; torch stops at 8
-_IN_REGISTERS = {
-    "realize_opcount_threshold": 100_000,
+_IN_REGISTERS: dict[str, Any] = {
+    "realize_opcount_threshold": 200,
     "realize_reads_threshold": 1000,
     "realize_acc_reads_threshold": 1000,
 }
-_IN_PARTS = {"max_pointwise_cat_inputs": 0}  # else each element of a stack asks which of its parts it is of
-_fusing: ContextVar[bool] = ContextVar("fusing", default=False)
+_IN_PARTS: dict[str, Any] = {
+    "max_pointwise_cat_inputs": 0
+}  # else each element of a stack asks which of its parts it is of
 
 
-@contextmanager
-def fusing(enabled: bool) -> Iterator[None]:
-    """Fuse the functions marked ``fusible`` that are called inside, where enabled."""
-    token = _fusing.set(enabled)
-    try:
-        yield
-    finally:
-        _fusing.reset(token)
+@cache
+def fused(function: Callable[P, T], in_parts: bool = False) -> Callable[P, T]:
+    """Return a function of tensors that changes nothing as one loop, compiled for each shape anew when it is called.
 
-
-def is_fusing() -> bool:
-    """Return whether functions marked ``fusible`` are fused now, or one of them is being so."""
-    return is_compiling() or _fusing.get()
-
-
-def fusible(function: Callable[P, T]) -> Callable[P, T]:
-    """Mark a function of tensors that changes nothing as one that may be fused, for each shape anew.
-
-    What is computed of a cell is computed again for each who asks and kept for none: on the CPU a mask in memory costs
-    more than the comparisons that made it.
+    What is computed of a cell is computed again for each who asks, and kept for none: on the CPU a mask in memory costs
+    more than the comparisons that made it. A function that is fused ``in_parts`` keeps what is asked for often.
     """
-    return _fusible(function, _IN_REGISTERS)
-
-
-def fusible_in_parts(function: Callable[P, T]) -> Callable[P, T]:
-    """Mark a function as ``fusible`` does, one that keeps in memory what is asked for often."""
-    return _fusible(function, _IN_PARTS)
-
-
-def _fusible(function: Callable[P, T], options: Mapping[str, Any]) -> Callable[P, T]:
-    @cache
-    def fused() -> Callable[P, T]:
-        torch._dynamo.config.recompile_limit = max(torch._dynamo.config.recompile_limit, _SHAPES)
-        warnings.filterwarnings("ignore", message="Dynamo detected a call to a `functools.lru_cache`-wrapped function")
-        return torch.compile(function, fullgraph=True, dynamic=False, options=dict(options))
-
-    @wraps(function)
-    def call(*args: P.args, **kwargs: P.kwargs) -> T:
-        fuse = not is_compiling() and _fusing.get()  # what is called inside of a function that is fused is a part of it
-        return (fused() if fuse else function)(*args, **kwargs)
-
-    return call
+    torch._dynamo.config.recompile_limit = max(torch._dynamo.config.recompile_limit, _SHAPES)
+    warnings.filterwarnings("ignore", message="Dynamo detected a call to a `functools.lru_cache`-wrapped function")
+    options = _IN_PARTS if in_parts else _IN_REGISTERS
+    return torch.compile(function, fullgraph=True, dynamic=False, options=options)
 
 
 def check_compiler(device: torch.device) -> None:

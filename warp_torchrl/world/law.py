@@ -35,7 +35,8 @@ class Law(Protocol):
 class Clipped:
     """Law ``paper``: p_d = clip(f, 0, 1), and q = 1 - prod (1 - p_d) (WARP-CA, spread).
 
-    q is accumulated as q + p_d (1 - q), which keeps 0, 1 and small numbers exact.
+    q is accumulated as p_d + q (1 - p_d), which keeps 0, 1 and small numbers exact; q stands in it once, so that a
+    compiler that writes it out does so eight times, not 2^8.
     """
 
     def susceptibility(self, alpha: Tensor) -> Tensor:
@@ -43,8 +44,9 @@ class Clipped:
         return alpha
 
     def join(self, total: Tensor, strength: Tensor, spare: Tensor) -> None:
-        """Add q + p (1 - q)."""
-        total.sub_(torch.sub(total, 1.0, out=spare).mul_(strength.clamp_(max=1.0)))
+        """Make p + q (1 - p) of the total q."""
+        strength.clamp_(max=1.0)
+        torch.sub(strength, total.mul_(torch.sub(strength, 1.0, out=spare)), out=total)
 
     def chance_of(self, strength: Tensor) -> Tensor:
         """Return clip(f, 0, 1)."""

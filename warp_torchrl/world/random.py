@@ -14,8 +14,7 @@ from enum import IntEnum
 
 import torch
 from torch import Tensor
-
-from warp_torchrl.world.fusion import fusible
+from torch.compiler import is_compiling
 
 _GOLDEN = -7046029254386353131  # 2^64 / golden ratio, odd, as a signed word
 _SPLITMIX = (-4658895280553007687, -7723592293110705685)
@@ -96,7 +95,7 @@ def uniform_at(key: Tensor, tick: Tensor | int, stream: Stream, index: Tensor) -
         float32 [B, n].
     """
     low, high = _key_words(key, tick, stream)
-    return _mix_all(index, low[:, None], high[:, None])
+    return _mix(index, low[:, None], high[:, None])
 
 
 def uniform_among(key: Tensor, tick: Tensor | int, stream: Stream, world: Tensor, index: Tensor) -> Tensor:
@@ -119,8 +118,15 @@ def uniform_among(key: Tensor, tick: Tensor | int, stream: Stream, world: Tensor
 def _key_words(key: Tensor, tick: Tensor | int, stream: Stream) -> tuple[Tensor, Tensor]:
     """Return the two words that a world's draws are hashed with, int32 [B] each."""
     counter = torch.zeros_like(key).add_(tick).mul_(64).add_(int(stream))
-    word = _splitmix64(key + counter * _GOLDEN)
+    word = _mixed(key + counter * _GOLDEN) if is_compiling() else _splitmix64(key + counter * _GOLDEN)
     return word.to(torch.int32), (word >> 32).to(torch.int32)
+
+
+# A compiler would write the mixer out again wherever a draw asks for its word.
+_mixed = torch.library.custom_op(
+    "warp_torchrl::splitmix64", _splitmix64, mutates_args=(), schema="(Tensor word) -> Tensor"
+)
+_mixed.register_fake(torch.empty_like)
 
 
 def _mix(index: Tensor, low: Tensor, high: Tensor) -> Tensor:
@@ -138,6 +144,3 @@ def _mix(index: Tensor, low: Tensor, high: Tensor) -> Tensor:
     # The word is signed: a positive one is a small number as it stands, a negative one lies half a range higher.
     fraction = fold(16).to(torch.float32).mul_(2.0**-32)
     return fraction.sub_(torch.floor(fraction, out=spare.view(torch.float32))).clamp_(max=_LARGEST_BELOW_ONE)
-
-
-_mix_all = fusible(_mix)  # not of a list, which is of another length each time

@@ -12,7 +12,6 @@ from torch.compiler import is_compiling
 from torch.nn.functional import pad
 
 from warp_torchrl.world.flags import number
-from warp_torchrl.world.fusion import fusible
 from warp_torchrl.world.geometry import DIRECTIONS, DISTANCES
 from warp_torchrl.world.law import Law
 
@@ -64,7 +63,16 @@ def ignition_chance(
         rows = [_in_a_row(burning * gain[:, direction]) for direction in range(8)]
         gain = torch.ones_like(gain[..., :1, :1])
     target = susceptible if is_compiling() else _shifted(_in_a_row(susceptible), shape, 0)
-    return _chance(law, rows, target, gain, slope, shape, directions(neighbours))
+    total, strength, spare = torch.zeros_like(target), torch.empty_like(target), torch.empty_like(target)
+    for direction in directions(neighbours):
+        source = _shifted(rows[direction % len(rows)], shape, -_offset(direction, shape))
+        torch.mul(source, gain[:, direction], out=strength)
+        strength.mul_(target)
+        if slope is not None:
+            strength *= _slope(slope, direction, shape, 0)
+        law.join(total, strength, spare)
+    chance = law.chance(total)
+    return chance if is_compiling() else _on_map(chance).contiguous()
 
 
 def expected_ignitions(
@@ -85,44 +93,12 @@ def expected_ignitions(
     shape = tuple(susceptible.shape)
     if gain.shape[2:] != (1, 1) and not is_compiling():
         gain = pad(gain, (0, 1, 0, 1))
-    return _expected(law, _in_a_row(susceptible), gain, slope, shape, directions(neighbours))
-
-
-@fusible
-def _chance(
-    law: Law, rows: list[Tensor], target: Tensor, gain: Tensor, slope: Tensor | None, shape: Shape, over: range
-) -> Tensor:
-    """Return what ``ignition_chance`` does.
-
-    Args:
-        law: As there.
-        rows: The burning cells in a row: one, or one a direction, times its gain.
-        target: The susceptible ones, of ``_shifted``.
-        gain: float32 [B, 8, 1, 1].
-        slope: As there.
-        shape: (B, H, W).
-        over: The directions.
-    """
-    total, strength, spare = torch.zeros_like(target), torch.empty_like(target), torch.empty_like(target)
-    for direction in over:
-        source = _shifted(rows[direction % len(rows)], shape, -_offset(direction, shape))
-        torch.mul(source, gain[:, direction], out=strength)
-        strength.mul_(target)
-        if slope is not None:
-            strength *= _slope(slope, direction, shape, 0)
-        law.join(total, strength, spare)
-    chance = law.chance(total)
-    return chance if is_compiling() else _on_map(chance).contiguous()
-
-
-@fusible
-def _expected(law: Law, susceptible: Tensor, gain: Tensor, slope: Tensor | None, shape: Shape, over: range) -> Tensor:
-    """Return what ``expected_ignitions`` does, of a row, and gains with a margin after them unless they are one."""
-    total = torch.zeros_like(_shifted(susceptible, shape, 0))
+    row = _in_a_row(susceptible)
+    total = torch.zeros_like(_shifted(row, shape, 0))
     strength = torch.empty_like(total)
-    for direction in over:
+    for direction in directions(neighbours):
         offset = _offset(direction, shape)
-        torch.mul(_shifted(susceptible, shape, offset), gain[:, direction], out=strength)
+        torch.mul(_shifted(row, shape, offset), gain[:, direction], out=strength)
         if slope is not None:
             strength *= _slope(slope, direction, shape, offset)
         total += law.chance_of(strength)
@@ -146,7 +122,9 @@ def _row(maps: Tensor) -> Tensor:
 
 
 # A compiler would ask of every neighbour anew whether it is on the map, and that one by one.
-_row_in_memory = torch.library.custom_op("warp_torchrl::in_a_row", _row, mutates_args=(), schema="(Tensor maps) -> Tensor")
+_row_in_memory = torch.library.custom_op(
+    "warp_torchrl::in_a_row", _row, mutates_args=(), schema="(Tensor maps) -> Tensor"
+)
 
 
 @_row_in_memory.register_fake

@@ -6,12 +6,12 @@ from functools import cached_property
 
 import torch
 from torch import Tensor
+from torch.compiler import is_compiling
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.batch import concatenated
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.flags import number
-from warp_torchrl.world.fusion import is_fusing
 from warp_torchrl.world.ignition import Ignition
 from warp_torchrl.world.landscape import LandscapeSource, Perlin, map_size
 from warp_torchrl.world.random import Stream, uniform, uniform_among, world_key
@@ -180,7 +180,7 @@ class World:
         return self.team.action_mask(state, self.fire.last_spreading)
 
     def _tick(self, state: WorldState, due: Tensor) -> WorldState:
-        if due.is_cuda or self.steps_per_tick == 1 or is_fusing():  # fused, a new number of worlds is a new compilation
+        if due.is_cuda or self.steps_per_tick == 1 or is_compiling():
             return advance(state, self.fire, self.air, due)
         return advance_some(state, self.fire, self.air, due)
 
