@@ -159,6 +159,7 @@ class WildfireEnv(EnvBase):
         if worlds:
             template = self.world.reset(self._seeds, self._episodes)
             state = _fill(template, worlds)
+            state = self.world.fire.in_wind(state, state.wind)  # another version's may be in another order
         for name in ("seeds", "episodes", "episode_reward"):
             if state_dict[name].shape != self._seeds.shape:
                 raise ValueError(f"{name} must have shape {list(self._seeds.shape)}, got {state_dict[name].shape}")

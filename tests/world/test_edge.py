@@ -7,6 +7,7 @@ from warp_torchrl.world.edge import places
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.hazard import HazardFire
 from warp_torchrl.world.landscape import Perlin
+from warp_torchrl.world.pattern import bit_of
 from warp_torchrl.world.random import Stream, uniform, uniform_among
 from warp_torchrl.world.wind import Paper, Uniform, Wandering, Wind
 from warp_torchrl.world.world import World, advance
@@ -30,7 +31,7 @@ def test_an_edge_by_hand() -> None:
     edge = Fire().edge(state)
     assert edge.cell.tolist() == [5, 8, 9, 17, 20, 21]  # (1, 1), (2, 0) and (2, 1) of each world
     assert edge.world.tolist() == [0, 0, 0, 1, 1, 1] and edge.place.tolist() == [5, 8, 9] * 2
-    east, south, south_east = 4, 16, 8  # as the fire travels
+    east, south_east, south = (1 << bit_of(direction) for direction in (2, 3, 4))  # as the fire travels
     assert edge.pattern.tolist() == [east, south, south_east] * 2
     assert edge.on_map(torch.ones(6)).sum((1, 2)).tolist() == [3.0, 3.0]
 

@@ -544,7 +544,7 @@ def test_growth_lightning_and_regrowth_keep_their_pace_in_finer_ticks() -> None:
 
 def test_with_four_neighbours_no_fire_goes_across_a_corner() -> None:
     fire = Fire(neighbours=4)
-    assert drawn(tick(fire, draw("TTT TaT TTT"), u=0.0)) == "TaT aba TaT"
+    assert drawn(tick(fire, draw("TTT TaT TTT", fire=fire), u=0.0)) == "TaT aba TaT"
 
 
 @pytest.mark.parametrize("wind", [Paper(), Paper(rotate=True)])

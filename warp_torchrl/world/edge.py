@@ -6,7 +6,7 @@ are is read back, which a CPU does for nothing and a CUDA device does not.
 """
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Protocol
 
 import torch
@@ -15,6 +15,7 @@ from torch import Tensor
 from warp_torchrl.world.flags import byte
 from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.law import Law
+from warp_torchrl.world.pattern import BESIDE, bit_of, burning_neighbours
 from warp_torchrl.world.spread import directions
 
 _WORD = 8  # bytes
@@ -55,9 +56,9 @@ class Edge:
         row, column = DIRECTIONS[direction]
         return row * self.shape[2] + column
 
-    def burns(self, bit: int) -> Tensor:
-        """Return 1.0 where the neighbour of this bit burns and 0.0 elsewhere, float32 [N]."""
-        return (self.pattern >> bit).bitwise_and_(1).to(torch.float32)
+    def burns(self, direction: int) -> Tensor:
+        """Return 1.0 where the neighbour that fire in a direction comes from burns and 0.0 elsewhere, float32 [N]."""
+        return (self.pattern >> bit_of(direction)).bitwise_and_(1).to(torch.float32)
 
     def on_map(self, values: Tensor) -> Tensor:
         """Return maps [B, H, W] that hold these values there, [N], and 0 elsewhere."""
@@ -72,48 +73,11 @@ def edge_of(spreading: Tensor, fuel: Tensor, neighbours: int) -> Edge:
         fuel: The trees that can ignite, bool [B, H, W].
         neighbours: 8 or 4.
     """
-    around, order = _neighbours(byte(spreading)), _order(neighbours, spreading.device)
+    around = burning_neighbours(spreading)
     if neighbours == 4:
-        around &= _BESIDE
+        around &= BESIDE
     cell = places((around * byte(fuel)).flatten())
-    pattern = order.index_select(0, around.flatten().index_select(0, cell).to(torch.int64))
-    return Edge(spreading.shape, neighbours, cell, pattern)
-
-
-def _neighbours(mask: Tensor) -> Tensor:
-    """Return which neighbours of each cell are 1, uint8 [B, H, W], in bits ordered as ``_TRAVELS``.
-
-    In this order a row's three are one sum, which serves the cells north and south of them: half the operations of
-    ``burning_neighbours``.
-    """
-    worlds, _, width = mask.shape
-    eastward, westward = mask.clone(), mask.clone()
-    eastward[:, :, -1] = 0  # leaves the map
-    westward[:, :, 0] = 0
-    beside = torch.zeros_like(mask).flatten()
-    beside[1:].add_(eastward.flatten()[:-1])
-    beside[:-1].add_(westward.flatten()[1:], alpha=2)
-    row = torch.add(beside, mask.flatten(), alpha=4).view(worlds, -1)
-    around = (beside * 64).view(worlds, -1)
-    around[:, width:].add_(row[:, :-width])
-    around[:, :-width].add_(row[:, width:], alpha=8)
-    return around.view_as(mask)
-
-
-_TRAVELS = (3, 5, 4, 1, 7, 0, 2, 6)
-"""The direction in which fire comes from the neighbour of each bit of ``_neighbours``."""
-_BESIDE = sum(1 << bit for bit, direction in enumerate(_TRAVELS) if direction % 2 == 0)
-"""The bits of the four neighbours that are not diagonal ones."""
-
-
-@lru_cache(maxsize=8)
-def _order(neighbours: int, device: torch.device) -> Tensor:
-    """Return the pattern of ``burning_neighbours`` for each of ``_neighbours``, int64 [256]."""
-    code = torch.arange(256)
-    pattern = torch.zeros_like(code)
-    for bit, direction in enumerate(directions(neighbours)):
-        pattern += ((code >> _TRAVELS.index(direction)) & 1) << bit
-    return pattern.to(device)
+    return Edge(spreading.shape, neighbours, cell, around.flatten().index_select(0, cell).to(torch.int64))
 
 
 class EdgeChances(Protocol):
@@ -123,10 +87,10 @@ class EdgeChances(Protocol):
         """Return the chance to be ignited by all the neighbours that burn, float32 [N]."""
         ...
 
-    def alone(self, bit: int, direction: int) -> Tensor:
+    def alone(self, direction: int) -> Tensor:
         """Return the chance to be ignited by the one neighbour that fire in a direction comes from, as if it burned.
 
-        float32 [N], of a direction and its bit; where there is no such neighbour it means nothing.
+        float32 [N]; where there is no such neighbour it means nothing.
         """
         ...
 
@@ -136,7 +100,7 @@ class ByPattern:
 
     Args:
         edge: The trees.
-        table: Of ``pattern.pattern_table``, float32 [B, G + 1, 2^neighbours].
+        table: Of ``pattern.pattern_table``, float32 [B, G + 1, 256].
         kind: Row of the table, int64 [N].
     """
 
@@ -149,9 +113,9 @@ class ByPattern:
         """See ``EdgeChances``."""
         return self._table.index_select(0, self._row + self._edge.pattern)
 
-    def alone(self, bit: int, direction: int) -> Tensor:
+    def alone(self, direction: int) -> Tensor:
         """See ``EdgeChances``."""
-        return self._table[1 << bit :].index_select(0, self._row)
+        return self._table[1 << bit_of(direction) :].index_select(0, self._row)
 
 
 class ByStrength:
@@ -172,11 +136,11 @@ class ByStrength:
         """See ``EdgeChances``."""
         total = torch.zeros_like(self._susceptible)
         spare = torch.empty_like(total)
-        for bit, direction in enumerate(directions(self._edge.neighbours)):
-            self._law.join(total, self._strength(direction).mul_(self._edge.burns(bit)), spare)
+        for direction in directions(self._edge.neighbours):
+            self._law.join(total, self._strength(direction).mul_(self._edge.burns(direction)), spare)
         return self._law.chance(total)
 
-    def alone(self, bit: int, direction: int) -> Tensor:
+    def alone(self, direction: int) -> Tensor:
         """See ``EdgeChances``."""
         return self._law.chance_of(self._strength(direction))
 
@@ -207,9 +171,9 @@ def expected_from_edge(edge: Edge, chances: EdgeChances) -> Tensor:
     """
     margin = edge.shape[2] + 1  # where no neighbour burns 0 is added, maybe beside the batch
     total = torch.zeros(edge.shape.numel() + 2 * margin, device=edge.cell.device)
-    for bit, direction in enumerate(directions(edge.neighbours)):
+    for direction in directions(edge.neighbours):
         at_source = total[margin - edge.offset(direction) :]
-        at_source.scatter_add_(0, edge.cell, edge.burns(bit).mul_(chances.alone(bit, direction)))
+        at_source.scatter_add_(0, edge.cell, edge.burns(direction).mul_(chances.alone(direction)))
     return total[margin:-margin].view(edge.shape)
 
 

@@ -161,7 +161,7 @@ class Fire:
         spreading = self._spreading(state)
         if state.chances is not None and not is_compiling():  # a look-up costs more than what it spares there
             kind = (state.landscape.cover + 1) * byte(self.is_fuel(state))
-            return chance_by_pattern(state.chances, spreading, kind, self.neighbours)
+            return chance_by_pattern(state.chances, spreading, kind)
         susceptible = self._susceptible(state)
         return ignition_chance(self._law(), spreading, susceptible, self._gain(state), state.slope, self.neighbours)
 

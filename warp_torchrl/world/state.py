@@ -107,7 +107,7 @@ class WorldState(Batch):
     slope: Tensor | None  # float32 [B,8,H+2,W+1], spread factor into a cell by direction of travel; None where flat
     wind: Tensor  # float32 [B,2,1,1] or [B,2,H,W], (u east, v north) of the air's motion [m/s]
     gain: Tensor | None  # float32 [B,8,1,1], what a wind does to fire in each direction; None where it differs by cell
-    chances: Tensor | None  # float32 [B,G,2^N], see ``world.pattern``; None where the wind differs by cell or on slopes
+    chances: Tensor | None  # float32 [B,G,256], see ``world.pattern``; None where the wind differs by cell or on slopes
     vehicles: Vehicles
     tally: Tally
     key: Tensor  # int64 [B], key of the world's draws in this episode
