@@ -83,6 +83,7 @@ RUNS = {
                        "wind=wandering", "reward=collaborative", "team.tank=3"],
     "taught": ["imitation.teacher=greedy", "imitation.until=0.7"],
     "remembers": ["model.memory=8"],
+    "compiled": ["compile=true", "imitation.teacher=greedy", "imitation.until=0.7"],
     **{name: [f"algorithm={name}", *(REPLAY if name in REPLAYS else [])] for name in ALGORITHMS},
 }  # fmt: skip
 RUNS["dqn"] += ["algorithm.target_interval=3"]
@@ -145,6 +146,29 @@ def test_a_run_resumed_equals_a_run_not_interrupted(tmp_path, never_stopped, sto
     resumed, expected = without_times(rows(tmp_path / "cut")), without_times(rows(folder))
     assert len(resumed) == len(expected) == LAST
     assert resumed[stop_after:] == expected[stop_after:]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", RUNS)
+def test_a_compiled_loss_is_the_eager_one(tmp_path, name):
+    training = tiny(tmp_path, *RUNS[name], "compile=true", "model.dtype=float32", "algorithm.learning_rate=0")
+    learner, eager = training.learner, tiny(tmp_path, *RUNS[name], "model.dtype=float32").learner
+    assert learner.terms is not learner.loss
+    for batch in training.collection:
+        learner.store(batch)
+        sample = next(iter(learner.samples()), None)
+        if sample is not None:
+            break
+    eager.loss.load_state_dict(learner.loss.state_dict())
+    gradients = []
+    for one in (learner, eager):
+        terms = one.terms(sample.clone())
+        sum(terms[key] for key in learner.loss_keys).backward()
+        gradients.append({key: value.grad for key, value in one.loss.named_parameters() if value.grad is not None})
+        gradients[-1] |= {key: terms[key].detach() for key in learner.loss_keys}
+    assert gradients[0].keys() == gradients[1].keys()
+    for key, value in gradients[1].items():
+        torch.testing.assert_close(gradients[0][key], value, rtol=1e-3, atol=1e-5, msg=lambda told: f"{key}: {told}")
 
 
 def test_metrics_have_the_columns_of_the_contract(finished):

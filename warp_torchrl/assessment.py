@@ -76,7 +76,7 @@ _PLAYED: dict[str, tuple[Settings, dict[str, Episodes]]] = {}
 
 def _yardsticks(plan: Settings, env: WildfireEnv, names: Sequence[str]) -> dict[str, Episodes]:
     """Return the episodes of heuristics; the jobs of a sweep that meet the same worlds play them once."""
-    worlds = repr((plan.world, plan.observation, plan.reward, plan.evaluation, plan.device, plan.compile))
+    worlds = repr((plan.world, plan.observation, plan.reward, plan.evaluation, plan.device))
     _, played = _PLAYED.setdefault(worlds, (plan, {}))  # the plan stays alive: no other can come to print the same
     played |= play_heuristics(env, plan.evaluation.first_seed, [name for name in names if name not in played])
     return {name: played[name] for name in names}

@@ -127,7 +127,7 @@ class Settings:
         if self.compile:
             check_compiler(torch.device(self.device))
 
-    def make_env(self, n_worlds: int, seed: int) -> WildfireEnv:
+    def make_env(self, n_worlds: int, seed: int, fuse: bool = False) -> WildfireEnv:
         """Return an environment of the run's scenario, on the run's device."""
         return WildfireEnv(
             self.world,
@@ -136,8 +136,15 @@ class Settings:
             n_worlds=n_worlds,
             seed=seed,
             device=self.device,
-            fuse=self.compile,
+            fuse=fuse,
         )
+
+    def make_training_env(self, n_worlds: int, seed: int) -> WildfireEnv:
+        """Return an environment to learn from, fused where that is asked for.
+
+        The few episodes of an evaluation would take less time than their compilation.
+        """
+        return self.make_env(n_worlds, seed, fuse=self.compile)
 
 
 def settings(config: Mapping[str, Any]) -> Settings:

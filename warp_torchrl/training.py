@@ -45,7 +45,7 @@ class Training:
     def __init__(self, settings: Settings, record: Record, run: Path) -> None:
         torch.manual_seed(settings.seed)
         self.settings, self.record, self.run = settings, record, run
-        self.env = settings.make_env(settings.n_worlds, TRAINING_SEEDS * settings.seed)
+        self.env = settings.make_training_env(settings.n_worlds, TRAINING_SEEDS * settings.seed)
         self.frames_per_batch = settings.collector.steps * settings.n_worlds
         learner = settings.algorithm.build(self.env, settings.model, self.frames_per_batch)
         if settings.compile:
@@ -53,7 +53,7 @@ class Training:
         self.learner: Learner = settings.imitation.taught(learner, self.env)
         self.reward_scale = RewardScale(settings.reward.gamma) if settings.reward.normalise else None
         self.collection = settings.collector.open(
-            self.env, self.learner, settings.make_env, TRAINING_SEEDS * settings.seed
+            self.env, self.learner, settings.make_training_env, TRAINING_SEEDS * settings.seed
         )
         self.frames = 0
         self.seconds = 0.0
