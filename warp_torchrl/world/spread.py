@@ -11,7 +11,7 @@ from torch import Tensor
 from torch.compiler import is_compiling
 from torch.nn.functional import pad
 
-from warp_torchrl.world.flags import number
+from warp_torchrl.world.flags import byte, narrow, number
 from warp_torchrl.world.geometry import DIRECTIONS, DISTANCES
 from warp_torchrl.world.law import Law
 
@@ -58,14 +58,14 @@ def ignition_chance(
         float32 [B, H, W].
     """
     shape, burning = tuple(susceptible.shape), number(spreading)
-    rows = [_in_a_row(burning)]
+    rows = [_in_a_row(narrow(byte(spreading)) if is_compiling() else burning)]
     if gain.shape[2:] != (1, 1):
         rows = [_in_a_row(burning * gain[:, direction]) for direction in range(8)]
         gain = torch.ones_like(gain[..., :1, :1])
     target = susceptible if is_compiling() else _shifted(_in_a_row(susceptible), shape, 0)
     total, strength, spare = torch.zeros_like(target), torch.empty_like(target), torch.empty_like(target)
     for direction in directions(neighbours):
-        source = _shifted(rows[direction % len(rows)], shape, -_offset(direction, shape))
+        source = _shifted(rows[direction % len(rows)], shape, -_offset(direction, shape)).to(torch.float32)
         torch.mul(source, gain[:, direction], out=strength)
         strength.mul_(target)
         if slope is not None:
