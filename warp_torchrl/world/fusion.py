@@ -15,6 +15,9 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 _SHAPES = 256  # that one function may be compiled for; torch stops at 8
+COMMON: dict[str, Any] = {"guard_filter_fn": torch.compiler.skip_guard_on_globals_unsafe}
+"""Options of whatever is compiled. Names of modules stay what they are, and to look at them at every call takes longer
+than a loss's sums; tensordict's list of classes grows, and would have all compiled again."""
 _IN_REGISTERS: dict[str, Any] = {
     "realize_opcount_threshold": 200,
     "realize_reads_threshold": 1000,
@@ -35,7 +38,7 @@ def fused(function: Callable[P, T], in_parts: bool = False) -> Callable[P, T]:
     torch._dynamo.config.recompile_limit = max(torch._dynamo.config.recompile_limit, _SHAPES)
     warnings.filterwarnings("ignore", message="Dynamo detected a call to a `functools.lru_cache`-wrapped function")
     options = _IN_PARTS if in_parts else _IN_REGISTERS
-    return torch.compile(function, fullgraph=True, dynamic=False, options=options)
+    return torch.compile(function, fullgraph=True, dynamic=False, options=options | COMMON)
 
 
 def check_compiler(device: torch.device) -> None:
