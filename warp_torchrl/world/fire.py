@@ -4,7 +4,6 @@ One synchronous tick, all from the state before it (WARP-CA, cellular automaton)
 state and of one uniform draw a cell.
 """
 
-import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -36,6 +35,7 @@ from warp_torchrl.world.kernel import alexandridis, ellipse, slope_factor
 from warp_torchrl.world.landscape import holds_trees
 from warp_torchrl.world.law import Clipped, Law
 from warp_torchrl.world.pattern import chance_by_pattern, pattern_table
+from warp_torchrl.world.rates import growth, in_a_tick, spontaneous_ignition
 from warp_torchrl.world.spread import expected_ignitions, gains, ignition_chance
 from warp_torchrl.world.state import EMBER, FIRST_FIRE, OLDEST, WorldState, is_burning
 
@@ -215,7 +215,8 @@ class Fire:
         """Join the chance to be ignited by neighbours with that of spontaneous ignition."""
         if self.beta == 0.0:
             return spread
-        spontaneous = look_up(self._spontaneous(state.cells[0].numel()), state.cells)
+        chances = spontaneous_ignition(self.beta, state.cells[0].numel(), self.ticks_per_stage)
+        spontaneous = look_up(chances, state.cells)
         spontaneous.mul_(number(self.is_fuel(state) & above(state.alpha, 0.0)))
         return (1.0 - spontaneous).mul_(spread).add_(spontaneous)
 
@@ -241,11 +242,11 @@ class Fire:
         q = self.chance_to_ignite(state)
         grows = None
         if self.growth:
-            leaves = look_up(self._growth(), cells).mul_(1.0 - q)
+            leaves = look_up(growth(self.tau, self.ticks_per_stage), cells).mul_(1.0 - q)
             grows = ~below(u, torch.sub(1.0, leaves, out=leaves))  # u < 1: none grows where p is 0
         if self.p_regrow > 0.0:
             bare = equal(cells, 0) & holds_trees(state.landscape.cover) & ~as_mask(byte(state.firebreak))
-            regrows = bare & below(u, self._in_a_tick(self.p_regrow))
+            regrows = bare & below(u, in_a_tick(self.p_regrow, self.ticks_per_stage))
             grows = regrows if grows is None else grows | regrows
         state, due_cells = self._age_fires(state, due), byte(due)[:, None, None]
         ignite = narrow(byte(below(u, q)) * due_cells)
@@ -293,29 +294,6 @@ class Fire:
 
     def _law(self) -> Law:
         return Clipped()
-
-    def _in_a_tick(self, chance: float) -> float:
-        """Return the chance in one tick of what has this chance in one of the paper's."""
-        if self.ticks_per_stage == 1 or chance == 1.0:
-            return chance
-        return -math.expm1(math.log1p(-chance) / self.ticks_per_stage)
-
-    def _growth(self) -> tuple[float, ...]:
-        """Return p_grow of each cell code, exp(-age / S_max tau) (WARP-CA, growth)."""
-
-        def chance(code: int) -> float:
-            return self._in_a_tick(math.exp(-code / OLDEST * self.tau)) if 1 <= code < OLDEST else 0.0
-
-        return tuple(chance(code) for code in range(EMBER + 1))
-
-    def _spontaneous(self, cells: int) -> tuple[float, ...]:
-        """Return p_spont of each cell code, beta exp(10 age / S_max - 10) / (H W) (WARP-CA, spontaneous ignition)."""
-
-        def chance(code: int) -> float:
-            p = min(1.0, self.beta * math.exp(10.0 * code / OLDEST - 10.0) / cells)
-            return self._in_a_tick(p) if 1 <= code <= OLDEST else 0.0
-
-        return tuple(chance(code) for code in range(EMBER + 1))
 
 
 def _as_front(expected: Tensor) -> Tensor:
