@@ -15,9 +15,6 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 _SHAPES = 256  # that one function may be compiled for; torch stops at 8
-COMMON: dict[str, Any] = {"guard_filter_fn": torch.compiler.skip_guard_on_globals_unsafe}
-"""Options of whatever is compiled. Names of modules stay what they are, and to look at them at every call takes longer
-than a loss's sums; tensordict's list of classes grows, and would have all compiled again."""
 _IN_REGISTERS: dict[str, Any] = {
     "realize_opcount_threshold": 200,
     "realize_reads_threshold": 1000,
@@ -28,6 +25,12 @@ _IN_PARTS: dict[str, Any] = {
 }  # else each element of a stack asks which of its parts it is of
 
 
+_NOISE = (
+    "Dynamo detected a call to a `functools.lru_cache`-wrapped function",  # of constants, which stay what they are
+    "torch._dynamo.config.inline_inbuilt_nn_modules is deprecated",  # in tensordict
+)
+
+
 @cache
 def fused(function: Callable[P, T], in_parts: bool = False) -> Callable[P, T]:
     """Return a function of tensors that changes nothing as one loop, compiled for each shape anew when it is called.
@@ -36,9 +39,24 @@ def fused(function: Callable[P, T], in_parts: bool = False) -> Callable[P, T]:
     more than the comparisons that made it. A function that is fused ``in_parts`` keeps what is asked for often.
     """
     torch._dynamo.config.recompile_limit = max(torch._dynamo.config.recompile_limit, _SHAPES)
-    warnings.filterwarnings("ignore", message="Dynamo detected a call to a `functools.lru_cache`-wrapped function")
-    options = _IN_PARTS if in_parts else _IN_REGISTERS
-    return torch.compile(function, fullgraph=True, dynamic=False, options=options | COMMON)
+    return compiled(function, fullgraph=True, **(_IN_PARTS if in_parts else _IN_REGISTERS))
+
+
+def compiled(function: Callable[P, T], fullgraph: bool = False, **options: Any) -> Callable[P, T]:
+    """Return a function that is compiled for each shape anew when it is called.
+
+    Names of modules are taken to stay what they are: to look at them at every call takes longer than a loss's sums, and
+    tensordict's list of classes grows, which would have all compiled again.
+
+    Args:
+        function: Of tensors.
+        fullgraph: Whether a part that cannot be compiled is an error.
+        options: Of Inductor.
+    """
+    for message in _NOISE:
+        warnings.filterwarnings("ignore", message=message)
+    options["guard_filter_fn"] = torch.compiler.skip_guard_on_globals_unsafe
+    return torch.compile(function, fullgraph=fullgraph, dynamic=False, options=options)
 
 
 def check_compiler(device: torch.device) -> None:
