@@ -54,6 +54,16 @@ def test_what_reads_the_state_knows_only_the_world(module):
     assert "torchrl" not in {name.split("/")[0] for name in imports(module)}
 
 
+@pytest.mark.parametrize("module", [name for name in MODULES if name.startswith("world/")] + READS_STATE)
+def test_tensors_are_compared_with_numbers_and_not_with_members_of_enumerations(module):
+    # Inside a function that torch compiles such a comparison is False, without a word.
+    for node in ast.walk(ast.parse(FILES[module].read_text())):
+        if isinstance(node, ast.Compare):
+            members = [each for each in (node.left, *node.comparators) if isinstance(each, ast.Attribute)]
+            owners = {each.value.id for each in members if isinstance(each.value, ast.Name)}
+            assert not owners & {"Cover", "Action", "Stream"}, f"line {node.lineno}"
+
+
 READ_OF_OBSERVATIONS = {
     "models/facing": ("observation/frame",),  # how they are turned
     "models/model": ("observation/frame",),

@@ -50,7 +50,7 @@ class Paper(Reward):
         failed = (action == int(Action.EXTINGUISH)) & ~outcome.extinguished
         failed |= (action == int(Action.CLEAR)) & ~cleared
         award = (
-            self.move * (action <= Action.NORTH_WEST)
+            self.move * (action <= int(Action.NORTH_WEST))
             + self.extinguish * outcome.extinguished
             + self.failed * failed
             + self.clear * cleared

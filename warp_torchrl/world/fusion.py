@@ -20,11 +20,8 @@ _IN_REGISTERS: dict[str, Any] = {
     "realize_reads_threshold": 1000,
     "realize_acc_reads_threshold": 1000,
 }
-_IN_PARTS: dict[str, Any] = {
-    "max_pointwise_cat_inputs": 0
-}  # else each element of a stack asks which of its parts it is of
-
-
+# Else each element of a stack asks which of its parts it is of.
+_IN_PARTS: dict[str, Any] = {"max_pointwise_cat_inputs": 0}
 _NOISE = (
     "Dynamo detected a call to a `functools.lru_cache`-wrapped function",  # of constants, which stay what they are
     "torch._dynamo.config.inline_inbuilt_nn_modules is deprecated",  # in tensordict

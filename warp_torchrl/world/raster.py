@@ -92,7 +92,7 @@ class Raster:
             age = _to_age("age", layers["age"], known["age"], self.full_age)
         if "canopy" in layers:
             age = _to_age("canopy", layers["canopy"], known["canopy"], 100.0)
-            age = np.where((cover == Cover.FOREST) & (age != DRAWN), np.maximum(age, 1), np.uint8(DRAWN))
+            age = np.where((cover == int(Cover.FOREST)) & (age != DRAWN), np.maximum(age, 1), np.uint8(DRAWN))
         assets = _to_worth(layers["assets"], known["assets"]) if "assets" in layers else None
         crop = Crop(
             cover=cover,

@@ -24,7 +24,7 @@ def starting_cells(key: Tensor, cover: Tensor, burning: Tensor, n_agents: int, s
         The corner's (row, column), int64 [B, 2], and the agents', int64 [B, A, 2] [cells].
     """
     height, width = cover.shape[1:]
-    taken = (cover == Cover.LAKE) | burning
+    taken = (cover == int(Cover.LAKE)) | burning
     rows = torch.arange(height, device=cover.device)
     columns = torch.arange(width, device=cover.device)
     corner = (uniform(key, 0, Stream.START, (2,)) < 0.5).to(torch.int64)

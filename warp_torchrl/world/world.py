@@ -116,7 +116,7 @@ class World:
             raise ValueError("landscape: a map has no tree that can burn, so there is no fire to start")
         vehicles = self.team.place(key, ground.cover, lit)
         index = vehicles.position[..., 0] * self.size[1] + vehicles.position[..., 1]
-        if (ground.cover.flatten(1).gather(1, index) == Cover.LAKE).any():
+        if (ground.cover.flatten(1).gather(1, index) == int(Cover.LAKE)).any():
             raise ValueError(f"team.n_agents must fit on a map's dry ground, got {self.team.n_agents}")
         state = quiet_state(
             ground, self.fire, self.air(key, self.size, ground.corner), key, vehicles, self.side_of_cell
