@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from torch._inductor.exc import InvalidCxxCompiler
 
 from warp_torchrl.config import (
     Record,
@@ -206,3 +207,15 @@ def test_a_yaml_file_that_was_edited_is_read_anew(tmp_path, monkeypatch):
 )
 def test_worlds_are_told_by_what_differs_from_their_scenario(overrides, expected):
     assert world_overrides(plain(compose_config("train", overrides))) == expected
+
+
+def test_only_training_asks_for_a_compiler(monkeypatch):
+    def none() -> str:
+        raise InvalidCxxCompiler
+
+    monkeypatch.setattr("torch._inductor.cpp_builder.get_cpp_compiler", none)
+    plan = settings(plain(compose_config("train", ["compile=true"])))
+    with pytest.raises(ConfigError, match="compile must be false here"):
+        plan.check_training()
+    assert plan.make_env(1, 0).reset()["done"].shape == (1, 1)  # what was trained elsewhere is played here
+    settings(plain(compose_config("train", []))).check_training()

@@ -188,6 +188,7 @@ def _check_first(name: str, arguments: Sequence[str]) -> None:
 def _check_training(config: DictConfig, overrides: Sequence[str]) -> None:
     if config.resume is None:
         plan = settings(plain(config))
+        plan.check_training()
         if config.start_from is not None:
             check_start(plan, checkpoints.newest(config.start_from)[0])
         return
@@ -198,7 +199,7 @@ def _check_training(config: DictConfig, overrides: Sequence[str]) -> None:
     if (folder / checkpoints.MANIFEST).exists():
         raise ConfigError(f"resume must be a run folder, got one of its checkpoints: {folder}")
     found, _ = checkpoints.newest(folder)
-    settings(plain(recompose(found.record())))
+    settings(plain(recompose(found.record()))).check_training()
 
 
 def _check_evaluation(config: DictConfig, overrides: Sequence[str]) -> None:

@@ -124,8 +124,18 @@ class Settings:
                 f"seed must be in 0..243, so that no training world has an evaluation seed, got {self.seed}"
             )
         _check_device(self.device)
+
+    def check_training(self) -> None:
+        """Check what training asks of the machine, and playing what was trained does not.
+
+        Raises:
+            ConfigError: If ``compile`` is asked for where there is no compiler.
+        """
         if self.compile:
-            check_compiler(torch.device(self.device))
+            try:
+                check_compiler(torch.device(self.device))
+            except ValueError as error:
+                raise ConfigError(str(error)) from None
 
     def make_env(self, n_worlds: int, seed: int, fuse: bool = False) -> WildfireEnv:
         """Return an environment of the run's scenario, on the run's device."""
