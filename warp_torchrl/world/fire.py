@@ -249,7 +249,7 @@ class Fire:
             regrows = bare & below(u, in_a_tick(self.p_regrow, self.ticks_per_stage))
             grows = regrows if grows is None else grows | regrows
         state, due_cells = self._age_fires(state, due), byte(due)[:, None, None]
-        ignite = narrow(byte(below(u, q)) * due_cells)
+        ignite = byte(below(u, q)) * due_cells
         after = choose(ignite, FIRST_FIRE, state.cells)
         if grows is not None:
             after += byte(grows) * due_cells

@@ -22,7 +22,8 @@ def wide(codes: Tensor) -> Tensor:
 
 def narrow(codes: Tensor) -> Tensor:
     """Return codes that were made ``wide`` as uint8."""
-    return codes.to(torch.uint8) if is_compiling() else codes
+    # Inductor has an instruction that makes int8 of sixteen numbers, and makes uint8 of them one by one.
+    return codes.to(torch.int8).view(torch.uint8) if is_compiling() else codes
 
 
 def at_least(codes: Tensor, bound: int) -> Tensor:
@@ -78,7 +79,7 @@ def as_mask(codes: Tensor) -> Tensor:
 
 def like(plane: Tensor, codes: Tensor) -> Tensor:
     """Return codes 0 and 1 of ``byte`` in the type of a plane of flags, maybe in their own memory."""
-    return codes.to(plane.dtype) if is_compiling() else codes.view(plane.dtype)
+    return narrow(codes) if is_compiling() else codes.view(plane.dtype)
 
 
 def number(mask: Tensor) -> Tensor:

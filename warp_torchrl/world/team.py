@@ -8,7 +8,6 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.flags import as_mask, byte, like
 from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.role import ROLES, RoleTable, role_table
@@ -230,17 +229,19 @@ class Team:
         """Write the credited acts into the maps, as sums of differences so that their order does not matter."""
 
         def add(plane: Tensor, difference: Tensor) -> Tensor:
-            return plane.flatten(1).scatter_add(1, target, difference).view_as(plane)
+            codes = plane.view(torch.uint8).flatten(1)
+            return codes.scatter_add(1, target, difference.to(torch.uint8)).view_as(plane).view(plane.dtype)
 
-        old = state.cells.flatten(1).gather(1, target)
-        age = state.age.flatten(1).gather(1, target)
-        put_out_before = as_mask(byte(state.extinguished.flatten(1).gather(1, target)))
+        def there(plane: Tensor) -> Tensor:
+            return plane.view(torch.uint8).flatten(1).gather(1, target)
+
+        old, age = there(state.cells), there(state.age)
         return state.replace(
             cells=add(state.cells, hit * (age - old) - cut * old),
             age=add(state.age, -(hit * age)),
-            extinguished=like(state.extinguished, add(byte(state.extinguished), byte(hit & ~put_out_before))),
-            firebreak=like(state.firebreak, add(byte(state.firebreak), byte(cut))),
-            wet=add(state.wet, hit * (wet_ticks - state.wet.flatten(1).gather(1, target))),
+            extinguished=add(state.extinguished, hit * (1 - there(state.extinguished))),
+            firebreak=add(state.firebreak, cut),
+            wet=add(state.wet, hit * (wet_ticks - there(state.wet))),
         )
 
     @staticmethod
