@@ -1,13 +1,16 @@
 """What an agent sees about itself: its own square of the map, north up."""
 
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import torch
 from torch import Tensor
-from torch.nn.functional import one_hot
+from torch.compiler import is_compiling
+from torch.nn.functional import one_hot, pad
 
-from warp_torchrl.world.flags import byte, equal, narrow
+from warp_torchrl.world.flags import at_least, byte, equal, narrow, wide
 from warp_torchrl.world.role import ROLE_NAMES
 from warp_torchrl.world.state import FIRST_FIRE, WorldState, is_burning, is_tree
 from warp_torchrl.world.world import World
@@ -34,6 +37,10 @@ ELEVATION_SCALE = 100.0
 class Window:
     """The squares of cells about the agents."""
 
+    position: Tensor
+    """(row, column) of the agents, int64 [B, A, 2] [cells]."""
+    radius: int
+    """r [cells]; V = 2 r + 1."""
     index: Tensor
     """Flat index of each cell, moved to the border where it is off the map, int64 [B, A V V]."""
     inside: Tensor
@@ -42,6 +49,17 @@ class Window:
     def of(self, plane: Tensor) -> Tensor:
         """Return what a plane [B, H, W] of numbers shows, [B, A, V, V]; 0 beyond the map."""
         return plane.flatten(1).gather(1, self.index).view_as(self.inside).mul_(self.inside)
+
+    def of_each(self, *planes: Tensor) -> list[Tensor]:
+        """Return what up to four planes [B, H, W] of codes 0..255, uint8 or ``wide``, show, likewise.
+
+        A function that is fused reads them at once, as the four bytes of a word.
+        """
+        if not is_compiling():
+            return [self.of(plane) for plane in planes]
+        word = reduce(operator.or_, (wide(plane) << 8 * byte for byte, plane in enumerate(planes)))
+        shown = _squares_in_memory(word, self.position, self.radius)
+        return [(shown >> 8 * byte) & 255 for byte in range(len(planes))]
 
 
 def window(position: Tensor, size: Sequence[int], radius: int) -> Window:
@@ -57,27 +75,87 @@ def window(position: Tensor, size: Sequence[int], radius: int) -> Window:
     row, column = position[..., 0, None] + away, position[..., 1, None] + away
     on_row, on_column = (row >= 0) & (row < height), (column >= 0) & (column < width)
     index = row.clamp(0, height - 1)[..., None] * width + column.clamp(0, width - 1)[..., None, :]
-    return Window(index.flatten(1), narrow(byte(on_row)[..., None] * byte(on_column)[..., None, :]))
+    inside = narrow(byte(on_row)[..., None] * byte(on_column)[..., None, :])
+    return Window(position, radius, index.flatten(1), inside)
+
+
+def _squares(plane: Tensor, position: Tensor, radius: int) -> Tensor:
+    """Return what a plane [B, H, W] shows about the agents, [B, A, V, V]; 0 beyond the map."""
+    worlds, height, width = plane.shape
+    side = 2 * radius + 1
+    line, padded = width + 2 * radius, pad(plane, (radius, radius, radius, radius))
+    world = torch.arange(worlds, device=plane.device)[:, None] * ((height + 2 * radius) * line)
+    first = (world + position[..., 0] * line + position[..., 1])[..., None]
+    first = first + torch.arange(side, device=plane.device) * line  # cell of each row of a square
+    rows = padded.flatten().unfold(0, side, 1).index_select(0, first.flatten())
+    return rows.view(*position.shape[:2], side, side)
+
+
+# A compiler would look up cell after cell, and ask of each whether it is on the map.
+_squares_in_memory = torch.library.custom_op(
+    "warp_torchrl::squares", _squares, mutates_args=(), schema="(Tensor plane, Tensor position, int radius) -> Tensor"
+)
+
+
+@_squares_in_memory.register_fake
+def _(plane: Tensor, position: Tensor, radius: int) -> Tensor:
+    return plane.new_empty(*position.shape[:2], 2 * radius + 1, 2 * radius + 1)
+
+
+def _as_channels(channels: Sequence[Tensor]) -> Tensor:
+    """Return channels [B, A, V, V], uint8 or ``wide``, as one tensor, uint8 [B, A, C, V, V]."""
+    if not is_compiling():
+        return _stacked(channels)
+    return _stacked_in_memory([narrow(channel).contiguous() for channel in channels])
+
+
+def _stacked(parts: Sequence[Tensor]) -> Tensor:
+    return torch.stack(tuple(parts), dim=2)
+
+
+# A compiler would write squares of odd sides a few cells at a time.
+_stacked_in_memory = torch.library.custom_op(
+    "warp_torchrl::stacked", _stacked, mutates_args=(), schema="(Tensor[] parts) -> Tensor"
+)
+_stacked_in_memory.register_fake(_stacked)
 
 
 def egocentric_view(state: WorldState, world: World, radius: int) -> Tensor:
     """Return the agents' own views in the channels ``CHANNELS``, uint8 [B, A, C, V, V]."""
     seen, elevation = window(state.vehicles.position, state.cells.shape[1:], radius), state.landscape.elevation
-    cells = seen.of(state.cells)
+    code, wet, alpha, threat = _shown(state, world, seen)
+    cells, inside = code & _CELLS, byte(at_least(code, _ON_MAP))
     role = world.team.table(cells.device).index
     channels = (
-        (1 - seen.inside) * 255,
-        _as_byte(seen.of(state.alpha)),
+        (inside ^ 1) * 255,
+        alpha,
         ages(cells),
         stages(cells),
-        seen.of(byte(state.burned)) * byte(equal(cells, 0)) * 255,
-        seen.of(byte(state.firebreak)) * 255,
-        seen.of(state.wet).clamp_(max=10) * 25,
-        seen.inside * 128 if elevation is None else _relative_elevation(elevation, seen),
-        _as_byte(seen.of(world.front(state)).add_(seen.of(world.chance(state)))),  # World.threat
+        byte(equal(code & (_CELLS | _BURNED), _BURNED)) * 255,
+        byte(equal(code & _FIREBREAK, _FIREBREAK)) * 255,
+        wet.clamp_(max=10) * 25,
+        inside * 128 if elevation is None else _relative_elevation(elevation, seen),
+        threat,
         *_others(state.vehicles.position, role, radius).unbind(2),
     )
-    return narrow(torch.stack(channels, dim=2))
+    return _as_channels(channels)
+
+
+_CELLS, _BURNED, _FIREBREAK, _ON_MAP = 0x0F, 0x10, 0x20, 0x40
+
+
+def _shown(state: WorldState, world: World, seen: Window) -> list[Tensor]:
+    """Return the agents' squares of the map in bytes, uint8 or ``wide`` [B, A, V, V] each.
+
+    They are the cells' codes, with what has burned, firebreaks and the map as bits above them, and how wet, flammable
+    and threatened (``World.threat``) they are.
+    """
+    burned, firebreak = wide(state.burned.view(torch.uint8)), wide(state.firebreak.view(torch.uint8))
+    code = torch.add(wide(state.cells), burned, alpha=_BURNED).add_(firebreak, alpha=_FIREBREAK).add_(_ON_MAP)
+    if is_compiling():
+        return seen.of_each(code, state.wet, _share(state.alpha), _share(world.threat(state)))
+    threat = seen.of(world.front(state)).add_(seen.of(world.chance(state)))
+    return [*seen.of_each(code, state.wet), _share(seen.of(state.alpha)), _share(threat)]
 
 
 def ages(cells: Tensor) -> Tensor:
@@ -90,16 +168,22 @@ def stages(cells: Tensor) -> Tensor:
     return (cells - (FIRST_FIRE - 1)) * byte(is_burning(cells)) * 51
 
 
-def _as_byte(fractions: Tensor) -> Tensor:
-    """Return 255 times numbers in 0..1, cut to whole ones, uint8; the numbers are used up."""
-    return fractions.mul_(255.0).to(torch.int32).to(torch.uint8)  # at once it takes twice the time
+def _share(fractions: Tensor) -> Tensor:
+    """Return 255 times numbers in 0..1, cut to whole ones, uint8 or ``wide``."""
+    return _as_codes(fractions * 255.0)
+
+
+def _as_codes(numbers: Tensor) -> Tensor:
+    """Return numbers in 0..255, cut to whole ones, uint8 or ``wide``."""
+    codes = numbers.to(torch.int32)
+    return codes if is_compiling() else codes.to(torch.uint8)  # at once it takes twice the time
 
 
 def _relative_elevation(elevation: Tensor, seen: Window) -> Tensor:
     heights = seen.of(elevation)
     middle = heights.shape[-1] // 2
     own = heights[:, :, middle, middle, None, None]
-    return ((heights - own) / ELEVATION_SCALE).clamp_(-1.0, 1.0).mul_(127.0).add_(128.0).to(torch.uint8)
+    return _as_codes(((heights - own) / ELEVATION_SCALE).clamp_(-1.0, 1.0).mul_(127.0).add_(128.0))
 
 
 def _others(position: Tensor, role: Tensor, radius: int) -> Tensor:

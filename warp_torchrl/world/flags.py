@@ -23,7 +23,7 @@ def wide(codes: Tensor) -> Tensor:
 def narrow(codes: Tensor) -> Tensor:
     """Return codes that were made ``wide`` as uint8."""
     # Inductor has an instruction that makes int8 of sixteen numbers, and makes uint8 of them one by one.
-    return codes.to(torch.int8).view(torch.uint8) if is_compiling() else codes
+    return codes if codes.dtype == torch.uint8 else codes.to(torch.int8).view(torch.uint8)
 
 
 def at_least(codes: Tensor, bound: int) -> Tensor:
