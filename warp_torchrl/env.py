@@ -1,22 +1,22 @@
 """The environment: joins world, observation, reward and metrics to TorchRL. It has no physics of its own."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import torch
 from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
 from torchrl.envs import EnvBase
 
-from warp_torchrl.metrics import metrics
-from warp_torchrl.observation import Observation, Surroundings, central_state
+from warp_torchrl.observation import Observation, Surroundings
 from warp_torchrl.render import render
 from warp_torchrl.reward import Efficiency, Reward
+from warp_torchrl.scene import Scene, Seen
 from warp_torchrl.specs import make_specs
 from warp_torchrl.starts import Start, Starts
-from warp_torchrl.world.fusion import check_compiler, fused
+from warp_torchrl.world.fusion import check_compiler
 from warp_torchrl.world.role import ROLES
-from warp_torchrl.world.state import Outcome, Transition, WorldState, in_bytes, in_flags
+from warp_torchrl.world.state import Transition, WorldState
 from warp_torchrl.world.world import World
 
 
@@ -68,7 +68,7 @@ class WildfireEnv(EnvBase):
         self.validate = self.device.type == "cpu" if validate is None else validate
         if fuse:
             check_compiler(self.device)
-        self._fuses = fuse
+        self._scene = Scene(self.world, self.observation, self.reward_function, fuse)
         names, roles = self.world.team.agent_names, self.world.team.agent_roles
         self.agent_names = names
         self.group_map = {"agents": list(names)}
@@ -216,8 +216,7 @@ class WildfireEnv(EnvBase):
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         action = self._checked(tensordict.get(("agents", "action"), None))
-        transition, seen = self._play(action)
-        reward = self.reward_function(transition)
+        transition, seen, reward = self._scene.play(self.world_state, action)
         self._state = transition.after
         self._episode_reward = self._episode_reward + reward.mean(1)[:, 0]
         out = self._told(transition.after, seen, self._episode_reward)
@@ -225,16 +224,6 @@ class WildfireEnv(EnvBase):
             self.watcher(transition)
         out.set(("agents", "reward"), reward)
         return out
-
-    def _play(self, action: Tensor) -> tuple[Transition, "_Seen"]:
-        """Take a step, and return it and what is seen after it."""
-        before = self.world_state
-        if not self._fuses:
-            transition = self.world.step(before, action)
-            return transition, _see(self.world, self.observation, self.world.with_outlook(transition.after))
-        after, outcome, outlook = fused(_step)(self.world, in_bytes(before), action)
-        seen = fused(_see, in_parts=True)(self.world, self.observation, after.replace(**outlook))
-        return Transition(before=before, outcome=outcome, after=in_flags(after), batch_size=self.batch_size), seen
 
     def _set_seed(self, seed: int | None) -> None:
         if seed is None:
@@ -260,10 +249,10 @@ class WildfireEnv(EnvBase):
 
     def _observe(self, state: WorldState, episode_reward: Tensor | None = None) -> TensorDict:
         """Return observations, mask, central state, flags and metrics of the worlds."""
-        seen = _see(self.world, self.observation, self.world.with_outlook(state))
+        seen = self._scene.see(state)
         return self._told(state, seen, self._episode_reward if episode_reward is None else episode_reward)
 
-    def _told(self, state: WorldState, seen: "_Seen", episode_reward: Tensor) -> TensorDict:
+    def _told(self, state: WorldState, seen: Seen, episode_reward: Tensor) -> TensorDict:
         """Return what is seen of worlds as TorchRL wants it."""
         batch = state.batch_size
         team = [*batch, self.n_agents]
@@ -283,31 +272,6 @@ class WildfireEnv(EnvBase):
             batch_size=batch,
             device=self.device,
         )
-
-
-class _Seen(NamedTuple):
-    """What is seen of worlds after a step."""
-
-    views: dict[str, Tensor]
-    action_mask: Tensor
-    metrics: dict[str, Tensor]
-    state: Tensor
-
-
-def _step(world: World, state: WorldState, action: Tensor) -> tuple[WorldState, Outcome, dict[str, Tensor | None]]:
-    """Return the worlds after a step, what the actions came to, and what the worlds keep for all who look."""
-    transition = world.step(state, action)
-    seen = world.with_outlook(transition.after)
-    return transition.after, transition.outcome, {"front": seen.front, "chance": seen.chance, "fuel": seen.fuel}
-
-
-def _see(world: World, observation: Observation, state: WorldState) -> _Seen:
-    return _Seen(
-        observation(state, world),
-        world.action_mask(state),
-        metrics(state, world.horizon),
-        central_state(state, world),
-    )
 
 
 def _fill(template: WorldState, entries: dict[str, Tensor]) -> WorldState:

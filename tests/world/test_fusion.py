@@ -15,12 +15,12 @@ except InvalidCxxCompiler:
     pytest.skip("no C++ compiler, so nothing can be fused", allow_module_level=True)
 
 SMALL = ["landscape.size=12", "n_worlds=5", "horizon=40"]
-BRIEFLY = ["fire=spread", "landscape.relief=200", "steps_per_tick=1", "team.n_agents=2"]
+BRIEFLY = ["fire=spread", "landscape.relief=200", "steps_per_tick=1", "team.n_agents=2", "reward.shaping=0.5"]
 AT_LENGTH = [
     ["fire=paper", "wind=wandering", "fire.growth=true", "fire.beta=50", "fire.p_regrow=0.05", "fire.wet_ticks=2"],
-    ["fire=hazard", "landscape.relief=100", "wind=wandering", "team.roles=[ugv,uav]", "team.tank=3"],
+    ["fire=hazard", "landscape.relief=100", "wind=wandering", "team.roles=[ugv,uav]", "team.tank=3", "reward=time"],
     ["fire=paper", "observation=paper", "team.allow_stay=false", "team.extinguish_p=0.5", "reward=paper"],
-    ["fire=spread", "landscape.size=[9,16]", "observation.centred=true", "fire.neighbours=4"],
+    ["fire=spread", "landscape.size=[9,16]", "observation.centred=true", "fire.neighbours=4", "reward=collaborative"],
 ]
 
 

@@ -8,7 +8,7 @@ from functools import reduce
 import torch
 from torch import Tensor
 from torch.compiler import is_compiling
-from torch.nn.functional import one_hot, pad
+from torch.nn.functional import one_hot
 
 from warp_torchrl.world.flags import at_least, byte, equal, narrow, wide
 from warp_torchrl.world.role import ROLE_NAMES
@@ -80,15 +80,7 @@ def window(position: Tensor, size: Sequence[int], radius: int) -> Window:
 
 
 def _squares(plane: Tensor, position: Tensor, radius: int) -> Tensor:
-    """Return what a plane [B, H, W] shows about the agents, [B, A, V, V]; 0 beyond the map."""
-    worlds, height, width = plane.shape
-    side = 2 * radius + 1
-    line, padded = width + 2 * radius, pad(plane, (radius, radius, radius, radius))
-    world = torch.arange(worlds, device=plane.device)[:, None] * ((height + 2 * radius) * line)
-    first = (world + position[..., 0] * line + position[..., 1])[..., None]
-    first = first + torch.arange(side, device=plane.device) * line  # cell of each row of a square
-    rows = padded.flatten().unfold(0, side, 1).index_select(0, first.flatten())
-    return rows.view(*position.shape[:2], side, side)
+    return window(position, plane.shape[1:], radius).of(plane)
 
 
 # A compiler would look up cell after cell, and ask of each whether it is on the map.

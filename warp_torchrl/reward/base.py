@@ -1,7 +1,7 @@
 """What all rewards have in common: the team's share, scale and potential-based shaping."""
 
 from dataclasses import dataclass, fields
-from typing import Literal
+from typing import ClassVar, Literal
 
 from torch import Tensor
 
@@ -53,6 +53,16 @@ class Reward:
         mean = own.mean(dim=1, keepdim=True)
         reward = self.scale * ((1.0 - self.team_share) * own + self.team_share * mean)
         return (reward * ~transition.before.done[:, None])[..., None]
+
+    @property
+    def fuses(self) -> bool:
+        """Return whether ``torch.compile`` gains by it: it asks counts and distances alone, and loops over no map.
+
+        What a reward ``own`` does is known to those that say so by ``counts_alone``.
+        """
+        return self.counts_alone and (self.shaping == 0.0 or self.potential == "distance")
+
+    counts_alone: ClassVar[bool] = False
 
     def own(self, transition: Transition) -> Tensor:
         """Return what each agent earns before sharing and shaping, float32 [B, A]."""

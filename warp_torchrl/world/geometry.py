@@ -8,8 +8,9 @@ import math
 
 import torch
 from torch import Tensor
+from torch.compiler import is_compiling
 
-from warp_torchrl.world.flags import byte
+from warp_torchrl.world.flags import byte, counting
 
 DIRECTIONS = ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1))
 """(row, column) offset of N, NE, E, SE, S, SW, W, NW [cells]."""
@@ -43,13 +44,11 @@ def chebyshev_distance(position: Tensor, mask: Tensor) -> Tensor:
 def _moves(position: Tensor, mask: Tensor, dtype: torch.dtype, far: int) -> Tensor:
     """Return what ``chebyshev_distance`` does, of another type and ``far`` where the mask is False."""
     height, width = mask.shape[-2:]
-    place = position.to(torch.int16)
-    rows = torch.arange(height, dtype=torch.int16, device=mask.device)
-    columns = torch.arange(width, dtype=torch.int16, device=mask.device)
-    row_distance = (rows - place[..., :1]).abs_().to(dtype)
-    column_distance = (columns - place[..., 1:]).abs_().to(dtype)
+    place = position.to(torch.int32)
+    row_distance = (counting(height, position) - place[..., :1]).abs_().to(dtype)
+    column_distance = (counting(width, position) - place[..., 1:]).abs_().to(dtype)
     distance = torch.maximum(row_distance[..., :, None], column_distance[..., None, :])
-    beyond = byte(~mask).to(dtype) * far  # a maximum is many times faster than masked_fill
+    beyond = (byte(mask) ^ 1).to(dtype) * far  # a maximum is many times faster than masked_fill
     return torch.maximum(distance, beyond[:, None])
 
 
@@ -63,9 +62,11 @@ def distance_to_nearest(position: Tensor, mask: Tensor) -> Tensor:
     Returns:
         int16 [B, A] [cells]; ``FAR`` where nothing is marked.
     """
+    if is_compiling():
+        return _moves(position, mask, torch.int32, FAR).flatten(2).amin(2).to(torch.int16)
     if max(mask.shape[-2:]) > 255:
-        return chebyshev_distance(position, mask).amin((2, 3))
-    distance = _moves(position, mask, torch.uint8, 255).amin((2, 3))  # bytes are many times faster
+        return chebyshev_distance(position, mask).flatten(2).amin(2)
+    distance = _moves(position, mask, torch.uint8, 255).flatten(2).amin(2)  # bytes are many times faster
     return torch.where(distance == 255, FAR, distance.to(torch.int16))
 
 

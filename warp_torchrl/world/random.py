@@ -16,6 +16,8 @@ import torch
 from torch import Tensor
 from torch.compiler import is_compiling
 
+from warp_torchrl.world.flags import counting
+
 _GOLDEN = -7046029254386353131  # 2^64 / golden ratio, odd, as a signed word
 _SPLITMIX = (-4658895280553007687, -7723592293110705685)
 _MULTIPLIERS = (0x21F0AAAD, 0xD35A2D97 - 2**32, 0x735A2D97)
@@ -76,8 +78,7 @@ def uniform(key: Tensor, tick: Tensor | int, stream: Stream, shape: tuple[int, .
         float32 [B, *shape]. Never 1, so that ``u < 1`` always holds; multiples of 2^-32 near 0, so that events of
         probability 1e-8 happen as often as they should.
     """
-    index = (_counted if is_compiling() else _count)(key, math.prod(shape))
-    return uniform_at(key, tick, stream, index).view(-1, *shape)
+    return uniform_at(key, tick, stream, counting(math.prod(shape), key)[None]).view(-1, *shape)
 
 
 def uniform_at(key: Tensor, tick: Tensor | int, stream: Stream, index: Tensor) -> Tensor:
@@ -120,16 +121,6 @@ def _key_words(key: Tensor, tick: Tensor | int, stream: Stream) -> tuple[Tensor,
     return word.to(torch.int32), (word >> 32).to(torch.int32)
 
 
-def _count(key: Tensor, length: int) -> Tensor:
-    """Return 0, 1, ... below a length, int32 [1, length], on a key's device."""
-    return torch.arange(length, dtype=torch.int32, device=key.device)[None]
-
-
-# A compiler would make the numbers one by one of each vector, which on CPUs takes as long as to mix them.
-_counted = torch.library.custom_op(
-    "warp_torchrl::count", _count, mutates_args=(), schema="(Tensor key, int length) -> Tensor"
-)
-_counted.register_fake(_count)
 # A compiler would write the mixer out again wherever a draw asks for its word.
 _mixed = torch.library.custom_op(
     "warp_torchrl::splitmix64", _splitmix64, mutates_args=(), schema="(Tensor word) -> Tensor"
