@@ -135,9 +135,9 @@ def held_state(state: Tensor) -> Tensor:
     along = torch.arange(side, device=state.device) + 0.5
     place = torch.stack([(each * along).sum(-1) for each in (team.sum(-1), team.sum(-2))], dim=-1)
     frame = _facing(_pull_from(place / team.sum((-2, -1))[..., None], state[..., _FIRE, :, :]))
-    turned = frame.maps(state)
-    happening = (turned[..., _FIRE, :, :] > 0) | (turned[..., _AGENTS, :, :] > 0).any(-3)
-    shown = _moved(turned, _corner(happening))
+    happening = (state[..., _FIRE, :, :] > 0) | (team > 0)
+    start = _corner(frame.maps(happening[..., None, :, :])[..., 0, :, :])
+    shown = _shown(state, frame, start)
     quarters = state[..., -1, :, :].unflatten(-1, (2, side // 2)).unflatten(-3, (2, side // 2))
     clock, wind = quarters[..., 0, 0, :, 0], quarters[..., 1, 0, :, 0]
     constants = torch.stack((clock, _wind(wind, frame)), dim=-2)[..., :, None, :, None]
@@ -161,15 +161,19 @@ def _corner(marked: Tensor) -> Tensor:
     return torch.stack(found, dim=-1)
 
 
-def _moved(maps: Tensor, start: Tensor) -> Tensor:
-    """Return maps [..., C, S, S] from the row and column ``start`` on, int64 [..., 2]; 0 off the map."""
+def _shown(maps: Tensor, frame: Frame, start: Tensor) -> Tensor:
+    """Return maps [..., C, S, S] as they are in the frame from the row and column ``start`` on, int64 [..., 2].
+
+    Off the map there is 0.
+    """
     side = maps.shape[-1]
     lines = start[..., None] + torch.arange(side, device=maps.device)
     row, column = lines.clamp(0, side - 1).unbind(-2)
-    cell = (row[..., :, None] * side + column[..., None, :]).flatten(-2)
+    in_frame = (row[..., :, None] * side + column[..., None, :]).flatten(-2)
+    cell = _cells(side, maps.device)[frame.index].gather(-1, in_frame)
     shown = maps.flatten(-2).gather(-1, cell.unsqueeze(-2).expand(*maps.shape[:-2], -1)).view(maps.shape)
     down, across = ((lines >= 0) & (lines < side)).unbind(-2)
-    return shown * (down[..., :, None] & across[..., None, :]).unsqueeze(-3)
+    return shown.mul_((down[..., :, None] & across[..., None, :]).unsqueeze(-3))
 
 
 _FIRE = STATE.index("fire")
