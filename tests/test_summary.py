@@ -1,6 +1,8 @@
 """What a sweep came to: runs that are gathered, the table, the figure."""
 
 import json
+import signal
+import subprocess
 import sys
 
 import numpy as np
@@ -131,3 +133,12 @@ def test_the_figure_is_drawn(sweep, tmp_path):
 
     draw(gather(sweep), tmp_path / "summary.png")
     assert np.ptp(imread(tmp_path / "summary.png")[..., :3]) > 0.5
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGPIPE"), reason="no pipes that are closed under a writer")
+def test_a_reader_that_has_seen_enough_gets_no_traceback(sweep):
+    command = [sys.executable, "-u", "-m", "warp_torchrl.summary", str(sweep)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
+        run.stdout.close()  # long before the table is there
+        assert run.stderr.read() == ""
+    assert run.returncode == -signal.SIGPIPE

@@ -5,6 +5,7 @@ A sweep ends with them; ``python -m warp_torchrl.summary FOLDER ...`` makes them
 
 import argparse
 import json
+import signal
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from textwrap import fill
@@ -231,4 +232,6 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
+    if hasattr(signal, "SIGPIPE"):
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # who reads the first lines only, with head, is done then
     main()
