@@ -81,6 +81,13 @@ def test_agents_see_each_other_and_not_themselves():
     assert channel(view, "other_uav").tolist() == [[0, 0, 0], [0, 0, 0], [0, 63, 0]]
 
 
+@pytest.mark.parametrize(("agents", "shown"), [(1, 0), (2, 63), (5, 252), (7, 252)])
+def test_up_to_four_others_are_told_apart_on_a_cell_and_oneself_is_none(agents, shown):
+    state, world = drawn([[5] * 6] * 6, [[2, 2]] * agents)
+    view = egocentric_view(state, world, 1)
+    assert channel(view, "other_ugv").tolist() == [[0, 0, 0], [0, shown, 0], [0, 0, 0]]
+
+
 def test_elevation_is_relative_to_the_agent():
     slope = torch.arange(5).mul(50.0).expand(5, 5)
     state, world = drawn([[5] * 5] * 5, [[2, 2]], elevation=slope)

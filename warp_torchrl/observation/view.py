@@ -8,7 +8,6 @@ from functools import reduce
 import torch
 from torch import Tensor
 from torch.compiler import is_compiling
-from torch.nn.functional import one_hot
 
 from warp_torchrl.world.flags import at_least, byte, equal, narrow, wide
 from warp_torchrl.world.role import ROLE_NAMES
@@ -183,8 +182,8 @@ def _others(position: Tensor, role: Tensor, radius: int) -> Tensor:
     side, roles = 2 * radius + 1, len(ROLE_NAMES)
     row, column = (position[:, None] - position[:, :, None] + radius).unbind(-1)  # of each in each other's square
     is_near = (row >= 0) & (row < side) & (column >= 0) & (column < side)
+    is_near &= ~torch.eye(len(role), dtype=torch.bool, device=role.device)
     index = torch.where(is_near, (role * side + row) * side + column, roles * side**2)
     count = torch.zeros(*row.shape[:2], roles * side**2 + 1, dtype=torch.uint8, device=role.device)
     count = count.scatter_add(2, index, torch.ones_like(index, dtype=torch.uint8))[..., :-1]
-    middle = one_hot((role * side + radius) * side + radius, roles * side**2).to(torch.uint8)  # the agent's own
-    return (count.clamp(max=4) - middle).mul_(63).unflatten(-1, (roles, side, side))
+    return count.clamp(max=4).mul_(63).unflatten(-1, (roles, side, side))

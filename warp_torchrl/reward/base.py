@@ -54,15 +54,13 @@ class Reward:
         reward = self.scale * ((1.0 - self.team_share) * own + self.team_share * mean)
         return (reward * ~transition.before.done[:, None])[..., None]
 
+    counts_alone: ClassVar[bool] = False
+    """Whether ``own`` reads counts and vehicles alone, and no map; a class says so that knows it."""
+
     @property
     def fuses(self) -> bool:
-        """Return whether ``torch.compile`` gains by it: it asks counts and distances alone, and loops over no map.
-
-        What a reward ``own`` does is known to those that say so by ``counts_alone``.
-        """
+        """Return whether ``compile=true`` compiles it: not what loops over maps, as floods and exposure do."""
         return self.counts_alone and (self.shaping == 0.0 or self.potential == "distance")
-
-    counts_alone: ClassVar[bool] = False
 
     def own(self, transition: Transition) -> Tensor:
         """Return what each agent earns before sharing and shaping, float32 [B, A]."""
