@@ -68,6 +68,21 @@ def test_a_function_is_compiled_once_for_all_who_ask():
     assert fused(entries) is not fused(entries, in_parts=True)
 
 
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("counting", (7, torch.zeros(2))),
+        ("splitmix64", (torch.arange(5),)),
+        ("in_a_row", (torch.ones(2, 3, 4, dtype=torch.uint8),)),
+        ("squares", (torch.ones(2, 6, 5, dtype=torch.int32), torch.tensor([[[0, 4]], [[5, 1]]]), 2)),
+        ("stacked", ([torch.ones(2, 3, 5, 5), torch.zeros(2, 3, 5, 5)],)),
+    ],
+)
+def test_what_is_kept_in_memory_is_what_the_compiler_is_told(name, arguments):
+    operator = getattr(torch.ops.warp_torchrl, name).default
+    torch.library.opcheck(operator, arguments, test_utils=("test_schema", "test_faketensor"))
+
+
 def test_a_missing_compiler_is_told(monkeypatch):
     def none() -> str:
         raise InvalidCxxCompiler

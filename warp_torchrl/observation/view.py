@@ -10,6 +10,7 @@ from torch import Tensor
 from torch.compiler import is_compiling
 
 from warp_torchrl.world.flags import at_least, byte, equal, narrow, wide
+from warp_torchrl.world.fusion import kept_in_memory
 from warp_torchrl.world.role import ROLE_NAMES
 from warp_torchrl.world.state import FIRST_FIRE, WorldState, is_burning, is_tree
 from warp_torchrl.world.world import World
@@ -56,9 +57,9 @@ class Window:
         """
         if not is_compiling():
             return [self.of(plane) for plane in planes]
-        word = reduce(operator.or_, (wide(plane) << 8 * byte for byte, plane in enumerate(planes)))
-        shown = _squares_in_memory(word, self.position, self.radius)
-        return [(shown >> 8 * byte) & 255 for byte in range(len(planes))]
+        word = reduce(operator.or_, (wide(plane) << 8 * place for place, plane in enumerate(planes)))
+        shown = _squares(word, self.position, self.radius)
+        return [(shown >> 8 * place) & 255 for place in range(len(planes))]
 
 
 def window(position: Tensor, size: Sequence[int], radius: int) -> Window:
@@ -78,37 +79,25 @@ def window(position: Tensor, size: Sequence[int], radius: int) -> Window:
     return Window(position, radius, index.flatten(1), inside)
 
 
+def _square(plane: Tensor, position: Tensor, radius: int) -> Tensor:
+    return plane.new_empty(*position.shape[:2], 2 * radius + 1, 2 * radius + 1)
+
+
+# A compiler would look up cell after cell, and ask of each whether it is on the map.
+@kept_in_memory("(Tensor plane, Tensor position, int radius) -> Tensor", like=_square)
 def _squares(plane: Tensor, position: Tensor, radius: int) -> Tensor:
     return window(position, plane.shape[1:], radius).of(plane)
 
 
-# A compiler would look up cell after cell, and ask of each whether it is on the map.
-_squares_in_memory = torch.library.custom_op(
-    "warp_torchrl::squares", _squares, mutates_args=(), schema="(Tensor plane, Tensor position, int radius) -> Tensor"
-)
-
-
-@_squares_in_memory.register_fake
-def _(plane: Tensor, position: Tensor, radius: int) -> Tensor:
-    return plane.new_empty(*position.shape[:2], 2 * radius + 1, 2 * radius + 1)
-
-
 def _as_channels(channels: Sequence[Tensor]) -> Tensor:
     """Return channels [B, A, V, V], uint8 or ``wide``, as one tensor, uint8 [B, A, C, V, V]."""
-    if not is_compiling():
-        return _stacked(channels)
-    return _stacked_in_memory([narrow(channel).contiguous() for channel in channels])
-
-
-def _stacked(parts: Sequence[Tensor]) -> Tensor:
-    return torch.stack(tuple(parts), dim=2)
+    return _stacked([narrow(channel).contiguous() for channel in channels] if is_compiling() else list(channels))
 
 
 # A compiler would write squares of odd sides a few cells at a time.
-_stacked_in_memory = torch.library.custom_op(
-    "warp_torchrl::stacked", _stacked, mutates_args=(), schema="(Tensor[] parts) -> Tensor"
-)
-_stacked_in_memory.register_fake(_stacked)
+@kept_in_memory("(Tensor[] channels) -> Tensor")
+def _stacked(channels: list[Tensor]) -> Tensor:
+    return torch.stack(channels, dim=2)
 
 
 def egocentric_view(state: WorldState, world: World, radius: int) -> Tensor:

@@ -12,6 +12,8 @@ import torch
 from torch import Tensor
 from torch.compiler import is_compiling
 
+from warp_torchrl.world.fusion import kept_in_memory
+
 _WORDS = 128
 
 
@@ -133,17 +135,8 @@ def numbers(values: tuple[float, ...], device: torch.device) -> Tensor:
     return torch.tensor(values, dtype=torch.float32, device=device)
 
 
+# A compiler would make the numbers of each vector one by one, which on CPUs takes as long as to mix them for a draw.
+@kept_in_memory("(int length, Tensor beside) -> Tensor")
 def counting(length: int, beside: Tensor) -> Tensor:
     """Return 0, 1, ... below a length, int32 [length], where another tensor lives, one that is in memory anyway."""
-    return (_counting_in_memory if is_compiling() else _counting)(beside, length)
-
-
-def _counting(beside: Tensor, length: int) -> Tensor:
     return torch.arange(length, dtype=torch.int32, device=beside.device)
-
-
-# A compiler would make the numbers of each vector one by one, which on CPUs takes as long as to mix them for a draw.
-_counting_in_memory = torch.library.custom_op(
-    "warp_torchrl::counting", _counting, mutates_args=(), schema="(Tensor beside, int length) -> Tensor"
-)
-_counting_in_memory.register_fake(_counting)

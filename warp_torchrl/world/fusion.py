@@ -6,10 +6,11 @@ same, and on the CPU every bit of a world, but for the last places of exponentia
 
 import warnings
 from collections.abc import Callable
-from functools import cache
+from functools import cache, wraps
 from typing import Any, ParamSpec, TypeVar
 
 import torch
+from torch.compiler import is_compiling
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -54,6 +55,30 @@ def compiled(function: Callable[P, T], fullgraph: bool = False, **options: Any) 
         warnings.filterwarnings("ignore", message=message)
     options["guard_filter_fn"] = torch.compiler.skip_guard_on_globals_unsafe
     return torch.compile(function, fullgraph=fullgraph, dynamic=False, options=options)
+
+
+def kept_in_memory(schema: str, like: Callable[..., Any] | None = None) -> Callable[[Callable[P, T]], Callable[P, T]]:
+    """Return what makes a function one that fused functions call as it is, and whose result they keep in memory.
+
+    A compiler would write it out again for each who asks, or make a question of each element of what is a slice.
+
+    Args:
+        schema: Of its arguments and its result, in torch's language.
+        like: Returns a tensor of the result's shape and type; None takes the function itself.
+    """
+
+    def kept(function: Callable[P, T]) -> Callable[P, T]:
+        name = f"warp_torchrl::{function.__name__.strip('_')}"
+        operator = torch.library.custom_op(name, function, mutates_args=(), schema=schema)
+        operator.register_fake(like or function)
+
+        @wraps(function)
+        def either(*args: P.args, **kwargs: P.kwargs) -> T:
+            return (operator if is_compiling() else function)(*args, **kwargs)
+
+        return either
+
+    return kept
 
 
 def check_compiler(device: torch.device) -> None:

@@ -14,9 +14,9 @@ from enum import IntEnum
 
 import torch
 from torch import Tensor
-from torch.compiler import is_compiling
 
 from warp_torchrl.world.flags import counting
+from warp_torchrl.world.fusion import kept_in_memory
 
 _GOLDEN = -7046029254386353131  # 2^64 / golden ratio, odd, as a signed word
 _SPLITMIX = (-4658895280553007687, -7723592293110705685)
@@ -46,6 +46,8 @@ def _shift_right(word: Tensor, bits: int) -> Tensor:
     return (word >> bits).bitwise_and_((1 << (64 - bits)) - 1)
 
 
+# A compiler would write the mixer out again wherever a draw asks for its word.
+@kept_in_memory("(Tensor word) -> Tensor", like=torch.empty_like)
 def _splitmix64(word: Tensor) -> Tensor:
     word = (word ^ _shift_right(word, 30)) * _SPLITMIX[0]
     word = (word ^ _shift_right(word, 27)) * _SPLITMIX[1]
@@ -117,15 +119,8 @@ def uniform_among(key: Tensor, tick: Tensor | int, stream: Stream, world: Tensor
 def _key_words(key: Tensor, tick: Tensor | int, stream: Stream) -> tuple[Tensor, Tensor]:
     """Return the two words that a world's draws are hashed with, int32 [B] each."""
     counter = torch.zeros_like(key).add_(tick).mul_(64).add_(int(stream))
-    word = _mixed(key + counter * _GOLDEN) if is_compiling() else _splitmix64(key + counter * _GOLDEN)
+    word = _splitmix64(key + counter * _GOLDEN)
     return word.to(torch.int32), (word >> 32).to(torch.int32)
-
-
-# A compiler would write the mixer out again wherever a draw asks for its word.
-_mixed = torch.library.custom_op(
-    "warp_torchrl::splitmix64", _splitmix64, mutates_args=(), schema="(Tensor word) -> Tensor"
-)
-_mixed.register_fake(torch.empty_like)
 
 
 def _mix(index: Tensor, low: Tensor, high: Tensor) -> Tensor:

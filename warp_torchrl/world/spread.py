@@ -12,6 +12,7 @@ from torch.compiler import is_compiling
 from torch.nn.functional import pad
 
 from warp_torchrl.world.flags import byte, narrow, number
+from warp_torchrl.world.fusion import kept_in_memory
 from warp_torchrl.world.geometry import DIRECTIONS, DISTANCES
 from warp_torchrl.world.law import Law
 
@@ -105,32 +106,22 @@ def expected_ignitions(
     return total if is_compiling() else _on_map(total)
 
 
-def _in_a_row(maps: Tensor) -> Tensor:
-    """Lay [B, H, W] maps out in one row, each with a zero column and row after it and a margin at both ends."""
-    return _row_in_memory(maps) if is_compiling() else _row(maps)
-
-
-def _row(maps: Tensor) -> Tensor:
+def _as_long(maps: Tensor) -> Tensor:
     worlds, height, width = maps.shape
-    margin, cells = width + 2, worlds * (height + 1) * (width + 1)
-    row = maps.new_empty(margin + cells + margin)
-    row[:margin] = row[margin + cells :] = 0
-    inner = row[margin : margin + cells].view(worlds, height + 1, width + 1)
-    inner[:, height] = inner[:, :, width] = 0
-    inner[:, :height, :width] = maps
-    return row
+    return maps.new_empty(2 * (width + 2) + worlds * (height + 1) * (width + 1))
 
 
 # A compiler would ask of every neighbour anew whether it is on the map, and that one by one.
-_row_in_memory = torch.library.custom_op(
-    "warp_torchrl::in_a_row", _row, mutates_args=(), schema="(Tensor maps) -> Tensor"
-)
-
-
-@_row_in_memory.register_fake
-def _(maps: Tensor) -> Tensor:
+@kept_in_memory("(Tensor maps) -> Tensor", like=_as_long)
+def _in_a_row(maps: Tensor) -> Tensor:
+    """Lay [B, H, W] maps out in one row, each with a zero column and row after it and a margin at both ends."""
     worlds, height, width = maps.shape
-    return maps.new_empty(2 * (width + 2) + worlds * (height + 1) * (width + 1))
+    margin, row = width + 2, _as_long(maps)
+    row[:margin] = row[-margin:] = 0
+    inner = row[margin:-margin].view(worlds, height + 1, width + 1)
+    inner[:, height] = inner[:, :, width] = 0
+    inner[:, :height, :width] = maps
+    return row
 
 
 def _offset(direction: int, shape: Shape) -> int:
