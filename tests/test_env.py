@@ -8,6 +8,7 @@ from torchrl.envs.utils import check_env_specs
 from tests.conftest import small_world
 from warp_torchrl import WildfireEnv
 from warp_torchrl.observation import Local, Paper, Surroundings
+from warp_torchrl.reward import Efficiency
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.state import Action
@@ -236,3 +237,12 @@ def test_cuda_equals_cpu_and_a_step_does_not_synchronise():
     for _ in range(20):
         stepped(ours, team_of(ours))
     assert (ours.world_state.cells == theirs.world_state.cells.cpu()).all()
+
+
+def test_another_reward_may_be_given_to_an_environment(make_small_env):
+    env = make_small_env(2)
+    env.reset()
+    env.reward_function = Efficiency(act=1000.0)
+    acting = torch.full((2, env.n_agents), int(Action.EXTINGUISH))
+    reward = env.step(env.full_done_spec.zero().set(("agents", "action"), acting))["next", "agents", "reward"]
+    assert (reward < -900.0).all()

@@ -68,7 +68,7 @@ class WildfireEnv(EnvBase):
         self.validate = self.device.type == "cpu" if validate is None else validate
         if fuse:
             check_compiler(self.device)
-        self._scene = Scene(self.world, self.observation, self.reward_function, fuse)
+        self._fuses = fuse
         names, roles = self.world.team.agent_names, self.world.team.agent_roles
         self.agent_names = names
         self.group_map = {"agents": list(names)}
@@ -224,6 +224,11 @@ class WildfireEnv(EnvBase):
             self.watcher(transition)
         out.set(("agents", "reward"), reward)
         return out
+
+    @property
+    def _scene(self) -> Scene:
+        """Return what is played, and how it is looked at, as they are now: another reward may be assigned."""
+        return Scene(self.world, self.observation, self.reward_function, self._fuses)
 
     def _set_seed(self, seed: int | None) -> None:
         if seed is None:
