@@ -93,8 +93,8 @@ def turned_world(state, turn):
     """Return whole worlds turned."""
     leaves = {
         name: turned_map(value, *turn)
-        for name, value in state.to_dict().items()
-        if isinstance(value, torch.Tensor) and value.shape[1:] == (SIZE, SIZE)
+        for name, value in state.leaves().items()
+        if "." not in name and value.shape[1:] == (SIZE, SIZE)
     }
     middle = (SIZE - 1) / 2
     old = state.vehicles

@@ -28,7 +28,7 @@ def drawn(cells: list[list[int]], cover: Cover | list[list[int]] = Cover.FOREST,
     ground = torch.full_like(codes, cover) if isinstance(cover, int) else torch.tensor([cover], dtype=torch.uint8)
     world, key = World(), torch.zeros(1, dtype=torch.int64)
     team = Team(n_agents=len(at)).place(key, ground, codes)
-    landscape = Landscape(cover=ground, age=codes, elevation=None, batch_size=[1])
+    landscape = Landscape(cover=ground, age=codes, elevation=None)
     state = quiet_state(
         landscape, world.fire, torch.zeros(1, 2, 1, 1), key, team.replace(position=torch.tensor([at])), 30.0
     )

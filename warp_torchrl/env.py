@@ -140,12 +140,12 @@ class WildfireEnv(EnvBase):
 
     def state_dict(self, *args: object, **kwargs: object) -> dict[str, Any]:
         """Return all that changes in the environment: seeds, episodes, worlds, returns."""
-        worlds = {} if self._state is None else self._state.to_tensordict().flatten_keys(".").to_dict()
+        worlds = {} if self._state is None else self._state.leaves()
         return {
             "seeds": self._seeds.clone(),
             "episodes": self._episodes.clone(),
             "episode_reward": self._episode_reward.clone(),
-            "worlds": {name: value.clone() for name, value in worlds.items() if isinstance(value, Tensor)},
+            "worlds": {name: value.clone() for name, value in worlds.items()},
         }
 
     def load_state_dict(self, state_dict: dict[str, Any], *args: object, **kwargs: object) -> None:
@@ -281,19 +281,11 @@ class WildfireEnv(EnvBase):
 
 def _fill(template: WorldState, entries: dict[str, Tensor]) -> WorldState:
     """Return worlds with the given entries, checked against a template's names, shapes and types."""
-    expected = {
-        name: value for name, value in template.to_tensordict().flatten_keys(".").items() if isinstance(value, Tensor)
-    }
+    expected = template.leaves()
     if set(expected) != set(entries):
         raise ValueError(f"worlds must have the entries {sorted(expected)}, got {sorted(entries)}")
-    filled = template.clone()
     for name, value in entries.items():
         old = expected[name]
         if value.shape != old.shape or value.dtype != old.dtype:
             raise ValueError(f"{name} must be {old.dtype} {list(old.shape)}, got {value.dtype} {list(value.shape)}")
-        *path, leaf = name.split(".")
-        owner = filled
-        for part in path:
-            owner = getattr(owner, part)
-        setattr(owner, leaf, value.to(old.device).clone())
-    return filled
+    return template.with_leaves({name: value.to(expected[name].device).clone() for name, value in entries.items()})

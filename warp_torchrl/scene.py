@@ -69,7 +69,7 @@ class Scene:
     def _play_fused(self, before: WorldState, action: Tensor) -> Played:
         given, earns = in_bytes(before), self.reward if self.reward.fuses else None
         after, outcome, outlook = fused(_step)(self.world, given, action)
-        told = Transition(before=given, outcome=outcome, after=after, batch_size=before.batch_size)
+        told = Transition(before=given, outcome=outcome, after=after)
         seen, reward = fused(_look_and_earn, in_parts=True)(self.world, self.observation, earns, told, outlook)
         transition = told.replace(before=before, after=in_flags(after))
         return Played(transition, seen, self.reward(transition) if reward is None else reward)

@@ -82,7 +82,7 @@ def draw(
     air = wind if isinstance(wind, Tensor) else torch.tensor(wind)[:, None, None]
     height = None if elevation is None else in_each(torch.tensor(elevation, dtype=torch.float32))
     trees = torch.where(burning, age_on_fire, cells)
-    land = Landscape(cover=in_each(cover), age=in_each(trees), elevation=height, batch_size=[worlds])
+    land = Landscape(cover=in_each(cover), age=in_each(trees), elevation=height)
     vehicles = team.place(key, land.cover, in_each(burning))
     places = torch.tensor(at or [(0, 0)] * team.n_agents)
     vehicles = vehicles.replace(position=in_each(places))
@@ -100,13 +100,7 @@ def drawn(state: WorldState, world: int = 0) -> str:
     return " ".join("".join(CELLS[code] for code in row) for row in state.cells[world].tolist())
 
 
-def planes(state: WorldState) -> dict[str, Tensor]:
-    """Return every tensor of the state by name."""
-    leaves = state.to_tensordict().flatten_keys(".").items()
-    return {name: leaf for name, leaf in leaves if isinstance(leaf, Tensor)}
-
-
 def differing(state: WorldState, other: WorldState) -> list[str]:
     """Return the names of the tensors that are not the same bit for bit."""
-    theirs = planes(other)
-    return [name for name, plane in planes(state).items() if not torch.equal(plane, theirs[name])]
+    theirs = other.leaves()
+    return [name for name, plane in state.leaves().items() if not torch.equal(plane, theirs[name])]

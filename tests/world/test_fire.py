@@ -7,6 +7,7 @@ import torch
 from scipy.stats import chi2
 from torch import Tensor
 
+from warp_torchrl.world.batch import concatenated
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.hazard import HazardFire
 from warp_torchrl.world.random import Stream, uniform, world_key
@@ -146,7 +147,7 @@ def counts_of_one_tick(fire: Fire, state: WorldState, trials: int) -> Tensor:
     """Return how often each cell had each code after one tick, int64 [H, W, 16]."""
     counts = torch.zeros(*state.cells.shape[1:], 16, dtype=torch.int64)
     batch = trials // 10
-    many = torch.cat([state] * batch)
+    many = concatenated([state] * batch)
     for first in range(0, trials, batch):
         seed = torch.arange(first, first + batch)
         after = tick(fire, many.replace(key=world_key(seed, torch.zeros_like(seed))))
@@ -284,7 +285,7 @@ def test_a_tree_remembers_the_age_it_had_when_it_caught_fire() -> None:
 def test_nothing_burns_across_the_edges_of_the_map_or_into_the_next_world() -> None:
     # Two worlds in a row: fire at every border of the first, the second has none; the far columns stay dark.
     first, second = draw("a...T ..... T...a"), draw("TTTTT TTTTT TTTTT")
-    both = torch.cat([second, first, second])
+    both = concatenated([second, first, second])
     assert drawn(tick(Fire(), both, u=0.0), world=1) == "b...T ..... T...b"
     for world in (0, 2):
         assert drawn(tick(Fire(), both, u=0.0), world=world) == "TTTTT TTTTT TTTTT"

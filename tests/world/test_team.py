@@ -12,7 +12,7 @@ from warp_torchrl.world.team import Team
 from warp_torchrl.world.wind import Calm
 from warp_torchrl.world.world import World
 
-from .drawing import draw, drawn, planes
+from .drawing import draw, drawn
 
 N, NE, E, SE, S, SW, W, NW, EXTINGUISH, CLEAR, STAY = range(11)
 UGV, UAV = Team(n_agents=1), Team(n_agents=1, roles=("uav",))
@@ -467,7 +467,7 @@ MAPS_AND_PLACE = ("cells", "age", "extinguished", "burned", "firebreak", "wet", 
 
 def changed_worlds(before: WorldState, after: WorldState) -> Tensor:
     """Return in which worlds a map or a position is not what it was, bool [B]."""
-    old, new = planes(before), planes(after)
+    old, new = before.leaves(), after.leaves()
     return torch.stack([(old[name] != new[name]).flatten(1).any(dim=1) for name in MAPS_AND_PLACE]).any(dim=0)
 
 
@@ -531,7 +531,7 @@ def test_in_a_world_that_has_ended_nobody_does_anything() -> None:
     state = draw("Ta. ...", at=[(0, 0)])
     for action in range(11):
         after, outcome = act(UGV, state, action, active=False)
-        assert all(torch.equal(plane, planes(state)[name]) for name, plane in planes(after).items())
+        assert all(torch.equal(plane, state.leaves()[name]) for name, plane in after.leaves().items())
         assert not (outcome.moved | outcome.extinguished | outcome.cleared | outcome.redundant).any()
 
 

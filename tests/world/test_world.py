@@ -17,7 +17,7 @@ from warp_torchrl.world.team import Team
 from warp_torchrl.world.wind import Calm, Paper, Uniform, Wandering
 from warp_torchrl.world.world import _CELLS_AT_ONCE, World, advance, advance_some
 
-from .drawing import differing, draw, drawn, planes
+from .drawing import differing, draw, drawn
 
 STAY, EXTINGUISH, CLEAR, EAST = 10, 8, 9, 2
 
@@ -140,11 +140,11 @@ def test_seeds_and_episodes_are_different_worlds(world: World) -> None:
 
 def test_a_run_repeats_and_leaves_the_state_before_alone(world: World) -> None:
     state = run(world, start(world, range(8)), 20)
-    before = {name: plane.clone() for name, plane in planes(state).items()}
+    before = {name: plane.clone() for name, plane in state.leaves().items()}
     transition = world.step(state, chosen(world, state))
     assert differing(transition.after, world.step(state, chosen(world, state)).after) == []
     assert transition.before is state or differing(transition.before, state) == []
-    assert all(torch.equal(plane, before[name]) for name, plane in planes(state).items())
+    assert all(torch.equal(plane, before[name]) for name, plane in state.leaves().items())
 
 
 def test_teams_that_stay_away_meet_the_same_fire() -> None:

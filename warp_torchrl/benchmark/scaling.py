@@ -1,10 +1,9 @@
 """How the cost of a step grows with worlds, agents and cells, and how much memory a world takes."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
-import torch
-from tensordict import TensorDictBase
+from torch import Tensor
 
 from warp_torchrl.api import make_env
 from warp_torchrl.benchmark.machine import peak_memory
@@ -68,7 +67,9 @@ def _step_cost(scenario: str, n_worlds: int, device: str, overrides: Sequence[st
     env = make_env(scenario, n_worlds=n_worlds, device=device, overrides=overrides)
     shown = env.step(env.rand_action(env.reset()))["next"]
     memory = {
-        "kib_per_world": (_bytes(env.world_state.to_tensordict()) + _bytes(shown)) / n_worlds / 1024,
+        "kib_per_world": (_bytes(env.world_state.leaves().values()) + _bytes(shown.values(True, True)))
+        / n_worlds
+        / 1024,
         "peak_gib": peak_memory(),  # before the timing, which keeps a copy of the worlds
     }
     found = spread("ms_per_step", [1000.0 * seconds for seconds in _first_steps(env, device, repeats)])
@@ -98,6 +99,5 @@ def _first_steps(env: "WildfireEnv", device: str, repeats: int) -> list[float]:
     return seconds[1:]
 
 
-def _bytes(worlds: TensorDictBase) -> int:
-    tensors = [value for value in worlds.flatten_keys(".").values() if isinstance(value, torch.Tensor)]
-    return sum(value.numel() * value.element_size() for value in tensors)
+def _bytes(tensors: Iterable[Tensor]) -> int:
+    return sum(tensor.numel() * tensor.element_size() for tensor in tensors)

@@ -1,7 +1,8 @@
 """The fire alone: worlds without vehicles that burn from given cells, and what a fire scientist reads off them."""
 
+from dataclasses import dataclass
+
 import torch
-from tensordict import tensorclass
 from torch import Tensor
 
 from warp_torchrl.world.batch import Batch
@@ -13,7 +14,7 @@ from warp_torchrl.world.wind import Wind
 from warp_torchrl.world.world import advance, quiet_state
 
 
-@tensorclass(nocast=True)
+@dataclass(eq=False, repr=False)
 class FireHistory(Batch):
     """A fire from its first to its last tick, in each world; batch size [B]."""
 
@@ -58,7 +59,7 @@ def start_burning(
     """
     seeds = seed + torch.arange(cells.shape[0], device=cells.device)
     key = world_key(seeds, torch.zeros_like(seeds))
-    ground = Landscape(cover=cover, age=cells, elevation=elevation, batch_size=key.shape)
+    ground = Landscape(cover=cover, age=cells, elevation=elevation)
     nobody = Team(n_agents=1).place(key, cover, is_burning(cells))
     air = wind(key, (cells.shape[1], cells.shape[2]))
     state = quiet_state(ground, fire, air, key, nobody, cell_size)
@@ -94,5 +95,4 @@ def trace(state: WorldState, fire: Fire, wind: Wind, ticks: int, cell_size: floa
         arrival=arrival,
         alight=torch.stack(alight, dim=1),
         cell_size=cell_size,
-        batch_size=state.batch_size,
     )

@@ -83,7 +83,6 @@ class Crop:
             elevation=elevation,
             assets=assets,
             corner=corner,
-            batch_size=key.shape,
         )
 
     @property

@@ -159,7 +159,7 @@ class Perlin:
         if _ends(self.relief)[1] > 0.0:
             ground = self.noise(key, Stream.ELEVATION) if self.independent_elevation else noise
             elevation = self._draw(key, "relief").to(torch.float32)[:, None, None] * ground
-        return Landscape(cover=cover, age=draw_age(key, cover), elevation=elevation, batch_size=key.shape)
+        return Landscape(cover=cover, age=draw_age(key, cover), elevation=elevation)
 
     def noise(self, key: Tensor, stream: Stream = Stream.NOISE) -> Tensor:
         """Return the noise scaled to [0, 1] on each map, float32 [B, H, W]."""

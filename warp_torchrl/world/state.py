@@ -1,12 +1,12 @@
-"""What the world is made of: the tensorclasses every other module reads, and the public codes.
+"""What the world is made of: the batches every other module reads, and the public codes.
 
 Letters, everywhere: B worlds, A agents, H rows, W columns.
 """
 
+from dataclasses import dataclass
 from enum import IntEnum
 
 import torch
-from tensordict import tensorclass
 from torch import Tensor
 
 from warp_torchrl.world.batch import Batch
@@ -49,7 +49,7 @@ EMBER = 15
 """Cell code of the last stage."""
 
 
-@tensorclass(nocast=True)
+@dataclass(eq=False, repr=False)
 class Landscape(Batch):
     """The ground of each world, fixed for an episode."""
 
@@ -60,7 +60,7 @@ class Landscape(Batch):
     corner: Tensor | None = None  # int64 [B,2], (row, column) of the map's first cell in its source; None: at (0, 0)
 
 
-@tensorclass(nocast=True)
+@dataclass(eq=False, repr=False)
 class Tally(Batch):
     """Counts of the initial trees by fate; they add up to ``initial`` (trees that regrow are counted apart)."""
 
@@ -77,7 +77,7 @@ class Tally(Batch):
         return (self.preserved + self.extinguished) / self.initial
 
 
-@tensorclass(nocast=True)
+@dataclass(eq=False, repr=False)
 class Vehicles(Batch):
     """The team on the map."""
 
@@ -90,7 +90,7 @@ class Vehicles(Batch):
     last_useful: Tensor  # int32 [B,A], step of the last credited act; -1 before the first
 
 
-@tensorclass(nocast=True)
+@dataclass(eq=False, repr=False)
 class WorldState(Batch):
     """Everything that a step reads or changes; batch size [B]."""
 
@@ -131,7 +131,7 @@ class WorldState(Batch):
         return self.terminated | self.truncated
 
 
-@tensorclass(nocast=True)
+@dataclass(eq=False, repr=False)
 class Outcome(Batch):
     """What each agent's action of one step came to."""
 
@@ -143,7 +143,7 @@ class Outcome(Batch):
     target: Tensor  # int64 [B,A], flat index of the cell acted on, valid where extinguished or cleared
 
 
-@tensorclass(nocast=True)
+@dataclass(eq=False, repr=False)
 class Transition(Batch):
     """One step of every world: all that rewards, metrics and pictures read."""
 
@@ -202,5 +202,4 @@ def count_trees(state: WorldState) -> Tally:
         burned=ash,
         burning=aflame,
         alight=alight,
-        batch_size=state.batch_size,
     )

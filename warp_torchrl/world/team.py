@@ -87,7 +87,6 @@ class Team:
             acts=counter,
             redundant=counter.clone(),
             last_useful=torch.full_like(counter, -1),
-            batch_size=key.shape,
         )
 
     def open_moves(self, state: WorldState) -> Tensor:
@@ -98,9 +97,8 @@ class Team:
         """
         height, width = state.cells.shape[1:]
         roles = self.table(state.cells.device)
-        target = state.vehicles.position[:, :, None] + _offsets(state.cells.device) * roles.stride[:, None, None]
-        inside = _inside(target, height, width)
-        index = _flat_index(target, height, width)
+        away = _offsets(state.cells.device) * roles.stride[:, None, None]
+        index, inside = _places(state.vehicles.position, away, height, width)
         index = index.flatten(1)
         ground, cells = (plane.flatten(1).gather(1, index) for plane in (state.landscape.cover, state.cells))
         blocked = ((ground == int(Cover.LAKE)) | is_burning(cells)).view_as(inside)
@@ -115,10 +113,9 @@ class Team:
             Flat index of the cell, int64 [B, A], and whether there is one that can be put out, bool [B, A].
         """
         height, width = state.cells.shape[1:]
-        around = state.vehicles.position[:, :, None] + _neighbourhood(state.cells.device)
-        index = _flat_index(around, height, width)
+        index, inside = _places(state.vehicles.position, _neighbourhood(state.cells.device), height, width)
         codes = state.cells.flatten(1).gather(1, index.flatten(1)).view_as(index).to(torch.int64)
-        fits = _inside(around, height, width) & (codes >= FIRST_FIRE) & (codes <= last_spreading)
+        fits = inside & (codes >= FIRST_FIRE) & (codes <= last_spreading)
         order = torch.arange(len(_NEIGHBOURHOOD), device=codes.device)
         best = torch.where(fits, codes * 16 + order, 1 << 20).argmin(dim=-1, keepdim=True)
         return index.gather(-1, best)[..., 0], fits.any(dim=-1)
@@ -193,7 +190,6 @@ class Team:
             cleared=cut_first,
             redundant=redundant,
             target=target,
-            batch_size=state.batch_size,
         )
         return after, outcome
 
@@ -217,10 +213,9 @@ class Team:
             return tank
         height, width = state.cells.shape[1:]
         position = state.vehicles.position
-        around = position[:, :, None] + _neighbourhood(tank.device)
-        index = _flat_index(around, height, width)
+        index, inside = _places(position, _neighbourhood(tank.device), height, width)
         cover = state.landscape.cover.flatten(1).gather(1, index.flatten(1)).view_as(index)
-        by_lake = ((cover == int(Cover.LAKE)) & _inside(around, height, width)).any(dim=-1)
+        by_lake = ((cover == int(Cover.LAKE)) & inside).any(dim=-1)
         at_base = (position == state.vehicles.base[:, None]).all(dim=-1)
         return torch.where(by_lake | at_base, self.tank, tank)
 
@@ -256,15 +251,23 @@ def _is_second(target: Tensor, acting: Tensor) -> Tensor:
     return same.tril(diagonal=-1).any(dim=-1)
 
 
-def _inside(place: Tensor, height: int, width: int) -> Tensor:
-    row, column = place.unbind(-1)
-    return (row >= 0) & (row < height) & (column >= 0) & (column < width)
+def _places(position: Tensor, away: Tensor, height: int, width: int) -> tuple[Tensor, Tensor]:
+    """Return where places about the agents are, row * W + column, and which of them are on the map.
 
+    Those off the map are moved to its edge.
 
-def _flat_index(place: Tensor, height: int, width: int) -> Tensor:
-    """Return row * W + column, with places off the map moved to its edge."""
-    row, column = place.unbind(-1)
-    return row.clamp(0, height - 1) * width + column.clamp(0, width - 1)
+    Args:
+        position: int64 [B, A, 2] [cells].
+        away: (rows, columns) from an agent to each, int64 [n, 2] or [A, n, 2] [cells].
+        height: H of the map [cells].
+        width: W.
+
+    Returns:
+        int64 [B, A, n] and bool [B, A, n].
+    """
+    row, column = position[..., 0, None] + away[..., 0], position[..., 1, None] + away[..., 1]
+    on_row, on_column = row.clamp(0, height - 1), column.clamp(0, width - 1)
+    return on_row * width + on_column, (on_row == row) & (on_column == column)
 
 
 @lru_cache(maxsize=8)

@@ -144,9 +144,7 @@ class World:
         after, outcome = self.team.act(state, action, active, self.fire.last_spreading, self.fire.wet_for)
         due = active & ((state.step + 1) % self.steps_per_tick == 0)
         after = self._tick(after, due)
-        return Transition(
-            before=state, outcome=outcome, after=self._advance_clock(after, active), batch_size=state.batch_size
-        )
+        return Transition(before=state, outcome=outcome, after=self._advance_clock(after, active))
 
     def with_outlook(self, state: WorldState) -> WorldState:
         """Return worlds that keep ``front``, ``chance`` and ``fuel`` for all who ask."""
@@ -231,14 +229,13 @@ def quiet_state(
         gain=None,
         chances=None,
         vehicles=vehicles,
-        tally=Tally(*[zero] * 7, batch_size=key.shape),
+        tally=Tally(*[zero] * 7),
         key=key,
         step=zero.clone(),
         tick=zero.clone(),
         burning_area=torch.zeros_like(zero, dtype=torch.float32),
         terminated=zero > 0,
         truncated=zero > 0,
-        batch_size=key.shape,
     )
     return fire.in_wind(state.replace(tally=count_trees(state)), wind)
 
