@@ -259,23 +259,23 @@ class WildfireEnv(EnvBase):
 
     def _told(self, state: WorldState, seen: Seen, episode_reward: Tensor) -> TensorDict:
         """Return what is seen of worlds as TorchRL wants it."""
-        batch = state.batch_size
+        batch, device = state.batch_size, self.device  # which tensordicts are told, else they copy those that they hold
         team = [*batch, self.n_agents]
-        views = seen.views[""] if "" in seen.views else TensorDict(seen.views, batch_size=team)
+        views = seen.views[""] if "" in seen.views else TensorDict(seen.views, batch_size=team, device=device)
         roles = self.world.team.table(self.device).index.repeat(*batch, 1)
         agents = {"observation": views, "action_mask": seen.action_mask, "role": roles}
         info = seen.metrics | {"episode_reward": episode_reward, "episode_length": state.step.to(torch.float32)}
         return TensorDict(
             {
-                "agents": TensorDict(agents, batch_size=team),
+                "agents": TensorDict(agents, batch_size=team, device=device),
                 "state": seen.state,
-                "info": TensorDict({name: value[:, None] for name, value in info.items()}, batch_size=batch),
+                "info": TensorDict({name: value[:, None] for name, value in info.items()}, batch, device=device),
                 "done": state.done[:, None],
                 "terminated": state.terminated[:, None].clone(),
                 "truncated": state.truncated[:, None].clone(),
             },
             batch_size=batch,
-            device=self.device,
+            device=device,
         )
 
 

@@ -66,7 +66,6 @@ def test_a_function_is_compiled_once_for_all_who_ask():
 @pytest.mark.parametrize(
     ("name", "arguments"),
     [
-        ("counting", (7, torch.zeros(2))),
         ("splitmix64", (torch.arange(5),)),
         ("in_a_row", (torch.ones(2, 3, 4, dtype=torch.uint8),)),
         ("squares", (torch.ones(2, 6, 5, dtype=torch.int32), torch.tensor([[[0, 4]], [[5, 1]]]), 2)),

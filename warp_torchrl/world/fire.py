@@ -12,6 +12,7 @@ from torch import Tensor
 from torch.compiler import is_compiling
 
 from warp_torchrl.validation import check_fields
+from warp_torchrl.world.constants import numbers
 from warp_torchrl.world.edge import ByPattern, ByStrength, Edge, EdgeChances, edge_of, expected_from_edge
 from warp_torchrl.world.flags import (
     above,
@@ -27,7 +28,6 @@ from warp_torchrl.world.flags import (
     look_up,
     narrow,
     number,
-    numbers,
     put,
     wide,
 )

@@ -6,13 +6,11 @@ comparisons and ``where`` cost nothing; there bools in memory and arithmetic on 
 ``wide`` numbers and written as bytes.
 """
 
-from functools import lru_cache
-
 import torch
 from torch import Tensor
 from torch.compiler import is_compiling
 
-from warp_torchrl.world.fusion import kept_in_memory
+from warp_torchrl.world.constants import numbers
 
 _WORDS = 128
 
@@ -127,16 +125,3 @@ def put(plane: Tensor, place: Tensor, values: Tensor | int) -> Tensor:
 def look_up(table: tuple[float, ...], codes: Tensor) -> Tensor:
     """Return what a table holds for each code, float32, shape of the codes; they are uint8 and within it."""
     return numbers(table, codes.device).index_select(0, codes.flatten().to(torch.int32)).view(codes.shape)
-
-
-@lru_cache(maxsize=64)
-def numbers(values: tuple[float, ...], device: torch.device) -> Tensor:
-    """Return some numbers as a tensor, float32 [n], kept for the next time."""
-    return torch.tensor(values, dtype=torch.float32, device=device)
-
-
-# A compiler would make the numbers of each vector one by one, which on CPUs takes as long as to mix them for a draw.
-@kept_in_memory("(int length, Tensor beside) -> Tensor")
-def counting(length: int, beside: Tensor) -> Tensor:
-    """Return 0, 1, ... below a length, int32 [length], where another tensor lives, one that is in memory anyway."""
-    return torch.arange(length, dtype=torch.int32, device=beside.device)
