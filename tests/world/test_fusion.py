@@ -14,7 +14,7 @@ try:
 except InvalidCxxCompiler:
     pytest.skip("no C++ compiler, so nothing can be fused", allow_module_level=True)
 
-SMALL = ["landscape.size=12", "n_worlds=5", "horizon=40"]
+SMALL = ["landscape.size=[10,12]", "n_worlds=5", "horizon=40"]
 BRIEFLY = ["fire=spread", "landscape.relief=200", "steps_per_tick=1", "team.n_agents=2", "reward.shaping=0.5"]
 AT_LENGTH = [
     ["fire=paper", "wind=wandering", "fire.growth=true", "fire.beta=50", "fire.p_regrow=0.05", "fire.wet_ticks=2"],
@@ -66,6 +66,7 @@ def test_a_function_is_compiled_once_for_all_who_ask():
 @pytest.mark.parametrize(
     ("name", "arguments"),
     [
+        ("counting", (7, torch.zeros(2))),
         ("splitmix64", (torch.arange(5),)),
         ("in_a_row", (torch.ones(2, 3, 4, dtype=torch.uint8),)),
         ("squares", (torch.ones(2, 6, 5, dtype=torch.int32), torch.tensor([[[0, 4]], [[5, 1]]]), 2)),

@@ -80,7 +80,7 @@ def uniform(key: Tensor, tick: Tensor | int, stream: Stream, shape: tuple[int, .
         float32 [B, *shape]. Never 1, so that ``u < 1`` always holds; multiples of 2^-32 near 0, so that events of
         probability 1e-8 happen as often as they should.
     """
-    return uniform_at(key, tick, stream, counting(math.prod(shape), key.device)[None]).view(-1, *shape)
+    return uniform_at(key, tick, stream, counting(math.prod(shape), key)[None]).view(-1, *shape)
 
 
 def uniform_at(key: Tensor, tick: Tensor | int, stream: Stream, index: Tensor) -> Tensor:
