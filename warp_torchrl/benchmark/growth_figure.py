@@ -71,7 +71,7 @@ def _share_y(row: list["Axes"]) -> None:
     """Give a row of axes the same range, with room for the numbers at the ends."""
     low, high = min(axes.get_ylim()[0] for axes in row), max(axes.get_ylim()[1] for axes in row)
     for axes in row:
-        axes.set_ylim(low / (high / low) ** 0.1, high * (high / low) ** 0.06)
+        axes.set_ylim(low / (high / low) ** 0.1, high * (high / low) ** 0.1)
 
 
 def _fixed(row: dict[str, Any], varies: str) -> str:
