@@ -5,12 +5,14 @@ tensordicts took a quarter of the time of a step of one world.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any, Self, TypeVar
 
 import torch
 from torch import Tensor
 
 
+@dataclass(eq=False, repr=False)
 class Batch:
     """What dataclasses of tensors [B, ...] have in common; a field may be another batch, a number or None too."""
 
@@ -26,7 +28,7 @@ class Batch:
 
     def replace(self, **changes: Any) -> Self:
         """Return the same batch but for some fields; what is not replaced is shared."""
-        return type(self)(**{**vars(self), **changes})
+        return replace(self, **changes)
 
     def clone(self) -> Self:
         """Return a copy that shares no memory."""
