@@ -38,7 +38,7 @@ def ours(module: str) -> set[str]:
 def test_the_world_knows_torch_and_itself(module):
     assert all(name.startswith("world/") or name in GROUND for name in ours(module))
     foreign = {name.split("/")[0] for name in imports(module)}
-    assert not foreign & {"torchrl", "hydra", "omegaconf", "gymnasium", "pettingzoo", "wandb"}
+    assert not foreign & {"tensordict", "torchrl", "hydra", "omegaconf", "gymnasium", "pettingzoo", "wandb"}
 
 
 @pytest.mark.parametrize("module", GROUND)
