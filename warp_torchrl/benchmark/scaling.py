@@ -66,10 +66,9 @@ def growth_table(rows: list[dict[str, Any]]) -> str:
 def _step_cost(scenario: str, n_worlds: int, device: str, overrides: Sequence[str], repeats: int) -> dict[str, Any]:
     env = make_env(scenario, n_worlds=n_worlds, device=device, overrides=overrides)
     shown = env.step(env.rand_action(env.reset()))["next"]
+    held = _bytes(env.world_state.leaves().values()) + _bytes(shown.values(True, True))
     memory = {
-        "kib_per_world": (_bytes(env.world_state.leaves().values()) + _bytes(shown.values(True, True)))
-        / n_worlds
-        / 1024,
+        "kib_per_world": held / n_worlds / 1024,
         "peak_gib": peak_memory(),  # before the timing, which keeps a copy of the worlds
     }
     found = spread("ms_per_step", [1000.0 * seconds for seconds in _first_steps(env, device, repeats)])

@@ -39,7 +39,7 @@ class Batch:
         return self._each(lambda leaf: leaf.to(device))
 
     def __getitem__(self, index: Tensor | slice) -> Self:
-        """Return some worlds: those of a slice, of a mask bool [B], or of indices int64 [n]."""
+        """Return some worlds: those of a slice, of a mask bool [B], or of indices from 0 on, int64 [n]."""
         if isinstance(index, Tensor) and index.dtype == torch.int64:
             return self._each(lambda leaf: leaf.index_select(0, index))  # several times faster than others
         return self._each(lambda leaf: leaf[index])
