@@ -6,7 +6,7 @@ from torch._inductor.cpp_builder import get_cpp_compiler
 from torch._inductor.exc import InvalidCxxCompiler
 
 from warp_torchrl import make_env
-from warp_torchrl.world.fusion import fused
+from warp_torchrl.world.fusion import fused, kept_in_memory
 from warp_torchrl.world.state import count_trees, in_bytes, in_flags
 
 try:
@@ -76,6 +76,16 @@ def test_a_function_is_compiled_once_for_all_who_ask():
 def test_what_is_kept_in_memory_is_what_the_compiler_is_told(name, arguments):
     operator = getattr(torch.ops.warp_torchrl, name).default
     torch.library.opcheck(operator, arguments, test_utils=("test_schema", "test_faketensor"))
+
+
+def test_a_module_that_keeps_something_in_memory_may_be_imported_again():
+    for factor in (2.0, 3.0):
+
+        @kept_in_memory("(Tensor given) -> Tensor", like=torch.empty_like)
+        def times(given):
+            return given * factor  # noqa: B023, used before the next
+
+        assert torch.compile(times, backend="eager", fullgraph=True)(torch.ones(1)).item() == factor
 
 
 def test_a_missing_compiler_is_told(monkeypatch):

@@ -57,6 +57,9 @@ def compiled(function: Callable[P, T], fullgraph: bool = False, **options: Any) 
     return torch.compile(function, fullgraph=fullgraph, dynamic=False, options=options)
 
 
+_LIBRARIES: dict[str, torch.library.Library] = {}
+
+
 def kept_in_memory(schema: str, like: Callable[..., Any] | None = None) -> Callable[[Callable[P, T]], Callable[P, T]]:
     """Return what makes a function one that fused functions call as it is, and whose result they keep in memory.
 
@@ -69,9 +72,11 @@ def kept_in_memory(schema: str, like: Callable[..., Any] | None = None) -> Calla
 
     def kept(function: Callable[P, T]) -> Callable[P, T]:
         name = function.__name__.strip("_")
-        torch.library.define(f"warp_torchrl::{name}", schema)  # a ``custom_op`` takes three times as long to call
-        torch.library.impl(f"warp_torchrl::{name}", "CompositeExplicitAutograd", function)
-        torch.library.register_fake(f"warp_torchrl::{name}", like or function)
+        _LIBRARIES.pop(name, None)  # of a module that is imported again
+        library = _LIBRARIES[name] = torch.library.Library("warp_torchrl", "FRAGMENT")
+        library.define(name + schema)  # a ``custom_op`` takes three times as long to call
+        library.impl(name, function, "CompositeExplicitAutograd")
+        torch.library.register_fake(f"warp_torchrl::{name}", like or function, lib=library)
         operator = getattr(torch.ops.warp_torchrl, name).default
 
         @wraps(function)
