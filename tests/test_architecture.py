@@ -1,6 +1,7 @@
 """The floors: what may import what."""
 
 import ast
+import re
 import sys
 from pathlib import Path
 
@@ -115,3 +116,20 @@ def test_nothing_reads_pickles(module):
     assert "weights_only=False" not in source and "allow_pickle=True" not in source
     assert "pickle" not in {name.split("/")[0] for name in imports(module)}
     assert source.count("torch.load(") == source.count("weights_only=True, map_location")
+
+
+FENCE = "world/fast"
+"""Where alone words of compilers stand."""
+
+
+@pytest.mark.parametrize("module", [each for each in MODULES if not each.startswith(FENCE)])
+def test_compilers_are_spoken_of_behind_the_fence_alone(module):
+    source = FILES[module].read_text()
+    assert "is_compiling" not in source and "torch.library" not in source and "torch.ops" not in source
+    assert not re.search(r'"\(.*Tensor.*\) -> ', source), "a schema of an operator"
+
+
+@pytest.mark.parametrize("module", ["world/law", "world/fire"])
+def test_the_page_of_the_law_takes_no_fast_road(module):
+    assert len(FILES["world/law"].read_text().splitlines()) < 150
+    assert not {each for each in ours(module) if each.startswith(FENCE)}

@@ -150,7 +150,7 @@ def test_the_numpy_world_plays_the_same_law(overrides):
     state = state.replace(
         cells=torch.from_numpy(random), wet=torch.from_numpy(rng.integers(0, 2, random.shape, dtype=np.uint8))
     )
-    chance = world.fire.chance_to_ignite(state)
+    chance = world.fire.ignition_probability(state)
     u = uniform(state.key, state.tick, Stream.FIRE, world.size)
     after = world.fire.tick(state, u, torch.ones_like(state.done))
     assert chance.max() > 0.5

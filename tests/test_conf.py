@@ -79,7 +79,7 @@ def test_the_landfire_scenario_runs_on_its_raster():
     plan = settings(plain(compose_config("train", ["scenario=landfire", f"landscape.path={LANDFIRE}"])))
     env = plan.make_env(2, 0)
     env.rollout(6, break_when_any_done=False)
-    assert env.world_state.slope is not None and env.world.side_of_cell == 30.0
+    assert env.world_state.ground.slope is not None and env.world.side_of_cell == 30.0
 
 
 def test_the_landfire_scenario_has_no_path_of_its_own():

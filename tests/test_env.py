@@ -14,6 +14,7 @@ from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.state import Action
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.wind import Paper as PaperWind
+from warp_torchrl.world.world import in_wind
 
 STAY = int(Action.STAY)
 
@@ -166,15 +167,16 @@ def test_set_state_goes_on_from_given_worlds(make_small_env):
 def test_a_state_whose_wind_was_changed_burns_in_that_wind(make_small_env):
     env = make_small_env(2)
     env.reset()
-    before = env.world.threat(env.world_state)
+    before = env.world.forecast(env.world_state).fire_risk()
     gale = torch.full_like(env.world_state.wind, 15.0)
-    env.set_state(env.world_state.replace(wind=gale))
-    spread = env.world.fire.spread(env.world_state)
-    assert not torch.equal(env.world.threat(env.world_state), before)
+    env.set_state(in_wind(env.world_state, env.world.fire, gale))
+    spread = env.world.fire.spread_probability(env.world_state)
+    assert not torch.equal(env.world.forecast(env.world_state).fire_risk(), before)
     rows, columns = env.world.size
-    env.set_state(env.world_state.replace(wind=gale.expand(2, 2, rows, columns).clone()))  # the same, cell by cell
-    assert env.world_state.chances is None
-    torch.testing.assert_close(env.world.fire.spread(env.world_state), spread)
+    field = gale.expand(2, 2, rows, columns).clone()  # the same, cell by cell
+    env.set_state(in_wind(env.world_state, env.world.fire, field))
+    assert env.world_state.air.gain is None
+    torch.testing.assert_close(env.world.fire.spread_probability(env.world_state), spread)
 
 
 def _reset_state(env):

@@ -10,7 +10,7 @@ from warp_torchrl.evaluation import play
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.heuristics.base import can_be_put_out, claim_cells, list_cells, nearest_fire
 from warp_torchrl.world.array import Array
-from warp_torchrl.world.geometry import FAR, chebyshev_distance
+from warp_torchrl.world.fast.distances import FAR, chebyshev_distance
 from warp_torchrl.world.ignition import Ignition
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import Action

@@ -6,11 +6,12 @@ import torch
 from PIL import Image
 
 from warp_torchrl.render import EpisodeRecorder, render
+from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.ignition import Ignition
 from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.state import Cover, Landscape, WorldState
 from warp_torchrl.world.team import Team
-from warp_torchrl.world.world import World, quiet_state
+from warp_torchrl.world.world import World, in_wind, initial_state
 
 UGV, UAV = torch.tensor([0]), torch.tensor([1])
 
@@ -29,7 +30,7 @@ def drawn(cells: list[list[int]], cover: Cover | list[list[int]] = Cover.FOREST,
     world, key = World(), torch.zeros(1, dtype=torch.int64)
     team = Team(n_agents=len(at)).place(key, ground, codes)
     landscape = Landscape(cover=ground, age=codes, elevation=None)
-    state = quiet_state(
+    state = initial_state(
         landscape, world.fire, torch.zeros(1, 2, 1, 1), key, team.replace(position=torch.tensor([at])), 30.0
     )
     return state.replace(**{name: torch.tensor([plane]).to(getattr(state, name)) for name, plane in planes.items()})
@@ -236,7 +237,7 @@ def test_the_legend_shows_only_the_roles_that_take_part():
 @pytest.mark.parametrize("wind", [(4.0, 0.0), (-4.0, 0.0), (0.0, 4.0), (0.0, -4.0), (3.0, 3.0)])
 def test_the_arrow_points_where_the_air_goes(wind):
     field = torch.tensor(wind).view(1, 2, 1, 1).expand(1, 2, 4, 4)
-    dial = panel(drawn([[5] * 4] * 4).replace(wind=field))[190:237, 6:53].sum(-1) > 450  # inside the ring
+    dial = panel(in_wind(drawn([[5] * 4] * 4), Fire(), field))[190:237, 6:53].sum(-1) > 450  # inside the ring
     rows, columns = np.nonzero(dial)
     east, north = columns.mean() - 23, 23 - rows.mean()  # the head is the heavier end
     assert east * wind[0] + north * wind[1] > 4.0

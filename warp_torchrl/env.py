@@ -11,10 +11,10 @@ from torchrl.envs import EnvBase
 from warp_torchrl.observation import Observation, Surroundings
 from warp_torchrl.render import render
 from warp_torchrl.reward import Efficiency, Reward
-from warp_torchrl.scene import Scene, Seen
+from warp_torchrl.scene import Observations, Scene
 from warp_torchrl.specs import make_specs
 from warp_torchrl.starts import Start, Starts
-from warp_torchrl.world.fusion import check_compiler
+from warp_torchrl.world.fast.compile import check_compiler
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.state import Transition, WorldState
 from warp_torchrl.world.world import World
@@ -134,13 +134,13 @@ class WildfireEnv(EnvBase):
         if got != expected:
             raise ValueError(f"state must have [worlds, rows, columns, agents] {list(expected)}, got {list(got)}")
         given = state.to(self.device).clone()
-        self._state = self.world.fire.in_wind(given, given.wind)  # which may have been changed by hand
+        self._state = given
         self._episode_reward.zero_()
         return self._observe(self._state)
 
     def state_dict(self, *args: object, **kwargs: object) -> dict[str, Any]:
         """Return all that changes in the environment: seeds, episodes, worlds, returns."""
-        worlds = {} if self._state is None else self._state.leaves()
+        worlds = {} if self._state is None else self._state.what_changes()
         return {
             "seeds": self._seeds.clone(),
             "episodes": self._episodes.clone(),
@@ -157,9 +157,7 @@ class WildfireEnv(EnvBase):
         worlds = state_dict["worlds"]
         state = None
         if worlds:
-            template = self.world.reset(self._seeds, self._episodes)
-            state = _fill(template, worlds)
-            state = self.world.fire.in_wind(state, state.wind)  # another version's may be in another order
+            state = self.world.restored(_fill(self.world.reset(self._seeds, self._episodes), worlds))
         for name in ("seeds", "episodes", "episode_reward"):
             if state_dict[name].shape != self._seeds.shape:
                 raise ValueError(f"{name} must have shape {list(self._seeds.shape)}, got {state_dict[name].shape}")
@@ -216,10 +214,10 @@ class WildfireEnv(EnvBase):
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         action = self._checked(tensordict.get(("agents", "action"), None))
-        transition, seen, reward = self._scene.play(self.world_state, action)
+        transition, observed, reward = self._scene.step(self.world_state, action)
         self._state = transition.after
         self._episode_reward = self._episode_reward + reward.mean(1)[:, 0]
-        out = self._told(transition.after, seen, self._episode_reward)
+        out = self._pack(transition.after, observed, self._episode_reward)
         if self.watcher is not None:
             self.watcher(transition)
         out.set(("agents", "reward"), reward)
@@ -254,21 +252,22 @@ class WildfireEnv(EnvBase):
 
     def _observe(self, state: WorldState, episode_reward: Tensor | None = None) -> TensorDict:
         """Return observations, mask, central state, flags and metrics of the worlds."""
-        seen = self._scene.see(state)
-        return self._told(state, seen, self._episode_reward if episode_reward is None else episode_reward)
+        observed = self._scene.observe(state)
+        return self._pack(state, observed, self._episode_reward if episode_reward is None else episode_reward)
 
-    def _told(self, state: WorldState, seen: Seen, episode_reward: Tensor) -> TensorDict:
-        """Return what is seen of worlds as TorchRL wants it."""
-        batch, device = state.batch_size, self.device  # which tensordicts are told, else they copy those that they hold
+    def _pack(self, state: WorldState, observed: Observations, episode_reward: Tensor) -> TensorDict:
+        """Pack observations, masks and metrics into TorchRL's layout."""
+        batch, device = state.batch_size, self.device  # without a device a tensordict copies those that it holds
         team = [*batch, self.n_agents]
-        views = seen.views[""] if "" in seen.views else TensorDict(seen.views, batch_size=team, device=device)
+        entries = observed.entries
+        views = entries[""] if "" in entries else TensorDict(entries, batch_size=team, device=device)
         roles = self.world.team.table(self.device).index.repeat(*batch, 1)
-        agents = {"observation": views, "action_mask": seen.action_mask, "role": roles}
-        info = seen.metrics | {"episode_reward": episode_reward, "episode_length": state.step.to(torch.float32)}
+        agents = {"observation": views, "action_mask": observed.action_mask, "role": roles}
+        info = observed.metrics | {"episode_reward": episode_reward, "episode_length": state.step.to(torch.float32)}
         return TensorDict(
             {
                 "agents": TensorDict(agents, batch_size=team, device=device),
-                "state": seen.state,
+                "state": observed.state,
                 "info": TensorDict({name: value[:, None] for name, value in info.items()}, batch, device=device),
                 "done": state.done[:, None],
                 "terminated": state.terminated[:, None].clone(),
@@ -279,13 +278,22 @@ class WildfireEnv(EnvBase):
         )
 
 
+_FORMER = {"wind": "air.wind"} | {
+    f"landscape.{name}": f"ground.landscape.{name}" for name in ("cover", "age", "elevation", "assets", "corner")
+}
+"""Names of entries in runs that were saved before version 0.2."""
+_NO_LONGER = ("alpha", "slope", "gain", "chances")
+
+
 def _fill(template: WorldState, entries: dict[str, Tensor]) -> WorldState:
     """Return worlds with the given entries, checked against a template's names, shapes and types."""
-    expected = template.leaves()
+    entries = {_FORMER.get(name, name): value for name, value in entries.items() if name not in _NO_LONGER}
+    expected = template.what_changes()
     if set(expected) != set(entries):
         raise ValueError(f"worlds must have the entries {sorted(expected)}, got {sorted(entries)}")
     for name, value in entries.items():
         old = expected[name]
         if value.shape != old.shape or value.dtype != old.dtype:
             raise ValueError(f"{name} must be {old.dtype} {list(old.shape)}, got {value.dtype} {list(value.shape)}")
-    return template.with_leaves({name: value.to(expected[name].device).clone() for name, value in entries.items()})
+    given = {name: value.to(expected[name].device).clone() for name, value in entries.items()}
+    return template.with_leaves({**template.leaves(), **given})

@@ -10,7 +10,7 @@ import torch
 from warp_torchrl.construction import ConfigError, build, construct
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.imitation import Imitation
-from warp_torchrl.world.fusion import check_compiler
+from warp_torchrl.world.fast.compile import check_compiler
 from warp_torchrl.world.world import World
 
 COMPONENTS = (

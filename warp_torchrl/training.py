@@ -24,7 +24,7 @@ from warp_torchrl.reward_scale import RewardScale
 from warp_torchrl.settings import TRAINING_SEEDS, Settings
 from warp_torchrl.signals import Noted, Stopped
 from warp_torchrl.transfer import learnt
-from warp_torchrl.world.fusion import compiled
+from warp_torchrl.world.fast.compile import compile_function
 
 log = logging.getLogger("warp_torchrl")
 _SECONDS_BETWEEN_LINES = 15.0
@@ -50,7 +50,7 @@ class Training:
         self.frames_per_batch = settings.collector.steps * settings.n_worlds
         learner = settings.algorithm.build(self.env, settings.model, self.frames_per_batch)
         if settings.compile:
-            learner.terms = compiled(learner.terms)
+            learner.terms = compile_function(learner.terms)
         self.learner: Learner = settings.imitation.taught(learner, self.env)
         self.reward_scale = RewardScale(settings.reward.gamma) if settings.reward.normalise else None
         self.collection = settings.collector.open(

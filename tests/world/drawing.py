@@ -15,7 +15,7 @@ from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.state import Cover, Landscape, WorldState, count_trees
 from warp_torchrl.world.team import Team
-from warp_torchrl.world.world import quiet_state
+from warp_torchrl.world.world import initial_state
 
 CELLS = ".123456789Tabcde"
 GROUND = "~wgfb"
@@ -86,7 +86,7 @@ def draw(
     vehicles = team.place(key, land.cover, in_each(burning))
     places = torch.tensor(at or [(0, 0)] * team.n_agents)
     vehicles = vehicles.replace(position=in_each(places))
-    state = quiet_state(land, fire, air.expand(worlds, *air.shape), key, vehicles, 30.0)
+    state = initial_state(land, fire, air.expand(worlds, *air.shape), key, vehicles, 30.0)
     state = state.replace(
         cells=in_each(cells),
         age=in_each(trees * burning),

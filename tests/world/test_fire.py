@@ -8,11 +8,14 @@ from scipy.stats import chi2
 from torch import Tensor
 
 from warp_torchrl.world.batch import concatenated
+from warp_torchrl.world.fast import road
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.hazard import HazardFire
 from warp_torchrl.world.random import Stream, uniform, world_key
 from warp_torchrl.world.state import WorldState, is_burning
 from warp_torchrl.world.wind import Paper, Wind
+from warp_torchrl.world.wind_and_slope import slope_factor
+from warp_torchrl.world.world import in_wind
 
 from .drawing import draw, drawn, tiled
 from .literal_fire import LiteralFire
@@ -37,7 +40,7 @@ def after_ticks(fire: Fire, state: WorldState, ticks: int, u: float | None = Non
 
 
 def chance(fire: Fire, state: WorldState) -> Tensor:
-    return fire.spread(state)
+    return fire.spread_probability(state)
 
 
 # One tick against the literal loop. All covers, every fire stage, ages on both sides of A_min, wet trees, a
@@ -131,7 +134,7 @@ def test_the_expected_ignitions_are_the_literal_loop_s(compared: tuple[Fire, Wor
     assert wanted.max() > 0.5
 
 
-def test_the_threat_is_the_literal_loop_s(compared: tuple[Fire, WorldState, LiteralFire]) -> None:
+def test_the_risk_is_the_literal_loop_s(compared: tuple[Fire, WorldState, LiteralFire]) -> None:
     # Of a burning cell the neighbours that it should ignite, / 4 and at most 1; of a tree its chance to ignite.
     fire, state, literal = compared
     wanted = torch.zeros(5, 6)
@@ -140,7 +143,7 @@ def test_the_threat_is_the_literal_loop_s(compared: tuple[Fire, WorldState, Lite
             burning = literal.cells[row][column] >= 11
             expected = min(1.0, literal.expected_to_ignite(row, column) / 4.0)
             wanted[row, column] = expected if burning else literal.chance_to_ignite(row, column)
-    torch.testing.assert_close((fire.front(state) + fire.chance_to_ignite(state))[0], wanted, atol=2e-6, rtol=0)
+    torch.testing.assert_close(road.forecast(fire, state).fire_risk()[0], wanted, atol=2e-6, rtol=0)
 
 
 def counts_of_one_tick(fire: Fire, state: WorldState, trials: int) -> Tensor:
@@ -378,7 +381,7 @@ def test_only_the_slope_between_source_and_target_matters(metres: list[float]) -
 
 def test_the_cell_size_makes_the_slope() -> None:
     # 10 m over 10 m is 45 degrees: exp(0.078 * 45) = 33.448; direction 2 is east, into column 1 (row 0 is margin).
-    factor = Fire().slope_factor(torch.tensor([[[0.0, 10.0], [0.0, 10.0]]]), cell_size=10.0)
+    factor = slope_factor(torch.tensor([[[0.0, 10.0], [0.0, 10.0]]]), 10.0, Fire().slope_gain)
     assert factor.shape == (1, 8, 4, 3)
     assert factor[0, 2, 1, 1].item() == pytest.approx(33.448, rel=1e-4)
     assert factor[0, 6, 1, 0].item() == pytest.approx(1 / 33.448, rel=1e-4)
@@ -552,7 +555,9 @@ def test_with_four_neighbours_no_fire_goes_across_a_corner() -> None:
 def test_a_chance_does_not_depend_on_the_batch(wind: Wind) -> None:
     fire = Fire(beta=0.65)
     state = draw(CELLS, ground=GROUND, fire=fire, elevation=METRES, worlds=65)
-    state = state.replace(wind=wind(state.key, (5, 6)))
-    q = chance(fire, state)
-    for world in (0, 7, 64):
-        assert torch.equal(q[world : world + 1], chance(fire, state[world : world + 1]))
+    state = in_wind(state, fire, wind(state.key, (5, 6)))
+    assert state.wind.shape[2:] == (5, 6) and state.wind.abs().max() > 1.0
+    for probability in (fire.ignition_probability, lambda each: road.forecast(fire, each).ignition_probability):
+        q = probability(state)
+        for world in (0, 7, 64):
+            assert torch.equal(q[world : world + 1], probability(state[world : world + 1]))

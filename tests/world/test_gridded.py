@@ -12,7 +12,7 @@ from warp_torchrl.world.gridded import Gridded
 from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.team import Team
-from warp_torchrl.world.world import World, advance
+from warp_torchrl.world.world import World, advance, in_wind
 
 from .drawing import draw
 
@@ -54,7 +54,7 @@ def test_a_series_in_time_holds_each_field_for_its_ticks_and_the_last_for_good()
     u = np.stack([np.full((3, 4), speed) for speed in (1.0, 2.0, 3.0)])
     wind = Gridded(u=u, v=np.zeros_like(u), ticks_per_field=2)
     state = draw("TTTT TTTT TTTT", worlds=2)
-    state = state.replace(wind=wind(state.key, (3, 4)))
+    state = in_wind(state, World().fire, wind(state.key, (3, 4)))
     seen = [state.wind[0, 0, 0, 0].item()]
     for _ in range(7):
         state = advance(state, World().fire, wind, torch.tensor([True, False]))

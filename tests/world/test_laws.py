@@ -13,9 +13,10 @@ from torch import Tensor
 from warp_torchrl.world.burn import burn, start_burning, trace
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.hazard import HazardFire
-from warp_torchrl.world.kernel import length_to_breadth
 from warp_torchrl.world.state import WorldState, is_burning
 from warp_torchrl.world.wind import Uniform, constant_wind
+from warp_torchrl.world.wind_and_slope import length_to_breadth
+from warp_torchrl.world.world import in_wind
 
 CALM = Uniform(speed=0.0)
 SLOW = pytest.mark.slow
@@ -317,7 +318,7 @@ def test_chances_of_nought_and_one_are_exact_for_every_law(fire: Fire) -> None:
         cell_size=30.0,
     )
     state = state.replace(wet=(random(4) == 0).to(torch.uint8))
-    chance = fire.chance_to_ignite(state)
+    chance = fire.ignition_probability(state)
     assert ((chance >= 0.0) & (chance <= 1.0)).all()
     spreading = (is_burning(state.cells) & (state.cells <= fire.last_spreading)).float()
     reach = (
@@ -329,8 +330,8 @@ def test_chances_of_nought_and_one_are_exact_for_every_law(fire: Fire) -> None:
     everywhere = torch.ones(20, dtype=torch.bool)
     lit = (fire.tick(state, torch.zeros(20, 9, 11), everywhere).cells == 11) & (state.cells < 11)
     assert torch.equal(lit, reached & can_burn)
-    gale = state.replace(wind=torch.tensor([60.0, 0.0])[None, :, None, None].expand(20, -1, -1, -1))
-    sure = fire.chance_to_ignite(gale) == 1.0
+    gale = in_wind(state, fire, torch.tensor([60.0, 0.0])[None, :, None, None].expand(20, -1, -1, -1))
+    sure = fire.ignition_probability(gale) == 1.0
     assert sure.any()
     almost_one = torch.full((20, 9, 11), 1.0 - 2.0**-24)
     assert torch.equal((fire.tick(gale, almost_one, everywhere).cells == 11) & sure, sure)

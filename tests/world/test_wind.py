@@ -9,7 +9,7 @@ from torch import Tensor
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.wind import Calm, Paper, Uniform, Wandering, constant_wind
-from warp_torchrl.world.world import advance
+from warp_torchrl.world.world import advance, in_wind
 
 from .drawing import draw
 
@@ -106,7 +106,7 @@ def wander(wind: Wandering, worlds: int, ticks: int) -> tuple[Tensor, Tensor]:
     field = wind(state.key, (1, 4))
     fields = [field]
     for tick in range(1, ticks + 1):
-        state = state.replace(wind=fields[-1], tick=torch.full_like(state.tick, tick))
+        state = in_wind(state, Fire(), fields[-1]).replace(tick=torch.full_like(state.tick, tick))
         fields.append(wind.after_tick(state))
     u, v = torch.stack(fields)[..., 0, 0].unbind(2)
     return torch.hypot(u, v), torch.atan2(v, u)
@@ -163,14 +163,14 @@ def test_a_wandering_wind_does_not_depend_on_the_batch() -> None:
 
 @pytest.mark.parametrize("wind", [Calm(), Uniform(), Paper()])
 def test_other_winds_stay(wind) -> None:
-    state = draw("....").replace(wind=wind(keys(1), (1, 4)))
+    state = in_wind(draw("...."), Fire(), wind(keys(1), (1, 4)))
     assert not wind.changes
     assert wind.after_tick(state) is state.wind
 
 
 def test_a_wandering_wind_waits_with_a_world_that_is_not_due() -> None:
     wind, state = Wandering(), draw("....", worlds=2)
-    state = state.replace(wind=wind(state.key, (1, 4)))
+    state = in_wind(state, Fire(), wind(state.key, (1, 4)))
     after = advance(state, Fire(), wind, torch.tensor([True, False]))
     assert not torch.equal(after.wind[0], state.wind[0])
     assert torch.equal(after.wind[1], state.wind[1])

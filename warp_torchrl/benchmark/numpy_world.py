@@ -147,7 +147,7 @@ def _chances(
 ) -> np.ndarray:
     """Return the chance to be ignited from each direction by a neighbour that burns, float32 [8, H, W].
 
-    p_d = clip(alpha w_d s_d / dist_d, 0, 1), wind read at the source; see ``Fire`` and ``warp_torchrl.world.kernel``.
+    p_d = clip(alpha w_d s_d / dist_d, 0, 1), wind read at the source; see ``warp_torchrl.world.law``.
     """
     height, width = alpha.shape
     u, v = wind if wind.shape[1:] == (1, 1) else np.pad(wind, ((0, 0), (1, 1), (1, 1)))

@@ -11,9 +11,10 @@ from warp_torchrl.benchmark.numpy_world import NumpyWorld, plays
 from warp_torchrl.benchmark.tables import entry, spread_of, table
 from warp_torchrl.benchmark.timing import spread, take_turns
 from warp_torchrl.world.burn import burn
+from warp_torchrl.world.fast.compile import check_compiler, compiled
+from warp_torchrl.world.fast.road import in_bytes
 from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.fusion import check_compiler, fused
-from warp_torchrl.world.state import WorldState, in_bytes
+from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.world import World, advance
 
 _TICKS = 10  # in a repeat, and before
@@ -98,7 +99,7 @@ def tick_table(rows: list[dict[str, Any]]) -> str:
 
 
 def _ours(world: World, state: WorldState, fuse: bool) -> Callable[[], None]:
-    due, tick = torch.ones_like(state.terminated), fused(advance) if fuse else advance
+    due, tick = torch.ones_like(state.terminated), compiled(advance) if fuse else advance
     first = in_bytes(state) if fuse else state
 
     def ticks() -> None:

@@ -30,7 +30,7 @@ from warp_torchrl.gallery.measures import (
 )
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.hazard import HazardFire
-from warp_torchrl.world.kernel import length_to_breadth
+from warp_torchrl.world.wind_and_slope import length_to_breadth
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

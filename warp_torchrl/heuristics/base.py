@@ -9,7 +9,8 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.world.geometry import DIRECTIONS, FAR, nearest
+from warp_torchrl.world.fast.distances import FAR, nearest
+from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.random import Stream, uniform_at
 from warp_torchrl.world.state import Action, Cover, WorldState, is_burning
 

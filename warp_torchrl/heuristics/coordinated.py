@@ -35,7 +35,7 @@ class Coordinated(Heuristic):
     def value(self, state: WorldState) -> tuple[Tensor, Tensor]:
         """Return what each cell is worth [cells of way], float32 [B, H, W], and which are of the front, bool."""
         fire = can_be_put_out(state, self.env)
-        threat = self.env.world.threat(state)
+        threat = self.env.world.forecast(state).fire_risk()
         front = fire & (threat > 0.01)
         front = torch.where(front.flatten(1).any(1)[:, None, None], front, fire)
         return self.eagerness * threat, front

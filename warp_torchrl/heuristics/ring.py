@@ -8,7 +8,8 @@ from torch import Tensor
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics.base import approach, claim_cells, extinguish_or, list_cells, or_refill
 from warp_torchrl.heuristics.coordinated import Coordinated
-from warp_torchrl.world.geometry import distance_to_nearest, grow
+from warp_torchrl.world.fast.distances import distance_to_nearest
+from warp_torchrl.world.geometry import grow
 from warp_torchrl.world.state import Action, WorldState, is_burning, is_tree
 
 

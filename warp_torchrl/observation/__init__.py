@@ -5,14 +5,13 @@ from warp_torchrl.observation.coarse import (
     PICTURE_SIDE,
     STATE,
     STATE_SIDE,
-    block_means,
     central_state,
     picture,
 )
 from warp_torchrl.observation.frame import Frame, can_be_held, frame_of, held, held_state
 from warp_torchrl.observation.own import SELF_SIZE, WIND_SCALE, own_vector
 from warp_torchrl.observation.presets import Local, Observation, Paper, Space, Surroundings
-from warp_torchrl.observation.view import CHANNELS, ELEVATION_SCALE, egocentric_view, window
+from warp_torchrl.observation.view import CHANNELS, ELEVATION_SCALE, egocentric_view
 
 __all__ = [
     "CHANNELS",
@@ -29,7 +28,6 @@ __all__ = [
     "Paper",
     "Space",
     "Surroundings",
-    "block_means",
     "can_be_held",
     "central_state",
     "egocentric_view",
@@ -38,5 +36,4 @@ __all__ = [
     "held_state",
     "own_vector",
     "picture",
-    "window",
 ]

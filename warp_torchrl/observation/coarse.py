@@ -2,14 +2,14 @@
 
 import torch
 from torch import Tensor
-from torch.compiler import is_compiling
-from torch.nn.functional import adaptive_avg_pool2d, one_hot
+from torch.nn.functional import one_hot
 
 from warp_torchrl.observation.own import WIND_SCALE, steps_to_tick, time_left
-from warp_torchrl.observation.view import ELEVATION_SCALE, window
-from warp_torchrl.world.flags import byte
+from warp_torchrl.observation.view import ELEVATION_SCALE
+from warp_torchrl.world.fast.blocks import block_means
+from warp_torchrl.world.fast.squares import window
 from warp_torchrl.world.role import ROLE_NAMES
-from warp_torchrl.world.state import WorldState, is_burning
+from warp_torchrl.world.state import Forecast, WorldState, is_burning
 from warp_torchrl.world.world import World
 
 PICTURE = ("fire", "fuel", "team_mates")
@@ -22,53 +22,24 @@ wind to the east and to the north."""
 STATE_SIDE = 16
 
 
-def block_means(maps: Tensor, side: int) -> Tensor:
-    """Return the means of maps over side x side blocks, float32 [..., side, side].
-
-    Where the map divides into equal blocks they are sums of slices, which on CPUs is several times faster than pooling.
-
-    Args:
-        maps: float32 or bool [..., H, W]; of a bool map, the share that is set.
-        side: Blocks to a side of the map.
-    """
-    height, width = maps.shape[-2:]
-    cells = byte(maps) if maps.dtype == torch.bool else maps
-    if height % side or width % side:
-        return adaptive_avg_pool2d(cells.to(torch.float32).flatten(0, -3), side).view(*maps.shape[:-2], side, side)
-    rows, columns = height // side, width // side
-    if rows > 1:
-        cells = cells.to(torch.int32) if cells.dtype == torch.uint8 and rows > 255 else cells
-        blocks = cells.unflatten(-2, (side, rows))
-        # A function that is fused keeps this sum, and would not keep that of the slices.
-        cells = blocks.sum(-2, dtype=blocks.dtype) if is_compiling() else _sum(blocks.unbind(-2))
-    cells = cells.to(torch.float32)
-    if columns > 1:
-        cells = _sum(cells.unflatten(-1, (side, columns)).unbind(-1))
-    return cells * (side * side / (height * width))
-
-
-def _sum(parts: tuple[Tensor, ...]) -> Tensor:
-    total = parts[0] + parts[1]
-    for part in parts[2:]:
-        total += part
-    return total
-
-
-def picture(state: WorldState, world: World) -> Tensor:
+def picture(state: WorldState, forecast: Forecast) -> Tensor:
     """Return the state of the fire in 8 x 8 blocks of the map, float32 [B, A, 3, 8, 8]."""
-    seen, place = _fire_and_fuel(state, world), one_hot(_block(state, PICTURE_SIDE), PICTURE_SIDE**2).to(torch.float32)
+    seen, place = (
+        _fire_and_fuel(state, forecast),
+        one_hot(_block(state, PICTURE_SIDE), PICTURE_SIDE**2).to(torch.float32),
+    )
     mates = ((place.sum(1, keepdim=True) - place) * 0.25).clamp_(max=1.0)
     mates = mates.view(*place.shape[:2], 1, PICTURE_SIDE, PICTURE_SIDE)
     return torch.cat((seen[:, None].expand(-1, place.shape[1], -1, -1, -1), mates), dim=2)
 
 
-def centred_picture(state: WorldState, world: World) -> Tensor:
+def centred_picture(state: WorldState, forecast: Forecast) -> Tensor:
     """Return the picture with the agent's own block in the middle, uint8 [B, A, 3, 15, 15]; 0 off the map.
 
     What it tells is what ``picture`` does; where things are is told from where the agent is.
     """
     sides, middle = (PICTURE_SIDE, PICTURE_SIDE), PICTURE_SIDE - 1
-    fire, fuel = (_fire_and_fuel(state, world) * 255.0).to(torch.uint8).unbind(1)
+    fire, fuel = (_fire_and_fuel(state, forecast) * 255.0).to(torch.uint8).unbind(1)
     block = _block(state, PICTURE_SIDE)
     about = window(torch.stack((block // PICTURE_SIDE, block % PICTURE_SIDE), dim=-1), sides, middle)
     mates = about.of(one_hot(block, PICTURE_SIDE**2).sum(1).view(-1, *sides))
@@ -76,10 +47,10 @@ def centred_picture(state: WorldState, world: World) -> Tensor:
     return torch.stack((about.of(fire), about.of(fuel), (mates.clamp_(max=4) * 63).to(torch.uint8)), dim=2)
 
 
-def central_state(state: WorldState, world: World) -> Tensor:
+def central_state(state: WorldState, world: World, forecast: Forecast) -> Tensor:
     """Return what the central critic sees, float32 [B, C, 16, 16] in the channels ``STATE``, for any map size."""
     worlds, blocks = state.cells.shape[0], (STATE_SIDE, STATE_SIDE)
-    maps = is_burning(state.cells), world.fuel(state), world.front(state), world.chance(state)
+    maps = is_burning(state.cells), forecast.fuel, forecast.expected_ignitions, forecast.ignition_probability
     index = world.team.table(state.cells.device).index * STATE_SIDE**2 + _block(state, STATE_SIDE)
     agents = torch.zeros(worlds, len(ROLE_NAMES) * STATE_SIDE**2, device=state.cells.device)
     agents = agents.scatter_add(1, index, torch.ones_like(index, dtype=torch.float32)).view(worlds, -1, *blocks)
@@ -105,9 +76,9 @@ def _elevation(elevation: Tensor | None, blocks: Tensor) -> Tensor:
     return block_means(relative, STATE_SIDE).clamp(-3.0, 3.0)
 
 
-def _fire_and_fuel(state: WorldState, world: World) -> Tensor:
+def _fire_and_fuel(state: WorldState, forecast: Forecast) -> Tensor:
     """Return the whole map's fire (square root of the share that burns) and fuel in blocks, float32 [B, 2, 8, 8]."""
-    fire, fuel = (block_means(maps, PICTURE_SIDE) for maps in (is_burning(state.cells), world.fuel(state)))
+    fire, fuel = (block_means(maps, PICTURE_SIDE) for maps in (is_burning(state.cells), forecast.fuel))
     return torch.stack((fire.sqrt_(), fuel), dim=1)
 
 

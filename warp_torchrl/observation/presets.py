@@ -11,9 +11,10 @@ from torch import Tensor
 
 from warp_torchrl.observation.coarse import PICTURE, PICTURE_SIDE, centred_picture, picture
 from warp_torchrl.observation.own import IDENTITY_SIZE, SELF_SIZE, identity, own_vector
-from warp_torchrl.observation.view import CHANNELS, ages, egocentric_view, stages, window
+from warp_torchrl.observation.view import CHANNELS, ages, egocentric_view, stages
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.fast.squares import window
+from warp_torchrl.world.state import Forecast, WorldState
 from warp_torchrl.world.world import World
 
 
@@ -57,13 +58,13 @@ class Local:
             "self": Space((SELF_SIZE + IDENTITY_SIZE * self.identity,), torch.float32, -3.0, 3.0),
         }
 
-    def __call__(self, state: WorldState, world: World) -> dict[str, Tensor]:
+    def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
         """Return ``view`` uint8 [B, A, C, V, V] and ``self`` float32 [B, A, F]."""
         own = own_vector(state, world)
         if self.identity:
             who = identity(own.shape[1], own.device)
             own = torch.cat((own, who.expand(len(own), -1, -1)), dim=-1)
-        return {"view": egocentric_view(state, world, self.radius), "self": own}
+        return {"view": egocentric_view(state, world, forecast, self.radius), "self": own}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,10 +89,10 @@ class Surroundings(Local):
         dtype, high = (torch.uint8, 255) if self.centred else (torch.float32, 1.0)
         return {**super().spaces(world), "picture": Space((len(PICTURE), side, side), dtype, 0, high)}
 
-    def __call__(self, state: WorldState, world: World) -> dict[str, Tensor]:
+    def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
         """Return ``view``, ``self``, and ``picture`` float32 [B, A, 3, 8, 8]."""
-        shown = centred_picture(state, world) if self.centred else picture(state, world)
-        return {**super().__call__(state, world), "picture": shown}
+        shown = centred_picture(state, forecast) if self.centred else picture(state, forecast)
+        return {**super().__call__(state, world, forecast), "picture": shown}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,7 +117,7 @@ class Paper:
         """Return the space of the one, nameless entry."""
         return {"": Space((3 * (2 * self.radius + 1) ** 2,), torch.float32, 0.0, 1.0)}
 
-    def __call__(self, state: WorldState, world: World) -> dict[str, Tensor]:
+    def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
         """Return one entry, float32 [B, A, 3 (2 r + 1)^2]."""
         seen = window(state.vehicles.position, state.cells.shape[1:], self.radius)
         cells = seen.of(state.cells)

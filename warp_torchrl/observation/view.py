@@ -1,18 +1,12 @@
 """What an agent sees about itself: its own square of the map, north up."""
 
-import operator
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import reduce
-
 import torch
 from torch import Tensor
-from torch.compiler import is_compiling
 
-from warp_torchrl.world.flags import at_least, byte, equal, narrow, wide
-from warp_torchrl.world.fusion import kept_in_memory
+from warp_torchrl.world.fast.bytes import at_least, byte, equal, to_codes, to_int32
+from warp_torchrl.world.fast.squares import Window, stacked, window
 from warp_torchrl.world.role import ROLE_NAMES
-from warp_torchrl.world.state import FIRST_FIRE, WorldState, is_burning, is_tree
+from warp_torchrl.world.state import FIRST_FIRE, Forecast, WorldState, is_burning, is_tree
 from warp_torchrl.world.world import World
 
 CHANNELS = (
@@ -33,77 +27,10 @@ ELEVATION_SCALE = 100.0
 """Difference in height that an observation shows as 1 [m]."""
 
 
-@dataclass(frozen=True, eq=False)
-class Window:
-    """The squares of cells about the agents."""
-
-    position: Tensor
-    """(row, column) of the agents, int64 [B, A, 2] [cells]."""
-    radius: int
-    """r [cells]; V = 2 r + 1."""
-    index: Tensor
-    """Flat index of each cell, moved to the border where it is off the map, int64 [B, A V V]."""
-    inside: Tensor
-    """1 on the map and 0 beyond, uint8 [B, A, V, V]."""
-
-    def of(self, plane: Tensor) -> Tensor:
-        """Return what a plane [B, H, W] of numbers shows, [B, A, V, V]; 0 beyond the map."""
-        return plane.flatten(1).gather(1, self.index).view_as(self.inside).mul_(self.inside)
-
-    def of_each(self, *planes: Tensor) -> list[Tensor]:
-        """Return what up to four planes [B, H, W] of codes 0..255, uint8 or ``wide``, show, likewise.
-
-        A function that is fused reads them at once, as the four bytes of a word.
-        """
-        if not is_compiling():
-            return [self.of(plane) for plane in planes]
-        word = reduce(operator.or_, (wide(plane) << 8 * place for place, plane in enumerate(planes)))
-        shown = _squares(word, self.position, self.radius)
-        return [(shown >> 8 * place) & 255 for place in range(len(planes))]
-
-
-def window(position: Tensor, size: Sequence[int], radius: int) -> Window:
-    """Return the squares about the agents.
-
-    Args:
-        position: int64 [B, A, 2] [cells].
-        size: (H, W) of the map [cells].
-        radius: r [cells]; V = 2 r + 1.
-    """
-    height, width = size
-    away = torch.arange(-radius, radius + 1, device=position.device)
-    row, column = position[..., 0, None] + away, position[..., 1, None] + away
-    on_row, on_column = (row >= 0) & (row < height), (column >= 0) & (column < width)
-    index = row.clamp(0, height - 1)[..., None] * width + column.clamp(0, width - 1)[..., None, :]
-    inside = narrow(byte(on_row)[..., None] * byte(on_column)[..., None, :])
-    return Window(position, radius, index.flatten(1), inside)
-
-
-def _square(plane: Tensor, position: Tensor, radius: int) -> Tensor:
-    return plane.new_empty(*position.shape[:2], 2 * radius + 1, 2 * radius + 1)
-
-
-# A compiler would look up cell after cell, and ask of each whether it is on the map.
-@kept_in_memory("(Tensor plane, Tensor position, int radius) -> Tensor", like=_square)
-def _squares(plane: Tensor, position: Tensor, radius: int) -> Tensor:
-    return window(position, plane.shape[1:], radius).of(plane)
-
-
-def _as_channels(channels: Sequence[Tensor]) -> Tensor:
-    """Return channels [B, A, V, V], uint8 or ``wide``, as one tensor, uint8 [B, A, C, V, V]."""
-    return _stacked([narrow(channel).contiguous() for channel in channels] if is_compiling() else list(channels))
-
-
-# A compiler would write squares of odd sides a few cells at a time.
-@kept_in_memory("(Tensor[] channels) -> Tensor")
-def _stacked(channels: list[Tensor]) -> Tensor:
-    return torch.stack(channels, dim=2)
-
-
-def egocentric_view(state: WorldState, world: World, radius: int) -> Tensor:
+def egocentric_view(state: WorldState, world: World, forecast: Forecast, radius: int) -> Tensor:
     """Return the agents' own views in the channels ``CHANNELS``, uint8 [B, A, C, V, V]."""
     seen, elevation = window(state.vehicles.position, state.cells.shape[1:], radius), state.landscape.elevation
-    code, wet, alpha, threat = _shown(state, world, seen)
+    code, wet, alpha, risk = _shown(state, forecast, seen)
     cells, inside = code & _CELLS, byte(at_least(code, _ON_MAP))
     role = world.team.table(cells.device).index
     channels = (
@@ -115,27 +42,25 @@ def egocentric_view(state: WorldState, world: World, radius: int) -> Tensor:
         byte(equal(code & _FIREBREAK, _FIREBREAK)) * 255,
         wet.clamp_(max=10) * 25,
         inside * 128 if elevation is None else _relative_elevation(elevation, seen),
-        threat,
+        risk,
         *_others(state.vehicles.position, role, radius).unbind(2),
     )
-    return _as_channels(channels)
+    return stacked(channels)
 
 
 _CELLS, _BURNED, _FIREBREAK, _ON_MAP = 0x0F, 0x10, 0x20, 0x40
 
 
-def _shown(state: WorldState, world: World, seen: Window) -> list[Tensor]:
-    """Return the agents' squares of the map in bytes, uint8 or ``wide`` [B, A, V, V] each.
+def _shown(state: WorldState, forecast: Forecast, seen: Window) -> list[Tensor]:
+    """Return the agents' squares of the map in bytes [B, A, V, V] each.
 
     They are the cells' codes, with what has burned, firebreaks and the map as bits above them, and how wet, flammable
-    and threatened (``World.threat``) they are.
+    and at risk (``Forecast.fire_risk``) they are.
     """
-    burned, firebreak = wide(state.burned.view(torch.uint8)), wide(state.firebreak.view(torch.uint8))
-    code = torch.add(wide(state.cells), burned, alpha=_BURNED).add_(firebreak, alpha=_FIREBREAK).add_(_ON_MAP)
-    if is_compiling():
-        return seen.of_each(code, state.wet, _share(state.alpha), _share(world.threat(state)))
-    threat = seen.of(world.front(state)).add_(seen.of(world.chance(state)))
-    return [*seen.of_each(code, state.wet), _share(seen.of(state.alpha)), _share(threat)]
+    burned, firebreak = to_int32(state.burned.view(torch.uint8)), to_int32(state.firebreak.view(torch.uint8))
+    code = torch.add(to_int32(state.cells), burned, alpha=_BURNED).add_(firebreak, alpha=_FIREBREAK).add_(_ON_MAP)
+    risk = forecast.expected_ignitions, forecast.ignition_probability
+    return seen.bytes_of([code, state.wet], [(state.alpha,), risk])
 
 
 def ages(cells: Tensor) -> Tensor:
@@ -148,22 +73,11 @@ def stages(cells: Tensor) -> Tensor:
     return (cells - (FIRST_FIRE - 1)) * byte(is_burning(cells)) * 51
 
 
-def _share(fractions: Tensor) -> Tensor:
-    """Return 255 times numbers in 0..1, cut to whole ones, uint8 or ``wide``."""
-    return _as_codes(fractions * 255.0)
-
-
-def _as_codes(numbers: Tensor) -> Tensor:
-    """Return numbers in 0..255, cut to whole ones, uint8 or ``wide``."""
-    codes = numbers.to(torch.int32)
-    return codes if is_compiling() else codes.to(torch.uint8)  # at once it takes twice the time
-
-
 def _relative_elevation(elevation: Tensor, seen: Window) -> Tensor:
     heights = seen.of(elevation)
     middle = heights.shape[-1] // 2
     own = heights[:, :, middle, middle, None, None]
-    return _as_codes(((heights - own) / ELEVATION_SCALE).clamp_(-1.0, 1.0).mul_(127.0).add_(128.0))
+    return to_codes(((heights - own) / ELEVATION_SCALE).clamp_(-1.0, 1.0).mul_(127.0).add_(128.0))
 
 
 def _others(position: Tensor, role: Tensor, radius: int) -> Tensor:

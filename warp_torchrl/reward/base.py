@@ -6,8 +6,8 @@ from typing import ClassVar, Literal
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
+from warp_torchrl.world.fast.distances import distance_to_nearest
 from warp_torchrl.world.front import exposure
-from warp_torchrl.world.geometry import distance_to_nearest
 from warp_torchrl.world.state import Transition, WorldState, is_burning
 
 

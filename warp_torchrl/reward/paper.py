@@ -7,7 +7,8 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.reward.base import Reward
-from warp_torchrl.world.geometry import distance_to_nearest, flood
+from warp_torchrl.world.fast.distances import distance_to_nearest
+from warp_torchrl.world.geometry import flood
 from warp_torchrl.world.state import Action, Transition, is_burning, is_tree
 
 

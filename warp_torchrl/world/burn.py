@@ -11,7 +11,7 @@ from warp_torchrl.world.random import world_key
 from warp_torchrl.world.state import Landscape, WorldState, is_burning
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.wind import Wind
-from warp_torchrl.world.world import advance, quiet_state
+from warp_torchrl.world.world import advance, in_wind, initial_state
 
 
 @dataclass(eq=False, repr=False)
@@ -62,12 +62,12 @@ def start_burning(
     ground = Landscape(cover=cover, age=cells, elevation=elevation)
     nobody = Team(n_agents=1).place(key, cover, is_burning(cells))
     air = wind(key, (cells.shape[1], cells.shape[2]))
-    state = quiet_state(ground, fire, air, key, nobody, cell_size)
+    state = initial_state(ground, fire, air, key, nobody, cell_size)
     if state.stage_age is not None and stage_age is not None:
         state = state.replace(stage_age=stage_age)
     for tick in range(1, first_tick + 1 if wind.changes else 1):
         state = state.replace(tick=torch.full_like(state.tick, tick))
-        state = fire.in_wind(state, wind.after_tick(state))
+        state = in_wind(state, fire, wind.after_tick(state))
     return state.replace(tick=torch.full_like(state.tick, first_tick))
 
 

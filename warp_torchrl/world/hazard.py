@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.law import Hazard, Law
+from warp_torchrl.world.law import Hazard
 
 
 @dataclass(frozen=True, kw_only=True)
 class HazardFire(Fire):
-    """The automaton under law ``hazard``: a tick is a k-th of the paper's, and a neighbour's chance is
+    """The automaton under ``law.Hazard``: a tick is a k-th of the paper's, and a neighbour's probability is
 
         p_d = 1 - exp(-h_d),   h_d = -ln(1 - min(alpha, 0.95)) / k w_d s_d / dist_d
 
@@ -38,5 +38,7 @@ class HazardFire(Fire):
         """Return k."""
         return self.refinement
 
-    def _law(self) -> Law:
+    @property
+    def law(self) -> Hazard:
+        """Return how the hazards of burning neighbours make a probability."""
         return Hazard(self.refinement)

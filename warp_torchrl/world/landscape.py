@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.flags import equal
+from warp_torchrl.world.fast.bytes import equal
 from warp_torchrl.world.perlin import fractal_noise
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import OLDEST, Cover, Landscape

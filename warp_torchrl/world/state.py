@@ -6,11 +6,10 @@ Letters, everywhere: B worlds, A agents, H rows, W columns.
 from dataclasses import dataclass
 from enum import IntEnum
 
-import torch
 from torch import Tensor
 
 from warp_torchrl.world.batch import Batch
-from warp_torchrl.world.flags import at_least, between, byte, counts
+from warp_torchrl.world.fast.bytes import at_least, between, byte, counts
 
 
 class Cover(IntEnum):
@@ -91,11 +90,53 @@ class Vehicles(Batch):
 
 
 @dataclass(eq=False, repr=False)
-class WorldState(Batch):
-    """Everything that a step reads or changes; batch size [B]."""
+class Ground(Batch):
+    """A landscape and all that follows from it for the fire; ``Fire.ground`` makes it."""
 
     landscape: Landscape
-    alpha: Tensor  # float32 [B,H,W], flammability of the ground
+    alpha: Tensor  # float32 [B,H,W], flammability
+    slope: Tensor | None  # float32 [B,8,H+2,W+1], s_d into a cell, a margin about the map; None where flat
+
+    @property
+    def slope_into_cell(self) -> Tensor | None:
+        """Return s_d into each cell by direction of travel, float32 [B, 8, H, W]; None where flat."""
+        return None if self.slope is None else self.slope[:, :, 1:-1, :-1]
+
+
+@dataclass(eq=False, repr=False)
+class Air(Batch):
+    """A wind and all that follows from it for the fire; ``world.fast.road.air`` makes it."""
+
+    wind: Tensor  # float32 [B,2,1,1] or [B,2,H,W], (u east, v north) of the air's motion [m/s]
+    gain: Tensor | None  # float32 [B,8,1,1], w_d / distance_d; None where the wind differs by cell
+    table: Tensor | None = None  # float32 [B,G,256], see ``world.fast.table``; None where no road asks for one
+
+
+@dataclass(eq=False, repr=False)
+class Forecast(Batch):
+    """What the fire is about to do in the next tick; it follows from a state, and is passed along with it."""
+
+    expected_ignitions: Tensor  # float32 [B,H,W], neighbours that a burning cell ignites in the mean / 4, at most 1
+    ignition_probability: Tensor  # float32 [B,H,W], of each tree
+    fuel: Tensor  # float32 [B,H,W], flammability of each tree that does not burn
+
+    def fire_risk(self) -> Tensor:
+        """Return where the fire is about to grow, float32 [B, H, W] in 0..1.
+
+        Of a burning cell its ``expected_ignitions``, and of a tree its ``ignition_probability``: no cell has both.
+        """
+        return self.expected_ignitions + self.ignition_probability
+
+
+@dataclass(eq=False, repr=False)
+class WorldState(Batch):
+    """What changes in the worlds, and the ground and air that it changes in; batch size [B].
+
+    Ground and air are replaced whole: there is no way to change the wind without what follows from it.
+    """
+
+    ground: Ground
+    air: Air
     cells: Tensor  # uint8 [B,H,W], 0 empty, 1..10 tree age, 11..15 fire
     age: Tensor  # uint8 [B,H,W], age a burning tree had when it caught fire, else 0
     stage_age: Tensor | None  # uint8 [B,H,W], ticks burned in the present stage; None where a stage lasts one tick
@@ -104,10 +145,6 @@ class WorldState(Batch):
     burned: Tensor  # bool [B,H,W], has burned to ash at least once
     firebreak: Tensor  # bool [B,H,W], cleared by an agent
     wet: Tensor  # uint8 [B,H,W], ticks for which the cell cannot ignite
-    slope: Tensor | None  # float32 [B,8,H+2,W+1], spread factor into a cell by direction of travel; None where flat
-    wind: Tensor  # float32 [B,2,1,1] or [B,2,H,W], (u east, v north) of the air's motion [m/s]
-    gain: Tensor | None  # float32 [B,8,1,1], what a wind does to fire in each direction; None where it differs by cell
-    chances: Tensor | None  # float32 [B,G,256], see ``world.pattern``; None where the wind differs by cell or on slopes
     vehicles: Vehicles
     tally: Tally
     key: Tensor  # int64 [B], key of the world's draws in this episode
@@ -116,9 +153,25 @@ class WorldState(Batch):
     burning_area: Tensor  # float32 [B], sum over steps of burning initial trees / N0, the area under the fire's curve
     terminated: Tensor  # bool [B], no cell burns any more
     truncated: Tensor  # bool [B], the horizon was reached
-    front: Tensor | None = None  # float32 [B,H,W], see ``World.front``, where it is kept for all who ask
-    chance: Tensor | None = None  # float32 [B,H,W], see ``World.chance``, likewise
-    fuel: Tensor | None = None  # float32 [B,H,W], see ``World.fuel``, likewise
+
+    def what_changes(self) -> dict[str, Tensor]:
+        """Return all tensors by name but those that follow from others, of which they can be made again."""
+        return {name: leaf for name, leaf in self.leaves().items() if name not in _FOLLOWS}
+
+    @property
+    def landscape(self) -> Landscape:
+        """Return the landscapes."""
+        return self.ground.landscape
+
+    @property
+    def alpha(self) -> Tensor:
+        """Return the flammability of the ground, float32 [B, H, W]."""
+        return self.ground.alpha
+
+    @property
+    def wind(self) -> Tensor:
+        """Return the wind, float32 [B, 2, 1, 1] or [B, 2, H, W], (u east, v north) of the air's motion [m/s]."""
+        return self.air.wind
 
     @property
     def cover(self) -> Tensor:
@@ -129,6 +182,9 @@ class WorldState(Batch):
     def done(self) -> Tensor:
         """Return which worlds have ended, bool [B]."""
         return self.terminated | self.truncated
+
+
+_FOLLOWS = ("ground.alpha", "ground.slope", "air.gain", "air.table")
 
 
 @dataclass(eq=False, repr=False)
@@ -150,19 +206,6 @@ class Transition(Batch):
     before: WorldState
     outcome: Outcome
     after: WorldState
-
-
-_FLAGS = ("initial", "extinguished", "burned", "firebreak")
-
-
-def in_bytes(state: WorldState) -> WorldState:
-    """Return worlds whose planes of flags are read as uint8, 0 and 1, as functions that are fused need them."""
-    return state.replace(**{name: getattr(state, name).view(torch.uint8) for name in _FLAGS})
-
-
-def in_flags(state: WorldState) -> WorldState:
-    """Return the worlds of ``in_bytes`` as they are elsewhere."""
-    return state.replace(**{name: getattr(state, name).view(torch.bool) for name in _FLAGS})
 
 
 def is_burning(cells: Tensor) -> Tensor:

@@ -6,26 +6,25 @@ from functools import cached_property
 
 import torch
 from torch import Tensor
-from torch.compiler import is_compiling
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.batch import concatenated
+from warp_torchrl.world.fast import road
 from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.flags import number
 from warp_torchrl.world.ignition import Ignition
 from warp_torchrl.world.landscape import LandscapeSource, Perlin, map_size
-from warp_torchrl.world.random import Stream, uniform, uniform_among, world_key
+from warp_torchrl.world.random import world_key
 from warp_torchrl.world.state import (
     EMBER,
     FIRST_FIRE,
     Cover,
+    Forecast,
     Landscape,
     Tally,
     Transition,
     Vehicles,
     WorldState,
     count_trees,
-    is_tree,
 )
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.wind import Uniform, Wind
@@ -118,7 +117,7 @@ class World:
         index = vehicles.position[..., 0] * self.size[1] + vehicles.position[..., 1]
         if (ground.cover.flatten(1).gather(1, index) == int(Cover.LAKE)).any():
             raise ValueError(f"team.n_agents must fit on a map's dry ground, got {self.team.n_agents}")
-        state = quiet_state(
+        state = initial_state(
             ground, self.fire, self.air(key, self.size, ground.corner), key, vehicles, self.side_of_cell
         )
         cells = state.cells
@@ -146,41 +145,23 @@ class World:
         after = self._tick(after, due)
         return Transition(before=state, outcome=outcome, after=self._advance_clock(after, active))
 
-    def with_outlook(self, state: WorldState) -> WorldState:
-        """Return worlds that keep ``front``, ``chance`` and ``fuel`` for all who ask."""
-        if self.fire.keeps_to_its_edge(state):
-            front, chance = self.fire.outlook(state)
-        else:
-            front, chance = self.front(state), self.chance(state)
-        return state.replace(front=front, chance=chance, fuel=self.fuel(state))
+    def restored(self, state: WorldState) -> WorldState:
+        """Return worlds with what follows from their landscape and wind made anew."""
+        ground = self.fire.ground(state.landscape, self.side_of_cell)
+        return state.replace(ground=ground, air=road.air(self.fire, state.wind, ground))
 
-    def front(self, state: WorldState) -> Tensor:
-        """Return what each cell is expected to ignite, float32 [B, H, W] in 0..1; see ``Fire.front``."""
-        return self.fire.front(state) if state.front is None else state.front
-
-    def chance(self, state: WorldState) -> Tensor:
-        """Return each tree's chance to ignite in the next tick, float32 [B, H, W]; see ``Fire.chance_to_ignite``."""
-        return self.fire.chance_to_ignite(state) if state.chance is None else state.chance
-
-    def fuel(self, state: WorldState) -> Tensor:
-        """Return the flammability of each tree that does not burn, float32 [B, H, W]; 0 elsewhere."""
-        return state.alpha * number(is_tree(state.cells)) if state.fuel is None else state.fuel
-
-    def threat(self, state: WorldState) -> Tensor:
-        """Return where the fire is about to grow, float32 [B, H, W] in 0..1.
-
-        Of a burning cell its ``front``, and of a tree its ``chance``: no cell has both.
-        """
-        return self.front(state) + self.chance(state)
+    def forecast(self, state: WorldState) -> Forecast:
+        """Return what the fire is about to do."""
+        return road.forecast(self.fire, state)
 
     def action_mask(self, state: WorldState) -> Tensor:
         """Return which actions would do something, bool [B, A, 10 or 11]."""
         return self.team.action_mask(state, self.fire.last_spreading)
 
     def _tick(self, state: WorldState, due: Tensor) -> WorldState:
-        if due.is_cuda or self.steps_per_tick == 1 or is_compiling():
+        if self.steps_per_tick == 1:
             return advance(state, self.fire, self.air, due)
-        return advance_some(state, self.fire, self.air, due)
+        return road.advance_rows(state, due, lambda rows, ticks: advance(rows, self.fire, self.air, ticks))
 
     def _advance_clock(self, state: WorldState, active: Tensor) -> WorldState:
         tally = count_trees(state)
@@ -196,7 +177,7 @@ class World:
         )
 
 
-def quiet_state(
+def initial_state(
     ground: Landscape, fire: Fire, wind: Tensor, key: Tensor, vehicles: Vehicles, cell_size: float
 ) -> WorldState:
     """Return worlds at step 0 in which nothing burns yet.
@@ -213,9 +194,10 @@ def quiet_state(
     none = torch.zeros_like(cells)
     no = torch.zeros_like(cells, dtype=torch.bool)
     zero = torch.zeros_like(key, dtype=torch.int32)
+    made = fire.ground(ground, cell_size)
     state = WorldState(
-        landscape=ground,
-        alpha=fire.flammability(ground.cover),
+        ground=made,
+        air=road.air(fire, wind, made),
         cells=cells.clone(),
         age=none,
         stage_age=none.clone() if fire.ticks_per_stage > 1 else None,
@@ -224,10 +206,6 @@ def quiet_state(
         burned=no.clone(),
         firebreak=no.clone(),
         wet=none.clone(),
-        slope=None if ground.elevation is None else fire.slope_factor(ground.elevation, cell_size),
-        wind=wind,
-        gain=None,
-        chances=None,
         vehicles=vehicles,
         tally=Tally(*[zero] * 7),
         key=key,
@@ -237,36 +215,17 @@ def quiet_state(
         terminated=zero > 0,
         truncated=zero > 0,
     )
-    return fire.in_wind(state.replace(tally=count_trees(state)), wind)
-
-
-def advance_some(state: WorldState, fire: Fire, wind: Wind, due: Tensor) -> WorldState:
-    """Return what ``advance`` returns, computed for the worlds that are due alone; which ones they are is read back."""
-    index = due.nonzero()[:, 0]
-    if len(index) == len(due):
-        return advance(state, fire, wind, due)
-    if not len(index):
-        return state
-    after = advance(state[index], fire, wind, due[index])
-    moved = {name: getattr(after, name) for name in (*_MOVED, *(_BLOWN if wind.changes else ()))}
-    return state.replace(
-        **{name: getattr(state, name).index_copy(0, index, value) for name, value in moved.items() if value is not None}
-    )
-
-
-_MOVED = ("cells", "age", "stage_age", "burned", "wet", "tick")  # what a tick changes
-_BLOWN = ("wind", "gain", "chances")  # and what a wind does
+    return state.replace(tally=count_trees(state))
 
 
 def advance(state: WorldState, fire: Fire, wind: Wind, due: Tensor) -> WorldState:
     """Advance fire and wind by one tick where it is due, bool [B]."""
-    if fire.keeps_to_its_edge(state):
-        edge = fire.edge(state)
-        draws = uniform_among(state.key, state.tick, Stream.FIRE, edge.world, edge.place)
-        after = fire.tick_at_edge(state, edge, draws, due)
-    else:
-        draws = uniform(state.key, state.tick, Stream.FIRE, tuple(state.cells.shape[1:]))
-        after = fire.tick(state, draws, due)
+    after = road.tick(fire, state, due)
     if not wind.changes:
         return after
-    return fire.in_wind(after, torch.where(due[:, None, None, None], wind.after_tick(after), state.wind))
+    return in_wind(after, fire, torch.where(due[:, None, None, None], wind.after_tick(after), state.wind))
+
+
+def in_wind(state: WorldState, fire: Fire, wind: Tensor) -> WorldState:
+    """Return worlds in another wind, float32 [B, 2, 1, 1] or [B, 2, H, W] [m/s]."""
+    return state.replace(air=road.air(fire, wind, state.ground))

@@ -10,35 +10,35 @@ import torch
 from torch import Tensor
 from torch.nn.functional import pad
 
-from warp_torchrl.world.flags import byte
-from warp_torchrl.world.law import Law
-from warp_torchrl.world.spread import directions
+from warp_torchrl.world.fast.bytes import byte
+from warp_torchrl.world.fast.constants import numbers
+from warp_torchrl.world.fast.join import in_place
+from warp_torchrl.world.fire import Fire
 
 
-def pattern_table(law: Law, susceptibility: Tensor, gain: Tensor, neighbours: int = 8) -> Tensor:
-    """Return the chance to ignite of each kind of ground under each pattern of burning neighbours.
+def pattern_table(fire: Fire, gain: Tensor) -> Tensor:
+    """Return the probability to ignite of each kind of ground under each pattern of burning neighbours.
 
     Args:
-        law: What makes chances of strengths.
-        susceptibility: Each kind's part of a strength, float32 [G].
-        gain: Of ``spread.gains``, float32 [B, 8, 1, 1].
-        neighbours: 8 or 4.
+        fire: The automaton.
+        gain: w_d / distance_d, float32 [B, 8, 1, 1].
 
     Returns:
         float32 [B, G + 1, 256]; the first kind is of cells that cannot ignite, all 0.
     """
-    strengths = gain[..., 0] * pad(susceptibility, (1, 0))
+    law = in_place(fire.law)
+    strengths = gain[..., 0] * pad(law.susceptibility(numbers(tuple(fire.alpha), gain.device)), (1, 0))
     total = torch.zeros_like(strengths[:, 0, :, None])
-    for direction in directions(neighbours):  # doubles the columns: as they were, and with this neighbour too
+    for direction in fire.directions:  # doubles the columns: as they were, and with this neighbour too
         strength = strengths[:, direction, :, None].expand_as(total).clone()
         joined = total.clone()
         law.join(joined, strength, torch.empty_like(total))
         total = torch.cat((total, joined), dim=-1)
-    return law.chance(total).index_select(-1, _columns(neighbours, gain.device))
+    return law.probability(total).index_select(-1, _columns(fire.directions, gain.device))
 
 
-def chance_by_pattern(table: Tensor, spreading: Tensor, kind: Tensor) -> Tensor:
-    """Return what ``spread.ignition_chance`` does of level worlds with one wind each, to the bit.
+def probability_by_pattern(table: Tensor, spreading: Tensor, kind: Tensor) -> Tensor:
+    """Return what ``rows.probability_from_rows`` does of level worlds with one wind each, to the bit.
 
     Args:
         table: Of ``pattern_table``, float32 [B, G + 1, 256].
@@ -86,10 +86,10 @@ def bit_of(direction: int) -> int:
 
 
 @lru_cache(maxsize=8)
-def _columns(neighbours: int, device: torch.device) -> Tensor:
+def _columns(directions: range, device: torch.device) -> Tensor:
     """Return which column each pattern has where the directions double the columns in turn, int64 [256]."""
     pattern = torch.arange(_PATTERNS)
     column = torch.zeros_like(pattern)
-    for index, direction in enumerate(directions(neighbours)):
+    for index, direction in enumerate(directions):
         column += ((pattern >> bit_of(direction)) & 1) << index
     return column.to(device)

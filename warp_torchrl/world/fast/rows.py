@@ -4,45 +4,21 @@ The maps of a batch lie in one row, each with a margin column and row after it, 
 direction are one contiguous slice at a constant offset.
 """
 
-from functools import lru_cache
-
 import torch
 from torch import Tensor
 from torch.compiler import is_compiling
 from torch.nn.functional import pad
 
-from warp_torchrl.world.flags import byte, narrow, number
-from warp_torchrl.world.fusion import kept_in_memory
-from warp_torchrl.world.geometry import DIRECTIONS, DISTANCES
-from warp_torchrl.world.law import Law
+from warp_torchrl.world.fast.bytes import byte, number, to_uint8
+from warp_torchrl.world.fast.compile import opaque_op
+from warp_torchrl.world.fast.join import Joining
+from warp_torchrl.world.geometry import DIRECTIONS
 
 Shape = tuple[int, ...]
 
 
-def gains(wind: Tensor, diagonal: str) -> Tensor:
-    """Return what each direction's strength is multiplied by at its source, float32, shape of ``wind``.
-
-    Args:
-        wind: The wind's factor at the source, float32 [B, 8, h, w].
-        diagonal: ``distance`` divides by the distance to the neighbour, ``unit`` treats all alike.
-    """
-    if diagonal == "unit":
-        return wind
-    return wind * _nearness(wind.device)
-
-
-@lru_cache(maxsize=8)
-def _nearness(device: torch.device) -> Tensor:
-    return torch.tensor([1.0 / distance for distance in DISTANCES], device=device)[:, None, None]
-
-
-def directions(neighbours: int) -> range:
-    """Return the directions in which fire passes: all 8, or 4 without the diagonal ones."""
-    return range(0, 8, 8 // neighbours)
-
-
-def ignition_chance(
-    law: Law, spreading: Tensor, susceptible: Tensor, gain: Tensor, slope: Tensor | None, neighbours: int = 8
+def probability_from_rows(
+    law: Joining, spreading: Tensor, susceptible: Tensor, gain: Tensor, slope: Tensor | None, directions: range
 ) -> Tensor:
     """Return each cell's chance to be ignited by its neighbours in one tick.
 
@@ -50,43 +26,43 @@ def ignition_chance(
         law: What makes chances of strengths.
         spreading: The burning cells that ignite others, bool [B, H, W].
         susceptible: The ground's part of a strength, 0 where nothing can ignite, float32 [B, H, W].
-        gain: Of ``gains``, float32 [B, 8, 1, 1] or [B, 8, H, W].
-        slope: The slope's factor into the target, float32 [B, 8, H + 2, W + 1], see ``kernel.slope_factor``; None where
-            the world is flat.
-        neighbours: 8 or 4.
+        gain: w_d / distance_d at the source, float32 [B, 8, 1, 1] or [B, 8, H, W].
+        slope: The slope's factor into the target, float32 [B, 8, H + 2, W + 1], see ``wind_and_slope.slope_factor``;
+            None where the world is flat.
+        directions: Those in which fire travels.
 
     Returns:
         float32 [B, H, W].
     """
     shape, burning = tuple(susceptible.shape), number(spreading)
-    rows = [_in_a_row(narrow(byte(spreading)) if is_compiling() else burning)]
+    rows = [_in_a_row(to_uint8(byte(spreading)) if is_compiling() else burning)]
     if gain.shape[2:] != (1, 1):
         rows = [_in_a_row(burning * gain[:, direction]) for direction in range(8)]
         gain = torch.ones_like(gain[..., :1, :1])
     target = susceptible if is_compiling() else _shifted(_in_a_row(susceptible), shape, 0)
     total, strength, spare = torch.zeros_like(target), torch.empty_like(target), torch.empty_like(target)
-    for direction in directions(neighbours):
+    for direction in directions:
         source = _shifted(rows[direction % len(rows)], shape, -_offset(direction, shape)).to(torch.float32)
         torch.mul(source, gain[:, direction], out=strength)
         strength.mul_(target)
         if slope is not None:
             strength *= _slope(slope, direction, shape, 0)
         law.join(total, strength, spare)
-    chance = law.chance(total)
+    chance = law.probability(total)
     return chance if is_compiling() else _on_map(chance).contiguous()
 
 
-def expected_ignitions(
-    law: Law, susceptible: Tensor, gain: Tensor, slope: Tensor | None, neighbours: int = 8
+def expected_from_rows(
+    law: Joining, susceptible: Tensor, gain: Tensor, slope: Tensor | None, directions: range
 ) -> Tensor:
     """Return how many neighbours each cell would be expected to ignite in a tick if it burned.
 
     Args:
-        law: As of ``ignition_chance``, and so are the others.
+        law: As of ``probability_from_rows``, and so are the others.
         susceptible: float32 [B, H, W].
         gain: float32 [B, 8, 1, 1] or [B, 8, H, W].
         slope: float32 [B, 8, H + 2, W + 1] or None.
-        neighbours: 8 or 4.
+        directions: Those in which fire travels.
 
     Returns:
         float32 [B, H, W].
@@ -97,12 +73,12 @@ def expected_ignitions(
     row = _in_a_row(susceptible)
     total = torch.zeros_like(_shifted(row, shape, 0))
     strength = torch.empty_like(total)
-    for direction in directions(neighbours):
+    for direction in directions:
         offset = _offset(direction, shape)
         torch.mul(_shifted(row, shape, offset), gain[:, direction], out=strength)
         if slope is not None:
             strength *= _slope(slope, direction, shape, offset)
-        total += law.chance_of(strength)
+        total += law.probability_of(strength)
     return total if is_compiling() else _on_map(total)
 
 
@@ -112,7 +88,7 @@ def _as_long(maps: Tensor) -> Tensor:
 
 
 # A compiler would ask of every neighbour anew whether it is on the map, and that one by one.
-@kept_in_memory("(Tensor maps) -> Tensor", like=_as_long)
+@opaque_op("(Tensor maps) -> Tensor", like=_as_long)
 def _in_a_row(maps: Tensor) -> Tensor:
     """Lay [B, H, W] maps out in one row, each with a zero column and row after it and a margin at both ends."""
     worlds, height, width = maps.shape

@@ -6,8 +6,9 @@ from torch._inductor.cpp_builder import get_cpp_compiler
 from torch._inductor.exc import InvalidCxxCompiler
 
 from warp_torchrl import make_env
-from warp_torchrl.world.fusion import fused, kept_in_memory
-from warp_torchrl.world.state import count_trees, in_bytes, in_flags
+from warp_torchrl.world.fast.compile import compiled, opaque_op
+from warp_torchrl.world.fast.road import in_bytes, in_flags
+from warp_torchrl.world.state import count_trees
 
 try:
     get_cpp_compiler()
@@ -59,8 +60,8 @@ def test_worlds_in_bytes_are_the_worlds():
 
 
 def test_a_function_is_compiled_once_for_all_who_ask():
-    assert fused(count_trees) is fused(count_trees)
-    assert fused(count_trees) is not fused(count_trees, in_parts=True)
+    assert compiled(count_trees) is compiled(count_trees)
+    assert compiled(count_trees) is not compiled(count_trees, in_parts=True)
 
 
 @pytest.mark.parametrize(
@@ -73,7 +74,7 @@ def test_a_function_is_compiled_once_for_all_who_ask():
         ("stacked", ([torch.ones(2, 3, 5, 5), torch.zeros(2, 3, 5, 5)],)),
     ],
 )
-def test_what_is_kept_in_memory_is_what_the_compiler_is_told(name, arguments):
+def test_what_is_opaque_op_is_what_the_compiler_is_told(name, arguments):
     operator = getattr(torch.ops.warp_torchrl, name).default
     torch.library.opcheck(operator, arguments, test_utils=("test_schema", "test_faketensor"))
 
@@ -81,7 +82,7 @@ def test_what_is_kept_in_memory_is_what_the_compiler_is_told(name, arguments):
 def test_a_module_that_keeps_something_in_memory_may_be_imported_again():
     for factor in (2.0, 3.0):
 
-        @kept_in_memory("(Tensor given) -> Tensor", like=torch.empty_like)
+        @opaque_op("(Tensor given) -> Tensor", like=torch.empty_like)
         def times(given):
             return given * factor  # noqa: B023, used before the next
 

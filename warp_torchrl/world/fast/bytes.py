@@ -3,25 +3,25 @@
 On CPUs a comparison that writes bool, ``where`` and ``masked_fill`` are many times slower than arithmetic on bytes: a
 comparison that writes its own type is vectorised, and a bool is a byte of 0 or 1. In a function that is fused,
 comparisons and ``where`` cost nothing; there bools in memory and arithmetic on bytes are slow, and planes are read as
-``wide`` numbers and written as bytes.
+``to_int32`` numbers and written as bytes.
 """
 
 import torch
 from torch import Tensor
 from torch.compiler import is_compiling
 
-from warp_torchrl.world.constants import numbers
+from warp_torchrl.world.fast.constants import numbers
 
 _WORDS = 128
 
 
-def wide(codes: Tensor) -> Tensor:
+def to_int32(codes: Tensor) -> Tensor:
     """Return uint8 codes in the type to compute in: int32 in a function that is fused, and as they are elsewhere."""
     return codes.to(torch.int32) if is_compiling() else codes
 
 
-def narrow(codes: Tensor) -> Tensor:
-    """Return codes that were made ``wide`` as uint8."""
+def to_uint8(codes: Tensor) -> Tensor:
+    """Return codes that were made ``to_int32`` as uint8."""
     # Inductor has an instruction that makes int8 of sixteen numbers, and makes uint8 of them one by one.
     return codes if codes.dtype == torch.uint8 else codes.to(torch.int8).view(torch.uint8)
 
@@ -29,14 +29,14 @@ def narrow(codes: Tensor) -> Tensor:
 def at_least(codes: Tensor, bound: int) -> Tensor:
     """Return ``codes >= bound``, bool; codes are uint8."""
     if is_compiling():
-        return wide(codes) >= bound
+        return to_int32(codes) >= bound
     return torch.ge(codes, bound, out=torch.empty_like(codes)).view(torch.bool)
 
 
 def between(codes: Tensor, low: int, high: int) -> Tensor:
     """Return which codes, uint8, are at least ``low`` and at most ``high``, bool."""
     if is_compiling():
-        return (wide(codes) >= low) & (wide(codes) <= high)
+        return (to_int32(codes) >= low) & (to_int32(codes) <= high)
     above_low = codes - low  # a lower code wraps round to a high one
     return torch.le(above_low, high - low, out=above_low).view(torch.bool)
 
@@ -44,7 +44,7 @@ def between(codes: Tensor, low: int, high: int) -> Tensor:
 def equal(codes: Tensor, code: int) -> Tensor:
     """Return ``codes == code``, bool; codes are uint8."""
     if is_compiling():
-        return wide(codes) == code
+        return to_int32(codes) == code
     return torch.eq(codes, code, out=torch.empty_like(codes)).view(torch.bool)
 
 
@@ -68,7 +68,7 @@ def _as_flags(numbers: Tensor) -> Tensor:
 
 
 def byte(mask: Tensor) -> Tensor:
-    """Return a bool mask as 0 and 1, uint8 and maybe in the mask's own memory, or ``wide`` ones."""
+    """Return a bool mask as 0 and 1, uint8 and maybe in the mask's own memory, or ``to_int32`` ones."""
     return mask.to(torch.int32) if is_compiling() else mask.view(torch.uint8)
 
 
@@ -77,9 +77,9 @@ def as_mask(codes: Tensor) -> Tensor:
     return codes != 0 if is_compiling() else codes.view(torch.bool)
 
 
-def like(plane: Tensor, codes: Tensor) -> Tensor:
+def view_as(plane: Tensor, codes: Tensor) -> Tensor:
     """Return codes 0 and 1 of ``byte`` in the type of a plane of flags, maybe in their own memory."""
-    return narrow(codes) if is_compiling() else codes.view(plane.dtype)
+    return to_uint8(codes) if is_compiling() else codes.view(plane.dtype)
 
 
 def number(mask: Tensor) -> Tensor:
@@ -88,16 +88,16 @@ def number(mask: Tensor) -> Tensor:
 
 
 def choose(flags: Tensor, one: Tensor | int, other: Tensor) -> Tensor:
-    """Return one, uint8 or ``wide``, where flags of ``byte`` are 1 and the other where they are 0."""
+    """Return one, uint8 or ``to_int32``, where flags of ``byte`` are 1 and the other where they are 0."""
     if is_compiling():
-        return torch.where(as_mask(wide(flags)), wide(one) if isinstance(one, Tensor) else one, wide(other))
+        return torch.where(as_mask(to_int32(flags)), to_int32(one) if isinstance(one, Tensor) else one, to_int32(other))
     return (one - other).mul_(flags).add_(other)
 
 
-def clear(flags: Tensor, values: Tensor) -> Tensor:
-    """Return values, uint8 or ``wide``, but 0 where flags of ``byte`` are 1."""
+def zero_where(flags: Tensor, values: Tensor) -> Tensor:
+    """Return values, uint8 or ``to_int32``, but 0 where flags of ``byte`` are 1."""
     if is_compiling():
-        return torch.where(as_mask(wide(flags)), 0, wide(values))
+        return torch.where(as_mask(to_int32(flags)), 0, to_int32(values))
     return values * (flags ^ 1)
 
 
@@ -115,7 +115,7 @@ def counts(*codes: Tensor) -> tuple[Tensor, ...]:
     return torch.cat(sums, dim=-1).view(torch.uint8).sum(-1, dtype=torch.int32).unbind()
 
 
-def put(plane: Tensor, place: Tensor, values: Tensor | int) -> Tensor:
+def index_put(plane: Tensor, place: Tensor, values: Tensor | int) -> Tensor:
     """Return a plane [B, H, W] that holds values, or one, at flat places int64 [N]; the plane is used up."""
     flat = plane.flatten()
     flat = flat.index_copy_(0, place, values) if isinstance(values, Tensor) else flat.index_fill_(0, place, values)
@@ -125,3 +125,9 @@ def put(plane: Tensor, place: Tensor, values: Tensor | int) -> Tensor:
 def look_up(table: tuple[float, ...], codes: Tensor) -> Tensor:
     """Return what a table holds for each code, float32, shape of the codes; they are uint8 and within it."""
     return numbers(table, codes.device).index_select(0, codes.flatten().to(torch.int32)).view(codes.shape)
+
+
+def to_codes(numbers: Tensor) -> Tensor:
+    """Return numbers in 0..255, cut to whole ones, uint8 or ``to_int32``."""
+    codes = numbers.to(torch.int32)
+    return codes if is_compiling() else codes.to(torch.uint8)  # at once it takes twice the time

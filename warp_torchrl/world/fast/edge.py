@@ -12,11 +12,10 @@ from typing import Protocol
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.flags import byte
+from warp_torchrl.world.fast.bytes import byte
+from warp_torchrl.world.fast.join import Joining
+from warp_torchrl.world.fast.table import BESIDE, bit_of, burning_neighbours
 from warp_torchrl.world.geometry import DIRECTIONS
-from warp_torchrl.world.law import Law
-from warp_torchrl.world.pattern import BESIDE, bit_of, burning_neighbours
-from warp_torchrl.world.spread import directions
 
 _WORD = 8  # bytes
 
@@ -27,8 +26,8 @@ class Edge:
 
     shape: torch.Size
     """(B, H, W)."""
-    neighbours: int
-    """8 or 4."""
+    directions: range
+    """Those in which fire travels."""
     cell: Tensor
     """Flat index of each in [B, H, W], int64 [N]."""
     pattern: Tensor
@@ -65,22 +64,22 @@ class Edge:
         return values.new_zeros(self.shape.numel()).scatter_(0, self.cell, values).view(self.shape)
 
 
-def edge_of(spreading: Tensor, fuel: Tensor, neighbours: int) -> Edge:
+def edge_of(spreading: Tensor, fuel: Tensor, directions: range) -> Edge:
     """Return the fire's edge.
 
     Args:
         spreading: The burning cells that ignite others, bool [B, H, W].
         fuel: The trees that can ignite, bool [B, H, W].
-        neighbours: 8 or 4.
+        directions: Those in which fire travels.
     """
     around = burning_neighbours(spreading)
-    if neighbours == 4:
+    if len(directions) == 4:
         around &= BESIDE
     cell = places((around * byte(fuel)).flatten())
-    return Edge(spreading.shape, neighbours, cell, around.flatten().index_select(0, cell).to(torch.int64))
+    return Edge(spreading.shape, directions, cell, around.flatten().index_select(0, cell).to(torch.int64))
 
 
-class EdgeChances(Protocol):
+class EdgeProbabilities(Protocol):
     """The chances of the trees of an edge to be ignited in one tick."""
 
     def joined(self) -> Tensor:
@@ -110,11 +109,11 @@ class ByPattern:
         self._row = (edge.world * kinds).add_(kind).mul_(patterns)
 
     def joined(self) -> Tensor:
-        """See ``EdgeChances``."""
+        """See ``EdgeProbabilities``."""
         return self._table.index_select(0, self._row + self._edge.pattern)
 
     def alone(self, direction: int) -> Tensor:
-        """See ``EdgeChances``."""
+        """See ``EdgeProbabilities``."""
         return self._table[1 << bit_of(direction) :].index_select(0, self._row)
 
 
@@ -125,24 +124,24 @@ class ByStrength:
         law: What makes chances of strengths.
         edge: The trees.
         susceptible: The ground's part of a strength, float32 [N].
-        gain: As of ``spread.ignition_chance``, and so is the slope.
+        gain: As of ``rows.probability_from_rows``, and so is the slope.
         slope: float32 [B, 8, H + 2, W + 1] or None.
     """
 
-    def __init__(self, law: Law, edge: Edge, susceptible: Tensor, gain: Tensor, slope: Tensor | None) -> None:
+    def __init__(self, law: Joining, edge: Edge, susceptible: Tensor, gain: Tensor, slope: Tensor | None) -> None:
         self._law, self._edge, self._susceptible, self._gain, self._slope = law, edge, susceptible, gain, slope
 
     def joined(self) -> Tensor:
-        """See ``EdgeChances``."""
+        """See ``EdgeProbabilities``."""
         total = torch.zeros_like(self._susceptible)
         spare = torch.empty_like(total)
-        for direction in directions(self._edge.neighbours):
+        for direction in self._edge.directions:
             self._law.join(total, self._strength(direction).mul_(self._edge.burns(direction)), spare)
-        return self._law.chance(total)
+        return self._law.probability(total)
 
     def alone(self, direction: int) -> Tensor:
-        """See ``EdgeChances``."""
-        return self._law.chance_of(self._strength(direction))
+        """See ``EdgeProbabilities``."""
+        return self._law.probability_of(self._strength(direction))
 
     def _strength(self, direction: int) -> Tensor:
         edge, gain = self._edge, self._gain[:, direction].flatten()
@@ -162,7 +161,7 @@ class ByStrength:
         return self._edge.world * ((height + 2) * (width + 1)) + (row + 1) * (width + 1) + (place - row * width)
 
 
-def expected_from_edge(edge: Edge, chances: EdgeChances) -> Tensor:
+def expected_from_edge(edge: Edge, chances: EdgeProbabilities) -> Tensor:
     """Return how many neighbours each burning cell is expected to ignite in one tick, float32 [B, H, W]; 0 elsewhere.
 
     Args:
@@ -171,7 +170,7 @@ def expected_from_edge(edge: Edge, chances: EdgeChances) -> Tensor:
     """
     margin = edge.shape[2] + 1  # where no neighbour burns 0 is added, maybe beside the batch
     total = torch.zeros(edge.shape.numel() + 2 * margin, device=edge.cell.device)
-    for direction in directions(edge.neighbours):
+    for direction in edge.directions:
         at_source = total[margin - edge.offset(direction) :]
         at_source.scatter_add_(0, edge.cell, edge.burns(direction).mul_(chances.alone(direction)))
     return total[margin:-margin].view(edge.shape)

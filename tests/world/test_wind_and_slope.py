@@ -6,7 +6,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.kernel import alexandridis, ellipse, length_to_breadth, slope_factor
+from warp_torchrl.world.wind_and_slope import alexandridis, ellipse, length_to_breadth, slope_factor
 
 EAST, NORTH_EAST, NORTH, WEST = 2, 1, 0, 6
 

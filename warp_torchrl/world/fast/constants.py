@@ -5,7 +5,7 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.fusion import kept_in_memory
+from warp_torchrl.world.fast.compile import opaque_op
 
 
 @lru_cache(maxsize=64)
@@ -15,7 +15,7 @@ def numbers(values: tuple[float, ...], device: torch.device) -> Tensor:
 
 
 # A compiler would make the numbers of each vector one by one, which on CPUs takes as long as to mix them for a draw.
-@kept_in_memory("(int length, Tensor beside) -> Tensor")
+@opaque_op("(int length, Tensor beside) -> Tensor")
 def counting(length: int, beside: Tensor) -> Tensor:
     """Return 0, 1, ... below a length, int32 [length], where another tensor lives, one that is in memory anyway."""
     return torch.arange(length, dtype=torch.int32, device=beside.device)

@@ -3,7 +3,18 @@
 import pytest
 import torch
 
-from warp_torchrl.world.flags import above, at_least, below, between, byte, choose, clear, counts, equal, number
+from warp_torchrl.world.fast.bytes import (
+    above,
+    at_least,
+    below,
+    between,
+    byte,
+    choose,
+    counts,
+    equal,
+    number,
+    zero_where,
+)
 
 codes = torch.arange(256, dtype=torch.uint8).view(1, 16, 16)
 
@@ -42,7 +53,7 @@ def test_choices():
     other = codes.flip(1)
     assert torch.equal(choose(byte(mask), codes, other), torch.where(mask, codes, other))
     assert torch.equal(choose(byte(mask), 11, other), torch.where(mask, torch.tensor(11, dtype=torch.uint8), other))
-    assert torch.equal(clear(byte(mask), codes), codes.masked_fill(mask, 0))
+    assert torch.equal(zero_where(byte(mask), codes), codes.masked_fill(mask, 0))
     assert torch.equal(number(mask), mask.to(torch.float32))
     assert counts(byte(mask).expand(2, -1, -1))[0].tolist() == [int(mask.sum())] * 2
     assert counts(torch.ones(1, 300, 300, dtype=torch.uint8))[0].item() == 90_000

@@ -30,17 +30,17 @@ _NOISE = (
 
 
 @cache
-def fused(function: Callable[P, T], in_parts: bool = False) -> Callable[P, T]:
+def compiled(function: Callable[P, T], in_parts: bool = False) -> Callable[P, T]:
     """Return a function of tensors that changes nothing as one loop, compiled for each shape anew when it is called.
 
     What is computed of a cell is computed again for each who asks, and kept for none: on the CPU a mask in memory costs
     more than the comparisons that made it. A function that is fused ``in_parts`` keeps what is asked for often.
     """
     torch._dynamo.config.recompile_limit = max(torch._dynamo.config.recompile_limit, _SHAPES)
-    return compiled(function, fullgraph=True, **(_IN_PARTS if in_parts else _IN_REGISTERS))
+    return compile_function(function, fullgraph=True, **(_IN_PARTS if in_parts else _IN_REGISTERS))
 
 
-def compiled(function: Callable[P, T], fullgraph: bool = False, **options: Any) -> Callable[P, T]:
+def compile_function(function: Callable[P, T], fullgraph: bool = False, **options: Any) -> Callable[P, T]:
     """Return a function that is compiled for each shape anew when it is called.
 
     Names of modules are taken to stay what they are: to look at them at every call takes longer than a loss's sums, and
@@ -60,7 +60,7 @@ def compiled(function: Callable[P, T], fullgraph: bool = False, **options: Any) 
 _LIBRARIES: dict[str, torch.library.Library] = {}
 
 
-def kept_in_memory(schema: str, like: Callable[..., Any] | None = None) -> Callable[[Callable[P, T]], Callable[P, T]]:
+def opaque_op(schema: str, like: Callable[..., Any] | None = None) -> Callable[[Callable[P, T]], Callable[P, T]]:
     """Return what makes a function one that fused functions call as it is, and whose result they keep in memory.
 
     A compiler would write it out again for each who asks, or make a question of each element of what is a slice.

@@ -1,0 +1,118 @@
+"""Every fast road comes to what the law's page does, to the bit."""
+
+from dataclasses import dataclass
+
+import pytest
+import torch
+from torch import Tensor
+
+from warp_torchrl.world.fast import at_edge, planes, road
+from warp_torchrl.world.fast.rows import probability_from_rows
+from warp_torchrl.world.fire import Fire
+from warp_torchrl.world.hazard import HazardFire
+from warp_torchrl.world.landscape import Perlin
+from warp_torchrl.world.random import Stream, uniform, uniform_among
+from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.wind import Calm, Paper, Uniform, Wandering, Wind
+from warp_torchrl.world.world import World, advance
+
+from ..drawing import differing
+
+ALONE = {
+    "paper": Fire(),
+    "unit": Fire(diagonal="unit", kernel="ellipse", alpha=(0.3, 0.1, 1.0, 0.8, 0.2)),
+    "four": Fire(burning_stages=5, neighbours=4, wind_gain=0.3),  # gains over 1 / alpha, which are clipped
+    "hazard": HazardFire(refinement=3, wet_ticks=2),
+}
+WHOLE = {
+    "growth": Fire(growth=True, tau=1.0),
+    "lightning": Fire(beta=60.0),
+    "regrowth": Fire(p_regrow=0.2),
+    "all": HazardFire(growth=True, beta=90.0, p_regrow=0.3, refinement=2, youngest_fuel=1),
+}
+WINDS = {"calm": Calm(), "uniform": Uniform(speed=7.0), "wandering": Wandering(), "field": Paper()}
+
+
+def burning(fire: Fire, relief: float, wind: Wind, ticks: int = 15) -> list[WorldState]:
+    """Return six worlds as they are before each of some ticks, the third of which waits."""
+    world = World(landscape=Perlin(size=(11, 13), relief=relief), fire=fire, wind=wind)
+    states, due = [world.reset(torch.arange(6), torch.zeros(6, dtype=torch.int64))], torch.arange(6) != 2
+    for _ in range(ticks):
+        wet = torch.where(states[-1].cells == 5, 3, states[-1].wet).to(torch.uint8)
+        states.append(advance(states[-1].replace(wet=wet), fire, world.air, due))
+    return states
+
+
+def whole_map(state: WorldState) -> Tensor:
+    return uniform(state.key, state.tick, Stream.FIRE, tuple(state.cells.shape[1:]))
+
+
+@pytest.mark.parametrize("fire", [*ALONE.values(), *WHOLE.values()], ids=[*ALONE, *WHOLE])
+@pytest.mark.parametrize("relief", [0.0, 300.0], ids=["level", "slopes"])
+@pytest.mark.parametrize("wind", WINDS.values(), ids=WINDS)
+def test_planes_come_to_what_the_page_does(fire: Fire, relief: float, wind: Wind) -> None:
+    lit, due = 0, torch.arange(6) != 4
+    for state in burning(fire, relief, wind):
+        q = fire.ignition_probability(state)
+        assert torch.equal(planes.ignition_probability(fire, state), q)
+        assert torch.equal(planes.expected_ignitions(fire, state), fire.expected_ignitions(state))
+        after = fire.tick(state, whole_map(state), due)
+        assert differing(planes.tick(fire, state, whole_map(state), due), after) == []
+        assert differing(road.tick(fire, state, due), after) == []
+        lit += int((q > 0.0).sum())
+    assert lit > 300
+
+
+@pytest.mark.parametrize("fire", ALONE.values(), ids=ALONE)
+@pytest.mark.parametrize("relief", [0.0, 300.0], ids=["level", "slopes"])
+@pytest.mark.parametrize("wind", WINDS.values(), ids=WINDS)
+def test_the_edge_comes_to_what_the_page_does(fire: Fire, relief: float, wind: Wind) -> None:
+    listed, due = 0, torch.arange(6) != 4
+    for state in burning(fire, relief, wind):
+        edge, draws = at_edge.edge(fire, state), whole_map(state)
+        at_trees = uniform_among(state.key, state.tick, Stream.FIRE, edge.world, edge.place)
+        assert torch.equal(at_trees, edge.of(draws))
+        assert differing(at_edge.tick(fire, state, edge, at_trees, due), fire.tick(state, draws, due)) == []
+        expected, probability = at_edge.expected_and_probability(fire, state)
+        assert torch.equal(expected, fire.expected_ignitions(state))
+        assert torch.equal(probability, fire.ignition_probability(state))
+        listed += len(edge.cell)
+    assert listed > 300
+
+
+@pytest.mark.parametrize("fire", ALONE.values(), ids=ALONE)
+def test_rows_come_to_what_the_table_does(fire: Fire) -> None:
+    for state in burning(fire, 0.0, Uniform(speed=7.0), ticks=5):
+        assert state.air.table is not None
+        without = state.replace(air=state.air.replace(table=None))
+        q = planes.ignition_probability(fire, without)
+        assert torch.equal(planes.ignition_probability(fire, state), q)
+        made = probability_from_rows(
+            planes.in_place(fire.law),
+            fire.spreads(state),
+            planes.in_place(fire.law).susceptibility(state.alpha) * fire.is_fuel(state),
+            fire.gain(state.wind),
+            None,
+            fire.directions,
+        )
+        assert torch.equal(made, q)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Certain(Fire):
+    """Every tree ignites beside any fire: a law of another form."""
+
+    def spread_probability(self, state: WorldState) -> Tensor:
+        """Return 1 for each tree beside fire, float32 [B, H, W]."""
+        return (super().spread_probability(state) > 0.0).to(torch.float32)
+
+
+def test_an_automaton_with_rules_of_its_own_takes_the_page() -> None:
+    fire = Certain()
+    world = World(landscape=Perlin(size=12), fire=fire, wind=Calm(), steps_per_tick=1)
+    state = world.reset(torch.arange(4), torch.zeros(4, dtype=torch.int64))
+    assert state.air.table is None
+    beside = Fire().ignition_probability(state) > 0.0
+    assert torch.equal(world.forecast(state).ignition_probability, beside.to(torch.float32)) and beside.any()
+    after = world.step(state, torch.full((4, world.team.n_agents), 10)).after
+    assert torch.equal((after.cells == 11), beside | (state.cells == 11) & (after.cells == 11))

@@ -1,0 +1,31 @@
+"""The law's rules by hand."""
+
+import math
+
+import pytest
+
+from warp_torchrl.world.fire import Fire
+from warp_torchrl.world.hazard import HazardFire
+from warp_torchrl.world.law import growth_probability, in_finer_time, lightning_probability
+
+
+def test_two_ticks_come_to_one():
+    assert in_finer_time(0.75, 2) == pytest.approx(0.5)
+    assert in_finer_time(0.3, 1) == 0.3 and in_finer_time(0.0, 8) == 0.0 and in_finer_time(1.0, 8) == 1.0
+    rules = {"growth": True, "tau": 2.0, "beta": 0.5}
+    for table in (Fire.growing, lambda fire: fire.lightning(4)):
+        whole, finer = table(Fire(**rules)), table(HazardFire(**rules, refinement=8))
+        assert [1.0 - (1.0 - chance) ** 8 for chance in finer] == pytest.approx(list(whole)) and any(whole)
+
+
+def test_the_oldest_do_not_grow_and_the_youngest_grow_most():
+    assert growth_probability(1, 5.0) == pytest.approx(math.exp(-0.5))
+    assert growth_probability(9, 5.0) == pytest.approx(math.exp(-4.5))
+    assert [growth_probability(code, 5.0) for code in (0, 10, 11, 15)] == [0.0] * 4
+
+
+def test_lightning_lights_the_oldest_most_and_no_fire():
+    assert lightning_probability(10, 2.0, 100) == pytest.approx(0.02)
+    assert lightning_probability(9, 2.0, 100) == pytest.approx(0.02 / math.e)
+    assert [lightning_probability(code, 2.0, 100) for code in (0, 11, 15)] == [0.0] * 3
+    assert lightning_probability(10, 1e6, 4) == 1.0

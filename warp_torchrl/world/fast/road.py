@@ -1,0 +1,97 @@
+"""The one entry to the fast roads, and the place where one is chosen.
+
+A road computes what the law's page does (``warp_torchrl.world.law``), to the bit. An automaton that none covers takes
+the page itself, on any device.
+"""
+
+from collections.abc import Callable
+
+import torch
+from torch import Tensor
+from torch.compiler import is_compiling
+
+from warp_torchrl.world.fast import at_edge, planes
+from warp_torchrl.world.fast.bytes import number
+from warp_torchrl.world.fast.table import pattern_table
+from warp_torchrl.world.fire import Fire
+from warp_torchrl.world.hazard import HazardFire
+from warp_torchrl.world.random import Stream, uniform, uniform_among
+from warp_torchrl.world.state import Air, Forecast, Ground, WorldState, is_tree
+
+COVERED = (Fire, HazardFire)
+"""The automata that the fast roads compute; a subclass may have other rules, and takes the page."""
+
+
+def tick(fire: Fire, state: WorldState, due: Tensor) -> WorldState:
+    """Return the worlds after one tick of the fire with their own draws, where it is due, bool [B]."""
+    if _burns_at_its_edge(fire, state):
+        trees = at_edge.edge(fire, state)
+        draws = uniform_among(state.key, state.tick, Stream.FIRE, trees.world, trees.place)
+        return at_edge.tick(fire, state, trees, draws, due)
+    draws = uniform(state.key, state.tick, Stream.FIRE, tuple(state.cells.shape[1:]))
+    if type(fire) in COVERED:
+        return planes.tick(fire, state, draws, due)
+    return fire.tick(state, draws, due)
+
+
+def forecast(fire: Fire, state: WorldState) -> Forecast:
+    """Return what the fire is about to do."""
+    if _burns_at_its_edge(fire, state):
+        expected, probability = at_edge.expected_and_probability(fire, state)
+    elif type(fire) in COVERED:
+        expected, probability = planes.expected_ignitions(fire, state), planes.ignition_probability(fire, state)
+    else:
+        expected, probability = fire.expected_ignitions(state), fire.ignition_probability(state)
+    return Forecast(
+        expected_ignitions=expected.mul_(0.25).clamp_(max=1.0),
+        ignition_probability=probability,
+        fuel=state.alpha * number(is_tree(state.cells)),
+    )
+
+
+def air(fire: Fire, wind: Tensor, ground: Ground) -> Air:
+    """Return a wind with all that follows from it on some ground, float32 [B, 2, 1, 1] or [B, 2, H, W] [m/s]."""
+    made = fire.air(wind)
+    if made.gain is None or ground.slope is not None or type(fire) not in COVERED:
+        return made
+    return made.replace(table=pattern_table(fire, made.gain))
+
+
+def advance_rows(state: WorldState, due: Tensor, advance: Callable[[WorldState, Tensor], WorldState]) -> WorldState:
+    """Return ``advance(state, due)``, computed for the worlds that are due alone where few are, on a CPU.
+
+    Which ones they are is read back from the device.
+    """
+    if due.is_cuda or is_compiling():
+        return advance(state, due)
+    index = due.nonzero()[:, 0]
+    if len(index) == len(due):
+        return advance(state, due)
+    if not len(index):
+        return state
+    rows = state[index]
+    before, after, leaves = rows.leaves(), advance(rows, due[index]).leaves(), state.leaves()
+    changed = [name for name, leaf in after.items() if leaf is not before[name]]
+    return state.with_leaves({**leaves, **{name: leaves[name].index_copy(0, index, after[name]) for name in changed}})
+
+
+_FLAGS = ("initial", "extinguished", "burned", "firebreak")
+
+
+def in_bytes(state: WorldState) -> WorldState:
+    """Return worlds whose planes of flags are read as uint8, 0 and 1, as functions that are compiled need them."""
+    return state.replace(**{name: getattr(state, name).view(torch.uint8) for name in _FLAGS})
+
+
+def in_flags(state: WorldState) -> WorldState:
+    """Return the worlds of ``in_bytes`` as they are elsewhere."""
+    return state.replace(**{name: getattr(state, name).view(torch.bool) for name in _FLAGS})
+
+
+def _burns_at_its_edge(fire: Fire, state: WorldState) -> bool:
+    """Return whether a tick is worked out at the fire's edge alone.
+
+    It is so where trees neither grow nor ignite by themselves, on a CPU, unless whole maps are compiled.
+    """
+    alone = not fire.growth and fire.beta == 0.0 and fire.p_regrow == 0.0
+    return alone and type(fire) in COVERED and state.cells.device.type == "cpu" and not is_compiling()
