@@ -10,12 +10,10 @@ from warp_torchrl.observation import (
     Local,
     Paper,
     Surroundings,
-    block_means,
     central_state,
     egocentric_view,
     own_vector,
     picture,
-    window,
 )
 from warp_torchrl.world.array import Array
 from warp_torchrl.world.team import Team
@@ -38,27 +36,10 @@ def channel(view, name):
     return view[0, 0, CHANNELS.index(name)]
 
 
-def test_a_window_is_the_square_about_the_agent_and_zero_off_the_map():
-    plane = torch.arange(1, 26).view(1, 5, 5)
-    seen = window(torch.tensor([[[0, 0], [4, 3]]]), (5, 5), 1).of(plane)
-    assert seen[0, 0].tolist() == [[0, 0, 0], [0, 1, 2], [0, 6, 7]]
-    assert seen[0, 1].tolist() == [[18, 19, 20], [23, 24, 25], [0, 0, 0]]
-
-
-def test_windows_of_many_worlds_equal_slices():
-    plane = torch.randint(0, 255, (3, 9, 7), dtype=torch.uint8)
-    position = torch.stack((torch.randint(2, 7, (3, 5)), torch.randint(2, 5, (3, 5))), dim=-1)
-    seen = window(position, (9, 7), 2).of(plane)
-    for world in range(3):
-        for agent in range(5):
-            row, column = position[world, agent].tolist()
-            assert (seen[world, agent] == plane[world, row - 2 : row + 3, column - 2 : column + 3]).all()
-
-
 def test_the_view_shows_fire_age_and_the_border():
     cells = [[5, 5, 5, 5], [5, 11, 13, 5], [5, 5, 0, 5], [5, 5, 5, 10]]
     state, world = drawn(cells, [[1, 0]])
-    view = egocentric_view(state, world, 1)
+    view = egocentric_view(state, world, world.forecast(state), 1)
     assert channel(view, "off_map").tolist() == [[255, 0, 0], [255, 0, 0], [255, 0, 0]]
     assert channel(view, "fire_stage").tolist() == [[0, 0, 0], [0, 0, 51], [0, 0, 0]]  # stage 1 of 5
     assert channel(view, "age").tolist() == [[0, 125, 125], [0, 125, 0], [0, 125, 125]]  # age 5 of 10
@@ -69,14 +50,14 @@ def test_the_threat_of_a_tree_is_its_chance_to_ignite_and_of_a_fire_what_it_will
     # Calm air, one fire in the middle of forest: axial 0.8, diagonal 0.8 / sqrt 2 = 0.566; sum 4 x 0.8 + 4 x 0.566.
     cells = [[5, 5, 5, 5], [5, 11, 5, 5], [5, 5, 5, 5], [5, 5, 5, 5]]
     state, world = drawn(cells, [[1, 1]], wind=Uniform(speed=0.0))
-    threat = channel(egocentric_view(state, world, 1), "threat")
+    threat = channel(egocentric_view(state, world, world.forecast(state), 1), "threat")
     assert threat[0].tolist() == [int(0.8 / 2**0.5 * 255), int(0.8 * 255), int(0.8 / 2**0.5 * 255)]
     assert threat[1, 1] == 255  # 5.46 / 4, at most 1
 
 
 def test_agents_see_each_other_and_not_themselves():
     state, world = drawn([[5] * 6] * 6, [[2, 2], [2, 3], [3, 2]], roles=("ugv", "ugv", "uav"))
-    view = egocentric_view(state, world, 1)
+    view = egocentric_view(state, world, world.forecast(state), 1)
     assert channel(view, "other_ugv").tolist() == [[0, 0, 0], [0, 0, 63], [0, 0, 0]]
     assert channel(view, "other_uav").tolist() == [[0, 0, 0], [0, 0, 0], [0, 63, 0]]
 
@@ -84,7 +65,7 @@ def test_agents_see_each_other_and_not_themselves():
 @pytest.mark.parametrize(("agents", "shown"), [(1, 0), (2, 63), (5, 252), (7, 252)])
 def test_up_to_four_others_are_told_apart_on_a_cell_and_oneself_is_none(agents, shown):
     state, world = drawn([[5] * 6] * 6, [[2, 2]] * agents)
-    view = egocentric_view(state, world, 1)
+    view = egocentric_view(state, world, world.forecast(state), 1)
     assert channel(view, "other_ugv").tolist() == [[0, 0, 0], [0, shown, 0], [0, 0, 0]]
 
 
@@ -92,7 +73,11 @@ def test_elevation_is_relative_to_the_agent():
     slope = torch.arange(5).mul(50.0).expand(5, 5)
     state, world = drawn([[5] * 5] * 5, [[2, 2]], elevation=slope)
     # 50 m up: 128 + 127 / 2 = 191.5; 50 m down 64.5; whole numbers below
-    assert channel(egocentric_view(state, world, 1), "relative_elevation")[1].tolist() == [64, 128, 191]
+    assert channel(egocentric_view(state, world, world.forecast(state), 1), "relative_elevation")[1].tolist() == [
+        64,
+        128,
+        191,
+    ]
 
 
 def test_an_agent_knows_its_place_the_time_and_the_wind():
@@ -114,7 +99,7 @@ def test_the_picture_pools_the_whole_map():
     cells = torch.full((16, 16), 5)
     cells[0, 0] = 12  # one burning cell of four in the first block
     state, world = drawn(cells.tolist(), [[8, 8], [0, 15]])
-    seen = picture(state, world)
+    seen = picture(state, world.forecast(state))
     assert seen[0, 0, 0, 0, 0] == pytest.approx(0.5) and seen[0, 0, 0].sum() == pytest.approx(0.5)  # sqrt(1 / 4)
     assert seen[0, 0, 1, 7, 7] == pytest.approx(0.8)
     assert seen[0, 0, 2].nonzero().tolist() == [[0, 7]] and seen[0, 1, 2].nonzero().tolist() == [[4, 4]]
@@ -122,7 +107,7 @@ def test_the_picture_pools_the_whole_map():
 
 def test_the_critic_sees_every_agent_and_the_clock():
     state, world = drawn([[5] * 16] * 16, [[8, 8], [0, 15]])
-    seen = central_state(state, world)[0]
+    seen = central_state(state, world, world.forecast(state))[0]
     assert seen[STATE.index("ugv")].nonzero().tolist() == [[0, 15], [8, 8]]
     clock = seen[STATE.index("clock_and_wind")]
     assert (clock[:8] == 1).all(), "the time left, the steps to the tick"
@@ -135,7 +120,7 @@ def test_the_critic_sees_where_fire_is_about_to_grow():
     cells = torch.full((16, 16), 5)
     cells[4, 6], cells[10, 10] = 11, 15
     state, world = drawn(cells.tolist(), [[0, 0]], wind=Uniform(speed=0.0))
-    seen = dict(zip(STATE, central_state(state, world)[0], strict=True))
+    seen = dict(zip(STATE, central_state(state, world, world.forecast(state))[0], strict=True))
     assert seen["fire"].nonzero().tolist() == [[4, 6], [10, 10]]
     assert seen["front"].nonzero().tolist() == [[4, 6]] and seen["front"][4, 6] == 1.0, "an ember spreads no more"
     assert seen["threat"][4, 7] == pytest.approx(0.8) and seen["threat"][5, 7] == pytest.approx(0.8 / 2**0.5)
@@ -150,7 +135,10 @@ def test_a_centred_picture_is_the_picture_seen_from_the_agent(size):
     state, world = drawn(cells.tolist(), places)
     plain, centred = Surroundings(radius=1), Surroundings(radius=1, centred=True)
     assert centred.spaces(world)["picture"].shape == (3, 15, 15)
-    flat, seen = plain(state, world)["picture"][0], centred(state, world)["picture"][0]
+    flat, seen = (
+        plain(state, world, world.forecast(state))["picture"][0],
+        centred(state, world, world.forecast(state))["picture"][0],
+    )
     assert seen.dtype == torch.uint8 and seen.shape == (4, 3, 15, 15)
     for agent, place in enumerate(places):
         row, column = (each * 8 // size for each in place)
@@ -162,7 +150,7 @@ def test_a_centred_picture_is_the_picture_seen_from_the_agent(size):
 
 def test_the_paper_preset_is_three_channels_flattened():
     state, world = drawn([[5] * 4, [5, 11, 5, 5]] * 2, [[0, 0]])
-    seen = Paper(radius=1)(state, world)[""][0, 0].view(3, 3, 3)
+    seen = Paper(radius=1)(state, world, world.forecast(state))[""][0, 0].view(3, 3, 3)
     forest = torch.tensor([[0, 0, 0], [0, 0.8, 0.8], [0, 0.8, 0.8]])  # (code 3 + 1) / 5, off the map 0
     assert torch.allclose(seen[0], forest, atol=0.01)
     assert seen[1, 1, 1] == pytest.approx(0.5, abs=0.01)  # age 5 of 10
@@ -175,7 +163,8 @@ def test_what_lies_out_of_view_is_not_in_view_or_self(preset):
     inside = torch.full((20, 20), 5)
     outside = inside.clone()
     outside[12:, 12:] = 12
-    seen = [preset(*drawn(cells.tolist(), [[2, 2]])) for cells in (inside, outside)]
+    worlds = [drawn(cells.tolist(), [[2, 2]]) for cells in (inside, outside)]
+    seen = [preset(state, world, world.forecast(state)) for state, world in worlds]
     for name in seen[0]:
         same = (seen[0][name] == seen[1][name]).all()
         assert same == (name != "picture")
@@ -188,29 +177,14 @@ def test_a_radius_out_of_range_is_refused(preset, radius):
         preset(radius=radius)
 
 
-@pytest.mark.parametrize("shape", [(16, 16), (32, 48), (64, 16), (20, 30), (12, 16)])
-def test_block_means_are_those_of_pooling(shape):
-    maps = torch.rand(3, 2, *shape)
-    for side in (8, 16):
-        if min(shape) >= side:
-            torch.testing.assert_close(block_means(maps, side), torch.nn.functional.adaptive_avg_pool2d(maps, side))
-
-
-@pytest.mark.parametrize("shape", [(16, 16), (40, 1024), (5120, 16), (20, 30)])
-def test_block_means_of_a_mask_are_the_shares_that_are_set(shape):
-    mask = torch.rand(2, *shape) < 0.9
-    torch.testing.assert_close(block_means(mask, 8), block_means(mask.to(torch.float32), 8))
-    assert (block_means(torch.ones(1, *shape, dtype=torch.bool), 8) == 1.0).all()
-
-
 @pytest.mark.parametrize("preset", [Local, Surroundings])
 def test_agents_know_their_place_in_the_team_where_asked(preset):
     state, world = drawn([[5] * 6] * 6, [[2, 2], [2, 2], [2, 2], [2, 2]])
     without, told = (preset(radius=1, identity=asked) for asked in (False, True))
     assert told.spaces(world)["self"].shape == (without.spaces(world)["self"].shape[0] + 4,)
-    own = told(state, world)["self"]
+    own = told(state, world, world.forecast(state))["self"]
     assert own.shape == (1, 4, *told.spaces(world)["self"].shape)
-    assert torch.equal(own[..., :-4], without(state, world)["self"])
+    assert torch.equal(own[..., :-4], without(state, world, world.forecast(state))["self"])
     half = 0.5**0.5  # places 1/8, 3/8, 5/8 and 7/8 of a turn
     by_hand = [[half, half, 0.0, 1.0], [-half, half, 0.0, -1.0], [-half, -half, 0.0, 1.0], [half, -half, 0.0, -1.0]]
     torch.testing.assert_close(own[0, :, -4:], torch.tensor(by_hand), atol=1e-6, rtol=0.0)

@@ -76,7 +76,7 @@ def test_coverage_weighs_blocks_by_their_assets():
     state, world = drawn(BLOCKS, [[7, 15]], steps_per_tick=1, fire=SURE)
     # The left block is worth three times the right one: 1.5 and 0.5 of the mean.
     assets = torch.tensor(np.repeat([3.0, 1.0], 8), dtype=torch.float32).expand(1, 8, 16)
-    state = state.replace(landscape=state.landscape.replace(assets=assets))
+    state = state.replace(ground=state.ground.replace(landscape=state.landscape.replace(assets=assets)))
     assert earned(Coverage(), state, world, STAY) == pytest.approx([-8 / 128 - 0.03])
 
 
