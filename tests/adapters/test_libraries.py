@@ -1,9 +1,8 @@
 """Other libraries on the views."""
 
 import gymnasium
-import numpy as np
 import pytest
-from gymnasium.spaces import Box, Dict, flatten, flatten_space
+from gymnasium.spaces import flatten, flatten_space
 from torchrl.envs import PettingZooWrapper
 from torchrl.envs.utils import check_env_specs
 
@@ -56,21 +55,24 @@ def test_stable_baselines3_trains_one_agent():
     sb3 = pytest.importorskip("stable_baselines3")
     env = gymnasium.wrappers.FlattenObservation(gymnasium.make("Wildfire-v0", horizon=20))
     assert sb3.DQN("MlpPolicy", env, learning_starts=10, buffer_size=100, device="cpu").learn(20).num_timesteps == 20
-    learner = sb3.PPO("MultiInputPolicy", with_flat_view(gym_env(horizon=20)), **TINY_PPO).learn(16)
+    learner = sb3.PPO("MultiInputPolicy", "Wildfire-v0", **TINY_PPO).learn(16)
     assert learner.num_timesteps == 16
 
 
-def with_flat_view(env):
-    """Keep SB3 from taking the view for a photograph: its network for those needs 36 x 36 pixels."""
-    view = env.observation_space["view"]
-    flat = Dict({**env.observation_space.spaces, "view": Box(0, 255, (int(np.prod(view.shape)),), np.uint8)})
-    return gymnasium.wrappers.TransformObservation(env, lambda seen: {**seen, "view": seen["view"].ravel()}, flat)
+@pytest.mark.parametrize("centred", ["false", "true"])
+def test_stable_baselines3_takes_nothing_for_a_photograph(centred):
+    """Its network for photographs needs 36 x 36 pixels."""
+    preprocessing = pytest.importorskip("stable_baselines3.common.preprocessing")
+    space = gym_env(overrides=[f"observation.centred={centred}"]).observation_space
+    assert not any(preprocessing.is_image_space(each) for each in space.values())
 
 
-def test_stable_baselines3_contrib_masks_actions():
+@pytest.mark.parametrize("policy", ["MultiInputPolicy", "MlpPolicy"])
+def test_stable_baselines3_contrib_masks_actions(policy):
     contrib = pytest.importorskip("sb3_contrib")
-    env = gymnasium.wrappers.FlattenObservation(gym_env(horizon=20))
-    learner = contrib.MaskablePPO("MlpPolicy", env, **TINY_PPO).learn(16)
+    env = gymnasium.make("Wildfire-v0", horizon=20)
+    env = env if policy == "MultiInputPolicy" else gymnasium.wrappers.FlattenObservation(env)
+    learner = contrib.MaskablePPO(policy, env, **TINY_PPO).learn(16)
     seen, _ = env.reset(seed=0)
     action, _ = learner.predict(seen, action_masks=env.unwrapped.action_masks())
     assert env.unwrapped.action_masks()[action]

@@ -169,20 +169,20 @@ class Worlds:
 def observation_space(env: WildfireEnv) -> spaces.Box | spaces.Dict:
     """Return the space of one agent's observation: one Box in preset ``paper``, else a flat Dict with its mask."""
     named = env.observation.spaces(env.world)
-    boxes = {name: _box(space.low, space.high, space.shape, space.dtype) for name, space in named.items()}
+    boxes = {name: _box(*space.bounds()) for name, space in named.items()}
     if "" in boxes:
         return boxes[""]
-    return spaces.Dict({**boxes, "action_mask": _box(0, 1, (env.world.team.n_actions,), torch.int8)})
+    return spaces.Dict({**boxes, "action_mask": spaces.Box(0, 1, (env.world.team.n_actions,), np.int8)})
 
 
 def state_space(env: WildfireEnv) -> spaces.Box:
     """Return the space of a world's central state."""
     spec = env.full_observation_spec_unbatched["state"]
-    return _box(float(spec.space.low.min()), float(spec.space.high.max()), tuple(spec.shape), spec.dtype)
+    return _box(spec.space.low, spec.space.high)
 
 
-def _box(low: float, high: float, shape: tuple[int, ...], dtype: torch.dtype) -> spaces.Box:
-    return spaces.Box(low, high, shape, torch.empty(0, dtype=dtype).numpy().dtype.type)
+def _box(low: torch.Tensor, high: torch.Tensor) -> spaces.Box:
+    return spaces.Box(low.numpy(force=True), high.numpy(force=True), dtype=low.numpy(force=True).dtype.type)
 
 
 def action_number(name: str, action: object, n_actions: int) -> int:
