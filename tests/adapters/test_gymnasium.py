@@ -8,6 +8,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 from warp_torchrl.adapters import FireExtinguishingEnv, FireExtinguishingVectorEnv, gym_env
+from warp_torchrl.construction import ConfigError
 
 STAY = 10
 BURNS_OUT = {"steps_per_tick": 1, "horizon": 12, "landscape.size": 8, "ignition.head_start": 0}
@@ -46,7 +47,7 @@ def test_without_a_seed_each_has_its_own_world():
     assert (views[0] != views[1]).any()
 
 
-@pytest.mark.parametrize("action", [11, -1, 0.0, "3", True, np.zeros(1, int)])
+@pytest.mark.parametrize("action", [11, -1, 0.0, "3", True, np.zeros(1), np.zeros(2, int), np.zeros((1, 1), int)])
 def test_bad_actions_are_refused_in_one_line(single, action):
     with pytest.raises(ValueError, match="action must be") as error:
         single.step(action)
@@ -58,6 +59,40 @@ def single():
     env = gym_env()
     env.reset()
     return env
+
+
+def test_an_action_may_stand_in_an_array():
+    rewards = []
+    for action in (8, np.int64(8), np.array(8), np.array([8], np.int32)):
+        env = gym_env(seed=3)
+        env.reset()
+        rewards.append(env.step(action)[1])
+    assert len(set(rewards)) == 1
+
+
+def test_an_unknown_keyword_is_a_type_error_as_of_any_function():
+    with pytest.raises(TypeError, match="unexpected keyword argument 'frameskip'") as error:
+        gym_env(frameskip=1)
+    assert isinstance(error.value, ConfigError) and "\n" not in str(error.value)
+    with pytest.raises(ConfigError, match="frameskip is not a key") as error:
+        gym_env(overrides=["frameskip=1"])
+    assert not isinstance(error.value, TypeError), "this is a text, and no keyword"
+    with pytest.raises(ConfigError, match="horizon") as error:
+        gym_env(horizon=-1)
+    assert not isinstance(error.value, TypeError)
+
+
+def test_what_is_seen_lies_within_its_space_through_episodes():
+    env = gym_env("single", overrides=["observation.centred=true"], **BURNS_OUT)
+    env.action_space.seed(0)
+    for _ in range(3):
+        seen, _ = env.reset()
+        ended = False
+        while not ended:
+            assert seen in env.observation_space
+            seen, _, terminated, truncated, _ = env.step(env.action_space.sample(seen["action_mask"]))
+            ended = terminated or truncated
+        assert seen in env.observation_space
 
 
 def test_stepping_a_finished_world_or_one_never_started_is_refused():

@@ -3,12 +3,19 @@
 import gymnasium
 import pytest
 from gymnasium.spaces import flatten, flatten_space
-from torchrl.envs import PettingZooWrapper
+from torchrl.envs import GymEnv, PettingZooWrapper
 from torchrl.envs.utils import check_env_specs
 
 from warp_torchrl.adapters import gym_env, parallel_env
 
 TINY_PPO = {"n_steps": 16, "batch_size": 16, "n_epochs": 1, "device": "cpu"}
+
+
+@pytest.mark.parametrize("options", [{}, {"observation": "paper", "frame_skip": 2}, {"from_pixels": True}])
+def test_torchrl_makes_it_by_name(options):
+    env = GymEnv("Wildfire-v0", horizon=4, **options)
+    check_env_specs(env)
+    assert env.rollout(6)["next", "done"].any()
 
 
 @pytest.mark.parametrize(("scenario", "observation"), [("hetero", "surroundings"), ("skirmish", "paper")])
@@ -23,7 +30,7 @@ def test_torchrl_reads_it_back(scenario, observation):
 def test_supersuit_and_stable_baselines3_train_a_team():
     supersuit = pytest.importorskip("supersuit")
     sb3 = pytest.importorskip("stable_baselines3")
-    env = supersuit.pad_action_space_v0(supersuit.pad_observations_v0(parallel_env("paper_marl", seed=None)))
+    env = supersuit.pad_action_space_v0(supersuit.pad_observations_v0(parallel_env("paper_marl")))
     env = supersuit.frame_stack_v1(supersuit.flatten_v0(env), 2)
     worlds = supersuit.concat_vec_envs_v1(
         supersuit.pettingzoo_env_to_vec_env_v1(env), 2, num_cpus=1, base_class="stable_baselines3"
@@ -31,6 +38,24 @@ def test_supersuit_and_stable_baselines3_train_a_team():
     learner = sb3.PPO("MlpPolicy", worlds, **TINY_PPO).learn(128)
     actions, _ = learner.predict(worlds.reset())
     assert learner.num_timesteps >= 128 and actions.shape == (2 * env.max_num_agents,)
+
+
+def test_supersuit_s_copies_differ():
+    supersuit = pytest.importorskip("supersuit")
+    worlds = supersuit.concat_vec_envs_v1(supersuit.pettingzoo_env_to_vec_env_v1(parallel_env("paper_marl")), 3)
+    n_agents = worlds.num_envs // 3
+    seen = worlds.reset()[0].reshape(3, n_agents, -1)
+    assert (seen[0] != seen[1]).any() and (seen[0] != seen[2]).any() and (seen[1] != seen[2]).any()
+
+
+@pytest.mark.parametrize("frames", [2, (2, 3)])
+def test_supersuit_skips_frames(frames):
+    supersuit = pytest.importorskip("supersuit")
+    one, team = supersuit.frame_skip_v0(gym_env(), frames), supersuit.frame_skip_v0(parallel_env("skirmish"), frames)
+    one.reset(seed=0), team.reset(seed=0)
+    assert one.step(8)[4]["episode_length"] >= 2
+    infos = team.step(dict.fromkeys(team.agents, 8))[4]
+    assert infos["bulldozer_0"]["episode_length"] >= 2
 
 
 def test_supersuit_flattens_a_dict():

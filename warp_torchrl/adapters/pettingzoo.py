@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 import torch
 from gymnasium import spaces
+from gymnasium.utils import seeding
 from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
@@ -25,7 +26,7 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
 
     Args:
         scenario: One of ``conf/scenario``.
-        seed: Of the world; None draws one at the first reset, such as for copies that shall differ.
+        seed: Of the world; None draws one at the first reset, so that copies made before differ.
         render_mode: ``rgb_array``, or ``human`` for a window, which follows every step.
         device: Where the world lives; observations come back as numpy.
         max_cycles: Steps to an episode, ``horizon``; None leaves the scenario's.
@@ -40,7 +41,7 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
         state_space: Of ``state()``.
 
     Raises:
-        ConfigError: A ``ValueError``, with key, value and rule.
+        ConfigError: A ``ValueError``, with key, value and rule; a ``TypeError`` too where a name is no key.
         ValueError: If the render mode is unknown or the seed is no whole number in 0..2**62.
         RuntimeError: If a window is asked for where there is no display or no matplotlib.
     """
@@ -56,7 +57,7 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
         self,
         scenario: str = "default",
         *,
-        seed: int | None = 0,
+        seed: int | None = None,
         render_mode: str | None = None,
         device: torch.device | str = "cpu",
         max_cycles: int | None = None,
@@ -73,6 +74,7 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
         self.observation_spaces = {name: observation_space(env) for name in self.possible_agents}
         self.action_spaces = {name: spaces.Discrete(self._worlds.n_actions) for name in self.possible_agents}
         self.state_space = state_space(env)
+        self._np_random: np.random.Generator | None = None
 
     def observation_space(self, agent: str) -> spaces.Box | spaces.Dict:
         """Return the space of an agent's observations, always the same object."""
@@ -81,6 +83,13 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
     def action_space(self, agent: str) -> spaces.Discrete:
         """Return the space of an agent's actions, always the same object."""
         return self.action_spaces[agent]
+
+    @property
+    def np_random(self) -> np.random.Generator:
+        """Return numpy's generator, which the worlds do not draw from: SuperSuit asks for it by this name."""
+        if self._np_random is None:
+            self._np_random, _ = seeding.np_random()
+        return self._np_random
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -98,6 +107,8 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
             ValueError: If the seed is no whole number in 0..2**62.
         """
         now = self._worlds.reset(seed)
+        if seed is not None:
+            self._np_random, _ = seeding.np_random(int(seed))
         self.agents = list(self.possible_agents)
         self._screen.refresh()
         return self._by_agent(now)
