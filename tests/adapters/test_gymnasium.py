@@ -123,8 +123,12 @@ def test_gymnasium_makes_a_batch_by_name():
     env.close()
 
 
-def test_worlds_start_anew_exactly_as_in_gymnasium_s_own_vector():
-    ours, theirs = vector(3, **BURNS_OUT), SyncVectorEnv([lambda: gym_env(**BURNS_OUT)] * 3)
+@pytest.mark.parametrize("observation", ["surroundings", "paper"])
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+def test_worlds_start_anew_exactly_as_in_gymnasium_s_own_vector(mode, observation):
+    options = {**BURNS_OUT, "observation": observation}
+    ours = vector(3, autoreset_mode=mode, **options)
+    theirs = SyncVectorEnv([lambda: gym_env(**options)] * 3, autoreset_mode=mode)
     assert theirs.metadata["autoreset_mode"] is ours.metadata["autoreset_mode"]
     assert ours.observation_space == theirs.observation_space and ours.action_space == theirs.action_space
     assert same(ours.reset(seed=7), theirs.reset(seed=7))
@@ -139,6 +143,16 @@ def test_worlds_start_anew_exactly_as_in_gymnasium_s_own_vector():
 
 def same(ours, theirs):
     return all(data_equivalence(one, other, exact=True) for one, other in zip(ours, theirs, strict=True))
+
+
+def test_gymnasium_makes_a_batch_that_starts_anew_in_the_same_step():
+    batch = {"num_envs": 2, "vectorization_mode": "vector_entry_point"}
+    env = gymnasium.make_vec("Wildfire-v0", **batch, horizon=1, autoreset_mode="SameStep")
+    env.reset(seed=0)
+    *_, truncated, infos = env.step(np.full(2, STAY))
+    assert truncated.all() and infos["episode_length"].tolist() == [0.0, 0.0]
+    assert infos["final_info"]["episode_length"].tolist() == [1.0, 1.0] and infos["_final_obs"].all()
+    assert FireExtinguishingVectorEnv.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
 
 
 def test_an_episode_s_end_by_hand():
@@ -207,6 +221,10 @@ def test_bad_options_of_a_batch_are_refused(batch):
         vector(2.0)
     with pytest.raises(ValueError, match="render_mode must be None or rgb_array"):
         vector(2, render_mode="human")
+    with pytest.raises(ValueError, match="autoreset_mode must be NextStep or SameStep, got 'Disabled'"):
+        vector(2, autoreset_mode=AutoresetMode.DISABLED)
+    with pytest.raises(ValueError, match="autoreset_mode must be"):
+        vector(2, autoreset_mode="Sometimes")
     with pytest.raises(ValueError, match="reset_mask"):
         batch.reset(options={"reset_mask": np.array([True, False, False])})
     with pytest.raises(RuntimeError, match=r"call reset\(\) first"):

@@ -188,7 +188,7 @@ def test_stepping_a_finished_world_or_one_never_started_is_refused():
         ({"horizons": 5}, "horizons"),
         ({"seed": 1.5}, "seed must be a whole number, got 1.5"),
         ({"seed": -1}, "seed must be in"),
-        ({"render_mode": "ansi"}, "render_mode must be None, human or rgb_array, got 'ansi'"),
+        ({"render_mode": "ansi"}, "render_mode must be None or human or rgb_array, got 'ansi'"),
         ({"team": object()}, "team must be a text, a number or a list, got object"),
         ({"team": {"n_agents": 3}}, "team must be a text, a number or a list, got dict"),
     ],

@@ -8,9 +8,12 @@ import numpy as np
 import torch
 from gymnasium import spaces
 
-from warp_torchrl.adapters.screen import FRAMES_PER_SECOND, RENDER_MODES, Screen
+from warp_torchrl.adapters.screen import FRAMES_PER_SECOND, Screen
 from warp_torchrl.adapters.worlds import Seen, Worlds, action_number, observation_space
 
+RENDER_MODES = ("rgb_array",)
+KEYS = {"w": 0, "e": 1, "d": 2, "c": 3, "x": 4, "z": 5, "a": 6, "q": 7, " ": 8, "f": 9, "s": 10}
+"""Actions by key: moves are about ``s``, which stays, as they are on the keyboard; space puts out fire, f clears."""
 Observation = np.ndarray | dict[str, np.ndarray]
 
 
@@ -23,7 +26,8 @@ class FireExtinguishingEnv(gymnasium.Env[Observation, int]):
     Args:
         scenario: One of ``conf/scenario``, with one agent.
         seed: Of the world; None draws one at the first reset, so that copies made before differ.
-        render_mode: ``rgb_array``, or ``human`` for a window, which follows every step.
+        render_mode: ``rgb_array`` or None; ``gymnasium.make`` makes a window of it, ``human``, by Gymnasium's
+            ``HumanRendering``, which needs pygame.
         device: Where the world lives; observations come back as numpy.
         overrides: In the command line's grammar, ``["fire=paper", "horizon=64"]``.
         more: Further overrides by name, ``observation="paper"``.
@@ -32,7 +36,6 @@ class FireExtinguishingEnv(gymnasium.Env[Observation, int]):
         ConfigError: A ``ValueError``, with key, value and rule; a ``TypeError`` too where a name is no key.
         ValueError: If the team has more than one agent, the render mode is unknown, or the seed is no whole number in
             0..2**62.
-        RuntimeError: If a window is asked for where there is no display or no matplotlib.
     """
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": FRAMES_PER_SECOND}  # noqa: RUF012
@@ -52,7 +55,7 @@ class FireExtinguishingEnv(gymnasium.Env[Observation, int]):
         self._worlds = Worlds(scenario, n_worlds=1, seed=seed, device=device, overrides=overrides, more=more)
         check_alone(self._worlds, scenario)
         self.render_mode = render_mode
-        self._screen = Screen(self._worlds.picture, render_mode, f"{scenario} (warp_torchrl)")
+        self._screen = Screen(self._worlds.picture, render_mode, RENDER_MODES, f"{scenario} (warp_torchrl)")
         self.observation_space = observation_space(self._worlds.env)
         self.action_space = spaces.Discrete(self._worlds.n_actions)
         self._mask = np.ones(self._worlds.n_actions, dtype=bool)
@@ -100,17 +103,16 @@ class FireExtinguishingEnv(gymnasium.Env[Observation, int]):
         """Return which actions would do something, bool [actions]; sb3-contrib asks for it by this name."""
         return self._mask.copy()
 
-    def render(self) -> np.ndarray | None:
-        """Return the picture, uint8 [H * s, W * s, 3], in mode ``rgb_array``; show it in mode ``human``."""
-        return self._screen.render()
+    def get_keys_to_action(self) -> dict[tuple[int, ...], int]:
+        """Return actions by the codes of keys, ``KEYS``; ``gymnasium.utils.play`` asks for it by this name."""
+        return {(ord(key),): action for key, action in KEYS.items() if action < self._worlds.n_actions}
 
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        self._screen.close()
+    def render(self) -> np.ndarray | None:
+        """Return the picture, uint8 [H * s, W * s, 3], in mode ``rgb_array``."""
+        return self._screen.render()
 
     def _shown(self, now: Seen) -> tuple[Observation, dict[str, Any]]:
         self._mask = now.action_mask[0, 0].astype(bool)
-        self._screen.refresh()
         return now.of_agent(0, 0), now.info_of_agent(0, 0)
 
 

@@ -10,9 +10,10 @@ from gymnasium.utils import seeding
 from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
-from warp_torchrl.adapters.screen import FRAMES_PER_SECOND, RENDER_MODES, Screen
+from warp_torchrl.adapters.screen import FRAMES_PER_SECOND, Screen
 from warp_torchrl.adapters.worlds import Seen, Worlds, action_number, observation_space, state_space
 
+RENDER_MODES = ("human", "rgb_array")
 Observation = np.ndarray | dict[str, np.ndarray]
 
 
@@ -27,7 +28,8 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
     Args:
         scenario: One of ``conf/scenario``.
         seed: Of the world; None draws one at the first reset, so that copies made before differ.
-        render_mode: ``rgb_array``, or ``human`` for a window, which follows every step.
+        render_mode: ``rgb_array``; or ``human``, which follows every step: a window where there are a display and
+            pygame, else pictures in the terminal.
         device: Where the world lives; observations come back as numpy.
         max_cycles: Steps to an episode, ``horizon``; None leaves the scenario's.
         overrides: In the command line's grammar, ``["fire=paper", "team.n_agents=3"]``.
@@ -43,7 +45,6 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
     Raises:
         ConfigError: A ``ValueError``, with key, value and rule; a ``TypeError`` too where a name is no key.
         ValueError: If the render mode is unknown or the seed is no whole number in 0..2**62.
-        RuntimeError: If a window is asked for where there is no display or no matplotlib.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
@@ -67,7 +68,7 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
         more = more if max_cycles is None else {**more, "horizon": max_cycles}
         self._worlds = Worlds(scenario, n_worlds=1, seed=seed, device=device, overrides=overrides, more=more)
         self.render_mode = render_mode
-        self._screen = Screen(self._worlds.picture, render_mode, f"{scenario} (warp_torchrl)")
+        self._screen = Screen(self._worlds.picture, render_mode, RENDER_MODES, f"{scenario} (warp_torchrl)")
         env = self._worlds.env
         self.possible_agents = list(env.agent_names)
         self.agents: list[str] = []
@@ -143,7 +144,7 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
         return self._worlds.state()[0]
 
     def render(self) -> np.ndarray | None:
-        """Return the picture, uint8 [H * s, W * s, 3], in mode ``rgb_array``; show it in mode ``human``."""
+        """Return the picture, uint8 [H * s, W * s, 3], in mode ``rgb_array``; show it to people in mode ``human``."""
         return self._screen.render()
 
     def close(self) -> None:

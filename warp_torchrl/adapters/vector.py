@@ -17,23 +17,25 @@ from warp_torchrl.adapters.worlds import Seen, Worlds, observation_space, whole_
 class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
     """A batch of worlds with one agent each, stepped at once; also ``gymnasium.make_vec("Wildfire-v0", num_envs=B)``.
 
-    Finished worlds start anew by Gymnasium's ``AutoresetMode.NEXT_STEP``: the step that ends an episode shows its last
-    observation; the next step ignores the world's action and shows the first observation of its next episode, with
-    reward 0 and neither flag set.
+    Finished worlds start anew by Gymnasium's rules. ``AutoresetMode.NEXT_STEP``: the step that ends an episode shows
+    its last observation; the next step ignores the world's action and shows the first observation of its next episode,
+    with reward 0 and neither flag set. ``SAME_STEP``: the step that ends an episode shows the first observation of the
+    next, and has the last observation and infos in ``final_obs`` and ``final_info``.
 
     Args:
         num_envs: B.
         scenario: One of ``conf/scenario``, with one agent.
         seed: World i draws with ``seed + i``; None draws a seed at the first reset, so that copies made before differ.
         render_mode: ``rgb_array`` or None.
+        autoreset_mode: ``NEXT_STEP`` or ``SAME_STEP``, or its value, ``"SameStep"``.
         device: Where the worlds live; observations come back as numpy.
         overrides: In the command line's grammar.
         more: Further overrides by name.
 
     Raises:
         ConfigError: A ``ValueError``, with key, value and rule; a ``TypeError`` too where a name is no key.
-        ValueError: If ``num_envs`` is not positive, the team has more than one agent, the render mode is unknown, or
-            the seed is no whole number in 0..2**62.
+        ValueError: If ``num_envs`` is not positive, the team has more than one agent, a mode is unknown, or the seed
+            is no whole number in 0..2**62.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012
@@ -49,16 +51,21 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
         *,
         seed: int | None = None,
         render_mode: str | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         device: torch.device | str = "cpu",
         overrides: Sequence[str] = (),
         **more: object,
     ) -> None:
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode must be None or rgb_array for a batch, got {render_mode!r}")
+        mode = autoreset_mode.value if isinstance(autoreset_mode, AutoresetMode) else autoreset_mode
+        if mode not in ("NextStep", "SameStep"):
+            raise ValueError(f"autoreset_mode must be NextStep or SameStep, got {mode!r}")
         num_envs = whole_number("num_envs", num_envs)
         self._worlds = Worlds(scenario, n_worlds=num_envs, seed=seed, device=device, overrides=overrides, more=more)
         check_alone(self._worlds, scenario)
         self.num_envs, self.render_mode = num_envs, render_mode
+        self.metadata = {**self.metadata, "autoreset_mode": AutoresetMode(mode)}
         self.single_observation_space = observation_space(self._worlds.env)
         self.single_action_space = spaces.Discrete(self._worlds.n_actions)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -86,7 +93,7 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
         return now.of_agent(slice(None), 0), self._info(now)
 
     def step(self, actions: np.ndarray) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Let every agent act, or start the next episode where the last step ended one.
+        """Let every agent act; start the next episode where this step or the last ended one, by ``autoreset_mode``.
 
         Args:
             actions: Whole numbers, [B].
@@ -98,12 +105,13 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
             RuntimeError: Before the first reset.
             ValueError: If actions are not whole numbers in range, one a world.
         """
-        ended = self._worlds.ended
-        now = self._worlds.step(self._checked(actions)[:, None])
-        if ended.any():
-            now = self._worlds.restart(ended, now.reward)
+        in_same_step, ended_before = self.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP, self._worlds.ended
+        last = self._worlds.step(self._checked(actions)[:, None])
+        ended = last.terminated | last.truncated if in_same_step else ended_before
+        now = self._worlds.restart(ended, last.reward) if ended.any() else last
+        how, info = (last, self._final(last, ended)) if in_same_step else (now, {})
         reward = now.reward[:, 0].astype(np.float64)
-        return now.of_agent(slice(None), 0), reward, now.terminated, now.truncated, self._info(now)
+        return now.of_agent(slice(None), 0), reward, how.terminated, how.truncated, {**info, **self._info(now)}
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """Return each world's picture, uint8 [H * s, W * s, 3], in mode ``rgb_array``."""
@@ -119,7 +127,18 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
             raise ValueError(f"actions must be in 0..{n_actions - 1}, got {given.min()}..{given.max()}")
         return given.astype(np.int64)
 
-    def _info(self, now: Seen) -> dict[str, Any]:
-        values = now.info_of_agent(slice(None), 0)
-        everywhere = {f"_{name}": np.ones(self.num_envs, dtype=bool) for name in values}
-        return {**values, **everywhere}
+    def _info(self, now: Seen, where: np.ndarray | None = None) -> dict[str, Any]:
+        """Return infos as Gymnasium batches them: 0 and false where there are none."""
+        where = np.ones(self.num_envs, dtype=bool) if where is None else where
+        values = {name: (value.T * where).T for name, value in now.info_of_agent(slice(None), 0).items()}
+        return {**values, **{f"_{name}": where.copy() for name in values}}
+
+    def _final(self, last: Seen, ended: np.ndarray) -> dict[str, Any]:
+        """Return the last observations and infos of the episodes that ended."""
+        if not ended.any():
+            return {}
+        observations = np.full(self.num_envs, None, dtype=object)
+        for world in ended.nonzero()[0].tolist():
+            observations[world] = last.of_agent(world, 0)
+        info = {"final_obs": observations, "final_info": self._info(last, ended)}
+        return {**info, **{f"_{name}": ended.copy() for name in info}}
