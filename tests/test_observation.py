@@ -4,6 +4,7 @@ import pytest
 import torch
 
 from tests.conftest import small_world
+from warp_torchrl.env import WildfireEnv
 from warp_torchrl.observation import (
     CHANNELS,
     STATE,
@@ -16,6 +17,7 @@ from warp_torchrl.observation import (
     picture,
 )
 from warp_torchrl.world.array import Array
+from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.wind import Uniform
 
@@ -34,6 +36,23 @@ def drawn(cells, positions, *, elevation=None, roles=("ugv",), wind=None, cover=
 
 def channel(view, name):
     return view[0, 0, CHANNELS.index(name)]
+
+
+@pytest.mark.parametrize("observation", [Surroundings(), Surroundings(centred=True, identity=True), Paper()])
+def test_what_is_seen_stays_within_its_space_and_reaches_its_bounds(observation):
+    steep = Perlin(size=12, relief=900.0)
+    world = small_world(landscape=steep, team=Team(n_agents=6, roles=("ugv", "uav")), horizon=60)
+    env = WildfireEnv(world, observation=observation, n_worlds=4)
+    seen = env.rollout(120, break_when_any_done=False)["agents", "observation"]
+    named = {"": seen} if isinstance(seen, torch.Tensor) else dict(seen.items())
+    for name, space in observation.spaces(world).items():
+        low, high = space.bounds()
+        assert low.dtype == high.dtype == named[name].dtype and low.shape == high.shape == space.shape
+        assert (named[name] >= low).all() and (named[name] <= high).all(), name
+        if name == "view":
+            highest = dict(zip(CHANNELS, named[name].amax((0, 1, 2, 4, 5)).tolist()))
+            assert [highest[each] for each in ("off_map", "fire_stage", "ash")] == [255, 255, 255]
+            assert highest["age"] == 250 and highest["relative_elevation"] == 255
 
 
 def test_the_view_shows_fire_age_and_the_border():

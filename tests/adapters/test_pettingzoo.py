@@ -12,6 +12,7 @@ import pytest
 from pettingzoo import ParallelEnv
 from pettingzoo.test import api_test, max_cycles_test, parallel_api_test, parallel_seed_test, performance_benchmark
 
+from warp_torchrl import make_env
 from warp_torchrl.adapters import FireExtinguishingEnvParallel, parallel_env, pettingzoo
 
 STAY = 10
@@ -87,11 +88,35 @@ def test_a_seed_starts_at_episode_0_and_no_seed_goes_on():
     assert (first == again).all() and (second == next_one).all() and (first != second).any()
 
 
-def test_without_a_seed_copies_differ():
-    one = small(seed=None)
-    other = copy.deepcopy(one)
+COPIES = {
+    "again": lambda env: small(),
+    "deepcopy": copy.deepcopy,
+    "pickle": lambda env: pickle.loads(pickle.dumps(env)),
+    "cloudpickle": lambda env: pickle.loads(pytest.importorskip("cloudpickle").dumps(env)),
+}
+
+
+@pytest.mark.parametrize("way", COPIES)
+def test_without_a_seed_copies_differ(way):
+    one = small()
+    other = COPIES[way](one)
     one.reset(), other.reset()
     assert (one.state() != other.state()).any()
+    one.reset(seed=3), other.reset(seed=3)
+    assert (one.state() == other.state()).all()
+
+
+def test_a_given_seed_is_the_documented_world():
+    env, theirs = small(seed=5), make_env("skirmish", n_worlds=1, seed=5)
+    env.reset()
+    assert (env.state() == theirs.reset()["state"][0].numpy()).all()
+
+
+def test_numpy_s_generator_follows_the_seed():
+    env, other = small(), small()
+    env.reset(seed=3), other.reset(seed=3)
+    assert env.np_random.integers(2**60) == other.np_random.integers(2**60)
+    assert small().np_random.integers(2**60) != small().np_random.integers(2**60)
 
 
 def test_it_can_be_sent_to_another_process():
@@ -120,7 +145,7 @@ def test_the_team_ends_together_and_is_then_empty():
         ({"bulldozer_0": 1.0, "bulldozer_1": 0}, r"action of bulldozer_0 must be a whole number, got 1\.0 \(float\)"),
         ({"bulldozer_0": True, "bulldozer_1": 0}, "must be a whole number, got True"),
         ({"bulldozer_0": None, "bulldozer_1": 0}, "must be a whole number, got None"),
-        ({"bulldozer_0": np.zeros(1, int), "bulldozer_1": 0}, "must be a whole number"),
+        ({"bulldozer_0": np.zeros(2, int), "bulldozer_1": 0}, "must be a whole number"),
         ({"bulldozer_0": 0}, r"one of each of \['bulldozer_0', 'bulldozer_1'\], got \['bulldozer_0'\]"),
         ({"bulldozer_0": 0, "bulldozer_1": 0, "uav_0": 0}, r"got \['bulldozer_0', 'bulldozer_1', 'uav_0'\]"),
         ([0, 0], "actions must be a dict .* got list"),
@@ -142,6 +167,7 @@ def skirmish():
 
 def test_whole_numbers_of_numpy_are_actions(skirmish):
     skirmish.step({"bulldozer_0": np.int32(STAY), "bulldozer_1": np.array(STAY)})
+    skirmish.step({"bulldozer_0": np.array([STAY]), "bulldozer_1": np.array([STAY], np.int8)})
 
 
 def test_stepping_a_finished_world_or_one_never_started_is_refused():
@@ -162,7 +188,7 @@ def test_stepping_a_finished_world_or_one_never_started_is_refused():
         ({"horizons": 5}, "horizons"),
         ({"seed": 1.5}, "seed must be a whole number, got 1.5"),
         ({"seed": -1}, "seed must be in"),
-        ({"render_mode": "ansi"}, "render_mode must be None, human or rgb_array, got 'ansi'"),
+        ({"render_mode": "ansi"}, "render_mode must be None or human or rgb_array, got 'ansi'"),
         ({"team": object()}, "team must be a text, a number or a list, got object"),
         ({"team": {"n_agents": 3}}, "team must be a text, a number or a list, got dict"),
     ],

@@ -2,7 +2,6 @@
 
 import json
 import operator
-import secrets
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -12,6 +11,7 @@ from gymnasium import spaces
 from tensordict import TensorDict, TensorDictBase
 
 from warp_torchrl.api import make_env
+from warp_torchrl.construction import ConfigError, UnknownKeyError
 from warp_torchrl.env import WildfireEnv
 
 
@@ -41,19 +41,23 @@ class Seen(NamedTuple):
         return {**info, "action_mask": self.action_mask[world, agent]} if "" in self.observation else info
 
 
+class UnknownKeywordError(ConfigError, TypeError):
+    """A keyword that is neither an argument nor a key of the configuration: a ``TypeError``, as of any function."""
+
+
 class Worlds:
     """One environment made by ``make_env``, in and out as numpy, and whether its worlds may be stepped.
 
     Args:
         scenario: One of ``conf/scenario``.
         n_worlds: B.
-        seed: World i draws with ``seed + i``; None draws a seed at the first reset.
+        seed: World i draws with ``seed + i``; None draws a seed at the first reset, so that copies made before differ.
         device: Where the worlds live.
         overrides: In the command line's grammar.
         more: Further overrides by name.
 
     Raises:
-        ConfigError: A ``ValueError``, with key, value and rule.
+        ConfigError: A ``ValueError``, with key, value and rule; a ``TypeError`` too where a name is no key.
         ValueError: If the seed is not a whole number in 0..2**62.
     """
 
@@ -68,11 +72,15 @@ class Worlds:
         more: Mapping[str, object],
     ) -> None:
         named = [f"{name}={written(name, value)}" for name, value in more.items()]
-        first = 0 if seed is None else whole_number("seed", seed)
-        self.env = make_env(
-            scenario, n_worlds=n_worlds, device=device, seed=first, overrides=[*overrides, *named], validate=False
-        )
-        self._seeded = seed is not None
+        first = None if seed is None else whole_number("seed", seed)
+        try:
+            self.env = make_env(
+                scenario, n_worlds=n_worlds, device=device, seed=first, overrides=[*overrides, *named], validate=False
+            )
+        except UnknownKeyError as error:
+            if error.key not in more:
+                raise
+            raise UnknownKeywordError(f"got an unexpected keyword argument {error.key!r}: {error}") from None
         self._now: TensorDictBase | None = None
 
     @property
@@ -107,14 +115,11 @@ class Worlds:
             ValueError: If a seed is not a whole number in 0..2**62, or there are not as many as worlds.
         """
         n_worlds = self.env.batch_size[0]
-        if seed is None and not self._seeded:
-            seed = 2**31 + secrets.randbelow(2**31)  # the seeds below are for training and evaluation
         if isinstance(seed, (list, tuple, np.ndarray)):
             self.env.set_seeds([whole_number("seed", each) for each in seed])
         elif seed is not None:
             first = whole_number("seed", seed)
             self.env.set_seeds(range(first, first + n_worlds))
-        self._seeded = True
         self._now = self.env.reset()
         return self._seen(np.zeros((n_worlds, self.env.n_agents), np.float32))
 
@@ -169,29 +174,29 @@ class Worlds:
 def observation_space(env: WildfireEnv) -> spaces.Box | spaces.Dict:
     """Return the space of one agent's observation: one Box in preset ``paper``, else a flat Dict with its mask."""
     named = env.observation.spaces(env.world)
-    boxes = {name: _box(space.low, space.high, space.shape, space.dtype) for name, space in named.items()}
+    boxes = {name: _box(*space.bounds()) for name, space in named.items()}
     if "" in boxes:
         return boxes[""]
-    return spaces.Dict({**boxes, "action_mask": _box(0, 1, (env.world.team.n_actions,), torch.int8)})
+    return spaces.Dict({**boxes, "action_mask": spaces.Box(0, 1, (env.world.team.n_actions,), np.int8)})
 
 
 def state_space(env: WildfireEnv) -> spaces.Box:
     """Return the space of a world's central state."""
     spec = env.full_observation_spec_unbatched["state"]
-    return _box(float(spec.space.low.min()), float(spec.space.high.max()), tuple(spec.shape), spec.dtype)
+    return _box(spec.space.low, spec.space.high)
 
 
-def _box(low: float, high: float, shape: tuple[int, ...], dtype: torch.dtype) -> spaces.Box:
-    return spaces.Box(low, high, shape, torch.empty(0, dtype=dtype).numpy().dtype.type)
+def _box(low: torch.Tensor, high: torch.Tensor) -> spaces.Box:
+    return spaces.Box(low.numpy(force=True), high.numpy(force=True), dtype=low.numpy(force=True).dtype.type)
 
 
 def action_number(name: str, action: object, n_actions: int) -> int:
-    """Return a given action as a number.
+    """Return a given action, or the only one of an array [1], as a number.
 
     Raises:
         ValueError: If it is not a whole number, or not one of the actions.
     """
-    number = whole_number(name, action)
+    number = whole_number(name, action[0] if isinstance(action, np.ndarray) and action.shape == (1,) else action)
     if not 0 <= number < n_actions:
         raise ValueError(f"{name} must be in 0..{n_actions - 1}, got {number}")
     return number
