@@ -67,7 +67,7 @@ def test_tensors_are_compared_with_numbers_and_not_with_members_of_enumerations(
 
 READ_OF_OBSERVATIONS = {
     "models/facing": ("observation/frame",),  # how they are turned
-    "models/model": ("observation/frame",),
+    "models/model": ("observation/channels", "observation/frame"),
     "models/memory": ("observation/frame", "observation/own"),  # and whether an episode begins
 }
 

@@ -15,7 +15,8 @@ from warp_torchrl.config import Record, recompose
 from warp_torchrl.construction import ConfigError
 from warp_torchrl.models import Entry, Signature
 
-SIGNATURE = Signature({"view": Entry((3, 5, 5), "uint8")}, Entry((9, 16, 16), "float32"), 2, 11, 2)
+ACTIONS = tuple(f"action_{code}" for code in range(11))
+SIGNATURE = Signature({"view": Entry((3, 5, 5), "uint8")}, Entry((9, 16, 16), "float32"), 2, ACTIONS, 2)
 
 
 def saved(run, frames, keep=3):

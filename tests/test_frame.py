@@ -28,7 +28,7 @@ from warp_torchrl.models import (
     signature,
 )
 from warp_torchrl.observation import (
-    CHANNELS,
+    DEFAULT,
     SELF_SIZE,
     Frame,
     Local,
@@ -39,11 +39,13 @@ from warp_torchrl.observation import (
     held,
     held_state,
 )
+from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.state import Action
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.wind import Uniform
+from warp_torchrl.world.world import in_wind
 
 TURNS = list(itertools.product((1, -1), (1, -1), (False, True)))
 """Whether rows, then columns, are mirrored, and whether they change places after that."""
@@ -104,7 +106,8 @@ def turned_world(state, turn):
     south_east = turned_vector(torch.stack((-north, east), dim=-1), *turn)
     wind = torch.stack((south_east[..., 1], -south_east[..., 0]), dim=1)
     cover = state.landscape.replace(cover=turned_map(state.cover, *turn), age=turned_map(state.landscape.age, *turn))
-    return state.replace(vehicles=vehicles, wind=wind, landscape=cover, **leaves)
+    fire = Fire()
+    return in_wind(state.replace(vehicles=vehicles, ground=fire.ground(cover, 30.0), **leaves), fire, wind)
 
 
 def seen(now):
@@ -281,9 +284,9 @@ def test_the_fire_lies_between_east_and_south_east(name):
     cells = torch.full((16, 16), 5)
     cells[8, 8] = 11
     state, world = drawn(cells.tolist(), places)
-    entries = PRESETS[name](state, world)
+    entries = PRESETS[name](state, world, world.forecast(state))
     frame, found = frame_of(entries), 0
-    what, channel = ("view", CHANNELS.index("fire_stage")) if name == "local" else ("picture", 0)
+    what, channel = ("view", DEFAULT.index("fire_stage")) if name == "local" else ("picture", 0)
     if name == "centred":
         entries["view"].zero_()  # what an agent sees itself goes first, and is not in the middle of a block
     for plane in held(what, entries[what], frame)[0, :, channel]:
@@ -343,8 +346,8 @@ def test_units_change_places_with_the_ways_to_hold_a_map():
 
 def test_near_fires_count_for_more():
     """A fire one cell north pulls with 1 / (1 + 2)^3 = 0.037, one four cells south with 4 / (4 + 2)^3 = 0.019."""
-    view = torch.zeros(1, 1, len(CHANNELS), 11, 11, dtype=torch.uint8)
-    fire = view[0, 0, CHANNELS.index("fire_stage")]
+    view = torch.zeros(1, 1, len(DEFAULT), 11, 11, dtype=torch.uint8)
+    fire = view[0, 0, DEFAULT.index("fire_stage")]
     fire[4, 5] = fire[9, 5] = 51
     assert frame_of({"view": view}).index == framed(-1, 1, True).index
     fire[9, 4] = fire[9, 6] = 204
@@ -358,11 +361,11 @@ def test_a_tie_is_a_tie_in_any_batch():
     entries = {
         "picture": picture,
         "self": torch.full((1000, 1, SELF_SIZE), 3.5 / 8),
-        "view": torch.zeros(1000, 1, len(CHANNELS), 11, 11, dtype=torch.uint8),
+        "view": torch.zeros(1000, 1, len(DEFAULT), 11, 11, dtype=torch.uint8),
     }
     for n_worlds in (1, 7, 1000):
         assert (frame_of({name: entry[:n_worlds] for name, entry in entries.items()}).index == 0).all()
-    entries["view"][:, 0, CHANNELS.index("fire_stage"), 7, 4] = 51  # two cells down, one to the left
+    entries["view"][:, 0, DEFAULT.index("fire_stage"), 7, 4] = 51  # two cells down, one to the left
     assert (frame_of(entries).index == framed(1, -1, True).index).all(), "what it sees itself goes first"
 
 

@@ -21,7 +21,8 @@ from warp_torchrl.gallery.curves import (
 from warp_torchrl.gallery.runs import bin_means, read_metrics, read_run, run_folders
 from warp_torchrl.models import Entry, Signature
 
-SIGNATURE = Signature({"view": Entry((3, 5, 5), "uint8")}, Entry((9, 16, 16), "float32"), 2, 11, 2)
+ACTIONS = tuple(f"action_{code}" for code in range(11))
+SIGNATURE = Signature({"view": Entry((3, 5, 5), "uint8")}, Entry((9, 16, 16), "float32"), 2, ACTIONS, 2)
 ALL = sorted({name for row in SINGLE + MULTI for name in row} | {"world/saved"})
 
 

@@ -23,7 +23,7 @@ from warp_torchrl.models import (
     Cnn,
     Mlp,
     Recollection,
-    faces_fire,
+    fire_channel,
     given_held,
     hold,
     memory_apart,
@@ -85,7 +85,7 @@ def test_a_sequence_says_what_its_steps_said(make_env, model):
     assert batch["next", "done"].any() and batch[MEMORY][:, 0].any()
     again = policy.module[0](batch.exclude(LOGITS))
     torch.testing.assert_close(again[LOGITS], batch[LOGITS])
-    held = (hold if faces_fire(policy) else TensorDict.clone)(batch.exclude(LOGITS))
+    held = (TensorDict.clone if fire_channel(policy) is None else hold)(batch.exclude(LOGITS))
     ours = given_held(policy).get_dist(held).log_prob(held[ACTION])
     torch.testing.assert_close(ours, policy.get_dist(batch).log_prob(batch[ACTION]))
 
@@ -204,7 +204,7 @@ def test_numpy_agents_remember_by_name(make_env):
     env = make_env(n_worlds=1)
     policy = lively(Ppo().policy(signature(env), MODELS["fire"]))
     batch = played(env, policy)
-    together, apart = (TrainedPolicy(policy, "deterministic").numpy_policy() for _ in range(2))
+    together, apart = (TrainedPolicy(policy, "deterministic", signature(env)).numpy_policy() for _ in range(2))
     with set_exploration_type(ExplorationType.DETERMINISTIC), torch.no_grad():
         expected = [policy(batch[:, step].exclude(LOGITS, MEMORY, ACTION))[ACTION][0].tolist() for step in range(24)]
     for step, wanted in enumerate(expected):

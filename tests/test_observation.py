@@ -6,7 +6,7 @@ import torch
 from tests.conftest import small_world
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.observation import (
-    CHANNELS,
+    DEFAULT,
     STATE,
     Local,
     Paper,
@@ -35,7 +35,7 @@ def drawn(cells, positions, *, elevation=None, roles=("ugv",), wind=None, cover=
 
 
 def channel(view, name):
-    return view[0, 0, CHANNELS.index(name)]
+    return view[0, 0, DEFAULT.index(name)]
 
 
 @pytest.mark.parametrize("observation", [Surroundings(), Surroundings(centred=True, identity=True), Paper()])
@@ -50,7 +50,7 @@ def test_what_is_seen_stays_within_its_space_and_reaches_its_bounds(observation)
         assert low.dtype == high.dtype == named[name].dtype and low.shape == high.shape == space.shape
         assert (named[name] >= low).all() and (named[name] <= high).all(), name
         if name == "view":
-            highest = dict(zip(CHANNELS, named[name].amax((0, 1, 2, 4, 5)).tolist()))
+            highest = dict(zip(DEFAULT, named[name].amax((0, 1, 2, 4, 5)).tolist()))
             assert [highest[each] for each in ("off_map", "fire_stage", "ash")] == [255, 255, 255]
             assert highest["age"] == 250 and highest["relative_elevation"] == 255
 
@@ -58,7 +58,7 @@ def test_what_is_seen_stays_within_its_space_and_reaches_its_bounds(observation)
 def test_the_view_shows_fire_age_and_the_border():
     cells = [[5, 5, 5, 5], [5, 11, 13, 5], [5, 5, 0, 5], [5, 5, 5, 10]]
     state, world = drawn(cells, [[1, 0]])
-    view = egocentric_view(state, world, world.forecast(state), 1)
+    view = egocentric_view(state, world, world.forecast(state), 1, DEFAULT)
     assert channel(view, "off_map").tolist() == [[255, 0, 0], [255, 0, 0], [255, 0, 0]]
     assert channel(view, "fire_stage").tolist() == [[0, 0, 0], [0, 0, 51], [0, 0, 0]]  # stage 1 of 5
     assert channel(view, "age").tolist() == [[0, 125, 125], [0, 125, 0], [0, 125, 125]]  # age 5 of 10
@@ -69,14 +69,14 @@ def test_the_threat_of_a_tree_is_its_chance_to_ignite_and_of_a_fire_what_it_will
     # Calm air, one fire in the middle of forest: axial 0.8, diagonal 0.8 / sqrt 2 = 0.566; sum 4 x 0.8 + 4 x 0.566.
     cells = [[5, 5, 5, 5], [5, 11, 5, 5], [5, 5, 5, 5], [5, 5, 5, 5]]
     state, world = drawn(cells, [[1, 1]], wind=Uniform(speed=0.0))
-    threat = channel(egocentric_view(state, world, world.forecast(state), 1), "threat")
+    threat = channel(egocentric_view(state, world, world.forecast(state), 1, DEFAULT), "threat")
     assert threat[0].tolist() == [int(0.8 / 2**0.5 * 255), int(0.8 * 255), int(0.8 / 2**0.5 * 255)]
     assert threat[1, 1] == 255  # 5.46 / 4, at most 1
 
 
 def test_agents_see_each_other_and_not_themselves():
     state, world = drawn([[5] * 6] * 6, [[2, 2], [2, 3], [3, 2]], roles=("ugv", "ugv", "uav"))
-    view = egocentric_view(state, world, world.forecast(state), 1)
+    view = egocentric_view(state, world, world.forecast(state), 1, DEFAULT)
     assert channel(view, "other_ugv").tolist() == [[0, 0, 0], [0, 0, 63], [0, 0, 0]]
     assert channel(view, "other_uav").tolist() == [[0, 0, 0], [0, 0, 0], [0, 63, 0]]
 
@@ -84,7 +84,7 @@ def test_agents_see_each_other_and_not_themselves():
 @pytest.mark.parametrize(("agents", "shown"), [(1, 0), (2, 63), (5, 252), (7, 252)])
 def test_up_to_four_others_are_told_apart_on_a_cell_and_oneself_is_none(agents, shown):
     state, world = drawn([[5] * 6] * 6, [[2, 2]] * agents)
-    view = egocentric_view(state, world, world.forecast(state), 1)
+    view = egocentric_view(state, world, world.forecast(state), 1, DEFAULT)
     assert channel(view, "other_ugv").tolist() == [[0, 0, 0], [0, shown, 0], [0, 0, 0]]
 
 
@@ -92,7 +92,9 @@ def test_elevation_is_relative_to_the_agent():
     slope = torch.arange(5).mul(50.0).expand(5, 5)
     state, world = drawn([[5] * 5] * 5, [[2, 2]], elevation=slope)
     # 50 m up: 128 + 127 / 2 = 191.5; 50 m down 64.5; whole numbers below
-    assert channel(egocentric_view(state, world, world.forecast(state), 1), "relative_elevation")[1].tolist() == [
+    assert channel(egocentric_view(state, world, world.forecast(state), 1, DEFAULT), "relative_elevation")[
+        1
+    ].tolist() == [
         64,
         128,
         191,

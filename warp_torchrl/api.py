@@ -97,4 +97,4 @@ def policy_of(found: checkpoints.Checkpoint, mode: str = "best") -> TrainedPolic
     seen = {name: value for name, value in config["observation"].items() if name != "_target_"}
     overrides = [f"observation={name}" for group, name in record.choices.items() if group == "observation"]
     overrides += [f"observation.{name}={json.dumps(value)}" for name, value in seen.items()]
-    return TrainedPolicy(policy.requires_grad_(False).eval(), chosen, overrides)
+    return TrainedPolicy(policy.requires_grad_(False).eval(), chosen, found.manifest.signature, overrides)

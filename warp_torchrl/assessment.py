@@ -24,7 +24,6 @@ from warp_torchrl.evaluation import (
     write_json,
 )
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.models import Signature, signature
 from warp_torchrl.settings import Settings
 from warp_torchrl.sweep import method
 
@@ -66,8 +65,10 @@ def _actors(
     """Return a policy's name, its mode, and who acts in many worlds and in one."""
     if isinstance(found, str):
         return found, "sampled", HEURISTICS[found](env), HEURISTICS[found](one)
-    _check_fits(found, env)
-    policy = policy_of(found, plan.evaluation.mode).to(plan.device)
+    try:
+        policy = policy_of(found, plan.evaluation.mode).to(plan.device).fitted(env)
+    except ValueError as error:
+        raise ConfigError(f"the policy in {found.path} does not fit here: {error}") from None
     return f"trained, {policy.mode}", policy.mode, policy, policy
 
 
@@ -80,23 +81,3 @@ def _yardsticks(plan: Settings, env: WildfireEnv, names: Sequence[str]) -> dict[
     _, played = _PLAYED.setdefault(worlds, (plan, {}))  # the plan stays alive: no other can come to print the same
     played |= play_heuristics(env, plan.evaluation.first_seed, [name for name in names if name not in played])
     return {name: played[name] for name in names}
-
-
-def _check_fits(found: checkpoints.Checkpoint, env: WildfireEnv) -> None:
-    here, there = signature(env), found.manifest.signature
-    if (here.observation, here.n_actions) != (there.observation, there.n_actions):
-        raise ConfigError(
-            f"the policy in {found.path} was trained on observations {_shapes(there)} and {there.n_actions} actions, "
-            f"this environment has {_shapes(here)} and {here.n_actions}"
-        )
-
-    own = found.record().values.get("model", {}).get("sharing") == "none"
-    if own and here.n_agents != there.n_agents:
-        raise ConfigError(
-            f"the policy in {found.path} has a network for each of {there.n_agents} agents, this team has "
-            f"{here.n_agents}"
-        )
-
-
-def _shapes(shape: Signature) -> str:
-    return ", ".join(f"{name or 'vector'} {list(entry.shape)}" for name, entry in shape.observation.items())

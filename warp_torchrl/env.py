@@ -72,7 +72,8 @@ class WildfireEnv(EnvBase):
             check_compiler(self.device)
         self._fuses = fuse
         names, roles = self.world.team.agent_names, self.world.team.agent_roles
-        self.agent_names = names
+        self.agent_names, self.action_names = names, self.world.team.action_names
+        self.channel_names = {name: space.names for name, space in self.observation.spaces(self.world).items()}
         self.group_map = {"agents": list(names)}
         self.role_map = {role: [n for n, r in zip(names, roles) if r == role] for role in ROLES if role in roles}
         self._state: WorldState | None = None

@@ -12,6 +12,8 @@ import torch
 import torchrl
 
 from warp_torchrl.models import Entry, Signature
+from warp_torchrl.observation import DEFAULT, PICTURE
+from warp_torchrl.world.state import Action
 
 FORMAT = 2
 """Version of the layout that is written."""
@@ -21,6 +23,9 @@ TRAINING = "training.pt"
 _POLICY = ("policy.pt", "config.json")  # what acting takes
 _FILES = ("policy.pt", TRAINING, "config.json")
 _LARGEST_JSON = 1_000_000
+_FORMER_NAMES = {"view": DEFAULT, "picture": PICTURE}
+_FORMER_ACTIONS = tuple(action.name.lower() for action in Action)
+"""Names of channels and actions in manifests that do not tell them."""
 
 
 class CheckpointError(Exception):
@@ -148,13 +153,20 @@ def _signature_to_json(signature: Signature) -> dict[str, Any]:
     return signature._asdict() | {
         "observation": {name: entry._asdict() for name, entry in signature.observation.items()},
         "state": signature.state._asdict(),
+        "n_actions": signature.n_actions,
     }
 
 
 def _signature_from_json(content: dict[str, Any]) -> Signature:
-    def entry(node: dict[str, Any]) -> Entry:
-        return Entry(tuple(int(side) for side in node["shape"]), str(node["dtype"]))
+    def entry(node: dict[str, Any], names: tuple[str, ...] = ()) -> Entry:
+        shape = tuple(int(side) for side in node["shape"])
+        told = tuple(str(name) for name in node.get("names", names if len(names) == shape[0] else ()))
+        if told and len(told) != shape[0]:
+            raise ValueError(f"{len(told)} names of {shape[0]} channels")
+        return Entry(shape, str(node["dtype"]), told)
 
-    observation = {str(name): entry(node) for name, node in content["observation"].items()}
-    counts = (int(content["n_agents"]), int(content["n_actions"]), int(content.get("n_roles", 2)))
-    return Signature(observation, entry(content["state"]), *counts)
+    observation = {str(name): entry(node, _FORMER_NAMES.get(name, ())) for name, node in content["observation"].items()}
+    actions = tuple(str(name) for name in content.get("actions", _FORMER_ACTIONS[: int(content["n_actions"])]))
+    return Signature(
+        observation, entry(content["state"]), int(content["n_agents"]), actions, int(content.get("n_roles", 2))
+    )

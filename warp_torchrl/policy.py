@@ -9,10 +9,12 @@ import torch
 from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
+from torchrl.envs import EnvBase
 from torchrl.envs.utils import exploration_type, set_exploration_type
 
 from warp_torchrl.evaluation import MODES
-from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, ROLE, recurrent_actors
+from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, ROLE, Signature, recurrent_actors, signature
+from warp_torchrl.models.fitting import fitted
 from warp_torchrl.models.networks import AgentNetworks, Network
 from warp_torchrl.observation import SELF_SIZE
 from warp_torchrl.world.role import ROLE_NAMES, ROLES
@@ -30,14 +32,36 @@ class TrainedPolicy(TensorDictModuleBase):
     Args:
         module: Observation and mask in, action out.
         mode: ``sampled`` or ``deterministic``.
+        trained: What it was trained to see and do.
         overrides: With which any environment shows what the policy was trained to read, and understands what it says:
             ``make_env("large", overrides=policy.overrides)``.
     """
 
-    def __init__(self, module: TensorDictModuleBase, mode: str, overrides: Sequence[str] = ()) -> None:
+    def __init__(
+        self, module: TensorDictModuleBase, mode: str, trained: Signature, overrides: Sequence[str] = ()
+    ) -> None:
         super().__init__()
         self.in_keys, self.out_keys = module.in_keys, module.out_keys
-        self.module, self.mode, self.overrides = module, mode, tuple(overrides)
+        self.module, self.mode, self.trained, self.overrides = module, mode, trained, tuple(overrides)
+
+    def fitted(self, env: EnvBase) -> "TrainedPolicy":
+        """Return the policy for an environment that may show more channels, or have more actions, than it knows.
+
+        Raises:
+            ValueError: If the environment lacks what the policy was trained to see or do; which by name.
+        """
+        here = signature(env)
+        if self.is_by_agent and here.n_agents != self.trained.n_agents:
+            raise ValueError(
+                f"it has a network for each of {self.trained.n_agents} agents, this team has {here.n_agents}"
+            )
+        module = fitted(self.module, self.trained, here, fallback=int(Action.EXTINGUISH))
+        return TrainedPolicy(module, self.mode, self.trained, self.overrides)
+
+    @property
+    def is_by_agent(self) -> bool:
+        """Return whether it has a network for each agent, and so fits teams of one size alone."""
+        return any(isinstance(module, AgentNetworks) for module in self.modules())
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write the team's actions, int64 [B, A]."""
@@ -128,7 +152,7 @@ class NumpyPolicy:
             raise ValueError(f"{where}{who} must have {', '.join(missing)}, got {', '.join(entries) or 'nothing'}")
         mask = np.asarray(entries["action_mask"], dtype=bool)
         read: dict[Any, np.ndarray] = {ACTION_MASK: mask}
-        for entry, (shape, dtype) in self._entries.items():
+        for entry, (shape, dtype, _) in self._entries.items():
             value, expected = np.asarray(entries[entry]), (*mask.shape[:-1], *shape)
             if value.shape != expected or value.dtype != dtype:
                 rule = f"{entry or 'observation'}{who} must be {dtype} of shape {list(expected)}"

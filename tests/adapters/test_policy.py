@@ -17,7 +17,7 @@ def policy_for(scenario, model=None, algorithm=None, **options):
     env = make_env(scenario, n_worlds=1, seed=3, overrides=[f"{name}={value}" for name, value in options.items()])
     torch.manual_seed(1)
     module = (algorithm or Ppo()).policy(signature(env), model or Mlp(actor_hidden=(32,)))
-    return env, TrainedPolicy(module.requires_grad_(False).eval(), "deterministic")
+    return env, TrainedPolicy(module.requires_grad_(False).eval(), "deterministic", signature(env))
 
 
 @pytest.mark.parametrize("observation", ["surroundings", "paper"])

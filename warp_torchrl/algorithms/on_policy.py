@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import torch
 from tensordict import TensorDictBase
@@ -26,7 +27,7 @@ from warp_torchrl.models import (
     Recollection,
     Signature,
     arithmetic_of,
-    faces_fire,
+    fire_channel,
     given_held,
     hold,
     signature,
@@ -100,6 +101,8 @@ class OnPolicy(Algorithm):
             loss.entropy_coeff.fill_(falling(self.entropy_coeff, self.entropy_coeff_end, progress))
             return {"train/learning_rate": self.rate_at(progress, optimizer), **self.constants()}
 
+        fire = fire_channel(policy)
+        prepare = _as_it_is if fire is None else partial(hold, fire=fire)
         memory = Recollection(policy)
         steps = frames_per_batch // env.batch_size[0] if memory.actors else 1  # in a row of the buffer
         buffer = TensorDictReplayBuffer(
@@ -110,7 +113,7 @@ class OnPolicy(Algorithm):
 
         def store(batch: TensorDictBase) -> None:
             buffer.empty()
-            valued = with_advantages(loss, batch, hold if faces_fire(policy) else _as_it_is, whole=bool(memory.actors))
+            valued = with_advantages(loss, batch, prepare, whole=bool(memory.actors))
             buffer.extend(narrowed(valued, arithmetic_of(critic, env.device.type)))
 
         return Learner(

@@ -4,7 +4,7 @@ They know the shapes of what they read, from a ``Signature``, how it looks when 
 world.
 """
 
-from warp_torchrl.models.facing import faces_fire, given_held, hold
+from warp_torchrl.models.facing import fire_channel, given_held, hold
 from warp_torchrl.models.memory import Recollection, RecurrentActor, memory_apart, recurrent_actors
 from warp_torchrl.models.model import Cnn, Mlp
 from warp_torchrl.models.networks import arithmetic_of
@@ -52,7 +52,7 @@ __all__ = [
     "RecurrentActor",
     "Signature",
     "arithmetic_of",
-    "faces_fire",
+    "fire_channel",
     "given_held",
     "hold",
     "memory_apart",

@@ -18,7 +18,7 @@ from warp_torchrl.models.signature import (
     STATE,
     TEACHER_ACTION,
 )
-from warp_torchrl.observation.frame import frame_of, held, held_state
+from warp_torchrl.observation.frame import FIRE_CHANNEL, frame_of, held, held_state
 
 Key = str | tuple[str, ...]
 Module = TypeVar("Module", bound=nn.Module)
@@ -34,17 +34,18 @@ class FacingFire(nn.Module):
         network: Reads entries [..., A, ...] and, where it is central, the state; writes [..., A, out].
         keys: Of what is read, in order.
         actions: How many of the entries that it writes, the first, are one for each action.
+        fire: Which channel of a view tells where fire is.
     """
 
-    def __init__(self, network: nn.Module, keys: list[Key], actions: int) -> None:
+    def __init__(self, network: nn.Module, keys: list[Key], actions: int, fire: int) -> None:
         super().__init__()
-        self.network, self.keys, self.actions = network, keys, actions
+        self.network, self.keys, self.actions, self.fire = network, keys, actions, fire
         self._names = _observed(keys)
 
     def forward(self, *inputs: Tensor) -> Tensor:
         """Return float32 [..., A, out]."""
         given = dict(zip(self.keys, inputs, strict=True))
-        frame = frame_of({name: given[key] for key, name in self._names.items()})
+        frame = frame_of({name: given[key] for key, name in self._names.items()}, self.fire)
         for key, name in self._names.items():
             given[key] = held(name, given[key], frame)
         if STATE in given:
@@ -88,9 +89,9 @@ class _Held(nn.Module):
         return self.network(*inputs)
 
 
-def faces_fire(module: nn.Module) -> bool:
-    """Return whether networks of a module face the fire."""
-    return any(isinstance(each, FacingFire) for each in module.modules())
+def fire_channel(module: nn.Module) -> int | None:
+    """Return by which channel of a view networks of a module face the fire; None where none does."""
+    return next((each.fire for each in module.modules() if isinstance(each, FacingFire)), None)
 
 
 def given_held(module: Module) -> Module:
@@ -103,16 +104,17 @@ def given_held(module: Module) -> Module:
     return twin
 
 
-def hold(batch: TensorDictBase) -> TensorDictBase:
+def hold(batch: TensorDictBase, fire: int = FIRE_CHANNEL) -> TensorDictBase:
     """Return a batch as its agents hold it: observations, masks and actions, and the critic's state.
 
     Args:
         batch: As it was collected; what is in it of ``ACTION``, ``ACTION_MASK``, ``TEACHER_ACTION`` and ``STATE`` is
             turned with what was seen. Entries of its ``next`` are not. Where its agents remember, how each holds the
             map is added as ``FRAME``.
+        fire: Which channel of a view tells where fire is.
     """
     names = _observed(batch.keys(include_nested=True, leaves_only=True))
-    frame = frame_of({name: batch.get(key) for key, name in names.items()})
+    frame = frame_of({name: batch.get(key) for key, name in names.items()}, fire)
     out = batch.copy()
     for key, name in names.items():
         out.set(key, held(name, batch.get(key), frame))

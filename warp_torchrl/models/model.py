@@ -30,6 +30,7 @@ from warp_torchrl.models.signature import (
     Entry,
     Signature,
 )
+from warp_torchrl.observation.channels import DEFAULT, FIRE
 from warp_torchrl.observation.frame import can_be_held
 from warp_torchrl.validation import check_fields
 
@@ -147,7 +148,8 @@ class Mlp:
         if self.facing == "fire":
             if not can_be_held({name: entry.shape for name, entry in signature.observation.items()}):
                 raise ValueError("model.facing must be north where observations are of no preset, got fire")
-            network = FacingFire(network, keys, actions=out if key in (LOGITS, ACTION_VALUE) else 0)
+            actions = out if key in (LOGITS, ACTION_VALUE) else 0
+            network = FacingFire(network, keys, actions, _fire_channel(signature))
         if memory:
             return RecurrentActor(network, [key for key in keys if key not in (BEGINS, FRAME, MEMORY)], out, memory)
         return TensorDictModule(network, in_keys=keys, out_keys=[key])
@@ -197,6 +199,23 @@ class Cnn(Mlp):
         return ConvolutionalEncoder(
             entries, size, tuple(self.channels), self.kernel_size, _ACTIVATIONS[self.activation]
         )
+
+
+def _fire_channel(signature: Signature) -> int:
+    """Return which channel of a view tells where fire is, whatever the number where there is no view.
+
+    Raises:
+        ValueError: If the view has no such channel.
+    """
+    if "view" not in signature.observation:
+        return 0
+    view = signature.observation["view"]
+    channels = view.names or DEFAULT
+    if len(channels) != view.shape[0]:
+        raise ValueError("model.facing must be north where observations are of no preset, got fire")
+    if FIRE not in channels:
+        raise ValueError(f"model.facing must be north where observation.channels lack {FIRE}, got fire")
+    return channels.index(FIRE)
 
 
 def _unread(names: list[str]) -> int | None:

@@ -24,10 +24,11 @@ VALUE = ("agents", "state_value")
 
 
 class Entry(NamedTuple):
-    """Shape of one agent's (or the critic's) entry, and its type's name."""
+    """Shape of one agent's (or the critic's) entry, its type's name, and the names of its channels where it has any."""
 
     shape: tuple[int, ...]
     dtype: str
+    names: tuple[str, ...] = ()
 
 
 class Signature(NamedTuple):
@@ -36,8 +37,13 @@ class Signature(NamedTuple):
     observation: dict[str, Entry]  # by name; "" where the observation is one tensor
     state: Entry
     n_agents: int
-    n_actions: int
+    actions: tuple[str, ...]  # by name, in order
     n_roles: int
+
+    @property
+    def n_actions(self) -> int:
+        """Return the number of actions."""
+        return len(self.actions)
 
     def observation_keys(self) -> list[tuple[str, ...]]:
         """Return the tensordict keys of the observation's entries."""
@@ -45,14 +51,17 @@ class Signature(NamedTuple):
 
 
 def signature(env: EnvBase) -> Signature:
-    """Read the signature off an environment's specs."""
+    """Read the signature off an environment's specs, and its names of channels and actions."""
     specs = env.full_observation_spec_unbatched
     seen = specs[OBSERVATION]
     named = dict(seen.items()) if hasattr(seen, "items") else {"": seen}
 
-    def entry(spec: TensorSpec, skip: int) -> Entry:
-        return Entry(tuple(spec.shape[skip:]), str(spec.dtype).removeprefix("torch."))
+    def entry(spec: TensorSpec, skip: int, names: tuple[str, ...] = ()) -> Entry:
+        shape = tuple(spec.shape[skip:])
+        fit = names if len(names) == shape[0] else ()  # transforms of TorchRL may stack channels
+        return Entry(shape, str(spec.dtype).removeprefix("torch."), fit)
 
-    n_agents, n_actions = specs[ACTION_MASK].shape
-    observation = {name: entry(spec, 1) for name, spec in sorted(named.items())}
-    return Signature(observation, entry(specs["state"], 0), n_agents, n_actions, specs[ROLE].n)
+    observation = {name: entry(spec, 1, env.channel_names.get(name, ())) for name, spec in sorted(named.items())}
+    return Signature(
+        observation, entry(specs["state"], 0), specs[ACTION_MASK].shape[0], env.action_names, specs[ROLE].n
+    )

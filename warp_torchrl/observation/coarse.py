@@ -4,8 +4,8 @@ import torch
 from torch import Tensor
 from torch.nn.functional import one_hot
 
+from warp_torchrl.observation.channels import ELEVATION_SCALE
 from warp_torchrl.observation.own import WIND_SCALE, steps_to_tick, time_left
-from warp_torchrl.observation.view import ELEVATION_SCALE
 from warp_torchrl.world.fast.blocks import block_means
 from warp_torchrl.world.fast.squares import window
 from warp_torchrl.world.role import ROLE_NAMES

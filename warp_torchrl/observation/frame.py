@@ -15,12 +15,14 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
+from warp_torchrl.observation.channels import DEFAULT, FIRE
 from warp_torchrl.observation.coarse import PICTURE, PICTURE_SIDE, STATE
 from warp_torchrl.observation.own import IDENTITY_SIZE, LAST_ACTION, PLACE, SELF_SIZE, WIND
-from warp_torchrl.observation.view import CHANNELS
 from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.state import Action
 
+FIRE_CHANNEL = DEFAULT.index(FIRE)
+"""Which channel of a view tells where fire is, unless others are chosen."""
 NEAR_CELLS, NEAR_BLOCKS = 2.0, 0.5
 """Distance that is added to that of a fire, so that those at hand count alike [cells of a view, blocks of a map]."""
 _PARTS = 2.0**16
@@ -88,26 +90,27 @@ def can_be_held(shapes: Mapping[str, tuple[int, ...]]) -> bool:
         return False
     pictures = {(len(PICTURE), side, side) for side in (PICTURE_SIDE, 2 * PICTURE_SIDE - 1)}
     return (
-        shapes["view"] == (len(CHANNELS), sides["view"], sides["view"])
+        shapes["view"][1:] == (sides["view"], sides["view"])
         and sides["self"] in (SELF_SIZE, SELF_SIZE + IDENTITY_SIZE)
         and shapes.get("picture", (len(PICTURE), PICTURE_SIDE, PICTURE_SIDE)) in pictures
     )
 
 
-def frame_of(observation: Mapping[str, Tensor]) -> Frame:
+def frame_of(observation: Mapping[str, Tensor], fire: int = FIRE_CHANNEL) -> Frame:
     """Return how agents hold the map so that the fire that they see lies between their east and their south-east.
 
     Where it lies is told by the view where that shows any, else by the picture: by the sum of the offsets to what
-    burns, each over (its king's moves + a little)^3.
+    burns, each over (its Chebyshev distance + a little)^3.
 
     Args:
         observation: Entries of a preset, batch dimensions first, by name.
+        fire: Which channel of the view tells where fire is.
 
     Returns:
         Frames [...] of the batch dimensions.
     """
     view = observation["view"] if "view" in observation else _planes(observation[""])
-    near = view[..., CHANNELS.index("fire_stage") if "view" in observation else -1, :, :] > 0
+    near = view[..., fire if "view" in observation else -1, :, :] > 0
     pull = _pull(near, NEAR_CELLS)
     if "picture" in observation:
         seen = near.flatten(-2).any(-1)[..., None]

@@ -9,9 +9,10 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from warp_torchrl.observation.channels import CHANNELS, DEFAULT, ages, check_channels, stages
 from warp_torchrl.observation.coarse import CENTRED_HIGHS, PICTURE, PICTURE_SIDE, centred_picture, picture
 from warp_torchrl.observation.own import IDENTITY_SIZE, SELF_SIZE, identity, own_vector
-from warp_torchrl.observation.view import CHANNEL_HIGHS, CHANNELS, ages, egocentric_view, stages
+from warp_torchrl.observation.view import egocentric_view
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.fast.squares import window
 from warp_torchrl.world.state import Forecast, WorldState
@@ -25,6 +26,7 @@ class Space(NamedTuple):
     dtype: torch.dtype
     low: float
     high: float | tuple[float, ...]  # of all numbers, or one for each channel
+    names: tuple[str, ...] = ()  # of the channels, where the entry has any
 
     def bounds(self) -> tuple[Tensor, Tensor]:
         """Return the least and the largest value of each number, both of the entry's shape and type."""
@@ -37,30 +39,32 @@ class Space(NamedTuple):
 class Local:
     """What an agent sees of its own surroundings, and nothing else.
 
-    ``view`` is the square of 2 r + 1 cells about the agent, north up, in the channels ``CHANNELS``, uint8: fractions
-    times 255, elevation relative to the agent's cell as 128 + 127 dz / 100 m, other agents 63 each. ``self`` is what
-    it knows of itself, see ``SELF_SIZE``.
+    ``view`` is the square of 2 r + 1 cells about the agent, north up, uint8, in channels that are chosen by name from
+    ``observation.channels.CHANNELS``. ``self`` is what it knows of itself, see ``SELF_SIZE``.
 
     Attributes:
         radius: r [cells].
         identity: Whether ``self`` ends with the agent's place in its team, see ``identity``: agents that stand together
             and see the same can then part.
+        channels: Names of the view's channels, in order.
 
     Raises:
-        ValueError: If the radius is not in 1..32.
+        ValueError: If the radius is not in 1..32, or a channel is unknown.
     """
 
     radius: int = 5
     identity: bool = False
+    channels: tuple[str, ...] = DEFAULT
 
     def __post_init__(self) -> None:
         check_fields(self, radius=(1, 32))
+        check_channels(self.channels)
 
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
-        side = 2 * self.radius + 1
+        side, highs = 2 * self.radius + 1, tuple(CHANNELS[name].high for name in self.channels)
         return {
-            "view": Space((len(CHANNELS), side, side), torch.uint8, 0, CHANNEL_HIGHS),
+            "view": Space((len(highs), side, side), torch.uint8, 0, highs, self.channels),
             "self": Space((SELF_SIZE + IDENTITY_SIZE * self.identity,), torch.float32, -3.0, 3.0),
         }
 
@@ -70,7 +74,7 @@ class Local:
         if self.identity:
             who = identity(own.shape[1], own.device)
             own = torch.cat((own, who.expand(len(own), -1, -1)), dim=-1)
-        return {"view": egocentric_view(state, world, forecast, self.radius), "self": own}
+        return {"view": egocentric_view(state, world, forecast, self.radius, self.channels), "self": own}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +98,7 @@ class Surroundings(Local):
         side = 2 * PICTURE_SIDE - 1 if self.centred else PICTURE_SIDE
         dtype = torch.uint8 if self.centred else torch.float32
         high: float | tuple[float, ...] = CENTRED_HIGHS if self.centred else 1.0
-        return {**super().spaces(world), "picture": Space((len(PICTURE), side, side), dtype, 0, high)}
+        return {**super().spaces(world), "picture": Space((len(PICTURE), side, side), dtype, 0, high, PICTURE)}
 
     def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
         """Return ``view``, ``self``, and ``picture`` float32 [B, A, 3, 8, 8]."""

@@ -61,6 +61,11 @@ class Team:
         return 11 if self.allow_stay else 10
 
     @property
+    def action_names(self) -> tuple[str, ...]:
+        """Return the names of the actions, ``north`` and so on, by their codes."""
+        return tuple(action.name.lower() for action in Action)[: self.n_actions]
+
+    @property
     def agent_roles(self) -> list[str]:
         """Return the role of each agent."""
         return [self.roles[index % len(self.roles)] for index in range(self.n_agents)]

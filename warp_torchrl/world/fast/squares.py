@@ -76,8 +76,8 @@ def _squares(plane: Tensor, position: Tensor, radius: int) -> Tensor:
 
 
 def stacked(channels: Sequence[Tensor]) -> Tensor:
-    """Return channels [B, A, V, V], uint8 or ``to_int32``, as one tensor, uint8 [B, A, C, V, V]."""
-    return _stacked([to_uint8(channel).contiguous() for channel in channels] if is_compiling() else list(channels))
+    """Return channels [B, A, V, V] of whole numbers 0..255 as one tensor, uint8 [B, A, C, V, V]."""
+    return _stacked([to_uint8(channel).contiguous() for channel in channels])
 
 
 # A compiler would write squares of odd sides a few cells at a time.

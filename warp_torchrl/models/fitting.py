@@ -1,0 +1,84 @@
+"""A policy in an environment that shows more than it was trained to see, or lets it do more: found by name."""
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
+
+from warp_torchrl.models.signature import ACTION_MASK, Entry, Signature
+
+
+class Fitted(TensorDictModuleBase):
+    """A policy that is given the channels and actions that it knows, of those that an environment has.
+
+    Args:
+        policy: Observation and mask in, action out.
+        channels: Index of each channel that it reads by key, int64 [C].
+        n_actions: Actions that it knows, the first of the environment's.
+        fallback: The action that is opened where none of those does anything.
+    """
+
+    def __init__(
+        self, policy: TensorDictModuleBase, channels: dict[tuple[str, ...], Tensor], n_actions: int, fallback: int
+    ) -> None:
+        super().__init__()
+        self.in_keys, self.out_keys = policy.in_keys, policy.out_keys
+        self.policy, self.channels, self.n_actions, self.fallback = policy, channels, n_actions, fallback
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Write the team's actions, int64 [B, A], and what else the policy writes."""
+        seen = tensordict.select(*self.in_keys, strict=False)
+        for key, index in self.channels.items():
+            entry = seen.get(key)
+            seen.set(key, entry.index_select(-3, index.to(entry.device)))
+        if ACTION_MASK in seen.keys(include_nested=True):
+            mask = seen.get(ACTION_MASK)[..., : self.n_actions].clone()
+            mask[..., self.fallback] |= ~mask.any(dim=-1)
+            seen.set(ACTION_MASK, mask)
+        return tensordict.update(self.policy(seen).select(*self.out_keys, strict=False))
+
+
+def fitted(policy: TensorDictModuleBase, trained: Signature, here: Signature, fallback: int) -> TensorDictModuleBase:
+    """Return a policy for an environment in which it knows its way by name.
+
+    Args:
+        policy: Observation and mask in, action out.
+        trained: What it was trained to see and do.
+        here: What the environment shows, and lets it do.
+        fallback: The action that is opened where none that it knows does anything.
+
+    Raises:
+        ValueError: If the environment lacks an entry, a channel or an action, or has it in another form; which one.
+    """
+    if (trained.observation, trained.actions) == (here.observation, here.actions):
+        return policy
+    if trained.actions != here.actions[: len(trained.actions)]:
+        lacking = [name for name in trained.actions if name not in here.actions]
+        raise ValueError(
+            f"it was trained with {len(trained.actions)} actions, this environment has {len(here.actions)}: "
+            f"{', '.join(lacking) or 'in another order'}"
+        )
+    keys = dict(zip(trained.observation, trained.observation_keys(), strict=True))
+    channels = {}
+    for name, entry in trained.observation.items():
+        if name not in here.observation:
+            raise ValueError(f"it was trained to see {name or 'a vector'}, which this environment does not show")
+        index = _places(name, entry, here.observation[name])
+        if index is not None:
+            channels[keys[name]] = index
+    return Fitted(policy, channels, len(trained.actions), fallback)
+
+
+def _places(name: str, trained: Entry, here: Entry) -> Tensor | None:
+    """Return where the channels that were trained with are among those that are here; None where they are the same."""
+    if trained == here:
+        return None
+    lacking = [each for each in trained.names if each not in here.names]
+    if lacking and here.names:
+        raise ValueError(f"it was trained to see {', '.join(lacking)} in {name}, which this environment does not show")
+    if not trained.names or lacking or (trained.shape[1:], trained.dtype) != (here.shape[1:], here.dtype):
+        raise ValueError(
+            f"it was trained on {name or 'vector'} {list(trained.shape)} {trained.dtype}, this environment shows "
+            f"{list(here.shape)} {here.dtype}"
+        )
+    return torch.tensor([here.names.index(each) for each in trained.names])

@@ -1,0 +1,216 @@
+"""The channels of an agent's view: a table of functions by name, from which ``observation.channels`` chooses.
+
+A channel reads a ``Look``, the squares of the map about the agents, and returns whole numbers 0..255. A module of a
+user's own adds one:
+
+    @channel(high=255)
+    def assets(look: Look) -> Tensor:
+        ...
+"""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.world.fast.bytes import at_least, byte, equal, to_codes, to_int32
+from warp_torchrl.world.fast.squares import Window, window
+from warp_torchrl.world.role import ROLE_NAMES
+from warp_torchrl.world.state import FIRST_FIRE, Forecast, WorldState, is_burning, is_tree
+from warp_torchrl.world.world import World
+
+ELEVATION_SCALE = 100.0
+"""Difference in height that an observation shows as 1 [m]."""
+FIRE = "fire_stage"
+"""The channel that tells where fire is, by which networks turn what an agent sees."""
+
+
+class Look(NamedTuple):
+    """What a channel reads: the worlds, and the square of 2 r + 1 = V cells about each agent, north up."""
+
+    state: WorldState
+    world: World
+    forecast: Forecast
+    window: Window  # ``window.of(plane)`` shows any plane [B, H, W] of numbers, 0 beyond the map
+    on_map: Tensor  # 1 on the map, 0 beyond, [B, A, V, V], whole numbers, as all that follow
+    cells: Tensor  # the world's codes
+    ash: Tensor  # 1 where a tree has burned to ash and none stands
+    firebreak: Tensor  # 1 where an agent has cleared
+    wet: Tensor  # ticks for which the cell cannot ignite
+    alpha: Tensor  # flammability, 255 times
+    fire_risk: Tensor  # ``Forecast.fire_risk``, 255 times
+
+
+class Channel(NamedTuple):
+    """A channel of the table."""
+
+    show: Callable[[Look], Tensor]
+    """Returns whole numbers [B, A, V, V] of a look."""
+    high: int
+    """The largest number that it returns."""
+
+
+CHANNELS: dict[str, Channel] = {}
+"""All channels, by name."""
+
+
+def channel(high: int = 255) -> Callable[[Callable[[Look], Tensor]], Callable[[Look], Tensor]]:
+    """Return what adds a function to the table, under the function's name.
+
+    Args:
+        high: The largest number that it returns, at most 255.
+
+    Raises:
+        ValueError: If the number is not in 1..255, or the table has another channel of that name.
+    """
+    if not 1 <= high <= 255:
+        raise ValueError(f"high must be in 1..255, got {high}")
+
+    def add(show: Callable[[Look], Tensor]) -> Callable[[Look], Tensor]:
+        name, known = show.__name__, CHANNELS.get(show.__name__)
+        if known is not None and known.show.__module__ != show.__module__:
+            raise ValueError(f"{name} must be a new channel's name, {known.show.__module__} has one")
+        CHANNELS[name] = Channel(show, high)
+        return show
+
+    return add
+
+
+@channel()
+def off_map(look: Look) -> Tensor:
+    """Return 255 beyond the map."""
+    return (look.on_map ^ 1) * 255
+
+
+@channel()
+def flammability(look: Look) -> Tensor:
+    """Return alpha of the ground, 255 times."""
+    return look.alpha
+
+
+@channel(high=250)
+def age(look: Look) -> Tensor:
+    """Return the ages of trees, 25 a year of ten."""
+    return ages(look.cells)
+
+
+@channel()
+def fire_stage(look: Look) -> Tensor:
+    """Return the stages of fires, 51 each."""
+    return stages(look.cells)
+
+
+@channel()
+def ash(look: Look) -> Tensor:
+    """Return 255 where a tree has burned to ash and none stands."""
+    return look.ash * 255
+
+
+@channel()
+def firebreak(look: Look) -> Tensor:
+    """Return 255 where an agent has cleared."""
+    return look.firebreak * 255
+
+
+@channel(high=250)
+def wet(look: Look) -> Tensor:
+    """Return the ticks for which a tree cannot ignite, 25 each, ten at most."""
+    return look.wet.clamp(max=10) * 25
+
+
+@channel()
+def relative_elevation(look: Look) -> Tensor:
+    """Return the height over the agent's own cell, 128 + 127 dz / 100 m."""
+    elevation = look.state.landscape.elevation
+    if elevation is None:
+        return look.on_map * 128
+    heights = look.window.of(elevation)
+    middle = heights.shape[-1] // 2
+    own = heights[:, :, middle, middle, None, None]
+    return to_codes(((heights - own) / ELEVATION_SCALE).clamp_(-1.0, 1.0).mul_(127.0).add_(128.0))
+
+
+@channel()
+def threat(look: Look) -> Tensor:
+    """Return where the fire is about to grow, see ``Forecast.fire_risk``, 255 times."""
+    return look.fire_risk
+
+
+@channel(high=252)
+def other_ugv(look: Look) -> Tensor:
+    """Return where other ground vehicles are, 63 each, four at most."""
+    return others(look, "ugv")
+
+
+@channel(high=252)
+def other_uav(look: Look) -> Tensor:
+    """Return where other aircraft are, 63 each, four at most."""
+    return others(look, "uav")
+
+
+DEFAULT = tuple(CHANNELS)
+"""The channels of a view unless others are chosen."""
+
+
+_CELLS, _BURNED, _FIREBREAK, _ON_MAP = 0x0F, 0x10, 0x20, 0x40
+
+
+def look_at(state: WorldState, world: World, forecast: Forecast, radius: int) -> Look:
+    """Return the squares about the agents.
+
+    Codes, ash, firebreaks and the map are read at once, as the bits of a byte.
+    """
+    burned, cleared = to_int32(state.burned.view(torch.uint8)), to_int32(state.firebreak.view(torch.uint8))
+    code = torch.add(to_int32(state.cells), burned, alpha=_BURNED).add_(cleared, alpha=_FIREBREAK).add_(_ON_MAP)
+    risk = forecast.expected_ignitions, forecast.ignition_probability
+    square = window(state.vehicles.position, state.cells.shape[1:], radius)
+    code, wet, alpha, fire_risk = square.bytes_of([code, state.wet], [(state.alpha,), risk])
+    return Look(
+        state=state,
+        world=world,
+        forecast=forecast,
+        window=square,
+        on_map=byte(at_least(code, _ON_MAP)),
+        cells=code & _CELLS,
+        ash=byte(equal(code & (_CELLS | _BURNED), _BURNED)),
+        firebreak=byte(equal(code & _FIREBREAK, _FIREBREAK)),
+        wet=wet,
+        alpha=alpha,
+        fire_risk=fire_risk,
+    )
+
+
+def check_channels(names: Sequence[str]) -> None:
+    """Check a choice of channels.
+
+    Raises:
+        ValueError: If there is none, one is not in the table, or one is named twice.
+    """
+    unknown = [name for name in names if name not in CHANNELS]
+    if not names or unknown or len(set(names)) < len(names):
+        got = unknown[0] if unknown else list(names)
+        raise ValueError(f"channels must be a list of different names of {', '.join(CHANNELS)}, got {got}")
+
+
+def ages(cells: Tensor) -> Tensor:
+    """Return the ages of trees, 25 a year of ten, shape of the cells."""
+    return cells * byte(is_tree(cells)) * 25
+
+
+def stages(cells: Tensor) -> Tensor:
+    """Return the stages of fires, 51 each, shape of the cells."""
+    return (cells - (FIRST_FIRE - 1)) * byte(is_burning(cells)) * 51
+
+
+def others(look: Look, role: str) -> Tensor:
+    """Return where the other agents of a role are, 63 each, at most 4 to a cell, uint8 [B, A, V, V]."""
+    position, radius = look.state.vehicles.position, look.window.radius
+    side, of_role = 2 * radius + 1, look.world.team.table(position.device).index == ROLE_NAMES.index(role)
+    row, column = (position[:, None] - position[:, :, None] + radius).unbind(-1)  # of each in each other's square
+    is_near = (row >= 0) & (row < side) & (column >= 0) & (column < side) & of_role
+    is_near &= ~torch.eye(len(of_role), dtype=torch.bool, device=position.device)
+    index = torch.where(is_near, row * side + column, side**2)
+    count = torch.zeros(*row.shape[:2], side**2 + 1, dtype=torch.uint8, device=position.device)
+    count = count.scatter_add(2, index, torch.ones_like(index, dtype=torch.uint8))[..., :-1]
+    return count.clamp(max=4).mul_(63).unflatten(-1, (side, side))
