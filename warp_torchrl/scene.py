@@ -10,7 +10,7 @@ from torch import Tensor
 
 from warp_torchrl.metrics import metrics
 from warp_torchrl.observation import Observation, central_state
-from warp_torchrl.reward import Reward
+from warp_torchrl.reward import Collaborative, Efficiency, Reward, Time
 from warp_torchrl.world.fast.compile import compiled
 from warp_torchrl.world.fast.road import in_bytes, in_flags
 from warp_torchrl.world.state import Forecast, Outcome, Transition, WorldState
@@ -68,7 +68,7 @@ class Scene:
         return Step(transition, self.observe(transition.after), self.reward(transition))
 
     def _compiled_step(self, before: WorldState, action: Tensor) -> Step:
-        given, earns = in_bytes(before), self.reward if self.reward.fuses else None
+        given, earns = in_bytes(before), self.reward if compiles(self.reward) else None
         after, outcome, forecast = compiled(_advance)(self.world, given, action)
         transition = Transition(before=given, outcome=outcome, after=after)
         observed, reward = compiled(_observe_and_earn, in_parts=True)(
@@ -76,6 +76,15 @@ class Scene:
         )
         transition = transition.replace(before=before, after=in_flags(after))
         return Step(transition, observed, self.reward(transition) if reward is None else reward)
+
+
+def compiles(reward: Reward) -> bool:
+    """Return whether a reward is compiled with the step: one of ours that reads counts and distances, and no map.
+
+    Those that loop over maps, and a user's own, are computed beside it.
+    """
+    reads_counts = type(reward) in (Efficiency, Time, Collaborative)
+    return reads_counts and (reward.shaping == 0.0 or reward.potential == "distance")
 
 
 def _advance(world: World, state: WorldState, action: Tensor) -> tuple[WorldState, Outcome, Forecast]:

@@ -61,14 +61,3 @@ def test_a_reward_must_say_what_an_agent_earns(make_small_env):
     env = make_small_env(1, reward=Reward())
     with pytest.raises(TypeError, match="define own"):
         env.rollout(1)
-
-
-def test_rewards_that_ask_counts_and_distances_alone_are_fused():
-    assert {each.__name__ for each in (Efficiency, Time, Coverage, Collaborative, Adaptive, Paper) if each().fuses} == {
-        "Efficiency",
-        "Time",
-        "Collaborative",
-    }
-    assert Efficiency(shaping=0.1).fuses
-    assert not Efficiency(shaping=0.1, potential="exposure").fuses
-    assert not Reward().fuses  # nor does one of the user's own that does not say so

@@ -1,7 +1,7 @@
 """What all rewards have in common: the team's share, scale and potential-based shaping."""
 
 from dataclasses import dataclass, fields
-from typing import ClassVar, Literal
+from typing import Literal
 
 from torch import Tensor
 
@@ -53,14 +53,6 @@ class Reward:
         mean = own.mean(dim=1, keepdim=True)
         reward = self.scale * ((1.0 - self.team_share) * own + self.team_share * mean)
         return (reward * ~transition.before.done[:, None])[..., None]
-
-    counts_alone: ClassVar[bool] = False
-    """Whether ``own`` reads counts and vehicles alone, and no map; a class says so that knows it."""
-
-    @property
-    def fuses(self) -> bool:
-        """Return whether ``compile=true`` compiles it: not what loops over maps, as floods and exposure do."""
-        return self.counts_alone and (self.shaping == 0.0 or self.potential == "distance")
 
     def own(self, transition: Transition) -> Tensor:
         """Return what each agent earns before sharing and shaping, float32 [B, A]."""

@@ -8,7 +8,7 @@ for its own acts, as many times as there are agents, so that the team's mean is 
 """
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Literal
 
 import torch
 from torch import Tensor
@@ -71,8 +71,6 @@ class Efficiency(Conservation):
     R = Q - w_a A_total      (WARP-CA, eq. of the action efficiency)
     """
 
-    counts_alone: ClassVar[bool] = True
-
 
 @dataclass(frozen=True, kw_only=True)
 class Time(Conservation):
@@ -88,8 +86,6 @@ class Time(Conservation):
         rule: ``share`` of the horizon, or ``printed``.
         horizon: T_max, agent steps; the environment's.
     """
-
-    counts_alone: ClassVar[bool] = True
 
     act: float = 0.0
     zeta: float = 0.2
@@ -151,8 +147,6 @@ class Collaborative(Conservation):
         window: Steps for which a credited act counts as lately.
         rule: ``positive`` or ``printed``.
     """
-
-    counts_alone: ClassVar[bool] = True
 
     act: float = 0.0
     together: float = 0.5
