@@ -80,7 +80,7 @@ def test_learning_knows_specs_and_not_the_world(module):
 
 
 PLAYED = {"world", "observation", "reward", "metrics"}
-SHOWN = PLAYED | {"scene", "render", "specs", "starts"}
+SHOWN = PLAYED | {"scene", "render", "specs", "reset_cache"}
 
 
 @pytest.mark.parametrize(("module", "allowed"), [("scene", PLAYED), ("env", SHOWN)])

@@ -15,7 +15,7 @@ from warp_torchrl.render import render
 from warp_torchrl.reward import Efficiency, Reward
 from warp_torchrl.scene import Observations, Scene
 from warp_torchrl.specs import make_specs
-from warp_torchrl.starts import Start, Starts
+from warp_torchrl.reset_cache import ResetCache, Start
 from warp_torchrl.world.fast.compile import check_compiler
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.state import Transition, WorldState
@@ -77,7 +77,7 @@ class WildfireEnv(EnvBase):
         self.group_map = {"agents": list(names)}
         self.role_map = {role: [n for n, r in zip(names, roles) if r == role] for role in ROLES if role in roles}
         self._state: WorldState | None = None
-        self._starts = Starts(self._start)
+        self._resets = ResetCache(self._start)
         self.watcher: Callable[[Transition], None] | None = None
         """Is shown every step's transition, for those who study behaviour."""
         self._episode_reward = torch.zeros(n_worlds, device=self.device)
@@ -137,7 +137,7 @@ class WildfireEnv(EnvBase):
             raise ValueError(f"seed must be in 0..2**62, got {min(seeds)}..{max(seeds)}")
         self._seeds = torch.tensor(list(seeds), dtype=torch.int64, device=self.device)
         self._episodes = torch.full_like(self._episodes, first_episode)
-        self._starts.forget()
+        self._resets.clear()
 
     def set_state(self, state: WorldState) -> TensorDictBase:
         """Go on from given worlds, and return what a reset would have returned for them.
@@ -190,14 +190,14 @@ class WildfireEnv(EnvBase):
         self._episodes = state_dict["episodes"].to(self.device).clone()
         self._episode_reward = state_dict["episode_reward"].to(self.device).clone()
         self._state = state
-        self._starts.forget()
+        self._resets.clear()
 
     # What TorchRL asks for
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
         mask = None if tensordict is None else tensordict.get("_reset", None)
         if mask is None or self._state is None or mask.all():
-            self._starts.forget()
+            self._resets.clear()
             self._state = self.world.reset(self.seeds, self._episodes)
             self._episodes = self._episodes + 1
             self._episode_reward = torch.zeros_like(self._episode_reward)
@@ -228,7 +228,7 @@ class WildfireEnv(EnvBase):
 
     def _start_again(self, index: Tensor) -> TensorDict:
         """Start the next episode of some worlds, and return what is observed in them."""
-        self.world_state[index], seen = self._starts.take(index, self.seeds, self._episodes)
+        self.world_state[index], seen = self._resets.pop(index, self.seeds, self._episodes)
         self._episodes = self._episodes.index_add(0, index, torch.ones_like(index))
         self._episode_reward = self._episode_reward.index_fill(0, index, 0.0)
         return seen

@@ -1,7 +1,7 @@
-"""Starts of episodes, made for many worlds at once before they are needed.
+"""Cache of resets: the next episode of every world is prepared in one batch.
 
-A start is a pure function of a world's seed and episode. A few worlds end at almost every step, and what a start costs
-is mostly the same for one world and for many.
+The start of an episode is a pure function of a world's seed and episode number. A few worlds end at almost every step,
+and a start costs nearly the same for one world as for many.
 """
 
 from collections.abc import Callable
@@ -16,8 +16,8 @@ Start = tuple[WorldState, TensorDict]
 """Worlds at the start of an episode, and what is observed there."""
 
 
-class Starts:
-    """The next start of each world of a batch.
+class ResetCache:
+    """The start of the next episode of each world of a batch.
 
     Args:
         make: Returns the starts of seeds and episodes, int64 [n] each.
@@ -28,11 +28,11 @@ class Starts:
         self._next: Start | None = None
         self._made = torch.zeros(0, dtype=torch.bool)
 
-    def forget(self) -> None:
-        """Drop what was made: the worlds get other seeds or episodes."""
+    def clear(self) -> None:
+        """Drop all starts: the worlds get other seeds or episodes."""
         self._next = None
 
-    def take(self, index: Tensor, seeds: Tensor, episodes: Tensor) -> Start:
+    def pop(self, index: Tensor, seeds: Tensor, episodes: Tensor) -> Start:
         """Return the starts of some worlds; where one is missing, all that are missing are made.
 
         Args:

@@ -4,7 +4,7 @@ import torch
 from tensordict import TensorDict
 
 from tests.conftest import small_world
-from warp_torchrl.starts import Starts
+from warp_torchrl.reset_cache import ResetCache
 
 SEEDS = torch.tensor([10, 11, 12, 13])
 
@@ -22,9 +22,9 @@ class Counting:
 
 
 def test_what_is_taken_is_the_next_episode_of_those_worlds():
-    starts, episodes = Starts(Counting()), torch.tensor([1, 1, 1, 1])
+    starts, episodes = ResetCache(Counting()), torch.tensor([1, 1, 1, 1])
     for index in ([2], [0, 1], [2], [2, 3], [1]):  # world 2 twice before world 3 at all
-        worlds, seen = starts.take(torch.tensor(index), SEEDS, episodes)
+        worlds, seen = starts.pop(torch.tensor(index), SEEDS, episodes)
         assert seen["seed"].tolist() == SEEDS[index].tolist()
         assert seen["episode"].tolist() == episodes[index].tolist()
         wanted = small_world().reset(SEEDS[index], episodes[index])
@@ -34,23 +34,23 @@ def test_what_is_taken_is_the_next_episode_of_those_worlds():
 
 def test_all_that_are_missing_are_made_at_once():
     make = Counting()
-    starts, episodes = Starts(make), torch.zeros_like(SEEDS)
+    starts, episodes = ResetCache(make), torch.zeros_like(SEEDS)
     for world in (0, 1, 2, 0):
-        starts.take(torch.tensor([world]), SEEDS, episodes)
+        starts.pop(torch.tensor([world]), SEEDS, episodes)
     assert make.asked == [4, 3]
 
 
-def test_forgotten_starts_are_made_anew():
+def test_forgotten_resets_are_made_anew():
     make = Counting()
-    starts = Starts(make)
-    starts.take(torch.tensor([0]), SEEDS, torch.zeros_like(SEEDS))
-    starts.forget()
-    _, seen = starts.take(torch.tensor([1]), SEEDS + 5, torch.zeros_like(SEEDS))
+    starts = ResetCache(make)
+    starts.pop(torch.tensor([0]), SEEDS, torch.zeros_like(SEEDS))
+    starts.clear()
+    _, seen = starts.pop(torch.tensor([1]), SEEDS + 5, torch.zeros_like(SEEDS))
     assert make.asked == [4, 4] and seen["seed"].tolist() == [16]
 
 
 def test_what_was_taken_stays_as_it_is():
-    starts, episodes = Starts(Counting()), torch.zeros_like(SEEDS)
-    _, seen = starts.take(torch.tensor([0]), SEEDS, episodes)
-    starts.take(torch.tensor([0]), SEEDS, episodes + 1)
+    starts, episodes = ResetCache(Counting()), torch.zeros_like(SEEDS)
+    _, seen = starts.pop(torch.tensor([0]), SEEDS, episodes)
+    starts.pop(torch.tensor([0]), SEEDS, episodes + 1)
     assert seen["episode"].tolist() == [0]
