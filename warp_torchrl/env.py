@@ -12,10 +12,10 @@ from torchrl.envs import EnvBase
 
 from warp_torchrl.observation import Observation, Surroundings
 from warp_torchrl.render import render
+from warp_torchrl.reset_cache import ResetCache, Start
 from warp_torchrl.reward import Efficiency, Reward
 from warp_torchrl.scene import Observations, Scene
 from warp_torchrl.specs import make_specs
-from warp_torchrl.reset_cache import ResetCache, Start
 from warp_torchrl.world.fast.compile import check_compiler
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.state import Transition, WorldState
