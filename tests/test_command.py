@@ -328,7 +328,7 @@ MISTAKES = [
     (("train.py", "team.n_agents=0"), 2, "team.n_agents must be in [1, 256], got 0"),
     (("train.py", "scenario=nowhere"), 2, "nowhere"),
     (("train.py", "+foo=1"), 2, "foo is not a key"),
-    (("train.py", "-m", "seed=0,400"), 2, "seed must be in 0..243"),
+    (("train.py", "-m", "seed=0,-1"), 2, "seed must be in 0..2147483648"),
     (("train.py", "scenario=landfire"), 2, "landscape.path must name"),
     (("train.py", "resume=nowhere"), 4, "nowhere is not a run folder"),
     (("evaluate.py",), 2, "give either checkpoint=PATH or policy=NAME"),

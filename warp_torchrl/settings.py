@@ -10,6 +10,7 @@ import torch
 from warp_torchrl.construction import ConfigError, build, construct
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.imitation import Imitation
+from warp_torchrl.seeds import BEYOND_EVALUATION, FIRST_EVALUATED, SEEDS, WORLDS
 from warp_torchrl.world.fusion import check_compiler
 from warp_torchrl.world.world import World
 
@@ -33,8 +34,6 @@ WORLD_KEYS = ("scenario", "landscape", "wind", "fire", "team", "ignition", "step
 """What a scenario sets."""
 COMMAND_KEYS = ("resume", "start_from", "debug", "policy")
 """What the commands read themselves."""
-TRAINING_SEEDS = 4096
-"""Seeds that one training seed owns: world i of seed s draws with 4096 s + i."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +65,7 @@ class EvaluationPlan:
     Attributes:
         interval: Frames between evaluations during training; 0 evaluates only at the end.
         episodes: Worlds.
-        first_seed: Seed of the first; training seeds lie below 1 000 000.
+        first_seed: Seed of the first; training has those below 1 000 000 and from 2^61 on.
         mode: ``sampled``, ``deterministic``, or ``best``: whichever did better on training seeds.
         leave_one_out: Play once more for each agent, without it, to see what it is worth.
 
@@ -76,7 +75,7 @@ class EvaluationPlan:
 
     interval: int = 0
     episodes: int = 256
-    first_seed: int = 1_000_000
+    first_seed: int = FIRST_EVALUATED
     mode: Literal["sampled", "deterministic", "best"] = "best"
     leave_one_out: bool = False
 
@@ -85,8 +84,11 @@ class EvaluationPlan:
             raise ValueError(f"interval must be 0 or more frames, got {self.interval}")
         if not 1 <= self.episodes <= 1_000_000:
             raise ValueError(f"episodes must be in 1..1000000, got {self.episodes}")
-        if not 0 <= self.first_seed < 2**62:
-            raise ValueError(f"first_seed must be in 0..2**62, got {self.first_seed}")
+        if not 0 <= self.first_seed <= BEYOND_EVALUATION - self.episodes:
+            raise ValueError(
+                f"first_seed must be in 0..{BEYOND_EVALUATION - self.episodes}, so that no episode has a training "
+                f"world's seed, got {self.first_seed}"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,14 +117,12 @@ class Settings:
     imitation: Imitation
 
     def __post_init__(self) -> None:
-        if not 1 <= self.n_worlds <= TRAINING_SEEDS:
-            raise ValueError(f"n_worlds must be in 1..{TRAINING_SEEDS}, got {self.n_worlds}")
+        if not 1 <= self.n_worlds <= WORLDS:
+            raise ValueError(f"n_worlds must be in 1..{WORLDS}, got {self.n_worlds}")
         if not 1 <= self.total_frames <= 10**15:
             raise ValueError(f"total_frames must be in 1..1e15, got {self.total_frames}")
-        if not 0 <= self.seed < 244:
-            raise ValueError(
-                f"seed must be in 0..243, so that no training world has an evaluation seed, got {self.seed}"
-            )
+        if not 0 <= self.seed <= SEEDS:
+            raise ValueError(f"seed must be in 0..{SEEDS}, got {self.seed}")
         _check_device(self.device)
 
     def check_training(self) -> None:

@@ -21,7 +21,8 @@ from warp_torchrl.logging import MetricsFile, Tracker
 from warp_torchrl.models import REWARD, signature
 from warp_torchrl.progress import TRAIN_COLUMNS, episode_columns, line
 from warp_torchrl.reward_scale import RewardScale
-from warp_torchrl.settings import TRAINING_SEEDS, Settings
+from warp_torchrl.seeds import WORLDS, first_world_seed
+from warp_torchrl.settings import Settings
 from warp_torchrl.signals import Noted, Stopped
 from warp_torchrl.transfer import learnt
 from warp_torchrl.world.fusion import compiled
@@ -46,16 +47,15 @@ class Training:
     def __init__(self, settings: Settings, record: Record, run: Path) -> None:
         torch.manual_seed(settings.seed)
         self.settings, self.record, self.run = settings, record, run
-        self.env = settings.make_training_env(settings.n_worlds, TRAINING_SEEDS * settings.seed)
+        first = first_world_seed(settings.seed)
+        self.env = settings.make_training_env(settings.n_worlds, first)
         self.frames_per_batch = settings.collector.steps * settings.n_worlds
         learner = settings.algorithm.build(self.env, settings.model, self.frames_per_batch)
         if settings.compile:
             learner.terms = compiled(learner.terms)
         self.learner: Learner = settings.imitation.taught(learner, self.env)
         self.reward_scale = RewardScale(settings.reward.gamma) if settings.reward.normalise else None
-        self.collection = settings.collector.open(
-            self.env, self.learner, settings.make_training_env, TRAINING_SEEDS * settings.seed
-        )
+        self.collection = settings.collector.open(self.env, self.learner, settings.make_training_env, first)
         self.frames = 0
         self.seconds = 0.0
         self.saved_at = 0
@@ -181,8 +181,8 @@ class Training:
         chosen = self.settings.evaluation.mode
         if chosen != "best":
             return chosen
-        first = TRAINING_SEEDS * self.settings.seed
-        env = self.settings.make_env(min(self.settings.evaluation.episodes, TRAINING_SEEDS), first)
+        first = first_world_seed(self.settings.seed)
+        env = self.settings.make_env(min(self.settings.evaluation.episodes, WORLDS), first)
         saved = {mode: play(env, self.learner.policy, first, mode)["saved"].mean() for mode in MODES}
         return max(saved, key=saved.__getitem__)
 

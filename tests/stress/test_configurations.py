@@ -9,7 +9,6 @@ pytestmark = pytest.mark.stress
 
 INVALID = [
     *(override for override, _ in MISTAKES),
-    "seed=-1",
     "seed=true",
     "seed=null",
     "n_worlds=4097",
@@ -113,6 +112,7 @@ INVALID = [
 VALID = [
     "",
     "seed=243",
+    "seed=2147483648",
     "n_worlds=4096",
     "total_frames=1",
     "horizon=1",
