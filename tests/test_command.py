@@ -23,6 +23,7 @@ TINY = [
     "collector.steps=8",
     "total_frames=128",
     "checkpoint.interval=32",
+    "checkpoint.minutes=0",
     "evaluation.episodes=6",
     "algorithm.minibatch_size=16",
     "model.actor_hidden=[16]",

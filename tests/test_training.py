@@ -27,6 +27,7 @@ TINY = [
     "collector.steps=8",
     "total_frames=192",
     "checkpoint.interval=64",
+    "checkpoint.minutes=0",
     "checkpoint.keep=10",
     "evaluation.episodes=4",
     "algorithm.minibatch_size=16",

@@ -72,11 +72,14 @@ def failures(folder: Path) -> list[Failure]:
     return sorted(found, key=lambda each: each.job)
 
 
+_NOT_TRAINED_BY = ("seed", "device", "evaluation", "checkpoint")
+
+
 def method(record: Record) -> tuple[str, str]:
-    """Return what a trained policy is called in a sweep, and a digest of its configuration but for the seed."""
+    """Return what a trained policy is called in a sweep, and a digest of what it was trained by but for the seed."""
     names = [record.choices[group] for group in ("algorithm", "reward", "observation")]
     names += [*unusual(record), *taught(record)]
-    values = {key: value for key, value in record.values.items() if key not in ("seed", "device", "evaluation")}
+    values = {key: value for key, value in record.values.items() if key not in _NOT_TRAINED_BY}
     return " ".join(names), sha256(json.dumps(_with_floats(values), sort_keys=True).encode()).hexdigest()
 
 

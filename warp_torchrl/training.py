@@ -21,6 +21,7 @@ from warp_torchrl.logging import MetricsFile, Tracker
 from warp_torchrl.models import REWARD, signature
 from warp_torchrl.progress import TRAIN_COLUMNS, episode_columns, line
 from warp_torchrl.reward_scale import RewardScale
+from warp_torchrl.saving import SaveClock, passes
 from warp_torchrl.seeds import WORLDS, first_world_seed
 from warp_torchrl.settings import Settings
 from warp_torchrl.signals import Noted, Stopped
@@ -59,6 +60,7 @@ class Training:
         self.frames = 0
         self.seconds = 0.0
         self.saved_at = 0
+        self.clock = SaveClock(settings.checkpoint.minutes)
         self.mode: str | None = None
         self.metrics = MetricsFile(run / "metrics.csv")
         self._scheduled = self.learner.schedule(0.0)
@@ -76,6 +78,7 @@ class Training:
                 self._train(signals, tracker)
                 self.mode = self.mode or self._better_mode()
                 self.save()
+                log.info("saved %d times, in %.2f %% of the time", self.clock.saves, 100.0 * self.clock.share())
             finally:
                 tracker.close()  # after the last save: a server may keep it waiting
             if signals.received:
@@ -101,7 +104,7 @@ class Training:
                     log.info(line(row, total))
                 if self.frames >= total:
                     break
-                if signals.received or self.frames - self.saved_at >= self.settings.checkpoint.interval:
+                if signals.received or self._is_regular(self.frames) or self.clock.is_due():
                     self.save()
                 if signals.received:
                     raise Stopped(signals.received, self.run)
@@ -169,10 +172,9 @@ class Training:
         return {name: terms[name].detach().mean() for name in wanted}
 
     def _evaluate(self, frames: int) -> float | None:
-        interval = self.settings.evaluation.interval
-        if not interval or self.frames // interval == (self.frames - frames) // interval:
-            return None
         plan = self.settings.evaluation
+        if not plan.interval or not passes(plan.interval, self.frames, frames):
+            return None
         env = self.settings.make_env(plan.episodes, plan.first_seed)
         return float(play(env, self.learner.policy, plan.first_seed)["saved"].mean())
 
@@ -188,20 +190,26 @@ class Training:
 
     def save(self) -> Path:
         """Write a checkpoint of everything."""
-        self.metrics.sync()
-        path = checkpoints.save(
-            self.run,
-            frames=self.frames,
-            scenario=self.settings.scenario,
-            signature=signature(self.env),
-            mode=self.mode,
-            record=self.record,
-            policy=self.learner.policy.state_dict(),
-            training=self.state_dict(),
-            keep=self.settings.checkpoint.keep,
-        )
+        with self.clock.timed():
+            self.metrics.sync()
+            path = checkpoints.save(
+                self.run,
+                frames=self.frames,
+                scenario=self.settings.scenario,
+                signature=signature(self.env),
+                mode=self.mode,
+                record=self.record,
+                policy=self.learner.policy.state_dict(),
+                training=self.state_dict(),
+                keep=self.settings.checkpoint.keep,
+                stays=self._is_regular,
+            )
         self.saved_at = self.frames
         return path
+
+    def _is_regular(self, frames: int) -> bool:
+        """Return whether a checkpoint of so many frames is one of the interval, whatever the clock does."""
+        return passes(self.settings.checkpoint.interval, frames, self.frames_per_batch)
 
     def start_from(self, found: checkpoints.Checkpoint) -> None:
         """Begin with another run's networks, and their value normalisation, and with nothing else of it.
