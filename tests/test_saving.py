@@ -7,7 +7,7 @@ import torch
 
 from tests.test_training import LAST, RUNS, TINIER, flattened, rows, tiny, without_times
 from warp_torchrl.checkpoint import newest
-from warp_torchrl.saving import FIRST, SHARE, SaveClock, passes
+from warp_torchrl.saving import SHARE, SaveClock, passes
 
 
 class Time:
@@ -23,7 +23,8 @@ class Time:
 def played(seconds, cost, minutes=2.0, step=1.0):
     """The moments of the saves of a run of so many seconds whose saves take ``cost(moment)``, and the clock."""
     time, moments = Time(), []
-    clock, start = SaveClock(minutes, time), time.seconds
+    start = time.seconds
+    clock = SaveClock(minutes, lambda: int(1e6 * cost(time.seconds - start)), time)  # a second for each megabyte
     while time.seconds - start < seconds:
         time.seconds += step
         if clock.is_due():
@@ -33,18 +34,14 @@ def played(seconds, cost, minutes=2.0, step=1.0):
     return moments, clock
 
 
-def test_the_first_save_is_soon_and_the_others_by_the_minutes():
+def test_the_first_save_comes_with_the_first_batch_and_the_others_by_the_minutes():
     moments, clock = played(600.0, cost=lambda moment: 0.05)
-    assert moments[0] == FIRST and len(moments) == clock.saves == 5
+    assert moments[0] == 1.0 and len(moments) == clock.saves == 5
     assert all(120.0 <= after - before < 122.0 for before, after in pairwise(moments))
 
 
 def test_a_clock_of_no_minutes_never_asks():
     assert played(10_000.0, cost=lambda moment: 0.0, minutes=0.0)[0] == []
-
-
-def test_less_than_the_first_wait_is_a_wait_too():
-    assert played(10.5, cost=lambda moment: 0.0, minutes=1 / 60)[0] == [float(each) for each in range(1, 12)]
 
 
 @pytest.mark.parametrize("took", [0.2, 3.0, 40.0])
@@ -54,10 +51,12 @@ def test_saves_take_a_hundredth_of_the_time_however_long_one_takes(took):
     assert all(after - before >= 99.0 * took - 10.0 for before, after in pairwise(moments))
 
 
-def test_saves_that_grow_with_a_replay_memory_are_waited_out():
-    """The memory is full after 400 s, and a save takes 8 s from then on: growth is paid for by later waits."""
+def test_a_save_of_a_memory_that_has_grown_is_foreseen():
+    """The memory is full after 400 s, and a save takes 8 s from then on: the second one waits for some 800 s."""
     moments, clock = played(20_000.0, cost=lambda moment: 8.0 * min(1.0, moment / 400.0))
-    assert moments[0] == FIRST and clock.share() <= SHARE and len(moments) > 15
+    assert moments[0] == 1.0 and 780.0 <= moments[1] <= 805.0
+    assert all(after - before >= 99.0 * 8.0 for before, after in pairwise(moments[1:]))
+    assert clock.share() <= SHARE and len(moments) > 20
 
 
 @pytest.mark.parametrize(("interval", "frames", "batch", "expected"), [
@@ -76,7 +75,7 @@ def test_saves_by_the_clock_change_nothing(tmp_path, name):
     never = tiny(tmp_path / "never", *own)
     never.train()
     often = tiny(tmp_path / "often", *own)
-    often.clock = SaveClock(1.0, time := Time())
+    often.clock = SaveClock(1.0, often._size, time := Time())
     learn = often._learn
 
     def slowly(batch):
@@ -103,7 +102,7 @@ def test_saves_by_the_clock_change_nothing(tmp_path, name):
 
 def test_the_interval_s_checkpoints_are_the_same_whatever_the_clock_does(tmp_path):
     run = tiny(tmp_path, *TINIER, "checkpoint.interval=32", "checkpoint.keep=4")
-    run.clock = SaveClock(1.0, time := Time())
+    run.clock = SaveClock(1.0, run._size, time := Time())
     learn = run._learn
 
     def slowly(batch):
@@ -113,3 +112,12 @@ def test_the_interval_s_checkpoints_are_the_same_whatever_the_clock_does(tmp_pat
     run._learn = slowly
     run.train()
     assert sorted(int(each.name) for each in (tmp_path / "checkpoints").iterdir()) == [32, 64, 80, 96]
+
+
+def test_what_a_save_writes_is_what_a_replay_memory_holds_and_not_its_room(tmp_path):
+    run = tiny(tmp_path, *TINIER, *RUNS["dqn"], "algorithm.capacity=4000")
+    run._learn(next(iter(run.collection)))
+    whole = run.learner.keeps["replay"].buffer._storage._storage
+    room = sum(each.nbytes for each in whole.values(True, True))
+    written = (run.save() / "training.pt").stat().st_size
+    assert 16 / 4000 * room < run._size() < written < 0.2 * room

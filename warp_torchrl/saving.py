@@ -4,8 +4,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-FIRST = 10.0
-"""Seconds after which the clock asks for its first save."""
 SHARE = 0.01
 """Of the run's time, what saves may take before the clock asks for another."""
 
@@ -18,26 +16,26 @@ def passes(interval: int, frames: int, batch: int) -> bool:
 class SaveClock:
     """Says when a run should save that has not saved for long.
 
-    The first save is due soon after the start, each later one ``minutes`` after the one before, but none until all
-    saves, and one more that takes as long as the last, fit into a hundredth of the time since the start: where a
-    replay memory makes saves slow they are rare. It draws no random number.
+    The first save is due at once, each later one ``minutes`` after the one before, but none until all saves, and one
+    more at the pace of the last, fit into a hundredth of the time since the start: where a replay memory makes saves
+    slow they are rare. It draws no random number.
 
     Args:
         minutes: Between saves; 0: none is ever due.
+        size: Tells what a save would write [bytes].
         now: Tells the time [s].
     """
 
-    def __init__(self, minutes: float, now: Callable[[], float] = time.monotonic) -> None:
-        self._interval, self._now = 60.0 * minutes, now
-        self.saves, self._spent, self._took = 0, 0.0, 0.0
+    def __init__(self, minutes: float, size: Callable[[], int], now: Callable[[], float] = time.monotonic) -> None:
+        self._interval, self._size, self._now = 60.0 * minutes, size, now
+        self.saves, self._spent, self._pace = 0, 0.0, 0.0
         self._start = self._last = now()
 
     def is_due(self) -> bool:
         """Return whether the run should save now."""
-        now = self._now()
-        wait = self._interval if self.saves else min(FIRST, self._interval)
-        is_cheap = self._spent + self._took <= SHARE * (now - self._start)
-        return self._interval > 0.0 and now - self._last >= wait and is_cheap
+        if not self._interval or (self.saves and self._now() - self._last < self._interval):
+            return False
+        return self._spent + self._pace * self._size() <= SHARE * (self._now() - self._start)
 
     @contextmanager
     def timed(self) -> Iterator[None]:
@@ -45,8 +43,8 @@ class SaveClock:
         before = self._now()
         yield
         self._last = self._now()
-        self._took = self._last - before
-        self._spent += self._took
+        self._pace = (self._last - before) / max(self._size(), 1)
+        self._spent += self._last - before
         self.saves += 1
 
     def share(self) -> float:

@@ -13,6 +13,7 @@ from torch import Tensor
 from tqdm import tqdm
 
 from warp_torchrl import checkpoint as checkpoints
+from warp_torchrl import disk
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.collectors import WorkerDied
 from warp_torchrl.config import Record
@@ -60,7 +61,7 @@ class Training:
         self.frames = 0
         self.seconds = 0.0
         self.saved_at = 0
-        self.clock = SaveClock(settings.checkpoint.minutes)
+        self.clock = SaveClock(settings.checkpoint.minutes, self._size)
         self.mode: str | None = None
         self.metrics = MetricsFile(run / "metrics.csv")
         self._scheduled = self.learner.schedule(0.0)
@@ -206,6 +207,10 @@ class Training:
             )
         self.saved_at = self.frames
         return path
+
+    def _size(self) -> int:
+        """Return the bytes of the tensors that a checkpoint holds."""
+        return disk.size(self.state_dict())
 
     def _is_regular(self, frames: int) -> bool:
         """Return whether a checkpoint of so many frames is one of the interval, whatever the clock does."""
