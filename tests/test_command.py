@@ -9,7 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
+import torch
 
+from tests.forgery import forge
 from warp_torchrl import checkpoint, load_policy, make_env
 from warp_torchrl import command as command_module
 from warp_torchrl.command import evaluate, train
@@ -108,10 +110,93 @@ def test_evaluate_takes_another_scenario_for_the_same_policy(trained, run_here):
     assert "single horizon=12: 3 fires" in said
 
 
-def test_a_policy_is_refused_where_it_does_not_fit(trained, run_here):
-    code, errors, _ = run_here("evaluate.py", f"checkpoint={trained[0]}", "observation.radius=4")
-    assert code == 2
-    assert "view [11, 11, 11]" in errors[-1] and "view [11, 9, 9]" in errors[-1]
+def contents(folder):
+    return {path.relative_to(folder): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+NOOP = ("policy=noop", "landscape.size=12", "horizon=4", "evaluation.episodes=2")
+
+
+def test_an_evaluation_never_writes_into_a_run_unless_told_to(trained, run_here, tmp_path):
+    shutil.copytree(trained[0], tmp_path / "run")
+    before = contents(tmp_path / "run")
+    code, errors, _ = run_here("evaluate.py", *NOOP, "hydra.run.dir=run")
+    assert code == 2 and len(errors) == 1
+    assert "hydra.run.dir: run holds a run: checkpoints, config.yaml, episode.gif and 3 more; take another" in errors[0]
+    assert "overwrite=true" in errors[0] and contents(tmp_path / "run") == before
+    code, errors, _ = run_here("evaluate.py", *NOOP, "hydra.run.dir=run", "overwrite=true")
+    assert code == 0, errors
+    after = contents(tmp_path / "run")
+    replaced = {str(path) for path, content in after.items() if before.get(path) != content}
+    assert replaced == {"evaluation.json", "episode.gif", "evaluate.log"}
+
+
+def test_an_evaluation_never_writes_over_another_nor_a_sweep_over_a_sweep(run_here, tmp_path):
+    (tmp_path / "seen").mkdir()
+    (tmp_path / "seen" / "evaluate.log").write_text("an earlier mistake\n")
+    for where, flags, held in (("hydra.run.dir=seen", (), "an evaluation: "), ("hydra.sweep.dir=sweep", ("-m",), "0")):
+        code, errors, _ = run_here("evaluate.py", *flags, *NOOP, where)
+        assert code == 0, errors
+        before = contents(tmp_path)
+        code, errors, _ = run_here("evaluate.py", *flags, *NOOP, where, "scenario=single")
+        assert code == 2 and len(errors) == 1 and f"{where.replace('=', ': ')} holds {held}" in errors[0]
+        assert contents(tmp_path) == before
+    code, errors, _ = run_here("evaluate.py", "-m", *NOOP, "hydra.sweep.dir=sweep", "overwrite=true", "scenario=single")
+    assert code == 0, errors
+    assert json.loads((tmp_path / "sweep" / "0" / "evaluation.json").read_text())["scenario"] == "single"
+
+
+def test_two_jobs_of_a_sweep_of_evaluations_do_not_share_a_folder(run_here, tmp_path):
+    what = (*NOOP, "scenario=skirmish,single", "hydra.sweep.dir=sweep", "hydra.sweep.subdir=one")
+    code, errors, _ = run_here("evaluate.py", "-m", *what)
+    assert code == 2 and "one holds an evaluation" in errors[-1]
+    assert json.loads((tmp_path / "sweep" / "one" / "evaluation.json").read_text())["scenario"] == "skirmish"
+
+
+def test_a_sweep_that_is_repeated_forgets_the_jobs_that_failed(run_here, tmp_path):
+    (tmp_path / "sweep" / "0").mkdir(parents=True)
+    failed = {"job": 0, "overrides": "", "code": 6, "reason": "the disk was full"}
+    (tmp_path / "sweep" / "0" / "failed.json").write_text(json.dumps(failed))
+    code, errors, _ = run_here("evaluate.py", "-m", *NOOP, "hydra.sweep.dir=sweep", "overwrite=true")
+    assert code == 0, errors
+    assert not (tmp_path / "sweep" / "0" / "failed.json").exists()
+
+
+def test_training_does_not_replace_an_evaluation(run_here, tmp_path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "evaluation.json").write_text("{}")
+    code, errors, _ = run_here("train.py", *TINY, "hydra.run.dir=run")
+    assert code == 2 and "run holds an evaluation" in errors[-1]
+    assert (tmp_path / "run" / "evaluation.json").read_text() == "{}"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "expected", "message"),
+    [
+        ("observation.radius=4", 2, "view [11, 9, 9] and 11"),
+        ("evaluation.episodes=0", 2, "evaluation.episodes must be"),
+        ("evaluation.first_seed=-1", 2, "evaluation.first_seed must be"),
+        ("device=cuda:99", 2, "device must be one of"),
+        ("landscape=raster", 2, "landscape.path must name"),
+        ("team.n_agents=70", 2, "team.n_agents must be"),
+        ("overwrite=maybe", 2, "overwrite must be true or false"),
+        ("other weights", 4, "is of another architecture"),
+        ("cut", 4, "policy.pt is missing or was cut"),
+    ],
+)
+def test_a_mistake_in_an_evaluation_leaves_no_folder(trained, run_here, tmp_path, wrong, expected, message):
+    shutil.copytree(trained[0] / "checkpoints" / "128", tmp_path / "checkpoints" / "128")
+    policy = tmp_path / "checkpoints" / "128" / "policy.pt"
+    if wrong == "other weights":
+        weights = torch.load(policy, weights_only=True)
+        torch.save(dict(list(weights.items())[1:]), policy)
+        forge(policy.parent)
+    elif wrong == "cut":
+        policy.write_bytes(policy.read_bytes()[:-1])
+    overrides = [wrong] if "=" in wrong else []
+    code, errors, _ = run_here("evaluate.py", "checkpoint=checkpoints/128", *overrides, "hydra.run.dir=seen")
+    assert code == expected and len(errors) == 1 and message in errors[0], errors
+    assert [each.name for each in tmp_path.iterdir()] == ["checkpoints"]
 
 
 def test_evaluate_takes_a_policy_by_name(tmp_path, run_here):

@@ -60,6 +60,17 @@ def assess(plan: Settings, folder: Path, found: checkpoints.Checkpoint | str, wo
     log.info("wrote evaluation.json and episode.gif into %s", folder)
 
 
+def check_assessment(plan: Settings, found: checkpoints.Checkpoint | str) -> None:
+    """Check that a checkpoint or a heuristic can be evaluated, before anything is made for it.
+
+    Raises:
+        CheckpointError: If its weights do not fit.
+        ConfigError: If it does not fit the environment.
+    """
+    one = plan.make_env(1, plan.evaluation.first_seed)
+    _actors(plan, found, one, one)
+
+
 def _actors(
     plan: Settings, found: checkpoints.Checkpoint | str, env: WildfireEnv, one: WildfireEnv
 ) -> tuple[str, str, TensorDictModuleBase, TensorDictModuleBase]:

@@ -15,23 +15,25 @@ from omegaconf import DictConfig, OmegaConf
 from warp_torchrl import checkpoint as checkpoints
 from warp_torchrl import disk
 from warp_torchrl.allocation import keep_freed_memory
-from warp_torchrl.assessment import assess
+from warp_torchrl.assessment import assess, check_assessment
 from warp_torchrl.config import (
     Record,
     compose_config,
     conf_folder,
     is_sweep,
+    output_folder,
     plain,
     recompose,
     without_targets,
     world_overrides,
 )
 from warp_torchrl.construction import ConfigError
+from warp_torchrl.destination import check_free
 from warp_torchrl.failure import fail
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.settings import COMPONENTS, settings
 from warp_torchrl.signals import Stopped, obeyed
-from warp_torchrl.sweep import SweepSummary, jobs, note_failure
+from warp_torchrl.sweep import SweepSummary, forget_failure, jobs, note_failure
 from warp_torchrl.training import Training
 from warp_torchrl.transfer import check_start
 
@@ -71,6 +73,8 @@ def _train_job(config: DictConfig) -> None:
 def _start(folder: Path, config: DictConfig) -> None:
     if checkpoints.holds_any(folder):
         raise ConfigError(f"hydra.run.dir: {folder} holds a run already; go on with resume={folder}, or take another")
+    if (folder / "evaluation.json").exists():
+        raise ConfigError(f"hydra.run.dir: {folder} holds an evaluation, which training would replace; take another")
     disk.replace(folder / "config.yaml", OmegaConf.to_yaml(config, resolve=True))
     record = Record(choices=_choices(), values=_values(config))
     training = Training(settings(plain(config)), record, folder)
@@ -109,13 +113,14 @@ def _newest(path: str | Path) -> checkpoints.Checkpoint:
 
 def _evaluate_job(config: DictConfig) -> None:
     folder = Path(HydraConfig.get().runtime.output_dir)
+    if not config.overwrite:
+        check_free(folder, "hydra.run.dir")  # once more: a sweep may have named two jobs' folders alike
     given, name = config.checkpoint, config.policy
     if given is None:
         assess(settings(_without_checkpoint(config)), folder, name, world_overrides(plain(config)))
         return
     found = _newest(given)
-    overrides = [each for each in HydraConfig.get().overrides.task if not each.startswith(("checkpoint=", "policy="))]
-    values = plain(recompose(found.record(), overrides))
+    values = plain(recompose(found.record(), _without_own(HydraConfig.get().overrides.task)))
     assess(settings(values), folder, found, world_overrides(values))
 
 
@@ -129,6 +134,11 @@ def _choices() -> dict[str, str]:
 
 def _values(config: DictConfig) -> dict[str, Any]:
     return {key: value for key, value in without_targets(plain(config)).items() if key not in _NOT_RECORDED}
+
+
+def _without_own(overrides: Sequence[str]) -> list[str]:
+    """Return the overrides of an evaluation that are a run's too."""
+    return [each for each in overrides if not each.startswith(("checkpoint=", "policy=", "overwrite="))]
 
 
 def _without_checkpoint(config: DictConfig) -> dict[str, Any]:
@@ -160,6 +170,7 @@ def _start_hydra(name: str, job: Callable[[DictConfig], None], arguments: list[s
 
     def guarded(config: DictConfig) -> None:
         try:
+            forget_failure()
             job(config)
         except Exception as error:
             code, line = fail(error, debug)
@@ -177,12 +188,18 @@ def _check_first(name: str, arguments: Sequence[str]) -> None:
     if any(flag not in _MULTIRUN for flag in flags):
         return  # Hydra's own flags (--help, --cfg, --config-dir ...) are Hydra's business
     own = [each for each in overrides if not each.startswith("hydra")]
-    for job in jobs(own) if flags or is_sweep(name, own) else [own]:
+    sweeps = bool(flags) or is_sweep(name, own)
+    listed = jobs(own) if sweeps else [own]
+    for job in listed:
         config = compose_config(name, job)
         if name == "train":
             _check_training(config, job)
         else:
             _check_evaluation(config, job)
+    if name == "evaluate" and not config.overwrite:
+        of_hydra = [each for each in overrides if each.startswith("hydra")]
+        key = "hydra.sweep.dir" if sweeps else "hydra.run.dir"
+        check_free(output_folder(name, [*listed[0], *of_hydra], sweeps), key)
 
 
 def _check_training(config: DictConfig, overrides: Sequence[str]) -> None:
@@ -207,11 +224,13 @@ def _check_evaluation(config: DictConfig, overrides: Sequence[str]) -> None:
         raise ConfigError("give either checkpoint=PATH or policy=NAME")
     if config.policy is not None and config.policy not in HEURISTICS:
         raise ConfigError(f"policy must be one of {', '.join(HEURISTICS)}, got {config.policy}")
+    if not isinstance(config.overwrite, bool):
+        raise ConfigError(f"overwrite must be true or false, got {config.overwrite!r}")
     if config.checkpoint is None:
-        settings(_without_checkpoint(config))
+        check_assessment(settings(_without_checkpoint(config)), config.policy)
         return
     found, _ = checkpoints.newest(Path(str(config.checkpoint)))
-    settings(plain(recompose(found.record(), [each for each in overrides if not each.startswith("checkpoint=")])))
+    check_assessment(settings(plain(recompose(found.record(), _without_own(overrides)))), found)
 
 
 def _with_run_folder(arguments: Sequence[str]) -> list[str]:

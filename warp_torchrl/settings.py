@@ -32,7 +32,7 @@ ENVIRONMENT = COMPONENTS[: COMPONENTS.index("reward") + 1]
 """Those that make an environment."""
 WORLD_KEYS = ("scenario", "landscape", "wind", "fire", "team", "ignition", "steps_per_tick", "horizon", "cell_size")
 """What a scenario sets."""
-COMMAND_KEYS = ("resume", "start_from", "debug", "policy")
+COMMAND_KEYS = ("resume", "start_from", "debug", "policy", "overwrite")
 """What the commands read themselves."""
 
 
@@ -42,7 +42,7 @@ class CheckpointPlan:
 
     Attributes:
         interval: Frames between checkpoints.
-        minutes: Between checkpoints by the clock, see ``warp_torchrl.saving.SaveClock``; 0: none.
+        minutes: Between checkpoints by the clock, as ``SaveClock`` has it; 0: none.
         keep: Checkpoints that stay: the newest two, and of the others those of the interval.
 
     Raises:

@@ -66,6 +66,11 @@ def note_failure(code: int, reason: str) -> None:
     (folder / FAILURE).write_text(json.dumps(asdict(failure)), encoding="utf-8")
 
 
+def forget_failure() -> None:
+    """Drop the word of a failure that an earlier sweep left in the job's folder."""
+    (Path(HydraConfig.get().runtime.output_dir) / FAILURE).unlink(missing_ok=True)
+
+
 def failures(folder: Path) -> list[Failure]:
     """Return the jobs of a sweep's folder that failed, in their order."""
     found = [Failure(**json.loads(path.read_text(encoding="utf-8"))) for path in folder.glob(f"*/{FAILURE}")]
