@@ -215,6 +215,90 @@ def test_a_finished_run_resumes_to_nothing_and_exits_0(trained, run_here):
     assert (run / "metrics.csv").read_bytes() == before
 
 
+def weights_and_numbers(run):
+    """What a run has learnt, and its rows but for the times."""
+    rows = [row.split(",")[3:] for row in (run / "metrics.csv").read_text().splitlines()]
+    return checkpoint.newest(run)[0].policy(), rows
+
+
+CONSTANT = ("algorithm.learning_rate_end=1.0", "algorithm.entropy_coeff_end=0.005")
+
+
+def test_a_finished_run_is_trained_longer_and_goes_on_to_the_new_total(run_here, tmp_path, monkeypatch):
+    """Killed on the way and in the evaluation; where nothing changes over a training it equals one that never ended."""
+    own = (*SHORT[:-1], *CONSTANT)
+    for total, name in ((64, "run"), (128, "whole")):
+        code, errors, _ = run_here("train.py", *own, f"total_frames={total}", f"hydra.run.dir={name}")
+        assert code == 0, errors
+    run, first = tmp_path / "run", (tmp_path / "run" / "evaluation.json").read_bytes()
+    with monkeypatch.context() as patched:
+        patched.setattr(Training, "_learn", signalled(Training._learn, signal.SIGTERM))
+        code, *_ = run_here("train.py", "resume=run", "total_frames=128")
+    assert code == 128 + signal.SIGTERM and checkpoint.newest(run)[0].manifest.frames == 96
+    assert "total_frames was 64 and is 128: " in (run / "train.log").read_text()
+    with monkeypatch.context() as patched:
+        patched.setattr(command_module, "assess", signalled(command_module.assess, signal.SIGTERM))
+        code, *_ = run_here("train.py", "resume=run")
+    assert code == 128 + signal.SIGTERM and checkpoint.newest(run)[0].manifest.frames == 128
+    assert (run / "evaluation.json").read_bytes() == first, "it is replaced by the next one alone"
+    code, errors, _ = run_here("train.py", "resume=run")
+    assert code == 0, errors
+    ours, theirs = weights_and_numbers(run), weights_and_numbers(tmp_path / "whole")
+    assert ours[1] == theirs[1] and len(ours[1]) == 5
+    assert all(torch.equal(ours[0][name], value) for name, value in theirs[0].items())
+    ours, theirs = (json.loads((tmp_path / name / "evaluation.json").read_text()) for name in ("run", "whole"))
+    assert ours["episodes"] == theirs["episodes"] and ours["frames"] == 128
+    before = contents(run)
+    assert run_here("train.py", "resume=run")[0] == 0
+    assert {name for name, content in contents(run).items() if before[name] != content} == {Path("train.log")}
+
+
+def test_a_run_that_was_stopped_goes_on_to_a_new_total_even_if_killed_at_once(run_here, tmp_path, monkeypatch):
+    with monkeypatch.context() as patched:
+        patched.setattr(Training, "_learn", signalled(Training._learn, signal.SIGTERM))
+        run_here("train.py", *SHORT)
+    with monkeypatch.context() as patched:
+        patched.setattr(Training, "train", lambda training: None)  # dies before it saves anything
+        patched.setattr(command_module, "assess", lambda *args: sys.exit(9))
+        assert run_here("train.py", "resume=run", "total_frames=96")[0] == 9
+    code, errors, _ = run_here("train.py", "resume=run")
+    assert code == 0, errors
+    found = checkpoint.newest(tmp_path / "run")[0]
+    assert found.manifest.frames == 96 and found.record().values["total_frames"] == 96
+
+
+@pytest.mark.parametrize("total", [128, 100, 0, "many"])
+def test_a_total_that_was_reached_is_refused_in_one_line(trained, run_here, tmp_path, total):
+    shutil.copytree(trained[0], tmp_path / "run")
+    before = contents(tmp_path / "run")
+    code, errors, _ = run_here("train.py", "resume=run", f"total_frames={total}")
+    assert code == 2 and len(errors) == 1 and "total_frames must be " in errors[0]
+    assert contents(tmp_path / "run") == before
+    assert total not in (128, 100) or f"more than the 128 that run has had, got {total}" in errors[0]
+
+
+def test_an_edited_configuration_is_told_and_not_ignored(trained, run_here, tmp_path):
+    shutil.copytree(trained[0], tmp_path / "run")
+    path = tmp_path / "run" / "config.yaml"
+    text = path.read_text()
+    path.write_text(text.replace("gamma: 0.99", "gamma: 0.9"))
+    before = contents(tmp_path / "run")
+    code, errors, _ = run_here("train.py", "resume=run")
+    assert code == 2 and len(errors) == 1 and contents(tmp_path / "run") == before
+    assert (
+        "run/config.yaml is not what the checkpoint was trained with: algorithm.gamma is 0.9 and was 0.99, "
+        in errors[0]
+    )
+    assert "start_from=run" in errors[0]
+    path.write_text("# what was best\n\n" + text.replace("gamma: 0.99", "gamma:   99.0e-2  # as ever"))
+    code, errors, _ = run_here("train.py", "resume=run")
+    assert code == 0, errors
+    path.write_text(text.replace("total_frames: 128", "total_frames: 160"))
+    code, errors, _ = run_here("train.py", "resume=run")
+    assert code == 0, errors
+    assert checkpoint.newest(tmp_path / "run")[0].manifest.frames == 160, "the total may change"
+
+
 def test_a_run_folder_is_not_trained_into_twice(trained, run_here):
     run, _ = trained
     before = (run / "metrics.csv").read_bytes()

@@ -31,6 +31,7 @@ from warp_torchrl.construction import ConfigError
 from warp_torchrl.destination import check_free
 from warp_torchrl.failure import fail
 from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.resumption import resumption
 from warp_torchrl.settings import COMPONENTS, settings
 from warp_torchrl.signals import Stopped, obeyed
 from warp_torchrl.sweep import SweepSummary, forget_failure, jobs, note_failure
@@ -63,7 +64,7 @@ def _train_job(config: DictConfig) -> None:
     lock = checkpoints.RunFolderLock(folder)
     try:
         if resumed:
-            _resume(folder)
+            _resume(folder, _new_total(config, HydraConfig.get().overrides.task))
         else:
             _start(folder, config)
     finally:
@@ -83,16 +84,20 @@ def _start(folder: Path, config: DictConfig) -> None:
     _finish(training, world_overrides(plain(config)))
 
 
-def _resume(folder: Path) -> None:
-    found = _newest(folder)
-    if found.manifest.mode is not None and (folder / "evaluation.json").exists():
-        log.info("%s is finished", folder)
+def _resume(folder: Path, total_frames: Any) -> None:
+    run = resumption(folder, total_frames)
+    _say_skipped(run.skipped)
+    if run.is_finished:
+        log.info("%s is finished; total_frames=MORE trains it longer", folder)
         return
-    values = plain(recompose(found.record()))
-    training = Training(settings(values), found.record(), folder)
-    training.load_state_dict(found.training())
-    log.info("resumed %s at %d frames", found.path, training.frames)
-    _finish(training, world_overrides(values))
+    training = Training(run.settings, run.record, folder)
+    training.load_state_dict(run.found.training())
+    log.info("resumed %s at %d frames", run.found.path, training.frames)
+    if run.settings.total_frames != run.total_before:
+        # Now and not with the next checkpoint: a run that is killed before it goes on to the new total too.
+        disk.replace(folder / "config.yaml", OmegaConf.to_yaml(recompose(run.record), resolve=True))
+        training.tell_new_total(run.total_before)
+    _finish(training, world_overrides(run.values))
 
 
 def _finish(training: Training, worlds: Sequence[str]) -> None:
@@ -106,9 +111,13 @@ def _finish(training: Training, worlds: Sequence[str]) -> None:
 def _newest(path: str | Path) -> checkpoints.Checkpoint:
     """Return the newest sound checkpoint, and say which were skipped."""
     found, skipped = checkpoints.newest(path)
+    _say_skipped(skipped)
+    return found
+
+
+def _say_skipped(skipped: Sequence[str]) -> None:
     for line in skipped:
         log.warning("skipped: %s", line)
-    return found
 
 
 def _evaluate_job(config: DictConfig) -> None:
@@ -209,14 +218,21 @@ def _check_training(config: DictConfig, overrides: Sequence[str]) -> None:
         if config.start_from is not None:
             check_start(plan, checkpoints.newest(config.start_from)[0])
         return
-    others = [each for each in overrides if each.split("=")[0] not in ("resume", "debug")]
+    others = [each for each in overrides if each.split("=")[0] not in ("resume", "debug", "total_frames")]
     if others:
-        raise ConfigError(f"resume goes on with the folder's own configuration; leave out {', '.join(others)}")
+        raise ConfigError(
+            f"resume goes on with the folder's own configuration, of which total_frames alone may change; leave out "
+            f"{', '.join(others)}"
+        )
     folder = Path(str(config.resume))
     if (folder / checkpoints.MANIFEST).exists():
         raise ConfigError(f"resume must be a run folder, got one of its checkpoints: {folder}")
-    found, _ = checkpoints.newest(folder)
-    settings(plain(recompose(found.record()))).check_training()
+    resumption(folder, _new_total(config, overrides)).settings.check_training()
+
+
+def _new_total(config: DictConfig, overrides: Sequence[str]) -> Any:
+    """Return the total that a resumed run is to go on to, None where none is asked for."""
+    return config.total_frames if any(each.startswith("total_frames=") for each in overrides) else None
 
 
 def _check_evaluation(config: DictConfig, overrides: Sequence[str]) -> None:

@@ -154,6 +154,21 @@ class Training:
         """Set what changes with progress; the columns that it gives belong to the next row."""
         self._scheduled = self.learner.schedule(min(1.0, self.frames / self.settings.total_frames))
 
+    def tell_new_total(self, before: int) -> None:
+        """Log what goes another way from here on than in a training of another length.
+
+        Args:
+            before: The ``total_frames`` that this training had.
+        """
+        old, total = self.learner.schedule(min(1.0, self.frames / before)), self.settings.total_frames
+        self._schedule()
+        changed = {name: (old[name], value) for name, value in self._scheduled.items() if value != old[name]}
+        columns = ", ".join(f"{name} {was:.3g} -> {now:.3g}" for name, (was, now) in changed.items())
+        log.info(
+            "total_frames was %d and is %d: what changes over a training goes on as at %.1f %% of the new total%s",
+            before, total, 100.0 * self.frames / total, f", {columns}" if columns else "",
+        )  # fmt: skip
+
     def _update(self, sample: TensorDictBase) -> dict[str, Tensor]:
         """Take one optimiser step and return the loss's terms; nothing is read back from the device but finiteness."""
         learner = self.learner

@@ -104,6 +104,7 @@ INVALID = [
     "-m seed=0,1 n_worlds=0",
     "resume=/no/such/run",
     "resume=. seed=3",
+    "resume=. ++total_frames=3",
     "policy=greedy",
     "fire._target_=builtins.eval",
     "reward._target_=warp_torchrl.world.fire.Fire2",
