@@ -1,12 +1,15 @@
 """The environment as TorchRL and its users see it."""
 
+import copy
+
 import pytest
 import torch
 from tensordict import TensorDict
+from torchrl.envs import EnvCreator, ParallelEnv, SerialEnv
 from torchrl.envs.utils import check_env_specs
 
 from tests.conftest import small_world
-from warp_torchrl import WildfireEnv
+from warp_torchrl import WildfireEnv, make_env
 from warp_torchrl.observation import Local, Paper, Surroundings
 from warp_torchrl.reward import Efficiency
 from warp_torchrl.world.fire import Fire
@@ -150,6 +153,47 @@ def test_load_state_dict_changes_nothing_when_it_does_not_fit(make_small_env):
     with pytest.raises(ValueError, match="must be"):
         env.load_state_dict(bigger.state_dict())
     assert (env.world_state.cells == before).all() and len(env.state_dict()["seeds"]) == 2
+
+
+def test_load_state_dict_asks_for_every_entry_unless_it_is_not_strict(make_small_env):
+    env, other = make_small_env(2, seed=7), make_small_env(2, seed=1)
+    other.reset()
+    cells = other.world_state.cells.clone()
+    part = {"seeds": env.state_dict()["seeds"]}
+    with pytest.raises(ValueError, match="state_dict must have episodes, episode_reward, worlds, got seeds"):
+        other.load_state_dict(part)
+    assert other.seeds.tolist() == [1, 2]
+    other.load_state_dict(part, strict=False)
+    assert other.seeds.tolist() == [7, 8] and (other.world_state.cells == cells).all()
+    assert other.state_dict()["episodes"].tolist() == [1, 1]
+
+
+def test_without_a_seed_copies_differ_and_go_on_from_what_they_drew(make_small_env):
+    env = make_small_env(2, seed=None)
+    copied = copy.deepcopy(env)
+    one, other = env.reset()["state"], copied.reset()["state"]
+    assert (one != other).any() and env.seeds.min() >= 2**31 and env.seeds.diff() == 1
+    again = make_small_env(2, seeds=env.seeds.tolist())
+    assert (again.reset()["state"] == one).all() and (again.reset()["state"] == env.reset()["state"]).all()
+
+
+@pytest.mark.parametrize("seed", [0, None])
+def test_torchrl_s_creator_takes_a_function(seed):
+    worlds = SerialEnv(2, EnvCreator(lambda: make_env("skirmish", n_worlds=2, seed=seed)))
+    first = worlds.rollout(3)["state"][:, :, 0]
+    assert first.shape == (2, 2, 8, 16, 16) and (first[0] == first[1]).all() == (seed is not None)
+    worlds.set_seed(5)
+    first = worlds.reset()["state"]
+    assert (first[0] != first[1]).any(), "TorchRL gives each a seed of its own"
+    worlds.load_state_dict(worlds.state_dict())
+
+
+@pytest.mark.slow
+def test_torchrl_s_parallel_environments_take_a_function():
+    worlds = ParallelEnv(2, lambda: make_env("skirmish", n_worlds=2))
+    assert worlds.rollout(3)["agents", "action"].shape == (2, 2, 3, 2)
+    worlds.load_state_dict(worlds.state_dict())
+    worlds.close()
 
 
 def test_set_state_goes_on_from_given_worlds(make_small_env):

@@ -4,6 +4,7 @@ import pytest
 import torch
 
 from tests.conftest import small_world
+from warp_torchrl.env import WildfireEnv
 from warp_torchrl.observation import (
     CHANNELS,
     STATE,
@@ -18,6 +19,7 @@ from warp_torchrl.observation import (
     window,
 )
 from warp_torchrl.world.array import Array
+from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.wind import Uniform
 
@@ -43,6 +45,23 @@ def test_a_window_is_the_square_about_the_agent_and_zero_off_the_map():
     seen = window(torch.tensor([[[0, 0], [4, 3]]]), (5, 5), 1).of(plane)
     assert seen[0, 0].tolist() == [[0, 0, 0], [0, 1, 2], [0, 6, 7]]
     assert seen[0, 1].tolist() == [[18, 19, 20], [23, 24, 25], [0, 0, 0]]
+
+
+@pytest.mark.parametrize("observation", [Surroundings(), Surroundings(centred=True, identity=True), Paper()])
+def test_what_is_seen_stays_within_its_space_and_reaches_its_bounds(observation):
+    steep = Perlin(size=12, relief=900.0)
+    world = small_world(landscape=steep, team=Team(n_agents=6, roles=("ugv", "uav")), horizon=60)
+    env = WildfireEnv(world, observation=observation, n_worlds=4)
+    seen = env.rollout(120, break_when_any_done=False)["agents", "observation"]
+    named = {"": seen} if isinstance(seen, torch.Tensor) else dict(seen.items())
+    for name, space in observation.spaces(world).items():
+        low, high = space.bounds()
+        assert low.dtype == high.dtype == named[name].dtype and low.shape == high.shape == space.shape
+        assert (named[name] >= low).all() and (named[name] <= high).all(), name
+        if name == "view":
+            highest = dict(zip(CHANNELS, named[name].amax((0, 1, 2, 4, 5)).tolist()))
+            assert [highest[each] for each in ("off_map", "fire_stage", "ash")] == [255, 255, 255]
+            assert highest["age"] == 250 and highest["relative_elevation"] == 255
 
 
 def test_windows_of_many_worlds_equal_slices():

@@ -19,7 +19,7 @@ def make_env(
     *,
     n_worlds: int = 64,
     device: torch.device | str = "cpu",
-    seed: int = 0,
+    seed: int | None = 0,
     seeds: Sequence[int] | None = None,
     overrides: Sequence[str] = (),
     validate: bool | None = None,
@@ -31,7 +31,7 @@ def make_env(
         scenario: One of ``conf/scenario``.
         n_worlds: B.
         device: Where the worlds live.
-        seed: World i draws with ``seed + i``.
+        seed: World i draws with ``seed + i``; None draws a seed when it is first needed, so that copies differ.
         seeds: Seeds of the worlds one by one, in place of ``seed``.
         overrides: In the command line's grammar, ``["fire=paper", "team.n_agents=3"]``.
         validate: Check actions on CUDA too.

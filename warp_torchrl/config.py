@@ -20,7 +20,7 @@ from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from warp_torchrl.construction import ConfigError
+from warp_torchrl.construction import ConfigError, UnknownKeyError
 from warp_torchrl.settings import COMPONENTS, WORLD_KEYS
 
 OmegaConf.register_new_resolver("pid", os.getpid, replace=True)
@@ -82,7 +82,7 @@ def _compose(name: str, overrides: Sequence[str], with_hydra: bool = False) -> D
         folder = conf_folder()
         return deepcopy(_composed(folder, _last_change(folder), name, tuple(overrides), with_hydra))
     except (HydraException, OmegaConfBaseException) as error:
-        raise ConfigError(_one_line(error)) from None
+        raise _told(error) from None
     except ValueError as error:
         raise ConfigError(f"{_one_line(error)}, in {' '.join(overrides)}") from None
 
@@ -99,11 +99,17 @@ def _last_change(folder: Path) -> int:
     return max(path.stat().st_mtime_ns for path in (folder, *folder.glob("**/*")))
 
 
+def _told(error: Exception) -> ConfigError:
+    """Return Hydra's error as ours."""
+    unknown = re.match(r"Could not override '([^']*)'", str(error))
+    if unknown is None:
+        return ConfigError(_one_line(error))
+    key = unknown[1]
+    return UnknownKeyError(f"{key} is not a key of the configuration; conf/ and --cfg job show what there is", key)
+
+
 def _one_line(error: Exception) -> str:
     """Return Hydra's message in one line, with the options where it lists them."""
-    unknown = re.match(r"Could not override '([^']*)'", str(error))
-    if unknown:
-        return f"{unknown[1]} is not a key of the configuration; conf/ and --cfg job show what there is"
     missing = re.search(
         r"Could not find '(\w+)/([^']*)'.*Available options in '\w+':(.*)Config search path", str(error), re.S
     )

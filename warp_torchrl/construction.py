@@ -15,6 +15,19 @@ class ConfigError(ValueError):
     """A mistake in the configuration, told in one line with key, value and rule."""
 
 
+class UnknownKeyError(ConfigError):
+    """A key that the configuration does not have.
+
+    Args:
+        message: One line.
+        key: As it was given.
+    """
+
+    def __init__(self, message: str, key: str = "") -> None:
+        super().__init__(message)
+        self.key = key
+
+
 def build(node: object, where: str) -> Any:
     """Build the component that a configuration node describes.
 

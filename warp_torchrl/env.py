@@ -1,6 +1,8 @@
 """The environment: joins world, observation, reward and metrics to TorchRL. It has no physics of its own."""
 
-from collections.abc import Callable, Sequence
+import secrets
+from collections import OrderedDict
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import torch
@@ -32,7 +34,7 @@ class WildfireEnv(EnvBase):
         observation: What agents see.
         reward: What they earn.
         n_worlds: B.
-        seed: Seed of world 0.
+        seed: Seed of world 0; None draws one when it is first needed, so that copies made before differ.
         seeds: Seeds of all worlds, in place of ``seed``.
         device: Where the worlds live.
         validate: Check on every device that actions are in range, which costs a synchronisation on CUDA; by default
@@ -53,7 +55,7 @@ class WildfireEnv(EnvBase):
         observation: Observation | None = None,
         reward: Reward | None = None,
         n_worlds: int = 1,
-        seed: int = 0,
+        seed: int | None = 0,
         seeds: Sequence[int] | None = None,
         device: torch.device | str = "cpu",
         validate: bool | None = None,
@@ -78,7 +80,12 @@ class WildfireEnv(EnvBase):
         self.watcher: Callable[[Transition], None] | None = None
         """Is shown every step's transition, for those who study behaviour."""
         self._episode_reward = torch.zeros(n_worlds, device=self.device)
-        self.set_seeds(range(seed, seed + n_worlds) if seeds is None else seeds)
+        self._seeds: Tensor | None = None
+        self._episodes = torch.zeros(n_worlds, dtype=torch.int64, device=self.device)
+        if seeds is not None:
+            self.set_seeds(seeds)
+        elif seed is not None:
+            self.set_seeds(range(seed, seed + n_worlds))
         specs = make_specs(self.world, self.observation, n_worlds, self.device)
         self.observation_spec, self.action_spec = specs.observation, specs.action
         self.reward_spec, self.done_spec = specs.reward, specs.done
@@ -89,6 +96,14 @@ class WildfireEnv(EnvBase):
     def n_agents(self) -> int:
         """Return A."""
         return self.world.team.n_agents
+
+    @property
+    def seeds(self) -> Tensor:
+        """Return each world's seed, int64 [B]; where none was given, they are drawn now."""
+        if self._seeds is None:
+            first = 2**31 + secrets.randbelow(2**31)  # the seeds below are for training and evaluation
+            self._seeds = torch.arange(first, first + self.batch_size[0], device=self.device)
+        return self._seeds
 
     @property
     def world_state(self) -> WorldState:
@@ -120,7 +135,7 @@ class WildfireEnv(EnvBase):
         if not all(0 <= seed < 2**62 for seed in seeds):
             raise ValueError(f"seed must be in 0..2**62, got {min(seeds)}..{max(seeds)}")
         self._seeds = torch.tensor(list(seeds), dtype=torch.int64, device=self.device)
-        self._episodes = torch.full_like(self._seeds, first_episode)
+        self._episodes = torch.full_like(self._episodes, first_episode)
         self._starts.forget()
 
     def set_state(self, state: WorldState) -> TensorDictBase:
@@ -138,31 +153,40 @@ class WildfireEnv(EnvBase):
         self._episode_reward.zero_()
         return self._observe(self._state)
 
-    def state_dict(self, *args: object, **kwargs: object) -> dict[str, Any]:
+    def state_dict(self, *args: object, **kwargs: object) -> OrderedDict[str, Any]:
         """Return all that changes in the environment: seeds, episodes, worlds, returns."""
         worlds = {} if self._state is None else self._state.leaves()
-        return {
-            "seeds": self._seeds.clone(),
-            "episodes": self._episodes.clone(),
-            "episode_reward": self._episode_reward.clone(),
-            "worlds": {name: value.clone() for name, value in worlds.items()},
-        }
+        return OrderedDict(  # as a module's is: TorchRL's EnvCreator looks into these alone
+            seeds=self.seeds.clone(),
+            episodes=self._episodes.clone(),
+            episode_reward=self._episode_reward.clone(),
+            worlds=OrderedDict((name, value.clone()) for name, value in worlds.items()),
+        )
 
-    def load_state_dict(self, state_dict: dict[str, Any], *args: object, **kwargs: object) -> None:
+    def load_state_dict(self, state_dict: Mapping[str, Any], strict: bool = True, **kwargs: object) -> None:
         """Restore what ``state_dict`` returned, all or nothing.
+
+        Args:
+            state_dict: Entries by name.
+            strict: Whether all must be there; else what is missing stays as it is.
 
         Raises:
             ValueError: If an entry is missing or of another shape or type.
         """
+        missing = [name for name in ("seeds", "episodes", "episode_reward", "worlds") if name not in state_dict]
+        if missing and strict:
+            raise ValueError(f"state_dict must have {', '.join(missing)}, got {', '.join(state_dict) or 'nothing'}")
+        if missing:
+            state_dict = {**self.state_dict(), **state_dict}
         worlds = state_dict["worlds"]
         state = None
         if worlds:
-            template = self.world.reset(self._seeds, self._episodes)
+            template = self.world.reset(self.seeds, self._episodes)
             state = _fill(template, worlds)
             state = self.world.fire.in_wind(state, state.wind)  # another version's may be in another order
         for name in ("seeds", "episodes", "episode_reward"):
-            if state_dict[name].shape != self._seeds.shape:
-                raise ValueError(f"{name} must have shape {list(self._seeds.shape)}, got {state_dict[name].shape}")
+            if state_dict[name].shape != self.batch_size:
+                raise ValueError(f"{name} must have shape {list(self.batch_size)}, got {state_dict[name].shape}")
         self._seeds = state_dict["seeds"].to(self.device).clone()
         self._episodes = state_dict["episodes"].to(self.device).clone()
         self._episode_reward = state_dict["episode_reward"].to(self.device).clone()
@@ -175,7 +199,7 @@ class WildfireEnv(EnvBase):
         mask = None if tensordict is None else tensordict.get("_reset", None)
         if mask is None or self._state is None or mask.all():
             self._starts.forget()
-            self._state = self.world.reset(self._seeds, self._episodes)
+            self._state = self.world.reset(self.seeds, self._episodes)
             self._episodes = self._episodes + 1
             self._episode_reward = torch.zeros_like(self._episode_reward)
             return self._observe(self._state)
@@ -205,7 +229,7 @@ class WildfireEnv(EnvBase):
 
     def _start_again(self, index: Tensor) -> TensorDict:
         """Start the next episode of some worlds, and return what is observed in them."""
-        self.world_state[index], seen = self._starts.take(index, self._seeds, self._episodes)
+        self.world_state[index], seen = self._starts.take(index, self.seeds, self._episodes)
         self._episodes = self._episodes.index_add(0, index, torch.ones_like(index))
         self._episode_reward = self._episode_reward.index_fill(0, index, 0.0)
         return seen

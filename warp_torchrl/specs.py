@@ -30,7 +30,8 @@ def make_specs(world: World, observation: Observation, n_worlds: int, device: to
     n_actions = world.team.n_actions
 
     def entry(space: Space) -> Bounded:
-        return Bounded(space.low, space.high, shape=(*team, *space.shape), dtype=space.dtype, device=device)
+        low, high = (bound.expand(*team, *space.shape).clone() for bound in space.bounds())
+        return Bounded(low, high, dtype=space.dtype, device=device)
 
     def of_team(**entries: object) -> Composite:
         return Composite(agents=Composite(**entries, shape=team, device=device), shape=batch, device=device)

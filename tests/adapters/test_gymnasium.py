@@ -8,6 +8,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 from warp_torchrl.adapters import FireExtinguishingEnv, FireExtinguishingVectorEnv, gym_env
+from warp_torchrl.construction import ConfigError
 
 STAY = 10
 BURNS_OUT = {"steps_per_tick": 1, "horizon": 12, "landscape.size": 8, "ignition.head_start": 0}
@@ -46,7 +47,7 @@ def test_without_a_seed_each_has_its_own_world():
     assert (views[0] != views[1]).any()
 
 
-@pytest.mark.parametrize("action", [11, -1, 0.0, "3", True, np.zeros(1, int)])
+@pytest.mark.parametrize("action", [11, -1, 0.0, "3", True, np.zeros(1), np.zeros(2, int), np.zeros((1, 1), int)])
 def test_bad_actions_are_refused_in_one_line(single, action):
     with pytest.raises(ValueError, match="action must be") as error:
         single.step(action)
@@ -58,6 +59,40 @@ def single():
     env = gym_env()
     env.reset()
     return env
+
+
+def test_an_action_may_stand_in_an_array():
+    rewards = []
+    for action in (8, np.int64(8), np.array(8), np.array([8], np.int32)):
+        env = gym_env(seed=3)
+        env.reset()
+        rewards.append(env.step(action)[1])
+    assert len(set(rewards)) == 1
+
+
+def test_an_unknown_keyword_is_a_type_error_as_of_any_function():
+    with pytest.raises(TypeError, match="unexpected keyword argument 'frameskip'") as error:
+        gym_env(frameskip=1)
+    assert isinstance(error.value, ConfigError) and "\n" not in str(error.value)
+    with pytest.raises(ConfigError, match="frameskip is not a key") as error:
+        gym_env(overrides=["frameskip=1"])
+    assert not isinstance(error.value, TypeError), "this is a text, and no keyword"
+    with pytest.raises(ConfigError, match="horizon") as error:
+        gym_env(horizon=-1)
+    assert not isinstance(error.value, TypeError)
+
+
+def test_what_is_seen_lies_within_its_space_through_episodes():
+    env = gym_env("single", overrides=["observation.centred=true"], **BURNS_OUT)
+    env.action_space.seed(0)
+    for _ in range(3):
+        seen, _ = env.reset()
+        ended = False
+        while not ended:
+            assert seen in env.observation_space
+            seen, _, terminated, truncated, _ = env.step(env.action_space.sample(seen["action_mask"]))
+            ended = terminated or truncated
+        assert seen in env.observation_space
 
 
 def test_stepping_a_finished_world_or_one_never_started_is_refused():
@@ -88,8 +123,12 @@ def test_gymnasium_makes_a_batch_by_name():
     env.close()
 
 
-def test_worlds_start_anew_exactly_as_in_gymnasium_s_own_vector():
-    ours, theirs = vector(3, **BURNS_OUT), SyncVectorEnv([lambda: gym_env(**BURNS_OUT)] * 3)
+@pytest.mark.parametrize("observation", ["surroundings", "paper"])
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+def test_worlds_start_anew_exactly_as_in_gymnasium_s_own_vector(mode, observation):
+    options = {**BURNS_OUT, "observation": observation}
+    ours = vector(3, autoreset_mode=mode, **options)
+    theirs = SyncVectorEnv([lambda: gym_env(**options)] * 3, autoreset_mode=mode)
     assert theirs.metadata["autoreset_mode"] is ours.metadata["autoreset_mode"]
     assert ours.observation_space == theirs.observation_space and ours.action_space == theirs.action_space
     assert same(ours.reset(seed=7), theirs.reset(seed=7))
@@ -104,6 +143,16 @@ def test_worlds_start_anew_exactly_as_in_gymnasium_s_own_vector():
 
 def same(ours, theirs):
     return all(data_equivalence(one, other, exact=True) for one, other in zip(ours, theirs, strict=True))
+
+
+def test_gymnasium_makes_a_batch_that_starts_anew_in_the_same_step():
+    batch = {"num_envs": 2, "vectorization_mode": "vector_entry_point"}
+    env = gymnasium.make_vec("Wildfire-v0", **batch, horizon=1, autoreset_mode="SameStep")
+    env.reset(seed=0)
+    *_, truncated, infos = env.step(np.full(2, STAY))
+    assert truncated.all() and infos["episode_length"].tolist() == [0.0, 0.0]
+    assert infos["final_info"]["episode_length"].tolist() == [1.0, 1.0] and infos["_final_obs"].all()
+    assert FireExtinguishingVectorEnv.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
 
 
 def test_an_episode_s_end_by_hand():
@@ -172,6 +221,10 @@ def test_bad_options_of_a_batch_are_refused(batch):
         vector(2.0)
     with pytest.raises(ValueError, match="render_mode must be None or rgb_array"):
         vector(2, render_mode="human")
+    with pytest.raises(ValueError, match="autoreset_mode must be NextStep or SameStep, got 'Disabled'"):
+        vector(2, autoreset_mode=AutoresetMode.DISABLED)
+    with pytest.raises(ValueError, match="autoreset_mode must be"):
+        vector(2, autoreset_mode="Sometimes")
     with pytest.raises(ValueError, match="reset_mask"):
         batch.reset(options={"reset_mask": np.array([True, False, False])})
     with pytest.raises(RuntimeError, match=r"call reset\(\) first"):

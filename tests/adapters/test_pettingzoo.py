@@ -8,10 +8,13 @@ from itertools import count
 from types import SimpleNamespace
 
 import numpy as np
+import pettingzoo as zoo
 import pytest
+from gymnasium import spaces
 from pettingzoo import ParallelEnv
 from pettingzoo.test import api_test, max_cycles_test, parallel_api_test, parallel_seed_test, performance_benchmark
 
+from warp_torchrl import make_env
 from warp_torchrl.adapters import FireExtinguishingEnvParallel, parallel_env, pettingzoo
 
 STAY = 10
@@ -60,6 +63,34 @@ def test_it_is_the_paper_s_class_with_the_paper_s_names():
 
 
 @pytest.mark.parametrize("observation", ["surroundings", "local", "paper"])
+def test_the_flat_layout_is_one_vector_beside_the_mask(observation):
+    named, flat = (small(observation=observation, layout=layout) for layout in ("dict", "flat"))
+    (seen, infos), (vectors, others) = named.reset(seed=3), flat.reset(seed=3)
+    for _ in range(3):
+        one, vector, space = seen["bulldozer_1"], vectors["bulldozer_1"], flat.observation_space("bulldozer_1")
+        mask = infos["bulldozer_1"]["action_mask"] if observation == "paper" else one["action_mask"]
+        assert vector in space and list(vector) == ["observation", "action_mask"] and isinstance(space, spaces.Dict)
+        assert vector["observation"].ndim == 1 and vector["observation"].dtype == np.float32
+        assert (vector["action_mask"] == mask).all() and "action_mask" not in others["bulldozer_1"]
+        if observation == "surroundings":
+            joined = np.concatenate([one["picture"].ravel(), one["self"], one["view"].ravel() / np.float32(255)])
+            assert (vector["observation"] == joined).all() and space["observation"].high.max() == 3.0
+        seen, _, _, _, infos = named.step(idle(named))
+        vectors, _, _, _, others = flat.step(idle(flat))
+
+
+@pytest.mark.filterwarnings("error::UserWarning")
+@pytest.mark.parametrize("kind", ["parallel", "aec"])
+def test_pettingzoo_makes_it_by_name(kind):
+    if not hasattr(zoo, "make"):
+        pytest.skip("this PettingZoo has no registry")
+    env = zoo.make(kind, "Wildfire-v0", scenario="skirmish", max_cycles=3)
+    assert isinstance(env, ParallelEnv if kind == "parallel" else zoo.AECEnv)
+    env.reset(seed=0)
+    assert zoo.spec(kind, "Wildfire").id == "Wildfire-v0"
+
+
+@pytest.mark.parametrize("observation", ["surroundings", "local", "paper"])
 def test_observations_state_and_infos_are_as_their_spaces_say(observation):
     env = small(observation=observation)
     seen, infos = env.reset()
@@ -87,11 +118,35 @@ def test_a_seed_starts_at_episode_0_and_no_seed_goes_on():
     assert (first == again).all() and (second == next_one).all() and (first != second).any()
 
 
-def test_without_a_seed_copies_differ():
-    one = small(seed=None)
-    other = copy.deepcopy(one)
+COPIES = {
+    "again": lambda env: small(),
+    "deepcopy": copy.deepcopy,
+    "pickle": lambda env: pickle.loads(pickle.dumps(env)),
+    "cloudpickle": lambda env: pickle.loads(pytest.importorskip("cloudpickle").dumps(env)),
+}
+
+
+@pytest.mark.parametrize("way", COPIES)
+def test_without_a_seed_copies_differ(way):
+    one = small()
+    other = COPIES[way](one)
     one.reset(), other.reset()
     assert (one.state() != other.state()).any()
+    one.reset(seed=3), other.reset(seed=3)
+    assert (one.state() == other.state()).all()
+
+
+def test_a_given_seed_is_the_documented_world():
+    env, theirs = small(seed=5), make_env("skirmish", n_worlds=1, seed=5)
+    env.reset()
+    assert (env.state() == theirs.reset()["state"][0].numpy()).all()
+
+
+def test_numpy_s_generator_follows_the_seed():
+    env, other = small(), small()
+    env.reset(seed=3), other.reset(seed=3)
+    assert env.np_random.integers(2**60) == other.np_random.integers(2**60)
+    assert small().np_random.integers(2**60) != small().np_random.integers(2**60)
 
 
 def test_it_can_be_sent_to_another_process():
@@ -120,7 +175,7 @@ def test_the_team_ends_together_and_is_then_empty():
         ({"bulldozer_0": 1.0, "bulldozer_1": 0}, r"action of bulldozer_0 must be a whole number, got 1\.0 \(float\)"),
         ({"bulldozer_0": True, "bulldozer_1": 0}, "must be a whole number, got True"),
         ({"bulldozer_0": None, "bulldozer_1": 0}, "must be a whole number, got None"),
-        ({"bulldozer_0": np.zeros(1, int), "bulldozer_1": 0}, "must be a whole number"),
+        ({"bulldozer_0": np.zeros(2, int), "bulldozer_1": 0}, "must be a whole number"),
         ({"bulldozer_0": 0}, r"one of each of \['bulldozer_0', 'bulldozer_1'\], got \['bulldozer_0'\]"),
         ({"bulldozer_0": 0, "bulldozer_1": 0, "uav_0": 0}, r"got \['bulldozer_0', 'bulldozer_1', 'uav_0'\]"),
         ([0, 0], "actions must be a dict .* got list"),
@@ -142,6 +197,7 @@ def skirmish():
 
 def test_whole_numbers_of_numpy_are_actions(skirmish):
     skirmish.step({"bulldozer_0": np.int32(STAY), "bulldozer_1": np.array(STAY)})
+    skirmish.step({"bulldozer_0": np.array([STAY]), "bulldozer_1": np.array([STAY], np.int8)})
 
 
 def test_stepping_a_finished_world_or_one_never_started_is_refused():
@@ -162,7 +218,8 @@ def test_stepping_a_finished_world_or_one_never_started_is_refused():
         ({"horizons": 5}, "horizons"),
         ({"seed": 1.5}, "seed must be a whole number, got 1.5"),
         ({"seed": -1}, "seed must be in"),
-        ({"render_mode": "ansi"}, "render_mode must be None, human or rgb_array, got 'ansi'"),
+        ({"render_mode": "ansi"}, "render_mode must be None or human or rgb_array, got 'ansi'"),
+        ({"layout": "list"}, "layout must be dict or flat, got 'list'"),
         ({"team": object()}, "team must be a text, a number or a list, got object"),
         ({"team": {"n_agents": 3}}, "team must be a text, a number or a list, got dict"),
     ],

@@ -1,7 +1,8 @@
 """The environment in other tools' clothes: PettingZoo and Gymnasium views of one ``WildfireEnv``, without physics."""
 
-from warp_torchrl.adapters.gymnasium import FireExtinguishingEnv, FireExtinguishingVectorEnv, gym_env
+from warp_torchrl.adapters.gymnasium import FireExtinguishingEnv, gym_env
 from warp_torchrl.adapters.pettingzoo import FireExtinguishingEnvParallel, parallel_env
+from warp_torchrl.adapters.vector import FireExtinguishingVectorEnv
 
 __all__ = [
     "FireExtinguishingEnv",

@@ -6,12 +6,14 @@ from typing import Any, ClassVar
 import numpy as np
 import torch
 from gymnasium import spaces
+from gymnasium.utils import seeding
 from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
-from warp_torchrl.adapters.screen import FRAMES_PER_SECOND, RENDER_MODES, Screen
-from warp_torchrl.adapters.worlds import Seen, Worlds, action_number, observation_space, state_space
+from warp_torchrl.adapters.screen import FRAMES_PER_SECOND, Screen
+from warp_torchrl.adapters.worlds import Seen, Worlds, action_number
 
+RENDER_MODES = ("human", "rgb_array")
 Observation = np.ndarray | dict[str, np.ndarray]
 
 
@@ -25,8 +27,11 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
 
     Args:
         scenario: One of ``conf/scenario``.
-        seed: Of the world; None draws one at the first reset, such as for copies that shall differ.
-        render_mode: ``rgb_array``, or ``human`` for a window, which follows every step.
+        seed: Of the world; None draws one at the first reset, so that copies made before differ.
+        render_mode: ``rgb_array``; or ``human``, which follows every step: a window where there are a display and
+            pygame, else pictures in the terminal.
+        layout: ``dict``; or ``flat``, in every preset ``observation``, one float32 vector, beside ``action_mask``: the
+            entries in the order of their names, bytes divided by 255.
         device: Where the world lives; observations come back as numpy.
         max_cycles: Steps to an episode, ``horizon``; None leaves the scenario's.
         overrides: In the command line's grammar, ``["fire=paper", "team.n_agents=3"]``.
@@ -40,9 +45,8 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
         state_space: Of ``state()``.
 
     Raises:
-        ConfigError: A ``ValueError``, with key, value and rule.
-        ValueError: If the render mode is unknown or the seed is no whole number in 0..2**62.
-        RuntimeError: If a window is asked for where there is no display or no matplotlib.
+        ConfigError: A ``ValueError``, with key, value and rule; a ``TypeError`` too where a name is no key.
+        ValueError: If the render mode or the layout is unknown or the seed is no whole number in 0..2**62.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
@@ -56,23 +60,27 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
         self,
         scenario: str = "default",
         *,
-        seed: int | None = 0,
+        seed: int | None = None,
         render_mode: str | None = None,
+        layout: str = "dict",
         device: torch.device | str = "cpu",
         max_cycles: int | None = None,
         overrides: Sequence[str] = (),
         **more: object,
     ) -> None:
         more = more if max_cycles is None else {**more, "horizon": max_cycles}
-        self._worlds = Worlds(scenario, n_worlds=1, seed=seed, device=device, overrides=overrides, more=more)
+        self._worlds = Worlds(
+            scenario, n_worlds=1, seed=seed, layout=layout, device=device, overrides=overrides, more=more
+        )
         self.render_mode = render_mode
-        self._screen = Screen(self._worlds.picture, render_mode, f"{scenario} (warp_torchrl)")
+        self._screen = Screen(self._worlds.picture, render_mode, RENDER_MODES, f"{scenario} (warp_torchrl)")
         env = self._worlds.env
         self.possible_agents = list(env.agent_names)
         self.agents: list[str] = []
-        self.observation_spaces = {name: observation_space(env) for name in self.possible_agents}
+        self.observation_spaces = {name: self._worlds.observation_space for name in self.possible_agents}
         self.action_spaces = {name: spaces.Discrete(self._worlds.n_actions) for name in self.possible_agents}
-        self.state_space = state_space(env)
+        self.state_space = self._worlds.state_space
+        self._np_random: np.random.Generator | None = None
 
     def observation_space(self, agent: str) -> spaces.Box | spaces.Dict:
         """Return the space of an agent's observations, always the same object."""
@@ -81,6 +89,13 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
     def action_space(self, agent: str) -> spaces.Discrete:
         """Return the space of an agent's actions, always the same object."""
         return self.action_spaces[agent]
+
+    @property
+    def np_random(self) -> np.random.Generator:
+        """Return numpy's generator, which the worlds do not draw from: SuperSuit asks for it by this name."""
+        if self._np_random is None:
+            self._np_random, _ = seeding.np_random()
+        return self._np_random
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -98,6 +113,8 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
             ValueError: If the seed is no whole number in 0..2**62.
         """
         now = self._worlds.reset(seed)
+        if seed is not None:
+            self._np_random, _ = seeding.np_random(int(seed))
         self.agents = list(self.possible_agents)
         self._screen.refresh()
         return self._by_agent(now)
@@ -132,7 +149,7 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
         return self._worlds.state()[0]
 
     def render(self) -> np.ndarray | None:
-        """Return the picture, uint8 [H * s, W * s, 3], in mode ``rgb_array``; show it in mode ``human``."""
+        """Return the picture, uint8 [H * s, W * s, 3], in mode ``rgb_array``; show it to people in mode ``human``."""
         return self._screen.render()
 
     def close(self) -> None:

@@ -1,13 +1,25 @@
-"""Where pictures of a world go: an array, or a window."""
+"""Where pictures of a world go: an array, a window, or the terminal."""
 
-from collections.abc import Callable
+import shutil
+import sys
+from collections.abc import Callable, Sequence
 from importlib.util import find_spec
+from typing import Any, Protocol
 
 import numpy as np
 from gymnasium import logger
 
-RENDER_MODES = ("human", "rgb_array")
 FRAMES_PER_SECOND = 8
+
+
+class Viewer(Protocol):
+    """Shows pictures to people."""
+
+    def show(self, frame: np.ndarray) -> None:
+        """Show a picture, uint8 [H, W, 3]."""
+
+    def close(self) -> None:
+        """Take the picture away."""
 
 
 class Screen:
@@ -15,76 +27,108 @@ class Screen:
 
     Args:
         draw: Returns the picture, uint8 [H, W, 3].
-        render_mode: ``human``, a window; ``rgb_array``, an array; or None, nothing.
+        render_mode: ``human``, for people: a window, or the terminal where there is no display or no pygame;
+            ``rgb_array``, an array; or None, nothing.
+        modes: Those that there are.
         title: Of the window.
 
     Raises:
-        ValueError: If the mode is unknown.
-        RuntimeError: If a window is asked for where there is no display or no matplotlib.
+        ValueError: If the mode is none of them.
     """
 
-    def __init__(self, draw: Callable[[], np.ndarray], render_mode: str | None, title: str) -> None:
-        if render_mode not in (None, *RENDER_MODES):
-            raise ValueError(f"render_mode must be None, {' or '.join(RENDER_MODES)}, got {render_mode!r}")
+    def __init__(
+        self, draw: Callable[[], np.ndarray], render_mode: str | None, modes: Sequence[str], title: str
+    ) -> None:
+        if render_mode not in (None, *modes):
+            raise ValueError(f"render_mode must be {' or '.join(['None', *modes])}, got {render_mode!r}")
         self._draw, self._mode = draw, render_mode
-        self._window = Window(title) if render_mode == "human" else None
+        self._viewer = viewer(title) if render_mode == "human" else None
 
     def refresh(self) -> None:
-        """Show the world as it is now, where there is a window."""
-        if self._window is not None:
-            self._window.show(self._draw())
+        """Show people the world as it is now."""
+        if self._viewer is not None:
+            self._viewer.show(self._draw())
 
     def render(self) -> np.ndarray | None:
-        """Return the picture, uint8 [H, W, 3], in mode ``rgb_array``."""
+        """Return the picture, uint8 [H, W, 3], in mode ``rgb_array``; show it to people in mode ``human``."""
         if self._mode is None:
-            logger.warn("render() shows nothing: make the environment with render_mode='rgb_array' or 'human'")
+            logger.warn("render() shows nothing: make the environment with a render_mode")
         self.refresh()
         return self._draw() if self._mode == "rgb_array" else None
 
     def close(self) -> None:
         """Close the window."""
-        if self._window is not None:
-            self._window.close()
+        if self._viewer is not None:
+            self._viewer.close()
+
+
+def viewer(title: str) -> Viewer:
+    """Return pygame's window where there is a display, else the terminal."""
+    if find_spec("pygame") is None:
+        return Terminal()
+    import pygame
+
+    try:
+        pygame.display.init()
+    except pygame.error:
+        return Terminal()
+    # Without a display pygame draws where nobody looks.
+    return Terminal() if pygame.display.get_driver() == "offscreen" else Window(pygame, title)
 
 
 class Window:
-    """A window of matplotlib's.
+    """A window of pygame's.
 
     Args:
+        pygame: The module, whose display is ready.
         title: Of the window.
-
-    Raises:
-        RuntimeError: If there is no display or no matplotlib.
     """
 
-    def __init__(self, title: str) -> None:
-        if find_spec("matplotlib") is None:
-            raise RuntimeError("render_mode 'human' needs matplotlib, which is not installed; 'rgb_array' does not")
-        from matplotlib import pyplot
-
-        self._pyplot = pyplot
-        try:
-            self._figure = pyplot.figure(title, frameon=False)
-        except ImportError as error:  # a viewer is asked for by name, and has no display
-            raise RuntimeError(f"render_mode 'human' needs a display; 'rgb_array' does not: {error}") from None
-        if self._figure.canvas.required_interactive_framework is None:
-            self.close()
-            raise RuntimeError(
-                f"render_mode 'human' needs a display and a viewer, got matplotlib's {pyplot.get_backend()}; "
-                "'rgb_array' needs none"
-            )
-        axes = self._figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        axes.set_axis_off()
-        self._image = axes.imshow(np.zeros((1, 1, 3), np.uint8))
-        self._figure.show()
+    def __init__(self, pygame: Any, title: str) -> None:
+        self._pygame, self._clock = pygame, pygame.time.Clock()
+        pygame.display.set_caption(title)
 
     def show(self, frame: np.ndarray) -> None:
-        """Show a picture, uint8 [H, W, 3]."""
-        self._image.set_data(frame)
-        self._image.set_extent((0.0, frame.shape[1], frame.shape[0], 0.0))
-        self._figure.canvas.draw_idle()
-        self._figure.canvas.flush_events()
+        """Show a picture, uint8 [H, W, 3], for as long as one lasts."""
+        pygame, size = self._pygame, frame.shape[1::-1]
+        surface = pygame.display.get_surface()
+        if surface is None or surface.get_size() != size:
+            surface = pygame.display.set_mode(size)
+        surface.blit(pygame.surfarray.make_surface(frame.swapaxes(0, 1)), (0, 0))
+        pygame.event.pump()
+        pygame.display.flip()
+        self._clock.tick(FRAMES_PER_SECOND)
 
     def close(self) -> None:
         """Close the window."""
-        self._pyplot.close(self._figure)
+        self._pygame.display.quit()
+
+
+class Terminal:
+    """Pictures as text on standard output: each over the one before on a terminal, else one below the other."""
+
+    def show(self, frame: np.ndarray) -> None:
+        """Show a picture, uint8 [H, W, 3], as large as the terminal allows."""
+        columns, lines = shutil.get_terminal_size()
+        start = "\x1b[H\x1b[2J" if sys.stdout.isatty() else ""
+        print(start + as_text(frame, columns, lines - 1), flush=True)
+
+    def close(self) -> None:
+        """Leave the last picture where it is."""
+
+
+def as_text(frame: np.ndarray, columns: int, lines: int) -> str:
+    """Return a picture as coloured half blocks, two of its squares to a character.
+
+    Args:
+        frame: uint8 [H, W, 3].
+        columns: Of the text, at most.
+        lines: Of the text, at most.
+    """
+    height, width = frame.shape[:2]
+    side = max(-(-width // columns), -(-height // (2 * lines)))
+    down, across = height // (2 * side), width // side
+    squares = frame[: down * 2 * side, : across * side].reshape(down, 2, side, across, side, 3)
+    pairs = squares.mean((2, 4)).astype(np.uint8).swapaxes(1, 2).reshape(down, across, 6)
+    block = "\x1b[38;2;{};{};{}m\x1b[48;2;{};{};{}m▀"
+    return "\n".join("".join(block.format(*pair) for pair in row) + "\x1b[0m" for row in pairs)

@@ -14,6 +14,8 @@ from warp_torchrl.world.world import World
 
 PICTURE = ("fire", "fuel", "team_mates")
 """Channels of ``picture``."""
+CENTRED_HIGHS = (255, 255, 252)
+"""Largest number in each of them, where the picture is centred."""
 PICTURE_SIDE = 8
 STATE = ("fire", "fuel", "front", "threat", "ugv", "uav", "elevation", "clock_and_wind")
 """Channels of the critic's ``state``: ``front`` is what fire is expected to ignite in a tick, ``threat`` the chance of

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from warp_torchrl.observation.coarse import PICTURE, PICTURE_SIDE, centred_picture, picture
+from warp_torchrl.observation.coarse import CENTRED_HIGHS, PICTURE, PICTURE_SIDE, centred_picture, picture
 from warp_torchrl.observation.own import IDENTITY_SIZE, SELF_SIZE, identity, own_vector
-from warp_torchrl.observation.view import CHANNELS, ages, egocentric_view, stages, window
+from warp_torchrl.observation.view import CHANNEL_HIGHS, CHANNELS, ages, egocentric_view, stages, window
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.world import World
@@ -23,7 +23,13 @@ class Space(NamedTuple):
     shape: tuple[int, ...]
     dtype: torch.dtype
     low: float
-    high: float
+    high: float | tuple[float, ...]  # of all numbers, or one for each channel
+
+    def bounds(self) -> tuple[Tensor, Tensor]:
+        """Return the least and the largest value of each number, both of the entry's shape and type."""
+        low, high = torch.full(self.shape, self.low, dtype=self.dtype), torch.tensor(self.high, dtype=self.dtype)
+        per_channel = high.view(-1, *[1] * (len(self.shape) - 1)) if high.ndim else high
+        return low, per_channel.expand(self.shape).contiguous()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +59,7 @@ class Local:
         """Return the space of each entry."""
         side = 2 * self.radius + 1
         return {
-            "view": Space((len(CHANNELS), side, side), torch.uint8, 0, 255),
+            "view": Space((len(CHANNELS), side, side), torch.uint8, 0, CHANNEL_HIGHS),
             "self": Space((SELF_SIZE + IDENTITY_SIZE * self.identity,), torch.float32, -3.0, 3.0),
         }
 
@@ -85,7 +91,8 @@ class Surroundings(Local):
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
         side = 2 * PICTURE_SIDE - 1 if self.centred else PICTURE_SIDE
-        dtype, high = (torch.uint8, 255) if self.centred else (torch.float32, 1.0)
+        dtype = torch.uint8 if self.centred else torch.float32
+        high: float | tuple[float, ...] = CENTRED_HIGHS if self.centred else 1.0
         return {**super().spaces(world), "picture": Space((len(PICTURE), side, side), dtype, 0, high)}
 
     def __call__(self, state: WorldState, world: World) -> dict[str, Tensor]:

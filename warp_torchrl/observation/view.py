@@ -29,6 +29,8 @@ CHANNELS = (
     "other_uav",
 )
 """Channels of ``view``."""
+CHANNEL_HIGHS = (255, 255, 250, 255, 255, 255, 250, 255, 255, 252, 252)
+"""Largest number in each of them: ages and wet ticks end at 10 times 25, other agents at 4 times 63."""
 ELEVATION_SCALE = 100.0
 """Difference in height that an observation shows as 1 [m]."""
 
