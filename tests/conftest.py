@@ -1,6 +1,7 @@
 """Small worlds that the tests of the upper floors share."""
 
 import os
+from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # the tests run side by side; read when torch is imported
 
@@ -13,6 +14,41 @@ from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.wind import Uniform
 from warp_torchrl.world.world import World
+
+TESTS = Path(__file__).parent
+QUICK = (
+    "algorithms/test_ppo.py",
+    "reward/test_base.py",
+    "reward/test_paper.py",
+    "test_api.py",
+    "test_architecture.py",
+    "test_checkpoint.py",
+    "test_conf.py",
+    "test_env.py",
+    "test_golden.py",
+    "test_metrics.py",
+    "test_observation.py",
+    "test_statistics.py",
+    "world/test_batch.py",
+    "world/test_burn.py",
+    "world/test_fire.py",
+    "world/test_ignition.py",
+    "world/test_landscape.py",
+    "world/test_laws.py",
+    "world/test_random.py",
+    "world/test_team.py",
+    "world/test_wind.py",
+    "world/test_world.py",
+)
+"""The files of ``pytest -m quick``: the laws of the world, the environment and its specs, configuration, one learner,
+checkpoints there and back, and who may import whom. Of a minute on two free cores they may take a half."""
+
+
+def pytest_collection_modifyitems(items):
+    for item in items:
+        takes_long = item.get_closest_marker("slow") or item.get_closest_marker("stress")
+        if item.path.relative_to(TESTS).as_posix() in QUICK and not takes_long:
+            item.add_marker(pytest.mark.quick)
 
 
 def small_world(**changes):

@@ -19,7 +19,7 @@ ACTIONS = tuple(f"action_{code}" for code in range(11))
 SIGNATURE = Signature({"view": Entry((3, 5, 5), "uint8")}, Entry((9, 16, 16), "float32"), 2, ACTIONS, 2)
 
 
-def saved(run, frames, keep=3):
+def saved(run, frames, keep=3, **options):
     return checkpoints.save(
         run,
         frames=frames,
@@ -30,6 +30,7 @@ def saved(run, frames, keep=3):
         policy={"weight": torch.arange(4.0)},
         training={"frames": frames, "random": torch.get_rng_state()},
         keep=keep,
+        **options,
     )
 
 
@@ -47,6 +48,13 @@ def test_the_newest_is_found_by_number_and_old_ones_go(tmp_path):
     assert newest(tmp_path)[0].manifest.frames == 99_999
     assert sorted(int(each.name) for each in (tmp_path / "checkpoints").iterdir()) == [900, 1000, 99_999]
     assert newest(tmp_path / "checkpoints" / "900")[0].manifest.frames == 900
+
+
+def test_what_is_not_to_stay_goes_when_two_newer_ones_are_safe(tmp_path):
+    for frames in (100, 130, 200, 210, 220, 300, 310, 320, 330):
+        saved(tmp_path, frames, keep=4, stays=lambda each: each % 100 == 0)
+        assert len(list((tmp_path / "checkpoints").iterdir())) <= 4
+    assert sorted(int(each.name) for each in (tmp_path / "checkpoints").iterdir()) == [200, 300, 320, 330]
 
 
 @pytest.mark.parametrize("name", ["policy.pt", "training.pt", "config.json", "manifest.json"])

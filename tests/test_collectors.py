@@ -12,6 +12,7 @@ from warp_torchrl.checkpoint import newest
 from warp_torchrl.collectors import Process, WorkerDied
 from warp_torchrl.config import Record, compose_config, plain
 from warp_torchrl.construction import ConfigError
+from warp_torchrl.seeds import first_world_seed
 from warp_torchrl.settings import settings
 from warp_torchrl.training import Training
 
@@ -47,7 +48,7 @@ def first_batches(folder: Path, *overrides: str) -> list:
 
 @pytest.fixture(scope="module")
 def here(tmp_path_factory):
-    return first_batches(tmp_path_factory.mktemp("here"), "collector=direct", "seed=3")
+    return first_batches(tmp_path_factory.mktemp("here"), "collector=direct", "seed=1234")
 
 
 def check_like(here, elsewhere):
@@ -63,13 +64,13 @@ def check_like(here, elsewhere):
 
 
 def test_processes_play_the_same_worlds(tmp_path, here):
-    check_like(here, first_batches(tmp_path, "collector=process", "seed=3"))
+    check_like(here, first_batches(tmp_path, "collector=process", "seed=1234"))
 
 
 @pytest.mark.slow
 def test_ray_plays_the_same_worlds(tmp_path, here):
     pytest.importorskip("ray", reason="Ray is not installed")
-    check_like(here, first_batches(tmp_path, "collector=ray", "seed=3"))
+    check_like(here, first_batches(tmp_path, "collector=ray", "seed=1234"))
 
 
 def test_a_worker_that_dies_is_named_and_what_was_learnt_is_saved(tmp_path):
@@ -91,15 +92,15 @@ def test_a_worker_that_dies_is_named_and_what_was_learnt_is_saved(tmp_path):
 
 
 def test_a_resumed_run_meets_new_fires(tmp_path, here):
-    run = training(tmp_path, "collector=process", "collector.workers=1", "seed=3")
+    run = training(tmp_path, "collector=process", "collector.workers=1", "seed=1234")
     run.collection.load_state_dict({"played": 12})
     try:
         batch = next(iter(run.collection))
     finally:
         run.close()
     assert not torch.equal(batch["state"][:, 0], here[0]["state"][:, 0])
-    env = run.settings.make_env(4, 3 * 4096)
-    env.set_seeds(range(3 * 4096, 3 * 4096 + 4), first_episode=12)
+    env = run.settings.make_env(4, first_world_seed(1234))
+    env.set_seeds(range(first_world_seed(1234), first_world_seed(1234) + 4), first_episode=12)
     assert torch.equal(env.reset()["state"], batch["state"][:, 0])
 
 

@@ -9,7 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
+import torch
 
+from tests.forgery import forge
 from warp_torchrl import checkpoint, load_policy, make_env
 from warp_torchrl import command as command_module
 from warp_torchrl.command import evaluate, train
@@ -23,6 +25,7 @@ TINY = [
     "collector.steps=8",
     "total_frames=128",
     "checkpoint.interval=32",
+    "checkpoint.minutes=0",
     "evaluation.episodes=6",
     "algorithm.minibatch_size=16",
     "model.actor_hidden=[16]",
@@ -107,10 +110,93 @@ def test_evaluate_takes_another_scenario_for_the_same_policy(trained, run_here):
     assert "single horizon=12: 3 fires" in said
 
 
-def test_a_policy_is_refused_where_it_does_not_fit(trained, run_here):
-    code, errors, _ = run_here("evaluate.py", f"checkpoint={trained[0]}", "observation.radius=4")
-    assert code == 2
-    assert "view [11, 11, 11]" in errors[-1] and "view [11, 9, 9]" in errors[-1]
+def contents(folder):
+    return {path.relative_to(folder): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+NOOP = ("policy=noop", "landscape.size=12", "horizon=4", "evaluation.episodes=2")
+
+
+def test_an_evaluation_never_writes_into_a_run_unless_told_to(trained, run_here, tmp_path):
+    shutil.copytree(trained[0], tmp_path / "run")
+    before = contents(tmp_path / "run")
+    code, errors, _ = run_here("evaluate.py", *NOOP, "hydra.run.dir=run")
+    assert code == 2 and len(errors) == 1
+    assert "hydra.run.dir: run holds a run: checkpoints, config.yaml, episode.gif and 3 more; take another" in errors[0]
+    assert "overwrite=true" in errors[0] and contents(tmp_path / "run") == before
+    code, errors, _ = run_here("evaluate.py", *NOOP, "hydra.run.dir=run", "overwrite=true")
+    assert code == 0, errors
+    after = contents(tmp_path / "run")
+    replaced = {str(path) for path, content in after.items() if before.get(path) != content}
+    assert replaced == {"evaluation.json", "episode.gif", "evaluate.log"}
+
+
+def test_an_evaluation_never_writes_over_another_nor_a_sweep_over_a_sweep(run_here, tmp_path):
+    (tmp_path / "seen").mkdir()
+    (tmp_path / "seen" / "evaluate.log").write_text("an earlier mistake\n")
+    for where, flags, held in (("hydra.run.dir=seen", (), "an evaluation: "), ("hydra.sweep.dir=sweep", ("-m",), "0")):
+        code, errors, _ = run_here("evaluate.py", *flags, *NOOP, where)
+        assert code == 0, errors
+        before = contents(tmp_path)
+        code, errors, _ = run_here("evaluate.py", *flags, *NOOP, where, "scenario=single")
+        assert code == 2 and len(errors) == 1 and f"{where.replace('=', ': ')} holds {held}" in errors[0]
+        assert contents(tmp_path) == before
+    code, errors, _ = run_here("evaluate.py", "-m", *NOOP, "hydra.sweep.dir=sweep", "overwrite=true", "scenario=single")
+    assert code == 0, errors
+    assert json.loads((tmp_path / "sweep" / "0" / "evaluation.json").read_text())["scenario"] == "single"
+
+
+def test_two_jobs_of_a_sweep_of_evaluations_do_not_share_a_folder(run_here, tmp_path):
+    what = (*NOOP, "scenario=skirmish,single", "hydra.sweep.dir=sweep", "hydra.sweep.subdir=one")
+    code, errors, _ = run_here("evaluate.py", "-m", *what)
+    assert code == 2 and "one holds an evaluation" in errors[-1]
+    assert json.loads((tmp_path / "sweep" / "one" / "evaluation.json").read_text())["scenario"] == "skirmish"
+
+
+def test_a_sweep_that_is_repeated_forgets_the_jobs_that_failed(run_here, tmp_path):
+    (tmp_path / "sweep" / "0").mkdir(parents=True)
+    failed = {"job": 0, "overrides": "", "code": 6, "reason": "the disk was full"}
+    (tmp_path / "sweep" / "0" / "failed.json").write_text(json.dumps(failed))
+    code, errors, _ = run_here("evaluate.py", "-m", *NOOP, "hydra.sweep.dir=sweep", "overwrite=true")
+    assert code == 0, errors
+    assert not (tmp_path / "sweep" / "0" / "failed.json").exists()
+
+
+def test_training_does_not_replace_an_evaluation(run_here, tmp_path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "evaluation.json").write_text("{}")
+    code, errors, _ = run_here("train.py", *TINY, "hydra.run.dir=run")
+    assert code == 2 and "run holds an evaluation" in errors[-1]
+    assert (tmp_path / "run" / "evaluation.json").read_text() == "{}"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "expected", "message"),
+    [
+        ("observation.radius=4", 2, "view [11, 9, 9] and 11"),
+        ("evaluation.episodes=0", 2, "evaluation.episodes must be"),
+        ("evaluation.first_seed=-1", 2, "evaluation.first_seed must be"),
+        ("device=cuda:99", 2, "device must be one of"),
+        ("landscape=raster", 2, "landscape.path must name"),
+        ("team.n_agents=70", 2, "team.n_agents must be"),
+        ("overwrite=maybe", 2, "overwrite must be true or false"),
+        ("other weights", 4, "is of another architecture"),
+        ("cut", 4, "policy.pt is missing or was cut"),
+    ],
+)
+def test_a_mistake_in_an_evaluation_leaves_no_folder(trained, run_here, tmp_path, wrong, expected, message):
+    shutil.copytree(trained[0] / "checkpoints" / "128", tmp_path / "checkpoints" / "128")
+    policy = tmp_path / "checkpoints" / "128" / "policy.pt"
+    if wrong == "other weights":
+        weights = torch.load(policy, weights_only=True)
+        torch.save(dict(list(weights.items())[1:]), policy)
+        forge(policy.parent)
+    elif wrong == "cut":
+        policy.write_bytes(policy.read_bytes()[:-1])
+    overrides = [wrong] if "=" in wrong else []
+    code, errors, _ = run_here("evaluate.py", "checkpoint=checkpoints/128", *overrides, "hydra.run.dir=seen")
+    assert code == expected and len(errors) == 1 and message in errors[0], errors
+    assert [each.name for each in tmp_path.iterdir()] == ["checkpoints"]
 
 
 def test_evaluate_takes_a_policy_by_name(tmp_path, run_here):
@@ -127,6 +213,90 @@ def test_a_finished_run_resumes_to_nothing_and_exits_0(trained, run_here):
     code, errors, _ = run_here("train.py", f"resume={run}")
     assert code == 0, errors
     assert (run / "metrics.csv").read_bytes() == before
+
+
+def weights_and_numbers(run):
+    """What a run has learnt, and its rows but for the times."""
+    rows = [row.split(",")[3:] for row in (run / "metrics.csv").read_text().splitlines()]
+    return checkpoint.newest(run)[0].policy(), rows
+
+
+CONSTANT = ("algorithm.learning_rate_end=1.0", "algorithm.entropy_coeff_end=0.005")
+
+
+def test_a_finished_run_is_trained_longer_and_goes_on_to_the_new_total(run_here, tmp_path, monkeypatch):
+    """Killed on the way and in the evaluation; where nothing changes over a training it equals one that never ended."""
+    own = (*SHORT[:-1], *CONSTANT)
+    for total, name in ((64, "run"), (128, "whole")):
+        code, errors, _ = run_here("train.py", *own, f"total_frames={total}", f"hydra.run.dir={name}")
+        assert code == 0, errors
+    run, first = tmp_path / "run", (tmp_path / "run" / "evaluation.json").read_bytes()
+    with monkeypatch.context() as patched:
+        patched.setattr(Training, "_learn", signalled(Training._learn, signal.SIGTERM))
+        code, *_ = run_here("train.py", "resume=run", "total_frames=128")
+    assert code == 128 + signal.SIGTERM and checkpoint.newest(run)[0].manifest.frames == 96
+    assert "total_frames was 64 and is 128: " in (run / "train.log").read_text()
+    with monkeypatch.context() as patched:
+        patched.setattr(command_module, "assess", signalled(command_module.assess, signal.SIGTERM))
+        code, *_ = run_here("train.py", "resume=run")
+    assert code == 128 + signal.SIGTERM and checkpoint.newest(run)[0].manifest.frames == 128
+    assert (run / "evaluation.json").read_bytes() == first, "it is replaced by the next one alone"
+    code, errors, _ = run_here("train.py", "resume=run")
+    assert code == 0, errors
+    ours, theirs = weights_and_numbers(run), weights_and_numbers(tmp_path / "whole")
+    assert ours[1] == theirs[1] and len(ours[1]) == 5
+    assert all(torch.equal(ours[0][name], value) for name, value in theirs[0].items())
+    ours, theirs = (json.loads((tmp_path / name / "evaluation.json").read_text()) for name in ("run", "whole"))
+    assert ours["episodes"] == theirs["episodes"] and ours["frames"] == 128
+    before = contents(run)
+    assert run_here("train.py", "resume=run")[0] == 0
+    assert {name for name, content in contents(run).items() if before[name] != content} == {Path("train.log")}
+
+
+def test_a_run_that_was_stopped_goes_on_to_a_new_total_even_if_killed_at_once(run_here, tmp_path, monkeypatch):
+    with monkeypatch.context() as patched:
+        patched.setattr(Training, "_learn", signalled(Training._learn, signal.SIGTERM))
+        run_here("train.py", *SHORT)
+    with monkeypatch.context() as patched:
+        patched.setattr(Training, "train", lambda training: None)  # dies before it saves anything
+        patched.setattr(command_module, "assess", lambda *args: sys.exit(9))
+        assert run_here("train.py", "resume=run", "total_frames=96")[0] == 9
+    code, errors, _ = run_here("train.py", "resume=run")
+    assert code == 0, errors
+    found = checkpoint.newest(tmp_path / "run")[0]
+    assert found.manifest.frames == 96 and found.record().values["total_frames"] == 96
+
+
+@pytest.mark.parametrize("total", [128, 100, 0, "many"])
+def test_a_total_that_was_reached_is_refused_in_one_line(trained, run_here, tmp_path, total):
+    shutil.copytree(trained[0], tmp_path / "run")
+    before = contents(tmp_path / "run")
+    code, errors, _ = run_here("train.py", "resume=run", f"total_frames={total}")
+    assert code == 2 and len(errors) == 1 and "total_frames must be " in errors[0]
+    assert contents(tmp_path / "run") == before
+    assert total not in (128, 100) or f"more than the 128 that run has had, got {total}" in errors[0]
+
+
+def test_an_edited_configuration_is_told_and_not_ignored(trained, run_here, tmp_path):
+    shutil.copytree(trained[0], tmp_path / "run")
+    path = tmp_path / "run" / "config.yaml"
+    text = path.read_text()
+    path.write_text(text.replace("gamma: 0.99", "gamma: 0.9"))
+    before = contents(tmp_path / "run")
+    code, errors, _ = run_here("train.py", "resume=run")
+    assert code == 2 and len(errors) == 1 and contents(tmp_path / "run") == before
+    assert (
+        "run/config.yaml is not what the checkpoint was trained with: algorithm.gamma is 0.9 and was 0.99, "
+        in errors[0]
+    )
+    assert "start_from=run" in errors[0]
+    path.write_text("# what was best\n\n" + text.replace("gamma: 0.99", "gamma:   99.0e-2  # as ever"))
+    code, errors, _ = run_here("train.py", "resume=run")
+    assert code == 0, errors
+    path.write_text(text.replace("total_frames: 128", "total_frames: 160"))
+    code, errors, _ = run_here("train.py", "resume=run")
+    assert code == 0, errors
+    assert checkpoint.newest(tmp_path / "run")[0].manifest.frames == 160, "the total may change"
 
 
 def test_a_run_folder_is_not_trained_into_twice(trained, run_here):
@@ -328,7 +498,7 @@ MISTAKES = [
     (("train.py", "team.n_agents=0"), 2, "team.n_agents must be in [1, 256], got 0"),
     (("train.py", "scenario=nowhere"), 2, "nowhere"),
     (("train.py", "+foo=1"), 2, "foo is not a key"),
-    (("train.py", "-m", "seed=0,400"), 2, "seed must be in 0..243"),
+    (("train.py", "-m", "seed=0,-1"), 2, "seed must be in 0..2147483648"),
     (("train.py", "scenario=landfire"), 2, "landscape.path must name"),
     (("train.py", "resume=nowhere"), 4, "nowhere is not a run folder"),
     (("evaluate.py",), 2, "give either checkpoint=PATH or policy=NAME"),

@@ -30,3 +30,15 @@ def test_a_policy_is_called_by_what_is_unusual(overrides, named):
 def test_a_record_from_before_a_key_tells_nothing_of_it():
     choices = {"algorithm": "mappo", "reward": "time", "observation": "local"}
     assert method(Record(choices=choices, values={"model": {"sharing": "team"}}))[0] == "mappo time local"
+
+
+def test_runs_that_are_saved_at_other_times_are_alike():
+    choices = {"algorithm": "mappo", "reward": "efficiency", "observation": "surroundings"}
+    plans = (
+        ["checkpoint.minutes=0", "seed=3"],
+        ["checkpoint.interval=7"],
+        [],
+        ["algorithm.gamma=0.5", "reward.gamma=0.5"],
+    )
+    digests = [method(Record(choices=choices, values=plain(compose_config("train", each))))[1] for each in plans]
+    assert digests[0] == digests[1] == digests[2] != digests[3]

@@ -27,6 +27,7 @@ TINY = [
     "collector.steps=8",
     "total_frames=192",
     "checkpoint.interval=64",
+    "checkpoint.minutes=0",
     "checkpoint.keep=10",
     "evaluation.episodes=4",
     "algorithm.minibatch_size=16",
@@ -383,6 +384,19 @@ def test_keep_bounds_the_checkpoints(tmp_path):
     tiny(tmp_path, "checkpoint.interval=32", "checkpoint.keep=2").train()
     assert sorted(int(each.name) for each in (tmp_path / "checkpoints").iterdir()) == [160, 192]
     assert checkpoints.newest(tmp_path)[0].manifest.frames == 192
+
+
+def test_a_longer_training_has_its_schedules_where_its_own_total_puts_them(finished, tmp_path, caplog):
+    shutil.copytree(finished[0], tmp_path / "run")
+    longer = tiny(
+        tmp_path / "run", "total_frames=384", "algorithm.learning_rate=1e-3", "algorithm.learning_rate_end=0.1"
+    )
+    longer.load_state_dict(newest(tmp_path / "run")[0].training())
+    with caplog.at_level("INFO", logger="warp_torchrl"):
+        longer.tell_new_total(192)
+    assert longer.learner.optimizer.param_groups[0]["lr"] == pytest.approx(0.55e-3)
+    said = "total_frames was 192 and is 384: what changes over a training goes on as at 50.0 % of the new total"
+    assert caplog.messages == [f"{said}, train/learning_rate 0.0001 -> 0.00055"]
 
 
 def test_a_run_starts_from_another_ones_networks_and_its_own_settings(finished, tmp_path):

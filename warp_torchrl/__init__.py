@@ -9,6 +9,7 @@ if "OMP_WAIT_POLICY" not in os.environ:
     os.environ.setdefault("GOMP_SPINCOUNT", "1000")
 
 import gymnasium
+import pettingzoo
 
 from warp_torchrl.api import load_policy, make_env
 from warp_torchrl.env import WildfireEnv
@@ -19,6 +20,9 @@ gymnasium.register(
     entry_point="warp_torchrl.adapters:FireExtinguishingEnv",
     vector_entry_point="warp_torchrl.adapters:FireExtinguishingVectorEnv",
 )
+if hasattr(pettingzoo, "register"):  # older ones have no registry
+    pettingzoo.register("parallel", "Wildfire-v0", entry_point="warp_torchrl.adapters:parallel_env")
+    pettingzoo.register("aec", "Wildfire-v0", entry_point="warp_torchrl.adapters.pettingzoo:env")
 
 __version__ = "0.1.0"
 __all__ = ["WildfireEnv", "__version__", "fire_history", "load_policy", "make_env", "simulate"]

@@ -44,19 +44,33 @@ def assess(plan: Settings, folder: Path, found: checkpoints.Checkpoint | str, wo
     name, mode, actor, filmed = _actors(plan, found, env, one)
     others = _yardsticks(plan, env, [each for each in YARDSTICKS if each != found])
     episodes = play(env, actor, first, mode, watch=True)
-    learner, digest, other_modes, left_out = None, "", {}, {}
+    learner, digest, frames, other_modes, left_out = None, "", None, {}, {}
     if isinstance(found, checkpoints.Checkpoint):
         learner, digest = method(found.record())
+        frames = found.manifest.frames
         other_modes = {f"trained, {other}": play(env, actor, first, other) for other in MODES if other != mode}
     if plan.evaluation.leave_one_out:
         left_out = {agent: play(env, LeftOut(actor, index), first, mode) for index, agent in enumerate(env.agent_names)}
-    content = report(plan.scenario, name, first, episodes, others, other_modes, left_out, learner, digest, worlds)
+    content = report(
+        plan.scenario, name, first, episodes, others, other_modes, left_out, learner, digest, worlds, frames
+    )
     folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / "evaluation.json", content)
     print(table(content), flush=True)
     with disk.telling(folder / "episode.gif"):
         record_episode(folder / "episode.gif", one, filmed, f"{plan.scenario}\n{name}", first, mode)
     log.info("wrote evaluation.json and episode.gif into %s", folder)
+
+
+def check_assessment(plan: Settings, found: checkpoints.Checkpoint | str) -> None:
+    """Check that a checkpoint or a heuristic can be evaluated, before anything is made for it.
+
+    Raises:
+        CheckpointError: If its weights do not fit.
+        ConfigError: If it does not fit the environment.
+    """
+    one = plan.make_env(1, plan.evaluation.first_seed)
+    _actors(plan, found, one, one)
 
 
 def _actors(

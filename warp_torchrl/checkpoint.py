@@ -7,7 +7,7 @@
 import fcntl
 import json
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -101,11 +101,24 @@ def save(
     policy: Mapping[str, torch.Tensor],
     training: Mapping[str, Any],
     keep: int,
+    stays: Callable[[int], bool] = lambda frames: True,
 ) -> Path:
-    """Write a checkpoint, then drop the oldest ones over ``keep``.
+    """Write a checkpoint, then drop all but ``keep``: the newest two stay, and the newest of the others that may.
 
     It appears under its name only when every file is on the disk: temporary folder, fsync, one rename, fsync. What a
     killed save left goes first; unsound ones that the run went past go when this one is safe.
+
+    Args:
+        run: Its run folder.
+        frames: Its name.
+        scenario: See ``Manifest``, as for signature and mode.
+        signature: Of the policy.
+        mode: None before it is known.
+        record: The configuration.
+        policy: Parameters.
+        training: What a run needs to go on.
+        keep: How many stay, at least two.
+        stays: Says of a checkpoint's frames whether it may stay when there are two newer ones.
 
     Returns:
         Its folder.
@@ -130,7 +143,7 @@ def save(
                 _publish(draft, final)
         finally:
             shutil.rmtree(draft, ignore_errors=True)
-    _drop(run, final, keep)
+    _drop(run, final, keep, stays)
     return final
 
 
@@ -216,12 +229,15 @@ def _publish(draft: Path, final: Path) -> None:
         disk.sync(path)
 
 
-def _drop(run: Path, newest: Path, keep: int) -> None:
+def _drop(run: Path, newest: Path, keep: int, stays: Callable[[int], bool]) -> None:
     """Keep so many checkpoints up to the newest: those beyond it are unsound, or a run would have gone on from them."""
     listed = _listed(run)
     place = listed.index(newest)
-    for folder in (*listed[:place], *listed[place + keep :]):
-        shutil.rmtree(folder, ignore_errors=True)
+    older = [folder for folder in listed[place + 2 :] if stays(int(folder.name))]
+    kept = {*listed[place : place + 2], *older[: keep - 2]}
+    for folder in listed:
+        if folder not in kept:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def _listed(run: Path) -> list[Path]:

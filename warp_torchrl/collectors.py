@@ -244,7 +244,7 @@ class _Elsewhere:
 
 def _worlds(make_env: MakeEnv, count: int, seed: int, first_episode: int) -> WildfireEnv:
     """Return a worker's worlds, and give it random numbers of its own for the actions."""
-    torch.manual_seed(seed + 2**40 * first_episode)
+    torch.manual_seed((seed + 2**40 * first_episode) % 2**64)
     env = make_env(count, seed)
     env.set_seeds(range(seed, seed + count), first_episode)
     return env

@@ -15,23 +15,26 @@ from omegaconf import DictConfig, OmegaConf
 from warp_torchrl import checkpoint as checkpoints
 from warp_torchrl import disk
 from warp_torchrl.allocation import keep_freed_memory
-from warp_torchrl.assessment import assess
+from warp_torchrl.assessment import assess, check_assessment
 from warp_torchrl.config import (
     Record,
     compose_config,
     conf_folder,
     is_sweep,
+    output_folder,
     plain,
     recompose,
     without_targets,
     world_overrides,
 )
 from warp_torchrl.construction import ConfigError
+from warp_torchrl.destination import check_free
 from warp_torchrl.failure import fail
 from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.resumption import resumption
 from warp_torchrl.settings import COMPONENTS, settings
 from warp_torchrl.signals import Stopped, obeyed
-from warp_torchrl.sweep import SweepSummary, jobs, note_failure
+from warp_torchrl.sweep import SweepSummary, forget_failure, jobs, note_failure
 from warp_torchrl.training import Training
 from warp_torchrl.transfer import check_start
 
@@ -61,7 +64,7 @@ def _train_job(config: DictConfig) -> None:
     lock = checkpoints.RunFolderLock(folder)
     try:
         if resumed:
-            _resume(folder)
+            _resume(folder, _new_total(config, HydraConfig.get().overrides.task))
         else:
             _start(folder, config)
     finally:
@@ -71,6 +74,8 @@ def _train_job(config: DictConfig) -> None:
 def _start(folder: Path, config: DictConfig) -> None:
     if checkpoints.holds_any(folder):
         raise ConfigError(f"hydra.run.dir: {folder} holds a run already; go on with resume={folder}, or take another")
+    if (folder / "evaluation.json").exists():
+        raise ConfigError(f"hydra.run.dir: {folder} holds an evaluation, which training would replace; take another")
     disk.replace(folder / "config.yaml", OmegaConf.to_yaml(config, resolve=True))
     record = Record(choices=_choices(), values=_values(config))
     training = Training(settings(plain(config)), record, folder)
@@ -79,16 +84,20 @@ def _start(folder: Path, config: DictConfig) -> None:
     _finish(training, world_overrides(plain(config)))
 
 
-def _resume(folder: Path) -> None:
-    found = _newest(folder)
-    if found.manifest.mode is not None and (folder / "evaluation.json").exists():
-        log.info("%s is finished", folder)
+def _resume(folder: Path, total_frames: Any) -> None:
+    run = resumption(folder, total_frames)
+    _say_skipped(run.skipped)
+    if run.is_finished:
+        log.info("%s is finished; total_frames=MORE trains it longer", folder)
         return
-    values = plain(recompose(found.record()))
-    training = Training(settings(values), found.record(), folder)
-    training.load_state_dict(found.training())
-    log.info("resumed %s at %d frames", found.path, training.frames)
-    _finish(training, world_overrides(values))
+    training = Training(run.settings, run.record, folder)
+    training.load_state_dict(run.found.training())
+    log.info("resumed %s at %d frames", run.found.path, training.frames)
+    if run.settings.total_frames != run.total_before:
+        # Now and not with the next checkpoint: a run that is killed before it goes on to the new total too.
+        disk.replace(folder / "config.yaml", OmegaConf.to_yaml(recompose(run.record), resolve=True))
+        training.tell_new_total(run.total_before)
+    _finish(training, world_overrides(run.values))
 
 
 def _finish(training: Training, worlds: Sequence[str]) -> None:
@@ -102,20 +111,25 @@ def _finish(training: Training, worlds: Sequence[str]) -> None:
 def _newest(path: str | Path) -> checkpoints.Checkpoint:
     """Return the newest sound checkpoint, and say which were skipped."""
     found, skipped = checkpoints.newest(path)
+    _say_skipped(skipped)
+    return found
+
+
+def _say_skipped(skipped: Sequence[str]) -> None:
     for line in skipped:
         log.warning("skipped: %s", line)
-    return found
 
 
 def _evaluate_job(config: DictConfig) -> None:
     folder = Path(HydraConfig.get().runtime.output_dir)
+    if not config.overwrite:
+        check_free(folder, "hydra.run.dir")  # once more: a sweep may have named two jobs' folders alike
     given, name = config.checkpoint, config.policy
     if given is None:
         assess(settings(_without_checkpoint(config)), folder, name, world_overrides(plain(config)))
         return
     found = _newest(given)
-    overrides = [each for each in HydraConfig.get().overrides.task if not each.startswith(("checkpoint=", "policy="))]
-    values = plain(recompose(found.record(), overrides))
+    values = plain(recompose(found.record(), _without_own(HydraConfig.get().overrides.task)))
     assess(settings(values), folder, found, world_overrides(values))
 
 
@@ -129,6 +143,11 @@ def _choices() -> dict[str, str]:
 
 def _values(config: DictConfig) -> dict[str, Any]:
     return {key: value for key, value in without_targets(plain(config)).items() if key not in _NOT_RECORDED}
+
+
+def _without_own(overrides: Sequence[str]) -> list[str]:
+    """Return the overrides of an evaluation that are a run's too."""
+    return [each for each in overrides if not each.startswith(("checkpoint=", "policy=", "overwrite="))]
 
 
 def _without_checkpoint(config: DictConfig) -> dict[str, Any]:
@@ -160,6 +179,7 @@ def _start_hydra(name: str, job: Callable[[DictConfig], None], arguments: list[s
 
     def guarded(config: DictConfig) -> None:
         try:
+            forget_failure()
             job(config)
         except Exception as error:
             code, line = fail(error, debug)
@@ -177,12 +197,18 @@ def _check_first(name: str, arguments: Sequence[str]) -> None:
     if any(flag not in _MULTIRUN for flag in flags):
         return  # Hydra's own flags (--help, --cfg, --config-dir ...) are Hydra's business
     own = [each for each in overrides if not each.startswith("hydra")]
-    for job in jobs(own) if flags or is_sweep(name, own) else [own]:
+    sweeps = bool(flags) or is_sweep(name, own)
+    listed = jobs(own) if sweeps else [own]
+    for job in listed:
         config = compose_config(name, job)
         if name == "train":
             _check_training(config, job)
         else:
             _check_evaluation(config, job)
+    if name == "evaluate" and not config.overwrite:
+        of_hydra = [each for each in overrides if each.startswith("hydra")]
+        key = "hydra.sweep.dir" if sweeps else "hydra.run.dir"
+        check_free(output_folder(name, [*listed[0], *of_hydra], sweeps), key)
 
 
 def _check_training(config: DictConfig, overrides: Sequence[str]) -> None:
@@ -192,14 +218,21 @@ def _check_training(config: DictConfig, overrides: Sequence[str]) -> None:
         if config.start_from is not None:
             check_start(plan, checkpoints.newest(config.start_from)[0])
         return
-    others = [each for each in overrides if each.split("=")[0] not in ("resume", "debug")]
+    others = [each for each in overrides if each.split("=")[0] not in ("resume", "debug", "total_frames")]
     if others:
-        raise ConfigError(f"resume goes on with the folder's own configuration; leave out {', '.join(others)}")
+        raise ConfigError(
+            f"resume goes on with the folder's own configuration, of which total_frames alone may change; leave out "
+            f"{', '.join(others)}"
+        )
     folder = Path(str(config.resume))
     if (folder / checkpoints.MANIFEST).exists():
         raise ConfigError(f"resume must be a run folder, got one of its checkpoints: {folder}")
-    found, _ = checkpoints.newest(folder)
-    settings(plain(recompose(found.record()))).check_training()
+    resumption(folder, _new_total(config, overrides)).settings.check_training()
+
+
+def _new_total(config: DictConfig, overrides: Sequence[str]) -> Any:
+    """Return the total that a resumed run is to go on to, None where none is asked for."""
+    return config.total_frames if any(each.startswith("total_frames=") for each in overrides) else None
 
 
 def _check_evaluation(config: DictConfig, overrides: Sequence[str]) -> None:
@@ -207,11 +240,13 @@ def _check_evaluation(config: DictConfig, overrides: Sequence[str]) -> None:
         raise ConfigError("give either checkpoint=PATH or policy=NAME")
     if config.policy is not None and config.policy not in HEURISTICS:
         raise ConfigError(f"policy must be one of {', '.join(HEURISTICS)}, got {config.policy}")
+    if not isinstance(config.overwrite, bool):
+        raise ConfigError(f"overwrite must be true or false, got {config.overwrite!r}")
     if config.checkpoint is None:
-        settings(_without_checkpoint(config))
+        check_assessment(settings(_without_checkpoint(config)), config.policy)
         return
     found, _ = checkpoints.newest(Path(str(config.checkpoint)))
-    settings(plain(recompose(found.record(), [each for each in overrides if not each.startswith("checkpoint=")])))
+    check_assessment(settings(plain(recompose(found.record(), _without_own(overrides)))), found)
 
 
 def _with_run_folder(arguments: Sequence[str]) -> list[str]:

@@ -64,6 +64,19 @@ def is_sweep(name: str, overrides: Sequence[str]) -> bool:
     return bool(chosen) and _compose(name, chosen, with_hydra=True).hydra.mode == RunMode.MULTIRUN
 
 
+def output_folder(name: str, overrides: Sequence[str], sweeps: bool) -> Path:
+    """Return the folder into which a command, or its sweep, will write.
+
+    Raises:
+        ConfigError: If an override does not fit, in one line.
+    """
+    hydra = _compose(name, overrides, with_hydra=True).hydra
+    try:
+        return Path(hydra.sweep.dir if sweeps else hydra.run.dir)
+    except OmegaConfBaseException as error:
+        raise ConfigError(_one_line(error)) from None
+
+
 def _compose(name: str, overrides: Sequence[str], with_hydra: bool = False) -> DictConfig:
     try:
         folder = conf_folder()

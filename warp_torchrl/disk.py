@@ -36,7 +36,7 @@ def replace(path: Path, text: str) -> None:
 
 
 def save_tensors(path: Path, content: Any) -> None:
-    """Write tensors and plain values with ``torch.save``.
+    """Write tensors and plain values with ``torch.save``, of a tensor that is part of another that part alone.
 
     Raises:
         OSError: With the path, where torch says only that its position is not the one that it expected.
@@ -44,11 +44,26 @@ def save_tensors(path: Path, content: Any) -> None:
     with telling(path), path.open("wb") as file:
         writer = _Writer(file)
         try:
-            torch.save(content, cast(BinaryIO, writer))
+            torch.save(_apart(content), cast(BinaryIO, writer))
         except RuntimeError:
             if writer.refusal is None:
                 raise
             raise writer.refusal from None
+
+
+def size(content: Any) -> int:
+    """Return how many bytes the tensors in nested mappings hold."""
+    if isinstance(content, dict):
+        return sum(size(each) for each in content.values())
+    return content.nbytes if isinstance(content, torch.Tensor) else 0
+
+
+def _apart(content: Any) -> Any:
+    """Return nested mappings with their tensors on their own: torch writes all the memory that a tensor is part of."""
+    if isinstance(content, dict):
+        return {key: _apart(each) for key, each in content.items()}
+    is_part = isinstance(content, torch.Tensor) and content.nbytes < content.untyped_storage().nbytes()
+    return content.clone() if is_part else content
 
 
 @contextmanager

@@ -109,6 +109,7 @@ def report(
     method: str | None = None,
     configuration: str = "",
     world_overrides: Sequence[str] = (),
+    frames: int | None = None,
 ) -> dict[str, Any]:
     """Return the content of ``evaluation.json``.
 
@@ -123,6 +124,7 @@ def report(
         method: What the policy is called beside others; its name where None.
         configuration: Tells policies of one method that were trained differently apart.
         world_overrides: How the worlds differ from the scenario's, as overrides.
+        frames: World steps that the policy was trained for; None where it was not.
     """
     if "noop" in others:
         episodes = episodes | {"averted": episodes["saved"] - others["noop"]["saved"]}
@@ -138,6 +140,7 @@ def report(
         "policy": policy,
         "method": policy if method is None else method,
         "configuration": configuration,
+        "frames": frames,
         "seeds": seeds,
         "metrics": _summaries(episodes),
         "episodes": rows,

@@ -13,6 +13,7 @@ from torchrl.envs import EnvBase
 from torchrl.envs.utils import exploration_type, set_exploration_type
 
 from warp_torchrl.evaluation import MODES
+from warp_torchrl.flat import FLAT, unflattened
 from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, ROLE, Signature, recurrent_actors, signature
 from warp_torchrl.models.fitting import fitted
 from warp_torchrl.models.networks import AgentNetworks, Network
@@ -75,7 +76,7 @@ class TrainedPolicy(TensorDictModuleBase):
 
 
 class NumpyPolicy:
-    """A trained policy on the numpy observations of ``warp_torchrl.adapters``.
+    """A trained policy on the numpy observations of ``warp_torchrl.adapters``, in either layout.
 
     It is decentralised: each agent's action comes from its own observation and mask. So one agent may ask alone, a
     team together, a batch of worlds too; but a policy with a network for each agent (``sharing: none``) must be given
@@ -94,6 +95,7 @@ class NumpyPolicy:
         network = next(module for module in modules if isinstance(module, Network))
         keys = [key for key in policy.in_keys if key[: len(OBSERVATION)] == OBSERVATION]
         self._entries = {"".join(key[len(OBSERVATION) :]): entry for key, entry in zip(keys, network.encoder.entries)}
+        self._shapes = {name: (entry.shape, entry.dtype) for name, entry in self._entries.items()}
         self._n_agents = next((len(each.networks) for each in modules if isinstance(each, AgentNetworks)), None)
         self._by_role = ROLE in policy.in_keys
         self._recurrent = recurrent_actors(policy)
@@ -108,7 +110,7 @@ class NumpyPolicy:
         Args:
             observation: One agent's, as Gymnasium's adapters and each of PettingZoo's agents have it, or a dict of
                 agents' by name. Worlds may come first, [B, ...].
-            info: What came with it; needed in preset ``paper`` alone, whose mask is there.
+            info: What came with it; needed in preset ``paper`` alone, whose mask is there unless its layout is flat.
 
         Returns:
             The agent's action, or a dict by agent's name; for a batch of worlds int64 [B] in place of a number.
@@ -135,7 +137,7 @@ class NumpyPolicy:
     def _is_of_one(self, observation: AgentObservation | Mapping[str, AgentObservation]) -> bool:
         """Return whether an observation is one agent's and not a team's."""
         if isinstance(observation, Mapping):
-            return bool(self._entries.keys() & observation.keys())
+            return bool({FLAT, *self._entries} & observation.keys())
         if "" not in self._entries:
             raise ValueError(
                 f"observation must be a dict of {', '.join(self._entries)}, got {type(observation).__name__}"
@@ -144,11 +146,14 @@ class NumpyPolicy:
 
     def _of_agent(self, name: str, seen: Any, info: Mapping[str, Any]) -> dict[Any, np.ndarray]:
         """Return what the policy reads of one agent, by key."""
-        entries = {"": seen, **info} if "" in self._entries else {**info, **seen}
         who = f" of {name}" if name else ""
+        is_flat = isinstance(seen, Mapping) and FLAT in seen
+        if is_flat:
+            seen = {**seen, **unflattened(np.asarray(seen[FLAT]), self._shapes, f"observation{who}")}
+        entries = {**info, **seen} if is_flat or "" not in self._entries else {"": seen, **info}
         missing = [entry for entry in ("action_mask", *self._entries) if entry not in entries]
         if missing:
-            where = "info" if "" in self._entries else "observation"
+            where = "info" if "" in self._entries and not is_flat else "observation"
             raise ValueError(f"{where}{who} must have {', '.join(missing)}, got {', '.join(entries) or 'nothing'}")
         mask = np.asarray(entries["action_mask"], dtype=bool)
         read: dict[Any, np.ndarray] = {ACTION_MASK: mask}

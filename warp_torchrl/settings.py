@@ -10,6 +10,7 @@ import torch
 from warp_torchrl.construction import ConfigError, build, construct
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.imitation import Imitation
+from warp_torchrl.seeds import BEYOND_EVALUATION, FIRST_EVALUATED, SEEDS, WORLDS
 from warp_torchrl.world.fast.compile import check_compiler
 from warp_torchrl.world.world import World
 
@@ -31,10 +32,8 @@ ENVIRONMENT = COMPONENTS[: COMPONENTS.index("reward") + 1]
 """Those that make an environment."""
 WORLD_KEYS = ("scenario", "landscape", "wind", "fire", "team", "ignition", "steps_per_tick", "horizon", "cell_size")
 """What a scenario sets."""
-COMMAND_KEYS = ("resume", "start_from", "debug", "policy")
+COMMAND_KEYS = ("resume", "start_from", "debug", "policy", "overwrite")
 """What the commands read themselves."""
-TRAINING_SEEDS = 4096
-"""Seeds that one training seed owns: world i of seed s draws with 4096 s + i."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,18 +42,22 @@ class CheckpointPlan:
 
     Attributes:
         interval: Frames between checkpoints.
-        keep: Checkpoints that stay.
+        minutes: Between checkpoints by the clock, as ``SaveClock`` has it; 0: none.
+        keep: Checkpoints that stay: the newest two, and of the others those of the interval.
 
     Raises:
-        ValueError: If the interval is not positive or fewer than two are kept.
+        ValueError: If the interval is not positive, the minutes are negative or fewer than two are kept.
     """
 
     interval: int = 500_000
+    minutes: float = 2.0
     keep: int = 2
 
     def __post_init__(self) -> None:
         if self.interval < 1:
             raise ValueError(f"interval must be at least 1 frame, got {self.interval}")
+        if not 0.0 <= self.minutes <= 1e6:
+            raise ValueError(f"minutes must be in 0..1e6, where 0 saves by frames alone, got {self.minutes}")
         if not 2 <= self.keep <= 10_000:
             raise ValueError(f"keep must be in 2..10000, got {self.keep}")
 
@@ -66,7 +69,7 @@ class EvaluationPlan:
     Attributes:
         interval: Frames between evaluations during training; 0 evaluates only at the end.
         episodes: Worlds.
-        first_seed: Seed of the first; training seeds lie below 1 000 000.
+        first_seed: Seed of the first; training has those below 1 000 000 and from 2^61 on.
         mode: ``sampled``, ``deterministic``, or ``best``: whichever did better on training seeds.
         leave_one_out: Play once more for each agent, without it, to see what it is worth.
 
@@ -76,7 +79,7 @@ class EvaluationPlan:
 
     interval: int = 0
     episodes: int = 256
-    first_seed: int = 1_000_000
+    first_seed: int = FIRST_EVALUATED
     mode: Literal["sampled", "deterministic", "best"] = "best"
     leave_one_out: bool = False
 
@@ -85,8 +88,11 @@ class EvaluationPlan:
             raise ValueError(f"interval must be 0 or more frames, got {self.interval}")
         if not 1 <= self.episodes <= 1_000_000:
             raise ValueError(f"episodes must be in 1..1000000, got {self.episodes}")
-        if not 0 <= self.first_seed < 2**62:
-            raise ValueError(f"first_seed must be in 0..2**62, got {self.first_seed}")
+        if not 0 <= self.first_seed <= BEYOND_EVALUATION - self.episodes:
+            raise ValueError(
+                f"first_seed must be in 0..{BEYOND_EVALUATION - self.episodes}, so that no episode has a training "
+                f"world's seed, got {self.first_seed}"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,14 +121,12 @@ class Settings:
     imitation: Imitation
 
     def __post_init__(self) -> None:
-        if not 1 <= self.n_worlds <= TRAINING_SEEDS:
-            raise ValueError(f"n_worlds must be in 1..{TRAINING_SEEDS}, got {self.n_worlds}")
+        if not 1 <= self.n_worlds <= WORLDS:
+            raise ValueError(f"n_worlds must be in 1..{WORLDS}, got {self.n_worlds}")
         if not 1 <= self.total_frames <= 10**15:
             raise ValueError(f"total_frames must be in 1..1e15, got {self.total_frames}")
-        if not 0 <= self.seed < 244:
-            raise ValueError(
-                f"seed must be in 0..243, so that no training world has an evaluation seed, got {self.seed}"
-            )
+        if not 0 <= self.seed <= SEEDS:
+            raise ValueError(f"seed must be in 0..{SEEDS}, got {self.seed}")
         _check_device(self.device)
 
     def check_training(self) -> None:

@@ -66,17 +66,25 @@ def note_failure(code: int, reason: str) -> None:
     (folder / FAILURE).write_text(json.dumps(asdict(failure)), encoding="utf-8")
 
 
+def forget_failure() -> None:
+    """Drop the word of a failure that an earlier sweep left in the job's folder."""
+    (Path(HydraConfig.get().runtime.output_dir) / FAILURE).unlink(missing_ok=True)
+
+
 def failures(folder: Path) -> list[Failure]:
     """Return the jobs of a sweep's folder that failed, in their order."""
     found = [Failure(**json.loads(path.read_text(encoding="utf-8"))) for path in folder.glob(f"*/{FAILURE}")]
     return sorted(found, key=lambda each: each.job)
 
 
+_NOT_TRAINED_BY = ("seed", "device", "evaluation", "checkpoint")
+
+
 def method(record: Record) -> tuple[str, str]:
-    """Return what a trained policy is called in a sweep, and a digest of its configuration but for the seed."""
+    """Return what a trained policy is called in a sweep, and a digest of what it was trained by but for the seed."""
     names = [record.choices[group] for group in ("algorithm", "reward", "observation")]
     names += [*unusual(record), *taught(record)]
-    values = {key: value for key, value in record.values.items() if key not in ("seed", "device", "evaluation")}
+    values = {key: value for key, value in record.values.items() if key not in _NOT_TRAINED_BY}
     return " ".join(names), sha256(json.dumps(_with_floats(values), sort_keys=True).encode()).hexdigest()
 
 

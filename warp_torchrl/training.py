@@ -13,6 +13,7 @@ from torch import Tensor
 from tqdm import tqdm
 
 from warp_torchrl import checkpoint as checkpoints
+from warp_torchrl import disk
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.collectors import WorkerDied
 from warp_torchrl.config import Record
@@ -21,7 +22,9 @@ from warp_torchrl.logging import MetricsFile, Tracker
 from warp_torchrl.models import REWARD, signature
 from warp_torchrl.progress import TRAIN_COLUMNS, episode_columns, line
 from warp_torchrl.reward_scale import RewardScale
-from warp_torchrl.settings import TRAINING_SEEDS, Settings
+from warp_torchrl.saving import SaveClock, passes
+from warp_torchrl.seeds import WORLDS, first_world_seed
+from warp_torchrl.settings import Settings
 from warp_torchrl.signals import Noted, Stopped
 from warp_torchrl.transfer import learnt
 from warp_torchrl.world.fast.compile import compile_function
@@ -46,19 +49,19 @@ class Training:
     def __init__(self, settings: Settings, record: Record, run: Path) -> None:
         torch.manual_seed(settings.seed)
         self.settings, self.record, self.run = settings, record, run
-        self.env = settings.make_training_env(settings.n_worlds, TRAINING_SEEDS * settings.seed)
+        first = first_world_seed(settings.seed)
+        self.env = settings.make_training_env(settings.n_worlds, first)
         self.frames_per_batch = settings.collector.steps * settings.n_worlds
         learner = settings.algorithm.build(self.env, settings.model, self.frames_per_batch)
         if settings.compile:
             learner.terms = compile_function(learner.terms)
         self.learner: Learner = settings.imitation.taught(learner, self.env)
         self.reward_scale = RewardScale(settings.reward.gamma) if settings.reward.normalise else None
-        self.collection = settings.collector.open(
-            self.env, self.learner, settings.make_training_env, TRAINING_SEEDS * settings.seed
-        )
+        self.collection = settings.collector.open(self.env, self.learner, settings.make_training_env, first)
         self.frames = 0
         self.seconds = 0.0
         self.saved_at = 0
+        self.clock = SaveClock(settings.checkpoint.minutes, self._size)
         self.mode: str | None = None
         self.metrics = MetricsFile(run / "metrics.csv")
         self._scheduled = self.learner.schedule(0.0)
@@ -76,6 +79,7 @@ class Training:
                 self._train(signals, tracker)
                 self.mode = self.mode or self._better_mode()
                 self.save()
+                log.info("saved %d times, in %.2f %% of the time", self.clock.saves, 100.0 * self.clock.share())
             finally:
                 tracker.close()  # after the last save: a server may keep it waiting
             if signals.received:
@@ -101,7 +105,7 @@ class Training:
                     log.info(line(row, total))
                 if self.frames >= total:
                     break
-                if signals.received or self.frames - self.saved_at >= self.settings.checkpoint.interval:
+                if signals.received or self._is_regular(self.frames) or self.clock.is_due():
                     self.save()
                 if signals.received:
                     raise Stopped(signals.received, self.run)
@@ -150,6 +154,21 @@ class Training:
         """Set what changes with progress; the columns that it gives belong to the next row."""
         self._scheduled = self.learner.schedule(min(1.0, self.frames / self.settings.total_frames))
 
+    def tell_new_total(self, before: int) -> None:
+        """Log what goes another way from here on than in a training of another length.
+
+        Args:
+            before: The ``total_frames`` that this training had.
+        """
+        old, total = self.learner.schedule(min(1.0, self.frames / before)), self.settings.total_frames
+        self._schedule()
+        changed = {name: (old[name], value) for name, value in self._scheduled.items() if value != old[name]}
+        columns = ", ".join(f"{name} {was:.3g} -> {now:.3g}" for name, (was, now) in changed.items())
+        log.info(
+            "total_frames was %d and is %d: what changes over a training goes on as at %.1f %% of the new total%s",
+            before, total, 100.0 * self.frames / total, f", {columns}" if columns else "",
+        )  # fmt: skip
+
     def _update(self, sample: TensorDictBase) -> dict[str, Tensor]:
         """Take one optimiser step and return the loss's terms; nothing is read back from the device but finiteness."""
         learner = self.learner
@@ -169,10 +188,9 @@ class Training:
         return {name: terms[name].detach().mean() for name in wanted}
 
     def _evaluate(self, frames: int) -> float | None:
-        interval = self.settings.evaluation.interval
-        if not interval or self.frames // interval == (self.frames - frames) // interval:
-            return None
         plan = self.settings.evaluation
+        if not plan.interval or not passes(plan.interval, self.frames, frames):
+            return None
         env = self.settings.make_env(plan.episodes, plan.first_seed)
         return float(play(env, self.learner.policy, plan.first_seed)["saved"].mean())
 
@@ -181,27 +199,37 @@ class Training:
         chosen = self.settings.evaluation.mode
         if chosen != "best":
             return chosen
-        first = TRAINING_SEEDS * self.settings.seed
-        env = self.settings.make_env(min(self.settings.evaluation.episodes, TRAINING_SEEDS), first)
+        first = first_world_seed(self.settings.seed)
+        env = self.settings.make_env(min(self.settings.evaluation.episodes, WORLDS), first)
         saved = {mode: play(env, self.learner.policy, first, mode)["saved"].mean() for mode in MODES}
         return max(saved, key=saved.__getitem__)
 
     def save(self) -> Path:
         """Write a checkpoint of everything."""
-        self.metrics.sync()
-        path = checkpoints.save(
-            self.run,
-            frames=self.frames,
-            scenario=self.settings.scenario,
-            signature=signature(self.env),
-            mode=self.mode,
-            record=self.record,
-            policy=self.learner.policy.state_dict(),
-            training=self.state_dict(),
-            keep=self.settings.checkpoint.keep,
-        )
+        with self.clock.timed():
+            self.metrics.sync()
+            path = checkpoints.save(
+                self.run,
+                frames=self.frames,
+                scenario=self.settings.scenario,
+                signature=signature(self.env),
+                mode=self.mode,
+                record=self.record,
+                policy=self.learner.policy.state_dict(),
+                training=self.state_dict(),
+                keep=self.settings.checkpoint.keep,
+                stays=self._is_regular,
+            )
         self.saved_at = self.frames
         return path
+
+    def _size(self) -> int:
+        """Return the bytes of the tensors that a checkpoint holds."""
+        return disk.size(self.state_dict())
+
+    def _is_regular(self, frames: int) -> bool:
+        """Return whether a checkpoint of so many frames is one of the interval, whatever the clock does."""
+        return passes(self.settings.checkpoint.interval, frames, self.frames_per_batch)
 
     def start_from(self, found: checkpoints.Checkpoint) -> None:
         """Begin with another run's networks, and their value normalisation, and with nothing else of it.

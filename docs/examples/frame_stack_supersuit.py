@@ -10,7 +10,7 @@ from warp_torchrl.adapters import parallel_env
 
 def main(steps: int) -> None:
     """Train on each agent's last four observations."""
-    env = parallel_env("paper_marl", seed=None)
+    env = parallel_env("paper_marl")
     size = env.observation_space("bulldozer_0").shape[0]
     env = supersuit.frame_stack_v1(env, 4)  # stacks a Box, which preset `paper` is
     stacked = env.observation_space("bulldozer_0").shape[0]

@@ -10,7 +10,7 @@ from warp_torchrl.adapters import parallel_env
 
 def main(steps: int) -> None:
     """Train four bulldozers that share one policy, then let them fight a fire they never saw."""
-    env = parallel_env("paper_marl", seed=None)  # without a seed, each copy has worlds of its own
+    env = parallel_env("paper_marl")  # without a seed, each copy has worlds of its own
     env = supersuit.pettingzoo_env_to_vec_env_v1(env)
     env = supersuit.concat_vec_envs_v1(env, 4, num_cpus=1, base_class="stable_baselines3")
     model = PPO("MlpPolicy", env, n_steps=64, batch_size=256, device="cpu").learn(steps)

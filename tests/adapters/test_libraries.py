@@ -1,12 +1,13 @@
 """Other libraries on the views."""
 
 import gymnasium
+import numpy as np
 import pytest
 from gymnasium.spaces import flatten, flatten_space
 from torchrl.envs import GymEnv, PettingZooWrapper
 from torchrl.envs.utils import check_env_specs
 
-from warp_torchrl.adapters import gym_env, parallel_env
+from warp_torchrl.adapters import gym_env, parallel_env, pettingzoo
 
 TINY_PPO = {"n_steps": 16, "batch_size": 16, "n_epochs": 1, "device": "cpu"}
 
@@ -18,9 +19,12 @@ def test_torchrl_makes_it_by_name(options):
     assert env.rollout(6)["next", "done"].any()
 
 
+@pytest.mark.parametrize("layout", ["dict", "flat"])
 @pytest.mark.parametrize(("scenario", "observation"), [("hetero", "surroundings"), ("skirmish", "paper")])
-def test_torchrl_reads_it_back(scenario, observation):
-    env = PettingZooWrapper(parallel_env(scenario, horizon=4, observation=observation), return_state=True)
+def test_torchrl_reads_it_back(scenario, observation, layout):
+    env = PettingZooWrapper(
+        parallel_env(scenario, horizon=4, observation=observation, layout=layout), return_state=True
+    )
     check_env_specs(env)
     rollout = env.rollout(6, break_when_any_done=False)
     assert rollout["next", "done"].sum() == 1 and rollout["next", "state"].shape == (6, 8, 16, 16)
@@ -56,6 +60,42 @@ def test_supersuit_skips_frames(frames):
     assert one.step(8)[4]["episode_length"] >= 2
     infos = team.step(dict.fromkeys(team.agents, 8))[4]
     assert infos["bulldozer_0"]["episode_length"] >= 2
+
+
+@pytest.mark.parametrize("observation", ["surroundings", "paper"])
+def test_tianshou_finds_the_mask_beside_the_observation(observation):
+    env = AsTianshouReads(pettingzoo.env("hetero", horizon=2, observation=observation, layout="flat"))
+    seen, _ = env.reset(seed=0)
+    for _ in range(6):
+        assert seen["obs"] in env.observation_space["observation"] and seen["obs"].ndim == 1
+        assert len(seen["mask"]) == env.action_space.n and seen["mask"][10]
+        seen, *_ = env.step(int(np.flatnonzero(seen["mask"])[0]))
+
+
+class AsTianshouReads:
+    """What ``tianshou.env.PettingZooEnv`` of Tianshou 2.0.1 asks of an AECEnv, and makes of its observations."""
+
+    def __init__(self, env):
+        self.env = env
+        first = env.possible_agents[0]
+        self.observation_space, self.action_space = env.observation_space(first), env.action_space(first)
+        assert all(env.observation_space(agent) == self.observation_space for agent in env.possible_agents)
+        assert all(env.action_space(agent) == self.action_space for agent in env.possible_agents)
+
+    def reset(self, seed):
+        self.env.reset(seed=seed)
+        observation, *_, info = self.env.last(self)
+        return self.read(observation), info
+
+    def step(self, action):
+        self.env.step(action)
+        observation, *rest = self.env.last()
+        return self.read(observation), *rest
+
+    def read(self, observation):
+        assert isinstance(observation, dict) and "action_mask" in observation
+        mask = [each == 1 for each in observation["action_mask"]]
+        return {"agent_id": self.env.agent_selection, "obs": observation["observation"], "mask": mask}
 
 
 def test_supersuit_flattens_a_dict():

@@ -8,7 +8,9 @@ from itertools import count
 from types import SimpleNamespace
 
 import numpy as np
+import pettingzoo as zoo
 import pytest
+from gymnasium import spaces
 from pettingzoo import ParallelEnv
 from pettingzoo.test import api_test, max_cycles_test, parallel_api_test, parallel_seed_test, performance_benchmark
 
@@ -58,6 +60,34 @@ def test_it_is_the_paper_s_class_with_the_paper_s_names():
     assert isinstance(env, FireExtinguishingEnvParallel) and isinstance(env, ParallelEnv)
     assert {"bulldozer_0", "uav_0"} <= set(env.possible_agents) and env.max_num_agents == len(env.possible_agents)
     assert env.metadata["name"] == str(env) == "warp_torchrl_v0" and env.metadata["is_parallelizable"]
+
+
+@pytest.mark.parametrize("observation", ["surroundings", "local", "paper"])
+def test_the_flat_layout_is_one_vector_beside_the_mask(observation):
+    named, flat = (small(observation=observation, layout=layout) for layout in ("dict", "flat"))
+    (seen, infos), (vectors, others) = named.reset(seed=3), flat.reset(seed=3)
+    for _ in range(3):
+        one, vector, space = seen["bulldozer_1"], vectors["bulldozer_1"], flat.observation_space("bulldozer_1")
+        mask = infos["bulldozer_1"]["action_mask"] if observation == "paper" else one["action_mask"]
+        assert vector in space and list(vector) == ["observation", "action_mask"] and isinstance(space, spaces.Dict)
+        assert vector["observation"].ndim == 1 and vector["observation"].dtype == np.float32
+        assert (vector["action_mask"] == mask).all() and "action_mask" not in others["bulldozer_1"]
+        if observation == "surroundings":
+            joined = np.concatenate([one["picture"].ravel(), one["self"], one["view"].ravel() / np.float32(255)])
+            assert (vector["observation"] == joined).all() and space["observation"].high.max() == 3.0
+        seen, _, _, _, infos = named.step(idle(named))
+        vectors, _, _, _, others = flat.step(idle(flat))
+
+
+@pytest.mark.filterwarnings("error::UserWarning")
+@pytest.mark.parametrize("kind", ["parallel", "aec"])
+def test_pettingzoo_makes_it_by_name(kind):
+    if not hasattr(zoo, "make"):
+        pytest.skip("this PettingZoo has no registry")
+    env = zoo.make(kind, "Wildfire-v0", scenario="skirmish", max_cycles=3)
+    assert isinstance(env, ParallelEnv if kind == "parallel" else zoo.AECEnv)
+    env.reset(seed=0)
+    assert zoo.spec(kind, "Wildfire").id == "Wildfire-v0"
 
 
 @pytest.mark.parametrize("observation", ["surroundings", "local", "paper"])
@@ -189,6 +219,7 @@ def test_stepping_a_finished_world_or_one_never_started_is_refused():
         ({"seed": 1.5}, "seed must be a whole number, got 1.5"),
         ({"seed": -1}, "seed must be in"),
         ({"render_mode": "ansi"}, "render_mode must be None or human or rgb_array, got 'ansi'"),
+        ({"layout": "list"}, "layout must be dict or flat, got 'list'"),
         ({"team": object()}, "team must be a text, a number or a list, got object"),
         ({"team": {"n_agents": 3}}, "team must be a text, a number or a list, got dict"),
     ],

@@ -60,6 +60,29 @@ def test_gymnasium_s_views_take_it_too(observation):
     one.step(action), many.step(actions)
 
 
+@pytest.mark.parametrize("observation", ["surroundings", "paper"])
+@pytest.mark.parametrize("sharing", ["role", "none"])
+def test_both_layouts_are_read_alike(sharing, observation):
+    _, policy = policy_for("hetero", Mlp(actor_hidden=(32,), sharing=sharing), observation=observation)
+    named, flat = (parallel_env("hetero", observation=observation, layout=layout) for layout in ("dict", "flat"))
+    act, chosen = policy.numpy_policy(), set()
+    (seen, infos), (vectors, _) = named.reset(seed=3), flat.reset(seed=3)
+    for _ in range(6):
+        actions = act(seen, infos)
+        assert act(vectors) == actions
+        seen, _, _, _, infos = named.step(actions)
+        vectors, *_ = flat.step(actions)
+        chosen |= set(actions.values())
+    assert len(chosen) > 1
+
+
+def test_batches_of_worlds_may_be_flat_too():
+    _, policy = policy_for("single")
+    act = policy.numpy_policy()
+    named, flat = (FireExtinguishingVectorEnv(3, layout=layout) for layout in ("dict", "flat"))
+    assert (act(*named.reset(seed=7)) == act(*flat.reset(seed=7))).all()
+
+
 def test_nobody_acts_after_the_end():
     _, policy = policy_for("skirmish")
     assert policy.numpy_policy()({}) == {}
@@ -80,7 +103,7 @@ def test_mistakes_are_told_in_one_line():
     _, by_agent = policy_for("hetero", Mlp(actor_hidden=(32,), sharing="none"))
     seen, _ = parallel_env("hetero").reset()
     flat, infos = parallel_env("hetero", observation="paper").reset()
-    one = seen["uav_0"]
+    one, vector = seen["uav_0"], parallel_env("hetero", layout="flat").reset()[0]["uav_0"]
     for call, message in [
         (lambda: policy.numpy_policy()({"view": one["view"]}), "must have action_mask, picture, self, got view"),
         (
@@ -89,6 +112,14 @@ def test_mistakes_are_told_in_one_line():
         ),
         (lambda: policy.numpy_policy()({**one, "view": one["view"] / 255}), "view must be uint8 of shape .* float64"),
         (lambda: policy.numpy_policy()(flat["uav_0"]), "observation must be a dict of picture, self, view"),
+        (
+            lambda: policy.numpy_policy()({"uav_0": {**vector, "observation": vector["observation"][1:]}}),
+            r"observation of uav_0 must be float32 of shape \[..., 1545\], got float32 \[1544\]",
+        ),
+        (
+            lambda: policy.numpy_policy()({"observation": vector["observation"]}),
+            "observation must have action_mask, got observation, picture, self, view",
+        ),
         (lambda: of_paper.numpy_policy()(flat), "info of .* must have action_mask"),
         (lambda: of_paper.numpy_policy()(flat["uav_0"], infos["uav_0"]), "a network for each role"),
         (lambda: by_agent.numpy_policy()(one), "a network for each of .* agents: .* got 1"),

@@ -72,8 +72,9 @@ def test_people_may_play(monkeypatch):
 
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     taken = []
-    pressed = iter([*[pygame.event.Event(pygame.KEYDOWN, key=ord(" "))] * 2, pygame.event.Event(pygame.QUIT)])
-    monkeypatch.setattr(pygame.event, "get", lambda: [next(pressed)])
+    space, end = pygame.event.Event(pygame.KEYDOWN, key=ord(" ")), pygame.event.Event(pygame.QUIT)
+    events = iter([[space], [], [end]])
+    monkeypatch.setattr(pygame.event, "get", lambda: next(events))
     env = gymnasium.make("Wildfire-v0", horizon=5, render_mode="rgb_array")
     play(env, fps=1000, noop=10, callback=lambda before, after, action, *rest: taken.append(action))
     assert taken == [8, 8]

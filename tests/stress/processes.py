@@ -13,6 +13,7 @@ TINY = (
     "n_worlds=4",
     "collector.steps=8",
     "evaluation.episodes=4",
+    "checkpoint.minutes=0",
     "evaluation.mode=sampled",
     "algorithm.minibatch_size=16",
     "model.actor_hidden=[16]",

@@ -9,7 +9,6 @@ pytestmark = pytest.mark.stress
 
 INVALID = [
     *(override for override, _ in MISTAKES),
-    "seed=-1",
     "seed=true",
     "seed=null",
     "n_worlds=4097",
@@ -105,6 +104,7 @@ INVALID = [
     "-m seed=0,1 n_worlds=0",
     "resume=/no/such/run",
     "resume=. seed=3",
+    "resume=. ++total_frames=3",
     "policy=greedy",
     "fire._target_=builtins.eval",
     "reward._target_=warp_torchrl.world.fire.Fire2",
@@ -113,6 +113,7 @@ INVALID = [
 VALID = [
     "",
     "seed=243",
+    "seed=2147483648",
     "n_worlds=4096",
     "total_frames=1",
     "horizon=1",

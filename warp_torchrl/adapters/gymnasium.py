@@ -9,7 +9,7 @@ import torch
 from gymnasium import spaces
 
 from warp_torchrl.adapters.screen import FRAMES_PER_SECOND, Screen
-from warp_torchrl.adapters.worlds import Seen, Worlds, action_number, observation_space
+from warp_torchrl.adapters.worlds import Seen, Worlds, action_number
 
 RENDER_MODES = ("rgb_array",)
 KEYS = {"w": 0, "e": 1, "d": 2, "c": 3, "x": 4, "z": 5, "a": 6, "q": 7, " ": 8, "f": 9, "s": 10}
@@ -28,14 +28,16 @@ class FireExtinguishingEnv(gymnasium.Env[Observation, int]):
         seed: Of the world; None draws one at the first reset, so that copies made before differ.
         render_mode: ``rgb_array`` or None; ``gymnasium.make`` makes a window of it, ``human``, by Gymnasium's
             ``HumanRendering``, which needs pygame.
+        layout: ``dict``; or ``flat``, in every preset ``observation``, one float32 vector, beside ``action_mask``: the
+            entries in the order of their names, bytes divided by 255.
         device: Where the world lives; observations come back as numpy.
         overrides: In the command line's grammar, ``["fire=paper", "horizon=64"]``.
         more: Further overrides by name, ``observation="paper"``.
 
     Raises:
         ConfigError: A ``ValueError``, with key, value and rule; a ``TypeError`` too where a name is no key.
-        ValueError: If the team has more than one agent, the render mode is unknown, or the seed is no whole number in
-            0..2**62.
+        ValueError: If the team has more than one agent, the render mode or the layout is unknown, or the seed is no
+            whole number in 0..2**62.
     """
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": FRAMES_PER_SECOND}  # noqa: RUF012
@@ -48,15 +50,18 @@ class FireExtinguishingEnv(gymnasium.Env[Observation, int]):
         *,
         seed: int | None = None,
         render_mode: str | None = None,
+        layout: str = "dict",
         device: torch.device | str = "cpu",
         overrides: Sequence[str] = (),
         **more: object,
     ) -> None:
-        self._worlds = Worlds(scenario, n_worlds=1, seed=seed, device=device, overrides=overrides, more=more)
+        self._worlds = Worlds(
+            scenario, n_worlds=1, seed=seed, layout=layout, device=device, overrides=overrides, more=more
+        )
         check_alone(self._worlds, scenario)
         self.render_mode = render_mode
         self._screen = Screen(self._worlds.picture, render_mode, RENDER_MODES, f"{scenario} (warp_torchrl)")
-        self.observation_space = observation_space(self._worlds.env)
+        self.observation_space = self._worlds.observation_space
         self.action_space = spaces.Discrete(self._worlds.n_actions)
         self._mask = np.ones(self._worlds.n_actions, dtype=bool)
 

@@ -11,7 +11,7 @@ from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
 from warp_torchrl.adapters.screen import FRAMES_PER_SECOND, Screen
-from warp_torchrl.adapters.worlds import Seen, Worlds, action_number, observation_space, state_space
+from warp_torchrl.adapters.worlds import Seen, Worlds, action_number
 
 RENDER_MODES = ("human", "rgb_array")
 Observation = np.ndarray | dict[str, np.ndarray]
@@ -30,6 +30,8 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
         seed: Of the world; None draws one at the first reset, so that copies made before differ.
         render_mode: ``rgb_array``; or ``human``, which follows every step: a window where there are a display and
             pygame, else pictures in the terminal.
+        layout: ``dict``; or ``flat``, in every preset ``observation``, one float32 vector, beside ``action_mask``: the
+            entries in the order of their names, bytes divided by 255.
         device: Where the world lives; observations come back as numpy.
         max_cycles: Steps to an episode, ``horizon``; None leaves the scenario's.
         overrides: In the command line's grammar, ``["fire=paper", "team.n_agents=3"]``.
@@ -44,7 +46,7 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
 
     Raises:
         ConfigError: A ``ValueError``, with key, value and rule; a ``TypeError`` too where a name is no key.
-        ValueError: If the render mode is unknown or the seed is no whole number in 0..2**62.
+        ValueError: If the render mode or the layout is unknown or the seed is no whole number in 0..2**62.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
@@ -60,21 +62,24 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
         *,
         seed: int | None = None,
         render_mode: str | None = None,
+        layout: str = "dict",
         device: torch.device | str = "cpu",
         max_cycles: int | None = None,
         overrides: Sequence[str] = (),
         **more: object,
     ) -> None:
         more = more if max_cycles is None else {**more, "horizon": max_cycles}
-        self._worlds = Worlds(scenario, n_worlds=1, seed=seed, device=device, overrides=overrides, more=more)
+        self._worlds = Worlds(
+            scenario, n_worlds=1, seed=seed, layout=layout, device=device, overrides=overrides, more=more
+        )
         self.render_mode = render_mode
         self._screen = Screen(self._worlds.picture, render_mode, RENDER_MODES, f"{scenario} (warp_torchrl)")
         env = self._worlds.env
         self.possible_agents = list(env.agent_names)
         self.agents: list[str] = []
-        self.observation_spaces = {name: observation_space(env) for name in self.possible_agents}
+        self.observation_spaces = {name: self._worlds.observation_space for name in self.possible_agents}
         self.action_spaces = {name: spaces.Discrete(self._worlds.n_actions) for name in self.possible_agents}
-        self.state_space = state_space(env)
+        self.state_space = self._worlds.state_space
         self._np_random: np.random.Generator | None = None
 
     def observation_space(self, agent: str) -> spaces.Box | spaces.Dict:

@@ -11,7 +11,7 @@ from gymnasium.vector.utils import batch_space
 
 from warp_torchrl.adapters.gymnasium import Observation, check_alone
 from warp_torchrl.adapters.screen import FRAMES_PER_SECOND
-from warp_torchrl.adapters.worlds import Seen, Worlds, observation_space, whole_number
+from warp_torchrl.adapters.worlds import Seen, Worlds, whole_number
 
 
 class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
@@ -28,14 +28,16 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
         seed: World i draws with ``seed + i``; None draws a seed at the first reset, so that copies made before differ.
         render_mode: ``rgb_array`` or None.
         autoreset_mode: ``NEXT_STEP`` or ``SAME_STEP``, or its value, ``"SameStep"``.
+        layout: ``dict``; or ``flat``, in every preset ``observation``, one float32 vector, beside ``action_mask``: the
+            entries in the order of their names, bytes divided by 255.
         device: Where the worlds live; observations come back as numpy.
         overrides: In the command line's grammar.
         more: Further overrides by name.
 
     Raises:
         ConfigError: A ``ValueError``, with key, value and rule; a ``TypeError`` too where a name is no key.
-        ValueError: If ``num_envs`` is not positive, the team has more than one agent, a mode is unknown, or the seed
-            is no whole number in 0..2**62.
+        ValueError: If ``num_envs`` is not positive, the team has more than one agent, a mode or the layout is unknown,
+            or the seed is no whole number in 0..2**62.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012
@@ -52,6 +54,7 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
         seed: int | None = None,
         render_mode: str | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        layout: str = "dict",
         device: torch.device | str = "cpu",
         overrides: Sequence[str] = (),
         **more: object,
@@ -62,11 +65,13 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
         if mode not in ("NextStep", "SameStep"):
             raise ValueError(f"autoreset_mode must be NextStep or SameStep, got {mode!r}")
         num_envs = whole_number("num_envs", num_envs)
-        self._worlds = Worlds(scenario, n_worlds=num_envs, seed=seed, device=device, overrides=overrides, more=more)
+        self._worlds = Worlds(
+            scenario, n_worlds=num_envs, seed=seed, layout=layout, device=device, overrides=overrides, more=more
+        )
         check_alone(self._worlds, scenario)
         self.num_envs, self.render_mode = num_envs, render_mode
         self.metadata = {**self.metadata, "autoreset_mode": AutoresetMode(mode)}
-        self.single_observation_space = observation_space(self._worlds.env)
+        self.single_observation_space = self._worlds.observation_space
         self.single_action_space = spaces.Discrete(self._worlds.n_actions)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)

@@ -12,7 +12,10 @@ from tensordict import TensorDict, TensorDictBase
 
 from warp_torchrl.api import make_env
 from warp_torchrl.construction import ConfigError, UnknownKeyError
-from warp_torchrl.env import WildfireEnv
+from warp_torchrl.flat import FLAT, flattened
+
+LAYOUTS = ("dict", "flat")
+"""An agent's observation as its entries by name, or as one vector beside its mask."""
 
 
 class Seen(NamedTuple):
@@ -24,13 +27,15 @@ class Seen(NamedTuple):
     terminated: np.ndarray  # bool [B]
     truncated: np.ndarray  # bool [B]
     info: dict[str, np.ndarray]  # float64 [B] each
+    layout: str
 
     def of_agent(self, world: int | slice, agent: int) -> np.ndarray | dict[str, np.ndarray]:
         """Return one agent's observation, as its space has it."""
-        if "" in self.observation:
-            return self.observation[""][world, agent]
         entries = {name: value[world, agent] for name, value in self.observation.items()}
-        return {**entries, "action_mask": self.action_mask[world, agent]}
+        mask = self.action_mask[world, agent]
+        if self.layout == "flat":
+            return {FLAT: flattened(entries, n_batch=mask.ndim - 1), "action_mask": mask}
+        return entries.get("", {**entries, "action_mask": mask})
 
     def info_of_agent(self, world: int | slice, agent: int) -> dict[str, np.ndarray]:
         """Return the world's metrics, and the agent's mask where its observation has none.
@@ -38,7 +43,8 @@ class Seen(NamedTuple):
         It is never in both: TorchRL's ``PettingZooWrapper`` then fails.
         """
         info = {name: value[world] for name, value in self.info.items()}
-        return {**info, "action_mask": self.action_mask[world, agent]} if "" in self.observation else info
+        has_mask = self.layout == "flat" or "" not in self.observation
+        return info if has_mask else {**info, "action_mask": self.action_mask[world, agent]}
 
 
 class UnknownKeywordError(ConfigError, TypeError):
@@ -52,13 +58,14 @@ class Worlds:
         scenario: One of ``conf/scenario``.
         n_worlds: B.
         seed: World i draws with ``seed + i``; None draws a seed at the first reset, so that copies made before differ.
+        layout: ``dict`` or ``flat``.
         device: Where the worlds live.
         overrides: In the command line's grammar.
         more: Further overrides by name.
 
     Raises:
         ConfigError: A ``ValueError``, with key, value and rule; a ``TypeError`` too where a name is no key.
-        ValueError: If the seed is not a whole number in 0..2**62.
+        ValueError: If the seed is not a whole number in 0..2**62, or the layout is unknown.
     """
 
     def __init__(
@@ -67,10 +74,14 @@ class Worlds:
         *,
         n_worlds: int,
         seed: int | None,
+        layout: str,
         device: torch.device | str,
         overrides: Sequence[str],
         more: Mapping[str, object],
     ) -> None:
+        if layout not in LAYOUTS:
+            raise ValueError(f"layout must be {' or '.join(LAYOUTS)}, got {layout!r}")
+        self._layout = layout
         named = [f"{name}={written(name, value)}" for name, value in more.items()]
         first = None if seed is None else whole_number("seed", seed)
         try:
@@ -82,6 +93,27 @@ class Worlds:
                 raise
             raise UnknownKeywordError(f"got an unexpected keyword argument {error.key!r}: {error}") from None
         self._now: TensorDictBase | None = None
+
+    @property
+    def observation_space(self) -> spaces.Box | spaces.Dict:
+        """Return a new space of one agent's observation: one Box in preset ``paper``, else a flat Dict with its mask.
+
+        In layout ``flat`` it is one Box and the mask in every preset.
+        """
+        bounds = {name: space.bounds() for name, space in self.env.observation.spaces(self.env.world).items()}
+        ends = [{name: bound[end].numpy() for name, bound in bounds.items()} for end in (0, 1)]
+        if self._layout == "flat":
+            ends = [{FLAT: flattened(end)} for end in ends]
+        low, high = ends
+        boxes = {name: spaces.Box(low[name], high[name], dtype=low[name].dtype.type) for name in low}
+        mask = spaces.Box(0, 1, (self.n_actions,), np.int8)
+        return boxes[""] if "" in boxes else spaces.Dict({**boxes, "action_mask": mask})
+
+    @property
+    def state_space(self) -> spaces.Box:
+        """Return a new space of a world's central state."""
+        space = self.env.full_observation_spec_unbatched["state"].space
+        return spaces.Box(space.low.numpy(force=True), space.high.numpy(force=True))
 
     @property
     def n_actions(self) -> int:
@@ -168,26 +200,8 @@ class Worlds:
             terminated=self.now["terminated"][:, 0].numpy(force=True),
             truncated=self.now["truncated"][:, 0].numpy(force=True),
             info=dict(zip(info.keys(), rows)),
+            layout=self._layout,
         )
-
-
-def observation_space(env: WildfireEnv) -> spaces.Box | spaces.Dict:
-    """Return the space of one agent's observation: one Box in preset ``paper``, else a flat Dict with its mask."""
-    named = env.observation.spaces(env.world)
-    boxes = {name: _box(*space.bounds()) for name, space in named.items()}
-    if "" in boxes:
-        return boxes[""]
-    return spaces.Dict({**boxes, "action_mask": spaces.Box(0, 1, (env.world.team.n_actions,), np.int8)})
-
-
-def state_space(env: WildfireEnv) -> spaces.Box:
-    """Return the space of a world's central state."""
-    spec = env.full_observation_spec_unbatched["state"]
-    return _box(spec.space.low, spec.space.high)
-
-
-def _box(low: torch.Tensor, high: torch.Tensor) -> spaces.Box:
-    return spaces.Box(low.numpy(force=True), high.numpy(force=True), dtype=low.numpy(force=True).dtype.type)
 
 
 def action_number(name: str, action: object, n_actions: int) -> int:
