@@ -173,7 +173,7 @@ def test_training_does_not_replace_an_evaluation(run_here, tmp_path):
 @pytest.mark.parametrize(
     ("wrong", "expected", "message"),
     [
-        ("observation.radius=4", 2, "view [11, 9, 9] and 11"),
+        ("observation.radius=4", 2, "this environment shows [11, 9, 9]"),
         ("evaluation.episodes=0", 2, "evaluation.episodes must be"),
         ("evaluation.first_seed=-1", 2, "evaluation.first_seed must be"),
         ("device=cuda:99", 2, "device must be one of"),
