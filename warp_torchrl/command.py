@@ -31,7 +31,7 @@ from warp_torchrl.failure import fail
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.settings import COMPONENTS, settings
 from warp_torchrl.signals import Stopped, obeyed
-from warp_torchrl.sweep import SweepSummary, jobs, note_failure
+from warp_torchrl.sweep import SweepSummary, conclude_early, forget_failure, jobs, note_failure
 from warp_torchrl.training import Training
 from warp_torchrl.transfer import check_start
 
@@ -159,6 +159,7 @@ def _start_hydra(name: str, job: Callable[[DictConfig], None], arguments: list[s
     sys.argv[1:] = sorted(arguments, key=lambda each: each not in _MULTIRUN)  # Hydra wants -m before the overrides
 
     def guarded(config: DictConfig) -> None:
+        forget_failure()
         try:
             job(config)
         except Exception as error:
@@ -167,7 +168,11 @@ def _start_hydra(name: str, job: Callable[[DictConfig], None], arguments: list[s
                 sys.exit(code)
             note_failure(code, line)  # the other jobs go on
 
-    hydra.main(version_base="1.3", config_path=str(conf_folder()), config_name=name)(guarded)()
+    try:
+        hydra.main(version_base="1.3", config_path=str(conf_folder()), config_name=name)(guarded)()
+    except Exception:
+        conclude_early()
+        raise
 
 
 def _check_first(name: str, arguments: Sequence[str]) -> None:

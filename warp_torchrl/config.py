@@ -23,7 +23,7 @@ from omegaconf.errors import OmegaConfBaseException
 from warp_torchrl.construction import ConfigError
 from warp_torchrl.settings import COMPONENTS, WORLD_KEYS
 
-OmegaConf.register_new_resolver("pid", os.getpid, replace=True)
+OmegaConf.register_new_resolver("pid", os.getpid, replace=True, use_cache=True)  # a sweep's jobs get its own process's
 HYDRA_ERRORS = (HydraException, OmegaConfBaseException)
 """What Hydra raises where a configuration has a mistake."""
 
