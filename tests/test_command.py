@@ -101,6 +101,14 @@ def test_evaluate_repeats_what_training_found(trained, run_here, tmp_path):
     assert (tmp_path / "seen" / "episode.gif").exists()
 
 
+@pytest.mark.parametrize("given", [("policy=null",), ("policy=null", "scenario=single")])
+def test_a_policy_of_null_is_none(trained, run_here, given):
+    what = (f"checkpoint={trained[0]}", "evaluation.episodes=2", "horizon=8")
+    code, errors, said = run_here("evaluate.py", *what, *given)
+    assert code == 0, errors
+    assert "trained" in said
+
+
 def test_evaluate_takes_another_scenario_for_the_same_policy(trained, run_here):
     what = (f"checkpoint={trained[0]}", "scenario=single", "evaluation.episodes=3", "horizon=12")
     code, errors, said = run_here("evaluate.py", *what)
@@ -310,9 +318,7 @@ def test_the_experiment_of_all_algorithms_is_a_sweep(tmp_path, run_here):
         pytest.param("train.py", "submitit", marks=pytest.mark.slow),
     ],
 )
-def test_jobs_in_processes_of_their_own_end_in_one_folder_and_the_one_that_failed_is_named(
-    tmp_path, program, launcher
-):
+def test_jobs_in_processes_of_their_own_end_in_one_folder_and_the_one_that_failed_is_named(tmp_path, program, launcher):
     pytest.importorskip(f"hydra_plugins.hydra_{launcher}_launcher")
     option = {"joblib": "joblib", "submitit": "submitit_local"}[launcher]
     what = ["policy=noop", "landscape.size=12"] if program == "evaluate.py" else [*TINY, "total_frames=32"]
@@ -372,6 +378,12 @@ MISTAKES = [
     (("train.py", "resume=nowhere"), 4, "nowhere is not a run folder"),
     (("evaluate.py",), 2, "give either checkpoint=PATH or policy=NAME"),
     (("evaluate.py", "policy=genius"), 2, "policy must be one of"),
+    (("evaluate.py", "policy=gredy"), 2, "did you mean greedy?"),
+    (("train.py", "--total_frames", "1000"), 2, "keys are given as total_frames=1000"),
+    (("train.py", "total_frames", "1000"), 2, "keys are given as total_frames=1000"),
+    (("train.py", "hydra.run.dir=/a=b"), 2, "quote it, \"hydra.run.dir='/a=b'\""),
+    (("train.py", "hydra.run.dri=a"), 2, "hydra.run.dri is not a key"),
+    (("train.py", "hydra/launcher=jobli"), 2, "hydra/launcher must be one of basic"),
     (("evaluate.py", "checkpoint=nowhere"), 4, "nowhere"),
 ]
 

@@ -28,7 +28,9 @@ from warp_torchrl.config import (
 )
 from warp_torchrl.construction import ConfigError
 from warp_torchrl.failure import fail
+from warp_torchrl.grammar import check_flags, check_overrides
 from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.settings import COMPONENTS, settings
 from warp_torchrl.signals import Stopped, obeyed
 from warp_torchrl.sweep import SweepSummary, conclude_early, forget_failure, jobs, note_failure
@@ -114,9 +116,13 @@ def _evaluate_job(config: DictConfig) -> None:
         assess(settings(_without_checkpoint(config)), folder, name, world_overrides(plain(config)))
         return
     found = _newest(given)
-    overrides = [each for each in HydraConfig.get().overrides.task if not each.startswith(("checkpoint=", "policy="))]
-    values = plain(recompose(found.record(), overrides))
+    values = plain(recompose(found.record(), _of_worlds(HydraConfig.get().overrides.task)))
     assess(settings(values), folder, found, world_overrides(values))
+
+
+def _of_worlds(overrides: Sequence[str]) -> list[str]:
+    """Return the overrides of an evaluation that are not the command's own."""
+    return [each for each in overrides if not each.startswith(("checkpoint=", "policy="))]
 
 
 # What a run folder records
@@ -177,10 +183,12 @@ def _start_hydra(name: str, job: Callable[[DictConfig], None], arguments: list[s
 
 def _check_first(name: str, arguments: Sequence[str]) -> None:
     """Compose and check every job of the command line before the first run folder is made."""
+    check_flags(arguments)
     overrides = [each for each in arguments if not each.startswith("-")]
     flags = [each for each in arguments if each.startswith("-")]
     if any(flag not in _MULTIRUN for flag in flags):
         return  # Hydra's own flags (--help, --cfg, --config-dir ...) are Hydra's business
+    check_overrides(overrides)
     own = [each for each in overrides if not each.startswith("hydra")]
     for job in jobs(own) if flags or is_sweep(name, own) else [own]:
         config = compose_config(name, job)
@@ -211,12 +219,13 @@ def _check_evaluation(config: DictConfig, overrides: Sequence[str]) -> None:
     if (config.checkpoint is None) == (config.policy is None):
         raise ConfigError("give either checkpoint=PATH or policy=NAME")
     if config.policy is not None and config.policy not in HEURISTICS:
-        raise ConfigError(f"policy must be one of {', '.join(HEURISTICS)}, got {config.policy}")
+        hint = did_you_mean(config.policy, HEURISTICS)
+        raise ConfigError(f"policy must be one of {', '.join(HEURISTICS)}, got {config.policy}{hint}")
     if config.checkpoint is None:
         settings(_without_checkpoint(config))
         return
     found, _ = checkpoints.newest(Path(str(config.checkpoint)))
-    settings(plain(recompose(found.record(), [each for each in overrides if not each.startswith("checkpoint=")])))
+    settings(plain(recompose(found.record(), _of_worlds(overrides))))
 
 
 def _with_run_folder(arguments: Sequence[str]) -> list[str]:
