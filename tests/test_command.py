@@ -122,6 +122,13 @@ def test_a_policy_is_refused_where_it_does_not_fit(trained, run_here):
     assert "view [11, 11, 11]" in errors[-1] and "view [11, 9, 9]" in errors[-1]
 
 
+def test_evaluate_takes_a_policy_that_ships_by_its_name(tmp_path, run_here):
+    what = ("checkpoint=skirmish", "horizon=12", "evaluation.episodes=2", "hydra.run.dir=seen")
+    code, errors, _ = run_here("evaluate.py", *what)
+    assert code == 0, errors
+    assert json.loads((tmp_path / "seen" / "evaluation.json").read_text())["scenario"] == "skirmish"
+
+
 def test_evaluate_takes_a_policy_by_name(tmp_path, run_here):
     arguments = ("policy=local", "scenario=skirmish", "horizon=12", "evaluation.episodes=4", "hydra.run.dir=seen")
     code, errors, _ = run_here("evaluate.py", *arguments)
@@ -384,6 +391,9 @@ MISTAKES = [
     (("train.py", "hydra.run.dir=/a=b"), 2, "quote it, \"hydra.run.dir='/a=b'\""),
     (("train.py", "hydra.run.dri=a"), 2, "hydra.run.dri is not a key"),
     (("train.py", "hydra/launcher=jobli"), 2, "hydra/launcher must be one of basic"),
+    (("train.py", "resume=default"), 4, "default is not a run folder"),
+    (("train.py", "start_from=default"), 4, "holds a policy alone"),
+    (("evaluate.py", "checkpoint=skirmsh"), 4, "policies default, single, skirmish: did you mean skirmish?"),
     (("evaluate.py", "checkpoint=nowhere"), 4, "nowhere"),
 ]
 

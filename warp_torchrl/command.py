@@ -32,6 +32,7 @@ from warp_torchrl.grammar import check_flags, check_overrides
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.settings import COMPONENTS, settings
+from warp_torchrl.shipped import find_policy
 from warp_torchrl.signals import Stopped, obeyed
 from warp_torchrl.sweep import SweepSummary, conclude_early, forget_failure, jobs, note_failure
 from warp_torchrl.training import Training
@@ -77,7 +78,7 @@ def _start(folder: Path, config: DictConfig) -> None:
     record = Record(choices=_choices(), values=_values(config))
     training = Training(settings(plain(config)), record, folder)
     if config.start_from is not None:
-        training.start_from(_newest(config.start_from))
+        training.start_from(_newest(find_policy(config.start_from)))
     _finish(training, world_overrides(plain(config)))
 
 
@@ -115,7 +116,7 @@ def _evaluate_job(config: DictConfig) -> None:
     if given is None:
         assess(settings(_without_checkpoint(config)), folder, name, world_overrides(plain(config)))
         return
-    found = _newest(given)
+    found = _newest(find_policy(given))
     values = plain(recompose(found.record(), _of_worlds(HydraConfig.get().overrides.task)))
     assess(settings(values), folder, found, world_overrides(values))
 
@@ -203,7 +204,7 @@ def _check_training(config: DictConfig, overrides: Sequence[str]) -> None:
         plan = settings(plain(config))
         plan.check_training()
         if config.start_from is not None:
-            check_start(plan, checkpoints.newest(config.start_from)[0])
+            check_start(plan, checkpoints.newest(find_policy(config.start_from))[0])
         return
     others = [each for each in overrides if each.split("=")[0] not in ("resume", "debug")]
     if others:
@@ -224,7 +225,7 @@ def _check_evaluation(config: DictConfig, overrides: Sequence[str]) -> None:
     if config.checkpoint is None:
         settings(_without_checkpoint(config))
         return
-    found, _ = checkpoints.newest(Path(str(config.checkpoint)))
+    found, _ = checkpoints.newest(find_policy(str(config.checkpoint)))
     settings(plain(recompose(found.record(), _of_worlds(overrides))))
 
 
