@@ -19,19 +19,25 @@ READS_STATE = [
 ]
 
 
-def imports(module: str) -> set[str]:
-    """Every module that a file imports, ours without the package's name and with slashes."""
+def named(module: str) -> set[str]:
+    """Every module that a file imports."""
     found = set()
     for node in ast.walk(ast.parse(FILES[module].read_text())):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
-    return {name.removeprefix("warp_torchrl.").replace(".", "/") for name in found}
+    return found
+
+
+def imports(module: str) -> set[str]:
+    """The same, ours without the package's name and with slashes."""
+    return {name.removeprefix("warp_torchrl.").replace(".", "/") for name in named(module)}
 
 
 def ours(module: str) -> set[str]:
-    return imports(module) & set(MODULES)
+    own = (name for name in named(module) if name.startswith("warp_torchrl."))  # Python has a module logging too
+    return {name.removeprefix("warp_torchrl.").replace(".", "/") for name in own} & set(MODULES)
 
 
 @pytest.mark.parametrize("module", [name for name in MODULES if name.startswith("world/")])
