@@ -114,7 +114,7 @@ def test_adaptive_by_hand():
 def test_adaptive_pays_for_the_downwind_half_and_once():
     # Two fires in a row, their centre between them; the wind blows east, so the eastern one is downwind.
     state, world = drawn(["TTTTTTT", "TFTTTFT", "TTTTTTT"] + ["TTTTTTT"] * 4, [[0, 0], [0, 6]])
-    state = state.replace(wind=torch.tensor([4.0, 0.0])[None, :, None, None])
+    state = world.fire.in_wind(state, torch.tensor([4.0, 0.0])[None, :, None, None])
     head = Adaptive(exposed=0.0, contained=0.0)
     west = earned(head, state, world, EXTINGUISH, STAY)[0]
     east = earned(head, state, world, STAY, EXTINGUISH)[0]
