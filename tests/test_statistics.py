@@ -33,6 +33,14 @@ def test_an_interval_leaves_two_and_a_half_percent_out_on_either_side():
     assert bounds == pytest.approx([-1.96, 1.96], abs=0.1)
 
 
+def test_published_intervals_come_again():
+    # The resamples are those of one seed: what an evaluation printed, any other prints of the same episodes.
+    values = np.random.default_rng(6).uniform(size=32)
+    found = summarise(values)
+    assert [round(bound, 6) for bound in found["ci95"]] == [0.373842, 0.576891]
+    assert summarise(values) == found
+
+
 def test_a_paired_difference_is_narrower_than_its_parts():
     luck = np.random.default_rng(3).uniform(size=200)
     better = compare(luck + 0.05, luck)

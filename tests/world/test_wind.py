@@ -84,6 +84,16 @@ def test_a_rotated_field_is_the_paper_field_turned_as_a_whole() -> None:
             assert field[world, :, row, column].tolist() == pytest.approx(wanted, abs=1e-3)
 
 
+def test_fields_are_rotated_alike_to_all_sides() -> None:
+    # 4096 worlds: the mean of a unit vector, and that of one of twice the angle, is 0 +- 1 / (64 sqrt 2) in each
+    # component; five of them, false alarm 2e-6.
+    u, v = Paper(rotate=True)(keys(4096), (5, 7))[:, :, 2, 3].unbind(1)
+    angle = torch.atan2(v, u)
+    for times in (1, 2):
+        mean = torch.stack(((times * angle).cos().mean(), (times * angle).sin().mean()))
+        assert mean.abs().max() < 5 / (64 * math.sqrt(2))
+
+
 def test_each_world_has_its_own_rotation() -> None:
     centre = Paper(rotate=True)(keys(64), (5, 7))[:, :, 2, 3]
     torch.testing.assert_close(centre.norm(dim=1), torch.full((64,), math.sqrt(1.01)))
