@@ -244,8 +244,9 @@ def test_what_somebody_else_removes_meanwhile_is_gone_and_no_error(tmp_path, mon
 
 
 def test_a_run_folder_has_one_writer(tmp_path):
-    lock = RunFolderLock(tmp_path / "run")
+    run = tmp_path / "runs" / "of today"  # neither is there
+    lock = RunFolderLock(run)
     with pytest.raises(RunFolderInUse, match="in use"):
-        RunFolderLock(tmp_path / "run")
+        RunFolderLock(run)
     lock.release()
-    RunFolderLock(tmp_path / "run").release()
+    RunFolderLock(run).release()

@@ -8,6 +8,11 @@ from warp_torchrl.statistics import compare, interquartile_mean, interval, perfo
 
 def test_the_interquartile_mean_is_that_of_the_middle_half():
     assert interquartile_mean(np.array([100.0, 1, 2, 3, 4, 5, 6, -50])) == pytest.approx(3.5)  # 2, 3, 4, 5
+    assert interquartile_mean(np.array([[100.0, 1, 2, -50], [0, 10, 20, 30], [7, 7, 7, 7]])).tolist() == [
+        1.5,
+        15.0,
+        7.0,
+    ]
     scipy = pytest.importorskip("scipy.stats")
     values = np.random.default_rng(1).normal(size=101)
     assert interquartile_mean(values) == pytest.approx(scipy.trim_mean(values, 0.25))
