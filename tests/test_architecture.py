@@ -1,6 +1,7 @@
 """The floors: what may import what."""
 
 import ast
+import re
 import sys
 from pathlib import Path
 
@@ -124,3 +125,31 @@ def test_nothing_reads_pickles(module):
     assert "weights_only=False" not in source and "allow_pickle=True" not in source
     assert "pickle" not in {name.split("/")[0] for name in imports(module)}
     assert source.count("torch.load(") == source.count("weights_only=True, map_location")
+
+
+def test_who_changes_a_wind_changes_what_follows_from_it():
+    # replace(wind=...) alone leaves the fire in the wind that was: a test that does it tests another wind. These may:
+    # `in_wind` itself, what hands the worlds to `set_state`, which sees to it, and a picture, in which nothing burns.
+    tests = {"tests/test_env.py", "tests/test_frame.py", "tests/test_render.py"}
+    root = PACKAGE.parent
+    files = [*PACKAGE.rglob("*.py"), *(root / "tests").rglob("*.py"), *(root / "docs").rglob("*.md")]
+    by_hand = re.compile(r"\.replace\((?:[^()]|\([^()]*\))*\bwind=")
+    found = {path.relative_to(root).as_posix() for path in files if by_hand.search(path.read_text())}
+    assert found == {"warp_torchrl/world/fire.py", *tests}
+
+
+COMPONENTS = [
+    each for each in MODULES if each.split("/")[0] in ("world", "observation", "reward", "models", "algorithms")
+]
+
+
+@pytest.mark.parametrize("module", [*COMPONENTS, "checkpoint"])
+def test_fields_are_those_of_frozen_dataclasses(module):
+    # But for batches of tensors, which steps fill in, and learners, which hold what they train.
+    mutable = {"world/batch", "world/state", "world/burn", "algorithms/learner"}
+    for node in ast.walk(ast.parse(FILES[module].read_text())):
+        if isinstance(node, ast.ClassDef) and any(isinstance(each, ast.AnnAssign) for each in node.body):
+            made = [ast.unparse(each) for each in node.decorator_list if ast.unparse(each).startswith("dataclass(")]
+            plain = {ast.unparse(each) for each in node.bases} & {"NamedTuple", "Protocol", "TypedDict"}
+            assert plain or made, f"{node.name} has fields and is no dataclass"
+            assert plain or module in mutable or "frozen=True" in made[0], f"{node.name} can be changed"

@@ -38,7 +38,7 @@ def test_division_is_what_chance_does_not_explain():
 def test_acts_downwind_attack_the_head_and_shared_targets_are_contested():
     # Fires in the west and the east of a centre between them; the wind blows east.
     state, world = drawn(["TTTTTTT", "TFTTTFT", "TTTTTTT", "TTTTTTT"], [[0, 6], [0, 6], [0, 0]])
-    state = state.replace(wind=torch.tensor([4.0, 0.0])[None, :, None, None])
+    state = world.fire.in_wind(state, torch.tensor([4.0, 0.0])[None, :, None, None])
     watched = Behaviour(state)
     watched(world.step(state, torch.tensor([[EXTINGUISH, EXTINGUISH, STAY]])))
     found = watched.summary()

@@ -552,7 +552,9 @@ def test_with_four_neighbours_no_fire_goes_across_a_corner() -> None:
 def test_a_chance_does_not_depend_on_the_batch(wind: Wind) -> None:
     fire = Fire(beta=0.65)
     state = draw(CELLS, ground=GROUND, fire=fire, elevation=METRES, worlds=65)
-    state = state.replace(wind=wind(state.key, (5, 6)))
+    calm = chance(fire, state)
+    state = fire.in_wind(state, wind(state.key, (5, 6)))
     q = chance(fire, state)
+    assert (q != calm).flatten(1).any(dim=1).all()
     for world in (0, 7, 64):
         assert torch.equal(q[world : world + 1], chance(fire, state[world : world + 1]))
