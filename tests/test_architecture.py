@@ -13,26 +13,32 @@ FILES = {
     for path in PACKAGE.rglob("*.py")
 }
 MODULES = sorted(FILES)
-GROUND = ("validation",)
-"""What knows nothing of ours and every floor may use."""
+GROUND = ("nearest", "validation")
+"""What knows nothing of ours but each other, and every floor may use."""
 READS_STATE = [
     each for each in MODULES if each.split("/")[0] in ("observation", "reward", "metrics", "render", "behaviour")
 ]
 
 
-def imports(module: str) -> set[str]:
-    """Every module that a file imports, ours without the package's name and with slashes."""
+def named(module: str) -> set[str]:
+    """Every module that a file imports."""
     found = set()
     for node in ast.walk(ast.parse(FILES[module].read_text())):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
-    return {name.removeprefix("warp_torchrl.").replace(".", "/") for name in found}
+    return found
+
+
+def imports(module: str) -> set[str]:
+    """The same, ours without the package's name and with slashes."""
+    return {name.removeprefix("warp_torchrl.").replace(".", "/") for name in named(module)}
 
 
 def ours(module: str) -> set[str]:
-    return imports(module) & set(MODULES)
+    own = (name for name in named(module) if name.startswith("warp_torchrl."))  # Python has a module logging too
+    return {name.removeprefix("warp_torchrl.").replace(".", "/") for name in own} & set(MODULES)
 
 
 @pytest.mark.parametrize("module", [name for name in MODULES if name.startswith("world/")])
@@ -44,8 +50,8 @@ def test_the_world_knows_torch_and_itself(module):
 
 @pytest.mark.parametrize("module", GROUND)
 def test_the_ground_floor_knows_the_standard_library_alone(module):
-    assert not ours(module)
-    assert {name.split("/")[0] for name in imports(module)} <= sys.stdlib_module_names
+    assert all(name in GROUND for name in ours(module))
+    assert {name.split("/")[0] for name in imports(module)} - set(GROUND) <= sys.stdlib_module_names
 
 
 @pytest.mark.parametrize("module", READS_STATE)
@@ -103,7 +109,7 @@ def test_adapters_are_views_that_nothing_needs(module):
 
 @pytest.mark.parametrize("module", MODULES)
 def test_hydra_appears_only_where_configuration_is_composed(module):
-    if module not in ("config", "command", "sweep"):
+    if module not in ("config", "grammar", "command", "sweep"):
         assert not {name.split("/")[0] for name in imports(module)} & {"hydra", "omegaconf"}
 
 
@@ -136,3 +142,20 @@ def test_compilers_are_spoken_of_behind_the_fence_alone(module):
 def test_the_page_of_the_law_takes_no_fast_road(module):
     assert len(FILES["world/law"].read_text().splitlines()) < 150
     assert not {each for each in ours(module) if each.startswith(FENCE)}
+
+
+COMPONENTS = [
+    each for each in MODULES if each.split("/")[0] in ("world", "observation", "reward", "models", "algorithms")
+]
+
+
+@pytest.mark.parametrize("module", [*COMPONENTS, "checkpoint"])
+def test_fields_are_those_of_frozen_dataclasses(module):
+    # But for batches of tensors, which steps fill in, and learners, which hold what they train.
+    mutable = {"world/batch", "world/state", "world/burn", "algorithms/learner"}
+    for node in ast.walk(ast.parse(FILES[module].read_text())):
+        if isinstance(node, ast.ClassDef) and any(isinstance(each, ast.AnnAssign) for each in node.body):
+            made = [ast.unparse(each) for each in node.decorator_list if ast.unparse(each).startswith("dataclass(")]
+            plain = {ast.unparse(each) for each in node.bases} & {"NamedTuple", "Protocol", "TypedDict"}
+            assert plain or made, f"{node.name} has fields and is no dataclass"
+            assert plain or module in mutable or "frozen=True" in made[0], f"{node.name} can be changed"

@@ -238,9 +238,24 @@ def test_a_draft_of_a_killed_save_is_not_a_checkpoint_and_goes_with_the_next(tmp
     assert sorted(each.name for each in (tmp_path / "checkpoints").iterdir()) == ["1", "2"]
 
 
+def test_what_somebody_else_removes_meanwhile_is_gone_and_no_error(tmp_path, monkeypatch):
+    real = shutil.rmtree
+
+    def after_another(path, **options):
+        real(path, ignore_errors=True)
+        real(path, **options)
+
+    monkeypatch.setattr(checkpoints.shutil, "rmtree", after_another)
+    for frames in (1, 2, 3, 4):
+        (tmp_path / "checkpoints" / f".{frames}.tmp").mkdir(parents=True)
+        saved(tmp_path, frames, keep=2)
+    assert sorted(each.name for each in (tmp_path / "checkpoints").iterdir()) == ["3", "4"]
+
+
 def test_a_run_folder_has_one_writer(tmp_path):
-    lock = RunFolderLock(tmp_path / "run")
+    run = tmp_path / "runs" / "of today"  # neither is there
+    lock = RunFolderLock(run)
     with pytest.raises(RunFolderInUse, match="in use"):
-        RunFolderLock(tmp_path / "run")
+        RunFolderLock(run)
     lock.release()
-    RunFolderLock(tmp_path / "run").release()
+    RunFolderLock(run).release()

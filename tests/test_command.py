@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import torch
+from hydra.core.plugins import Plugins
 
 from tests.forgery import forge
 from warp_torchrl import checkpoint, load_policy, make_env
@@ -101,6 +102,14 @@ def test_evaluate_repeats_what_training_found(trained, run_here, tmp_path):
     ours, theirs = (json.loads((where / "evaluation.json").read_text()) for where in (tmp_path / "seen", run))
     assert ours["episodes"] == theirs["episodes"] and ours["versus"] == theirs["versus"]
     assert (tmp_path / "seen" / "episode.gif").exists()
+
+
+@pytest.mark.parametrize("given", [("policy=null",), ("policy=null", "scenario=single")])
+def test_a_policy_of_null_is_none(trained, run_here, given):
+    what = (f"checkpoint={trained[0]}", "evaluation.episodes=2", "horizon=8")
+    code, errors, said = run_here("evaluate.py", *what, *given)
+    assert code == 0, errors
+    assert "trained" in said
 
 
 def test_evaluate_takes_another_scenario_for_the_same_policy(trained, run_here):
@@ -197,6 +206,13 @@ def test_a_mistake_in_an_evaluation_leaves_no_folder(trained, run_here, tmp_path
     code, errors, _ = run_here("evaluate.py", "checkpoint=checkpoints/128", *overrides, "hydra.run.dir=seen")
     assert code == expected and len(errors) == 1 and message in errors[0], errors
     assert [each.name for each in tmp_path.iterdir()] == ["checkpoints"]
+
+
+def test_evaluate_takes_a_policy_that_ships_by_its_name(tmp_path, run_here):
+    what = ("checkpoint=skirmish", "horizon=12", "evaluation.episodes=2", "hydra.run.dir=seen")
+    code, errors, _ = run_here("evaluate.py", *what)
+    assert code == 0, errors
+    assert json.loads((tmp_path / "seen" / "evaluation.json").read_text())["scenario"] == "skirmish"
 
 
 def test_evaluate_takes_a_policy_by_name(tmp_path, run_here):
@@ -471,26 +487,62 @@ def test_the_experiment_of_all_algorithms_is_a_sweep(tmp_path, run_here):
     assert "a2c" in (tmp_path / "sweep" / "summary.md").read_text() and (tmp_path / "sweep" / "1").is_dir()
 
 
-def test_a_job_that_fails_beside_others_is_named_at_the_end_and_they_go_on(tmp_path, run_here):
-    pytest.importorskip("hydra_plugins.hydra_joblib_launcher")
-    arguments = (
-        *TINY,
-        "total_frames=32",
-        "horizon=8",
-        "evaluation.episodes=2",
-        "evaluation.mode=sampled",
-        "-m",
-        "seed=0,1",
-        "hydra/launcher=joblib",
-    )
-    (tmp_path / "sweep" / "0" / "checkpoints" / "1").mkdir(parents=True)
-    code, errors, _ = run_here("train.py", *arguments, "hydra.sweep.dir=sweep")
-    assert code == 2
-    *_, last = errors
-    assert last.startswith("error: job 0 (") and "seed=0) failed: " in last and "holds a run already" in last
-    assert "Traceback" not in "".join(errors)
-    assert (tmp_path / "sweep" / "1" / "evaluation.json").exists()
-    assert (tmp_path / "sweep" / "summary.md").exists()
+@pytest.mark.parametrize(
+    ("program", "launcher"),
+    [
+        ("evaluate.py", "joblib"),
+        pytest.param("train.py", "joblib", marks=pytest.mark.slow),
+        pytest.param("train.py", "submitit", marks=pytest.mark.slow),
+    ],
+)
+def test_jobs_in_processes_of_their_own_end_in_one_folder_and_the_one_that_failed_is_named(tmp_path, program, launcher):
+    pytest.importorskip(f"hydra_plugins.hydra_{launcher}_launcher")
+    option = {"joblib": "joblib", "submitit": "submitit_local"}[launcher]
+    what = ["policy=noop", "landscape.size=12"] if program == "evaluate.py" else [*TINY, "total_frames=32"]
+    what += ["horizon=8", "evaluation.episodes=2"]
+    beyond = 2**62 - 1  # a first seed that may be; the second is beyond the last, which only the job finds
+    seeds = f"evaluation.first_seed=7,{beyond},8"
+    done = command(program, *what, "-m", seeds, f"hydra/launcher={option}", folder=tmp_path)
+    assert done.returncode == 2, done.stderr
+    named = [line for line in done.stderr.splitlines() if line.startswith("error: job ")]
+    assert len(named) == 1 and done.stderr.strip().endswith(named[0])
+    assert named[0].startswith("error: job 1 (") and f"first_seed={beyond}) failed: seed must be in" in named[0]
+    assert "Traceback" not in done.stderr
+    (sweep,) = (tmp_path / "multirun").glob("*/*")
+    assert (sweep / "summary.md").read_text().strip() in done.stdout and (sweep / "summary.png").exists()
+    assert [(sweep / job / "evaluation.json").exists() for job in "012"] == [True, False, True]
+
+
+def test_what_an_earlier_sweep_left_of_a_failure_is_forgotten(tmp_path, run_here):
+    (tmp_path / "sweep" / "0").mkdir(parents=True)
+    (tmp_path / "sweep" / "0" / "failed.json").write_text('{"job": 0, "overrides": "", "code": 5, "reason": "old"}')
+    what = ("policy=noop", "landscape.size=12", "horizon=8", "evaluation.episodes=2", "hydra.sweep.dir=sweep")
+    code, errors, _ = run_here("evaluate.py", "-m", *what)
+    assert code == 0, errors
+
+
+def test_a_launcher_that_gives_up_leaves_the_table_and_names_the_jobs_that_did_not_end(tmp_path, run_here, monkeypatch):
+    make = Plugins.instantiate_launcher
+
+    def make_weak(*args, **options):
+        launcher = make(*args, **options)
+        launch = launcher.launch
+
+        def give_up(overrides, initial_job_idx):
+            launch(overrides[:1], initial_job_idx)
+            (tmp_path / "sweep" / "1").mkdir()
+            (tmp_path / "sweep" / "1" / "evaluate.log").touch()
+            raise RuntimeError("a worker was killed")
+
+        launcher.launch = give_up
+        return launcher
+
+    monkeypatch.setattr(Plugins, "instantiate_launcher", make_weak)
+    what = ("policy=noop,greedy", "landscape.size=12", "horizon=8", "evaluation.episodes=2", "hydra.sweep.dir=sweep")
+    code, errors, _ = run_here("evaluate.py", "-m", *what)
+    assert code == 1 and "a worker was killed" in errors[-1]
+    assert errors[-2] == f"error: the job in {Path('sweep', '1')} did not end"
+    assert "noop" in (tmp_path / "sweep" / "summary.md").read_text()
 
 
 MISTAKES = [
@@ -503,6 +555,15 @@ MISTAKES = [
     (("train.py", "resume=nowhere"), 4, "nowhere is not a run folder"),
     (("evaluate.py",), 2, "give either checkpoint=PATH or policy=NAME"),
     (("evaluate.py", "policy=genius"), 2, "policy must be one of"),
+    (("evaluate.py", "policy=gredy"), 2, "did you mean greedy?"),
+    (("train.py", "--total_frames", "1000"), 2, "keys are given as total_frames=1000"),
+    (("train.py", "total_frames", "1000"), 2, "keys are given as total_frames=1000"),
+    (("train.py", "hydra.run.dir=/a=b"), 2, "quote it, \"hydra.run.dir='/a=b'\""),
+    (("train.py", "hydra.run.dri=a"), 2, "hydra.run.dri is not a key"),
+    (("train.py", "hydra/launcher=jobli"), 2, "hydra/launcher must be one of basic"),
+    (("train.py", "resume=default"), 4, "default is not a run folder"),
+    (("train.py", "start_from=default"), 4, "holds a policy alone"),
+    (("evaluate.py", "checkpoint=skirmsh"), 4, "policies default, single, skirmish: did you mean skirmish?"),
     (("evaluate.py", "checkpoint=nowhere"), 4, "nowhere"),
 ]
 

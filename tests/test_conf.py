@@ -92,6 +92,24 @@ MISTAKES = [
     ("+sede=1", "sede is not a key"),
     ("team.n_agent=3", "n_agent"),
     ("+team.n_agent=3", r"team\.n_agent is not a key"),
+    ("sede=1", r"sede is not a key of the configuration: did you mean seed\?"),
+    ("+sede=1", r"did you mean seed\?"),
+    ("algorithm.gama=0.9", r"algorithm\.gama is not a key of the configuration: did you mean algorithm\.gamma\?"),
+    ("+algorithm.gama=0.9", r"algorithm\.gama is not a key of algorithm; .*: did you mean algorithm\.gamma\?"),
+    ("sceanrio=large", r"did you mean scenario\?"),
+    ("experimnt=default", r"did you mean experiment\?"),
+    ("wind=calm radius=3", r"did you mean .*observation\.radius\?"),
+    ("checkpoint.intervall=9", r"did you mean checkpoint\.interval\?"),
+    ("scenario=skirmsh", r"scenario must be one of .*, got skirmsh: did you mean skirmish\?"),
+    ("imitation.teacher=locl", r"imitation\.teacher must be .*: did you mean local\?"),
+    ("evaluation.mode=sampld", r"evaluation\.mode must be .*: did you mean sampled\?"),
+    ("landscape.path=/data", r"is not a key of the configuration, but with landscape=array or landscape=raster"),
+    ("algorithm.gamma=0.9,0.99", r"has several values: -m sweeps over them"),
+    ("scenario=single,large", r"scenario must be one of .*; -m sweeps over several"),
+    ("landscape=raster landscape.path=/a=b", r"""quote it, "landscape\.path='/a=b'\""""),
+    ("total_frames=1.5", "total_frames must be a whole number, got 1.5"),
+    ("n_worlds=.inf", "n_worlds must be a whole number"),
+    ("collector.steps=0.5", r"collector\.steps must be a whole number, got 0\.5"),
     ("scenario=nowhere", r"scenario must be one of default, .*, water, got nowhere"),
     ("algorithm=sarsa", r"algorithm must be one of a2c, ddpg, .*, got sarsa"),
     ("experiment=nowhere", r"experiment must be one of algorithms, .*, got nowhere"),
@@ -141,6 +159,14 @@ def test_mistakes_are_told_in_one_line(override, message):
     with pytest.raises(ConfigError, match=message) as error:
         settings(plain(compose_config("train", override.split())))
     assert "\n" not in str(error.value)
+
+
+def test_a_number_that_is_whole_is_a_whole_number_however_it_is_written():
+    overrides = ["total_frames=1e6", "collector.steps=6.4e1", "landscape.size=20.0", "observation.radius=3.0"]
+    plan = settings(plain(compose_config("train", [*overrides, "model.actor_hidden=[16.0]", "algorithm.epochs=2e0"])))
+    numbers = [plan.total_frames, plan.collector.steps, plan.world.landscape.size, plan.observation.radius]
+    numbers += [*plan.model.actor_hidden, plan.algorithm.epochs]
+    assert numbers == [1_000_000, 64, 20, 3, 16, 2] and {type(each) for each in numbers} == {int}
 
 
 def test_an_unknown_experiment_is_no_sweep():

@@ -20,6 +20,7 @@ from warp_torchrl.world.array import Array
 from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.wind import Uniform
+from warp_torchrl.world.world import in_wind
 
 
 def drawn(cells, positions, *, elevation=None, roles=("ugv",), wind=None, cover=3):
@@ -63,6 +64,15 @@ def test_the_view_shows_fire_age_and_the_border():
     assert channel(view, "fire_stage").tolist() == [[0, 0, 0], [0, 0, 51], [0, 0, 0]]  # stage 1 of 5
     assert channel(view, "age").tolist() == [[0, 125, 125], [0, 125, 0], [0, 125, 125]]  # age 5 of 10
     assert channel(view, "flammability").tolist() == [[0, 204, 204]] * 3  # 0.8 x 255
+
+
+def test_the_view_shows_for_how_long_trees_are_wet():
+    # 25 a tick, at most ten of them.
+    state, world = drawn([[5] * 4] * 4, [[1, 1]])
+    ticks = torch.tensor([[[0, 1, 4, 0], [9, 10, 11, 0], [80, 0, 0, 0], [0] * 4]], dtype=torch.uint8)
+    state = state.replace(wet=ticks)
+    wet = channel(egocentric_view(state, world, world.forecast(state), 1, DEFAULT), "wet")
+    assert wet.tolist() == [[0, 25, 100], [225, 250, 250], [250, 0, 0]]
 
 
 def test_the_threat_of_a_tree_is_its_chance_to_ignite_and_of_a_fire_what_it_will_ignite():
@@ -109,6 +119,15 @@ def test_an_agent_knows_its_place_the_time_and_the_wind():
     assert (tank, has_tank) == (1.0, 0.0)
 
 
+def test_an_agent_knows_the_wind_of_its_own_cell():
+    # East grows by 1 m/s a column and north by 2 m/s a row; three agents, whose own parts are of 20 m/s.
+    row, column = torch.meshgrid(torch.arange(5.0), torch.arange(6.0), indexing="ij")
+    state, world = drawn([[5] * 6] * 5, [[4, 0], [1, 5], [2, 3]])
+    state = in_wind(state, world.fire, torch.stack((column, 2.0 * row))[None])
+    wind = own_vector(state, world)[0, :, 3:5] * 20.0
+    torch.testing.assert_close(wind, torch.tensor([[0.0, 8.0], [5.0, 2.0], [3.0, 4.0]]))
+
+
 def test_the_last_action_is_remembered():
     state, world = drawn([[5] * 5] * 5, [[4, 0]])
     before = own_vector(state, world)[0, 0, -11:]
@@ -127,9 +146,10 @@ def test_the_picture_pools_the_whole_map():
 
 
 def test_the_critic_sees_every_agent_and_the_clock():
-    state, world = drawn([[5] * 16] * 16, [[8, 8], [0, 15]])
+    state, world = drawn([[5] * 16] * 16, [[8, 8], [0, 15], [3, 4]], roles=("ugv", "ugv", "uav"))
     seen = central_state(state, world, world.forecast(state))[0]
     assert seen[STATE.index("ugv")].nonzero().tolist() == [[0, 15], [8, 8]]
+    assert seen[STATE.index("uav")].nonzero().tolist() == [[3, 4]]
     clock = seen[STATE.index("clock_and_wind")]
     assert (clock[:8] == 1).all(), "the time left, the steps to the tick"
     torch.testing.assert_close(clock[8:, :8], torch.full((8, 8), 0.5))  # 10 of 20 m/s to the east

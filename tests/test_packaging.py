@@ -4,6 +4,7 @@ import importlib
 import os
 import subprocess
 import sys
+import tarfile
 import tomllib
 from pathlib import Path
 from zipfile import ZipFile
@@ -30,14 +31,32 @@ def test_the_wheel_has_every_module_and_every_option(wheel):
     options = list((ROOT / "conf").rglob("*.yaml"))
     assert {path.relative_to(ROOT).as_posix() for path in package} <= files
     assert {f"warp_torchrl/{path.relative_to(ROOT).as_posix()}" for path in options} <= files and len(options) > 50
+    policies = [path for path in (ROOT / "docs" / "policies").rglob("*") if path.is_file()]
+    assert {f"warp_torchrl/{path.relative_to(ROOT / 'docs').as_posix()}" for path in policies} <= files and policies
     assert not [name for name in files if not name.startswith(("warp_torchrl/", "warp_torchrl-"))]
+
+
+def test_a_wheel_can_be_built_from_the_source_distribution(tmp_path):
+    pytest.importorskip("hatchling", reason="needs the extra dev")
+    from hatchling.builders.sdist import SdistBuilder
+
+    path = next(SdistBuilder(str(ROOT)).build(directory=str(tmp_path), versions=["standard"]))
+    with tarfile.open(path) as archive:
+        files = {name.partition("/")[2] for name in archive.getnames()}
+    wheel = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]["wheel"]
+    for folder in (*wheel["packages"], *wheel["force-include"]):
+        needed = [each for each in (ROOT / folder).rglob("*") if each.is_file() and "__pycache__" not in each.parts]
+        assert {each.relative_to(ROOT).as_posix() for each in needed} <= files and needed
 
 
 @pytest.mark.slow
 def test_the_wheel_runs_from_any_folder(wheel, tmp_path):
     ZipFile(wheel).extractall(tmp_path / "installed")
     (tmp_path / "empty").mkdir()
-    code = "import warp_torchrl as w; print(w.__file__); print(len(w.make_env('default', n_worlds=2).reset()))"
+    code = "import warp_torchrl as w; print(w.__file__)\n"
+    code += "for policy in (w.load_policy(name) for name in ('default', 'single', 'skirmish')):\n"
+    code += "    env = w.make_env('default', n_worlds=2, overrides=policy.overrides)\n"
+    code += "    print(tuple(env.rollout(3, policy).shape))"
     done = subprocess.run(
         [sys.executable, "-c", code],
         cwd=tmp_path / "empty",
@@ -48,7 +67,7 @@ def test_the_wheel_runs_from_any_folder(wheel, tmp_path):
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    assert done.stdout.splitlines() == [str(tmp_path / "installed" / "warp_torchrl" / "__init__.py"), "2"]
+    assert done.stdout.splitlines() == [str(tmp_path / "installed" / "warp_torchrl" / "__init__.py"), *["(2, 3)"] * 3]
 
 
 @pytest.mark.parametrize("name", PROJECT["scripts"])
@@ -57,7 +76,7 @@ def test_a_program_s_function_is_there(name):
     assert callable(getattr(importlib.import_module(module), function))
 
 
-@pytest.mark.parametrize("extra", ["gis", "tensorboard", "figures", "interop", "docs"])
+@pytest.mark.parametrize("extra", ["gis", "tensorboard", "figures", "interop", "docs", "sweep"])
 def test_development_has_what_each_extra_has(extra):
     extras = PROJECT["optional-dependencies"]
     assert set(extras[extra]) <= set(extras["dev"])

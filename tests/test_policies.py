@@ -4,19 +4,48 @@ import json
 from pathlib import Path
 
 import pytest
+import torch
 
 from warp_torchrl import load_policy, make_env
-from warp_torchrl.checkpoint import newest
+from warp_torchrl.checkpoint import CheckpointError, export, newest
 from warp_torchrl.config import compose_config, plain, recompose, without_targets
 from warp_torchrl.evaluation import play, play_heuristics
 from warp_torchrl.settings import settings
+from warp_torchrl.shipped import find_policy, policy_names
 
 SHIPPED = Path(__file__).parent.parent / "docs" / "policies"
 SCENARIOS = ("default", "skirmish", "single")
 
 
 def test_there_is_one_for_each_scenario():
-    assert sorted(each.name for each in SHIPPED.iterdir()) == sorted(SCENARIOS)
+    assert sorted(each.name for each in SHIPPED.iterdir()) == sorted(SCENARIOS) == policy_names()
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_it_is_loaded_by_its_name_from_any_folder(scenario, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    named, found = load_policy(scenario), load_policy(SHIPPED / scenario)
+    ours, theirs = named.state_dict(), found.state_dict()
+    assert named.mode == found.mode and ours.keys() == theirs.keys()
+    assert all(torch.equal(ours[key], theirs[key]) for key in ours)
+
+
+def test_a_folder_goes_before_a_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    export(newest(SHIPPED / "single")[0], tmp_path / "default")
+    assert find_policy("default") == Path("default") and find_policy("single") == SHIPPED / "single"
+    assert find_policy("runs/default") == Path("runs/default")
+    assert newest(find_policy("default"))[0].manifest.scenario == "single"
+
+
+def test_an_unknown_name_is_told_with_the_names(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(
+        CheckpointError, match=r"skirmsh is not a run folder, nor one of the policies default, single, s"
+    ):
+        load_policy("skirmsh")
+    with pytest.raises(CheckpointError, match=r"did you mean skirmish\?"):
+        load_policy("skirmsh")
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)

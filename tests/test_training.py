@@ -213,6 +213,15 @@ def test_training_moves_the_weights_and_seeds_repeat(tmp_path, finished):
     assert any((again.learner.policy.state_dict()[name] != value).any() for name, value in fresh.items())
 
 
+@pytest.mark.parametrize(("frames", "level"), [(5, "WARNING"), (20, "INFO"), (16, None)])
+def test_whole_batches_are_not_trained_on_without_a_word(tmp_path, caplog, frames, level):
+    training = tiny(tmp_path, *TINIER, f"total_frames={frames}")
+    with caplog.at_level("INFO", "warp_torchrl"):
+        training.train()
+    told = [record.levelname for record in caplog.records if "total_frames=" in record.message]
+    assert told == ([] if level is None else [level])
+
+
 def test_a_signal_saves_and_stops(tmp_path):
     training = tiny(tmp_path, "checkpoint.interval=1000000", "total_frames=1000000")
     learn = training._learn

@@ -12,6 +12,7 @@ from warp_torchrl.construction import build
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.policy import TrainedPolicy
 from warp_torchrl.settings import ENVIRONMENT, build_components
+from warp_torchrl.shipped import find_policy
 
 
 def make_env(
@@ -64,7 +65,8 @@ def load_policy(path: str | Path, mode: str = "best") -> TrainedPolicy:
     Only the manifest, the configuration and the policy's parameters are read; all are verified first.
 
     Args:
-        path: A run folder (its newest sound checkpoint), or one checkpoint folder.
+        path: A run folder (its newest sound checkpoint), one checkpoint folder, or the name of a policy that comes with
+            the package: ``default``, ``single`` or ``skirmish``, where no folder has that name.
         mode: ``sampled``, ``deterministic``, or ``best``: as was found on training seeds.
 
     Returns:
@@ -75,7 +77,7 @@ def load_policy(path: str | Path, mode: str = "best") -> TrainedPolicy:
         CheckpointError: If there is no sound checkpoint, or it does not fit.
         ValueError: If the mode is unknown.
     """
-    found, _ = checkpoints.newest(path)
+    found, _ = checkpoints.newest(find_policy(path))
     return policy_of(found, mode)
 
 

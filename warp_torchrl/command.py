@@ -30,11 +30,14 @@ from warp_torchrl.config import (
 from warp_torchrl.construction import ConfigError
 from warp_torchrl.destination import check_free
 from warp_torchrl.failure import fail
+from warp_torchrl.grammar import check_flags, check_overrides
 from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.resumption import resumption
 from warp_torchrl.settings import COMPONENTS, settings
+from warp_torchrl.shipped import find_policy
 from warp_torchrl.signals import Stopped, obeyed
-from warp_torchrl.sweep import SweepSummary, forget_failure, jobs, note_failure
+from warp_torchrl.sweep import SweepSummary, conclude_early, forget_failure, jobs, note_failure
 from warp_torchrl.training import Training
 from warp_torchrl.transfer import check_start
 
@@ -80,7 +83,7 @@ def _start(folder: Path, config: DictConfig) -> None:
     record = Record(choices=_choices(), values=_values(config))
     training = Training(settings(plain(config)), record, folder)
     if config.start_from is not None:
-        training.start_from(_newest(config.start_from))
+        training.start_from(_newest(find_policy(config.start_from)))
     _finish(training, world_overrides(plain(config)))
 
 
@@ -128,9 +131,14 @@ def _evaluate_job(config: DictConfig) -> None:
     if given is None:
         assess(settings(_without_checkpoint(config)), folder, name, world_overrides(plain(config)))
         return
-    found = _newest(given)
-    values = plain(recompose(found.record(), _without_own(HydraConfig.get().overrides.task)))
+    found = _newest(find_policy(given))
+    values = plain(recompose(found.record(), _of_worlds(HydraConfig.get().overrides.task)))
     assess(settings(values), folder, found, world_overrides(values))
+
+
+def _of_worlds(overrides: Sequence[str]) -> list[str]:
+    """Return the overrides of an evaluation that are not the command's own."""
+    return [each for each in overrides if not each.startswith(("checkpoint=", "policy=", "overwrite="))]
 
 
 # What a run folder records
@@ -143,11 +151,6 @@ def _choices() -> dict[str, str]:
 
 def _values(config: DictConfig) -> dict[str, Any]:
     return {key: value for key, value in without_targets(plain(config)).items() if key not in _NOT_RECORDED}
-
-
-def _without_own(overrides: Sequence[str]) -> list[str]:
-    """Return the overrides of an evaluation that are a run's too."""
-    return [each for each in overrides if not each.startswith(("checkpoint=", "policy=", "overwrite="))]
 
 
 def _without_checkpoint(config: DictConfig) -> dict[str, Any]:
@@ -187,15 +190,21 @@ def _start_hydra(name: str, job: Callable[[DictConfig], None], arguments: list[s
                 sys.exit(code)
             note_failure(code, line)  # the other jobs go on
 
-    hydra.main(version_base="1.3", config_path=str(conf_folder()), config_name=name)(guarded)()
+    try:
+        hydra.main(version_base="1.3", config_path=str(conf_folder()), config_name=name)(guarded)()
+    except Exception:
+        conclude_early()
+        raise
 
 
 def _check_first(name: str, arguments: Sequence[str]) -> None:
     """Compose and check every job of the command line before the first run folder is made."""
+    check_flags(arguments)
     overrides = [each for each in arguments if not each.startswith("-")]
     flags = [each for each in arguments if each.startswith("-")]
     if any(flag not in _MULTIRUN for flag in flags):
         return  # Hydra's own flags (--help, --cfg, --config-dir ...) are Hydra's business
+    check_overrides(overrides)
     own = [each for each in overrides if not each.startswith("hydra")]
     sweeps = bool(flags) or is_sweep(name, own)
     listed = jobs(own) if sweeps else [own]
@@ -216,7 +225,7 @@ def _check_training(config: DictConfig, overrides: Sequence[str]) -> None:
         plan = settings(plain(config))
         plan.check_training()
         if config.start_from is not None:
-            check_start(plan, checkpoints.newest(config.start_from)[0])
+            check_start(plan, checkpoints.newest(find_policy(config.start_from))[0])
         return
     others = [each for each in overrides if each.split("=")[0] not in ("resume", "debug", "total_frames")]
     if others:
@@ -239,14 +248,15 @@ def _check_evaluation(config: DictConfig, overrides: Sequence[str]) -> None:
     if (config.checkpoint is None) == (config.policy is None):
         raise ConfigError("give either checkpoint=PATH or policy=NAME")
     if config.policy is not None and config.policy not in HEURISTICS:
-        raise ConfigError(f"policy must be one of {', '.join(HEURISTICS)}, got {config.policy}")
+        hint = did_you_mean(config.policy, HEURISTICS)
+        raise ConfigError(f"policy must be one of {', '.join(HEURISTICS)}, got {config.policy}{hint}")
     if not isinstance(config.overwrite, bool):
         raise ConfigError(f"overwrite must be true or false, got {config.overwrite!r}")
     if config.checkpoint is None:
         check_assessment(settings(_without_checkpoint(config)), config.policy)
         return
-    found, _ = checkpoints.newest(Path(str(config.checkpoint)))
-    check_assessment(settings(plain(recompose(found.record(), _without_own(overrides)))), found)
+    found, _ = checkpoints.newest(find_policy(str(config.checkpoint)))
+    check_assessment(settings(plain(recompose(found.record(), _of_worlds(overrides)))), found)
 
 
 def _with_run_folder(arguments: Sequence[str]) -> list[str]:

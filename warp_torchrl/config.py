@@ -6,7 +6,7 @@ one of this package's own; nothing that is read from a run folder is ever instan
 
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -21,11 +21,15 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from warp_torchrl.construction import ConfigError, UnknownKeyError
+from warp_torchrl.grammar import check_overrides, several_values
+from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.settings import COMPONENTS, WORLD_KEYS
 
-OmegaConf.register_new_resolver("pid", os.getpid, replace=True)
+OmegaConf.register_new_resolver("pid", os.getpid, replace=True, use_cache=True)  # a sweep's jobs get its own process's
 HYDRA_ERRORS = (HydraException, OmegaConfBaseException)
 """What Hydra raises where a configuration has a mistake."""
+GROUPS = ("scenario", "experiment")
+"""Groups whose options are no classes."""
 
 
 def conf_folder() -> Path:
@@ -45,12 +49,13 @@ def compose_config(name: str, overrides: Sequence[str] = ()) -> DictConfig:
         group, _, option = override.partition("=")
         if group in (*COMPONENTS, "scenario") and not _OPTION.fullmatch(option.strip("'\"")):
             # Hydra merges lists of options and follows paths; a run folder could not tell them, nor resume.
-            raise ConfigError(f"{group} must be one of the files of conf/{group}, got {option}")
+            several = "; -m sweeps over several" if "," in option else ""
+            raise ConfigError(f"{group} must be one of the files of conf/{group}, got {option}{several}")
     config = _compose(name, overrides)
     try:
         OmegaConf.resolve(config)
     except OmegaConfBaseException as error:
-        raise ConfigError(_one_line(error)) from None
+        raise ConfigError(one_line(error)) from None
     return config
 
 
@@ -74,17 +79,30 @@ def output_folder(name: str, overrides: Sequence[str], sweeps: bool) -> Path:
     try:
         return Path(hydra.sweep.dir if sweeps else hydra.run.dir)
     except OmegaConfBaseException as error:
-        raise ConfigError(_one_line(error)) from None
+        raise ConfigError(one_line(error)) from None
 
 
 def _compose(name: str, overrides: Sequence[str], with_hydra: bool = False) -> DictConfig:
     try:
         folder = conf_folder()
         return deepcopy(_composed(folder, _last_change(folder), name, tuple(overrides), with_hydra))
-    except (HydraException, OmegaConfBaseException) as error:
-        raise _told(error) from None
+    except HYDRA_ERRORS as error:
+        check_overrides(overrides)
+        raise _told(error, _known_keys(name, overrides)) from None
     except ValueError as error:
-        raise ConfigError(f"{_one_line(error)}, in {' '.join(overrides)}") from None
+        raise ConfigError(f"{one_line(error)}, in {' '.join(overrides)}") from None
+
+
+def _known_keys(name: str, overrides: Sequence[str]) -> list[str]:
+    """Return every key of a configuration with the options that the overrides choose, where they can be had."""
+    chosen = tuple(each for each in overrides if each.partition("=")[0] in (*COMPONENTS, *GROUPS))
+    for choices in (chosen, ()):
+        try:
+            config = _composed(conf_folder(), _last_change(conf_folder()), name, choices, False)
+        except HYDRA_ERRORS:
+            continue
+        return [*_keys(plain(config)), *GROUPS]
+    return []
 
 
 @lru_cache(maxsize=64)
@@ -99,24 +117,39 @@ def _last_change(folder: Path) -> int:
     return max(path.stat().st_mtime_ns for path in (folder, *folder.glob("**/*")))
 
 
-def _told(error: Exception) -> ConfigError:
+def _told(error: Exception, known: Sequence[str]) -> ConfigError:
     """Return Hydra's error as ours."""
     unknown = re.match(r"Could not override '([^']*)'", str(error))
-    if unknown is None:
-        return ConfigError(_one_line(error))
-    key = unknown[1]
-    return UnknownKeyError(f"{key} is not a key of the configuration; conf/ and --cfg job show what there is", key)
+    told = one_line(error, known)
+    return UnknownKeyError(told, unknown[1]) if unknown else ConfigError(told)
 
 
-def _one_line(error: Exception) -> str:
-    """Return Hydra's message in one line, with the options where it lists them."""
+def one_line(error: Exception, known: Sequence[str] = ()) -> str:
+    """Return Hydra's message in one line, with the options where it lists them, and the known key that is nearest."""
+    text = str(error)
+    unknown = re.match(r"Could not override '([^']*)'", text)
+    if unknown:
+        others = _options_with(unknown[1])
+        hint = f", but with {' or '.join(others)}" if others else did_you_mean(unknown[1], known)
+        return f"{unknown[1]} is not a key of the configuration{hint or '; conf/ and --cfg job show what there is'}"
     missing = re.search(
-        r"Could not find '(\w+)/([^']*)'.*Available options in '\w+':(.*)Config search path", str(error), re.S
+        r"Could not find '([\w/]+)/([^']*)'.*Available options in '[^']*':(.*)Config search", text, re.S
     )
     if missing:
-        return f"{missing[1]} must be one of {', '.join(missing[3].split())}, got {missing[2]}"
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+        options = missing[3].split()
+        return f"{missing[1]} must be one of {', '.join(options)}, got {missing[2]}{did_you_mean(missing[2], options)}"
+    several = re.match(r"Ambiguous value for argument '(.*)'$", text, re.M)
+    if several:
+        return several_values(several[1])
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
     return " ".join(line for line in lines if not line.startswith(("full_key", "object_type", "Set the environment")))
+
+
+def _options_with(key: str) -> list[str]:
+    """Return the options of a key's group whose files have it."""
+    group, _, name = key.partition(".")
+    files = sorted((conf_folder() / group).glob("*.yaml")) if group in COMPONENTS and name else []
+    return [f"{group}={path.stem}" for path in files if name in cast("DictConfig", OmegaConf.load(path))]
 
 
 # What is written into a run folder, and read back
@@ -214,6 +247,15 @@ def recompose(record: Record, overrides: Sequence[str] = ()) -> DictConfig:
         except OmegaConfBaseException:
             raise ConfigError(f"{path} in the run folder is not a key of this version's configuration") from None
     return config
+
+
+def _keys(node: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    """Yield the keys of a configuration, those of groups included."""
+    for key, value in node.items():
+        if key != "_target_":
+            yield f"{prefix}{key}"
+        if isinstance(value, Mapping):
+            yield from _keys(value, f"{prefix}{key}.")
 
 
 def _leaves(node: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:

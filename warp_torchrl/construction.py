@@ -10,6 +10,8 @@ from dataclasses import MISSING, fields, is_dataclass
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
+from warp_torchrl.nearest import did_you_mean
+
 
 class ConfigError(ValueError):
     """A mistake in the configuration, told in one line with key, value and rule."""
@@ -66,9 +68,9 @@ def construct(component: type, values: Mapping[str, Any], where: str) -> Any:
     allowed = {each.name: each for each in fields(component) if each.init}
     for key in values:
         if key not in allowed:
-            raise ConfigError(
-                f"{prefix}{key} is not a key of {where or component.__name__}; it has {', '.join(allowed)}"
-            )
+            has = f"it has {', '.join(allowed)}"
+            hint = did_you_mean(f"{prefix}{key}", [f"{prefix}{name}" for name in allowed])
+            raise ConfigError(f"{prefix}{key} is not a key of {where or component.__name__}; {has}{hint}")
     for name, each in allowed.items():
         if name not in values and each.default is MISSING and each.default_factory is MISSING:
             raise ConfigError(f"{prefix}{name} must be given")
@@ -88,7 +90,8 @@ def _fit(value: object, hint: object, key: str) -> object:
         if fits:
             return fitted
     names = " or ".join(_describe(choice) for choice in choices)
-    raise ConfigError(f"{key} must be {names}, got {value!r}")
+    words = [str(word) for choice in choices if get_origin(choice) is Literal for word in get_args(choice)]
+    raise ConfigError(f"{key} must be {names}, got {value!r}{did_you_mean(value, words)}")
 
 
 def _try_fit(value: object, hint: object) -> tuple[bool, object]:
@@ -104,7 +107,8 @@ def _try_fit(value: object, hint: object) -> tuple[bool, object]:
     if hint is bool:
         return isinstance(value, bool), value
     if hint is int:
-        return isinstance(value, int) and not isinstance(value, bool), value
+        whole = int(value) if isinstance(value, float) and value.is_integer() else value  # 1e6 is how many are written
+        return isinstance(whole, int) and not isinstance(whole, bool), whole
     if hint is float:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             return False, value

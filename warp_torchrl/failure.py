@@ -7,7 +7,7 @@ from pathlib import Path
 
 from warp_torchrl import checkpoint as checkpoints
 from warp_torchrl.collectors import WorkerDied
-from warp_torchrl.config import HYDRA_ERRORS
+from warp_torchrl.config import HYDRA_ERRORS, one_line
 from warp_torchrl.construction import ConfigError
 from warp_torchrl.signals import Stopped
 from warp_torchrl.training import NumericalFailure
@@ -26,7 +26,8 @@ def fail(error: Exception, debug: bool) -> tuple[int, str]:
 
 
 def _diagnose(error: Exception) -> tuple[int, str]:
-    line = " ".join(str(error).split()) or type(error).__name__
+    text = one_line(error) if isinstance(error, HYDRA_ERRORS) else str(error)
+    line = " ".join(text.split()) or type(error).__name__
     if isinstance(error, Stopped):
         return 128 + error.number, line
     if isinstance(error, checkpoints.RunFolderInUse):

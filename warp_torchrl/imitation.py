@@ -19,6 +19,7 @@ from warp_torchrl.collectors import Direct, Process
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS, Heuristic
 from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, TEACHER_ACTION
+from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.validation import check_fields
 
 TEACHERS = tuple(name for name, rule in HEURISTICS.items() if not rule.remembers)
@@ -48,7 +49,8 @@ class Imitation:
     def __post_init__(self) -> None:
         check_fields(self, weight=(1e-6, 1e6), until=(1e-6, 1.0))
         if self.teacher is not None and self.teacher not in TEACHERS:
-            raise ValueError(f"teacher must be null or one of {', '.join(TEACHERS)}, got {self.teacher}")
+            hint = did_you_mean(self.teacher, TEACHERS)
+            raise ValueError(f"teacher must be null or one of {', '.join(TEACHERS)}, got {self.teacher}{hint}")
 
     def check_fits(self, algorithm: Algorithm, collector: Direct) -> None:
         """Check that a teacher, where there is one, can teach.

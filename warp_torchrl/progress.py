@@ -46,3 +46,20 @@ def line(row: Mapping[str, float | None], total: int) -> str:
         f"{row['time/fps']:.0f} frames/s  saved {show('world/saved', '{:.3f}')}  "
         f"reward {show('rollout/ep_rew_mean', '{:.2f}')}  loss {show('train/loss', '{:.3f}')}"
     )
+
+
+def told_of_batches(total: int, n_worlds: int, steps: int) -> str | None:
+    """Return what is said where a training cannot end at its number of frames, since it takes whole batches.
+
+    Args:
+        total: World steps in all, as asked for.
+        n_worlds: Worlds in a batch.
+        steps: World steps of each of them in a batch.
+    """
+    batch = n_worlds * steps
+    if total % batch == 0:
+        return None
+    what = f"one batch is {batch} frames, n_worlds={n_worlds} x collector.steps={steps}"
+    if total < batch:
+        return f"total_frames={total} is less than one batch: {what}, and one is trained on"
+    return f"{what}: training ends at {-(-total // batch) * batch} frames, not at total_frames={total}"

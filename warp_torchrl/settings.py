@@ -10,6 +10,7 @@ import torch
 from warp_torchrl.construction import ConfigError, build, construct
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.imitation import Imitation
+from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.seeds import BEYOND_EVALUATION, FIRST_EVALUATED, SEEDS, WORLDS
 from warp_torchrl.world.fast.compile import check_compiler
 from warp_torchrl.world.world import World
@@ -170,7 +171,8 @@ def settings(config: Mapping[str, Any]) -> Settings:
     known = {each.name for each in fields(Settings)} | {*COMPONENTS, *WORLD_KEYS, *COMMAND_KEYS}
     for key in config:
         if key not in known:
-            raise ConfigError(f"{key} is not a key of the configuration; it has {', '.join(sorted(known - {'world'}))}")
+            has = f"it has {', '.join(sorted(known - {'world'}))}"
+            raise ConfigError(f"{key} is not a key of the configuration; {has}{did_you_mean(key, known)}")
     for key in (*COMPONENTS, "checkpoint", "evaluation", "imitation"):
         if key not in config:
             raise ConfigError(f"{key} must be given")

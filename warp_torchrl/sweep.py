@@ -57,6 +57,11 @@ def jobs(overrides: Sequence[str]) -> list[list[str]]:
     return [list(job) for job in product(*choices)]
 
 
+def forget_failure() -> None:
+    """Remove what an earlier sweep into the same folder left of this job."""
+    Path(HydraConfig.get().runtime.output_dir, FAILURE).unlink(missing_ok=True)
+
+
 def note_failure(code: int, reason: str) -> None:
     """Leave word of a failed job in its folder, for the end of the sweep, whatever process runs the job."""
     job = HydraConfig.get().job
@@ -66,14 +71,9 @@ def note_failure(code: int, reason: str) -> None:
     (folder / FAILURE).write_text(json.dumps(asdict(failure)), encoding="utf-8")
 
 
-def forget_failure() -> None:
-    """Drop the word of a failure that an earlier sweep left in the job's folder."""
-    (Path(HydraConfig.get().runtime.output_dir) / FAILURE).unlink(missing_ok=True)
-
-
 def failures(folder: Path) -> list[Failure]:
     """Return the jobs of a sweep's folder that failed, in their order."""
-    found = [Failure(**json.loads(path.read_text(encoding="utf-8"))) for path in folder.glob(f"*/{FAILURE}")]
+    found = [Failure(**json.loads(path.read_text(encoding="utf-8"))) for path in folder.glob(f"**/{FAILURE}")]
     return sorted(found, key=lambda each: each.job)
 
 
@@ -126,20 +126,42 @@ class SweepSummary(Callback):
 
     Attributes:
         exit_code: The first failed job's; 0 where none failed.
+        folder: Of the sweep that has begun and not ended.
     """
 
     exit_code: ClassVar[int] = 0
+    folder: ClassVar[Path | None] = None
+
+    def on_multirun_start(self, config: DictConfig, **kwargs: Any) -> None:
+        """Remember the sweep's folder: a launcher that gives up does not come to the end."""
+        SweepSummary.folder = Path(str(config.hydra.sweep.dir))
 
     def on_multirun_end(self, config: DictConfig, **kwargs: Any) -> None:
         """Write ``summary.md`` and ``summary.png`` into the sweep's folder, and print the table."""
-        folder = Path(str(config.hydra.sweep.dir))
-        entries = summary.gather(folder)
-        if entries:
-            _summarise(entries, folder)
-        failed = failures(folder)
-        for each in failed:
-            print(f"error: job {each.job} ({each.overrides}) failed: {each.reason}", file=sys.stderr, flush=True)
+        failed = _conclude(Path(str(config.hydra.sweep.dir)))
         SweepSummary.exit_code = failed[0].code if failed else 0
+        SweepSummary.folder = None
+
+
+def conclude_early() -> None:
+    """Tell what there is of a sweep whose launcher gave up, as joblib's and submitit's do where a worker is killed."""
+    folder, SweepSummary.folder = SweepSummary.folder, None
+    if folder is None or not folder.is_dir():
+        return
+    _conclude(folder)
+    for log in sorted(folder.glob("**/*.log")):
+        if not ((log.parent / "evaluation.json").exists() or (log.parent / FAILURE).exists()):
+            print(f"error: the job in {log.parent} did not end", file=sys.stderr, flush=True)
+
+
+def _conclude(folder: Path) -> list[Failure]:
+    entries = summary.gather(folder)
+    if entries:
+        _summarise(entries, folder)
+    failed = failures(folder)
+    for each in failed:
+        print(f"error: job {each.job} ({each.overrides}) failed: {each.reason}", file=sys.stderr, flush=True)
+    return failed
 
 
 def _summarise(entries: list[summary.Entry], folder: Path) -> None:

@@ -20,7 +20,7 @@ from warp_torchrl.config import Record
 from warp_torchrl.evaluation import MODES, play
 from warp_torchrl.logging import MetricsFile, Tracker
 from warp_torchrl.models import REWARD, signature
-from warp_torchrl.progress import TRAIN_COLUMNS, episode_columns, line
+from warp_torchrl.progress import TRAIN_COLUMNS, episode_columns, line, told_of_batches
 from warp_torchrl.reward_scale import RewardScale
 from warp_torchrl.saving import SaveClock, passes
 from warp_torchrl.seeds import WORLDS, first_world_seed
@@ -87,6 +87,9 @@ class Training:
 
     def _train(self, signals: Noted, tracker: Tracker) -> None:
         total = self.settings.total_frames
+        told = told_of_batches(total, self.settings.n_worlds, self.settings.collector.steps)
+        if told is not None and self.frames < total:
+            log.log(logging.WARNING if total < self.frames_per_batch else logging.INFO, told)
         bar = tqdm(total=total, initial=self.frames, unit="frame", disable=None, dynamic_ncols=True)
         start, next_line = time.perf_counter() - self.seconds, 0.0
         try:

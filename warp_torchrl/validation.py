@@ -4,6 +4,8 @@ from dataclasses import fields
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
+from warp_torchrl.nearest import did_you_mean
+
 
 def check_fields(component: Any, **ranges: tuple[float, float]) -> None:
     """Check a dataclass's fields: choices, whole numbers, and ranges.
@@ -21,7 +23,8 @@ def check_fields(component: Any, **ranges: tuple[float, float]) -> None:
         value, hint = getattr(component, name), hints[name]
         kinds = set(get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,))
         if get_origin(hint) is Literal and (value not in get_args(hint) or isinstance(value, bool)):
-            raise ValueError(f"{name} must be one of {', '.join(map(str, get_args(hint)))}, got {value}")
+            words = [str(word) for word in get_args(hint)]
+            raise ValueError(f"{name} must be one of {', '.join(words)}, got {value}{did_you_mean(value, words)}")
         if value is None and NoneType in kinds:
             continue
         may_be_pair = name in ranges and any(get_origin(kind) is tuple for kind in kinds)

@@ -158,6 +158,14 @@ def test_values_out_of_range_are_refused(field, value):
         Ppo(**{field: value})
 
 
+def test_the_critic_reads_the_state_unless_it_is_told_not_to(make_small_env):
+    env, model = make_small_env(2), Mlp(actor_hidden=(8,), critic_hidden=(8,))
+    reads = [
+        STATE in each.build(env, model, 8).loss.critic_network.in_keys for each in (Ppo(), Ppo(central_critic=False))
+    ]
+    assert reads == [True, False]
+
+
 def test_the_critic_is_not_part_of_the_policy(make_small_env):
     env = make_small_env(2)
     learner = Ppo().build(env, Mlp(actor_hidden=(8,), critic_hidden=(8,)), 8)

@@ -62,6 +62,14 @@ def test_what_is_put_in_lies_where_torchrls_storage_puts_it(cursor):
         assert torch.equal(ours[:][key], theirs[:][key]), key
 
 
+@pytest.mark.parametrize(("cursor", "put_at"), [([3, 4, 5, 6, 7, 8], slice(3, 9)), ([8, 3, 4, 5, 6, 7], None)])
+def test_rows_in_order_are_put_in_as_a_slice(monkeypatch, cursor, put_at):
+    given = []
+    monkeypatch.setattr(LazyTensorStorage, "set", lambda storage, cursor, *_, **options: given.append(cursor))
+    RowStorage(9).set(torch.tensor(cursor), TRANSITIONS)
+    assert given == [put_at] if put_at else torch.equal(given[0], torch.tensor(cursor))
+
+
 def test_what_was_put_in_is_a_copy():
     storage, given = RowStorage(6), TRANSITIONS.clone()
     storage.set(torch.arange(6), given)

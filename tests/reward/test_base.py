@@ -1,5 +1,7 @@
 """What all rewards have in common: shaping, shares, checks."""
 
+import math
+
 import pytest
 import torch
 
@@ -55,6 +57,17 @@ def test_shaping_adds_minus_the_first_potential_to_the_return(make_small_env, re
 def test_values_out_of_range_are_refused(reward, field, value):
     with pytest.raises(ValueError, match=f"{field} must be in"):
         reward(**{field: value})
+
+
+@pytest.mark.parametrize(
+    ("field", "low", "high"),
+    [("team_share", 0.0, 1.0), ("scale", 1e-6, 1e6), ("shaping", 0.0, 1e3), ("gamma", 0.0, 1.0), ("act", -1e9, 1e9)],
+)
+def test_both_ends_of_a_range_are_taken_and_nothing_beyond(field, low, high):
+    assert [getattr(Efficiency(**{field: end}), field) for end in (low, high)] == [low, high]
+    for value in (math.nextafter(low, -math.inf), math.nextafter(high, math.inf)):
+        with pytest.raises(ValueError, match=f"{field} must be in"):
+            Efficiency(**{field: value})
 
 
 def test_a_reward_must_say_what_an_agent_earns(make_small_env):

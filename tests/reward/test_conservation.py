@@ -6,6 +6,7 @@ import torch
 
 from tests.conftest import small_world
 from warp_torchrl.reward import Adaptive, Collaborative, Coverage, Efficiency, Time
+from warp_torchrl.world.batch import concatenated
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.world import in_wind
@@ -80,6 +81,17 @@ def test_coverage_weighs_blocks_by_their_assets():
     assert earned(Coverage(), state, world, STAY) == pytest.approx([-8 / 128 - 0.03])
 
 
+def test_assets_are_weighed_by_the_mean_of_the_whole_map_of_each_world():
+    # Four blocks of 8 x 8 worth 1, 2, 3 and 6, of mean 3: weights 1/3, 2/3, 1, 2; another world is worth ten times as
+    # much. Fire in the first block, 8 of 64 trees, loses its third: 0.02 x (2/3 + 1 + 2) in both worlds.
+    rows = ["F" * 8 + "T" * 8] + ["T" * 16] * 15
+    state, _ = drawn(rows, [[15, 15]])
+    assets = torch.tensor([[1.0, 2.0], [3.0, 6.0]]).repeat_interleave(8, 0).repeat_interleave(8, 1)
+    both = concatenated([state, state])
+    both = both.replace(landscape=both.landscape.replace(assets=torch.stack((assets, 10.0 * assets))))
+    assert Coverage().value(both).tolist() == pytest.approx([248 / 256 + 0.02 * 11 / 3] * 2)
+
+
 def test_collaborative_multiplies_by_those_who_were_useful_lately():
     state, world = drawn(FIELD, [[0, 0], [3, 3]])
     # One of two puts the fire out: eta 1 + 0.5 / 2 = 1.25 on Q = (15 + 0.9) / 16; before, 1 on 15 / 16.
@@ -110,6 +122,12 @@ def test_adaptive_by_hand():
     # now none; r_3 no ray met a barrier, now nothing burns, 1.
     wanted = 0.9 / 16 + 0.1 * (1 / 16 + 15 / 16 + 1.0)
     assert earned(Adaptive(), state, world, EXTINGUISH, STAY) == pytest.approx([wanted] * 2)
+
+
+def test_adaptive_charges_the_fuel_within_three_cells_of_fire():
+    # Of 81 trees the one in the middle burns; within three king's moves of it stand 7 x 7 - 1 = 48.
+    state, _ = drawn(["T" * 9] * 4 + ["TTTTFTTTT"] + ["T" * 9] * 4, [[0, 0]])
+    assert Adaptive(contained=0.0).value(state).item() == pytest.approx(80 / 81 - 0.1 * 48 / 81)
 
 
 def test_adaptive_pays_for_the_downwind_half_and_once():

@@ -76,6 +76,8 @@ def test_what_is_not_known_is_bare_whatever_its_code():
         ([[8, 8.5]], "^fuel must hold whole class codes, got 8.5"),
         ([[8, np.nan]], "^fuel must hold whole class codes, got nan"),
         ([[8, 20, 0, 20]], "^table must have every code of fuel, it lacks 2: 0, 20$"),
+        ([[101, 98, 165]], "it lacks 2: 101, 165; table=fbfm40 has them$"),
+        ([[10, 80, 100]], "it lacks 2: 80, 100; table=worldcover has them$"),
         ([[8, *range(14, 91)]], r"^table must have every code of fuel, it lacks 77: 14, .*, 63, \.\.\.$"),
     ],
 )

@@ -54,10 +54,11 @@ def test_a_series_in_time_holds_each_field_for_its_ticks_and_the_last_for_good()
     u = np.stack([np.full((3, 4), speed) for speed in (1.0, 2.0, 3.0)])
     wind = Gridded(u=u, v=np.zeros_like(u), ticks_per_field=2)
     state = draw("TTTT TTTT TTTT", worlds=2)
-    state = in_wind(state, World().fire, wind(state.key, (3, 4)))
+    fire = World().fire
+    state = in_wind(state, fire, wind(state.key, (3, 4)))
     seen = [state.wind[0, 0, 0, 0].item()]
     for _ in range(7):
-        state = advance(state, World().fire, wind, torch.tensor([True, False]))
+        state = advance(state, fire, wind, torch.tensor([True, False]))
         seen.append(state.wind[0, 0, 0, 0].item())
     assert wind.changes
     assert seen == [1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0]

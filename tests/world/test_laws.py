@@ -332,6 +332,6 @@ def test_chances_of_nought_and_one_are_exact_for_every_law(fire: Fire) -> None:
     assert torch.equal(lit, reached & can_burn)
     gale = in_wind(state, fire, torch.tensor([60.0, 0.0])[None, :, None, None].expand(20, -1, -1, -1))
     sure = fire.ignition_probability(gale) == 1.0
-    assert sure.any()
+    assert (sure & (chance < 1.0)).any()  # at 8 m/s they were not
     almost_one = torch.full((20, 9, 11), 1.0 - 2.0**-24)
     assert torch.equal((fire.tick(gale, almost_one, everywhere).cells == 11) & sure, sure)

@@ -34,6 +34,11 @@ def draws() -> Tensor:
     return uniform(keys([21]), 7, Stream.FIRE, (N,))[0]
 
 
+def test_streams_keep_their_numbers() -> None:
+    # Every world that was published hangs on them.
+    assert [stream.value for stream in Stream] == list(range(1, 13))
+
+
 def test_the_mean_is_a_half_and_the_variance_a_twelfth(draws: Tensor) -> None:
     # Standard errors sqrt(1/12 / n) and sqrt(1/180 / n); 5 of them: false alarm 6e-7 each.
     variance, mean = torch.var_mean(draws.to(torch.float64))

@@ -139,6 +139,24 @@ def test_a_real_map_may_be_put_on_coarser_cells():
     assert (coarse - blocks).abs().mean() < 2.0  # m; the interpolation reaches half a cell farther than the block
 
 
+@pytest.mark.parametrize("suffix", [".tif", ".asc"])
+def test_a_map_without_a_crs_is_told_once(tmp_path, caplog, suffix):
+    path = tmp_path / f"fuel{suffix}"
+    if suffix == ".tif":
+        write(path, np.full((6, 6), 8), crs=None, cell=10.0)
+    else:
+        write_ascii(path, ["8 8 8 8 8 8"] * 6)
+    with caplog.at_level("WARNING", "warp_torchrl"):
+        for _ in range(2):
+            assert Raster(path=path, elevation=None, size=4).cell_size == 10.0
+    assert caplog.messages == [f"{path} has no CRS: its cells are taken as squares of 10 m"]
+
+
+def test_a_map_with_a_crs_is_not_spoken_of(folder, caplog):
+    Raster(path=folder, size=4)
+    assert not caplog.messages
+
+
 # --- Tree age and canopy cover
 
 
@@ -232,7 +250,10 @@ def test_worldcover_in_degrees_goes_to_metres_with_an_elevation_beside_it(tmp_pa
     write(tmp_path / "wc.tif", codes, "uint8", nodata=0, **where)
     write(tmp_path / "Elev.tif", np.full((120, 120), 321.0), **where)
     fields = {"path": tmp_path, "fuel": "wc.tif", "table": "worldcover", "size": 16, "min_fuel": 0.1}
-    refuse("^fuel must have square cells in metres, north up, or be resampled, .* in EPSG:4326", **fields)
+    refuse(
+        "^fuel must have square cells in metres, north up, .* in EPSG:4326; give resolution=30 resample=mode to put",
+        **fields,
+    )
     source = Raster(**fields, resample="mode", resolution=100)
     assert source.grid.crs.to_epsg() == 32618 and source.cell_size == 100.0
     land = source(keys(100))

@@ -84,6 +84,16 @@ def test_a_rotated_field_is_the_paper_field_turned_as_a_whole() -> None:
             assert field[world, :, row, column].tolist() == pytest.approx(wanted, abs=1e-3)
 
 
+def test_fields_are_rotated_alike_to_all_sides() -> None:
+    # 4096 worlds: the mean of a unit vector, and that of one of twice the angle, is 0 +- 1 / (64 sqrt 2) in each
+    # component; five of them, false alarm 2e-6.
+    u, v = Paper(rotate=True)(keys(4096), (5, 7))[:, :, 2, 3].unbind(1)
+    angle = torch.atan2(v, u)
+    for times in (1, 2):
+        mean = torch.stack(((times * angle).cos().mean(), (times * angle).sin().mean()))
+        assert mean.abs().max() < 5 / (64 * math.sqrt(2))
+
+
 def test_each_world_has_its_own_rotation() -> None:
     centre = Paper(rotate=True)(keys(64), (5, 7))[:, :, 2, 3]
     torch.testing.assert_close(centre.norm(dim=1), torch.full((64,), math.sqrt(1.01)))
@@ -169,8 +179,8 @@ def test_other_winds_stay(wind) -> None:
 
 
 def test_a_wandering_wind_waits_with_a_world_that_is_not_due() -> None:
-    wind, state = Wandering(), draw("....", worlds=2)
-    state = in_wind(state, Fire(), wind(state.key, (1, 4)))
-    after = advance(state, Fire(), wind, torch.tensor([True, False]))
+    fire, wind, state = Fire(), Wandering(), draw("....", worlds=2)
+    state = in_wind(state, fire, wind(state.key, (1, 4)))
+    after = advance(state, fire, wind, torch.tensor([True, False]))
     assert not torch.equal(after.wind[0], state.wind[0])
     assert torch.equal(after.wind[1], state.wind[1])

@@ -16,7 +16,7 @@ from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import Cover, WorldState, count_trees, is_burning, is_tree
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.wind import Calm, Paper, Uniform, Wandering
-from warp_torchrl.world.world import _CELLS_AT_ONCE, World, advance
+from warp_torchrl.world.world import _CELLS_AT_ONCE, World, advance, in_wind
 
 from .drawing import differing, draw, drawn
 
@@ -449,3 +449,20 @@ def test_the_tally_by_hand() -> None:
     assert counts == {"initial": 11, "preserved": 6, "extinguished": 1, "cleared": 1}
     assert (tally.burned.item(), tally.burning.item(), tally.alight.item()) == (2, 1, 1)
     assert tally.saved().item() == pytest.approx(7 / 11)
+
+
+def test_ground_and_air_are_replaced_whole() -> None:
+    state = start(WORLDS["control"], range(2))
+    for derived in ("wind", "alpha", "landscape", "cover"):
+        with pytest.raises(TypeError, match=derived):
+            state.replace(**{derived: getattr(state, derived)})
+    gale = in_wind(state, WORLDS["control"].fire, torch.full((2, 2, 1, 1), 30.0))
+    assert not torch.equal(gale.air.gain, state.air.gain) and not torch.equal(gale.air.table, state.air.table)
+
+
+def test_what_follows_from_ground_and_air_is_made_again_from_what_changes(world: World) -> None:
+    state = start(world, range(3))
+    emptied = state.replace(
+        ground=state.ground.replace(alpha=torch.zeros_like(state.alpha)), air=state.air.replace(table=None)
+    )
+    assert differing(world.restored(emptied), state) == []

@@ -88,5 +88,7 @@ def to_cover(codes: np.ndarray, known: np.ndarray, table: Mapping[int, int]) -> 
     strange = np.unique(codes[known & (cover == 255)])
     if strange.size:
         listed = ", ".join(f"{code:.0f}" for code in strange[:50]) + ", ..." * (strange.size > 50)
-        raise ValueError(f"table must have every code of fuel, it lacks {strange.size}: {listed}")
+        fits = [name for name, preset in TABLES.items() if set(np.unique(codes[known])) <= preset.keys()]
+        hint = f"; table={' or table='.join(fits)} has them" if fits else ""
+        raise ValueError(f"table must have every code of fuel, it lacks {strange.size}: {listed}{hint}")
     return np.where(known, cover, np.uint8(Cover.BARE))

@@ -45,13 +45,14 @@ def find_layer(name: str, folder: Path, pattern: str) -> Path:
     return matches[0]
 
 
-def read_grid(name: str, path: Path, metric: bool = True) -> Grid:
+def read_grid(name: str, path: Path, metric: bool = True, remedy: str = "resample") -> Grid:
     """Return a layer's grid; only the header is read.
 
     Args:
         name: What the layer is, for messages.
         path: Its file.
         metric: Refuse cells that are not squares in metres, north up. False for a layer that is to be resampled.
+        remedy: What the user gives to have it resampled, for messages.
 
     Raises:
         ValueError: If the file cannot be read, is enormous, or has more than a band or other than real numbers.
@@ -64,8 +65,9 @@ def read_grid(name: str, path: Path, metric: bool = True) -> Grid:
             raise ValueError(f"{name} must have one band of real numbers, {path} has {', '.join(layer.dtypes[:4])}")
         grid = Grid((rows, columns), crs, layer.transform)
         if metric and not grid.is_metric:
-            rule = "square cells in metres, north up, or be resampled"
-            raise ValueError(f"{name} must have {rule}, {path} has {layer.res} in {crs}")
+            has = f"{path} has {layer.res} in {crs or 'no CRS'}"
+            hint = f"; give {remedy} to put it on such cells" if grid.is_on_earth else ""
+            raise ValueError(f"{name} must have square cells in metres, north up, {has}{hint}")
         return grid
 
 

@@ -1,7 +1,9 @@
 """Landscapes from rasters: fuel or land cover, elevation, and tree age or canopy cover, cropped to the world's size."""
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from os import PathLike
 from pathlib import Path
 from typing import Literal
@@ -17,13 +19,16 @@ from warp_torchrl.world.landscape import map_size
 from warp_torchrl.world.layer import find_layer, read_grid, read_layer, regrid, resample_layer
 from warp_torchrl.world.state import OLDEST, Cover, Landscape
 
+_log = logging.getLogger("warp_torchrl")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Raster:
     """Real ground: the cover from a fuel or land-cover layer and the elevation, read once and cropped from one grid.
 
     A layer is a GeoTIFF (.tif, .tiff) or an ESRI ASCII grid (.asc) with one band. The grid is the fuel layer's, which
-    must have square cells in metres, north up, or one of cells of ``resolution``.
+    must have square cells in metres, north up, or one of cells of ``resolution``. Where it has no CRS, as ASCII grids
+    have none, its unit is taken to be the metre, and a warning says so.
 
     Attributes:
         path: Folder of the layers; or the fuel layer's file, with the others beside it. None is an error.
@@ -148,7 +153,9 @@ class Raster:
     def _read_layers(self, paths: Mapping[str, Path]) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
         """Return the values of each layer on the grid, and where they are known; every header is checked first."""
         strict = self.resample == "refuse"
-        grid = read_grid("fuel", paths["fuel"], metric=self.resolution is None)
+        grid = read_grid("fuel", paths["fuel"], self.resolution is None, remedy="resolution=30 resample=mode")
+        if not grid.crs:
+            _tell_once(f"{paths['fuel']} has no CRS: its cells are taken as squares of {grid.cell_size:g} m")
         grids = {"fuel": grid}
         if self.resolution is not None:
             grid = regrid("fuel", grid, self.resolution)
@@ -165,6 +172,11 @@ class Raster:
                 method = self.resample if name == "fuel" else "bilinear"  # "refuse" has raised by now
                 layers[name], known[name] = resample_layer(name, path, grid, method)  # type: ignore[arg-type]
         return layers, known
+
+
+@cache
+def _tell_once(line: str) -> None:
+    _log.warning(line)
 
 
 def _to_metres(heights: np.ndarray, known: np.ndarray) -> np.ndarray:

@@ -1,0 +1,1 @@
+"""Mutants: the package with one small fault each, which the tests beside it must notice."""
