@@ -88,7 +88,8 @@ def test_assets_are_weighed_by_the_mean_of_the_whole_map_of_each_world():
     state, _ = drawn(rows, [[15, 15]])
     assets = torch.tensor([[1.0, 2.0], [3.0, 6.0]]).repeat_interleave(8, 0).repeat_interleave(8, 1)
     both = concatenated([state, state])
-    both = both.replace(landscape=both.landscape.replace(assets=torch.stack((assets, 10.0 * assets))))
+    weighed = both.landscape.replace(assets=torch.stack((assets, 10.0 * assets)))
+    both = both.replace(ground=both.ground.replace(landscape=weighed))
     assert Coverage().value(both).tolist() == pytest.approx([248 / 256 + 0.02 * 11 / 3] * 2)
 
 
