@@ -35,8 +35,9 @@ def saved(run, frames, keep=3, **options):
 
 
 def test_what_was_saved_comes_back(tmp_path):
-    saved(tmp_path, 100)
-    found, skipped = newest(tmp_path)
+    run = tmp_path / "runs" / "of today"  # neither is there
+    saved(run, 100)
+    found, skipped = newest(run)
     assert not skipped and found.manifest.frames == 100 and found.manifest.signature == SIGNATURE
     assert found.policy()["weight"].tolist() == [0, 1, 2, 3] and found.training()["frames"] == 100
     assert found.record() == Record(choices={"algorithm": "mappo"}, values={"seed": 3})

@@ -68,6 +68,13 @@ def test_every_run_is_compared_with_every_run():
     assert found["saved_difference"] == pytest.approx(0.1)
 
 
+def test_an_interval_of_improvement_resamples_the_runs_of_the_policy():
+    # Of two runs one always saves more than the other policy's only run and one never: the mean of two draws of them
+    # is 0, 1/2 or 1.
+    found = compare(np.repeat([[0.1], [0.9]], 50, axis=1), np.full((1, 50), 0.5))
+    assert found["probability_of_improvement"] == 0.5 and found["probability_ci95"] == [0.0, 1.0]
+
+
 def test_several_runs_are_resampled_as_runs():
     # Two runs that differ by 0.4 on every world: the mean of two draws of them is 0.3, 0.5 or 0.7.
     values = np.repeat([[0.3], [0.7]], 50, axis=1)

@@ -80,6 +80,21 @@ def test_a_central_critic_reads_the_joint_action(make_small_env):
     assert (critic(other)[STATE_ACTION_VALUE][:, 0] != before[:, 0]).all()
 
 
+def test_the_targets_of_actor_and_critic_follow(make_small_env):
+    env = make_small_env(1)
+    learner = Ddpg(tau=0.75, warm_up=1, capacity=3, minibatch_size=3).build(env, SMALL, 3)
+    data = three_transitions(env, learner)
+    sources = [getattr(learner.loss, f"{name}_network_params") for name in ("actor", "value")]
+    targets = [getattr(learner.loss, f"target_{name}_network_params") for name in ("actor", "value")]
+    with torch.no_grad():
+        for value, networks in ((1.0, sources), (0.0, targets)):
+            for network in networks:
+                network.apply_(lambda weight, value=value: weight.data.fill_(value))
+    learner.after_step(data)
+    for value, networks in ((1.0, sources), (0.75, targets)):
+        assert all((weight == value).all() for network in networks for weight in network.values(True, True))
+
+
 def test_a_share_of_the_actions_is_drawn_and_the_memory_holds_what_was_done(make_small_env):
     env = make_small_env(64)
     learner = Ddpg(epsilon=0.8, epsilon_until=0.5, warm_up=1, capacity=256, minibatch_size=3).build(env, SMALL, 256)

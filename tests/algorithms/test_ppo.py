@@ -62,6 +62,14 @@ def test_what_is_learnt_from_is_kept_as_the_networks_compute(make_small_env):
     assert kept == {"float32": torch.float32, "bfloat16": torch.bfloat16}
 
 
+def test_who_remembers_learns_from_whole_sequences(make_small_env):
+    # Six worlds of eight steps each: 20 steps a minibatch are two sequences.
+    env, model = make_small_env(6), Mlp(memory=8, actor_hidden=(8,), critic_hidden=(8,))
+    learner = Ppo(minibatch_size=20, epochs=1).build(env, model, 48)
+    learner.store(collected(env, learner, 8))
+    assert [tuple(sample.batch_size) for sample in learner.samples()] == [(2, 8)] * 3
+
+
 def test_gae_by_hand():
     """Three steps, reward 1 each, values 0.5, gamma 0.5, lambda 0.5; the episode terminates at the last.
 
