@@ -500,25 +500,16 @@ def test_jobs_in_processes_of_their_own_end_in_one_folder_and_the_one_that_faile
     option = {"joblib": "joblib", "submitit": "submitit_local"}[launcher]
     what = ["policy=noop", "landscape.size=12"] if program == "evaluate.py" else [*TINY, "total_frames=32"]
     what += ["horizon=8", "evaluation.episodes=2"]
-    beyond = 2**62 - 1  # a first seed that may be; the second is beyond the last, which only the job finds
-    seeds = f"evaluation.first_seed=7,{beyond},8"
-    done = command(program, *what, "-m", seeds, f"hydra/launcher={option}", folder=tmp_path)
+    levels = "landscape.levels=[0,0,0.5],[1,1,1],[0,0,1]"  # the second floods the map, which only the job finds
+    done = command(program, *what, "-m", levels, f"hydra/launcher={option}", folder=tmp_path)
     assert done.returncode == 2, done.stderr
     named = [line for line in done.stderr.splitlines() if line.startswith("error: job ")]
     assert len(named) == 1 and done.stderr.strip().endswith(named[0])
-    assert named[0].startswith("error: job 1 (") and f"first_seed={beyond}) failed: seed must be in" in named[0]
+    assert named[0].startswith("error: job 1 (") and "levels=[1,1,1]) failed: " in named[0]
     assert "Traceback" not in done.stderr
     (sweep,) = (tmp_path / "multirun").glob("*/*")
     assert (sweep / "summary.md").read_text().strip() in done.stdout and (sweep / "summary.png").exists()
     assert [(sweep / job / "evaluation.json").exists() for job in "012"] == [True, False, True]
-
-
-def test_what_an_earlier_sweep_left_of_a_failure_is_forgotten(tmp_path, run_here):
-    (tmp_path / "sweep" / "0").mkdir(parents=True)
-    (tmp_path / "sweep" / "0" / "failed.json").write_text('{"job": 0, "overrides": "", "code": 5, "reason": "old"}')
-    what = ("policy=noop", "landscape.size=12", "horizon=8", "evaluation.episodes=2", "hydra.sweep.dir=sweep")
-    code, errors, _ = run_here("evaluate.py", "-m", *what)
-    assert code == 0, errors
 
 
 def test_a_launcher_that_gives_up_leaves_the_table_and_names_the_jobs_that_did_not_end(tmp_path, run_here, monkeypatch):
