@@ -40,6 +40,7 @@ class Look(NamedTuple):
     wet: Tensor  # ticks for which the cell cannot ignite
     alpha: Tensor  # flammability, 255 times
     fire_risk: Tensor  # ``Forecast.fire_risk``, 255 times
+    others: Tensor  # 63 for each other agent of each role, four at most, [B, A, R, V, V]
 
 
 class Channel(NamedTuple):
@@ -140,13 +141,13 @@ def threat(look: Look) -> Tensor:
 @channel(high=252)
 def other_ugv(look: Look) -> Tensor:
     """Return where other ground vehicles are, 63 each, four at most."""
-    return others(look, "ugv")
+    return look.others[:, :, ROLE_NAMES.index("ugv")]
 
 
 @channel(high=252)
 def other_uav(look: Look) -> Tensor:
     """Return where other aircraft are, 63 each, four at most."""
-    return others(look, "uav")
+    return look.others[:, :, ROLE_NAMES.index("uav")]
 
 
 DEFAULT = tuple(CHANNELS)
@@ -178,6 +179,7 @@ def look_at(state: WorldState, world: World, forecast: Forecast, radius: int) ->
         wet=wet,
         alpha=alpha,
         fire_risk=fire_risk,
+        others=_others(state.vehicles.position, world.team.table(state.cells.device).index, radius),
     )
 
 
@@ -203,14 +205,13 @@ def stages(cells: Tensor) -> Tensor:
     return (cells - (FIRST_FIRE - 1)) * byte(is_burning(cells)) * 51
 
 
-def others(look: Look, role: str) -> Tensor:
-    """Return where the other agents of a role are, 63 each, at most 4 to a cell, uint8 [B, A, V, V]."""
-    position, radius = look.state.vehicles.position, look.window.radius
-    side, of_role = 2 * radius + 1, look.world.team.table(position.device).index == ROLE_NAMES.index(role)
+def _others(position: Tensor, role: Tensor, radius: int) -> Tensor:
+    """Return where the other agents of each role are, 63 each, at most 4 to a cell, uint8 [B, A, R, V, V]."""
+    side, roles = 2 * radius + 1, len(ROLE_NAMES)
     row, column = (position[:, None] - position[:, :, None] + radius).unbind(-1)  # of each in each other's square
-    is_near = (row >= 0) & (row < side) & (column >= 0) & (column < side) & of_role
-    is_near &= ~torch.eye(len(of_role), dtype=torch.bool, device=position.device)
-    index = torch.where(is_near, row * side + column, side**2)
-    count = torch.zeros(*row.shape[:2], side**2 + 1, dtype=torch.uint8, device=position.device)
+    is_near = (row >= 0) & (row < side) & (column >= 0) & (column < side)
+    is_near &= ~torch.eye(len(role), dtype=torch.bool, device=role.device)
+    index = torch.where(is_near, (role * side + row) * side + column, roles * side**2)
+    count = torch.zeros(*row.shape[:2], roles * side**2 + 1, dtype=torch.uint8, device=role.device)
     count = count.scatter_add(2, index, torch.ones_like(index, dtype=torch.uint8))[..., :-1]
-    return count.clamp(max=4).mul_(63).unflatten(-1, (side, side))
+    return count.clamp(max=4).mul_(63).unflatten(-1, (roles, side, side))

@@ -214,7 +214,8 @@ class Fire:
 
 def _of_codes(table: tuple[float, ...], codes: Tensor) -> Tensor:
     """Return what a table holds for each code, float32, shape of the codes."""
-    return torch.tensor(table, device=codes.device)[codes.to(torch.int64)]
+    values = torch.tensor(table, device=codes.device)
+    return values.index_select(0, codes.flatten().to(torch.int32)).view(codes.shape)
 
 
 @lru_cache(maxsize=8)

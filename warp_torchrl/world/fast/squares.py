@@ -77,7 +77,8 @@ def _squares(plane: Tensor, position: Tensor, radius: int) -> Tensor:
 
 def stacked(channels: Sequence[Tensor]) -> Tensor:
     """Return channels [B, A, V, V] of whole numbers 0..255 as one tensor, uint8 [B, A, C, V, V]."""
-    return _stacked([to_uint8(channel).contiguous() for channel in channels])
+    codes = [to_uint8(channel) for channel in channels]
+    return _stacked([each.contiguous() for each in codes] if is_compiling() else codes)
 
 
 # A compiler would write squares of odd sides a few cells at a time.
