@@ -306,7 +306,7 @@ class WildfireEnv(EnvBase):
 _FORMER = {"wind": "air.wind"} | {
     f"landscape.{name}": f"ground.landscape.{name}" for name in ("cover", "age", "elevation", "assets", "corner")
 }
-"""Names of entries in runs that were saved before version 0.2."""
+"""Names of entries in runs that were saved before ground and air were made whole."""
 _NO_LONGER = ("alpha", "slope", "gain", "chances")
 
 
