@@ -1,4 +1,4 @@
-"""What is told of a policy: the yardsticks of worlds that were met before are not played again."""
+"""What is told of a policy: the baselines of worlds that were met before are not played again."""
 
 from warp_torchrl import assessment
 from warp_torchrl.config import compose_config, plain
@@ -8,7 +8,7 @@ from warp_torchrl.settings import settings
 TINY = ["landscape.size=12", "horizon=16"]
 
 
-def test_the_jobs_of_a_sweep_play_the_yardsticks_once(monkeypatch):
+def test_the_jobs_of_a_sweep_play_the_baselines_once(monkeypatch):
     asked = []
 
     def note(env, first_seed, names):
@@ -18,14 +18,14 @@ def test_the_jobs_of_a_sweep_play_the_yardsticks_once(monkeypatch):
     monkeypatch.setattr(assessment, "play_heuristics", note)
     monkeypatch.setattr(assessment, "_PLAYED", {})
 
-    def yardsticks(names, *overrides):
+    def baselines(names, *overrides):
         plan = settings(plain(compose_config("train", ["evaluation.episodes=3", *TINY, *overrides])))
-        return assessment._yardsticks(plan, plan.make_env(3, plan.evaluation.first_seed), names)
+        return assessment._baselines(plan, plan.make_env(3, plan.evaluation.first_seed), names)
 
-    first = yardsticks(["noop", "local"])
-    again = yardsticks(["local", "noop"], "seed=7", "algorithm=ppo")
+    first = baselines(["noop", "local"])
+    again = baselines(["local", "noop"], "seed=7", "algorithm=ppo")
     assert asked == [["noop", "local"], []] and again["local"] is first["local"]
-    more = yardsticks(["greedy", "local"], "seed=8")
+    more = baselines(["greedy", "local"], "seed=8")
     assert asked[2] == ["greedy"] and list(more) == ["greedy", "local"]
-    yardsticks(["noop"], "wind.speed=9")
+    baselines(["noop"], "wind.speed=9")
     assert asked[3] == ["noop"], "other worlds"

@@ -1,4 +1,4 @@
-"""The yardsticks do what they say, and rank as they should."""
+"""The baselines do what they say, and rank as they should."""
 
 import numpy as np
 import pytest
@@ -163,7 +163,7 @@ def test_agents_with_empty_tanks_go_for_water(name):
     assert (env.world_state.vehicles.tank == 2).all()
 
 
-def test_yardsticks_rank_on_skirmish():
+def test_baselines_rank_on_skirmish():
     """16 fires: standard errors of the means are 1 to 5 points, the gaps 10 and more but for two of seven."""
     env = make_env("skirmish", n_worlds=16)
     saved = {name: play(env, HEURISTICS[name](env), 1_000_000)["saved"].mean() for name in HEURISTICS}

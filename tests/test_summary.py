@@ -35,7 +35,7 @@ def test_runs_that_were_trained_alike_are_gathered(sweep):
     assert other.scenario == "other"
 
 
-def test_yardsticks_are_those_of_any_evaluation_that_holds_them(sweep):
+def test_baselines_are_those_of_any_evaluation_that_holds_them(sweep):
     path = sweep / "0" / "evaluation.json"
     held = {"saved": [0.2, 0.3, 0.4], "success": [0.0, 0.0, 1.0]}
     content = json.loads(path.read_text()) | {"yardstick_episodes": {"noop": held, "local": held}}
@@ -46,7 +46,7 @@ def test_yardsticks_are_those_of_any_evaluation_that_holds_them(sweep):
     assert entries["tiny", "local"].saved.tolist() == [[0.5, 0.5, 0.6]], "its own evaluation comes first"
 
 
-def test_yardsticks_that_met_other_worlds_are_left_out(sweep):
+def test_baselines_that_met_other_worlds_are_left_out(sweep):
     for run, saved in (("0", 0.2), ("1", 0.4)):
         path = sweep / run / "evaluation.json"
         held = {

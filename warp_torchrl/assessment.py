@@ -1,4 +1,4 @@
-"""A policy assessed: it and the yardsticks meet the same fires, and what came of it is told, kept and drawn."""
+"""A policy assessed: it and the baselines meet the same fires, and what came of it is told, kept and drawn."""
 
 import logging
 from collections.abc import Sequence
@@ -12,8 +12,8 @@ from warp_torchrl.api import policy_of
 from warp_torchrl.construction import ConfigError
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation import (
+    BASELINES,
     MODES,
-    YARDSTICKS,
     Episodes,
     LeftOut,
     play,
@@ -31,7 +31,7 @@ log = logging.getLogger("warp_torchrl")
 
 
 def assess(plan: Settings, folder: Path, found: checkpoints.Checkpoint | str, worlds: Sequence[str]) -> None:
-    """Evaluate a checkpoint or a heuristic beside the yardsticks: table, ``evaluation.json`` and ``episode.gif``.
+    """Evaluate a checkpoint or a heuristic beside the baselines: table, ``evaluation.json`` and ``episode.gif``.
 
     Args:
         plan: Of the worlds.
@@ -42,7 +42,7 @@ def assess(plan: Settings, folder: Path, found: checkpoints.Checkpoint | str, wo
     first, folder = plan.evaluation.first_seed, folder.resolve()
     env, one = plan.make_env(plan.evaluation.episodes, first), plan.make_env(1, first)
     name, mode, actor, filmed = _actors(plan, found, env, one)
-    others = _yardsticks(plan, env, [each for each in YARDSTICKS if each != found])
+    others = _baselines(plan, env, [each for each in BASELINES if each != found])
     episodes = play(env, actor, first, mode, watch=True)
     learner, digest, frames, other_modes, left_out = None, "", None, {}, {}
     if isinstance(found, checkpoints.Checkpoint):
@@ -89,7 +89,7 @@ def _actors(
 _PLAYED: dict[str, tuple[Settings, dict[str, Episodes]]] = {}
 
 
-def _yardsticks(plan: Settings, env: WildfireEnv, names: Sequence[str]) -> dict[str, Episodes]:
+def _baselines(plan: Settings, env: WildfireEnv, names: Sequence[str]) -> dict[str, Episodes]:
     """Return the episodes of heuristics; the jobs of a sweep that meet the same worlds play them once."""
     worlds = repr((plan.world, plan.observation, plan.reward, plan.evaluation, plan.device))
     _, played = _PLAYED.setdefault(worlds, (plan, {}))  # the plan stays alive: no other can come to print the same

@@ -22,7 +22,7 @@ from warp_torchrl.statistics import compare, summarise
 
 SHOWN = ("averted", *BEHAVIOUR)
 MODES = {"sampled": ExplorationType.RANDOM, "deterministic": ExplorationType.DETERMINISTIC}
-YARDSTICKS = ("noop", "random", "local", "greedy", "coordinated")
+BASELINES = ("noop", "random", "local", "greedy", "coordinated")
 """Policies that every table shows."""
 
 Episodes = dict[str, np.ndarray]
@@ -205,7 +205,7 @@ def _behaviour_lines(content: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def play_heuristics(env: WildfireEnv, first_seed: int, names: Sequence[str] = YARDSTICKS) -> dict[str, Episodes]:
+def play_heuristics(env: WildfireEnv, first_seed: int, names: Sequence[str] = BASELINES) -> dict[str, Episodes]:
     """Return the episodes of heuristics by name."""
     return {name: play(env, HEURISTICS[name](env), first_seed) for name in names}
 

@@ -1,4 +1,4 @@
-"""Learning from a rule of thumb first: the learner's loss gets a cloning term that falls to nothing.
+"""Learning from a baseline first: the learner's loss gets a cloning term that falls to nothing.
 
 The pupil acts, the teacher says what it would have done there, and reinforcement takes over as the cloning term falls
 (Schmitt et al., "Kickstarting Deep Reinforcement Learning", 2018, with a rule for a teacher).

@@ -28,11 +28,11 @@ class Entry(NamedTuple):
     saved: np.ndarray  # [runs, n]
     success: np.ndarray  # [runs, n]
     seeds: tuple[int, ...]
-    metrics: Mapping[str, np.ndarray] = {}  # by name, [runs, n], NaN where an episode has none; a yardstick's are none
+    metrics: Mapping[str, np.ndarray] = {}  # by name, [runs, n], NaN where an episode has none; a baseline's are none
 
 
 def gather(*folders: Path) -> list[Entry]:
-    """Return what the ``evaluation.json`` files under folders hold, the yardsticks that they were measured by included.
+    """Return what the ``evaluation.json`` files under folders hold, the baselines that they were measured by included.
 
     Runs that differ in their seed alone are one entry.
     """
@@ -42,7 +42,7 @@ def gather(*folders: Path) -> list[Entry]:
         key = (place(content), content["method"], content["configuration"], tuple(content["seeds"]))
         found.setdefault(key, []).append(content)
     several = {(scenario, method) for scenario, method, *_ in found if _differ(found, scenario, method)}
-    return _yardsticks(found) + [
+    return _baselines(found) + [
         Entry(
             scenario,
             f"{method} {configuration[:6]}" if (scenario, method) in several else method,
@@ -55,8 +55,8 @@ def gather(*folders: Path) -> list[Entry]:
     ]
 
 
-def _yardsticks(found: Mapping[_Key, Sequence[Mapping[str, Any]]]) -> list[Entry]:
-    """Return the yardsticks that have no evaluation of their own, as others hold them.
+def _baselines(found: Mapping[_Key, Sequence[Mapping[str, Any]]]) -> list[Entry]:
+    """Return the baselines that have no evaluation of their own, as others hold them.
 
     Those that did not save the same in each met other worlds, under the scenario's name, and are left out.
     """

@@ -126,7 +126,7 @@ def test_adaptive_by_hand():
 
 
 def test_adaptive_charges_the_fuel_within_three_cells_of_fire():
-    # Of 81 trees the one in the middle burns; within three king's moves of it stand 7 x 7 - 1 = 48.
+    # Of 81 trees the one in the middle burns; within three cells of it stand 7 x 7 - 1 = 48.
     state, _ = drawn(["T" * 9] * 4 + ["TTTTFTTTT"] + ["T" * 9] * 4, [[0, 0]])
     assert Adaptive(contained=0.0).value(state).item() == pytest.approx(80 / 81 - 0.1 * 48 / 81)
 

@@ -75,7 +75,7 @@ def test_a_history_cut_in_two_is_the_whole(fire: str, wind: str) -> None:
 
 
 def test_a_certain_fire_arrives_with_its_distance() -> None:
-    # alpha 1, calm, flat, unit diagonal: one king's move a tick; a cell is 1 ha, and (2 t + 1)^2 have caught fire.
+    # alpha 1, calm, flat, unit diagonal: one cell a tick all round; a cell is 1 ha, and (2 t + 1)^2 have caught fire.
     fire = Fire(diagonal="unit")
     history = trace(draw("TTTTT TTTTT TTaTT TTTTT TTTTT", fire=fire), fire, Uniform(), 3, 100.0)
     assert history.arrival[0].tolist() == [

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 
 from warp_torchrl.api import make_env
-from warp_torchrl.evaluation import YARDSTICKS, play, play_heuristics
+from warp_torchrl.evaluation import BASELINES, play, play_heuristics
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.reward import Adaptive, Collaborative, Coverage, Efficiency, Paper, Time
 from warp_torchrl.statistics import compare, summarise
@@ -41,11 +41,11 @@ def calibrate(scenario: str, device: str, episodes: int, overrides: Sequence[str
 
 
 def rank_rewards(scenario: str, device: str, episodes: int, overrides: Sequence[str] = ()) -> dict[str, Any]:
-    """Return what each reward, unscaled and unshaped, pays the yardsticks, and how much they save, by policy [n]."""
+    """Return what each reward, unscaled and unshaped, pays the baselines, and how much they save, by policy [n]."""
     env = make_env(scenario, n_worlds=episodes, seed=FIRST_SEED, device=device, overrides=overrides)
     rewards = [Efficiency(), Time(horizon=env.world.horizon), Coverage(), Collaborative(), Adaptive(), Paper()]
     returns: dict[str, dict[str, np.ndarray]] = {"saved": {}}
-    for policy in YARDSTICKS:
+    for policy in BASELINES:
         totals = {type(reward).__name__.lower(): torch.zeros(episodes, device=device) for reward in rewards}
 
         def pay(transition: Transition, totals: dict[str, torch.Tensor] = totals) -> None:
@@ -108,12 +108,12 @@ def reward_table(rows: list[dict[str, Any]]) -> str:
     lines = [
         f"Mean return of {rows[0]['episodes']} episodes by reward, unscaled and unshaped",
         "",
-        "| scenario | reward | " + " | ".join(YARDSTICKS) + " | ranked against trees saved |",
-        "|---|---|" + "---|" * (len(YARDSTICKS) + 1),
+        "| scenario | reward | " + " | ".join(BASELINES) + " | ranked against trees saved |",
+        "|---|---|" + "---|" * (len(BASELINES) + 1),
     ]
     for row in rows:
         for name, returns in row["returns"].items():
-            cells = [f"{returns[policy].mean():.3f}" for policy in YARDSTICKS]
+            cells = [f"{returns[policy].mean():.3f}" for policy in BASELINES]
             against = ", ".join(disagreements(returns, row["returns"]["saved"])) or "none"
             lines.append(f"| {row['scenario']} | {name} | " + " | ".join(cells) + f" | {against} |")
     return "\n".join(lines)

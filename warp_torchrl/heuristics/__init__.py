@@ -1,4 +1,4 @@
-"""Policies without learning, the yardsticks. Each is usable wherever a policy is: tensordict in, action out.
+"""Policies without learning, the baselines. Each is usable wherever a policy is: tensordict in, action out.
 
 They read the worlds through the environment: all but ``local`` see every cell, which no learned policy does.
 """

@@ -16,7 +16,7 @@ from warp_torchrl.world.state import Action, Cover, WorldState, is_burning
 
 
 class Heuristic(TensorDictModuleBase):
-    """A rule of thumb for the teams of one environment.
+    """A baseline for the teams of one environment.
 
     Args:
         env: The environment whose worlds it acts in.
@@ -77,7 +77,7 @@ def list_cells(mask: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def way_to(state: WorldState, cells: Tensor) -> Tensor:
-    """Return the king's moves from each agent to cells [B, K], float32 [B, A, K]."""
+    """Return the Chebyshev distance from each agent to cells [B, K], float32 [B, A, K]."""
     gap = state.vehicles.position[:, :, None] - place(cells, state)[:, None]
     return gap.abs().amax(dim=-1).to(torch.float32)
 

@@ -1,4 +1,4 @@
-"""Rules of thumb in which each agent acts for itself."""
+"""Baselines in which each agent acts for itself."""
 
 import torch
 from torch import Tensor

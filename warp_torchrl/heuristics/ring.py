@@ -62,7 +62,7 @@ class Ring(Coordinated):
         """Return the nearest ring that can be closed in time and what it encloses; none where none can be."""
         world = self.env.world
         reach = max(burning.shape[1:]) // 2
-        away = torch.full(burning.shape, reach, device=burning.device)  # king's moves to the fire, ``reach`` at most
+        away = torch.full(burning.shape, reach, device=burning.device)  # cells to the fire, ``reach`` at most
         fire = burning
         for moves in range(reach):
             away = torch.where(fire & (away == reach), moves, away)

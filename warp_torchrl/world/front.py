@@ -58,7 +58,7 @@ def sector(place: Tensor, middle: Tensor, count: int = 8) -> Tensor:
 
 
 def exposure(state: WorldState, reach: int = 3) -> Tensor:
-    """Return the trees that could burn within ``reach`` king's moves of fire, a share of N0, float32 [B]."""
+    """Return the trees that could burn within a Chebyshev distance ``reach`` of fire, a share of N0, float32 [B]."""
     fuel = is_tree(state.cells) & (state.alpha > 0.0)
     near = grow(is_burning(state.cells), reach) & fuel
     return near.sum((1, 2)) / state.tally.initial
