@@ -172,3 +172,17 @@ def test_q_is_that_of_the_metrics(make_small_env):
     info = now["info"]
     wanted = info["saved"] - 0.1 * info["extinguished"] - 0.5 * info["cleared"] - info["burned"]
     torch.testing.assert_close(Efficiency().worth(env.world_state), wanted[:, 0], atol=1e-6, rtol=0)
+
+
+@pytest.mark.parametrize("barrier", ["lake", "firebreak", "wet"])
+def test_adaptive_counts_every_kind_of_barrier_as_containment(barrier):
+    # Fire in the middle of 5 x 5, and a ring of one kind about it: every ray meets it.
+    state, _ = drawn(["TTTTT", "TTTTT", "TTFTT", "TTTTT", "TTTTT"], [[0, 0], [4, 4]])
+    ring = torch.ones(1, 5, 5, dtype=torch.bool)
+    ring[:, 2, 2] = False
+    open_ground = Adaptive(exposed=0.0).value(state)
+    if barrier == "lake":
+        state = state.replace(ground=state.ground.replace(alpha=torch.where(ring, 0.0, state.alpha)))
+    else:
+        state = state.replace(**{barrier: ring.to(getattr(state, barrier).dtype)})
+    assert (Adaptive(exposed=0.0).value(state) - open_ground).item() == pytest.approx(0.1)

@@ -7,6 +7,18 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.batch import Batch, concatenated
+from warp_torchrl.world.burn import FireHistory
+from warp_torchrl.world.state import (
+    Air,
+    Forecast,
+    Ground,
+    Landscape,
+    Outcome,
+    Tally,
+    Transition,
+    Vehicles,
+    WorldState,
+)
 
 
 @dataclass(eq=False, repr=False)
@@ -96,3 +108,8 @@ def test_a_batch_shows_its_shapes_and_types() -> None:
 def test_a_batch_moves_to_a_device() -> None:
     moved = outer().to("meta")
     assert moved.inner.place.is_meta and moved.burned.is_meta and moved.burned.dtype == torch.bool
+
+
+def test_batches_are_compared_by_what_they_are_and_not_by_their_tensors() -> None:
+    for kind in (Landscape, Ground, Air, Forecast, Tally, Vehicles, WorldState, Outcome, Transition, FireHistory):
+        assert kind.__eq__ is object.__eq__ and kind.__hash__ is object.__hash__, kind.__name__

@@ -130,3 +130,12 @@ def test_a_world_is_the_same_on_every_device():
     here, there = source(key), source(key.cuda())
     for layer in ("cover", "age", "elevation", "corner"):
         assert torch.equal(getattr(here, layer), getattr(there, layer).cpu())
+
+
+@pytest.mark.parametrize("size", [(6, 8), (4, 4)])
+def test_no_tree_stands_where_none_can(size):
+    cover = np.full((6, 8), Cover.LAKE, np.uint8)
+    cover[2:] = Cover.GRASSLAND
+    land = Crop(cover=cover, age=np.full((6, 8), 7, np.uint8), size=size)(keys(20))
+    assert land.age.dtype == torch.uint8
+    assert torch.equal(land.age, torch.where(land.cover == int(Cover.LAKE), 0, 7).to(torch.uint8)) and land.age.any()
