@@ -97,3 +97,19 @@ def test_networks_that_face_the_fire_must_see_it():
     env, _ = seen_with("age", "threat")
     with pytest.raises(ValueError, match=r"facing must be north where observation\.channels lack fire_stage"):
         Ppo().policy(signature(env), Mlp())
+
+
+def test_ash_and_firebreaks_are_shown_where_they_are_and_not_beyond_the_map():
+    env, _ = seen_with("ash", "firebreak", "off_map")
+    state = env.world_state
+    position = torch.zeros_like(state.vehicles.position)  # in the corner: five by five cells, of which nine are there
+    flags = torch.zeros_like(state.burned)
+    marked = [flags.clone() for _ in range(2)]
+    marked[0][:, 0, 1], marked[1][:, 1, 0] = True, True
+    cells = torch.where(marked[0] | marked[1], 0, 5).to(torch.uint8)
+    state = state.replace(
+        cells=cells, burned=marked[0], firebreak=marked[1], vehicles=state.vehicles.replace(position=position)
+    )
+    ash, firebreak, off_map = env.set_state(state)[(*OBSERVATION, "view")][0, 0]
+    assert ash.nonzero().tolist() == [[2, 3]] and firebreak.nonzero().tolist() == [[3, 2]]
+    assert (off_map == 255).sum() == 16

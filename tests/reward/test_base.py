@@ -20,6 +20,13 @@ def test_shaping_pays_the_way_to_the_fire():
     assert earned(shaped, state, world, int(Action.WEST)) == pytest.approx([0.1375])
 
 
+def test_the_distance_potential_is_nought_where_nothing_burns():
+    state, world = drawn(FIELD, [[0, 0]])
+    out = world.step(state, torch.tensor([[EXTINGUISH]])).after
+    assert state.tally.alight.item() == 1 and out.tally.alight.item() == 0
+    assert Efficiency().phi(state).item() < 0.0 == Efficiency().phi(out).item()
+
+
 def test_the_exposure_potential_pays_for_fuel_out_of_reach():
     state, world = drawn(FIELD, [[0, 0]])
     shaped = Efficiency(shaping=1.0, potential="exposure", gamma=0.9, act=0.0)

@@ -101,3 +101,15 @@ def test_the_lattice_is_large_enough_for_every_offset(frequency: float) -> None:
     noise = fractal_noise(keys(256), (5, 17), [frequency], [1.0], Stream.NOISE)
     assert noise.isfinite().all()
     assert noise.abs().max() < 1.5
+
+
+def test_offsets_and_gradients_are_draws_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def noted(key: Tensor, tick: int, stream: Stream, shape: tuple[int, ...]) -> Tensor:
+        asked.append((tick, stream))
+        return torch.full((key.shape[0], *shape), 0.25)
+
+    monkeypatch.setattr(perlin, "uniform", noted)
+    fractal_noise(keys(1), (4, 4), [0.5, 1.0], [1.0, 0.5], Stream.NOISE)
+    assert asked == [(0, Stream.NOISE), (1, Stream.NOISE)]
