@@ -18,6 +18,7 @@ from warp_torchrl.scene import Observations, Scene
 from warp_torchrl.specs import make_specs
 from warp_torchrl.world.fast.compile import check_compiler
 from warp_torchrl.world.role import ROLES
+from warp_torchrl.world.saved import filled
 from warp_torchrl.world.state import Transition, WorldState
 from warp_torchrl.world.world import World
 
@@ -182,7 +183,7 @@ class WildfireEnv(EnvBase):
         worlds = state_dict["worlds"]
         state = None
         if worlds:
-            state = self.world.restored(_fill(self.world.reset(self.seeds, self._episodes), worlds))
+            state = self.world.restored(filled(self.world.reset(self.seeds, self._episodes), worlds))
         for name in ("seeds", "episodes", "episode_reward"):
             if state_dict[name].shape != self.batch_size:
                 raise ValueError(f"{name} must have shape {list(self.batch_size)}, got {state_dict[name].shape}")
@@ -301,24 +302,3 @@ class WildfireEnv(EnvBase):
             batch_size=batch,
             device=device,
         )
-
-
-_FORMER = {"wind": "air.wind"} | {
-    f"landscape.{name}": f"ground.landscape.{name}" for name in ("cover", "age", "elevation", "assets", "corner")
-}
-"""Names of entries in runs that were saved before ground and air were made whole."""
-_NO_LONGER = ("alpha", "slope", "gain", "chances")
-
-
-def _fill(template: WorldState, entries: dict[str, Tensor]) -> WorldState:
-    """Return worlds with the given entries, checked against a template's names, shapes and types."""
-    entries = {_FORMER.get(name, name): value for name, value in entries.items() if name not in _NO_LONGER}
-    expected = template.what_changes()
-    if set(expected) != set(entries):
-        raise ValueError(f"worlds must have the entries {sorted(expected)}, got {sorted(entries)}")
-    for name, value in entries.items():
-        old = expected[name]
-        if value.shape != old.shape or value.dtype != old.dtype:
-            raise ValueError(f"{name} must be {old.dtype} {list(old.shape)}, got {value.dtype} {list(value.shape)}")
-    given = {name: value.to(expected[name].device).clone() for name, value in entries.items()}
-    return template.with_leaves({**template.leaves(), **given})

@@ -1,0 +1,29 @@
+"""Worlds that were saved, read back."""
+
+from torch import Tensor
+
+from warp_torchrl.world.state import WorldState
+
+_FORMER = {"wind": "air.wind"} | {
+    f"landscape.{name}": f"ground.landscape.{name}" for name in ("cover", "age", "elevation", "assets", "corner")
+}
+"""Names of entries in runs that were saved before ground and air were made whole."""
+_NO_LONGER = ("alpha", "slope", "gain", "chances")
+
+
+def filled(template: WorldState, entries: dict[str, Tensor]) -> WorldState:
+    """Return worlds like a template with the entries that ``WorldState.what_changes`` once returned.
+
+    Raises:
+        ValueError: If an entry is missing, unknown, or of another shape or type.
+    """
+    entries = {_FORMER.get(name, name): value for name, value in entries.items() if name not in _NO_LONGER}
+    expected = template.what_changes()
+    if set(expected) != set(entries):
+        raise ValueError(f"worlds must have the entries {sorted(expected)}, got {sorted(entries)}")
+    for name, value in entries.items():
+        old = expected[name]
+        if value.shape != old.shape or value.dtype != old.dtype:
+            raise ValueError(f"{name} must be {old.dtype} {list(old.shape)}, got {value.dtype} {list(value.shape)}")
+    given = {name: value.to(expected[name].device).clone() for name, value in entries.items()}
+    return template.with_leaves({**template.leaves(), **given})
