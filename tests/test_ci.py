@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+from tests.conftest import QUICK, TESTS
+
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
@@ -89,3 +91,7 @@ def test_codespell_finds_a_mistake_and_none_of_ours(tmp_path):
     (tmp_path / "page.md").write_text("The fire".replace("he", "eh"))
     theirs = subprocess.run([codespell, tmp_path / "page.md"], cwd=ROOT, capture_output=True, text=True, check=False)
     assert theirs.returncode != 0 and "==> The" in theirs.stdout
+
+
+def test_the_quick_files_are_there():
+    assert [each for each in QUICK if not (TESTS / each).exists()] == []
