@@ -34,14 +34,12 @@ QUICK = (
     "world/test_burn.py",
     "world/test_fire.py",
     "world/test_ignition.py",
-    "world/fast/test_road.py",
     "world/test_landscape.py",
     "world/test_law.py",
     "world/test_laws.py",
     "world/test_random.py",
     "world/test_team.py",
     "world/test_wind.py",
-    "world/test_world.py",
 )
 """The files of ``pytest -m quick``: the laws of the world, the environment and its specs, configuration, one learner,
 checkpoints there and back, and who may import whom. Of a minute on two free cores they may take a half."""

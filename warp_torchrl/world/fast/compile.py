@@ -57,11 +57,13 @@ def compile_function(function: Callable[P, T], fullgraph: bool = False, **option
     return torch.compile(function, fullgraph=fullgraph, dynamic=False, options=options)
 
 
-_LIBRARIES: dict[str, torch.library.Library] = {}
+_OPERATORS = torch.library.Library("warp_torchrl", "FRAGMENT")
+_FUNCTIONS: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {}
+"""Of each operator by name: what it computes, and what tells its result's shape."""
 
 
 def opaque_op(schema: str, like: Callable[..., Any] | None = None) -> Callable[[Callable[P, T]], Callable[P, T]]:
-    """Return what makes a function one that fused functions call as it is, and whose result they keep in memory.
+    """Return what makes a function one that compiled functions call as it is, and whose result they keep in memory.
 
     A compiler would write it out again for each who asks, or make a question of each element of what is a slice.
 
@@ -70,13 +72,15 @@ def opaque_op(schema: str, like: Callable[..., Any] | None = None) -> Callable[[
         like: Returns a tensor of the result's shape and type; None takes the function itself.
     """
 
-    def kept(function: Callable[P, T]) -> Callable[P, T]:
+    def opaque(function: Callable[P, T]) -> Callable[P, T]:
         name = function.__name__.strip("_")
-        _LIBRARIES.pop(name, None)  # of a module that is imported again
-        library = _LIBRARIES[name] = torch.library.Library("warp_torchrl", "FRAGMENT")
-        library.define(name + schema)  # a ``custom_op`` takes three times as long to call
-        library.impl(name, function, "CompositeExplicitAutograd")
-        torch.library.register_fake(f"warp_torchrl::{name}", like or function, lib=library)
+        known = name in _FUNCTIONS  # of a module that is imported again: an operator cannot be defined twice
+        _FUNCTIONS[name] = function, like or function
+        if not known:
+            _OPERATORS.define(name + schema)  # a ``custom_op`` takes three times as long to call
+            _OPERATORS.impl(name, lambda *given: _FUNCTIONS[name][0](*given), "CompositeExplicitAutograd")
+            fake = torch.library.register_fake(f"warp_torchrl::{name}", lib=_OPERATORS)
+            fake(lambda *given: _FUNCTIONS[name][1](*given))
         operator = getattr(torch.ops.warp_torchrl, name).default
 
         @wraps(function)
@@ -85,7 +89,7 @@ def opaque_op(schema: str, like: Callable[..., Any] | None = None) -> Callable[[
 
         return either
 
-    return kept
+    return opaque
 
 
 def check_compiler(device: torch.device) -> None:
