@@ -148,7 +148,7 @@ class Fire:
 
     def spread_probability(self, state: WorldState) -> Tensor:
         """Return each tree's probability to be ignited by its neighbours in one tick, float32 [B, H, W]."""
-        gain, burns = self._gain_of(state), self.spreads(state).to(torch.float32)
+        gain, burns = self.gain_in(state), self.spreads(state).to(torch.float32)
         return law.spread_probability(
             self.law, burns, self._susceptible(state), gain, state.ground.slope_into_cell, self.directions
         )
@@ -168,7 +168,7 @@ class Fire:
     def expected_ignitions(self, state: WorldState) -> Tensor:
         """Return how many neighbours each burning cell is expected to ignite in one tick, float32 [B, H, W]; else 0."""
         expected = law.expected_ignitions(
-            self.law, self._susceptible(state), self._gain_of(state), state.ground.slope_into_cell, self.directions
+            self.law, self._susceptible(state), self.gain_in(state), state.ground.slope_into_cell, self.directions
         )
         return expected * self.spreads(state)
 
@@ -205,7 +205,8 @@ class Fire:
     def _by_code(self, rule: Callable[[int], float]) -> tuple[float, ...]:
         return tuple(law.in_finer_time(rule(code), self.ticks_per_stage) for code in range(EMBER + 1))
 
-    def _gain_of(self, state: WorldState) -> Tensor:
+    def gain_in(self, state: WorldState) -> Tensor:
+        """Return w_d / distance_d at the source in some worlds, float32 [B, 8, h, w]."""
         return self.gain(state.wind) if state.air.gain is None else state.air.gain
 
     def _susceptible(self, state: WorldState) -> Tensor:

@@ -12,7 +12,7 @@ from warp_torchrl.world.fast.edge import (
     expected_from_edge,
 )
 from warp_torchrl.world.fast.join import in_place
-from warp_torchrl.world.fast.planes import age_fires, gain_of, is_fuel, spreads
+from warp_torchrl.world.fast.planes import age_fires, is_fuel, spreads
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.state import FIRST_FIRE, WorldState
 
@@ -46,4 +46,4 @@ def probabilities(fire: Fire, state: WorldState, trees: Edge) -> EdgeProbabiliti
         return ByPattern(trees, state.air.table, trees.of(state.cover).long() + 1)
     law = in_place(fire.law)
     susceptible = law.susceptibility(trees.of(state.alpha))
-    return ByStrength(law, trees, susceptible, gain_of(fire, state), state.ground.slope)
+    return ByStrength(law, trees, susceptible, fire.gain_in(state), state.ground.slope)

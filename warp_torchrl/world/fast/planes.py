@@ -90,7 +90,7 @@ def ignition_probability(fire: Fire, state: WorldState) -> Tensor:
 def expected_ignitions(fire: Fire, state: WorldState) -> Tensor:
     """Return what ``Fire.expected_ignitions`` does."""
     expected = expected_from_rows(
-        in_place(fire.law), _susceptible(fire, state), gain_of(fire, state), state.ground.slope, fire.directions
+        in_place(fire.law), _susceptible(fire, state), fire.gain_in(state), state.ground.slope, fire.directions
     )
     return expected * number(spreads(fire, state))
 
@@ -105,11 +105,6 @@ def is_fuel(fire: Fire, state: WorldState) -> Tensor:
     return between(state.cells, fire.youngest_fuel, OLDEST) & equal(state.wet, 0)
 
 
-def gain_of(fire: Fire, state: WorldState) -> Tensor:
-    """Return w_d / distance_d at the source, float32 [B, 8, h, w]."""
-    return fire.gain(state.wind) if state.air.gain is None else state.air.gain
-
-
 def _spread_probability(fire: Fire, state: WorldState) -> Tensor:
     if state.air.table is not None and not is_compiling():  # a look-up costs more than what it spares there
         kind = (state.cover + 1) * byte(is_fuel(fire, state))
@@ -118,7 +113,7 @@ def _spread_probability(fire: Fire, state: WorldState) -> Tensor:
         in_place(fire.law),
         spreads(fire, state),
         _susceptible(fire, state),
-        gain_of(fire, state),
+        fire.gain_in(state),
         state.ground.slope,
         fire.directions,
     )
