@@ -1,6 +1,6 @@
 """Evaluate: ``python evaluate.py checkpoint=RUN``, or ``policy=local scenario=default``. See ``conf/evaluate.yaml``."""
 
-from warp_torchrl.command import evaluate
+from warp_torchrl.commands.command import evaluate
 
 if __name__ == "__main__":
     evaluate()

@@ -10,8 +10,8 @@ import torch
 
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.world.ignition import Ignition
-from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.team import Team
+from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.wind import Uniform
 from warp_torchrl.world.world import World
 
@@ -22,19 +22,19 @@ QUICK = (
     "reward/test_paper.py",
     "test_api.py",
     "test_architecture.py",
-    "test_channels.py",
-    "test_checkpoint.py",
-    "test_conf.py",
-    "test_env.py",
+    "observation/test_channels.py",
+    "runs/test_checkpoint.py",
+    "config/test_conf.py",
+    "env/test_wildfire.py",
     "test_golden.py",
-    "test_metrics.py",
-    "test_observation.py",
-    "test_statistics.py",
+    "env/test_metrics.py",
+    "observation/test_observation.py",
+    "evaluation/test_statistics.py",
     "world/test_batch.py",
     "world/test_burn.py",
     "world/test_fire.py",
     "world/test_ignition.py",
-    "world/test_landscape.py",
+    "world/terrain/test_landscape.py",
     "world/test_law.py",
     "world/test_laws.py",
     "world/test_random.py",

@@ -4,8 +4,8 @@ import pytest
 import torch
 
 from warp_torchrl import WildfireEnv, load_policy, make_env
-from warp_torchrl.checkpoint import CheckpointError
-from warp_torchrl.construction import ConfigError
+from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.runs.checkpoint import CheckpointError
 
 
 def test_make_env_makes_a_scenario_with_overrides():

@@ -16,9 +16,9 @@ from warp_torchrl.benchmark.numpy_terrain import new_ground
 from warp_torchrl.benchmark.shares import training_shares
 from warp_torchrl.benchmark.tasks import disagreements
 from warp_torchrl.benchmark.ticks import numpy_copy
-from warp_torchrl.config import Record, compose_config, plain
-from warp_torchrl.settings import settings
-from warp_torchrl.training import Training
+from warp_torchrl.config.compose import Record, compose_config, plain
+from warp_torchrl.config.settings import settings
+from warp_torchrl.training.loop import Training
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import Action
 

@@ -165,7 +165,7 @@ def test_an_extension_is_one_module_one_yaml_and_one_test(extended):
 def test_the_extensions_keep_to_their_own_tests_and_the_configuration_s(extended):
     copy, files = extended
     tests = [path for path in files if path.startswith("tests/")]
-    passes(copy, *tests, "tests/test_conf.py")
+    passes(copy, *tests, "tests/config/test_conf.py")
 
 
 @pytest.mark.slow

@@ -5,13 +5,13 @@ import shutil
 import pytest
 import torch
 
-from tests.test_checkpoint import SIGNATURE
-from tests.test_training import tiny
-from warp_torchrl import checkpoint as checkpoints
+from tests.runs.test_checkpoint import SIGNATURE
+from tests.training.test_loop import tiny
 from warp_torchrl import load_policy
-from warp_torchrl.checkpoint import CheckpointError, newest
 from warp_torchrl.export import main
 from warp_torchrl.models import ACTION
+from warp_torchrl.runs import checkpoint as checkpoints
+from warp_torchrl.runs.checkpoint import CheckpointError, newest
 
 
 @pytest.fixture(scope="module")

@@ -21,9 +21,9 @@ from warp_torchrl.gallery.measures import (
     strike_and_burn,
 )
 from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.state import OLDEST, is_tree
+from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.wind import Calm
 
 SMALL = {

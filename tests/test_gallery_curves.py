@@ -7,8 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from warp_torchrl import checkpoint as checkpoints
-from warp_torchrl.config import Record
+from warp_torchrl.config.compose import Record
 from warp_torchrl.gallery.__main__ import main
 from warp_torchrl.gallery.curves import (
     MULTI,
@@ -20,6 +19,7 @@ from warp_torchrl.gallery.curves import (
 )
 from warp_torchrl.gallery.runs import bin_means, read_metrics, read_run, run_folders
 from warp_torchrl.models import Entry, Signature
+from warp_torchrl.runs import checkpoint as checkpoints
 
 ACTIONS = tuple(f"action_{code}" for code in range(11))
 SIGNATURE = Signature({"view": Entry((3, 5, 5), "uint8")}, Entry((9, 16, 16), "float32"), 2, ACTIONS, 2)

@@ -9,12 +9,12 @@ import torch
 
 from tests.forgery import forge
 from warp_torchrl import load_policy, make_env
-from warp_torchrl.checkpoint import CheckpointError, newest
-from warp_torchrl.config import plain, recompose
-from warp_torchrl.evaluation import play
+from warp_torchrl.config.compose import plain, recompose
+from warp_torchrl.config.settings import settings
+from warp_torchrl.evaluation.play import play
 from warp_torchrl.models import ACTION
-from warp_torchrl.settings import settings
-from warp_torchrl.training import Training
+from warp_torchrl.runs.checkpoint import CheckpointError, newest
+from warp_torchrl.training.loop import Training
 
 GOLDEN = Path(__file__).parent / "golden"
 RELEASES = sorted(path.name for path in GOLDEN.iterdir() if path.is_dir())

@@ -6,15 +6,15 @@ import torch
 
 from warp_torchrl import make_env
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.evaluation import play
+from warp_torchrl.evaluation.play import play
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.heuristics.base import can_be_put_out, claim_cells, list_cells, nearest_fire
-from warp_torchrl.world.array import Array
 from warp_torchrl.world.fast.distances import FAR, chebyshev_distance
 from warp_torchrl.world.ignition import Ignition
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import Action
 from warp_torchrl.world.team import Team
+from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.wind import Calm
 from warp_torchrl.world.world import World
 

@@ -7,11 +7,11 @@ import pytest
 import torch
 
 from warp_torchrl import load_policy, make_env
-from warp_torchrl.checkpoint import CheckpointError, export, newest
-from warp_torchrl.config import compose_config, plain, recompose, without_targets
-from warp_torchrl.evaluation import play, play_heuristics
-from warp_torchrl.settings import settings
-from warp_torchrl.shipped import find_policy, policy_names
+from warp_torchrl.config.compose import compose_config, plain, recompose, without_targets
+from warp_torchrl.config.settings import settings
+from warp_torchrl.evaluation.play import play, play_heuristics
+from warp_torchrl.runs.checkpoint import CheckpointError, export, newest
+from warp_torchrl.runs.shipped import find_policy, policy_names
 
 SHIPPED = Path(__file__).parent.parent / "docs" / "policies"
 SCENARIOS = ("default", "skirmish", "single")

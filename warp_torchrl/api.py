@@ -6,13 +6,13 @@ from pathlib import Path
 
 import torch
 
-from warp_torchrl import checkpoint as checkpoints
-from warp_torchrl.config import compose_config, plain, recompose
-from warp_torchrl.construction import build
+from warp_torchrl.config.compose import compose_config, plain, recompose
+from warp_torchrl.config.construction import build
+from warp_torchrl.config.settings import ENVIRONMENT, build_components
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.policy import TrainedPolicy
-from warp_torchrl.settings import ENVIRONMENT, build_components
-from warp_torchrl.shipped import find_policy
+from warp_torchrl.runs import checkpoint as checkpoints
+from warp_torchrl.runs.shipped import find_policy
 
 
 def make_env(

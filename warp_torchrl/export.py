@@ -8,7 +8,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from warp_torchrl import checkpoint as checkpoints
+from warp_torchrl.runs import checkpoint as checkpoints
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -10,10 +10,9 @@ from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import EnvBase
-from torchrl.envs.utils import exploration_type, set_exploration_type
+from torchrl.envs.utils import ExplorationType, exploration_type, set_exploration_type
 
-from warp_torchrl.evaluation import MODES
-from warp_torchrl.flat import FLAT, unflattened
+from warp_torchrl.env.flat import FLAT, unflattened
 from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, ROLE, Signature, recurrent_actors, signature
 from warp_torchrl.models.fitting import fitted
 from warp_torchrl.models.networks import AgentNetworks, Network
@@ -24,6 +23,8 @@ from warp_torchrl.world.state import Action
 _ROLE_ENTRIES = slice(SELF_SIZE - len(Action) - len(ROLE_NAMES), SELF_SIZE - len(Action))  # of ``self``
 _ROLE_INDEX = {role.name: index for index, role in enumerate(ROLES.values())}
 
+MODES = {"sampled": ExplorationType.RANDOM, "deterministic": ExplorationType.DETERMINISTIC}
+"""How a policy acts, by name."""
 AgentObservation = np.ndarray | Mapping[str, np.ndarray]
 
 

@@ -5,8 +5,8 @@ import math
 import torch
 from torch import Tensor
 
-from warp_torchrl.config import compose_config, plain
-from warp_torchrl.construction import build
+from warp_torchrl.config.compose import compose_config, plain
+from warp_torchrl.config.construction import build
 from warp_torchrl.world.burn import FireHistory, burn, start_burning, trace
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.state import EMBER, Cover, WorldState

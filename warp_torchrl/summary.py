@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from warp_torchrl.evaluation import place
-from warp_torchrl.statistics import compare, performance_profile, summarise
+from warp_torchrl.evaluation.report import place
+from warp_torchrl.evaluation.statistics import compare, performance_profile, summarise
 
 LEVELS = np.linspace(0.0, 1.0, 101)
 _Key = tuple[str, str, str, tuple[int, ...]]  # scenario, method, configuration, seeds

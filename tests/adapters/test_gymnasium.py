@@ -8,7 +8,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 from warp_torchrl.adapters import FireExtinguishingEnv, FireExtinguishingVectorEnv, gym_env
-from warp_torchrl.construction import ConfigError
+from warp_torchrl.config.construction import ConfigError
 
 STAY = 10
 BURNS_OUT = {"steps_per_tick": 1, "horizon": 12, "landscape.size": 8, "ignition.head_start": 0}

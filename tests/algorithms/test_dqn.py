@@ -6,10 +6,10 @@ from tensordict import TensorDict
 from torch.nn.functional import smooth_l1_loss
 
 from warp_torchrl.algorithms.dqn import Dqn
-from warp_torchrl.config import compose_config, plain
-from warp_torchrl.construction import ConfigError
+from warp_torchrl.config.compose import compose_config, plain
+from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.config.settings import settings
 from warp_torchrl.models import ACTION, ACTION_MASK, ACTION_VALUE, OBSERVATION, REWARD, Mlp
-from warp_torchrl.settings import settings
 
 SMALL = Mlp(actor_hidden=(8,), critic_hidden=(8,))
 

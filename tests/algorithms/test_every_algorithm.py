@@ -5,9 +5,9 @@ import torch
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from tests.conftest import small_world
-from warp_torchrl.config import compose_config, conf_folder, plain
+from warp_torchrl.config.compose import compose_config, conf_folder, plain
+from warp_torchrl.config.settings import settings
 from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, REWARD, Cnn, Mlp
-from warp_torchrl.settings import settings
 from warp_torchrl.world.team import Team
 
 NAMES = sorted(path.stem for path in (conf_folder() / "algorithm").glob("*.yaml"))

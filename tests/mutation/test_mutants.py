@@ -32,7 +32,7 @@ def test_the_plan_names_what_there_is():
 def test_a_module_s_tests_are_its_mirror_and_what_the_plan_adds():
     also = {"world/fire": ["tests/world/test_laws.py"]}
     assert beside("warp_torchrl/world/fire.py", also) == ("tests/world/test_fire.py", "tests/world/test_laws.py")
-    assert beside("warp_torchrl/statistics.py", also) == ("tests/test_statistics.py",)
+    assert beside("warp_torchrl/evaluation/statistics.py", also) == ("tests/evaluation/test_statistics.py",)
     assert beside("warp_torchrl/algorithms/replay.py", also) == ("tests/algorithms",)
 
 

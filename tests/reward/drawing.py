@@ -3,10 +3,10 @@
 import torch
 
 from tests.conftest import small_world
-from warp_torchrl.world.array import Array
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.state import Action, count_trees
 from warp_torchrl.world.team import Team
+from warp_torchrl.world.terrain.array import Array
 
 STAY, CLEAR, EXTINGUISH, EAST = int(Action.STAY), int(Action.CLEAR), int(Action.EXTINGUISH), int(Action.EAST)
 

@@ -8,7 +8,7 @@ from tests.conftest import small_world
 from warp_torchrl.reward import Adaptive, Collaborative, Coverage, Efficiency, Time
 from warp_torchrl.world.batch import concatenated
 from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.landscape import Perlin
+from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.world import in_wind
 
 from .drawing import CLEAR, EXTINGUISH, FIELD, STAY, drawn, earned

@@ -2,8 +2,8 @@
 
 import pytest
 
-from tests.test_conf import MISTAKES
-from warp_torchrl.command import _check_first, train
+from tests.config.test_conf import MISTAKES
+from warp_torchrl.commands.command import _check_first, train
 
 pytestmark = pytest.mark.stress
 

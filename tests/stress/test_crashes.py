@@ -4,10 +4,10 @@ import shutil
 
 import pytest
 
+from tests.runs.test_checkpoint import saved
 from tests.stress.power import with_power_cut
-from tests.test_checkpoint import saved
-from warp_torchrl import checkpoint as checkpoints
-from warp_torchrl.checkpoint import CheckpointError, newest
+from warp_torchrl.runs import checkpoint as checkpoints
+from warp_torchrl.runs.checkpoint import CheckpointError, newest
 
 pytestmark = pytest.mark.stress
 

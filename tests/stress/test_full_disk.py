@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from tests.stress.processes import TINY
-from warp_torchrl.checkpoint import CheckpointError, newest
-from warp_torchrl.command import train
+from warp_torchrl.commands.command import train
+from warp_torchrl.runs.checkpoint import CheckpointError, newest
 
 pytestmark = pytest.mark.stress
 DISK = 4 * 2**20

@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from tests.stress.processes import TINY, finish, rows, start, wait_for
-from warp_torchrl.checkpoint import CheckpointError, newest
+from warp_torchrl.runs.checkpoint import CheckpointError, newest
 
 pytestmark = pytest.mark.stress
 KILLS = 10

@@ -8,11 +8,11 @@ import pytest
 import torch
 
 from tests.forgery import forge
-from tests.test_training import tiny
+from tests.training.test_loop import tiny
 from warp_torchrl import load_policy
-from warp_torchrl.checkpoint import CheckpointError, newest
-from warp_torchrl.command import evaluate
-from warp_torchrl.construction import ConfigError
+from warp_torchrl.commands.command import evaluate
+from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.runs.checkpoint import CheckpointError, newest
 
 pytestmark = pytest.mark.stress
 MUTATIONS = 200

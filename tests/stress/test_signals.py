@@ -6,7 +6,7 @@ import time
 import pytest
 
 from tests.stress.processes import TINY, alive, finish, rows, start, wait_for
-from warp_torchrl.checkpoint import newest
+from warp_torchrl.runs.checkpoint import newest
 
 pytestmark = pytest.mark.stress
 LONG = [*TINY, "total_frames=1000000", "checkpoint.interval=64", "hydra.run.dir=run"]

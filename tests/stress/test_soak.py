@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.test_training import RUNS, tiny
+from tests.training.test_loop import RUNS, tiny
 from warp_torchrl import load_policy
-from warp_torchrl.evaluation import play
+from warp_torchrl.evaluation.play import play
 
 pytestmark = pytest.mark.stress
 MINUTES = float(os.environ.get("WARP_SOAK_MINUTES", "10"))

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warp_torchrl.world.array import Array
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.hazard import HazardFire
 from warp_torchrl.world.ignition import Ignition
-from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.team import Team
+from warp_torchrl.world.terrain.array import Array
+from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.wind import Paper, Uniform, Wandering
 from warp_torchrl.world.world import World
 

@@ -7,10 +7,10 @@ from warp_torchrl.world.burn import FireHistory, burn, start_burning, trace
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.hazard import HazardFire
 from warp_torchrl.world.ignition import Ignition
-from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.team import Team
+from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.wind import Paper, Uniform, Wandering, Wind
 from warp_torchrl.world.world import World, advance
 

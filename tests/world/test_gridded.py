@@ -7,11 +7,11 @@ import pytest
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.array import Array
 from warp_torchrl.world.gridded import Gridded
-from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.team import Team
+from warp_torchrl.world.terrain.array import Array
+from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.world import World, advance, in_wind
 
 from .drawing import draw
@@ -127,7 +127,7 @@ def write_layer(path, values, cell=30.0, nodata=-9999.0):
 
 
 def raster_world(folder, wind, **options):
-    from warp_torchrl.world.raster import Raster
+    from warp_torchrl.world.terrain.raster import Raster
 
     write_layer(folder / "F13.tif", np.full((ROWS, COLUMNS), 8))
     ground = Raster(path=folder, elevation=None, size=6, **options)

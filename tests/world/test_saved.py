@@ -3,8 +3,8 @@
 import pytest
 import torch
 
-from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.saved import filled
+from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.world import World
 
 from .drawing import differing

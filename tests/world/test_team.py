@@ -5,10 +5,10 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import Action, Cover, Outcome, WorldState, is_burning
 from warp_torchrl.world.team import Team
+from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.wind import Calm
 from warp_torchrl.world.world import World
 

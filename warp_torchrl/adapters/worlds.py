@@ -11,8 +11,8 @@ from gymnasium import spaces
 from tensordict import TensorDict, TensorDictBase
 
 from warp_torchrl.api import make_env
-from warp_torchrl.construction import ConfigError, UnknownKeyError
-from warp_torchrl.flat import FLAT, flattened
+from warp_torchrl.config.construction import ConfigError, UnknownKeyError
+from warp_torchrl.env.flat import FLAT, flattened
 
 LAYOUTS = ("dict", "flat")
 """An agent's observation as its entries by name, or as one vector beside its mask."""

@@ -12,7 +12,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from warp_torchrl.allocation import keep_freed_memory
 from warp_torchrl.benchmark.environments import LARGE, environment_speed, rate_table
 from warp_torchrl.benchmark.growth_figure import draw_growth
 from warp_torchrl.benchmark.machine import header, machine, peak_memory
@@ -29,7 +28,8 @@ from warp_torchrl.benchmark.tasks import (
 )
 from warp_torchrl.benchmark.ticks import tick_cost, tick_table
 from warp_torchrl.benchmark.trainings import training_speed
-from warp_torchrl.construction import ConfigError
+from warp_torchrl.commands.allocation import keep_freed_memory
+from warp_torchrl.config.construction import ConfigError
 
 Rows = list[dict[str, Any]]
 _WORLDS = 256

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.state import OLDEST, Cover
+from warp_torchrl.world.terrain.landscape import Perlin
 
 _PERLIN: dict[str, Any] = asdict(Perlin())
 

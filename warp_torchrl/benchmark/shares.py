@@ -10,7 +10,7 @@ from tensordict import TensorDictBase
 
 from warp_torchrl.benchmark.tables import entry, table
 from warp_torchrl.benchmark.timing import Clock, clock
-from warp_torchrl.training import Training
+from warp_torchrl.training.loop import Training
 
 _PARTS = ("collector", "environment", "policy", "advantages", "sampling", "loss", "backward", "optimiser", "other")
 _COLLECTING = ("collector", "environment", "policy")

@@ -7,8 +7,8 @@ import torch
 
 from warp_torchrl.algorithms.ppo import Ppo
 from warp_torchrl.benchmark.environments import paper_stack
+from warp_torchrl.config.settings import Settings
 from warp_torchrl.models import Mlp
-from warp_torchrl.settings import Settings
 
 NAME = "SuperSuit + SB3 PPO"
 

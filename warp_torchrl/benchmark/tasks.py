@@ -8,10 +8,10 @@ import numpy as np
 import torch
 
 from warp_torchrl.api import make_env
-from warp_torchrl.evaluation import BASELINES, play, play_heuristics
+from warp_torchrl.evaluation.play import BASELINES, play, play_heuristics
+from warp_torchrl.evaluation.statistics import compare, summarise
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.reward import Adaptive, Collaborative, Coverage, Efficiency, Paper, Time
-from warp_torchrl.statistics import compare, summarise
 from warp_torchrl.world.state import Transition
 
 SCENARIOS = (

@@ -9,9 +9,9 @@ from typing import Any
 from warp_torchrl.benchmark.shares import training_shares
 from warp_torchrl.benchmark.stable_baselines import NAME, open_stable_baselines, reason_against
 from warp_torchrl.benchmark.timing import spread, take_turns
-from warp_torchrl.config import Record, compose_config, plain
-from warp_torchrl.settings import settings
-from warp_torchrl.training import Training
+from warp_torchrl.config.compose import Record, compose_config, plain
+from warp_torchrl.config.settings import settings
+from warp_torchrl.training.loop import Training
 
 
 def training_speed(

@@ -15,7 +15,7 @@ import torch
 from PIL import Image
 from torch import Tensor
 
-from warp_torchrl.render import _ASH, _FIRE, _GROUND, render
+from warp_torchrl.env.render import _ASH, _FIRE, _GROUND, render
 from warp_torchrl.world.state import Cover, Landscape, WorldState
 
 if TYPE_CHECKING:

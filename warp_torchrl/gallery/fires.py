@@ -20,9 +20,9 @@ from warp_torchrl.gallery.drawing import (
 )
 from warp_torchrl.gallery.measures import snapshots
 from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.state import Cover, is_burning
+from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.wind import Calm, Paper
 
 if TYPE_CHECKING:

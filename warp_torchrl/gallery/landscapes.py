@@ -24,8 +24,8 @@ from warp_torchrl.simulation import fire_history
 from warp_torchrl.world.burn import FireHistory
 from warp_torchrl.world.hazard import HazardFire
 from warp_torchrl.world.random import world_key
-from warp_torchrl.world.raster import Raster
 from warp_torchrl.world.state import FIRST_FIRE, Cover, Landscape
+from warp_torchrl.world.terrain.raster import Raster
 from warp_torchrl.world.wind import Wandering
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import yaml
 
-from warp_torchrl.checkpoint import Checkpoint, CheckpointError, newest
-from warp_torchrl.config import Record
-from warp_torchrl.sweep import method, taught, unusual
+from warp_torchrl.config.compose import Record
+from warp_torchrl.evaluation.method import method, taught, unusual
+from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError, newest
 
 FRAMES, SECONDS = "time/frames", "time/seconds"
 MOST_ROWS = 400

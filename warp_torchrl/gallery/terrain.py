@@ -6,9 +6,9 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.gallery.drawing import CELL, contours, cover_image, cover_legend, hillshade, relief, sheet, show_map
-from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.state import Cover
+from warp_torchrl.world.terrain.landscape import Perlin
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

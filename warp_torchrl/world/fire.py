@@ -11,8 +11,8 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world import law
 from warp_torchrl.world.geometry import DISTANCES
-from warp_torchrl.world.landscape import holds_trees
 from warp_torchrl.world.state import EMBER, FIRST_FIRE, OLDEST, Air, Ground, Landscape, WorldState
+from warp_torchrl.world.terrain.landscape import holds_trees
 from warp_torchrl.world.wind_and_slope import alexandridis, ellipse, slope_factor
 
 

@@ -12,11 +12,11 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.array import read_npz
-from warp_torchrl.world.grid import Grid, check_grid
-from warp_torchrl.world.landscape import LandscapeSource, map_size
-from warp_torchrl.world.layer import find_layer, read_grid, read_layer, resample
 from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.terrain.array import read_npz
+from warp_torchrl.world.terrain.grid import Grid, check_grid
+from warp_torchrl.world.terrain.landscape import LandscapeSource, map_size
+from warp_torchrl.world.terrain.layer import find_layer, read_grid, read_layer, resample
 from warp_torchrl.world.wind import Wind
 
 STRONGEST = 120.0

@@ -12,9 +12,9 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.landscape import LandscapeSource
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.terrain.landscape import LandscapeSource
 
 _FASTEST = 60.0  # m/s
 

@@ -12,7 +12,6 @@ from warp_torchrl.world.batch import concatenated
 from warp_torchrl.world.fast import road
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.ignition import Ignition
-from warp_torchrl.world.landscape import LandscapeSource, Perlin, map_size
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.state import (
     EMBER,
@@ -27,6 +26,7 @@ from warp_torchrl.world.state import (
     count_trees,
 )
 from warp_torchrl.world.team import Team
+from warp_torchrl.world.terrain.landscape import LandscapeSource, Perlin, map_size
 from warp_torchrl.world.wind import Uniform, Wind
 
 _CELLS_AT_ONCE = {"cpu": 2**17, "cuda": 2**20}

@@ -6,7 +6,7 @@ from warp_torchrl.world.fast import at_edge
 from warp_torchrl.world.fast.edge import places
 from warp_torchrl.world.fast.table import bit_of
 from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.landscape import Perlin
+from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.world import World, advance
 
 from ..drawing import differing, draw

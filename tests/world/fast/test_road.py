@@ -10,9 +10,9 @@ from warp_torchrl.world.fast import at_edge, planes, road
 from warp_torchrl.world.fast.rows import probability_from_rows
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.hazard import HazardFire
-from warp_torchrl.world.landscape import Perlin
 from warp_torchrl.world.random import Stream, uniform, uniform_among
 from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.wind import Calm, Paper, Uniform, Wandering, Wind
 from warp_torchrl.world.world import World, advance
 

@@ -24,9 +24,9 @@ from warp_torchrl.world.fast.join import in_place
 from warp_torchrl.world.fast.rows import expected_from_rows, probability_from_rows
 from warp_torchrl.world.fast.table import probability_by_pattern
 from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.landscape import holds_trees
 from warp_torchrl.world.law import in_finer_time
 from warp_torchrl.world.state import EMBER, FIRST_FIRE, OLDEST, WorldState, is_burning
+from warp_torchrl.world.terrain.landscape import holds_trees
 
 
 def tick(fire: Fire, state: WorldState, u: Tensor, due: Tensor) -> WorldState:

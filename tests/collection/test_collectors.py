@@ -1,0 +1,117 @@
+"""Worlds that are played elsewhere are the worlds that would be played here."""
+
+import os
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+import torch
+
+from warp_torchrl.collection.collectors import Process, WorkerDied
+from warp_torchrl.config.compose import Record, compose_config, plain
+from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.config.seeds import first_world_seed
+from warp_torchrl.config.settings import settings
+from warp_torchrl.runs.checkpoint import newest
+from warp_torchrl.training.loop import Training
+
+TINY = [
+    "scenario=single",
+    "algorithm=ppo",
+    "landscape.size=8",
+    "n_worlds=4",
+    "horizon=12",
+    "collector.steps=6",
+    "model.actor_hidden=[8]",
+    "model.critic_hidden=[8]",
+    "algorithm.minibatch_size=24",
+    "evaluation.episodes=2",
+    "total_frames=96",
+]
+
+
+def training(folder: Path, *overrides: str) -> Training:
+    return Training(settings(plain(compose_config("train", [*TINY, *overrides]))), Record(), folder)
+
+
+def first_batches(folder: Path, *overrides: str) -> list:
+    run = training(folder, *overrides)
+    try:
+        batches = iter(run.collection)
+        first = next(batches).clone()
+        run._learn(first.clone())
+        return [first, next(batches).clone()]
+    finally:
+        run.close()
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory):
+    return first_batches(tmp_path_factory.mktemp("here"), "collector=direct", "seed=1234")
+
+
+def check_like(here, elsewhere):
+    first, other = here[0], elsewhere[0]
+    assert first.batch_size == other.batch_size == torch.Size([4, 6])
+    assert set(other.keys(True, True)) == set(first.keys(True, True))
+    for name in ("state", ("agents", "observation", "view"), ("agents", "action_mask")):
+        assert torch.equal(first[name][:, 0], other[name][:, 0]), "the same fires in the same order"
+    # Each worker draws actions of its own: two worlds would agree on all twelve draws with chance 11^-12 or so.
+    actions = torch.cat([each["agents", "action"] for each in elsewhere], dim=1).flatten(1)
+    assert not (actions[:2] == actions[2:]).all()
+    assert (elsewhere[1]["agents", "action_log_prob"] < 0.0).all()
+
+
+def test_processes_play_the_same_worlds(tmp_path, here):
+    check_like(here, first_batches(tmp_path, "collector=process", "seed=1234"))
+
+
+@pytest.mark.slow
+def test_ray_plays_the_same_worlds(tmp_path, here):
+    pytest.importorskip("ray", reason="Ray is not installed")
+    check_like(here, first_batches(tmp_path, "collector=ray", "seed=1234"))
+
+
+def test_a_worker_that_dies_is_named_and_what_was_learnt_is_saved(tmp_path):
+    run = training(tmp_path, "collector=process", "collector.workers=1", "total_frames=100_000")
+    learn = run._learn
+
+    def killing(batch):
+        row = learn(batch)
+        if run.frames == 48:
+            os.kill(run.collection._collector.procs[0].pid, signal.SIGKILL)
+        return row
+
+    run._learn = killing
+    with pytest.raises(WorkerDied, match="a worker has ended: worker 0 by signal 9"):
+        run.train()
+    run.close()
+    assert newest(tmp_path)[0].manifest.frames == 48
+    assert newest(tmp_path)[0].training()["collection"] == {"played": 12}
+
+
+def test_a_resumed_run_meets_new_fires(tmp_path, here):
+    run = training(tmp_path, "collector=process", "collector.workers=1", "seed=1234")
+    run.collection.load_state_dict({"played": 12})
+    try:
+        batch = next(iter(run.collection))
+    finally:
+        run.close()
+    assert not torch.equal(batch["state"][:, 0], here[0]["state"][:, 0])
+    env = run.settings.make_env(4, first_world_seed(1234))
+    env.set_seeds(range(first_world_seed(1234), first_world_seed(1234) + 4), first_episode=12)
+    assert torch.equal(env.reset()["state"], batch["state"][:, 0])
+
+
+def test_workers_must_share_the_worlds():
+    with pytest.raises(ConfigError, match=r"collector\.workers must divide n_worlds, 4, got 3"):
+        settings(plain(compose_config("train", [*TINY, "collector=process", "collector.workers=3"])))
+    with pytest.raises(ValueError, match="workers must be in"):
+        Process(workers=0)
+
+
+def test_a_missing_ray_is_told(monkeypatch):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(ConfigError, match=r"collector\.workers need Ray: pip install"):
+        settings(plain(compose_config("train", [*TINY, "collector=ray"])))

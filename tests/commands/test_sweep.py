@@ -1,0 +1,44 @@
+"""What runs are called in the tables of a sweep."""
+
+import pytest
+
+from warp_torchrl.config.compose import Record, compose_config, plain
+from warp_torchrl.evaluation.method import method
+
+
+@pytest.mark.parametrize(
+    ("overrides", "named"),
+    [
+        ([], "mappo efficiency surroundings"),
+        (["algorithm=ippo", "model.sharing=none"], "ippo efficiency surroundings sharing=none"),
+        (["model.facing=north", "observation.radius=7"], "mappo efficiency surroundings facing=north radius=7"),
+        (["observation=local", "observation.radius=3"], "mappo efficiency local radius=3"),
+        (["model.memory=64"], "mappo efficiency surroundings memory=64"),
+        (["observation=paper", "observation.radius=5"], "mappo efficiency paper radius=5"),
+        (["reward=paper", "reward.barrier_rule=printed"], "mappo paper surroundings barrier_rule=printed"),
+        (["observation=paper", "imitation.teacher=local"], "mappo efficiency paper taught by local"),
+    ],
+)
+def test_a_policy_is_called_by_what_is_unusual(overrides, named):
+    chosen = dict(each.split("=") for each in overrides)
+    usual = {"algorithm": "mappo", "reward": "efficiency", "observation": "surroundings"}
+    choices = {group: chosen.get(group, option) for group, option in usual.items()}
+    record = Record(choices=choices, values=plain(compose_config("train", overrides)))
+    assert method(record)[0] == named
+
+
+def test_a_record_from_before_a_key_tells_nothing_of_it():
+    choices = {"algorithm": "mappo", "reward": "time", "observation": "local"}
+    assert method(Record(choices=choices, values={"model": {"sharing": "team"}}))[0] == "mappo time local"
+
+
+def test_runs_that_are_saved_at_other_times_are_alike():
+    choices = {"algorithm": "mappo", "reward": "efficiency", "observation": "surroundings"}
+    plans = (
+        ["checkpoint.minutes=0", "seed=3"],
+        ["checkpoint.interval=7"],
+        [],
+        ["algorithm.gamma=0.5", "reward.gamma=0.5"],
+    )
+    digests = [method(Record(choices=choices, values=plain(compose_config("train", each))))[1] for each in plans]
+    assert digests[0] == digests[1] == digests[2] != digests[3]

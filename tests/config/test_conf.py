@@ -1,0 +1,252 @@
+"""Every yaml builds, says what its class says, and mistakes are told with key, value and rule."""
+
+import shutil
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+from torch._inductor.exc import InvalidCxxCompiler
+
+from warp_torchrl.config.compose import (
+    Record,
+    compose_config,
+    conf_folder,
+    is_sweep,
+    plain,
+    recompose,
+    without_targets,
+    world_overrides,
+)
+from warp_torchrl.config.construction import ConfigError, build
+from warp_torchrl.config.settings import COMPONENTS, settings
+from warp_torchrl.world.gridded import Gridded
+from warp_torchrl.world.terrain.array import Array
+from warp_torchrl.world.terrain.raster import Raster
+
+SCENARIOS = sorted(path.stem for path in (conf_folder() / "scenario").glob("*.yaml") if path.stem != "landfire")
+EXPERIMENTS = sorted(path.stem for path in (conf_folder() / "experiment").glob("*.yaml"))
+OPTIONS = [(path.parent.name, path.stem) for path in sorted(conf_folder().glob("*/*.yaml"))]
+LANDFIRE = Path(__file__).parents[3] / "shared" / "landscapes" / "landfire"
+
+
+@pytest.mark.parametrize(("group", "option"), [each for each in OPTIONS if each[0] in COMPONENTS])
+def test_every_option_builds_and_holds_every_field(group, option):
+    if (group, option) == ("collector", "ray"):
+        pytest.importorskip("ray", reason="Ray is not installed")
+    node = plain(compose_config("train", [f"{group}={option}"]))[group]
+    needs_a_file = {"raster": Raster, "array": Array, "gridded": Gridded}
+    if option in needs_a_file:
+        with pytest.raises(ConfigError, match=rf"{group}\.path must name"):
+            build(node, group)
+        component = needs_a_file[option]
+    else:
+        component = build(node, group)
+    assert set(node) - {"_target_"} == {each.name for each in fields(component) if each.init} - _derived(component)
+
+
+def _derived(component):
+    return {each.name for each in fields(component) if each.name.startswith("_")}
+
+
+@pytest.mark.parametrize("scenario", ["single", "default"])
+def test_an_array_runs_in_every_scenario_cropped_to_its_size(scenario, tmp_path):
+    np.savez(tmp_path / "land.npz", cover=np.full((40, 50), 3))
+    overrides = [f"scenario={scenario}", "landscape=array", f"landscape.path={tmp_path / 'land.npz'}"]
+    plan = settings(plain(compose_config("train", overrides)))
+    env = plan.make_env(2, 0)
+    env.reset()
+    side = plan.world.size[0]
+    assert env.world_state.cover.shape == (2, side, side) and side < 40
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_every_scenario_is_a_run(scenario):
+    plan = settings(plain(compose_config("train", [f"scenario={scenario}"])))
+    assert plan.scenario == scenario and plan.world.horizon == 8 * plan.world.size[0]
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS)
+def test_every_experiment_is_a_run(experiment):
+    plan = settings(plain(compose_config("train", [f"experiment={experiment}"])))
+    assert plan.total_frames >= plan.n_worlds * plan.collector.steps
+
+
+def test_the_landfire_scenario_runs_on_its_raster():
+    if not LANDFIRE.is_dir():
+        pytest.skip(f"no landscape at {LANDFIRE}")
+    pytest.importorskip("rasterio")
+    plan = settings(plain(compose_config("train", ["scenario=landfire", f"landscape.path={LANDFIRE}"])))
+    env = plan.make_env(2, 0)
+    env.rollout(6, break_when_any_done=False)
+    assert env.world_state.ground.slope is not None and env.world.side_of_cell == 30.0
+
+
+def test_the_landfire_scenario_has_no_path_of_its_own():
+    with pytest.raises(ConfigError, match=r"landscape\.path"):
+        settings(plain(compose_config("train", ["scenario=landfire"])))
+
+
+MISTAKES = [
+    ("sede=1", "sede"),
+    ("+sede=1", "sede is not a key"),
+    ("team.n_agent=3", "n_agent"),
+    ("+team.n_agent=3", r"team\.n_agent is not a key"),
+    ("sede=1", r"sede is not a key of the configuration: did you mean seed\?"),
+    ("+sede=1", r"did you mean seed\?"),
+    ("algorithm.gama=0.9", r"algorithm\.gama is not a key of the configuration: did you mean algorithm\.gamma\?"),
+    ("+algorithm.gama=0.9", r"algorithm\.gama is not a key of algorithm; .*: did you mean algorithm\.gamma\?"),
+    ("sceanrio=large", r"did you mean scenario\?"),
+    ("experimnt=default", r"did you mean experiment\?"),
+    ("wind=calm radius=3", r"did you mean .*observation\.radius\?"),
+    ("checkpoint.intervall=9", r"did you mean checkpoint\.interval\?"),
+    ("scenario=skirmsh", r"scenario must be one of .*, got skirmsh: did you mean skirmish\?"),
+    ("imitation.teacher=locl", r"imitation\.teacher must be .*: did you mean local\?"),
+    ("evaluation.mode=sampld", r"evaluation\.mode must be .*: did you mean sampled\?"),
+    ("landscape.path=/data", r"is not a key of the configuration, but with landscape=array or landscape=raster"),
+    ("algorithm.gamma=0.9,0.99", r"has several values: -m sweeps over them"),
+    ("scenario=single,large", r"scenario must be one of .*; -m sweeps over several"),
+    ("landscape=raster landscape.path=/a=b", r"""quote it, "landscape\.path='/a=b'\""""),
+    ("total_frames=1.5", "total_frames must be a whole number, got 1.5"),
+    ("n_worlds=.inf", "n_worlds must be a whole number"),
+    ("collector.steps=0.5", r"collector\.steps must be a whole number, got 0\.5"),
+    ("scenario=nowhere", r"scenario must be one of default, .*, water, got nowhere"),
+    ("algorithm=sarsa", r"algorithm must be one of a2c, ddpg, .*, got sarsa"),
+    ("experiment=nowhere", r"experiment must be one of algorithms, .*, got nowhere"),
+    ("n_worlds=0", "n_worlds must be in 1..4096, got 0"),
+    ("n_worlds=many", "n_worlds must be a whole number, got 'many'"),
+    ("n_worlds=1.5", "n_worlds must be a whole number"),
+    ("total_frames=-1", "total_frames must be"),
+    ("seed=-1", "seed must be in 0..2147483648, got -1"),
+    ("seed=2147483649", "seed must be in 0..2147483648, got 2147483649"),
+    ("seed=1.5", "seed must be a whole number"),
+    ("evaluation.first_seed=2305843009213693952", r"evaluation\.first_seed must be in 0..2305843009213693696, so"),
+    ("device=tpu", "device must be"),
+    ("device=cuda:99", "device must be"),
+    ("steps_per_tick=0", "steps_per_tick must be"),
+    ("horizon=0", "horizon must be"),
+    ("landscape.size=3", r"landscape\.size must be"),
+    ("landscape.size=[8]", r"landscape\.size must be"),
+    ("landscape.levels=[0.5,0.2,0.1]", r"landscape\.levels must be in order"),
+    ("landscape=raster landscape.table=fbfm", r"landscape\.table must be fbfm13 or .* or a mapping, got 'fbfm'"),
+    ("landscape.thresholds=median", r"landscape\.thresholds must be quantile or minmax or printed"),
+    ("wind.speed=-1", r"wind\.speed must be"),
+    ("wind.speed=.nan", r"wind\.speed must be"),
+    ("fire.alpha=[0,1,2,3,4]", r"fire\.alpha must be"),
+    ("fire.p_regrow=2", r"fire\.p_regrow must be"),
+    ("team.n_agents=70", r"team\.n_agents must be"),
+    ("team.roles=[tank]", r"team\.roles must be"),
+    ("ignition.count=0", r"ignition\.count must be"),
+    ("observation.radius=2.5", r"observation\.radius must be a whole number"),
+    ("reward.team_share=2", r"reward\.team_share must be"),
+    ("reward.gamma=0.5", r"reward\.gamma must be algorithm\.gamma"),
+    ("model.actor_hidden=[]", r"model\.actor_hidden must be"),
+    ("algorithm.gamma=1.5", r"gamma must be"),
+    ("algorithm.epochs=0", r"algorithm\.epochs must be"),
+    ("collector.steps=0", r"collector\.steps must be"),
+    ("checkpoint.keep=1", r"checkpoint\.keep must be"),
+    ("checkpoint.minutes=-1", r"checkpoint\.minutes must be in 0\.\.1e6, where 0 saves by frames alone, got -1"),
+    ("checkpoint.minutes=null", r"checkpoint\.minutes must be a number"),
+    ("evaluation.mode=lucky", r"evaluation\.mode must be"),
+    ("fire=null", "fire"),
+    ("fire._target_=os.system", r"fire\._target_ must be a component of warp_torchrl, got os\.system"),
+    ("fire._target_=warp_torchrl.config.compose.conf_folder", r"fire\._target_ must be a component"),
+]
+
+
+@pytest.mark.parametrize(("override", "message"), MISTAKES)
+def test_mistakes_are_told_in_one_line(override, message):
+    with pytest.raises(ConfigError, match=message) as error:
+        settings(plain(compose_config("train", override.split())))
+    assert "\n" not in str(error.value)
+
+
+def test_a_number_that_is_whole_is_a_whole_number_however_it_is_written():
+    overrides = ["total_frames=1e6", "collector.steps=6.4e1", "landscape.size=20.0", "observation.radius=3.0"]
+    plan = settings(plain(compose_config("train", [*overrides, "model.actor_hidden=[16.0]", "algorithm.epochs=2e0"])))
+    numbers = [plan.total_frames, plan.collector.steps, plan.world.landscape.size, plan.observation.radius]
+    numbers += [*plan.model.actor_hidden, plan.algorithm.epochs]
+    assert numbers == [1_000_000, 64, 20, 3, 16, 2] and {type(each) for each in numbers} == {int}
+
+
+def test_an_unknown_experiment_is_no_sweep():
+    with pytest.raises(ConfigError, match="experiment must be one of algorithms"):
+        is_sweep("train", ["seed=1", "experiment=nowhere"])
+    assert is_sweep("train", ["experiment=algorithms"]) and not is_sweep("train", ["experiment=paper_sarl"])
+
+
+def recorded(*overrides):
+    config = compose_config("train", overrides)
+    return Record(choices={"scenario": "single", "observation": "local"}, values=without_targets(plain(config)))
+
+
+def test_a_recorded_configuration_comes_back():
+    record = recorded("scenario=single", "observation=local", "seed=5", "team.n_agents=3")
+    config = recompose(record)
+    assert config.seed == 5 and config.team.n_agents == 3 and config.scenario == "single"
+    assert config.observation._target_.endswith("Local")
+
+
+def test_overrides_come_before_what_is_recorded():
+    record = recorded("scenario=single", "observation=local", "wind.speed=9")
+    config = recompose(record, ["team.n_agents=2", "fire=paper"])
+    assert config.team.n_agents == 2 and config.fire.beta == 0.65 and config.wind.speed == 9
+
+
+def test_another_scenario_takes_the_whole_world_from_it():
+    config = recompose(recorded("scenario=single", "observation=local", "wind.speed=9"), ["scenario=large"])
+    assert config.team.n_agents == 8 and config.horizon == 512 and config.wind.speed == 4.0
+    assert config.observation._target_.endswith("Local")
+
+
+def test_classes_never_come_from_a_record():
+    values = {"fire": {"_target_": "os.system"}}
+    with pytest.raises(ConfigError, match=r"os\.system"):
+        settings(plain(recompose(Record(choices={}, values=values))))
+    for choices in ({"scenario": "../../evil"}, {"hydra": "x"}):
+        with pytest.raises(ConfigError, match="not one of our options"):
+            recompose(Record(choices=choices, values={}))
+
+
+def test_a_yaml_file_that_was_edited_is_read_anew(tmp_path, monkeypatch):
+    shutil.copytree(conf_folder(), tmp_path / "conf")
+    monkeypatch.setattr("warp_torchrl.config.compose.conf_folder", lambda: tmp_path / "conf")
+    first = compose_config("train", ["wind=calm"])
+    first.horizon = 7  # the caller's own
+    assert compose_config("train", ["wind=calm"]).horizon == 128
+    (tmp_path / "conf" / "scenario" / "skirmish.yaml").write_text("# @package _global_\nhorizon: 99\n")
+    assert compose_config("train", ["wind=calm"]).horizon == 99
+    (tmp_path / "conf" / "wind" / "calm.yaml").unlink()
+    with pytest.raises(ConfigError, match="wind must be one of"):
+        compose_config("train", ["wind=calm"])
+
+
+@pytest.mark.parametrize(
+    ("overrides", "expected"),
+    [
+        ([], []),
+        (["scenario=large", "reward=time", "n_worlds=3"], []),
+        (["team.n_agents=4", "wind.speed=10"], ["wind.speed=10", "team.n_agents=4"]),
+        (["team.roles=[uav,ugv]", "fire=hazard"], ["fire=hazard", "team.roles=['uav','ugv']"]),
+        (["landscape=raster", "landscape.path=/tmp/land", "horizon=9"], ["landscape=raster", "horizon=9"]),
+        (
+            ["landscape=raster", "landscape.table={11:3,98:0}"],
+            ["landscape=raster", "landscape.table.11=3", "landscape.table.98=0"],
+        ),
+        (["wind=calm", "fire=paper"], ["wind=calm", "fire.growth=True", "fire.beta=0.65", "fire.p_regrow=0.01"]),
+    ],
+)
+def test_worlds_are_told_by_what_differs_from_their_scenario(overrides, expected):
+    assert world_overrides(plain(compose_config("train", overrides))) == expected
+
+
+def test_only_training_asks_for_a_compiler(monkeypatch):
+    def none() -> str:
+        raise InvalidCxxCompiler
+
+    monkeypatch.setattr("torch._inductor.cpp_builder.get_cpp_compiler", none)
+    plan = settings(plain(compose_config("train", ["compile=true"])))
+    with pytest.raises(ConfigError, match="compile must be false here"):
+        plan.check_training()
+    assert plan.make_env(1, 0).reset()["done"].shape == (1, 1)  # what was trained elsewhere is played here
+    settings(plain(compose_config("train", []))).check_training()

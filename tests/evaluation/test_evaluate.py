@@ -1,0 +1,31 @@
+"""What is told of a policy: the baselines of worlds that were met before are not played again."""
+
+from warp_torchrl.config.compose import compose_config, plain
+from warp_torchrl.config.settings import settings
+from warp_torchrl.evaluation import evaluate as assessment
+from warp_torchrl.evaluation.play import play_heuristics
+
+TINY = ["landscape.size=12", "horizon=16"]
+
+
+def test_the_jobs_of_a_sweep_play_the_baselines_once(monkeypatch):
+    asked = []
+
+    def note(env, first_seed, names):
+        asked.append(list(names))
+        return play_heuristics(env, first_seed, names)
+
+    monkeypatch.setattr(assessment, "play_heuristics", note)
+    monkeypatch.setattr(assessment, "_PLAYED", {})
+
+    def baselines(names, *overrides):
+        plan = settings(plain(compose_config("train", ["evaluation.episodes=3", *TINY, *overrides])))
+        return assessment._baselines(plan, plan.make_env(3, plan.evaluation.first_seed), names)
+
+    first = baselines(["noop", "local"])
+    again = baselines(["local", "noop"], "seed=7", "algorithm=ppo")
+    assert asked == [["noop", "local"], []] and again["local"] is first["local"]
+    more = baselines(["greedy", "local"], "seed=8")
+    assert asked[2] == ["greedy"] and list(more) == ["greedy", "local"]
+    baselines(["noop"], "wind.speed=9")
+    assert asked[3] == ["noop"], "other worlds"

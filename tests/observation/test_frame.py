@@ -1,0 +1,424 @@
+"""Frames: a map that is turned or mirrored looks the same to those who face the fire, and they do the same there."""
+
+import itertools
+
+import pytest
+import torch
+from tensordict import TensorDict
+
+from tests.conftest import small_world
+from tests.observation.test_observation import drawn
+from warp_torchrl.algorithms.dqn import Dqn
+from warp_torchrl.algorithms.ppo import Ppo
+from warp_torchrl.env import WildfireEnv
+from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.models import (
+    ACTION,
+    ACTION_ONE_HOT,
+    ACTION_VALUE,
+    CHOSEN_ACTION_VALUE,
+    LOGITS,
+    STATE_ACTION_VALUE,
+    VALUE,
+    Cnn,
+    Entry,
+    Mlp,
+    given_held,
+    hold,
+    signature,
+)
+from warp_torchrl.observation import (
+    DEFAULT,
+    SELF_SIZE,
+    Frame,
+    Local,
+    Paper,
+    Surroundings,
+    can_be_held,
+    frame_of,
+    held,
+    held_state,
+)
+from warp_torchrl.world.fire import Fire
+from warp_torchrl.world.geometry import DIRECTIONS
+from warp_torchrl.world.state import Action
+from warp_torchrl.world.team import Team
+from warp_torchrl.world.terrain.landscape import Perlin
+from warp_torchrl.world.wind import Uniform
+from warp_torchrl.world.world import in_wind
+
+TURNS = list(itertools.product((1, -1), (1, -1), (False, True)))
+"""Whether rows, then columns, are mirrored, and whether they change places after that."""
+PRESETS = {
+    "whole map": Surroundings(),
+    "centred": Surroundings(centred=True, identity=True),
+    "local": Local(identity=True),
+    "paper": Paper(),
+}
+SIZE = 16
+
+
+def fighting(observation, n_worlds=6, steps=12):
+    """Worlds of a windy, flat map that burn, with a team among the trees."""
+    team = Team(n_agents=3, roles=("ugv", "ugv", "uav"), start="anywhere")
+    world = small_world(
+        landscape=Perlin(size=SIZE), wind=Uniform(speed=7.0, direction=35.0), team=team, horizon=60, steps_per_tick=3
+    )
+    env = WildfireEnv(world, n_worlds=n_worlds, observation=observation, seed=3)
+    now, rule = env.reset(), HEURISTICS["local"](env)
+    for _ in range(steps):
+        now = env.step(rule(now))["next"]
+    return env
+
+
+def turned_map(plane, rows, columns, swapped):
+    """Return planes [..., H, W] as the map's other side shows them."""
+    plane = plane.flip(-2) if rows < 0 else plane
+    plane = plane.flip(-1) if columns < 0 else plane
+    return plane.transpose(-1, -2).contiguous() if swapped else plane.contiguous()
+
+
+def turned_vector(vector, rows, columns, swapped):
+    vector = vector * torch.tensor([rows, columns])
+    return vector.flip(-1) if swapped else vector
+
+
+def turned_actions(action, turn):
+    """Return actions on the map, int64 [...], as they are on the turned one."""
+    offsets = torch.tensor([*DIRECTIONS])
+    turned = [[*DIRECTIONS].index(tuple(each)) for each in turned_vector(offsets, *turn).tolist()]
+    names = torch.tensor([*turned, *range(len(turned), len(Action))])
+    return torch.where(action < 0, action, names[action.clamp(min=0)])
+
+
+def turned_world(state, turn):
+    """Return whole worlds turned."""
+    leaves = {
+        name: turned_map(value, *turn)
+        for name, value in state.leaves().items()
+        if "." not in name and value.shape[1:] == (SIZE, SIZE)
+    }
+    middle = (SIZE - 1) / 2
+    old = state.vehicles
+    place, base = ((turned_vector(each - middle, *turn) + middle).to(torch.int64) for each in (old.position, old.base))
+    vehicles = old.replace(position=place, base=base, last_action=turned_actions(old.last_action, turn))
+    east, north = state.wind[:, 0], state.wind[:, 1]
+    south_east = turned_vector(torch.stack((-north, east), dim=-1), *turn)
+    wind = torch.stack((south_east[..., 1], -south_east[..., 0]), dim=1)
+    cover = state.landscape.replace(cover=turned_map(state.cover, *turn), age=turned_map(state.landscape.age, *turn))
+    fire = Fire()
+    return in_wind(state.replace(vehicles=vehicles, ground=fire.ground(cover, 30.0), **leaves), fire, wind)
+
+
+def seen(now):
+    """Return the entries of an observation by name."""
+    found = now["agents", "observation"]
+    return {"": found} if isinstance(found, torch.Tensor) else dict(found.items())
+
+
+def pulled(preset, state, n_worlds=6):
+    """Return which agents see fire more on one side than on the other, bool [B, A]: their frames are not arbitrary."""
+    env = fighting(preset, n_worlds, steps=0)
+    here, across, mirrored = (
+        frame_of(seen(env.set_state(turned_world(state, turn)))).index
+        for turn in ((1, 1, False), (1, 1, True), (-1, -1, False))
+    )
+    return (here % 2 != across % 2) & (here // 2 == 3 - mirrored // 2)
+
+
+def in_both(preset, turn):
+    """Return what is observed in worlds and in the same worlds turned, and whose frames are not arbitrary."""
+    env = fighting(preset)
+    state = env.world_state.clone()
+    here = env.set_state(state).clone()
+    there = env.set_state(turned_world(state, turn)).clone()
+    sees = pulled(preset, state)
+    assert sees.sum() >= 6
+    return here, there, sees
+
+
+@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("turn", TURNS, ids=str)
+def test_a_turned_world_looks_the_same(name, turn):
+    here, there, sees = in_both(PRESETS[name], turn)
+    before, after = seen(here), seen(there)
+    frames = frame_of(before), frame_of(after)
+    for entry in before:
+        ours, theirs = (held(entry, each[entry], frame) for each, frame in zip((before, after), frames))
+        torch.testing.assert_close(theirs[sees], ours[sees], atol=1e-6, rtol=0.0)
+    masks = [frame.actions(now["agents", "action_mask"]) for now, frame in zip((here, there), frames)]
+    assert torch.equal(masks[0][sees], masks[1][sees])
+    torch.testing.assert_close(held_state(there["state"]), held_state(here["state"]), atol=1e-5, rtol=0.0)
+
+
+@pytest.mark.parametrize(
+    "model", [Mlp(), Mlp(sharing="none"), Mlp(sharing="role"), Cnn()], ids=["team", "none", "role", "cnn"]
+)
+def test_networks_say_the_same_of_a_turned_world(model):
+    """Logits and values of acts turn with the map, and a state's value stays what it is, whatever the weights."""
+    preset, turn = PRESETS["whole map"], (-1, 1, True)
+    here, there, sees = in_both(preset, turn)
+    shape = signature(fighting(preset, steps=0))
+    for key, network in ((LOGITS, model.actor(shape)), (ACTION_VALUE, model.action_value(shape))):
+        ours, theirs = network(here)[key], network(there)[key]
+        expected = torch.empty_like(ours).index_copy_(2, turned_actions(torch.arange(11), turn), ours)
+        torch.testing.assert_close(theirs[sees], expected[sees], atol=1e-5, rtol=0.0)
+        assert not torch.allclose(theirs[sees], ours[sees], atol=1e-5), "another map, north up"
+    for central in (False, True):
+        critic = model.critic(shape, central)
+        torch.testing.assert_close(critic(there)[VALUE][sees], critic(here)[VALUE][sees], atol=1e-4, rtol=0.0)
+    action = torch.arange(18).view(6, 3) % 11
+    for now, said in ((here, action), (there, turned_actions(action, turn))):
+        now[ACTION_ONE_HOT] = torch.nn.functional.one_hot(said, 11).to(torch.float32)
+    judge = model.action_critic(shape, central=False)
+    ours, theirs = (judge(now)[STATE_ACTION_VALUE] for now in (here, there))
+    torch.testing.assert_close(theirs[sees], ours[sees], atol=1e-4, rtol=0.0)
+
+
+@pytest.mark.parametrize("turn", TURNS, ids=str)
+def test_what_is_remembered_of_a_turned_world_is_turned(turn):
+    """Three steps of a world and of the same world turned; frames change on the way."""
+    preset = PRESETS["local"]
+    env, rule = fighting(preset, n_worlds=24), HEURISTICS["local"](fighting(preset, n_worlds=24, steps=0))
+    actors = [lively(Mlp(memory=16), fighting(preset, steps=0)) for _ in range(2)]
+    faced, sees = [], True
+    for _ in range(3):
+        state = env.world_state.clone()
+        here, there = (env.set_state(each).clone() for each in (state, turned_world(state, turn)))
+        sees = sees & pulled(preset, state, 24)
+        faced.append(frame_of(seen(here)).index)
+        ours, theirs = (actor(now)[LOGITS] for actor, now in zip(actors, (here, there)))
+        fresh = lively(Mlp(memory=16), fighting(preset, steps=0))(here.clone())[LOGITS]
+        expected = torch.empty_like(ours).index_copy_(2, turned_actions(torch.arange(11), turn), ours)
+        torch.testing.assert_close(theirs[sees], expected[sees], atol=1e-5, rtol=0.0)
+        env.step(rule(env.set_state(state)))
+    assert ((faced[0] != faced[1]) | (faced[1] != faced[2]))[sees].any()
+    assert not torch.allclose(ours[sees], fresh[sees], atol=1e-3), "the memory has a say"
+
+
+def lively(model, env):
+    """Return an actor whose weights tell, the same each time."""
+    torch.manual_seed(0)
+    actor = model.actor(signature(env))
+    with torch.no_grad():
+        for weight in actor.parameters():
+            weight += 0.1 * torch.randn_like(weight)
+    return actor.requires_grad_(False)
+
+
+def test_networks_that_face_north_say_something_else():
+    """The check on the check."""
+    here, there, sees = in_both(PRESETS["whole map"], (-1, 1, True))
+    shape = signature(fighting(PRESETS["whole map"], steps=0))
+    critic = Mlp(facing="north").critic(shape, central=True)
+    assert not torch.allclose(critic(there)[VALUE][sees], critic(here)[VALUE][sees], atol=1e-3)
+
+
+def test_a_mixer_says_the_same_of_a_turned_world():
+    here, there, _ = in_both(PRESETS["whole map"], (-1, 1, True))
+    env = fighting(PRESETS["whole map"], steps=0)
+    said = {}
+    for facing in ("fire", "north"):
+        mixer = Dqn(mixer="qmix").build(env, Mlp(facing=facing), 8).loss.mixer_network
+        own = torch.arange(18.0).view(6, 3, 1)
+        said[facing] = [
+            mixer(TensorDict({CHOSEN_ACTION_VALUE: own, "state": now["state"]}, [6]))["chosen_action_value"]
+            for now in (here, there)
+        ]
+    torch.testing.assert_close(*said["fire"], atol=1e-4, rtol=0.0)
+    assert not torch.allclose(*said["north"], atol=1e-3)
+
+
+@pytest.mark.parametrize("model", [Mlp(), Mlp(sharing="none"), Cnn()], ids=["team", "none", "cnn"])
+@pytest.mark.parametrize("name", PRESETS)
+def test_a_batch_that_is_held_once_is_learnt_from_as_if_it_were_turned_each_time(name, model):
+    env = fighting(PRESETS[name])
+    policy, critic = Ppo().policy(signature(env), model), model.critic(signature(env), central=True)
+    with torch.no_grad():
+        batch = policy(env.rollout(3, policy))
+    kept = batch.clone()
+    held_once = hold(batch)
+    assert (batch == kept).all(), "what was collected stays as it is"
+    assert (held_once[ACTION] != batch[ACTION]).any()
+    ours, theirs = given_held(policy).get_dist(held_once), policy.get_dist(batch)
+    torch.testing.assert_close(ours.log_prob(held_once[ACTION]), theirs.log_prob(batch[ACTION]))
+    torch.testing.assert_close(ours.entropy(), theirs.entropy())
+    assert torch.equal(given_held(critic)(held_once.clone())[VALUE], critic(batch.clone())[VALUE])
+    again = hold(held_once)
+    for key in held_once.keys(True, True):
+        if key[0] != "next":
+            assert torch.equal(again[key], held_once[key]), key
+
+
+def test_networks_given_what_is_held_have_the_same_weights_by_the_same_names():
+    env = fighting(PRESETS["centred"], steps=0)
+    policy = Ppo().policy(signature(env), Mlp())
+    ours, theirs = dict(given_held(policy).named_parameters()), dict(policy.named_parameters())
+    assert set(ours) == set(theirs) and all(ours[name] is weight for name, weight in theirs.items())
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_every_preset_can_be_held(name):
+    shapes = {entry: tuple(value.shape[2:]) for entry, value in seen(fighting(PRESETS[name], steps=0).reset()).items()}
+    assert can_be_held(shapes)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [{"view": (44, 11, 11)}, {"self": (96,)}, {"picture": (3, 8, 15)}, {"more": (2,)}, {"view": None}],
+    ids=str,
+)
+def test_what_is_of_no_preset_is_read_north_up(make_small_env, changed):
+    """Of observations that were stacked, cut or added to no one knows how they turn."""
+    shape = signature(make_small_env(2))
+    entries = {name: entry.shape for name, entry in shape.observation.items()} | changed
+    other = shape._replace(observation={name: Entry(size, "float32") for name, size in entries.items() if size})
+    with pytest.raises(ValueError, match=r"model\.facing must be north where observations are of no preset, got fire"):
+        Mlp().actor(other)
+    assert Mlp(facing="north").actor(other) is not None
+
+
+@pytest.mark.parametrize("name", ["centred", "local"])
+def test_the_fire_lies_between_east_and_south_east(name):
+    places = [[0, 0], [0, 9], [15, 15], [2, 15], [9, 11], [12, 2], [7, 4]]
+    cells = torch.full((16, 16), 5)
+    cells[8, 8] = 11
+    state, world = drawn(cells.tolist(), places)
+    entries = PRESETS[name](state, world, world.forecast(state))
+    frame, found = frame_of(entries), 0
+    what, channel = ("view", DEFAULT.index("fire_stage")) if name == "local" else ("picture", 0)
+    if name == "centred":
+        entries["view"].zero_()  # what an agent sees itself goes first, and is not in the middle of a block
+    for plane in held(what, entries[what], frame)[0, :, channel]:
+        for row, column in (plane.nonzero() - len(plane) // 2).tolist():
+            assert 0 <= row <= column
+            found += 1
+    assert found == (2 if name == "local" else len(places)), "what is within five cells, or all"
+
+
+def framed(rows, columns, swapped):
+    return Frame(torch.tensor(4 * (rows < 0) + 2 * (columns < 0) + swapped))
+
+
+def test_vectors_maps_and_actions_by_hand():
+    # What is two rows up and five columns to the left of one: mirrored both, it is (2, 5) away.
+    mirrored, turned = framed(-1, -1, False), framed(-1, 1, True)
+    assert mirrored.vectors(torch.tensor([-2.0, -5.0])).tolist() == [2.0, 5.0]
+    assert turned.vectors(torch.tensor([-5.0, 2.0])).tolist() == [2.0, 5.0]
+    # Rows mirrored, 1 2 / 3 4 is 3 4 / 1 2; rows and columns swapped after that, 3 1 / 4 2.
+    one = torch.tensor([[[1, 2], [3, 4]]])
+    assert framed(-1, 1, False).maps(one).tolist() == [[[3, 4], [1, 2]]]
+    assert turned.maps(one).tolist() == [[[3, 1], [4, 2]]]
+    # Rows mirrored and then swapped with columns, east in the frame is what is north on the map, and south is east.
+    entries = torch.arange(11)
+    said = turned.actions(entries)
+    assert (
+        said[Action.EAST] == Action.NORTH and said[Action.SOUTH] == Action.EAST and said[Action.CLEAR] == Action.CLEAR
+    )
+    assert torch.equal(framed(1, 1, False).actions(entries), entries)
+
+
+@pytest.mark.parametrize("n_actions", [10, 11])
+def test_entries_by_action_come_back(n_actions):
+    frame, entries = Frame(torch.arange(8)), torch.randn(8, n_actions)
+    assert torch.equal(frame.actions_on_map(frame.actions(entries)), entries)
+    assert len({tuple(each) for each in frame.actions(torch.arange(n_actions).expand(8, -1)).tolist()}) == 8
+
+
+def test_units_change_places_with_the_ways_to_hold_a_map():
+    """From one frame to another they move as they do between what these are of any turned map, and come back."""
+    frames, features = Frame(torch.arange(8)), torch.randn(8, 16)
+    assert torch.equal(frames.units_on_map(frames.units(features)), features)
+    assert torch.equal(framed(1, 1, False).units(features), features)
+    basis = torch.eye(2).expand(8, -1, -1)
+    matrices = Frame(torch.arange(8)[:, None].expand(-1, 2)).vectors(basis).transpose(-1, -2)
+
+    def of_turned(frame, turn):
+        return (matrices == matrices[frame] @ matrices[turn]).flatten(1).all(1).nonzero().item()
+
+    def moved(first, then):
+        return Frame(torch.tensor(then)).units(Frame(torch.tensor(first)).units_on_map(features[0])).tolist()
+
+    for first, then, turn in itertools.product(range(8), repeat=3):
+        assert moved(first, then) == moved(of_turned(first, turn), of_turned(then, turn))
+    assert len({tuple(moved(0, then)) for then in range(8)}) == 8
+
+
+def test_near_fires_count_for_more():
+    """A fire one cell north pulls with 1 / (1 + 2)^3 = 0.037, one four cells south with 4 / (4 + 2)^3 = 0.019."""
+    view = torch.zeros(1, 1, len(DEFAULT), 11, 11, dtype=torch.uint8)
+    fire = view[0, 0, DEFAULT.index("fire_stage")]
+    fire[4, 5] = fire[9, 5] = 51
+    assert frame_of({"view": view}).index == framed(-1, 1, True).index
+    fire[9, 4] = fire[9, 6] = 204
+    assert frame_of({"view": view}).index == framed(1, 1, True).index, "three of them are more, whatever their stage"
+
+
+def test_a_tie_is_a_tie_in_any_batch():
+    """Fires at the corners of a diamond pull nowhere: north stays up, in one world and in a thousand."""
+    picture = torch.zeros(1000, 1, 3, 8, 8)
+    picture[:, :, 0, [1, 5, 3, 3], [3, 3, 1, 5]] = 0.3
+    entries = {
+        "picture": picture,
+        "self": torch.full((1000, 1, SELF_SIZE), 3.5 / 8),
+        "view": torch.zeros(1000, 1, len(DEFAULT), 11, 11, dtype=torch.uint8),
+    }
+    for n_worlds in (1, 7, 1000):
+        assert (frame_of({name: entry[:n_worlds] for name, entry in entries.items()}).index == 0).all()
+    entries["view"][:, 0, DEFAULT.index("fire_stage"), 7, 4] = 51  # two cells down, one to the left
+    assert (frame_of(entries).index == framed(1, -1, True).index).all(), "what it sees itself goes first"
+
+
+def test_the_critics_map_faces_the_fire_and_is_about_what_happens(make_small_env):
+    env = make_small_env(1, world=small_world(landscape=Perlin(size=16)))
+    state = env.reset()["state"].zero_()
+    state[0, 0, 2, 3] = 1.0  # fire
+    state[0, 4, 10, 5] = state[0, 5, 12, 9] = 1.0  # a bulldozer, an aircraft: their middle is (11, 7)
+    state[0, 1, 0, 0] = state[0, 1, 15, 15] = 0.5  # trees
+    state[0, 7, :8, :8], state[0, 7, :8, 8:], state[0, 7, 8:, :8], state[0, 7, 8:, 8:] = 0.9, 0.4, 0.1, -0.3
+    shown = held_state(state)[0]
+    # The fire is nine rows up and four columns to the left: mirrored both, rows and columns swapped, it is at (12, 13),
+    # the bulldozer at (10, 5), the aircraft at (6, 3). They fill rows 6 to 12 and columns 3 to 13, whose middles are 9
+    # and 8: one row up, so that trees in the corner are lost above and come to row 14 below.
+    assert shown[0].nonzero().tolist() == [[11, 13]]
+    assert shown[4].nonzero().tolist() == [[9, 5]] and shown[5].nonzero().tolist() == [[5, 3]]
+    assert shown[1].nonzero().tolist() == [[14, 15]]
+    # A wind 0.1 to the east and 0.3 to the south: 0.1 to the west and 0.3 to the north, then swapped.
+    quarters = shown[7].unflatten(1, (2, 8)).unflatten(0, (2, 8))[:, 0, :, 0]
+    torch.testing.assert_close(quarters, torch.tensor([[0.9, 0.4], [-0.3, 0.1]]))
+    assert (shown[7, 8:, :8] == shown[7, 8, 0]).all() and (shown[7, 8:, 8:] == shown[7, 8, 8]).all()
+
+
+@pytest.mark.parametrize("down", [-4, -1, 0, 3])
+@pytest.mark.parametrize("across", [-2, 0, 1])
+def test_where_on_the_map_it_burns_makes_no_difference_to_the_critics_map(down, across):
+    state = torch.zeros(8, 16, 16)
+    state[0, 6, 5] = state[0, 9, 12] = 0.5  # fires
+    state[1, 4:12, 3:14] = torch.randint(9, (8, 11)) / 8  # trees
+    state[4, 4, 2] = 1.0  # a bulldozer
+    moved = state.roll((down, across), (1, 2))  # of what is drawn, nothing comes in again on the other side
+    shown = held_state(state)
+    assert torch.equal(held_state(moved), shown)
+    assert shown[0].nonzero().tolist() == [[7, 6], [10, 13]] and shown[4].nonzero().tolist() == [[5, 3]]
+    assert shown.sum() == state.sum(), "nothing is lost here"
+
+
+def test_the_critics_map_loses_no_fire_and_no_agent_and_shows_nothing_off_the_map():
+    state = torch.rand(500, 8, 16, 16)
+    for plane, share in ((0, 0.01), (4, 0.01), (5, 0.01)):
+        state[:, plane] = (state[:, plane] < share).to(torch.float32)
+    state[::2, :, 9:] = 0.0  # half of the maps are empty to the south
+    state[:, 4, 1, 1] += 1.0
+    shown = held_state(state)
+    sums, before = shown.sum((-2, -1)), state.sum((-2, -1))
+    for plane in (0, 4, 5):
+        assert torch.equal(sums[:, plane], before[:, plane]), plane
+    assert (sums[:, 1:4] <= before[:, 1:4] + 1e-3).all() and (sums[:, 1] < before[:, 1] - 1.0).any()
+
+
+def test_worlds_really_are_turned():
+    """The check on the check: north up, the eight maps differ."""
+    env = fighting(Local())
+    before = env.world_state.clone()
+    views = [env.set_state(turned_world(before, turn))["agents", "observation", "view"] for turn in TURNS]
+    assert not any(torch.equal(one, another) for one, another in itertools.combinations(views, 2))

@@ -1,0 +1,262 @@
+"""Checkpoints are complete or invisible, and verified before they are read."""
+
+import io
+import json
+import pickle
+import shutil
+
+import pytest
+import torch
+
+from tests.forgery import forge
+from warp_torchrl.config.compose import Record, recompose
+from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.models import Entry, Signature
+from warp_torchrl.runs import checkpoint as checkpoints
+from warp_torchrl.runs.checkpoint import CheckpointError, RunFolderInUse, RunFolderLock, newest
+
+ACTIONS = tuple(f"action_{code}" for code in range(11))
+SIGNATURE = Signature({"view": Entry((3, 5, 5), "uint8")}, Entry((9, 16, 16), "float32"), 2, ACTIONS, 2)
+
+
+def saved(run, frames, keep=3, **options):
+    return checkpoints.save(
+        run,
+        frames=frames,
+        scenario="tiny",
+        signature=SIGNATURE,
+        mode="sampled",
+        record=Record(choices={"algorithm": "mappo"}, values={"seed": 3}),
+        policy={"weight": torch.arange(4.0)},
+        training={"frames": frames, "random": torch.get_rng_state()},
+        keep=keep,
+        **options,
+    )
+
+
+def test_what_was_saved_comes_back(tmp_path):
+    run = tmp_path / "runs" / "of today"  # neither is there
+    saved(run, 100)
+    found, skipped = newest(run)
+    assert not skipped and found.manifest.frames == 100 and found.manifest.signature == SIGNATURE
+    assert found.policy()["weight"].tolist() == [0, 1, 2, 3] and found.training()["frames"] == 100
+    assert found.record() == Record(choices={"algorithm": "mappo"}, values={"seed": 3})
+
+
+def test_the_newest_is_found_by_number_and_old_ones_go(tmp_path):
+    for frames in (20, 900, 1000, 99_999):
+        saved(tmp_path, frames, keep=3)
+    assert newest(tmp_path)[0].manifest.frames == 99_999
+    assert sorted(int(each.name) for each in (tmp_path / "checkpoints").iterdir()) == [900, 1000, 99_999]
+    assert newest(tmp_path / "checkpoints" / "900")[0].manifest.frames == 900
+
+
+def test_what_is_not_to_stay_goes_when_two_newer_ones_are_safe(tmp_path):
+    for frames in (100, 130, 200, 210, 220, 300, 310, 320, 330):
+        saved(tmp_path, frames, keep=4, stays=lambda each: each % 100 == 0)
+        assert len(list((tmp_path / "checkpoints").iterdir())) <= 4
+    assert sorted(int(each.name) for each in (tmp_path / "checkpoints").iterdir()) == [200, 300, 320, 330]
+
+
+@pytest.mark.parametrize("name", ["policy.pt", "training.pt", "config.json", "manifest.json"])
+@pytest.mark.parametrize("harm", ["flip", "cut", "empty", "append", "delete"])
+def test_an_altered_file_is_noticed_and_the_one_before_taken(tmp_path, name, harm):
+    saved(tmp_path, 1)
+    path = saved(tmp_path, 2) / name
+    content = bytearray(path.read_bytes())
+    if harm == "delete":
+        path.unlink()
+    else:
+        half = len(content) // 2
+        flipped = content[:half] + bytes([content[half] ^ 1]) + content[half + 1 :]
+        path.write_bytes({"flip": flipped, "cut": content[:half], "empty": b"", "append": content + b" x"}[harm])
+    found, (line,) = newest(tmp_path)
+    assert found.manifest.frames == 1 and "\n" not in line and "checkpoints/2" in line
+
+
+def test_every_byte_of_a_manifest_counts(tmp_path):
+    saved(tmp_path, 1)
+    path = saved(tmp_path, 2) / "manifest.json"
+    content = path.read_bytes()
+    for place in range(0, len(content), 7):
+        path.write_bytes(content[:place] + bytes([content[place] ^ (1 << place % 8)]) + content[place + 1 :])
+        assert newest(tmp_path)[0].manifest.frames == 1, content[max(place - 20, 0) : place + 20]
+    path.write_bytes(content)
+    assert newest(tmp_path)[0].manifest.frames == 2
+
+
+def test_checkpoints_that_change_places_are_noticed(tmp_path):
+    first, second = saved(tmp_path, 1), saved(tmp_path, 2)
+    first.rename(tmp_path / "aside")
+    second.rename(first)
+    (tmp_path / "aside").rename(second)
+    with pytest.raises(CheckpointError, match="2 holds a checkpoint of 1 frames"):
+        newest(tmp_path)
+    assert newest(second)[0].manifest.frames == 1, "a single checkpoint may be anywhere"
+
+
+@pytest.mark.parametrize("keep", [2, 3])
+def test_a_run_that_fell_back_never_loses_what_it_then_saves(tmp_path, keep):
+    """Two unsound checkpoints are newer: they must neither stand for the new one nor push it out."""
+    saved(tmp_path, 100)
+    for frames in (200, 300):
+        (saved(tmp_path, frames, keep=9) / "policy.pt").write_bytes(b"rotten")
+    assert newest(tmp_path)[0].manifest.frames == 100 and len(newest(tmp_path)[1]) == 2
+    saved(tmp_path, 200, keep)
+    assert newest(tmp_path)[0].manifest.frames == 200 and newest(tmp_path)[1] == []
+    assert sorted(each.name for each in (tmp_path / "checkpoints").iterdir()) == ["100", "200"]
+
+
+def test_a_sound_checkpoint_is_never_written_again(tmp_path):
+    path = saved(tmp_path, 1) / "training.pt"
+    before = path.stat()
+    saved(tmp_path, 1)
+    assert path.stat() == before
+
+
+def test_nothing_sound_is_one_line(tmp_path):
+    with pytest.raises(CheckpointError, match="no sound checkpoint") as error:
+        newest(tmp_path)
+    assert "\n" not in str(error.value)
+    with pytest.raises(CheckpointError, match="nothing there"):
+        newest(tmp_path / "elsewhere")
+
+
+def test_another_format_is_refused_by_name(tmp_path):
+    manifest = saved(tmp_path, 1) / "manifest.json"
+    manifest.write_text(json.dumps(json.loads(manifest.read_text()) | {"format": 99}))
+    with pytest.raises(CheckpointError, match="format 99"):
+        newest(tmp_path)
+
+
+class Poison:
+    """Unpickled, it writes the file that its tests look for."""
+
+    def __init__(self, canary):
+        self.canary = canary
+
+    def __reduce__(self):
+        return (open, (str(self.canary), "w"))
+
+
+def read_all(run):
+    found, _ = newest(run)
+    return found.record(), found.policy(), found.training()
+
+
+@pytest.mark.parametrize("name", ["policy.pt", "training.pt", "config.json", "manifest.json"])
+@pytest.mark.parametrize("as_archive", [False, True])
+def test_a_pickle_in_place_of_any_file_does_not_run(tmp_path, name, as_archive):
+    folder, canary = saved(tmp_path, 1), tmp_path / "canary"
+    poison = io.BytesIO()
+    torch.save({"weight": Poison(canary)}, poison) if as_archive else pickle.dump(Poison(canary), poison)
+    (folder / name).write_bytes(poison.getvalue())
+    if name != "manifest.json":
+        forge(folder)
+    with pytest.raises(CheckpointError, match="cannot be read"):
+        read_all(tmp_path)
+    assert not canary.exists()
+    poison.seek(0)
+    torch.load(poison, weights_only=False) if as_archive else pickle.load(poison)
+    assert canary.exists(), "it works where it is let in"
+
+
+FORGED = [
+    {"frames": "1"},
+    {"frames": True},
+    {"mode": "lucky"},
+    {"files": []},
+    {"files": {}},
+    {"files": {"policy.pt": {}}},
+    {"signature": None},
+    {"signature": {}},
+    {"signature": {"observation": {}, "state": {"shape": ["x"], "dtype": "uint8"}, "n_agents": 2, "n_actions": 11}},
+    {"signature": {"observation": {}, "state": {"shape": [1e400], "dtype": "uint8"}, "n_agents": 2, "n_actions": 11}},
+    {"versions": None, "more": 1},
+    {"format": None},
+    {"format": [2]},
+]
+
+
+@pytest.mark.parametrize("changes", FORGED, ids=str)
+def test_a_forged_manifest_is_refused_in_one_line(tmp_path, changes):
+    forge(saved(tmp_path, 1), **changes)
+    with pytest.raises(CheckpointError) as error:
+        newest(tmp_path)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("content", ["{}", "[]", '{"choices": 1, "values": {}}', "[" * 100_000, "\xff"])
+def test_a_forged_configuration_is_refused_in_one_line(tmp_path, content):
+    folder = saved(tmp_path, 1)
+    (folder / "config.json").write_bytes(content.encode("latin-1"))
+    forge(folder)
+    with pytest.raises(CheckpointError, match=r"config\.json") as error:
+        newest(tmp_path)[0].record()
+    assert "\n" not in str(error.value)
+
+
+def test_a_configuration_that_reads_the_environment_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match="must be a plain value"):
+        recompose(Record(choices={}, values={"landscape": {"path": "${oc.env:HOME}"}}))
+
+
+def test_the_format_before_the_seal_is_read(tmp_path):
+    folder = saved(tmp_path, 1)
+    manifest = json.loads((folder / "manifest.json").read_text())
+    del manifest["sha256"]
+    (folder / "manifest.json").write_text(json.dumps(manifest | {"format": 1}))
+    assert newest(tmp_path)[0].policy()["weight"].tolist() == [0, 1, 2, 3]
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(CheckpointError, match="altered"):
+        newest(tmp_path)
+
+
+def test_a_crash_while_saving_leaves_what_was_there(tmp_path, monkeypatch):
+    saved(tmp_path, 1)
+    calls = {"left": 0}
+    real = checkpoints.disk.sync
+
+    def fails(path):
+        calls["left"] -= 1
+        if calls["left"] < 0:
+            raise OSError(28, "No space left on device", str(path))
+        real(path)
+
+    monkeypatch.setattr(checkpoints.disk, "sync", fails)
+    for allowed in range(5):
+        calls["left"] = allowed
+        with pytest.raises(OSError, match="No space"):
+            saved(tmp_path, 2)
+        assert [each.name for each in (tmp_path / "checkpoints").iterdir()] == ["1"]
+        assert newest(tmp_path)[0].manifest.frames == 1
+
+
+def test_a_draft_of_a_killed_save_is_not_a_checkpoint_and_goes_with_the_next(tmp_path):
+    shutil.copytree(saved(tmp_path, 1), tmp_path / "checkpoints" / ".5.tmp")
+    assert newest(tmp_path)[0].manifest.frames == 1
+    saved(tmp_path, 2)
+    assert sorted(each.name for each in (tmp_path / "checkpoints").iterdir()) == ["1", "2"]
+
+
+def test_what_somebody_else_removes_meanwhile_is_gone_and_no_error(tmp_path, monkeypatch):
+    real = shutil.rmtree
+
+    def after_another(path, **options):
+        real(path, ignore_errors=True)
+        real(path, **options)
+
+    monkeypatch.setattr(checkpoints.shutil, "rmtree", after_another)
+    for frames in (1, 2, 3, 4):
+        (tmp_path / "checkpoints" / f".{frames}.tmp").mkdir(parents=True)
+        saved(tmp_path, frames, keep=2)
+    assert sorted(each.name for each in (tmp_path / "checkpoints").iterdir()) == ["3", "4"]
+
+
+def test_a_run_folder_has_one_writer(tmp_path):
+    run = tmp_path / "runs" / "of today"  # neither is there
+    lock = RunFolderLock(run)
+    with pytest.raises(RunFolderInUse, match="in use"):
+        RunFolderLock(run)
+    lock.release()
+    RunFolderLock(run).release()

@@ -1,0 +1,114 @@
+"""metrics.csv is complete, and a tracker that fails does not end the run."""
+
+import csv
+
+import pytest
+
+from warp_torchrl.runs.logging import CsvOnly, MetricsFile, Tensorboard, Wandb, _TorchRlTracker
+
+
+def lines(path):
+    with path.open(newline="") as file:
+        return list(csv.reader(file))
+
+
+def test_rows_are_appended_and_holes_left_empty(tmp_path):
+    metrics = MetricsFile(tmp_path / "metrics.csv")
+    metrics.add({"a": 1, "b": 0.1 + 0.2})
+    metrics.add({"a": 2, "b": None})
+    assert lines(tmp_path / "metrics.csv") == [["a", "b"], ["1", "0.30000000000000004"], ["2", ""]]
+    with pytest.raises(ValueError, match="no columns"):
+        metrics.add({"c": 1})
+
+
+def test_a_resumed_file_is_cut_back_to_the_checkpoint(tmp_path):
+    metrics = MetricsFile(tmp_path / "metrics.csv")
+    for number in range(4):
+        metrics.add({"a": number})
+    resumed = MetricsFile(tmp_path / "metrics.csv", keep_rows=2)
+    resumed.add({"a": 9})
+    assert lines(tmp_path / "metrics.csv") == [["a"], ["0"], ["1"], ["9"]] and resumed.rows == 3
+
+
+def test_a_new_run_starts_a_new_file(tmp_path):
+    (tmp_path / "metrics.csv").write_text("old,columns\n1,2\n")
+    MetricsFile(tmp_path / "metrics.csv").add({"a": 1})
+    assert lines(tmp_path / "metrics.csv") == [["a"], ["1"]]
+
+
+def test_a_tracker_that_cannot_open_warns_once_and_is_silent(tmp_path, caplog):
+    tracker = _TorchRlTracker("no such tracker", tmp_path)
+    tracker.log({"a": 1.0}, 1)
+    tracker.close()
+    assert [record.levelname for record in caplog.records if record.name == "warp_torchrl"] == ["WARNING"]
+    assert "goes on without it" in caplog.text
+
+
+def test_a_tracker_that_breaks_on_the_way_warns_once(tmp_path, caplog):
+    tracker = _TorchRlTracker("csv", tmp_path)
+
+    def broken(*args, **kwargs):
+        raise OSError("server gone")
+
+    tracker._logger.log_scalar = broken
+    tracker.log({"a": 1.0}, 1)
+    tracker.log({"a": 2.0}, 2)
+    assert caplog.text.count("server gone") == 1
+
+
+def test_the_default_tracker_says_nothing(tmp_path):
+    tracker = CsvOnly().open(tmp_path)
+    tracker.log({"a": 1.0}, 1)
+    tracker.close()
+    assert not list(tmp_path.iterdir())
+
+
+def test_wandb_works_offline(tmp_path, caplog, monkeypatch):
+    monkeypatch.delenv("WANDB_API_KEY", raising=False)
+    tracker = Wandb().open(tmp_path)
+    tracker.log({"world/saved": 0.5, "train/loss": None}, 10)
+    tracker.close()
+    assert "goes on without it" not in caplog.text
+    assert any("offline-run" in path.name for path in tmp_path.rglob("*"))
+
+
+def test_the_runs_of_a_sweep_are_one_group(tmp_path, monkeypatch):
+    given = []
+    monkeypatch.setattr("warp_torchrl.runs.logging.get_logger", lambda *args, **options: given.append(options))
+    (tmp_path / "sweep" / "3").mkdir(parents=True)
+    (tmp_path / "alone").mkdir()
+    (tmp_path / "sweep" / "multirun.yaml").touch()
+    Wandb().open(tmp_path / "sweep" / "3")
+    Wandb().open(tmp_path / "alone")
+    Wandb(group="mine").open(tmp_path / "sweep" / "3")
+    assert [each["wandb_kwargs"]["group"] for each in given] == ["sweep", None, "mine"]
+
+
+def test_trackers_get_the_names_and_values_of_metrics_csv(tmp_path):
+    row = {"time/frames": 64, "train/loss": 0.25, "train/approx_kl": None, "world/saved": 0.5}
+    events = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
+    tracker = Tensorboard().open(tmp_path)
+    tracker.log(row, 64)
+    tracker.close()
+    folder = next(path.parent for path in tmp_path.rglob("*tfevents*"))
+    found = events.EventAccumulator(str(folder)).Reload()
+    assert set(found.Tags()["scalars"]) == {name for name, value in row.items() if value is not None}
+    assert [(each.step, each.value) for each in found.Scalars("world/saved")] == [(64, 0.5)]
+
+
+def test_wandb_gets_the_names_of_metrics_csv(tmp_path, monkeypatch):
+    monkeypatch.delenv("WANDB_API_KEY", raising=False)
+    tracker = Wandb().open(tmp_path)
+    seen = []
+    monkeypatch.setattr(tracker._logger.experiment, "log", lambda values, **options: seen.append(values))
+    tracker.log({"world/saved": 0.5, "train/loss": None, "time/frames": 10}, 10)
+    tracker.close()
+    assert [name for each in seen for name in each if not name.endswith("/step")] == ["world/saved", "time/frames"]
+
+
+def test_tensorboard_works_where_it_is_installed(tmp_path, caplog):
+    pytest.importorskip("tensorboard")
+    tracker = Tensorboard().open(tmp_path)
+    tracker.log({"world/saved": 0.5}, 10)
+    tracker.close()
+    assert "goes on without it" not in caplog.text and any("tfevents" in path.name for path in tmp_path.rglob("*"))

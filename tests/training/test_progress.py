@@ -1,0 +1,23 @@
+"""What a training tells of itself."""
+
+from warp_torchrl.training.progress import line, told_of_batches
+
+ROW = {"time/frames": 104, "time/seconds": 3.2, "time/fps": 40.4, "world/saved": None, "rollout/ep_rew_mean": -1.234,
+       "train/loss": 0.5}  # fmt: skip
+
+
+def test_a_line_says_what_there_is_to_say():
+    assert line(ROW, 400) == " 26.0 %  104 frames  3 s  40 frames/s  saved -  reward -1.23  loss 0.500"
+
+
+def test_whole_batches_end_at_a_hundred_per_cent():
+    assert line(ROW, 100).startswith("100.0 %  104 frames")
+
+
+def test_it_is_told_where_whole_batches_are_not_what_was_asked_for():
+    assert told_of_batches(128, 4, 8) is None
+    assert told_of_batches(20, 4, 8) == (
+        "total_frames=20 is less than one batch: one batch is 32 frames, n_worlds=4 x collector.steps=8, and one is "
+        "trained on"
+    )
+    assert told_of_batches(100, 4, 8).endswith(": training ends at 128 frames, not at total_frames=100")

@@ -1,0 +1,1 @@
+"""How experience is collected: in this process, in others, with a teacher beside."""

@@ -1,0 +1,132 @@
+"""Learning from a baseline first: the learner's loss gets a cloning term that falls to nothing.
+
+The pupil acts, the teacher says what it would have done there, and reinforcement takes over as the cloning term falls
+(Schmitt et al., "Kickstarting Deep Reinforcement Learning", 2018, with a rule for a teacher).
+"""
+
+from dataclasses import dataclass, replace
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from torch import Tensor, nn
+from torch.nn.functional import cross_entropy
+
+from warp_torchrl.algorithms.algorithm import Algorithm
+from warp_torchrl.algorithms.learner import Learner
+from warp_torchrl.algorithms.on_policy import OnPolicy
+from warp_torchrl.collection.collectors import Direct, Process
+from warp_torchrl.env import WildfireEnv
+from warp_torchrl.heuristics import HEURISTICS, Heuristic
+from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, TEACHER_ACTION
+from warp_torchrl.nearest import did_you_mean
+from warp_torchrl.validation import check_fields
+
+TEACHERS = tuple(name for name, rule in HEURISTICS.items() if not rule.remembers)
+"""Names of the heuristics that can teach: they tell what to do in any state, whoever led there."""
+_LOSS, _COLUMN = "loss_bc", "train/cloning_loss"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Imitation:
+    """How a team learns from a teacher, which may see more than the team does.
+
+    A policy that learnt so is imitation-initialised; who reports it should say so.
+
+    Attributes:
+        teacher: One of ``TEACHERS``; None learns from rewards alone.
+        weight: Of the cloning loss when training starts; it falls linearly.
+        until: Share of the training at which it is nothing.
+
+    Raises:
+        ValueError: If the teacher is unknown or a value is out of its range.
+    """
+
+    teacher: str | None = None
+    weight: float = 1.0
+    until: float = 0.3
+
+    def __post_init__(self) -> None:
+        check_fields(self, weight=(1e-6, 1e6), until=(1e-6, 1.0))
+        if self.teacher is not None and self.teacher not in TEACHERS:
+            hint = did_you_mean(self.teacher, TEACHERS)
+            raise ValueError(f"teacher must be null or one of {', '.join(TEACHERS)}, got {self.teacher}{hint}")
+
+    def check_fits(self, algorithm: Algorithm, collector: Direct) -> None:
+        """Check that a teacher, where there is one, can teach.
+
+        Raises:
+            ValueError: If the learner replays what it did long ago, or acts in other processes.
+        """
+        if self.teacher is not None and not isinstance(algorithm, OnPolicy):
+            raise ValueError("teacher must be null where the algorithm replays: choose mappo, ippo, ppo or a2c")
+        if self.teacher is not None and isinstance(collector, Process):
+            raise ValueError("teacher must be null where workers collect: choose collector=direct")
+
+    def taught(self, learner: Learner, env: WildfireEnv) -> Learner:
+        """Return the learner with its teacher, where it has one.
+
+        Args:
+            learner: One whose policy writes logits first.
+            env: In whose worlds it acts.
+        """
+        if self.teacher is None:
+            return learner
+        lesson = _Lesson(self, learner)
+        return replace(
+            learner,
+            explore=_Pupil(learner.explore, HEURISTICS[self.teacher](env), lesson),
+            terms=lesson.terms,
+            loss_keys=(*learner.loss_keys, _LOSS),
+            columns={**learner.columns, _LOSS: _COLUMN},
+            schedule=lesson.schedule,
+        )
+
+
+class _Lesson:
+    """A learner's loss with the cloning loss beside it.
+
+    It is what TorchRL's ``BCLoss`` says of the teacher's choices, of the logits that the learner's own loss has just
+    worked out of the same sample: cloning takes no pass of its own.
+    """
+
+    def __init__(self, plan: Imitation, learner: Learner) -> None:
+        self.plan, self.learner, self.weight = plan, learner, plan.weight
+        learner.loss.actor_network[0].register_forward_hook(self._overhear)
+
+    def _overhear(self, actor: nn.Module, given: object, said: TensorDictBase) -> None:
+        self._logits = said.get(LOGITS)
+
+    def terms(self, sample: TensorDictBase) -> TensorDictBase:
+        """Return the learner's terms, and the cloning loss of the teacher's choices."""
+        terms = self.learner.terms(sample)
+        if not self.weight:
+            return terms.set(_LOSS, torch.zeros((), device=sample.device))
+        return terms.set(_LOSS, self.weight * _log_loss(self._logits, sample.get(TEACHER_ACTION)))
+
+    def schedule(self, progress: float) -> dict[str, float]:
+        """Set what changes with progress in 0..1."""
+        self.weight = self.plan.weight * max(0.0, 1.0 - progress / self.plan.until)
+        return self.learner.schedule(progress)
+
+
+class _Pupil(TensorDictModuleBase):
+    """A policy that is told, while the lesson lasts, what its teacher would do."""
+
+    def __init__(self, policy: TensorDictModuleBase, teacher: Heuristic, lesson: _Lesson) -> None:
+        super().__init__()
+        self.in_keys, self.out_keys = policy.in_keys, [*policy.out_keys, TEACHER_ACTION]
+        self.policy, self._teacher, self._lesson = policy, teacher, lesson
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Write the team's actions and the teacher's, int64 [B, A]; the latter is the team's own after the lesson."""
+        out = self.policy(tensordict)
+        if not self._lesson.weight:
+            return out.set(TEACHER_ACTION, out.get(ACTION))
+        state = self._teacher.env.world_state
+        return out.set(TEACHER_ACTION, self._teacher.choose(state, tensordict.get(ACTION_MASK)))
+
+
+def _log_loss(logits: Tensor, action: Tensor) -> Tensor:
+    """Return the negative log-likelihood of actions int64 [...] under logits [..., actions]."""
+    return cross_entropy(logits.flatten(0, -2), action.flatten())

@@ -1,0 +1,47 @@
+"""How a command that failed ends: one line, the last of stderr, and an exit code that says of what kind it was."""
+
+import errno
+import sys
+import traceback
+from pathlib import Path
+
+from warp_torchrl.collection.collectors import WorkerDied
+from warp_torchrl.config.compose import HYDRA_ERRORS, one_line
+from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.runs import checkpoint as checkpoints
+from warp_torchrl.training.loop import NumericalFailure
+from warp_torchrl.training.signals import Stopped
+
+DONE, MISTAKE, IN_USE, UNSOUND, NUMERICAL, DISK = 0, 2, 3, 4, 5, 6
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
+
+
+def fail(error: Exception, debug: bool) -> tuple[int, str]:
+    """Say what failed in one line, the last of stderr, and return the exit code and the line."""
+    if debug:
+        traceback.print_exc()
+    code, line = _diagnose(error)
+    print(f"error: {line}", file=sys.stderr, flush=True)
+    return code, line
+
+
+def _diagnose(error: Exception) -> tuple[int, str]:
+    text = one_line(error) if isinstance(error, HYDRA_ERRORS) else str(error)
+    line = " ".join(text.split()) or type(error).__name__
+    if isinstance(error, Stopped):
+        return 128 + error.number, line
+    if isinstance(error, checkpoints.RunFolderInUse):
+        return IN_USE, line
+    if isinstance(error, checkpoints.CheckpointError):
+        return UNSOUND, line
+    if isinstance(error, NumericalFailure):
+        return NUMERICAL, line
+    if isinstance(error, WorkerDied):
+        return 1, line
+    if isinstance(error.__cause__, OSError):  # logging says that a handler cannot be configured, and not why
+        error = error.__cause__
+    if isinstance(error, OSError) and (error.filename is not None or error.errno in _NO_ROOM):
+        return DISK, f"{error.filename or Path.cwd()}: {error.strerror}"
+    if isinstance(error, (ConfigError, ValueError, *HYDRA_ERRORS)):
+        return MISTAKE, line
+    return 1, f"{type(error).__name__}: {line} (debug=true shows where)"

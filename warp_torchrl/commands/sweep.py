@@ -1,0 +1,129 @@
+"""Sweeps: the jobs that a command line asks for, the ones that failed, and the summary of the others."""
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any, ClassVar
+
+from hydra.core.hydra_config import HydraConfig
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.experimental.callback import Callback
+from omegaconf import DictConfig
+
+from warp_torchrl import summary
+from warp_torchrl.config.construction import ConfigError
+
+FAILURE = "failed.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Failure:
+    """A job of a sweep that failed.
+
+    Attributes:
+        job: Its number.
+        overrides: What its command line would have been.
+        code: The exit code that it would have had.
+        reason: One line.
+    """
+
+    job: int
+    overrides: str
+    code: int
+    reason: str
+
+
+def jobs(overrides: Sequence[str]) -> list[list[str]]:
+    """Return the overrides of each job of a sweep.
+
+    Raises:
+        ConfigError: If an override is not of Hydra's grammar.
+    """
+    try:
+        parsed = OverridesParser.create().parse_overrides(list(overrides))
+    except Exception as error:
+        raise ConfigError(" ".join(str(error).split())) from None
+    choices = [
+        [f"{each.get_key_element()}={value}" for value in each.sweep_string_iterator()]
+        if each.is_sweep_override()
+        else [str(each.input_line)]
+        for each in parsed
+    ]
+    return [list(job) for job in product(*choices)]
+
+
+def forget_failure() -> None:
+    """Remove what an earlier sweep into the same folder left of this job."""
+    Path(HydraConfig.get().runtime.output_dir, FAILURE).unlink(missing_ok=True)
+
+
+def note_failure(code: int, reason: str) -> None:
+    """Leave word of a failed job in its folder, for the end of the sweep, whatever process runs the job."""
+    job = HydraConfig.get().job
+    failure = Failure(job=int(job.num), overrides=" ".join(HydraConfig.get().overrides.task), code=code, reason=reason)
+    folder = Path(HydraConfig.get().runtime.output_dir)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / FAILURE).write_text(json.dumps(asdict(failure)), encoding="utf-8")
+
+
+def failures(folder: Path) -> list[Failure]:
+    """Return the jobs of a sweep's folder that failed, in their order."""
+    found = [Failure(**json.loads(path.read_text(encoding="utf-8"))) for path in folder.glob(f"**/{FAILURE}")]
+    return sorted(found, key=lambda each: each.job)
+
+
+class SweepSummary(Callback):
+    """Ends a sweep with one table and one figure of all its evaluations, and with the jobs that failed.
+
+    Attributes:
+        exit_code: The first failed job's; 0 where none failed.
+        folder: Of the sweep that has begun and not ended.
+    """
+
+    exit_code: ClassVar[int] = 0
+    folder: ClassVar[Path | None] = None
+
+    def on_multirun_start(self, config: DictConfig, **kwargs: Any) -> None:
+        """Remember the sweep's folder: a launcher that gives up does not come to the end."""
+        SweepSummary.folder = Path(str(config.hydra.sweep.dir))
+
+    def on_multirun_end(self, config: DictConfig, **kwargs: Any) -> None:
+        """Write ``summary.md`` and ``summary.png`` into the sweep's folder, and print the table."""
+        failed = _conclude(Path(str(config.hydra.sweep.dir)))
+        SweepSummary.exit_code = failed[0].code if failed else 0
+        SweepSummary.folder = None
+
+
+def conclude_early() -> None:
+    """Tell what there is of a sweep whose launcher gave up, as joblib's and submitit's do where a worker is killed."""
+    folder, SweepSummary.folder = SweepSummary.folder, None
+    if folder is None or not folder.is_dir():
+        return
+    _conclude(folder)
+    for log in sorted(folder.glob("**/*.log")):
+        if not ((log.parent / "evaluation.json").exists() or (log.parent / FAILURE).exists()):
+            print(f"error: the job in {log.parent} did not end", file=sys.stderr, flush=True)
+
+
+def _conclude(folder: Path) -> list[Failure]:
+    entries = summary.gather(folder)
+    if entries:
+        _summarise(entries, folder)
+    failed = failures(folder)
+    for each in failed:
+        print(f"error: job {each.job} ({each.overrides}) failed: {each.reason}", file=sys.stderr, flush=True)
+    return failed
+
+
+def _summarise(entries: list[summary.Entry], folder: Path) -> None:
+    text = summary.table(entries)
+    (folder / "summary.md").write_text(text + "\n", encoding="utf-8")
+    print(text, flush=True)
+    try:
+        summary.draw(entries, folder / "summary.png")
+    except ImportError:
+        print('no summary.png: Matplotlib is missing, pip install "warp_torchrl[figures]"', flush=True)
+    print(f"wrote the summary into {folder}", flush=True)

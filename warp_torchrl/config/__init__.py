@@ -1,0 +1,1 @@
+"""Configuration: composed from yaml, checked, and built."""

@@ -1,0 +1,266 @@
+"""Configuration: composes the yaml files of ``conf/``, and lays out what run folders keep of it.
+
+A component's types, defaults and rules stand in its dataclass and nowhere else. The yaml files name the class, always
+one of this package's own; nothing that is read from a run folder is ever instantiated by name.
+"""
+
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, cast
+
+from hydra import compose, initialize_config_dir
+from hydra.core.global_hydra import GlobalHydra
+from hydra.errors import HydraException
+from hydra.types import RunMode
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from warp_torchrl.config.construction import ConfigError, UnknownKeyError
+from warp_torchrl.config.grammar import check_overrides, several_values
+from warp_torchrl.config.settings import COMPONENTS, WORLD_KEYS
+from warp_torchrl.nearest import did_you_mean
+
+OmegaConf.register_new_resolver("pid", os.getpid, replace=True, use_cache=True)  # a sweep's jobs get its own process's
+HYDRA_ERRORS = (HydraException, OmegaConfBaseException)
+"""What Hydra raises where a configuration has a mistake."""
+GROUPS = ("scenario", "experiment")
+"""Groups whose options are no classes."""
+
+
+def conf_folder() -> Path:
+    """Return the folder of the yaml files: inside the package when installed, beside it in a checkout."""
+    package = Path(__file__).parents[1]
+    inside = package / "conf"
+    return inside if inside.is_dir() else package.parent / "conf"
+
+
+def compose_config(name: str, overrides: Sequence[str] = ()) -> DictConfig:
+    """Compose ``conf/<name>.yaml`` with overrides in Hydra's grammar.
+
+    Raises:
+        ConfigError: If an override does not fit, in one line.
+    """
+    for override in overrides:
+        group, _, option = override.partition("=")
+        if group in (*COMPONENTS, "scenario") and not _OPTION.fullmatch(option.strip("'\"")):
+            # Hydra merges lists of options and follows paths; a run folder could not tell them, nor resume.
+            several = "; -m sweeps over several" if "," in option else ""
+            raise ConfigError(f"{group} must be one of the files of conf/{group}, got {option}{several}")
+    config = _compose(name, overrides)
+    try:
+        OmegaConf.resolve(config)
+    except OmegaConfBaseException as error:
+        raise ConfigError(one_line(error)) from None
+    return config
+
+
+def is_sweep(name: str, overrides: Sequence[str]) -> bool:
+    """Return whether an experiment among the overrides is a sweep in itself.
+
+    Raises:
+        ConfigError: If there is no such experiment, in one line.
+    """
+    chosen = [each for each in overrides if each.startswith("experiment=")]
+    return bool(chosen) and _compose(name, chosen, with_hydra=True).hydra.mode == RunMode.MULTIRUN
+
+
+def output_folder(name: str, overrides: Sequence[str], sweeps: bool) -> Path:
+    """Return the folder into which a command, or its sweep, will write.
+
+    Raises:
+        ConfigError: If an override does not fit, in one line.
+    """
+    hydra = _compose(name, overrides, with_hydra=True).hydra
+    try:
+        return Path(hydra.sweep.dir if sweeps else hydra.run.dir)
+    except OmegaConfBaseException as error:
+        raise ConfigError(one_line(error)) from None
+
+
+def _compose(name: str, overrides: Sequence[str], with_hydra: bool = False) -> DictConfig:
+    try:
+        folder = conf_folder()
+        return deepcopy(_composed(folder, _last_change(folder), name, tuple(overrides), with_hydra))
+    except HYDRA_ERRORS as error:
+        check_overrides(overrides)
+        raise _told(error, _known_keys(name, overrides)) from None
+    except ValueError as error:
+        raise ConfigError(f"{one_line(error)}, in {' '.join(overrides)}") from None
+
+
+def _known_keys(name: str, overrides: Sequence[str]) -> list[str]:
+    """Return every key of a configuration with the options that the overrides choose, where they can be had."""
+    chosen = tuple(each for each in overrides if each.partition("=")[0] in (*COMPONENTS, *GROUPS))
+    for choices in (chosen, ()):
+        try:
+            config = _composed(conf_folder(), _last_change(conf_folder()), name, choices, False)
+        except HYDRA_ERRORS:
+            continue
+        return [*_keys(plain(config)), *GROUPS]
+    return []
+
+
+@lru_cache(maxsize=64)
+def _composed(folder: Path, last_change: int, name: str, overrides: tuple[str, ...], with_hydra: bool) -> DictConfig:
+    """Return a composed configuration, which takes Hydra a fifth of a second: once for each state of the files."""
+    GlobalHydra.instance().clear()
+    with initialize_config_dir(str(folder), version_base="1.3"):
+        return compose(name, overrides=list(overrides), return_hydra_config=with_hydra)
+
+
+def _last_change(folder: Path) -> int:
+    return max(path.stat().st_mtime_ns for path in (folder, *folder.glob("**/*")))
+
+
+def _told(error: Exception, known: Sequence[str]) -> ConfigError:
+    """Return Hydra's error as ours."""
+    unknown = re.match(r"Could not override '([^']*)'", str(error))
+    told = one_line(error, known)
+    return UnknownKeyError(told, unknown[1]) if unknown else ConfigError(told)
+
+
+def one_line(error: Exception, known: Sequence[str] = ()) -> str:
+    """Return Hydra's message in one line, with the options where it lists them, and the known key that is nearest."""
+    text = str(error)
+    unknown = re.match(r"Could not override '([^']*)'", text)
+    if unknown:
+        others = _options_with(unknown[1])
+        hint = f", but with {' or '.join(others)}" if others else did_you_mean(unknown[1], known)
+        return f"{unknown[1]} is not a key of the configuration{hint or '; conf/ and --cfg job show what there is'}"
+    missing = re.search(
+        r"Could not find '([\w/]+)/([^']*)'.*Available options in '[^']*':(.*)Config search", text, re.S
+    )
+    if missing:
+        options = missing[3].split()
+        return f"{missing[1]} must be one of {', '.join(options)}, got {missing[2]}{did_you_mean(missing[2], options)}"
+    several = re.match(r"Ambiguous value for argument '(.*)'$", text, re.M)
+    if several:
+        return several_values(several[1])
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    return " ".join(line for line in lines if not line.startswith(("full_key", "object_type", "Set the environment")))
+
+
+def _options_with(key: str) -> list[str]:
+    """Return the options of a key's group whose files have it."""
+    group, _, name = key.partition(".")
+    files = sorted((conf_folder() / group).glob("*.yaml")) if group in COMPONENTS and name else []
+    return [f"{group}={path.stem}" for path in files if name in cast("DictConfig", OmegaConf.load(path))]
+
+
+# What is written into a run folder, and read back
+
+_OPTION = re.compile(r"[A-Za-z0-9_]+")
+_BEFORE = {"model.facing": "north"}
+"""What runs did whose record has none of a key yet."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Record:
+    """A configuration as a run folder keeps it: which option each group had, and every value.
+
+    Attributes:
+        choices: Option by group.
+        values: Resolved values, without the names of classes.
+    """
+
+    choices: dict[str, str] = field(default_factory=dict)
+    values: dict[str, Any] = field(default_factory=dict)
+
+
+def plain(config: DictConfig) -> dict[str, Any]:
+    """Return a configuration as plain, resolved values."""
+    return cast("dict[str, Any]", OmegaConf.to_container(config, resolve=True))
+
+
+def without_targets(node: Any) -> Any:
+    """Return a configuration node without its ``_target_`` entries."""
+    if isinstance(node, Mapping):
+        return {key: without_targets(value) for key, value in node.items() if key != "_target_"}
+    return list(node) if isinstance(node, list) else node
+
+
+def world_overrides(values: Mapping[str, Any]) -> list[str]:
+    """Return how a configuration's worlds differ from those of its scenario, as overrides; files are not named.
+
+    Args:
+        values: Plain, with ``_target_``.
+    """
+    choices = [f"scenario={values['scenario']}"]
+    usual = _composed_worlds(choices)
+    for group, parts in values.items():
+        if group in usual and isinstance(parts, Mapping) and parts.get("_target_") != usual[group].get("_target_"):
+            options = (f"{group}={path.stem}" for path in sorted((conf_folder() / group).glob("*.yaml")))
+            of_its_class = (
+                each for each in options if _composed_worlds([*choices, each])[group]["_target_"] == parts["_target_"]
+            )
+            choices.append(next(of_its_class))
+            usual = _composed_worlds(choices)
+    usual = dict(_leaves(usual))
+    changed = [
+        f"{path}={value}".replace(" ", "")
+        for path, value in _leaves({key: values[key] for key in WORLD_KEYS if key in values})
+        if (path not in usual or usual[path] != value) and not path.endswith(".path")
+    ]
+    return choices[1:] + changed
+
+
+def _composed_worlds(choices: Sequence[str]) -> dict[str, Any]:
+    composed = plain(_compose("train", choices))
+    return {key: composed[key] for key in WORLD_KEYS}
+
+
+def recompose(record: Record, overrides: Sequence[str] = ()) -> DictConfig:
+    """Compose the configuration of a record anew from this package's own files, and lay its values over it.
+
+    Classes come from our yaml files alone. Values that an override touches are the override's; an override of
+    ``scenario`` takes the whole world from that scenario.
+
+    Args:
+        record: From a run folder: not trusted.
+        overrides: In Hydra's grammar.
+
+    Raises:
+        ConfigError: If a choice or a value does not fit.
+    """
+    for group, option in record.choices.items():
+        if group not in (*COMPONENTS, "scenario") or not _OPTION.fullmatch(str(option)):
+            raise ConfigError(f"{group}={option!r} in the run folder is not one of our options")
+    touched = [override.split("=", 1)[0].lstrip("+~") for override in overrides]
+    if "scenario" in touched:
+        touched += WORLD_KEYS
+    choices = [f"{group}={option}" for group, option in record.choices.items() if group not in touched]
+    config = compose_config("train", [*choices, *overrides])
+    recorded = dict(_leaves(record.values))
+    before = {key: value for key, value in _BEFORE.items() if key.split(".")[0] in record.values}
+    for path, value in {**before, **recorded}.items():
+        if "${" in str(value):  # what is recorded was resolved: this one was put there to read what is ours
+            raise ConfigError(f"{path} in the run folder must be a plain value, got {value!r}")
+        if any(path == key or path.startswith(f"{key}.") for key in touched):
+            continue
+        try:
+            OmegaConf.update(config, path, value, merge=False, force_add=False)
+        except OmegaConfBaseException:
+            raise ConfigError(f"{path} in the run folder is not a key of this version's configuration") from None
+    return config
+
+
+def _keys(node: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    """Yield the keys of a configuration, those of groups included."""
+    for key, value in node.items():
+        if key != "_target_":
+            yield f"{prefix}{key}"
+        if isinstance(value, Mapping):
+            yield from _keys(value, f"{prefix}{key}.")
+
+
+def _leaves(node: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
+    found = []
+    for key, value in node.items():
+        path = f"{prefix}{key}"
+        found += _leaves(value, f"{path}.") if isinstance(value, Mapping) else [(path, value)]
+    return found

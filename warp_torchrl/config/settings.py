@@ -1,0 +1,239 @@
+"""The settings of a run: every value checked, every component built, from a composed configuration as plain values."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
+from typing import Any, Literal
+
+import torch
+
+from warp_torchrl.collection.imitation import Imitation
+from warp_torchrl.config.construction import ConfigError, build, construct
+from warp_torchrl.config.seeds import BEYOND_EVALUATION, FIRST_EVALUATED, SEEDS, WORLDS
+from warp_torchrl.env import WildfireEnv
+from warp_torchrl.nearest import did_you_mean
+from warp_torchrl.world.fast.compile import check_compiler
+from warp_torchrl.world.world import World
+
+COMPONENTS = (
+    "landscape",
+    "wind",
+    "fire",
+    "team",
+    "ignition",
+    "observation",
+    "reward",
+    "model",
+    "algorithm",
+    "collector",
+    "logger",
+)
+"""Groups whose options are classes."""
+ENVIRONMENT = COMPONENTS[: COMPONENTS.index("reward") + 1]
+"""Those that make an environment."""
+WORLD_KEYS = ("scenario", "landscape", "wind", "fire", "team", "ignition", "steps_per_tick", "horizon", "cell_size")
+"""What a scenario sets."""
+COMMAND_KEYS = ("resume", "start_from", "debug", "policy", "overwrite")
+"""What the commands read themselves."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckpointPlan:
+    """When training saves.
+
+    Attributes:
+        interval: Frames between checkpoints.
+        minutes: Between checkpoints by the clock, as ``SaveClock`` has it; 0: none.
+        keep: Checkpoints that stay: the newest two, and of the others those of the interval.
+
+    Raises:
+        ValueError: If the interval is not positive, the minutes are negative or fewer than two are kept.
+    """
+
+    interval: int = 500_000
+    minutes: float = 2.0
+    keep: int = 2
+
+    def __post_init__(self) -> None:
+        if self.interval < 1:
+            raise ValueError(f"interval must be at least 1 frame, got {self.interval}")
+        if not 0.0 <= self.minutes <= 1e6:
+            raise ValueError(f"minutes must be in 0..1e6, where 0 saves by frames alone, got {self.minutes}")
+        if not 2 <= self.keep <= 10_000:
+            raise ValueError(f"keep must be in 2..10000, got {self.keep}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvaluationPlan:
+    """How policies are evaluated.
+
+    Attributes:
+        interval: Frames between evaluations during training; 0 evaluates only at the end.
+        episodes: Worlds.
+        first_seed: Seed of the first; training has those below 1 000 000 and from 2^61 on.
+        mode: ``sampled``, ``deterministic``, or ``best``: whichever did better on training seeds.
+        leave_one_out: Play once more for each agent, without it, to see what it is worth.
+
+    Raises:
+        ValueError: If a value is out of its range.
+    """
+
+    interval: int = 0
+    episodes: int = 256
+    first_seed: int = FIRST_EVALUATED
+    mode: Literal["sampled", "deterministic", "best"] = "best"
+    leave_one_out: bool = False
+
+    def __post_init__(self) -> None:
+        if self.interval < 0:
+            raise ValueError(f"interval must be 0 or more frames, got {self.interval}")
+        if not 1 <= self.episodes <= 1_000_000:
+            raise ValueError(f"episodes must be in 1..1000000, got {self.episodes}")
+        if not 0 <= self.first_seed <= BEYOND_EVALUATION - self.episodes:
+            raise ValueError(
+                f"first_seed must be in 0..{BEYOND_EVALUATION - self.episodes}, so that no episode has a training "
+                f"world's seed, got {self.first_seed}"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """Everything that a run needs, checked: the components, built, and the run's own numbers.
+
+    Raises:
+        ValueError: If a value is out of its range.
+    """
+
+    scenario: str
+    world: World
+    observation: Any
+    reward: Any
+    model: Any
+    algorithm: Any
+    collector: Any
+    logger: Any
+    n_worlds: int
+    total_frames: int
+    seed: int
+    device: str
+    compile: bool
+    checkpoint: CheckpointPlan
+    evaluation: EvaluationPlan
+    imitation: Imitation
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.n_worlds <= WORLDS:
+            raise ValueError(f"n_worlds must be in 1..{WORLDS}, got {self.n_worlds}")
+        if not 1 <= self.total_frames <= 10**15:
+            raise ValueError(f"total_frames must be in 1..1e15, got {self.total_frames}")
+        if not 0 <= self.seed <= SEEDS:
+            raise ValueError(f"seed must be in 0..{SEEDS}, got {self.seed}")
+        _check_device(self.device)
+
+    def check_training(self) -> None:
+        """Check what training asks of the machine, and playing what was trained does not.
+
+        Raises:
+            ConfigError: If ``compile`` is asked for where there is no compiler.
+        """
+        if self.compile:
+            try:
+                check_compiler(torch.device(self.device))
+            except ValueError as error:
+                raise ConfigError(str(error)) from None
+
+    def make_env(self, n_worlds: int, seed: int, fuse: bool = False) -> WildfireEnv:
+        """Return an environment of the run's scenario, on the run's device."""
+        return WildfireEnv(
+            self.world,
+            observation=self.observation,
+            reward=self.reward,
+            n_worlds=n_worlds,
+            seed=seed,
+            device=self.device,
+            fuse=fuse,
+        )
+
+    def make_training_env(self, n_worlds: int, seed: int) -> WildfireEnv:
+        """Return an environment to learn from, fused where that is asked for.
+
+        The few episodes of an evaluation would take less time than their compilation.
+        """
+        return self.make_env(n_worlds, seed, fuse=self.compile)
+
+
+def settings(config: Mapping[str, Any]) -> Settings:
+    """Check a composed configuration and build what it describes.
+
+    Raises:
+        ConfigError: With key, value and rule.
+    """
+    known = {each.name for each in fields(Settings)} | {*COMPONENTS, *WORLD_KEYS, *COMMAND_KEYS}
+    for key in config:
+        if key not in known:
+            has = f"it has {', '.join(sorted(known - {'world'}))}"
+            raise ConfigError(f"{key} is not a key of the configuration; {has}{did_you_mean(key, known)}")
+    for key in (*COMPONENTS, "checkpoint", "evaluation", "imitation"):
+        if key not in config:
+            raise ConfigError(f"{key} must be given")
+    built = build_components(config)
+    values = {each.name: built.get(each.name, config.get(each.name)) for each in fields(Settings)}
+    values["world"] = built["world"]
+    values["checkpoint"] = construct(CheckpointPlan, config["checkpoint"], "checkpoint")
+    values["evaluation"] = construct(EvaluationPlan, config["evaluation"], "evaluation")
+    values["imitation"] = construct(Imitation, config["imitation"], "imitation")
+    _check_together(config)
+    made = construct(Settings, values, "")
+    with _told("algorithm"):
+        made.algorithm.check_batch(made.n_worlds * made.collector.steps)
+    with _told("model"):
+        made.algorithm.check_model(made.model)
+    with _told("collector"):
+        made.collector.check_worlds(made.n_worlds)
+    with _told("imitation"):
+        made.imitation.check_fits(made.algorithm, made.collector)
+    return made
+
+
+@contextmanager
+def _told(section: str) -> Iterator[None]:
+    """Let a mistake name the section of the configuration that it is in."""
+    try:
+        yield
+    except ValueError as error:
+        raise ConfigError(f"{section}.{error}") from None
+
+
+def build_components(config: Mapping[str, Any], names: Sequence[str] = COMPONENTS) -> dict[str, Any]:
+    """Build components of a composed configuration, and the ``world`` of those that make one.
+
+    Args:
+        config: As plain values.
+        names: Which; those of the world must be among them.
+
+    Raises:
+        ConfigError: With key, value and rule.
+    """
+    built = {name: build(config[name], name) for name in names}
+    world = {each.name: built.get(each.name, config.get(each.name)) for each in fields(World)}
+    return {**built, "world": construct(World, world, "")}
+
+
+def _check_together(config: Mapping[str, Any]) -> None:
+    reward, algorithm = config["reward"], config["algorithm"]
+    if reward["shaping"] > 0.0 and reward["gamma"] != algorithm["gamma"]:
+        raise ConfigError(
+            f"reward.gamma must be algorithm.gamma, {algorithm['gamma']}, for shaping to leave optimal policies as "
+            f"they are, got {reward['gamma']}"
+        )
+
+
+def _check_device(name: str) -> None:
+    try:
+        device = torch.device(name)
+    except RuntimeError:
+        raise ValueError(f"device must be cpu, cuda or cuda:<number>, got {name}") from None
+    if device.type not in ("cpu", "cuda"):
+        raise ValueError(f"device must be cpu, cuda or cuda:<number>, got {name}")
+    if device.type == "cuda" and (device.index or 0) >= torch.cuda.device_count():
+        raise ValueError(f"device must be one of this machine's {torch.cuda.device_count()} CUDA devices, got {name}")

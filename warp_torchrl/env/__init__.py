@@ -1,0 +1,5 @@
+"""The environment: batched worlds behind TorchRL's ``EnvBase``."""
+
+from warp_torchrl.env.wildfire import WildfireEnv
+
+__all__ = ["WildfireEnv"]

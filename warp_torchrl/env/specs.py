@@ -1,0 +1,55 @@
+"""TorchRL's specs of the environment: the shape, type and range of everything that goes in and comes out."""
+
+from typing import NamedTuple
+
+import torch
+from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
+
+from warp_torchrl.env.metrics import METRICS
+from warp_torchrl.observation import STATE, STATE_SIDE, Observation, Space
+from warp_torchrl.world.role import ROLES
+from warp_torchrl.world.world import World
+
+EPISODE_METRICS = (*METRICS, "episode_reward", "episode_length")
+"""Entries of ``info``: the metrics, the team's mean return so far, and the steps so far."""
+_FLAGS = ("done", "terminated", "truncated")
+
+
+class Specs(NamedTuple):
+    """The four that an environment has."""
+
+    observation: Composite
+    action: Composite
+    reward: Composite
+    done: Composite
+
+
+def make_specs(world: World, observation: Observation, n_worlds: int, device: torch.device) -> Specs:
+    """Return the specs of so many worlds, with the team's entries nested under ``agents``."""
+    batch, team = (n_worlds,), (n_worlds, world.team.n_agents)
+    n_actions = world.team.n_actions
+
+    def entry(space: Space) -> Bounded:
+        low, high = (bound.expand(*team, *space.shape).clone() for bound in space.bounds())
+        return Bounded(low, high, dtype=space.dtype, device=device)
+
+    def of_team(**entries: object) -> Composite:
+        return Composite(agents=Composite(**entries, shape=team, device=device), shape=batch, device=device)
+
+    spaces = {name: entry(space) for name, space in observation.spaces(world).items()}
+    seen = of_team(
+        observation=spaces[""] if "" in spaces else Composite(spaces, shape=team, device=device),
+        action_mask=Binary(n_actions, shape=(*team, n_actions), dtype=torch.bool, device=device),
+        role=Categorical(len(ROLES), shape=team, dtype=torch.int64, device=device),
+    )
+    seen["state"] = Bounded(-3.0, 256.0, shape=(*batch, len(STATE), STATE_SIDE, STATE_SIDE), device=device)
+    seen["info"] = Composite(
+        {name: Unbounded(shape=(*batch, 1), device=device) for name in EPISODE_METRICS}, shape=batch, device=device
+    )
+    flags = {name: Categorical(2, shape=(*batch, 1), dtype=torch.bool, device=device) for name in _FLAGS}
+    return Specs(
+        observation=seen,
+        action=of_team(action=Categorical(n_actions, shape=team, dtype=torch.int64, device=device)),
+        reward=of_team(reward=Unbounded(shape=(*team, 1), device=device)),
+        done=Composite(flags, shape=batch, device=device),
+    )

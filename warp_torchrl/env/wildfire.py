@@ -1,0 +1,304 @@
+"""The environment: joins world, observation, reward and metrics to TorchRL. It has no physics of its own."""
+
+import secrets
+from collections import OrderedDict
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import torch
+from tensordict import TensorDict, TensorDictBase
+from torch import Tensor
+from torchrl.envs import EnvBase
+
+from warp_torchrl.env.render import render
+from warp_torchrl.env.reset_cache import ResetCache, Start
+from warp_torchrl.env.scene import Observations, Scene
+from warp_torchrl.env.specs import make_specs
+from warp_torchrl.observation import Observation, Surroundings
+from warp_torchrl.reward import Efficiency, Reward
+from warp_torchrl.world.fast.compile import check_compiler
+from warp_torchrl.world.role import ROLES
+from warp_torchrl.world.saved import filled
+from warp_torchrl.world.state import Transition, WorldState
+from warp_torchrl.world.world import World
+
+
+class WildfireEnv(EnvBase):
+    """A batch of wildfires and the teams that fight them.
+
+    World i draws with its own seed, ``seed + i`` or ``seeds[i]``: it evolves the same in any batch and at any place in
+    it. The first reset is its episode 0, each later reset the next. A finished world stays as it is, with reward 0,
+    until it is reset.
+
+    Args:
+        world: The scenario's rules.
+        observation: What agents see.
+        reward: What they earn.
+        n_worlds: B.
+        seed: Seed of world 0; None draws one when it is first needed, so that copies made before differ.
+        seeds: Seeds of all worlds, in place of ``seed``.
+        device: Where the worlds live.
+        validate: Check on every device that actions are in range, which costs a synchronisation on CUDA; by default
+            they are checked on the CPU only.
+        fuse: Fuse what can be with ``torch.compile``, which takes a while at the first steps.
+
+    Raises:
+        ValueError: If ``n_worlds`` is not positive, ``seeds`` are not as many, a seed is out of range, or there is no
+            C++ compiler to compile with.
+    """
+
+    batch_locked = True
+
+    def __init__(
+        self,
+        world: World | None = None,
+        *,
+        observation: Observation | None = None,
+        reward: Reward | None = None,
+        n_worlds: int = 1,
+        seed: int | None = 0,
+        seeds: Sequence[int] | None = None,
+        device: torch.device | str = "cpu",
+        validate: bool | None = None,
+        fuse: bool = False,
+    ) -> None:
+        if n_worlds < 1:
+            raise ValueError(f"n_worlds must be at least 1, got {n_worlds}")
+        super().__init__(device=torch.device(device), batch_size=[n_worlds])
+        self.world = World() if world is None else world
+        self.observation = Surroundings() if observation is None else observation
+        self.reward_function = Efficiency() if reward is None else reward
+        self.validate = self.device.type == "cpu" if validate is None else validate
+        if fuse:
+            check_compiler(self.device)
+        self._fuses = fuse
+        names, roles = self.world.team.agent_names, self.world.team.agent_roles
+        self.agent_names, self.action_names = names, self.world.team.action_names
+        self.channel_names = {name: space.names for name, space in self.observation.spaces(self.world).items()}
+        self.group_map = {"agents": list(names)}
+        self.role_map = {role: [n for n, r in zip(names, roles) if r == role] for role in ROLES if role in roles}
+        self._state: WorldState | None = None
+        self._resets = ResetCache(self._start)
+        self.watcher: Callable[[Transition], None] | None = None
+        """Is shown every step's transition, for those who study behaviour."""
+        self._episode_reward = torch.zeros(n_worlds, device=self.device)
+        self._seeds: Tensor | None = None
+        self._episodes = torch.zeros(n_worlds, dtype=torch.int64, device=self.device)
+        if seeds is not None:
+            self.set_seeds(seeds)
+        elif seed is not None:
+            self.set_seeds(range(seed, seed + n_worlds))
+        specs = make_specs(self.world, self.observation, n_worlds, self.device)
+        self.observation_spec, self.action_spec = specs.observation, specs.action
+        self.reward_spec, self.done_spec = specs.reward, specs.done
+
+    # What users ask for
+
+    @property
+    def n_agents(self) -> int:
+        """Return A."""
+        return self.world.team.n_agents
+
+    @property
+    def seeds(self) -> Tensor:
+        """Return each world's seed, int64 [B]; where none was given, they are drawn now."""
+        if self._seeds is None:
+            first = 2**31 + secrets.randbelow(2**31)  # the seeds below are for training and evaluation
+            self._seeds = torch.arange(first, first + self.batch_size[0], device=self.device)
+        return self._seeds
+
+    @property
+    def world_state(self) -> WorldState:
+        """Return the worlds as they are now; clone them to keep them.
+
+        Raises:
+            RuntimeError: Before the first reset.
+        """
+        if self._state is None:
+            raise RuntimeError("the environment has no state yet: call reset() first")
+        return self._state
+
+    def render(self, scale: int = 12) -> Tensor:
+        """Draw the worlds, uint8 [B, H * scale, W * scale, 3]."""
+        return render(self.world_state, self.world.team.table(self.device).index, scale)
+
+    def set_seeds(self, seeds: Sequence[int], first_episode: int = 0) -> None:
+        """Give each world a seed of its own, in force from the next reset.
+
+        Args:
+            seeds: One a world, in 0..2^62.
+            first_episode: Number of the next episode.
+
+        Raises:
+            ValueError: If their number or a seed's range is wrong.
+        """
+        if len(seeds) != self.batch_size[0]:
+            raise ValueError(f"seeds must be {self.batch_size[0]} numbers, one a world, got {len(seeds)}")
+        if not all(0 <= seed < 2**62 for seed in seeds):
+            raise ValueError(f"seed must be in 0..2**62, got {min(seeds)}..{max(seeds)}")
+        self._seeds = torch.tensor(list(seeds), dtype=torch.int64, device=self.device)
+        self._episodes = torch.full_like(self._episodes, first_episode)
+        self._resets.clear()
+
+    def set_state(self, state: WorldState) -> TensorDictBase:
+        """Go on from given worlds, and return what a reset would have returned for them.
+
+        Raises:
+            ValueError: If the batch, the map or the team differs from this environment's.
+        """
+        expected = (self.batch_size[0], *self.world.size, self.n_agents)
+        got = (*state.cells.shape, state.vehicles.position.shape[1])
+        if got != expected:
+            raise ValueError(f"state must have [worlds, rows, columns, agents] {list(expected)}, got {list(got)}")
+        given = state.to(self.device).clone()
+        self._state = given
+        self._episode_reward.zero_()
+        return self._observe(self._state)
+
+    def state_dict(self, *args: object, **kwargs: object) -> OrderedDict[str, Any]:
+        """Return all that changes in the environment: seeds, episodes, worlds, returns."""
+        worlds = {} if self._state is None else self._state.what_changes()
+        return OrderedDict(  # as a module's is: TorchRL's EnvCreator looks into these alone
+            seeds=self.seeds.clone(),
+            episodes=self._episodes.clone(),
+            episode_reward=self._episode_reward.clone(),
+            worlds=OrderedDict((name, value.clone()) for name, value in worlds.items()),
+        )
+
+    def load_state_dict(self, state_dict: Mapping[str, Any], strict: bool = True, **kwargs: object) -> None:
+        """Restore what ``state_dict`` returned, all or nothing.
+
+        Args:
+            state_dict: Entries by name.
+            strict: Whether all must be there; else what is missing stays as it is.
+
+        Raises:
+            ValueError: If an entry is missing or of another shape or type.
+        """
+        missing = [name for name in ("seeds", "episodes", "episode_reward", "worlds") if name not in state_dict]
+        if missing and strict:
+            raise ValueError(f"state_dict must have {', '.join(missing)}, got {', '.join(state_dict) or 'nothing'}")
+        if missing:
+            state_dict = {**self.state_dict(), **state_dict}
+        worlds = state_dict["worlds"]
+        state = None
+        if worlds:
+            state = self.world.restored(filled(self.world.reset(self.seeds, self._episodes), worlds))
+        for name in ("seeds", "episodes", "episode_reward"):
+            if state_dict[name].shape != self.batch_size:
+                raise ValueError(f"{name} must have shape {list(self.batch_size)}, got {state_dict[name].shape}")
+        self._seeds = state_dict["seeds"].to(self.device).clone()
+        self._episodes = state_dict["episodes"].to(self.device).clone()
+        self._episode_reward = state_dict["episode_reward"].to(self.device).clone()
+        self._state = state
+        self._resets.clear()
+
+    # What TorchRL asks for
+
+    def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
+        mask = None if tensordict is None else tensordict.get("_reset", None)
+        if mask is None or self._state is None or mask.all():
+            self._resets.clear()
+            self._state = self.world.reset(self.seeds, self._episodes)
+            self._episodes = self._episodes + 1
+            self._episode_reward = torch.zeros_like(self._episode_reward)
+            return self._observe(self._state)
+        index = mask.flatten().nonzero()[:, 0]
+        seen = self._start_again(index)
+        rows = torch.zeros(len(mask), dtype=torch.int64, device=self.device).index_copy_(
+            0, index, torch.arange(len(index), device=self.device)
+        )
+        return seen[rows]  # TorchRL reads those of the worlds that were reset
+
+    def maybe_reset(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Reset the worlds that have ended, as TorchRL would: what it does with masks is done to their rows alone."""
+        done = tensordict.get("done", None)
+        if done is None or done.all():
+            return super().maybe_reset(tensordict)
+        index = done.flatten().nonzero()[:, 0]
+        if not len(index):
+            return tensordict
+        seen, out = self._start_again(index), tensordict.clone()
+        started = dict(seen.items(include_nested=True, leaves_only=True))
+        for key, value in out.items(include_nested=True, leaves_only=True):
+            if key in started:
+                value.index_copy_(0, index, started[key])
+            elif isinstance(value, Tensor):
+                value.index_fill_(0, index, 0)
+        return out
+
+    def _start_again(self, index: Tensor) -> TensorDict:
+        """Start the next episode of some worlds, and return what is observed in them."""
+        self.world_state[index], seen = self._resets.pop(index, self.seeds, self._episodes)
+        self._episodes = self._episodes.index_add(0, index, torch.ones_like(index))
+        self._episode_reward = self._episode_reward.index_fill(0, index, 0.0)
+        return seen
+
+    def _start(self, seeds: Tensor, episodes: Tensor) -> Start:
+        worlds = self.world.reset(seeds, episodes)
+        return worlds, self._observe(worlds, torch.zeros(len(seeds), device=self.device))
+
+    def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
+        action = self._checked(tensordict.get(("agents", "action"), None))
+        transition, observed, reward = self._scene.step(self.world_state, action)
+        self._state = transition.after
+        self._episode_reward = self._episode_reward + reward.mean(1)[:, 0]
+        out = self._pack(transition.after, observed, self._episode_reward)
+        if self.watcher is not None:
+            self.watcher(transition)
+        out.set(("agents", "reward"), reward)
+        return out
+
+    @property
+    def _scene(self) -> Scene:
+        """Return what is played, and how it is looked at, as they are now: another reward may be assigned."""
+        return Scene(self.world, self.observation, self.reward_function, self._fuses)
+
+    def _set_seed(self, seed: int | None) -> None:
+        if seed is None:
+            seed = int(torch.empty((), dtype=torch.int64).random_(2**31))
+        self.set_seeds(range(seed, seed + self.batch_size[0]))
+
+    def _checked(self, action: Tensor | None) -> Tensor:
+        shape = (*self.batch_size, self.n_agents)
+        if action is None:
+            raise ValueError('("agents", "action") must be given: an int64 tensor of shape [worlds, agents]')
+        if action.dtype != torch.int64 or tuple(action.shape) != shape:
+            raise ValueError(
+                f'("agents", "action") must be int64 of shape {list(shape)}, got {action.dtype} {list(action.shape)}'
+            )
+        if action.device != self.device:
+            raise ValueError(f'("agents", "action") must be on {self.device}, got {action.device}')
+        if self.validate and not ((action >= 0) & (action < self.world.team.n_actions)).all():
+            raise ValueError(
+                f'("agents", "action") must be in 0..{self.world.team.n_actions - 1}, '
+                f"got {int(action.min())}..{int(action.max())}"
+            )
+        return action
+
+    def _observe(self, state: WorldState, episode_reward: Tensor | None = None) -> TensorDict:
+        """Return observations, mask, central state, flags and metrics of the worlds."""
+        observed = self._scene.observe(state)
+        return self._pack(state, observed, self._episode_reward if episode_reward is None else episode_reward)
+
+    def _pack(self, state: WorldState, observed: Observations, episode_reward: Tensor) -> TensorDict:
+        """Pack observations, masks and metrics into TorchRL's layout."""
+        batch, device = state.batch_size, self.device  # without a device a tensordict copies those that it holds
+        team = [*batch, self.n_agents]
+        entries = observed.entries
+        views = entries[""] if "" in entries else TensorDict(entries, batch_size=team, device=device)
+        roles = self.world.team.table(self.device).index.repeat(*batch, 1)
+        agents = {"observation": views, "action_mask": observed.action_mask, "role": roles}
+        info = observed.metrics | {"episode_reward": episode_reward, "episode_length": state.step.to(torch.float32)}
+        return TensorDict(
+            {
+                "agents": TensorDict(agents, batch_size=team, device=device),
+                "state": observed.state,
+                "info": TensorDict({name: value[:, None] for name, value in info.items()}, batch, device=device),
+                "done": state.done[:, None],
+                "terminated": state.terminated[:, None].clone(),
+                "truncated": state.truncated[:, None].clone(),
+            },
+            batch_size=batch,
+            device=device,
+        )

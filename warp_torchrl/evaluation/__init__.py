@@ -1,0 +1,1 @@
+"""Paired evaluation, its statistics and its report."""

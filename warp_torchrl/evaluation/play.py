@@ -1,0 +1,108 @@
+"""Paired evaluation of any policy: every policy meets the same worlds, on seeds that training never sees."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import torch
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from torchrl.envs.utils import set_exploration_type
+
+from warp_torchrl.env import WildfireEnv
+from warp_torchrl.env.render import EpisodeRecorder
+from warp_torchrl.env.specs import EPISODE_METRICS
+from warp_torchrl.evaluation.behaviour import Behaviour
+from warp_torchrl.heuristics import HEURISTICS, idle_action
+from warp_torchrl.models import ACTION, ACTION_MASK, memory_apart
+from warp_torchrl.policy import MODES
+
+BASELINES = ("noop", "random", "local", "greedy", "coordinated")
+"""Policies that every table shows."""
+
+Episodes = dict[str, np.ndarray]
+"""Each metric at the end of each episode, float64 [n]."""
+
+
+def play(
+    env: WildfireEnv,
+    policy: TensorDictModuleBase,
+    first_seed: int,
+    mode: str = "sampled",
+    recorder: EpisodeRecorder | None = None,
+    watch: bool = False,
+) -> Episodes:
+    """Play one episode in each world of an environment, without resets, until all have ended.
+
+    The draws of a sampled policy are seeded by ``first_seed``; the global generator is left as it was, and so is what
+    a policy remembers.
+
+    Args:
+        env: Its worlds become episode 0 of ``first_seed``, ``first_seed + 1``, ...
+        policy: Any policy.
+        first_seed: Seed of world 0.
+        mode: ``sampled`` or ``deterministic``.
+        recorder: Is shown world 0 after every step.
+        watch: Whether to add the numbers of ``BEHAVIOUR``.
+
+    Returns:
+        The metrics of each world.
+    """
+    behaviour = None
+    with torch.random.fork_rng(), torch.no_grad(), set_exploration_type(MODES[mode]), memory_apart(policy):
+        torch.manual_seed(first_seed)
+        env.set_seed(first_seed, static_seed=True)
+        now = env.reset()
+        if watch:
+            behaviour = env.watcher = Behaviour(env.world_state)
+        for _ in range(env.world.horizon):
+            if recorder is not None:
+                recorder.add(env.world_state)
+            now = env.step(policy(now))["next"]
+            if now["done"].all():
+                break
+        if recorder is not None:
+            recorder.add(env.world_state)
+    env.watcher = None
+    episodes = {name: now["info", name][:, 0].double().cpu().numpy() for name in EPISODE_METRICS}
+    return episodes if behaviour is None else episodes | behaviour.summary()
+
+
+class LeftOut(TensorDictModuleBase):
+    """A policy whose team lacks one agent: that one stays where it is, or, where it cannot, does nothing.
+
+    Args:
+        policy: The whole team's.
+        agent: Index of the one left out.
+    """
+
+    in_keys: ClassVar = [ACTION_MASK]
+    out_keys: ClassVar = [ACTION]
+
+    def __init__(self, policy: TensorDictModuleBase, agent: int) -> None:
+        super().__init__()
+        self.policy, self.agent = policy, agent
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Write the team's actions, int64 [B, A]."""
+        out = self.policy(tensordict)
+        mask = tensordict.get(ACTION_MASK)[:, self.agent]
+        idle = idle_action(mask)
+        action = out.get(ACTION).clone()
+        action[:, self.agent] = idle
+        return out.set(ACTION, action)
+
+
+def play_heuristics(env: WildfireEnv, first_seed: int, names: Sequence[str] = BASELINES) -> dict[str, Episodes]:
+    """Return the episodes of heuristics by name."""
+    return {name: play(env, HEURISTICS[name](env), first_seed) for name in names}
+
+
+def record_episode(
+    path: Path, env: WildfireEnv, policy: TensorDictModuleBase, title: str, seed: int, mode: str
+) -> None:
+    """Draw one episode, of an environment with one world, as a GIF."""
+    recorder = EpisodeRecorder(title=title, roles=env.world.team.agent_roles)
+    play(env, policy, seed, mode, recorder)
+    recorder.save(path)

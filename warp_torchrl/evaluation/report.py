@@ -1,0 +1,127 @@
+"""The report of an evaluation: ``evaluation.json`` and the table for the terminal."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warp_torchrl.evaluation.behaviour import BEHAVIOUR
+from warp_torchrl.evaluation.play import Episodes
+from warp_torchrl.evaluation.statistics import compare, summarise
+from warp_torchrl.runs import disk
+
+SHOWN = ("averted", *BEHAVIOUR)
+
+
+def report(
+    scenario: str,
+    policy: str,
+    first_seed: int,
+    episodes: Episodes,
+    others: Mapping[str, Episodes],
+    other_modes: Mapping[str, Episodes] | None = None,
+    left_out: Mapping[str, Episodes] | None = None,
+    method: str | None = None,
+    configuration: str = "",
+    world_overrides: Sequence[str] = (),
+    frames: int | None = None,
+) -> dict[str, Any]:
+    """Return the content of ``evaluation.json``.
+
+    Args:
+        scenario: Its name.
+        policy: Name of the policy, with its mode.
+        first_seed: Seed of world 0.
+        episodes: The policy's.
+        others: The heuristics' on the same worlds, by name.
+        other_modes: The same policy's, acting in another mode, by name.
+        left_out: The same policy's with an agent left out, by the agent's name.
+        method: What the policy is called beside others; its name where None.
+        configuration: Tells policies of one method that were trained differently apart.
+        world_overrides: How the worlds differ from the scenario's, as overrides.
+        frames: World steps that the policy was trained for; None where it was not.
+    """
+    if "noop" in others:
+        episodes = episodes | {"averted": episodes["saved"] - others["noop"]["saved"]}
+    count = len(episodes["saved"])
+    seeds = list(range(first_seed, first_seed + count))
+    rows = [
+        {"seed": seed, **{name: _number(values[index]) for name, values in episodes.items()}}
+        for index, seed in enumerate(seeds)
+    ]
+    return {
+        "scenario": scenario,
+        "world_overrides": list(world_overrides),
+        "policy": policy,
+        "method": policy if method is None else method,
+        "configuration": configuration,
+        "frames": frames,
+        "seeds": seeds,
+        "metrics": _summaries(episodes),
+        "episodes": rows,
+        "versus": {name: compare(episodes["saved"], other["saved"]) for name, other in others.items()},
+        "yardsticks": {name: _summaries(other) for name, other in others.items()},
+        "yardstick_episodes": {
+            name: {metric: other[metric].tolist() for metric in ("saved", "success")} for name, other in others.items()
+        },
+        "other_modes": {name: _summaries(other) for name, other in (other_modes or {}).items()},
+        "left_out": {agent: compare(episodes["saved"], other["saved"]) for agent, other in (left_out or {}).items()},
+    }
+
+
+def _summaries(episodes: Episodes) -> dict[str, dict[str, Any]]:
+    return {name: summarise(values) for name, values in episodes.items()}
+
+
+def _number(value: float) -> float | None:
+    return None if np.isnan(value) else float(value)
+
+
+def table(content: Mapping[str, Any]) -> str:
+    """Return the report as a table for the terminal."""
+    header = (
+        f"{'policy':<22}{'saved %':>8}{'95 % interval':>16}{'iqm %':>8}{'success %':>11}{'control':>9}{'cleared %':>11}"
+    )
+    lines = [f"{place(content)}: {len(content['seeds'])} fires, seeds from {content['seeds'][0]}", header]
+    rows = {**content["yardsticks"], **content["other_modes"], content["policy"]: content["metrics"]}
+    for name, summary in rows.items():
+        saved = summary["saved"]
+        interval = "{:.1f} .. {:.1f}".format(*(100.0 * bound for bound in saved["ci95"]))
+        lines.append(
+            f"{name:<22}{100 * saved['mean']:>8.1f}{interval:>16}{100 * saved['iqm']:>8.1f}"
+            f"{100 * summary['success']['mean']:>11.1f}{summary['control_time']['mean']:>9.2f}"
+            f"{100 * summary['cleared']['mean']:>11.2f}"
+        )
+    for name, difference in content["versus"].items():
+        low, high = (100.0 * bound for bound in difference["ci95"])
+        lines.append(
+            f"{content['policy']} - {name}: {100 * difference['saved_difference']:+.1f} points saved, "
+            f"{low:+.1f} .. {high:+.1f}; more on {100 * difference['probability_of_improvement']:.0f} % of fires"
+        )
+    lines += _behaviour_lines(content)
+    return "\n".join(lines)
+
+
+def place(content: Mapping[str, Any]) -> str:
+    """Return what the worlds of a report are called: their scenario, and how they differ from it."""
+    return " ".join((content["scenario"], *content.get("world_overrides", ())))
+
+
+def _behaviour_lines(content: Mapping[str, Any]) -> list[str]:
+    lines = []
+    for name in SHOWN:
+        found = content["metrics"].get(name, {"mean": None})
+        if found["mean"] is not None:
+            low, high = found["ci95"]
+            lines.append(f"{name.replace('_', ' '):<22}{found['mean']:>8.3f}{f'{low:.3f} .. {high:.3f}':>18}")
+    for agent, loss in content["left_out"].items():
+        low, high = (100.0 * bound for bound in loss["ci95"])
+        lines.append(f"without {agent:<14}{-100 * loss['saved_difference']:>+8.1f}{f'{-high:+.1f} .. {-low:+.1f}':>16}")
+    return lines
+
+
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Write a file whole or not at all."""
+    disk.replace(path, json.dumps(content, indent=1))

@@ -1,0 +1,263 @@
+"""Checkpoints: complete or invisible, verified before they are read, the newest found by listing.
+
+``checkpoints/<frames>/`` holds ``policy.pt`` and ``training.pt`` (tensors and plain values, read with
+``weights_only=True``), ``config.json``, and ``manifest.json``, see ``warp_torchrl.runs.manifest``.
+"""
+
+import fcntl
+import json
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from warp_torchrl.config.compose import Record
+from warp_torchrl.models import Signature
+from warp_torchrl.runs import disk
+from warp_torchrl.runs.manifest import (
+    MANIFEST,
+    TRAINING,
+    CheckpointError,
+    Manifest,
+    first_line,
+    read_json,
+    read_manifest,
+    write_manifest,
+)
+
+__all__ = [
+    "MANIFEST",
+    "Checkpoint",
+    "CheckpointError",
+    "RunFolderInUse",
+    "RunFolderLock",
+    "export",
+    "holds_any",
+    "newest",
+    "save",
+]
+
+
+class RunFolderInUse(Exception):  # noqa: N818
+    """Another process writes into the run folder."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Checkpoint:
+    """A checkpoint whose files were verified; reading them can still fail only if the disk changes.
+
+    Attributes:
+        path: Its folder.
+        manifest: What it says of itself.
+    """
+
+    path: Path
+    manifest: Manifest
+
+    def record(self) -> Record:
+        """Return the configuration it was trained with."""
+        content = read_json(self.path / "config.json")
+        choices, values = content.get("choices"), content.get("values")
+        if not (isinstance(choices, dict) and isinstance(values, dict)):
+            raise CheckpointError(f"{self.path / 'config.json'} must hold choices and values")
+        return Record(choices=choices, values=values)
+
+    def policy(self) -> dict[str, torch.Tensor]:
+        """Return the policy's parameters."""
+        return self._load("policy.pt")
+
+    def training(self) -> dict[str, Any]:
+        """Return everything a run needs to go on."""
+        self.check_goes_on()
+        return self._load(TRAINING)
+
+    def check_goes_on(self) -> None:
+        """Check that training can go on from here.
+
+        Raises:
+            CheckpointError: If it is a policy alone, see ``export``.
+        """
+        if TRAINING not in self.manifest.files:
+            raise CheckpointError(f"{self.path} holds a policy alone: it acts, and nothing goes on from it")
+
+    def _load(self, name: str) -> dict[str, Any]:
+        try:
+            return torch.load(self.path / name, weights_only=True, map_location="cpu")
+        except Exception as error:
+            raise CheckpointError(f"{self.path / name} cannot be read: {first_line(error)}") from None
+
+
+def save(
+    run: Path,
+    *,
+    frames: int,
+    scenario: str,
+    signature: Signature,
+    mode: str | None,
+    record: Record,
+    policy: Mapping[str, torch.Tensor],
+    training: Mapping[str, Any],
+    keep: int,
+    stays: Callable[[int], bool] = lambda frames: True,
+) -> Path:
+    """Write a checkpoint, then drop all but ``keep``: the newest two stay, and the newest of the others that may.
+
+    It appears under its name only when every file is on the disk: temporary folder, fsync, one rename, fsync. What a
+    killed save left goes first; unsound ones that the run went past go when this one is safe.
+
+    Args:
+        run: Its run folder.
+        frames: Its name.
+        scenario: See ``Manifest``, as for signature and mode.
+        signature: Of the policy.
+        mode: None before it is known.
+        record: The configuration.
+        policy: Parameters.
+        training: What a run needs to go on.
+        keep: How many stay, at least two.
+        stays: Says of a checkpoint's frames whether it may stay when there are two newer ones.
+
+    Returns:
+        Its folder.
+
+    Raises:
+        OSError: If the disk refuses; the checkpoints that were there stay.
+    """
+    parent = run / "checkpoints"
+    final, draft = parent / f"{frames}", parent / f".{frames}.tmp"
+    with disk.telling(parent):
+        parent.mkdir(parents=True, exist_ok=True)
+    for leftover in parent.glob(".*.tmp"):
+        shutil.rmtree(leftover, ignore_errors=True)
+    if not _is_sound(final):
+        try:
+            with disk.telling(draft):
+                draft.mkdir()
+                disk.save_tensors(draft / "policy.pt", dict(policy))
+                disk.save_tensors(draft / TRAINING, dict(training))
+                (draft / "config.json").write_text(json.dumps(asdict(record), indent=1), encoding="utf-8")
+                write_manifest(draft, frames, scenario, signature, mode)
+                _publish(draft, final)
+        finally:
+            shutil.rmtree(draft, ignore_errors=True)
+    _drop(run, final, keep, stays)
+    return final
+
+
+def export(found: Checkpoint, folder: Path) -> None:
+    """Write a checkpoint's policy, and nothing that only training needs, into a new folder.
+
+    Raises:
+        FileExistsError: If there is such a folder.
+        OSError: If the disk refuses.
+    """
+    manifest, draft = found.manifest, folder.with_name(f".{folder.name}.tmp")
+    if folder.exists():
+        raise FileExistsError(f"{folder} exists")
+    shutil.rmtree(draft, ignore_errors=True)
+    with disk.telling(draft):
+        draft.mkdir(parents=True)
+        for name in manifest.files:
+            if name != TRAINING:
+                shutil.copyfile(found.path / name, draft / name)
+        write_manifest(draft, manifest.frames, manifest.scenario, manifest.signature, manifest.mode)
+        _publish(draft, folder)
+
+
+def holds_any(run: Path) -> bool:
+    """Return whether a run folder holds checkpoints, sound or not."""
+    return bool(_listed(run))
+
+
+def newest(path: Path | str) -> tuple[Checkpoint, list[str]]:
+    """Find the newest sound checkpoint.
+
+    Args:
+        path: A run folder, or one checkpoint folder.
+
+    Returns:
+        The checkpoint, and a line for each newer one that was skipped, with the reason.
+
+    Raises:
+        CheckpointError: If there is none.
+    """
+    path = Path(path)
+    if (path / MANIFEST).exists() or path.parent.name == "checkpoints":
+        return _verified(path), []
+    if not path.is_dir():
+        raise CheckpointError(f"{path} is not a run folder: nothing there")
+    skipped: list[str] = []
+    for folder in _listed(path):
+        try:
+            return _verified(folder, frames=int(folder.name)), skipped
+        except CheckpointError as error:
+            skipped.append(str(error))
+    reason = f": {skipped[0]}" if skipped else f": no folder in {path / 'checkpoints'}"
+    raise CheckpointError(f"{path} holds no sound checkpoint{reason}")
+
+
+class RunFolderLock:
+    """Holds a run folder for one writer; the operating system lets go of it when the process ends.
+
+    Raises:
+        RunFolderInUse: If another process holds it.
+    """
+
+    def __init__(self, run: Path) -> None:
+        run.mkdir(parents=True, exist_ok=True)
+        self._file = (run / ".lock").open("w")
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self._file.close()
+            raise RunFolderInUse(f"{run} is in use: another process trains into it") from None
+
+    def release(self) -> None:
+        """Let another process have it."""
+        self._file.close()
+
+
+def _publish(draft: Path, final: Path) -> None:
+    for path in (*draft.iterdir(), draft):
+        disk.sync(path)
+    shutil.rmtree(final, ignore_errors=True)  # an unsound one
+    draft.rename(final)
+    for path in (final.parent, final.parent.parent):  # which may be new too
+        disk.sync(path)
+
+
+def _drop(run: Path, newest: Path, keep: int, stays: Callable[[int], bool]) -> None:
+    """Keep so many checkpoints up to the newest: those beyond it are unsound, or a run would have gone on from them."""
+    listed = _listed(run)
+    place = listed.index(newest)
+    older = [folder for folder in listed[place + 2 :] if stays(int(folder.name))]
+    kept = {*listed[place : place + 2], *older[: keep - 2]}
+    for folder in listed:
+        if folder not in kept:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _listed(run: Path) -> list[Path]:
+    """Return the checkpoint folders, newest first."""
+    parent = run / "checkpoints"
+    folders = [each for each in parent.iterdir() if each.name.isdigit()] if parent.is_dir() else []
+    return sorted(folders, key=lambda each: int(each.name), reverse=True)
+
+
+def _verified(folder: Path, frames: int | None = None) -> Checkpoint:
+    """Check every file of a checkpoint against its manifest before any of them is parsed."""
+    manifest = read_manifest(folder)
+    if frames not in (None, manifest.frames):
+        raise CheckpointError(f"{folder} holds a checkpoint of {manifest.frames} frames")
+    return Checkpoint(path=folder, manifest=manifest)
+
+
+def _is_sound(folder: Path) -> bool:
+    try:
+        _verified(folder)
+    except CheckpointError:
+        return False
+    return True

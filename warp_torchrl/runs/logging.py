@@ -1,0 +1,175 @@
+"""Where a run's numbers go: ``metrics.csv`` always, and a tracker where one is asked for."""
+
+import csv
+import io
+import logging
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Literal, Protocol
+
+from torchrl.record.loggers import get_logger
+
+from warp_torchrl.runs import disk
+
+log = logging.getLogger("warp_torchrl")
+
+
+class MetricsFile:
+    """``metrics.csv``: one row an iteration, complete after a crash, cut back on resume.
+
+    The first row fixes the columns. A value that an iteration does not have is left empty.
+
+    Args:
+        path: The file.
+        keep_rows: Rows that stay when it exists; the others were written after the checkpoint.
+
+    Raises:
+        ValueError: If there are fewer.
+    """
+
+    def __init__(self, path: Path, keep_rows: int = 0) -> None:
+        self.path = path
+        self.rows = keep_rows
+        self._columns: list[str] | None = None
+        if keep_rows:
+            self._columns = self._cut(keep_rows)
+
+    def add(self, row: Mapping[str, float | None]) -> None:
+        """Append a row; it is on its way to the disk when this returns.
+
+        Raises:
+            ValueError: If a column is new.
+            OSError: If the disk refuses.
+        """
+        lines = []
+        if self._columns is None:
+            self._columns = list(row)
+            lines.append(self._columns)
+        unknown = set(row) - set(self._columns)
+        if unknown:
+            raise ValueError(f"metrics.csv has no columns {sorted(unknown)}")
+        values = [row.get(column) for column in self._columns]
+        lines.append(["" if value is None else repr(value) for value in values])
+        mode = "w" if len(lines) > 1 else "a"
+        with disk.telling(self.path), self.path.open(mode, newline="", encoding="utf-8") as file:
+            csv.writer(file).writerows(lines)
+        self.rows += 1
+
+    def sync(self) -> None:
+        """Wait until every row is on the disk."""
+        if self.rows:
+            disk.sync(self.path)
+
+    def _cut(self, rows: int) -> list[str]:
+        """Drop all but the first rows, and return the columns."""
+        lines = []
+        if self.path.exists():
+            with self.path.open(newline="", encoding="utf-8", errors="replace") as file:  # the last row may be torn
+                lines = list(islice(csv.reader(file), rows + 1))
+        if len(lines) <= rows:
+            raise ValueError(f"{self.path} must hold the {rows} rows of the checkpoint, got {max(len(lines) - 1, 0)}")
+        kept = io.StringIO(newline="")
+        csv.writer(kept).writerows(lines)
+        disk.replace(self.path, kept.getvalue())
+        return lines[0]
+
+
+class Tracker(Protocol):
+    """What a run needs of a tracker."""
+
+    def log(self, row: Mapping[str, float | None], frames: int) -> None:
+        """Send a row."""
+        ...
+
+    def close(self) -> None:
+        """Finish."""
+        ...
+
+
+class _Silent:
+    def log(self, row: Mapping[str, float | None], frames: int) -> None:
+        """Send nothing."""
+
+    def close(self) -> None:
+        """Finish nothing."""
+
+
+class _TorchRlTracker:
+    """One of TorchRL's loggers; the first failure ends the tracking and never the training."""
+
+    def __init__(self, name: str, run: Path, **options: object) -> None:
+        self._name = name
+        try:
+            self._logger = get_logger(name, str(run), run.name, **options)
+        except Exception as error:
+            self._fail(error)
+
+    def log(self, row: Mapping[str, float | None], frames: int) -> None:
+        """Send a row under the names of ``metrics.csv``."""
+        if self._logger is None:
+            return
+        try:
+            for name, value in row.items():
+                if value is not None:
+                    self._logger.log_scalar(name, value, step=frames)
+        except Exception as error:
+            self._fail(error)
+
+    def close(self) -> None:
+        """Finish the tracker's run."""
+        experiment = getattr(self._logger, "experiment", None)
+        finish = getattr(experiment, "finish", None) or getattr(experiment, "close", None)
+        try:
+            if finish is not None:
+                finish()
+        except Exception as error:
+            self._fail(error)
+
+    def _fail(self, error: Exception) -> None:
+        self._logger = None
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        log.warning("%s does not work, the run goes on without it: %s", self._name, reason)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CsvOnly:
+    """No tracker: ``metrics.csv`` is always written."""
+
+    def open(self, run: Path) -> Tracker:
+        """Return a tracker for a run folder."""
+        return _Silent()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wandb:
+    """Weights & Biases.
+
+    Attributes:
+        project: Its project.
+        mode: ``offline`` keeps everything in the run folder, to be synced later; ``online`` sends it.
+        group: Its group; null puts the runs of a sweep into one, named as the sweep's folder.
+    """
+
+    project: str = "warp_torchrl"
+    mode: Literal["offline", "online"] = "offline"
+    group: str | None = None
+
+    def open(self, run: Path) -> Tracker:
+        """Return a tracker for a run folder."""
+        os.environ.setdefault("WANDB_SILENT", "true")
+        sweep = run.resolve().parent
+        group = self.group or (sweep.name if (sweep / "multirun.yaml").exists() else None)
+        options = {"offline": self.mode == "offline", "project": self.project, "group": group}
+        return _TorchRlTracker("wandb", run, wandb_kwargs=options)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tensorboard:
+    """TensorBoard; needs the extra ``tensorboard``."""
+
+    def open(self, run: Path) -> Tracker:
+        """Return a tracker for a run folder."""
+        return _TorchRlTracker("tensorboard", run)

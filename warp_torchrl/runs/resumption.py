@@ -1,0 +1,154 @@
+"""What a resumed run goes on with: the configuration of its checkpoint, of which the total alone may change."""
+
+import json
+import reprlib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from warp_torchrl.config.compose import Record, plain, recompose
+from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.config.settings import COMPONENTS, Settings, settings
+from warp_torchrl.runs.checkpoint import Checkpoint, newest
+
+_LARGEST = 1_000_000  # bytes
+_MISSING = "not there"
+_MAY_CHANGE = ("total_frames", "resume", "debug")
+_NAMED = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Resumption:
+    """A run that goes on.
+
+    Attributes:
+        found: Its newest sound checkpoint.
+        skipped: A line for each newer one, with what is wrong with it.
+        record: Its configuration, with the total that it goes on to.
+        values: The same, whole and plain.
+        settings: The same, built.
+        total_before: The total that it had when it was saved.
+        is_finished: Whether it was trained to its end and evaluated there.
+    """
+
+    found: Checkpoint
+    skipped: list[str]
+    record: Record
+    values: dict[str, Any]
+    settings: Settings
+    total_before: int
+    is_finished: bool
+
+
+def resumption(folder: Path, total_frames: Any = None) -> Resumption:
+    """Find out what a run goes on with.
+
+    Args:
+        folder: Its run folder.
+        total_frames: The new total; None: that of its ``config.yaml``, or of the checkpoint where there is none.
+
+    Raises:
+        CheckpointError: If there is no sound checkpoint.
+        ConfigError: If ``config.yaml`` has other values than the checkpoint, but for the total, or the run has come as
+            far as the new total.
+    """
+    found, skipped = newest(folder)
+    record = found.record()
+    held, trained = read_config(folder / "config.yaml"), plain(recompose(record))
+    _check_unedited(folder, held, record, trained)
+    before = trained["total_frames"]
+    asked = total_frames if total_frames is not None else held.get("total_frames", before)
+    values = plain(recompose(replace(record, values={**record.values, "total_frames": asked})))
+    made = settings(values)
+    frames, is_new = found.manifest.frames, total_frames is not None or made.total_frames != before
+    if is_new and made.total_frames <= frames:
+        raise ConfigError(f"total_frames must be more than the {frames} that {folder} has had, got {made.total_frames}")
+    is_trained = found.manifest.mode is not None and frames >= made.total_frames
+    return Resumption(
+        found=found,
+        skipped=skipped,
+        record=replace(record, values={**record.values, "total_frames": made.total_frames}),
+        values=values,
+        settings=made,
+        total_before=before,
+        is_finished=is_trained and _evaluated(folder / "evaluation.json") == frames,
+    )
+
+
+def _evaluated(path: Path) -> int | None:
+    """Return how far the policy was trained that a run's evaluation is of; None where there is none."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))["frames"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+
+
+# What was edited
+
+
+def read_config(path: Path) -> dict[str, Any]:
+    """Return what a ``config.yaml`` says, nothing resolved or instantiated; nothing where there is none.
+
+    Raises:
+        ConfigError: If it cannot be read.
+    """
+    if not path.exists():
+        return {}
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8")) if path.stat().st_size <= _LARGEST else None
+    except (yaml.YAMLError, ValueError, RecursionError):
+        content = None
+    if not isinstance(content, dict):
+        raise ConfigError(f"{path} must be as the run wrote it; without it resume takes what the checkpoint holds")
+    return content
+
+
+def _check_unedited(folder: Path, held: Mapping[str, Any], record: Record, trained: Mapping[str, Any]) -> None:
+    found = edits(held, record.values) + _other_classes(held, trained) if held else []
+    if found:
+        more = f", and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
+        raise ConfigError(
+            f"{folder / 'config.yaml'} is not what the checkpoint was trained with: {', '.join(found[:_NAMED])}{more}; "
+            f"put it back to resume, or begin anew from its networks with start_from={folder} and what is to change"
+        )
+
+
+def edits(held: Mapping[Any, Any], trained: Mapping[str, Any], prefix: str = "") -> list[str]:
+    """Return what differs in value between a ``config.yaml`` and a record, a text for each key."""
+    held = {str(key): value for key, value in held.items() if key != "_target_"}
+    found = []
+    for key in sorted({*held, *trained} - {*(() if prefix else _MAY_CHANGE)}):
+        there, here = held.get(key, _MISSING), trained.get(key, _MISSING)
+        if isinstance(there, Mapping) and isinstance(here, Mapping):
+            found += edits(there, here, f"{prefix}{key}.")
+        elif not _is_same(there, here):
+            found.append(f"{prefix}{key} is {_shown(there)} and was {_shown(here)}")
+    return found
+
+
+def _other_classes(held: Mapping[str, Any], trained: Mapping[str, Any]) -> list[str]:
+    """Return the components of which a ``config.yaml`` names another class; modules may have moved."""
+
+    def name(node: Any) -> str:
+        return str(node.get("_target_")).rpartition(".")[2] if isinstance(node, Mapping) else ""
+
+    pairs = {group: (name(held.get(group)), name(trained[group])) for group in COMPONENTS}
+    return [f"{group} is {there} and was {here}" for group, (there, here) in pairs.items() if there != here]
+
+
+def _is_same(there: Any, here: Any) -> bool:
+    if isinstance(there, list) and isinstance(here, list):
+        return len(there) == len(here) and all(map(_is_same, there, here))
+    if isinstance(there, str) and isinstance(here, (int, float)):  # 1e-3 is a text to YAML
+        try:
+            there = float(there)
+        except ValueError:
+            return False
+    return isinstance(there, bool) == isinstance(here, bool) and there == here
+
+
+def _shown(value: Any) -> str:
+    return value if value is _MISSING else reprlib.repr(value)

@@ -1,0 +1,65 @@
+"""What a training tells of itself: the rows of ``metrics.csv`` and the lines of the log."""
+
+from collections.abc import Mapping
+
+from tensordict import TensorDictBase
+
+from warp_torchrl.env.specs import EPISODE_METRICS
+
+TRAIN_COLUMNS = (
+    "train/policy_gradient_loss",
+    "train/value_loss",
+    "train/entropy_loss",
+    "train/approx_kl",
+    "train/clip_fraction",
+    "train/clip_range",
+    "train/explained_variance",
+    "train/learning_rate",
+)
+"""Columns of ``metrics.csv`` that every run has; empty where an algorithm has no value for them."""
+
+
+def episode_columns(batch: TensorDictBase) -> dict[str, float | None]:
+    """Return the means over the episodes that ended in a batch, None where none did."""
+    done = batch["next", "done"][..., 0]
+    info = batch["next", "info"]
+    count = int(done.sum())
+    means = {name: float(info[name][..., 0][done].mean()) if count else None for name in EPISODE_METRICS}
+    row = {"rollout/ep_rew_mean": means.pop("episode_reward"), "rollout/ep_len_mean": means.pop("episode_length")}
+    return row | {f"world/{name}": value for name, value in means.items()}
+
+
+def line(row: Mapping[str, float | None], total: int) -> str:
+    """Return the log's line of a row.
+
+    Args:
+        row: Of ``metrics.csv``.
+        total: World steps in all.
+    """
+
+    def show(name: str, pattern: str) -> str:
+        return "-" if row[name] is None else pattern.format(row[name])
+
+    frames = row["time/frames"] or 0
+    return (
+        f"{min(100.0, 100 * frames / total):5.1f} %  {frames} frames  {row['time/seconds']:.0f} s  "
+        f"{row['time/fps']:.0f} frames/s  saved {show('world/saved', '{:.3f}')}  "
+        f"reward {show('rollout/ep_rew_mean', '{:.2f}')}  loss {show('train/loss', '{:.3f}')}"
+    )
+
+
+def told_of_batches(total: int, n_worlds: int, steps: int) -> str | None:
+    """Return what is said where a training cannot end at its number of frames, since it takes whole batches.
+
+    Args:
+        total: World steps in all, as asked for.
+        n_worlds: Worlds in a batch.
+        steps: World steps of each of them in a batch.
+    """
+    batch = n_worlds * steps
+    if total % batch == 0:
+        return None
+    what = f"one batch is {batch} frames, n_worlds={n_worlds} x collector.steps={steps}"
+    if total < batch:
+        return f"total_frames={total} is less than one batch: {what}, and one is trained on"
+    return f"{what}: training ends at {-(-total // batch) * batch} frames, not at total_frames={total}"

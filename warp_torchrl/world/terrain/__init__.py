@@ -1,0 +1,1 @@
+"""Landscapes: noise, arrays and rasters, with elevation and fuel."""

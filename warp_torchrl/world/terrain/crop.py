@@ -1,0 +1,156 @@
+"""Windows of a map that is bigger than the world: which ones qualify, and the one that a world gets."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from warp_torchrl.world.random import Stream, uniform
+from warp_torchrl.world.state import Landscape
+from warp_torchrl.world.terrain.landscape import draw_age, holds_trees, map_size
+
+DRAWN = 255
+"""Age code of a cell whose age is drawn for each episode."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Crop:
+    """Draws a window of one map for each world, evenly among those without unknown cells and with enough fuel.
+
+    Attributes:
+        cover: Land cover, uint8 [rows, columns], ``Cover`` codes.
+        elevation: Elevation [m], float32 [rows, columns]; None makes flat worlds.
+        age: Tree age, uint8 [rows, columns], 0..10, or ``DRAWN``; None draws it everywhere.
+        assets: What each cell is worth, float32 [rows, columns]; None leaves all alike.
+        known: Where the map is known, bool [rows, columns]; None is everywhere.
+        size: Side of a window, or (rows, columns) [cells].
+        row: Top row of the only window; None, with ``column``, leaves it to the draw.
+        column: Left column of the only window.
+        min_fuel: Lowest share of a drawn window where trees can stand; one cell of it is always asked for.
+
+    Raises:
+        ValueError: If no window qualifies, or ``row`` and ``column`` name none without unknown cells.
+    """
+
+    cover: np.ndarray = field(repr=False)
+    elevation: np.ndarray | None = field(default=None, repr=False)
+    age: np.ndarray | None = field(default=None, repr=False)
+    assets: np.ndarray | None = field(default=None, repr=False)
+    known: np.ndarray | None = field(default=None, repr=False)
+    size: tuple[int, int] | int
+    row: int | None = None
+    column: int | None = None
+    min_fuel: float = 0.5
+    _draws_age: bool = field(init=False, repr=False)
+    _maps: dict[torch.device, list[Any]] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        corners = self._find_corners()
+        ground = slice(None), slice(None)
+        if len(corners) == 1:  # the only window, so every world gets the same ground: cut it out once
+            (row, column), (height, width) = divmod(int(corners), self.cover.shape[1]), map_size(self.size)
+            ground = slice(row, row + height), slice(column, column + width)
+        layers = [
+            None if each is None else each[ground] for each in (self.cover, self.elevation, self.age, self.assets)
+        ]
+        maps = [None if each is None else torch.from_numpy(np.ascontiguousarray(each)) for each in layers]
+        object.__setattr__(self, "_draws_age", self.age is None or bool((self.age == DRAWN).any()))
+        object.__setattr__(self, "_maps", {torch.device("cpu"): [corners, *maps]})
+
+    def __call__(self, key: Tensor) -> Landscape:
+        """Return the landscape of each world's window, with its ``corner`` in the map, batch size [B].
+
+        Args:
+            key: World keys, int64 [B].
+        """
+        if key.device not in self._maps:
+            maps = self._maps[torch.device("cpu")]
+            self._maps[key.device] = [each if each is None else each.to(key.device) for each in maps]
+        corners, cover, elevation, age, assets = self._maps[key.device]
+        draw = uniform(key, 0, Stream.CROP, (1, 1))[:, 0, 0].double()  # float32 cannot count past 2^24 windows
+        window, across = corners[(draw * len(corners)).long()], self.cover.shape[1]
+        corner = torch.stack((window // across, window % across), dim=1)
+        elevation, age, assets = (
+            layer if layer is None else self._cut(layer, corner) for layer in (elevation, age, assets)
+        )
+        cover = self._cut(cover, corner)
+        return Landscape(
+            cover=cover,
+            age=self._fill_age(key, cover, age),
+            elevation=elevation,
+            assets=assets,
+            corner=corner,
+        )
+
+    @property
+    def extent(self) -> tuple[int, int]:
+        """Return (rows, columns) of the map."""
+        return self.cover.shape
+
+    def reach(self) -> np.ndarray:
+        """Return the cells that some window has, bool [rows, columns]."""
+        height, width = map_size(self.size)
+        corners = self._maps[torch.device("cpu")][0].numpy()
+        first = np.zeros(self.cover.shape, bool)
+        first.flat[corners] = True
+        padded = torch.from_numpy(np.pad(first, ((height - 1, 0), (width - 1, 0))))
+        return (_sum_windows(padded, height, width) > 0).numpy()
+
+    def _cut(self, layer: Tensor, corner: Tensor) -> Tensor:
+        """Return each world's window of a layer, [B, H, W]."""
+        height, width = map_size(self.size)
+        if layer.shape == (height, width):
+            return layer.repeat(len(corner), 1, 1)
+        row = corner[:, 0, None, None] + torch.arange(height, device=layer.device)[:, None]
+        column = corner[:, 1, None, None] + torch.arange(width, device=layer.device)
+        return layer[row, column]
+
+    def _fill_age(self, key: Tensor, cover: Tensor, age: Tensor | None) -> Tensor:
+        """Return the age of each cell, drawn where the map has none; 0 where no tree can stand."""
+        if age is not None and not self._draws_age:
+            return age * holds_trees(cover)
+        drawn = draw_age(key, cover)
+        return drawn if age is None else torch.where(age == DRAWN, drawn, age * holds_trees(cover))
+
+    def _find_corners(self) -> Tensor:
+        """Return the flat index of the top left cell of each window to draw from, int64 [windows]."""
+        height, width = map_size(self.size)
+        rows, columns = self.cover.shape
+        if height > rows or width > columns:
+            raise ValueError(f"size must fit in the map of {rows} x {columns} cells, got {height} x {width}")
+        known = np.ones(self.cover.shape, bool) if self.known is None else self.known
+        whole = _sum_windows(torch.from_numpy(~known), height, width) == 0
+        if self.row is not None or self.column is not None:
+            row, column = self._fixed_corner(whole)
+            return torch.tensor([row * columns + column])
+        least = max(1, math.ceil(self.min_fuel * height * width - 1e-6))
+        fuel = _sum_windows(holds_trees(torch.from_numpy(self.cover)), height, width)
+        window = (whole & (fuel >= least)).flatten().nonzero().squeeze(1)
+        if not len(window):
+            rule = f"window of {height} x {width} cells without nodata and with min_fuel {self.min_fuel:g}"
+            raise ValueError(f"size must leave some place, the map has no {rule}")
+        across = whole.shape[1]
+        return window // across * columns + window % across
+
+    def _fixed_corner(self, whole: Tensor) -> tuple[int, int]:
+        """Return ``row`` and ``column`` if they name a window without nodata."""
+        corner = []
+        for name, count in zip(("row", "column"), whole.shape):
+            value = getattr(self, name)
+            if type(value) is not int or not 0 <= value < count:
+                raise ValueError(f"{name} must be whole, in 0..{count - 1} for a window in the map, got {value}")
+            corner.append(value)
+        row, column = corner
+        if not whole[row, column]:
+            raise ValueError(f"row, column must name a window without nodata, got {row}, {column}")
+        return row, column
+
+
+def _sum_windows(mask: Tensor, height: int, width: int) -> Tensor:
+    """Count the set cells of each window by its top left cell, from a summed-area table, int32 [.., ..]."""
+    total = torch.zeros(mask.shape[0] + 1, mask.shape[1] + 1, dtype=torch.int32)
+    total[1:, 1:] = mask.cumsum(0, dtype=torch.int32).cumsum(1, dtype=torch.int32)
+    return total[height:, width:] - total[:-height, width:] - total[height:, :-width] + total[:-height, :-width]

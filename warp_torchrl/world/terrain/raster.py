@@ -1,0 +1,203 @@
+"""Landscapes from rasters: fuel or land cover, elevation, and tree age or canopy cover, cropped to the world's size."""
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from os import PathLike
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from torch import Tensor
+
+from warp_torchrl.validation import check_fields
+from warp_torchrl.world.state import OLDEST, Cover, Landscape
+from warp_torchrl.world.terrain.crop import DRAWN, Crop
+from warp_torchrl.world.terrain.fuel import code_table, to_cover
+from warp_torchrl.world.terrain.grid import Grid, check_grid
+from warp_torchrl.world.terrain.landscape import map_size
+from warp_torchrl.world.terrain.layer import find_layer, read_grid, read_layer, regrid, resample_layer
+
+_log = logging.getLogger("warp_torchrl")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Raster:
+    """Real ground: the cover from a fuel or land-cover layer and the elevation, read once and cropped from one grid.
+
+    A layer is a GeoTIFF (.tif, .tiff) or an ESRI ASCII grid (.asc) with one band. The grid is the fuel layer's, which
+    must have square cells in metres, north up, or one of cells of ``resolution``. Where it has no CRS, as ASCII grids
+    have none, its unit is taken to be the metre, and a warning says so.
+
+    Attributes:
+        path: Folder of the layers; or the fuel layer's file, with the others beside it. None is an error.
+        size: Side of the crop, or (rows, columns) [cells].
+        elevation: File name of the elevation layer [m], or a pattern that one raster in the folder matches; None
+            makes a flat world.
+        fuel: The same for the layer of class codes; not used where ``path`` is a file.
+        table: Cover of each class code: a preset of ``fuel.TABLES``, or a mapping to ``Cover`` codes or names.
+        age: The same for a layer of tree ages, in any unit; None draws the ages for each episode. A tree's code is
+            10 x value / ``full_age``, 10 at most, halves up; where it is 0 nothing stands. Where the layer has
+            nodata, as age maps have outside of forests, the age is drawn.
+        full_age: Value of the age layer from which a tree counts as oldest [its unit].
+        canopy: The same for a layer of canopy cover [%], which then makes the ages of the trees of forest cells:
+            code = canopy / 10, halves up, 1 at least. It tells nothing of grass, shrub or wetland, where LANDFIRE has
+            0 over grass and a mixture over shrub, so there, and under nodata, the age is drawn. A forest cell without
+            canopy keeps a young tree, code 1, since its fuel is timber and code 0 is bare ground or ash.
+        assets: The same for a layer of what each cell is worth, 0 or more in any unit, for rewards that ask; nodata is
+            0. None leaves all alike.
+        resample: What becomes of layers on another grid: ``refuse`` makes them an error; ``nearest`` and ``mode``
+            (the most frequent class) are how class codes are put on the grid, elevation, age and canopy being
+            interpolated (bilinear) in both. See ``resample_layer``.
+        resolution: Side of the grid's cells [m], a grid over the fuel layer from its north-west corner on, in the
+            fuel layer's CRS; in the UTM zone of its middle where that is in degrees, as ESA WorldCover is. None keeps
+            the fuel layer's grid. It needs ``resample``.
+        row: Top row of the crop in the grid. None, with ``column``, draws a window for each episode.
+        column: Left column of the crop in the grid.
+        min_fuel: Lowest share of a drawn window where trees can stand, so that there is something to burn.
+
+    Raises:
+        ValueError: If a value is out of its range, no window fits, a layer is missing, ambiguous, damaged, enormous,
+            empty or on another grid, a code is not whole or not in the table, or rasterio is not installed.
+    """
+
+    path: str | PathLike[str] | None = None
+    size: tuple[int, int] | int = 64
+    elevation: str | None = "*Elev*"
+    fuel: str = "*F13*"
+    table: Literal["fbfm13", "fbfm40", "worldcover"] | Mapping[int, int | str] = "fbfm13"
+    age: str | None = None
+    full_age: float = 10.0
+    canopy: str | None = None
+    assets: str | None = None
+    resample: Literal["refuse", "nearest", "mode"] = "refuse"
+    resolution: float | None = None
+    row: int | None = None
+    column: int | None = None
+    min_fuel: float = 0.5
+    _grid: Grid = field(init=False, repr=False, compare=False)
+    _crop: Crop = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        map_size(self.size)
+        check_fields(self, full_age=(1e-6, 1e6), resolution=(0.1, 100_000.0), min_fuel=(0.0, 1.0))
+        if self.age is not None and self.canopy is not None:
+            raise ValueError(f"canopy must be null where age makes the trees, got {self.canopy} and {self.age}")
+        if self.resolution is not None and self.resample == "refuse":
+            raise ValueError(f"resample must be nearest or mode where resolution is {self.resolution:g}, got refuse")
+        table, paths = code_table(self.table), self._find_layers()
+        layers, known = self._read_layers(paths)
+        cover, elevation, age = to_cover(layers["fuel"], known["fuel"], table), None, None
+        whole = known["fuel"]
+        if "elevation" in layers:
+            elevation = _to_metres(layers["elevation"], known["elevation"])
+            whole = whole & known["elevation"]
+        if "age" in layers:
+            age = _to_age("age", layers["age"], known["age"], self.full_age)
+        if "canopy" in layers:
+            age = _to_age("canopy", layers["canopy"], known["canopy"], 100.0)
+            age = np.where((cover == int(Cover.FOREST)) & (age != DRAWN), np.maximum(age, 1), np.uint8(DRAWN))
+        assets = _to_worth(layers["assets"], known["assets"]) if "assets" in layers else None
+        crop = Crop(
+            cover=cover,
+            elevation=elevation,
+            age=age,
+            assets=assets,
+            known=whole,
+            size=self.size,
+            row=self.row,
+            column=self.column,
+            min_fuel=self.min_fuel,
+        )
+        object.__setattr__(self, "_crop", crop)
+
+    def __call__(self, key: Tensor) -> Landscape:
+        """Return the landscape of each world's window, with its ``corner`` in ``grid``, batch size [B]."""
+        return self._crop(key)
+
+    @property
+    def grid(self) -> Grid:
+        """Return the grid in force, of which every world is a window."""
+        return self._grid
+
+    @property
+    def extent(self) -> tuple[int, int]:
+        """Return (rows, columns) of the grid."""
+        return self._crop.extent
+
+    def reach(self) -> np.ndarray:
+        """Return where a world may lie, bool [rows, columns]."""
+        return self._crop.reach()
+
+    @property
+    def cell_size(self) -> float:
+        """Return the side of a cell of the grid [m]; 30 where the fuel layer has no place on Earth."""
+        return self._grid.cell_size
+
+    def _find_layers(self) -> dict[str, Path]:
+        try:
+            exists = isinstance(self.path, str | PathLike) and self.path and Path(self.path).exists()
+        except OSError:  # a name too long
+            exists = False
+        if self.path is None or not exists:
+            raise ValueError(f"path must name a folder of rasters, or a raster, that exists, got {self.path!r}")
+        path = Path(self.path)
+        folder = path if path.is_dir() else path.parent
+        paths = {"fuel": find_layer("fuel", folder, self.fuel) if path.is_dir() else path}
+        for name in ("elevation", "age", "canopy", "assets"):
+            if getattr(self, name) is not None:
+                paths[name] = find_layer(name, folder, getattr(self, name))
+        return paths
+
+    def _read_layers(self, paths: Mapping[str, Path]) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+        """Return the values of each layer on the grid, and where they are known; every header is checked first."""
+        strict = self.resample == "refuse"
+        grid = read_grid("fuel", paths["fuel"], self.resolution is None, remedy="resolution=30 resample=mode")
+        if not grid.crs:
+            _tell_once(f"{paths['fuel']} has no CRS: its cells are taken as squares of {grid.cell_size:g} m")
+        grids = {"fuel": grid}
+        if self.resolution is not None:
+            grid = regrid("fuel", grid, self.resolution)
+        object.__setattr__(self, "_grid", grid)
+        for name in paths.keys() - grids.keys():
+            grids[name] = read_grid(name, paths[name], metric=strict)
+            if strict:
+                check_grid(name, grids[name], "fuel", grid)
+        layers, known = {}, {}
+        for name, path in paths.items():
+            if grids[name].differs_in(grid) is None:
+                layers[name], known[name] = read_layer(name, path)
+            else:
+                method = self.resample if name == "fuel" else "bilinear"  # "refuse" has raised by now
+                layers[name], known[name] = resample_layer(name, path, grid, method)  # type: ignore[arg-type]
+        return layers, known
+
+
+@cache
+def _tell_once(line: str) -> None:
+    _log.warning(line)
+
+
+def _to_metres(heights: np.ndarray, known: np.ndarray) -> np.ndarray:
+    broken = known & ~((heights >= -1000.0) & (heights <= 10_000.0))  # NaN; or nodata undeclared: -9999, 32767
+    if broken.any():
+        raise ValueError(f"elevation must be in [-1000, 10000] m wherever it is known, got {heights[broken][0]}")
+    return np.where(known, heights, 0).astype(np.float32)
+
+
+def _to_worth(values: np.ndarray, known: np.ndarray) -> np.ndarray:
+    broken = known & ~((values >= 0.0) & (values <= np.finfo(np.float32).max))
+    if broken.any():
+        raise ValueError(f"assets must be finite and 0 or more wherever they are known, got {values[broken][0]}")
+    return np.where(known, values, 0).astype(np.float32)
+
+
+def _to_age(name: str, values: np.ndarray, known: np.ndarray, top: float) -> np.ndarray:
+    """Return the tree's code, 10 from ``top`` on and halves up; ``DRAWN`` where the value is not known."""
+    highest = 100.0 if name == "canopy" else 10_000.0  # above it nodata undeclared: 255, 32767
+    broken = known & ~((values >= 0.0) & (values <= highest))
+    if broken.any():
+        raise ValueError(f"{name} must be in [0, {highest:g}] wherever it is known, got {values[broken][0]}")
+    code = np.floor(OLDEST * np.where(known, values, 0).astype(np.float64) / top + 0.5).clip(max=OLDEST)
+    return np.where(known, code, DRAWN).astype(np.uint8)
