@@ -220,7 +220,7 @@ def initial_state(
 
 def advance(state: WorldState, fire: Fire, wind: Wind, due: Tensor) -> WorldState:
     """Advance fire and wind by one tick where it is due, bool [B]."""
-    after = road.tick(fire, state, due)
+    after = road.fastest(fire, state.cells.device).tick(state, due)
     if not wind.changes:
         return after
     return in_wind(after, fire, torch.where(due[:, None, None, None], wind.after_tick(after), state.wind))

@@ -2,8 +2,7 @@
 
 import torch
 
-from warp_torchrl.world.fast import at_edge
-from warp_torchrl.world.fast.edge import places
+from warp_torchrl.world.fast.edge import AtEdge, places
 from warp_torchrl.world.fast.table import bit_of
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.terrain.landscape import Perlin
@@ -23,7 +22,7 @@ def test_places_are_found_word_by_word() -> None:
 def test_an_edge_by_hand() -> None:
     # Fire beside a lake, a tree too young, two that can ignite, and two that no burning cell touches.
     state = draw("~1.. a55. 55.5", worlds=2)
-    edge = at_edge.edge(Fire(), state)
+    edge = AtEdge(Fire()).edge(state)
     assert edge.cell.tolist() == [5, 8, 9, 17, 20, 21]  # (1, 1), (2, 0) and (2, 1) of each world
     assert edge.world.tolist() == [0, 0, 0, 1, 1, 1] and edge.place.tolist() == [5, 8, 9] * 2
     east, south_east, south = (1 << bit_of(direction) for direction in (2, 3, 4))  # as the fire travels

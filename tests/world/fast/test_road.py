@@ -6,7 +6,10 @@ import pytest
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.fast import at_edge, planes, road
+from warp_torchrl.world.fast.edge import AtEdge
+from warp_torchrl.world.fast.join import in_place
+from warp_torchrl.world.fast.planes import Planes
+from warp_torchrl.world.fast.road import Page, fastest
 from warp_torchrl.world.fast.rows import probability_from_rows
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.hazard import HazardFire
@@ -54,11 +57,11 @@ def test_planes_come_to_what_the_page_does(fire: Fire, relief: float, wind: Wind
     lit, due = 0, torch.arange(6) != 4
     for state in burning(fire, relief, wind):
         q = fire.ignition_probability(state)
-        assert torch.equal(planes.ignition_probability(fire, state), q)
-        assert torch.equal(planes.expected_ignitions(fire, state), fire.expected_ignitions(state))
+        expected, probability = Planes(fire).forecast(state)
+        assert torch.equal(probability, q) and torch.equal(expected, fire.expected_ignitions(state))
         after = fire.tick(state, whole_map(state), due)
-        assert differing(planes.tick(fire, state, whole_map(state), due), after) == []
-        assert differing(road.tick(fire, state, due), after) == []
+        for road in (Page(fire), Planes(fire), fastest(fire, state.cells.device)):
+            assert differing(road.tick(state, due), after) == []
         lit += int((q > 0.0).sum())
     assert lit > 300
 
@@ -69,11 +72,12 @@ def test_planes_come_to_what_the_page_does(fire: Fire, relief: float, wind: Wind
 def test_the_edge_comes_to_what_the_page_does(fire: Fire, relief: float, wind: Wind) -> None:
     listed, due = 0, torch.arange(6) != 4
     for state in burning(fire, relief, wind):
-        edge, draws = at_edge.edge(fire, state), whole_map(state)
+        road, draws = AtEdge(fire), whole_map(state)
+        edge = road.edge(state)
         at_trees = uniform_among(state.key, state.tick, Stream.FIRE, edge.world, edge.place)
         assert torch.equal(at_trees, edge.of(draws))
-        assert differing(at_edge.tick(fire, state, edge, at_trees, due), fire.tick(state, draws, due)) == []
-        expected, probability = at_edge.expected_and_probability(fire, state)
+        assert differing(road.tick(state, due), fire.tick(state, draws, due)) == []
+        expected, probability = road.forecast(state)
         assert torch.equal(expected, fire.expected_ignitions(state))
         assert torch.equal(probability, fire.ignition_probability(state))
         listed += len(edge.cell)
@@ -85,12 +89,12 @@ def test_rows_come_to_what_the_table_does(fire: Fire) -> None:
     for state in burning(fire, 0.0, Uniform(speed=7.0), ticks=5):
         assert state.air.table is not None
         without = state.replace(air=state.air.replace(table=None))
-        q = planes.ignition_probability(fire, without)
-        assert torch.equal(planes.ignition_probability(fire, state), q)
+        q = Planes(fire).ignition_probability(without)
+        assert torch.equal(Planes(fire).ignition_probability(state), q)
         made = probability_from_rows(
-            planes.in_place(fire.law),
+            in_place(fire.law),
             fire.spreads(state),
-            planes.in_place(fire.law).susceptibility(state.alpha) * fire.is_fuel(state),
+            in_place(fire.law).susceptibility(state.alpha) * fire.is_fuel(state),
             fire.gain(state.wind),
             None,
             fire.directions,

@@ -1,7 +1,7 @@
-"""The fire's edge: the trees that a burning neighbour may ignite in the next tick, listed.
+"""The fire's edge, the trees that a burning neighbour may ignite in the next tick: the road of a CPU.
 
-Where trees neither grow nor catch fire by themselves, nothing else is drawn for. They are a few cells in a hundred, so
-that chances and draws at them alone cost a fraction of those of whole maps, and come to the same bits. How many they
+Where trees neither grow nor ignite by themselves, nothing else is drawn for. They are a few cells in a hundred, so that
+probabilities and draws at them alone cost a fraction of those of whole maps, and come to the same bits. How many they
 are is read back, which a CPU does for nothing and a CUDA device does not.
 """
 
@@ -12,12 +12,57 @@ from typing import Protocol
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.fast.bytes import byte
-from warp_torchrl.world.fast.join import Joining
+from warp_torchrl.world.fast.bytes import byte, index_put
+from warp_torchrl.world.fast.join import Joining, in_place
+from warp_torchrl.world.fast.planes import age_fires, is_fuel, spreads
 from warp_torchrl.world.fast.table import BESIDE, bit_of, burning_neighbours
+from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.geometry import DIRECTIONS
+from warp_torchrl.world.random import Stream, uniform_among
+from warp_torchrl.world.state import FIRST_FIRE, WorldState
 
 _WORD = 8  # bytes
+
+
+class AtEdge:
+    """Ticks and forecasts from the fire's edge alone.
+
+    Args:
+        fire: The automaton.
+    """
+
+    def __init__(self, fire: Fire) -> None:
+        self.fire = fire
+
+    def tick(self, state: WorldState, due: Tensor) -> WorldState:
+        """Return the worlds after one tick of the fire with their own draws, where it is due, bool [B]."""
+        trees = self.edge(state)
+        u = uniform_among(state.key, state.tick, Stream.FIRE, trees.world, trees.place)
+        ignites = (u < self._probabilities(state, trees).joined()) & due.index_select(0, trees.world)
+        lit = trees.cell[ignites]
+        after = age_fires(self.fire, state, due)
+        after.cells = index_put(after.cells, lit, FIRST_FIRE)
+        after.age = index_put(after.age, lit, state.cells.flatten().index_select(0, lit))
+        if after.stage_age is not None:
+            after.stage_age = index_put(after.stage_age, lit, 0)
+        return after
+
+    def forecast(self, state: WorldState) -> tuple[Tensor, Tensor]:
+        """Return what ``Fire.expected_ignitions`` and ``Fire.ignition_probability`` do, float32 [B, H, W] each."""
+        trees = self.edge(state)
+        each = self._probabilities(state, trees)
+        return expected_from_edge(trees, each), trees.on_map(each.joined())
+
+    def edge(self, state: WorldState) -> "Edge":
+        """Return the trees that a burning neighbour may ignite in the next tick."""
+        return edge_of(spreads(self.fire, state), is_fuel(self.fire, state), self.fire.directions)
+
+    def _probabilities(self, state: WorldState, trees: "Edge") -> "EdgeProbabilities":
+        if state.air.table is not None:
+            return ByPattern(trees, state.air.table, trees.of(state.cover).long() + 1)
+        law = in_place(self.fire.law)
+        susceptible = law.susceptibility(trees.of(state.alpha))
+        return ByStrength(law, trees, susceptible, self.fire.gain_in(state), state.ground.slope)
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +76,7 @@ class Edge:
     cell: Tensor
     """Flat index of each in [B, H, W], int64 [N]."""
     pattern: Tensor
-    """Of ``pattern.burning_neighbours``, int64 [N]."""
+    """Of ``table.burning_neighbours``, int64 [N]."""
 
     @cached_property
     def world(self) -> Tensor:
@@ -80,26 +125,26 @@ def edge_of(spreading: Tensor, fuel: Tensor, directions: range) -> Edge:
 
 
 class EdgeProbabilities(Protocol):
-    """The chances of the trees of an edge to be ignited in one tick."""
+    """Probabilities of the trees of an edge to ignite in one tick."""
 
     def joined(self) -> Tensor:
-        """Return the chance to be ignited by all the neighbours that burn, float32 [N]."""
+        """Return the probability that the burning neighbours together ignite the tree, float32 [N]."""
         ...
 
     def alone(self, direction: int) -> Tensor:
-        """Return the chance to be ignited by the one neighbour that fire in a direction comes from, as if it burned.
+        """Return the probability that the upstream neighbour would ignite the tree if it burned, float32 [N].
 
-        float32 [N]; where there is no such neighbour it means nothing.
+        It is undefined where that neighbour is off the map.
         """
         ...
 
 
 class ByPattern:
-    """Chances of level worlds with one wind each.
+    """Probabilities in level worlds with one wind each.
 
     Args:
         edge: The trees.
-        table: Of ``pattern.pattern_table``, float32 [B, G + 1, 256].
+        table: Of ``table.pattern_table``, float32 [B, G + 1, 256].
         kind: Row of the table, int64 [N].
     """
 
@@ -118,10 +163,10 @@ class ByPattern:
 
 
 class ByStrength:
-    """Chances of any worlds.
+    """Probabilities in any worlds.
 
     Args:
-        law: What makes chances of strengths.
+        law: How strengths make a probability.
         edge: The trees.
         susceptible: The ground's part of a strength, float32 [N].
         gain: As of ``rows.probability_from_rows``, and so is the slope.
@@ -161,18 +206,18 @@ class ByStrength:
         return self._edge.world * ((height + 2) * (width + 1)) + (row + 1) * (width + 1) + (place - row * width)
 
 
-def expected_from_edge(edge: Edge, chances: EdgeProbabilities) -> Tensor:
+def expected_from_edge(edge: Edge, probabilities: EdgeProbabilities) -> Tensor:
     """Return how many neighbours each burning cell is expected to ignite in one tick, float32 [B, H, W]; 0 elsewhere.
 
     Args:
         edge: The trees.
-        chances: Theirs.
+        probabilities: Of those trees.
     """
     margin = edge.shape[2] + 1  # where no neighbour burns 0 is added, maybe beside the batch
     total = torch.zeros(edge.shape.numel() + 2 * margin, device=edge.cell.device)
     for direction in edge.directions:
         at_source = total[margin - edge.offset(direction) :]
-        at_source.scatter_add_(0, edge.cell, edge.burns(direction).mul_(chances.alone(direction)))
+        at_source.scatter_add_(0, edge.cell, edge.burns(direction).mul_(probabilities.alone(direction)))
     return total[margin:-margin].view(edge.shape)
 
 

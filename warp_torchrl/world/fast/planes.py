@@ -25,33 +25,79 @@ from warp_torchrl.world.fast.rows import expected_from_rows, probability_from_ro
 from warp_torchrl.world.fast.table import probability_by_pattern
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.law import in_finer_time
+from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import EMBER, FIRST_FIRE, OLDEST, WorldState, is_burning
 from warp_torchrl.world.terrain.landscape import holds_trees
 
 
-def tick(fire: Fire, state: WorldState, u: Tensor, due: Tensor) -> WorldState:
-    """Return what ``Fire.tick`` does."""
-    cells = state.cells
-    q = ignition_probability(fire, state)
-    grows = None
-    if fire.growth:
-        leaves = look_up(fire.growing(), cells).mul_(1.0 - q)
-        grows = ~below(u, torch.sub(1.0, leaves, out=leaves))  # u < 1: none grows where p is 0
-    if fire.p_regrow > 0.0:
-        bare = equal(cells, 0) & holds_trees(state.cover) & ~as_mask(byte(state.firebreak))
-        regrows = bare & below(u, in_finer_time(fire.p_regrow, fire.ticks_per_stage))
-        grows = regrows if grows is None else grows | regrows
-    state, due_cells = age_fires(fire, state, due), byte(due)[:, None, None]
-    ignite = byte(below(u, q)) * due_cells
-    after = choose(ignite, FIRST_FIRE, state.cells)
-    if grows is not None:
-        after += byte(grows) * due_cells
-    waited = None if state.stage_age is None else zero_where(ignite, state.stage_age)
-    return state.replace(
-        cells=to_uint8(after),
-        age=to_uint8(choose(ignite, cells, state.age)),
-        stage_age=waited if waited is None else to_uint8(waited),
-    )
+class Planes:
+    """Ticks and forecasts from whole maps.
+
+    Args:
+        fire: The automaton.
+    """
+
+    def __init__(self, fire: Fire) -> None:
+        self.fire = fire
+
+    def tick(self, state: WorldState, due: Tensor) -> WorldState:
+        """Return the worlds after one tick of the fire with their own draws, where it is due, bool [B]."""
+        fire, cells = self.fire, state.cells
+        u = uniform(state.key, state.tick, Stream.FIRE, tuple(cells.shape[1:]))
+        q = self.ignition_probability(state)
+        grows = None
+        if fire.growth:
+            leaves = look_up(fire.growing(), cells).mul_(1.0 - q)
+            grows = ~below(u, torch.sub(1.0, leaves, out=leaves))  # u < 1: none grows where p is 0
+        if fire.p_regrow > 0.0:
+            bare = equal(cells, 0) & holds_trees(state.cover) & ~as_mask(byte(state.firebreak))
+            regrows = bare & below(u, in_finer_time(fire.p_regrow, fire.ticks_per_stage))
+            grows = regrows if grows is None else grows | regrows
+        state, due_cells = age_fires(fire, state, due), byte(due)[:, None, None]
+        ignite = byte(below(u, q)) * due_cells
+        after = choose(ignite, FIRST_FIRE, state.cells)
+        if grows is not None:
+            after += byte(grows) * due_cells
+        waited = None if state.stage_age is None else zero_where(ignite, state.stage_age)
+        return state.replace(
+            cells=to_uint8(after),
+            age=to_uint8(choose(ignite, cells, state.age)),
+            stage_age=waited if waited is None else to_uint8(waited),
+        )
+
+    def forecast(self, state: WorldState) -> tuple[Tensor, Tensor]:
+        """Return what ``Fire.expected_ignitions`` and ``Fire.ignition_probability`` do, float32 [B, H, W] each."""
+        fire = self.fire
+        expected = expected_from_rows(
+            in_place(fire.law), self._susceptible(state), fire.gain_in(state), state.ground.slope, fire.directions
+        )
+        return expected * number(spreads(fire, state)), self.ignition_probability(state)
+
+    def ignition_probability(self, state: WorldState) -> Tensor:
+        """Return what ``Fire.ignition_probability`` does."""
+        spread = self._spread_probability(state)
+        if self.fire.beta == 0.0:
+            return spread
+        spontaneous = look_up(self.fire.lightning(state.cells[0].numel()), state.cells)
+        spontaneous.mul_(number(is_fuel(self.fire, state) & above(state.alpha, 0.0)))
+        return (1.0 - spontaneous).mul_(spread).add_(spontaneous)
+
+    def _spread_probability(self, state: WorldState) -> Tensor:
+        fire = self.fire
+        if state.air.table is not None and not is_compiling():  # a look-up costs more than what it spares there
+            kind = (state.cover + 1) * byte(is_fuel(fire, state))
+            return probability_by_pattern(state.air.table, spreads(fire, state), kind)
+        return probability_from_rows(
+            in_place(fire.law),
+            spreads(fire, state),
+            self._susceptible(state),
+            fire.gain_in(state),
+            state.ground.slope,
+            fire.directions,
+        )
+
+    def _susceptible(self, state: WorldState) -> Tensor:
+        return in_place(self.fire.law).susceptibility(state.alpha) * number(is_fuel(self.fire, state))
 
 
 def age_fires(fire: Fire, state: WorldState, due: Tensor) -> WorldState:
@@ -77,24 +123,6 @@ def age_fires(fire: Fire, state: WorldState, due: Tensor) -> WorldState:
     )
 
 
-def ignition_probability(fire: Fire, state: WorldState) -> Tensor:
-    """Return what ``Fire.ignition_probability`` does."""
-    spread = _spread_probability(fire, state)
-    if fire.beta == 0.0:
-        return spread
-    spontaneous = look_up(fire.lightning(state.cells[0].numel()), state.cells)
-    spontaneous.mul_(number(is_fuel(fire, state) & above(state.alpha, 0.0)))
-    return (1.0 - spontaneous).mul_(spread).add_(spontaneous)
-
-
-def expected_ignitions(fire: Fire, state: WorldState) -> Tensor:
-    """Return what ``Fire.expected_ignitions`` does."""
-    expected = expected_from_rows(
-        in_place(fire.law), _susceptible(fire, state), fire.gain_in(state), state.ground.slope, fire.directions
-    )
-    return expected * number(spreads(fire, state))
-
-
 def spreads(fire: Fire, state: WorldState) -> Tensor:
     """Return what ``Fire.spreads`` does."""
     return between(state.cells, FIRST_FIRE, fire.last_spreading)
@@ -103,21 +131,3 @@ def spreads(fire: Fire, state: WorldState) -> Tensor:
 def is_fuel(fire: Fire, state: WorldState) -> Tensor:
     """Return what ``Fire.is_fuel`` does."""
     return between(state.cells, fire.youngest_fuel, OLDEST) & equal(state.wet, 0)
-
-
-def _spread_probability(fire: Fire, state: WorldState) -> Tensor:
-    if state.air.table is not None and not is_compiling():  # a look-up costs more than what it spares there
-        kind = (state.cover + 1) * byte(is_fuel(fire, state))
-        return probability_by_pattern(state.air.table, spreads(fire, state), kind)
-    return probability_from_rows(
-        in_place(fire.law),
-        spreads(fire, state),
-        _susceptible(fire, state),
-        fire.gain_in(state),
-        state.ground.slope,
-        fire.directions,
-    )
-
-
-def _susceptible(fire: Fire, state: WorldState) -> Tensor:
-    return in_place(fire.law).susceptibility(state.alpha) * number(is_fuel(fire, state))

@@ -5,43 +5,71 @@ the page itself, on any device.
 """
 
 from collections.abc import Callable
+from typing import Protocol
 
 import torch
 from torch import Tensor
 from torch.compiler import is_compiling
 
-from warp_torchrl.world.fast import at_edge, planes
 from warp_torchrl.world.fast.bytes import number
+from warp_torchrl.world.fast.edge import AtEdge
+from warp_torchrl.world.fast.planes import Planes
 from warp_torchrl.world.fast.table import pattern_table
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.hazard import HazardFire
-from warp_torchrl.world.random import Stream, uniform, uniform_among
+from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import Air, Forecast, Ground, WorldState, is_tree
 
 COVERED = (Fire, HazardFire)
 """The automata that the fast roads compute; a subclass may have other rules, and takes the page."""
 
 
-def tick(fire: Fire, state: WorldState, due: Tensor) -> WorldState:
-    """Return the worlds after one tick of the fire with their own draws, where it is due, bool [B]."""
-    if _burns_at_its_edge(fire, state):
-        trees = at_edge.edge(fire, state)
-        draws = uniform_among(state.key, state.tick, Stream.FIRE, trees.world, trees.place)
-        return at_edge.tick(fire, state, trees, draws, due)
-    draws = uniform(state.key, state.tick, Stream.FIRE, tuple(state.cells.shape[1:]))
-    if type(fire) in COVERED:
-        return planes.tick(fire, state, draws, due)
-    return fire.tick(state, draws, due)
+class Road(Protocol):
+    """One way to compute the law's page."""
+
+    def tick(self, state: WorldState, due: Tensor) -> WorldState:
+        """Return the worlds after one tick of the fire with their own draws, where it is due, bool [B]."""
+        ...
+
+    def forecast(self, state: WorldState) -> tuple[Tensor, Tensor]:
+        """Return the expected ignitions and the ignition probability of each cell, float32 [B, H, W] each."""
+        ...
+
+
+class Page:
+    """The law's page itself, for any automaton and on any device.
+
+    Args:
+        fire: The automaton.
+    """
+
+    def __init__(self, fire: Fire) -> None:
+        self.fire = fire
+
+    def tick(self, state: WorldState, due: Tensor) -> WorldState:
+        """See ``Road``."""
+        return self.fire.tick(state, uniform(state.key, state.tick, Stream.FIRE, tuple(state.cells.shape[1:])), due)
+
+    def forecast(self, state: WorldState) -> tuple[Tensor, Tensor]:
+        """See ``Road``."""
+        return self.fire.expected_ignitions(state), self.fire.ignition_probability(state)
+
+
+def fastest(fire: Fire, device: torch.device) -> Road:
+    """Return the fastest road of an automaton on a device.
+
+    A CPU computes a tick at the fire's edge alone where trees neither grow nor ignite by themselves, unless whole maps
+    are compiled.
+    """
+    if type(fire) not in COVERED:
+        return Page(fire)
+    spreads_alone = not fire.growth and fire.beta == 0.0 and fire.p_regrow == 0.0
+    return AtEdge(fire) if spreads_alone and device.type == "cpu" and not is_compiling() else Planes(fire)
 
 
 def forecast(fire: Fire, state: WorldState) -> Forecast:
     """Return what the fire is about to do."""
-    if _burns_at_its_edge(fire, state):
-        expected, probability = at_edge.expected_and_probability(fire, state)
-    elif type(fire) in COVERED:
-        expected, probability = planes.expected_ignitions(fire, state), planes.ignition_probability(fire, state)
-    else:
-        expected, probability = fire.expected_ignitions(state), fire.ignition_probability(state)
+    expected, probability = fastest(fire, state.cells.device).forecast(state)
     return Forecast(
         expected_ignitions=expected.mul_(0.25).clamp_(max=1.0),
         ignition_probability=probability,
@@ -86,12 +114,3 @@ def in_bytes(state: WorldState) -> WorldState:
 def in_flags(state: WorldState) -> WorldState:
     """Return the worlds of ``in_bytes`` as they are elsewhere."""
     return state.replace(**{name: getattr(state, name).view(torch.bool) for name in _FLAGS})
-
-
-def _burns_at_its_edge(fire: Fire, state: WorldState) -> bool:
-    """Return whether a tick is worked out at the fire's edge alone.
-
-    It is so where trees neither grow nor ignite by themselves, on a CPU, unless whole maps are compiled.
-    """
-    alone = not fire.growth and fire.beta == 0.0 and fire.p_regrow == 0.0
-    return alone and type(fire) in COVERED and state.cells.device.type == "cpu" and not is_compiling()
