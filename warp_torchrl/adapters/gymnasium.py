@@ -9,7 +9,7 @@ import torch
 from gymnasium import spaces
 
 from warp_torchrl.adapters.screen import FRAMES_PER_SECOND, Screen
-from warp_torchrl.adapters.worlds import Seen, Worlds, action_number
+from warp_torchrl.adapters.worlds import NumpyStep, Worlds, action_number
 
 RENDER_MODES = ("rgb_array",)
 KEYS = {"w": 0, "e": 1, "d": 2, "c": 3, "x": 4, "z": 5, "a": 6, "q": 7, " ": 8, "f": 9, "s": 10}
@@ -82,7 +82,7 @@ class FireExtinguishingEnv(gymnasium.Env[Observation, int]):
         """
         now = self._worlds.reset(seed)
         super().reset(seed=None if seed is None else int(seed))
-        return self._shown(now)
+        return self._unpack(now)
 
     def step(self, action: int) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Let the agent act.
@@ -101,7 +101,7 @@ class FireExtinguishingEnv(gymnasium.Env[Observation, int]):
             raise RuntimeError("the episode has ended: call reset() before step()")
         number = action_number("action", action, self._worlds.n_actions)
         now = self._worlds.step(np.array([[number]], dtype=np.int64))
-        observation, info = self._shown(now)
+        observation, info = self._unpack(now)
         return observation, float(now.reward[0, 0]), bool(now.terminated[0]), bool(now.truncated[0]), info
 
     def action_masks(self) -> np.ndarray:
@@ -116,7 +116,7 @@ class FireExtinguishingEnv(gymnasium.Env[Observation, int]):
         """Return the picture, uint8 [H * s, W * s, 3], in mode ``rgb_array``."""
         return self._screen.render()
 
-    def _shown(self, now: Seen) -> tuple[Observation, dict[str, Any]]:
+    def _unpack(self, now: NumpyStep) -> tuple[Observation, dict[str, Any]]:
         self._mask = now.action_mask[0, 0].astype(bool)
         return now.of_agent(0, 0), now.info_of_agent(0, 0)
 

@@ -11,7 +11,7 @@ from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
 from warp_torchrl.adapters.screen import FRAMES_PER_SECOND, Screen
-from warp_torchrl.adapters.worlds import Seen, Worlds, action_number
+from warp_torchrl.adapters.worlds import NumpyStep, Worlds, action_number
 
 RENDER_MODES = ("human", "rgb_array")
 Observation = np.ndarray | dict[str, np.ndarray]
@@ -167,7 +167,7 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
         ]
         return np.array([numbers], dtype=np.int64)
 
-    def _by_agent(self, now: Seen) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
+    def _by_agent(self, now: NumpyStep) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         agents = list(enumerate(self.possible_agents))
         observations = {name: now.of_agent(0, index) for index, name in agents}
         return observations, {name: now.info_of_agent(0, index) for index, name in agents}

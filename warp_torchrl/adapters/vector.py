@@ -11,7 +11,7 @@ from gymnasium.vector.utils import batch_space
 
 from warp_torchrl.adapters.gymnasium import Observation, check_alone
 from warp_torchrl.adapters.screen import FRAMES_PER_SECOND
-from warp_torchrl.adapters.worlds import Seen, Worlds, whole_number
+from warp_torchrl.adapters.worlds import NumpyStep, Worlds, whole_number
 
 
 class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
@@ -132,13 +132,13 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
             raise ValueError(f"actions must be in 0..{n_actions - 1}, got {given.min()}..{given.max()}")
         return given.astype(np.int64)
 
-    def _info(self, now: Seen, where: np.ndarray | None = None) -> dict[str, Any]:
+    def _info(self, now: NumpyStep, where: np.ndarray | None = None) -> dict[str, Any]:
         """Return infos as Gymnasium batches them: 0 and false where there are none."""
         where = np.ones(self.num_envs, dtype=bool) if where is None else where
         values = {name: (value.T * where).T for name, value in now.info_of_agent(slice(None), 0).items()}
         return {**values, **{f"_{name}": where.copy() for name in values}}
 
-    def _final(self, last: Seen, ended: np.ndarray) -> dict[str, Any]:
+    def _final(self, last: NumpyStep, ended: np.ndarray) -> dict[str, Any]:
         """Return the last observations and infos of the episodes that ended."""
         if not ended.any():
             return {}

@@ -18,7 +18,7 @@ LAYOUTS = ("dict", "flat")
 """An agent's observation as its entries by name, or as one vector beside its mask."""
 
 
-class Seen(NamedTuple):
+class NumpyStep(NamedTuple):
     """What a reset or a step shows, as numpy; A agents in each of B worlds."""
 
     observation: dict[str, np.ndarray]  # [B, A, ...] each; "" where the observation is one array
@@ -82,7 +82,7 @@ class Worlds:
         if layout not in LAYOUTS:
             raise ValueError(f"layout must be {' or '.join(LAYOUTS)}, got {layout!r}")
         self._layout = layout
-        named = [f"{name}={written(name, value)}" for name, value in more.items()]
+        named = [f"{name}={as_override(name, value)}" for name, value in more.items()]
         first = None if seed is None else whole_number("seed", seed)
         try:
             self.env = make_env(
@@ -140,7 +140,7 @@ class Worlds:
         """
         return self.now["done"][:, 0].numpy(force=True)
 
-    def reset(self, seed: int | Sequence[int] | None = None) -> Seen:
+    def reset(self, seed: int | Sequence[int] | None = None) -> NumpyStep:
         """Start episode 0 of the seeds given, world i's being ``seed + i``; without, the next episode of each world.
 
         Raises:
@@ -153,9 +153,9 @@ class Worlds:
             first = whole_number("seed", seed)
             self.env.set_seeds(range(first, first + n_worlds))
         self._now = self.env.reset()
-        return self._seen(np.zeros((n_worlds, self.env.n_agents), np.float32))
+        return self._to_numpy(np.zeros((n_worlds, self.env.n_agents), np.float32))
 
-    def step(self, action: np.ndarray) -> Seen:
+    def step(self, action: np.ndarray) -> NumpyStep:
         """Advance every world by one step; a finished one stays as it is, with reward 0.
 
         Args:
@@ -163,9 +163,9 @@ class Worlds:
         """
         given = torch.from_numpy(action).to(self.env.device)
         self._now = self.env.step(TensorDict({"agents": {"action": given}}, batch_size=self.env.batch_size))["next"]
-        return self._seen(self.now["agents", "reward"][..., 0].numpy(force=True))
+        return self._to_numpy(self.now["agents", "reward"][..., 0].numpy(force=True))
 
-    def restart(self, which: np.ndarray, reward: np.ndarray) -> Seen:
+    def restart(self, which: np.ndarray, reward: np.ndarray) -> NumpyStep:
         """Start the next episode in some worlds.
 
         Args:
@@ -174,7 +174,7 @@ class Worlds:
         """
         asked = torch.from_numpy(which).to(self.env.device)[:, None]
         self._now = self.env.reset(self.now.exclude(("agents", "reward")).set("_reset", asked))
-        return self._seen(reward)
+        return self._to_numpy(reward)
 
     def state(self) -> np.ndarray:
         """Return the central state, float32 [B, C, 16, 16]."""
@@ -188,12 +188,12 @@ class Worlds:
         """Return the picture of world 0, uint8 [H * s, W * s, 3]."""
         return self.frames()[0]
 
-    def _seen(self, reward: np.ndarray) -> Seen:
+    def _to_numpy(self, reward: np.ndarray) -> NumpyStep:
         agents, info = self.now["agents"], self.now["info"]
         seen = agents["observation"]
         named = {"": seen} if isinstance(seen, torch.Tensor) else dict(seen.items())
         rows = torch.cat(list(info.values()), dim=-1).to(torch.float64).T.numpy(force=True)
-        return Seen(
+        return NumpyStep(
             observation={name: value.numpy(force=True) for name, value in named.items()},
             action_mask=agents["action_mask"].to(torch.int8).numpy(force=True),
             reward=reward,
@@ -231,7 +231,7 @@ def whole_number(name: str, value: Any) -> int:
         raise ValueError(f"{name} must be a whole number, got {given} ({type(value).__name__})") from None
 
 
-def written(name: str, value: object) -> str:
+def as_override(name: str, value: object) -> str:
     """Return an override's value in the command line's grammar.
 
     Raises:

@@ -17,7 +17,7 @@ MakeEnv = Callable[[int, int], WildfireEnv]
 """Makes so many worlds, the first with this seed."""
 
 
-_FOR_EVER = 10**12  # batches; TorchRL's Ray collector takes no -1
+_UNLIMITED = 10**12  # batches; TorchRL's Ray collector takes no -1
 
 
 class WorkerDied(Exception):  # noqa: N818
@@ -49,7 +49,7 @@ class Collection(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Direct:
+class InProcess:
     """Collects in this process: exact resume.
 
     Attributes:
@@ -69,11 +69,11 @@ class Direct:
 
     def open(self, env: WildfireEnv, learner: Learner, make_env: MakeEnv, seed: int) -> Collection:
         """Return the worlds of ``env``, played by the learner; finished ones are reset at once."""
-        return _Here(env, learner, self.steps)
+        return _InProcessCollection(env, learner, self.steps)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Process(Direct):
+class MultiProcess(InProcess):
     """Collects in processes of this machine, each with its share of the worlds, while no one learns.
 
     World i has the seed that it has with ``direct``. A resumed run goes on with fires that it has not met.
@@ -113,11 +113,11 @@ class Process(Direct):
                 num_collectors=self.workers,
                 sync=True,
                 frames_per_batch=frames,
-                total_frames=frames * _FOR_EVER,
+                total_frames=frames * _UNLIMITED,
                 **self.backend(),
             )
 
-        return _Elsewhere(start, self.steps, env.device)
+        return _MultiProcessCollection(start, self.steps, env.device)
 
     def backend(self) -> dict[str, Any]:
         """Return what TorchRL's collector is told of where it works."""
@@ -125,8 +125,8 @@ class Process(Direct):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ray(Process):
-    """Collects in workers of a Ray cluster; otherwise as ``Process``. Needs the extra ``ray``.
+class Ray(MultiProcess):
+    """Collects in workers of a Ray cluster; otherwise as ``MultiProcess``. Needs the extra ``ray``.
 
     Attributes:
         address: The cluster's, ``auto`` for the one that this machine belongs to; None starts one here.
@@ -158,7 +158,7 @@ class Ray(Process):
         return {"backend": "ray", "backend_options": options}
 
 
-class _Here:
+class _InProcessCollection:
     """One collector, in this process."""
 
     def __init__(self, env: WildfireEnv, learner: Learner, steps: int) -> None:
@@ -204,7 +204,7 @@ class _Here:
         self._collector.shutdown()
 
 
-class _Elsewhere:
+class _MultiProcessCollection:
     """One collector with workers, started with the first batch."""
 
     def __init__(self, start: Callable[[int], BaseCollector], steps: int, device: torch.device) -> None:

@@ -14,7 +14,7 @@ from omegaconf import DictConfig, OmegaConf
 
 from warp_torchrl.commands.allocation import keep_freed_memory
 from warp_torchrl.commands.failure import fail
-from warp_torchrl.commands.sweep import SweepSummary, conclude_early, forget_failure, jobs, note_failure
+from warp_torchrl.commands.sweep import SweepSummary, jobs, remove_failure, save_failure, summarise_unfinished
 from warp_torchrl.config.compose import (
     Record,
     compose_config,
@@ -29,7 +29,7 @@ from warp_torchrl.config.compose import (
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.grammar import check_flags, check_overrides
 from warp_torchrl.config.settings import COMPONENTS, settings
-from warp_torchrl.evaluation.evaluate import assess, check_assessment
+from warp_torchrl.evaluation.evaluate import check_policy, evaluate_policy
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.runs import checkpoint as checkpoints
@@ -39,7 +39,7 @@ from warp_torchrl.runs.resumption import resumption
 from warp_torchrl.runs.shipped import find_policy
 from warp_torchrl.runs.transfer import check_start
 from warp_torchrl.training.loop import Training
-from warp_torchrl.training.signals import Stopped, obeyed
+from warp_torchrl.training.signals import Stopped, exit_on_signal
 
 log = logging.getLogger("warp_torchrl")
 
@@ -99,7 +99,7 @@ def _resume(folder: Path, total_frames: Any) -> None:
     if run.settings.total_frames != run.total_before:
         # Now and not with the next checkpoint: a run that is killed before it goes on to the new total too.
         disk.replace(folder / "config.yaml", OmegaConf.to_yaml(recompose(run.record), resolve=True))
-        training.tell_new_total(run.total_before)
+        training.log_new_total(run.total_before)
     _finish(training, world_overrides(run.values))
 
 
@@ -108,7 +108,7 @@ def _finish(training: Training, worlds: Sequence[str]) -> None:
         training.train()
     finally:
         training.close()
-    assess(training.settings, training.run, checkpoints.newest(training.run)[0], worlds)
+    evaluate_policy(training.settings, training.run, checkpoints.newest(training.run)[0], worlds)
 
 
 def _newest(path: str | Path) -> checkpoints.Checkpoint:
@@ -129,11 +129,11 @@ def _evaluate_job(config: DictConfig) -> None:
         check_free(folder, "hydra.run.dir")  # once more: a sweep may have named two jobs' folders alike
     given, name = config.checkpoint, config.policy
     if given is None:
-        assess(settings(_without_checkpoint(config)), folder, name, world_overrides(plain(config)))
+        evaluate_policy(settings(_without_checkpoint(config)), folder, name, world_overrides(plain(config)))
         return
     found = _newest(find_policy(given))
     values = plain(recompose(found.record(), _of_worlds(HydraConfig.get().overrides.task)))
-    assess(settings(values), folder, found, world_overrides(values))
+    evaluate_policy(settings(values), folder, found, world_overrides(values))
 
 
 def _of_worlds(overrides: Sequence[str]) -> list[str]:
@@ -166,7 +166,7 @@ def _run(name: str, job: Callable[[DictConfig], None]) -> None:
     logging.raiseExceptions = debug  # a log that cannot be written is no second failure
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra's own errors come to fail
     keep_freed_memory()
-    with obeyed():
+    with exit_on_signal():
         try:
             _check_first(name, arguments)
             _start_hydra(name, job, arguments, debug)
@@ -182,18 +182,18 @@ def _start_hydra(name: str, job: Callable[[DictConfig], None], arguments: list[s
 
     def guarded(config: DictConfig) -> None:
         try:
-            forget_failure()
+            remove_failure()
             job(config)
         except Exception as error:
             code, line = fail(error, debug)
             if HydraConfig.get().mode != RunMode.MULTIRUN or isinstance(error, Stopped):
                 sys.exit(code)
-            note_failure(code, line)  # the other jobs go on
+            save_failure(code, line)  # the other jobs go on
 
     try:
         hydra.main(version_base="1.3", config_path=str(conf_folder()), config_name=name)(guarded)()
     except Exception:
-        conclude_early()
+        summarise_unfinished()
         raise
 
 
@@ -253,10 +253,10 @@ def _check_evaluation(config: DictConfig, overrides: Sequence[str]) -> None:
     if not isinstance(config.overwrite, bool):
         raise ConfigError(f"overwrite must be true or false, got {config.overwrite!r}")
     if config.checkpoint is None:
-        check_assessment(settings(_without_checkpoint(config)), config.policy)
+        check_policy(settings(_without_checkpoint(config)), config.policy)
         return
     found, _ = checkpoints.newest(find_policy(str(config.checkpoint)))
-    check_assessment(settings(plain(recompose(found.record(), _of_worlds(overrides)))), found)
+    check_policy(settings(plain(recompose(found.record(), _of_worlds(overrides)))), found)
 
 
 def _with_run_folder(arguments: Sequence[str]) -> list[str]:

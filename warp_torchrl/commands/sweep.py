@@ -55,12 +55,12 @@ def jobs(overrides: Sequence[str]) -> list[list[str]]:
     return [list(job) for job in product(*choices)]
 
 
-def forget_failure() -> None:
+def remove_failure() -> None:
     """Remove what an earlier sweep into the same folder left of this job."""
     Path(HydraConfig.get().runtime.output_dir, FAILURE).unlink(missing_ok=True)
 
 
-def note_failure(code: int, reason: str) -> None:
+def save_failure(code: int, reason: str) -> None:
     """Leave word of a failed job in its folder, for the end of the sweep, whatever process runs the job."""
     job = HydraConfig.get().job
     failure = Failure(job=int(job.num), overrides=" ".join(HydraConfig.get().overrides.task), code=code, reason=reason)
@@ -92,23 +92,23 @@ class SweepSummary(Callback):
 
     def on_multirun_end(self, config: DictConfig, **kwargs: Any) -> None:
         """Write ``summary.md`` and ``summary.png`` into the sweep's folder, and print the table."""
-        failed = _conclude(Path(str(config.hydra.sweep.dir)))
+        failed = _write_summary(Path(str(config.hydra.sweep.dir)))
         SweepSummary.exit_code = failed[0].code if failed else 0
         SweepSummary.folder = None
 
 
-def conclude_early() -> None:
+def summarise_unfinished() -> None:
     """Tell what there is of a sweep whose launcher gave up, as joblib's and submitit's do where a worker is killed."""
     folder, SweepSummary.folder = SweepSummary.folder, None
     if folder is None or not folder.is_dir():
         return
-    _conclude(folder)
+    _write_summary(folder)
     for log in sorted(folder.glob("**/*.log")):
         if not ((log.parent / "evaluation.json").exists() or (log.parent / FAILURE).exists()):
             print(f"error: the job in {log.parent} did not end", file=sys.stderr, flush=True)
 
 
-def _conclude(folder: Path) -> list[Failure]:
+def _write_summary(folder: Path) -> list[Failure]:
     entries = summary.gather(folder)
     if entries:
         _summarise(entries, folder)

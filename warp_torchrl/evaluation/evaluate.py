@@ -11,7 +11,7 @@ from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.settings import Settings
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation.method import method
-from warp_torchrl.evaluation.play import BASELINES, Episodes, LeftOut, play, play_heuristics, record_episode
+from warp_torchrl.evaluation.play import BASELINES, Episodes, WithoutAgent, play, play_heuristics, record_episode
 from warp_torchrl.evaluation.report import report, table, write_json
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.policy import MODES
@@ -21,7 +21,7 @@ from warp_torchrl.runs import disk
 log = logging.getLogger("warp_torchrl")
 
 
-def assess(plan: Settings, folder: Path, found: checkpoints.Checkpoint | str, worlds: Sequence[str]) -> None:
+def evaluate_policy(plan: Settings, folder: Path, found: checkpoints.Checkpoint | str, worlds: Sequence[str]) -> None:
     """Evaluate a checkpoint or a heuristic beside the baselines: table, ``evaluation.json`` and ``episode.gif``.
 
     Args:
@@ -41,19 +41,21 @@ def assess(plan: Settings, folder: Path, found: checkpoints.Checkpoint | str, wo
         frames = found.manifest.frames
         other_modes = {f"trained, {other}": play(env, actor, first, other) for other in MODES if other != mode}
     if plan.evaluation.leave_one_out:
-        left_out = {agent: play(env, LeftOut(actor, index), first, mode) for index, agent in enumerate(env.agent_names)}
+        left_out = {
+            agent: play(env, WithoutAgent(actor, index), first, mode) for index, agent in enumerate(env.agent_names)
+        }
     content = report(
         plan.scenario, name, first, episodes, others, other_modes, left_out, learner, digest, worlds, frames
     )
     folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / "evaluation.json", content)
     print(table(content), flush=True)
-    with disk.telling(folder / "episode.gif"):
+    with disk.with_path(folder / "episode.gif"):
         record_episode(folder / "episode.gif", one, filmed, f"{plan.scenario}\n{name}", first, mode)
     log.info("wrote evaluation.json and episode.gif into %s", folder)
 
 
-def check_assessment(plan: Settings, found: checkpoints.Checkpoint | str) -> None:
+def check_policy(plan: Settings, found: checkpoints.Checkpoint | str) -> None:
     """Check that a checkpoint or a heuristic can be evaluated, before anything is made for it.
 
     Raises:

@@ -13,7 +13,7 @@ _NOT_TRAINED_BY = ("seed", "device", "evaluation", "checkpoint")
 def method(record: Record) -> tuple[str, str]:
     """Return what a trained policy is called in a sweep, and a digest of what it was trained by but for the seed."""
     names = [record.choices[group] for group in ("algorithm", "reward", "observation")]
-    names += [*unusual(record), *taught(record)]
+    names += [*unusual(record), *teacher_label(record)]
     values = {key: value for key, value in record.values.items() if key not in _NOT_TRAINED_BY}
     return " ".join(names), sha256(json.dumps(_with_floats(values), sort_keys=True).encode()).hexdigest()
 
@@ -36,7 +36,7 @@ def unusual(record: Record) -> list[str]:
     return [f"{key[1]}={value}" for key, value in found.items() if value is not None and value != usual[key]]
 
 
-def taught(record: Record) -> list[str]:
+def teacher_label(record: Record) -> list[str]:
     """Return how a policy that had a teacher must be called, in one piece; none where it had none."""
     teacher = record.values.get("imitation", {}).get("teacher")
     return [f"taught by {teacher}"] if teacher else []

@@ -69,7 +69,7 @@ def play(
     return episodes if behaviour is None else episodes | behaviour.summary()
 
 
-class LeftOut(TensorDictModuleBase):
+class WithoutAgent(TensorDictModuleBase):
     """A policy whose team lacks one agent: that one stays where it is, or, where it cannot, does nothing.
 
     Args:

@@ -62,8 +62,8 @@ def report(
         "metrics": _summaries(episodes),
         "episodes": rows,
         "versus": {name: compare(episodes["saved"], other["saved"]) for name, other in others.items()},
-        "yardsticks": {name: _summaries(other) for name, other in others.items()},
-        "yardstick_episodes": {
+        "baselines": {name: _summaries(other) for name, other in others.items()},
+        "baseline_episodes": {
             name: {metric: other[metric].tolist() for metric in ("saved", "success")} for name, other in others.items()
         },
         "other_modes": {name: _summaries(other) for name, other in (other_modes or {}).items()},
@@ -85,7 +85,7 @@ def table(content: Mapping[str, Any]) -> str:
         f"{'policy':<22}{'saved %':>8}{'95 % interval':>16}{'iqm %':>8}{'success %':>11}{'control':>9}{'cleared %':>11}"
     )
     lines = [f"{place(content)}: {len(content['seeds'])} fires, seeds from {content['seeds'][0]}", header]
-    rows = {**content["yardsticks"], **content["other_modes"], content["policy"]: content["metrics"]}
+    rows = {**content["baselines"], **content["other_modes"], content["policy"]: content["metrics"]}
     for name, summary in rows.items():
         saved = summary["saved"]
         interval = "{:.1f} .. {:.1f}".format(*(100.0 * bound for bound in saved["ci95"]))

@@ -111,8 +111,8 @@ def gather(runs: Sequence[Run]) -> list[Line]:
     for run in runs:
         found.setdefault(run.alike, []).append(run)
     recorded = [run.names for run in runs if len(run.names) > 1]
-    told = [place for place, names in enumerate(zip(*recorded)) if place == 0 or len(set(names)) > 1]
-    names = [_name(alike[0].names, told) for alike in found.values()]
+    shown = [place for place, names in enumerate(zip(*recorded)) if place == 0 or len(set(names)) > 1]
+    names = [_name(alike[0].names, shown) for alike in found.values()]
     count = Counter(names)
     seen: Counter[tuple[str, ...]] = Counter()
     lines, looks, scenarios = [], _Places(), _Places()
@@ -132,8 +132,8 @@ class _Places(dict[Hashable, int]):
         return self.setdefault(thing, len(self))
 
 
-def _name(names: tuple[str, ...], told: Sequence[int]) -> str:
-    return names[0] if len(names) == 1 else " ".join(names[place] for place in told)
+def _name(names: tuple[str, ...], shown: Sequence[int]) -> str:
+    return names[0] if len(names) == 1 else " ".join(names[place] for place in shown)
 
 
 def _how_many(runs: Sequence[Run]) -> str:

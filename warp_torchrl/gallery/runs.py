@@ -12,7 +12,7 @@ import numpy as np
 import yaml
 
 from warp_torchrl.config.compose import Record
-from warp_torchrl.evaluation.method import method, taught, unusual
+from warp_torchrl.evaluation.method import method, teacher_label, unusual
 from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError, newest
 
 FRAMES, SECONDS = "time/frames", "time/seconds"
@@ -124,15 +124,15 @@ def _recorded(found: Checkpoint, record: Record) -> dict[str, Any]:
         algorithm, reward, observation = (
             str(record.choices[group]) for group in ("algorithm", "reward", "observation")
         )
-        names = (" ".join((algorithm, *unusual(record), *taught(record))), reward, observation)
+        names = (" ".join((algorithm, *unusual(record), *teacher_label(record))), reward, observation)
         _, digest = method(record)
         n_agents, seed = record.values["team"]["n_agents"], str(record.values["seed"])
     except (KeyError, TypeError, AttributeError):
         raise ValueError(f"{found.path / 'config.json'} does not hold a run's configuration") from None
     scenario = str(found.manifest.scenario)
     alike = " ".join((scenario, *names, digest))
-    told = {"names": (*names, scenario), "alike": alike, "mark": digest[:6]}
-    return told | {"scenario": scenario, "n_agents": n_agents, "seed": seed}
+    fields = {"names": (*names, scenario), "alike": alike, "mark": digest[:6]}
+    return fields | {"scenario": scenario, "n_agents": n_agents, "seed": seed}
 
 
 def _not_recorded(folder: Path) -> dict[str, Any]:
@@ -145,10 +145,10 @@ def _not_recorded(folder: Path) -> dict[str, Any]:
             raise ValueError(f"{path} is not a run's configuration") from None
     content = content if isinstance(content, dict) else {}
     team, scenario = content.get("team"), content.get("scenario")
-    told = {"names": (folder.name,), "alike": str(folder), "mark": f"in {folder.parent.name}"}
+    fields = {"names": (folder.name,), "alike": str(folder), "mark": f"in {folder.parent.name}"}
     n_agents = team.get("n_agents") if isinstance(team, dict) else None
     scenario = scenario if isinstance(scenario, str) else "not recorded"
-    return told | {"scenario": scenario, "n_agents": n_agents, "seed": None}
+    return fields | {"scenario": scenario, "n_agents": n_agents, "seed": None}
 
 
 def bin_means(values: np.ndarray, size: int) -> np.ndarray:

@@ -24,7 +24,7 @@ class Heuristic(TensorDictModuleBase):
 
     in_keys = [("agents", "action_mask")]  # noqa: RUF012
     out_keys = [("agents", "action")]  # noqa: RUF012
-    remembers: ClassVar[bool] = False
+    is_stateful: ClassVar[bool] = False
     """Whether what it does depends on more than the state."""
 
     def __init__(self, env: WildfireEnv) -> None:
@@ -76,7 +76,7 @@ def list_cells(mask: Tensor) -> tuple[Tensor, Tensor]:
     return index, torch.arange(index.shape[1], device=mask.device) < counts[:, None]
 
 
-def way_to(state: WorldState, cells: Tensor) -> Tensor:
+def chebyshev_distance(state: WorldState, cells: Tensor) -> Tensor:
     """Return the Chebyshev distance from each agent to cells [B, K], float32 [B, A, K]."""
     gap = state.vehicles.position[:, :, None] - place(cells, state)[:, None]
     return gap.abs().amax(dim=-1).to(torch.float32)
@@ -91,8 +91,8 @@ def nearest_fire(state: WorldState, fire: Tensor) -> tuple[Tensor, Tensor]:
     cells, valid = list_cells(fire)
     agents = torch.arange(state.vehicles.position.shape[1], device=cells.device)[:, None]
     draw = (agents * fire[0].numel() + cells[:, None]).to(torch.int32)
-    taste = uniform_at(state.key, 0, Stream.POLICY, draw.flatten(1)).view(draw.shape)
-    best = (way_to(state, cells) + taste).masked_fill_(~valid[:, None], float(FAR)).min(dim=-1)
+    tie_break = uniform_at(state.key, 0, Stream.POLICY, draw.flatten(1)).view(draw.shape)
+    best = (chebyshev_distance(state, cells) + tie_break).masked_fill_(~valid[:, None], float(FAR)).min(dim=-1)
     return best.values.floor(), cells.gather(1, best.indices)
 
 
@@ -102,7 +102,7 @@ def place(index: Tensor, state: WorldState) -> Tensor:
     return torch.stack((index // width, index % width), dim=-1)
 
 
-def approach(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
+def move_towards(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
     """Return the move that brings each agent nearest to its target, int64 [B, A].
 
     Turning straight back costs as much as a cell of way, so that agents slide along a lake instead of swinging.
@@ -118,7 +118,7 @@ def approach(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
     return way.masked_fill(~team.open_moves(state), float(FAR)).argmin(dim=-1)
 
 
-def or_refill(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
+def target_or_water(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
     """Return the targets of agents with water, and the nearest lake or the base for those whose tank is empty."""
     if not env.world.team.tank:
         return target
@@ -129,9 +129,7 @@ def or_refill(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
     return torch.where((state.vehicles.tank == 0)[..., None], place(index, state), target)
 
 
-def claim_cells(
-    state: WorldState, cells: Tensor, value: Tensor, elbow_room: int, discount: float, taken: float
-) -> Tensor:
+def claim_cells(state: WorldState, cells: Tensor, value: Tensor, spacing: int, discount: float, taken: float) -> Tensor:
     """Return a cell for each agent, int64 [B, A, 2], the best of value less way, one agent after the other.
 
     In each of as many rounds as there are agents, the best pair of an agent without a claim and a cell is taken, and
@@ -141,11 +139,11 @@ def claim_cells(
         state: The worlds.
         cells: Flat indices of the cells to share out, int64 [B, K].
         value: What each is worth to each agent [cells of way], -inf for nothing, float32 [B, 1 or A, K].
-        elbow_room: Cells about a claim that the others avoid.
+        spacing: Cells about a claim that the others avoid.
         discount: What avoiding them is worth [cells of way].
         taken: What avoiding the claimed cell itself is worth.
     """
-    gain = value - way_to(state, cells)
+    gain = value - chebyshev_distance(state, cells)
     worlds, agents, count = gain.shape
     place_of = place(cells, state)
     claim = state.vehicles.position.clone()
@@ -157,7 +155,7 @@ def claim_cells(
         worth = torch.isfinite(best.values)[:, None]
         claim[rows, agent] = torch.where(worth, claimed, claim[rows, agent])
         distance = (place_of - claimed[:, None]).abs().amax(dim=-1)
-        gain -= (discount * (distance <= elbow_room) + taken * (distance == 0))[:, None]
+        gain -= (discount * (distance <= spacing) + taken * (distance == 0))[:, None]
         gain[rows, agent] = -math.inf
     return claim
 

@@ -5,13 +5,13 @@ from torch import Tensor
 
 from warp_torchrl.heuristics.base import (
     Heuristic,
-    approach,
     can_be_put_out,
     extinguish_or,
     idle_action,
+    move_towards,
     nearest_fire,
-    or_refill,
     place,
+    target_or_water,
 )
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import WorldState
@@ -47,7 +47,7 @@ class Local(Heuristic):
         distance, index = nearest_fire(state, fire)
         sees = distance <= self.radius
         target = torch.where(sees[..., None], place(index, state), self._waypoint(state))
-        return extinguish_or(approach(state, self.env, or_refill(state, self.env, target)), mask)
+        return extinguish_or(move_towards(state, self.env, target_or_water(state, self.env, target)), mask)
 
     def _waypoint(self, state: WorldState) -> Tensor:
         """Return where each agent sweeps to, int64 [B, A, 2]: fanning out over the map, later random points."""
@@ -68,5 +68,5 @@ class Greedy(Heuristic):
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
         _, index = nearest_fire(state, can_be_put_out(state, self.env))
-        target = or_refill(state, self.env, place(index, state))
-        return extinguish_or(approach(state, self.env, target), mask)
+        target = target_or_water(state, self.env, place(index, state))
+        return extinguish_or(move_towards(state, self.env, target), mask)

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.heuristics.base import approach, claim_cells, extinguish_or, list_cells, or_refill
+from warp_torchrl.heuristics.base import claim_cells, extinguish_or, list_cells, move_towards, target_or_water
 from warp_torchrl.heuristics.coordinated import Coordinated
 from warp_torchrl.world.fast.distances import distance_to_nearest
 from warp_torchrl.world.geometry import grow
@@ -19,7 +19,7 @@ class Ring(Coordinated):
     can be, agents that have water attack the front as ``Coordinated`` does, and so do those that cannot clear.
     """
 
-    remembers = True
+    is_stateful = True
     pace = 1.0  # cells that a front makes in one of the paper's ticks
     effort = 2.0  # steps for each cell of the ring: go there, clear it
 
@@ -28,7 +28,7 @@ class Ring(Coordinated):
         self._plan = torch.zeros(0, dtype=torch.bool)  # [B, H, W], the ring; empty before the first step
         self._inside = torch.zeros(0, dtype=torch.bool)  # [B, H, W], what it encloses
 
-    def diggers(self, state: WorldState) -> Tensor:
+    def line_builders(self, state: WorldState) -> Tensor:
         """Return which agents work on the ring, bool [A]."""
         return self.env.world.team.table(state.cells.device).clears
 
@@ -36,16 +36,16 @@ class Ring(Coordinated):
         """Return the actions, int64 [B, A]."""
         self._revise(state)
         todo = self._plan & is_tree(state.cells) & (state.alpha > 0.0)
-        digs = self.diggers(state) & todo.flatten(1).any(dim=1)[:, None]
+        digs = self.line_builders(state) & todo.flatten(1).any(dim=1)[:, None]
         value, front = self.value(state)
         cells, valid = list_cells(todo | front)
         worth = value.flatten(1).gather(1, cells).masked_fill_(~(front.flatten(1).gather(1, cells) & valid), -math.inf)
         unbroken = torch.zeros_like(worth).masked_fill_(~(todo.flatten(1).gather(1, cells) & valid), -math.inf)
         worth = torch.where(digs[..., None], unbroken[:, None], worth[:, None])
-        claims = claim_cells(state, cells, worth, elbow_room=1, discount=2.0, taken=1000.0)
-        attack = extinguish_or(approach(state, self.env, or_refill(state, self.env, claims)), mask)
+        claims = claim_cells(state, cells, worth, spacing=1, discount=2.0, taken=1000.0)
+        attack = extinguish_or(move_towards(state, self.env, target_or_water(state, self.env, claims)), mask)
         there = (claims == state.vehicles.position).all(dim=-1) & mask[..., Action.CLEAR]
-        dig = torch.where(there, int(Action.CLEAR), approach(state, self.env, claims))
+        dig = torch.where(there, int(Action.CLEAR), move_towards(state, self.env, claims))
         return torch.where(digs, dig, attack)
 
     def _revise(self, state: WorldState) -> None:
@@ -73,7 +73,7 @@ class Ring(Coordinated):
         distance = torch.arange(1, reach, device=burning.device)
         farthest = distance_to_nearest(state.vehicles.position, burning).amax(dim=1)
         way = farthest[:, None] - distance
-        workers = self.diggers(state).sum().clamp(min=1)
+        workers = self.line_builders(state).sum().clamp(min=1)
         need = way.clamp(min=0) + self.effort * cells[:, 1:reach] / workers
         steps = world.steps_per_tick * world.fire.ticks_per_stage / self.pace
         fits = need <= (distance - 1) * steps
@@ -84,7 +84,7 @@ class Ring(Coordinated):
 class Mixed(Ring):
     """Every other agent that can clear works on the ring; the others attack the front."""
 
-    def diggers(self, state: WorldState) -> Tensor:
+    def line_builders(self, state: WorldState) -> Tensor:
         """Return which agents work on the ring, bool [A]."""
-        clears = super().diggers(state)
+        clears = super().line_builders(state)
         return clears & (clears.cumsum(0) % 2 == 1)

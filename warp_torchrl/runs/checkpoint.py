@@ -128,13 +128,13 @@ def save(
     """
     parent = run / "checkpoints"
     final, draft = parent / f"{frames}", parent / f".{frames}.tmp"
-    with disk.telling(parent):
+    with disk.with_path(parent):
         parent.mkdir(parents=True, exist_ok=True)
     for leftover in parent.glob(".*.tmp"):
         shutil.rmtree(leftover, ignore_errors=True)
     if not _is_sound(final):
         try:
-            with disk.telling(draft):
+            with disk.with_path(draft):
                 draft.mkdir()
                 disk.save_tensors(draft / "policy.pt", dict(policy))
                 disk.save_tensors(draft / TRAINING, dict(training))
@@ -158,7 +158,7 @@ def export(found: Checkpoint, folder: Path) -> None:
     if folder.exists():
         raise FileExistsError(f"{folder} exists")
     shutil.rmtree(draft, ignore_errors=True)
-    with disk.telling(draft):
+    with disk.with_path(draft):
         draft.mkdir(parents=True)
         for name in manifest.files:
             if name != TRAINING:

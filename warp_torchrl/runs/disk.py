@@ -26,7 +26,7 @@ def replace(path: Path, text: str) -> None:
     """
     draft = path.with_name(f".{path.name}.tmp")
     try:
-        with telling(path):
+        with with_path(path):
             draft.write_text(text, encoding="utf-8", newline="")
             sync(draft)
             draft.replace(path)
@@ -41,7 +41,7 @@ def save_tensors(path: Path, content: Any) -> None:
     Raises:
         OSError: With the path, where torch says only that its position is not the one that it expected.
     """
-    with telling(path), path.open("wb") as file:
+    with with_path(path), path.open("wb") as file:
         writer = _Writer(file)
         try:
             torch.save(_apart(content), cast(BinaryIO, writer))
@@ -67,7 +67,7 @@ def _apart(content: Any) -> Any:
 
 
 @contextmanager
-def telling(path: Path) -> Iterator[None]:
+def with_path(path: Path) -> Iterator[None]:
     """Give an OSError the path, which Python leaves out where a write fails."""
     try:
         yield

@@ -54,7 +54,7 @@ class MetricsFile:
         values = [row.get(column) for column in self._columns]
         lines.append(["" if value is None else repr(value) for value in values])
         mode = "w" if len(lines) > 1 else "a"
-        with disk.telling(self.path), self.path.open(mode, newline="", encoding="utf-8") as file:
+        with disk.with_path(self.path), self.path.open(mode, newline="", encoding="utf-8") as file:
             csv.writer(file).writerows(lines)
         self.rows += 1
 

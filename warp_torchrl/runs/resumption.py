@@ -18,6 +18,7 @@ _LARGEST = 1_000_000  # bytes
 _MISSING = "not there"
 _MAY_CHANGE = ("total_frames", "resume", "debug")
 _NAMED = 3
+_RENAMED = {"Direct": "InProcess", "Process": "MultiProcess"}  # classes, as earlier runs wrote them
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,7 +134,8 @@ def _other_classes(held: Mapping[str, Any], trained: Mapping[str, Any]) -> list[
     """Return the components of which a ``config.yaml`` names another class; modules may have moved."""
 
     def name(node: Any) -> str:
-        return str(node.get("_target_")).rpartition(".")[2] if isinstance(node, Mapping) else ""
+        written = str(node.get("_target_")).rpartition(".")[2] if isinstance(node, Mapping) else ""
+        return _RENAMED.get(written, written)
 
     pairs = {group: (name(held.get(group)), name(trained[group])) for group in COMPONENTS}
     return [f"{group} is {there} and was {here}" for group, (there, here) in pairs.items() if there != here]

@@ -15,17 +15,17 @@ def check_start(settings: Settings, found: Checkpoint) -> None:
     """
     found.check_goes_on()
     batch = settings.collector.steps * settings.n_worlds
-    learnt(found, settings.algorithm.build(settings.make_env(1, 0), settings.model, batch).loss)
+    learned_parameters(found, settings.algorithm.build(settings.make_env(1, 0), settings.model, batch).loss)
 
 
-def learnt(found: Checkpoint, loss: LossModule) -> dict[str, Tensor]:
+def learned_parameters(found: Checkpoint, loss: LossModule) -> dict[str, Tensor]:
     """Return what a checkpoint's loss has learnt, the state of networks and of value normalisation, by name.
 
     Raises:
         CheckpointError: If it does not fit this loss.
     """
     own, given = (
-        {name: each for name, each in state.items() if _is_learnt(name)}
+        {name: each for name, each in state.items() if _is_learned(name)}
         for state in (loss.state_dict(), found.training()["loss"])
     )
     if {name: each.shape for name, each in own.items()} != {name: each.shape for name, each in given.items()}:
@@ -33,6 +33,6 @@ def learnt(found: Checkpoint, loss: LossModule) -> dict[str, Tensor]:
     return given
 
 
-def _is_learnt(name: str) -> bool:
+def _is_learned(name: str) -> bool:
     """Return whether an entry of a loss's state is a parameter or the running scale of values, and not a setting."""
     return "_params." in name or name.startswith("value_norm.")

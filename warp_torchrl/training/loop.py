@@ -24,10 +24,10 @@ from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs import disk
 from warp_torchrl.runs.logging import MetricsFile, Tracker
 from warp_torchrl.runs.saving import SaveClock, passes
-from warp_torchrl.runs.transfer import learnt
-from warp_torchrl.training.progress import TRAIN_COLUMNS, episode_columns, line, told_of_batches
+from warp_torchrl.runs.transfer import learned_parameters
+from warp_torchrl.training.progress import TRAIN_COLUMNS, batch_size_notice, episode_columns, line
 from warp_torchrl.training.reward_scale import RewardScale
-from warp_torchrl.training.signals import Noted, Stopped
+from warp_torchrl.training.signals import DeferredSignals, Stopped
 from warp_torchrl.world.fast.compile import compile_function
 
 log = logging.getLogger("warp_torchrl")
@@ -56,7 +56,7 @@ class Training:
         learner = settings.algorithm.build(self.env, settings.model, self.frames_per_batch)
         if settings.compile:
             learner.terms = compile_function(learner.terms)
-        self.learner: Learner = settings.imitation.taught(learner, self.env)
+        self.learner: Learner = settings.imitation.kickstart(learner, self.env)
         self.reward_scale = RewardScale(settings.reward.gamma) if settings.reward.normalise else None
         self.collection = settings.collector.open(self.env, self.learner, settings.make_training_env, first)
         self.frames = 0
@@ -74,7 +74,7 @@ class Training:
             Stopped: By a signal, after saving.
             NumericalFailure: If a reward, loss or gradient is not finite.
         """
-        with Noted() as signals:
+        with DeferredSignals() as signals:
             tracker = self.settings.logger.open(self.run)
             try:
                 self._train(signals, tracker)
@@ -86,9 +86,9 @@ class Training:
             if signals.received:
                 raise Stopped(signals.received, self.run)
 
-    def _train(self, signals: Noted, tracker: Tracker) -> None:
+    def _train(self, signals: DeferredSignals, tracker: Tracker) -> None:
         total = self.settings.total_frames
-        told = told_of_batches(total, self.settings.n_worlds, self.settings.collector.steps)
+        told = batch_size_notice(total, self.settings.n_worlds, self.settings.collector.steps)
         if told is not None and self.frames < total:
             log.log(logging.WARNING if total < self.frames_per_batch else logging.INFO, told)
         bar = tqdm(total=total, initial=self.frames, unit="frame", disable=None, dynamic_ncols=True)
@@ -118,7 +118,7 @@ class Training:
 
     _last_seconds = 0.0
 
-    def _batches(self, signals: Noted) -> Iterator[TensorDictBase]:
+    def _batches(self, signals: DeferredSignals) -> Iterator[TensorDictBase]:
         """Yield batches; where a worker dies, save first what was learnt."""
         try:
             yield from self.collection
@@ -158,7 +158,7 @@ class Training:
         """Set what changes with progress; the columns that it gives belong to the next row."""
         self._scheduled = self.learner.schedule(min(1.0, self.frames / self.settings.total_frames))
 
-    def tell_new_total(self, before: int) -> None:
+    def log_new_total(self, before: int) -> None:
         """Log what goes another way from here on than in a training of another length.
 
         Args:
@@ -242,7 +242,7 @@ class Training:
             CheckpointError: If it trained by another kind of loss or other networks.
         """
         loss = self.learner.loss
-        loss.load_state_dict({**loss.state_dict(), **learnt(found, loss)})
+        loss.load_state_dict({**loss.state_dict(), **learned_parameters(found, loss)})
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything that a run needs to go on exactly as if never stopped."""

@@ -48,7 +48,7 @@ def line(row: Mapping[str, float | None], total: int) -> str:
     )
 
 
-def told_of_batches(total: int, n_worlds: int, steps: int) -> str | None:
+def batch_size_notice(total: int, n_worlds: int, steps: int) -> str | None:
     """Return what is said where a training cannot end at its number of frames, since it takes whole batches.
 
     Args:

@@ -1,4 +1,4 @@
-"""What asks a command to stop: noted where a run can save first, obeyed at once elsewhere."""
+"""What asks a command to stop: noted where a run can save first, exit_on_signal at once elsewhere."""
 
 import os
 import signal
@@ -24,7 +24,7 @@ class Stopped(Exception):  # noqa: N818
         self.number = number
 
 
-class Noted:
+class DeferredSignals:
     """Within it the first signal is only noted; a second one ends the process.
 
     Attributes:
@@ -34,7 +34,7 @@ class Noted:
     def __init__(self) -> None:
         self.received = 0
 
-    def __enter__(self) -> "Noted":
+    def __enter__(self) -> "DeferredSignals":
         self._before = _watch(self._note)
         return self
 
@@ -48,7 +48,7 @@ class Noted:
 
 
 @contextmanager
-def obeyed() -> Iterator[None]:
+def exit_on_signal() -> Iterator[None]:
     """Within it a signal ends the process with its exit code, in one line."""
     before = _watch(_leave)
     try:

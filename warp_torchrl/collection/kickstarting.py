@@ -15,20 +15,20 @@ from torch.nn.functional import cross_entropy
 from warp_torchrl.algorithms.algorithm import Algorithm
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.algorithms.on_policy import OnPolicy
-from warp_torchrl.collection.collectors import Direct, Process
+from warp_torchrl.collection.collectors import InProcess, MultiProcess
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS, Heuristic
 from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, TEACHER_ACTION
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.validation import check_fields
 
-TEACHERS = tuple(name for name, rule in HEURISTICS.items() if not rule.remembers)
+TEACHERS = tuple(name for name, heuristic in HEURISTICS.items() if not heuristic.is_stateful)
 """Names of the heuristics that can teach: they tell what to do in any state, whoever led there."""
 _LOSS, _COLUMN = "loss_bc", "train/cloning_loss"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Imitation:
+class Kickstarting:
     """How a team learns from a teacher, which may see more than the team does.
 
     A policy that learnt so is imitation-initialised; who reports it should say so.
@@ -52,7 +52,7 @@ class Imitation:
             hint = did_you_mean(self.teacher, TEACHERS)
             raise ValueError(f"teacher must be null or one of {', '.join(TEACHERS)}, got {self.teacher}{hint}")
 
-    def check_fits(self, algorithm: Algorithm, collector: Direct) -> None:
+    def check_fits(self, algorithm: Algorithm, collector: InProcess) -> None:
         """Check that a teacher, where there is one, can teach.
 
         Raises:
@@ -60,10 +60,10 @@ class Imitation:
         """
         if self.teacher is not None and not isinstance(algorithm, OnPolicy):
             raise ValueError("teacher must be null where the algorithm replays: choose mappo, ippo, ppo or a2c")
-        if self.teacher is not None and isinstance(collector, Process):
+        if self.teacher is not None and isinstance(collector, MultiProcess):
             raise ValueError("teacher must be null where workers collect: choose collector=direct")
 
-    def taught(self, learner: Learner, env: WildfireEnv) -> Learner:
+    def kickstart(self, learner: Learner, env: WildfireEnv) -> Learner:
         """Return the learner with its teacher, where it has one.
 
         Args:
@@ -72,10 +72,10 @@ class Imitation:
         """
         if self.teacher is None:
             return learner
-        lesson = _Lesson(self, learner)
+        lesson = _KickstartingLoss(self, learner)
         return replace(
             learner,
-            explore=_Pupil(learner.explore, HEURISTICS[self.teacher](env), lesson),
+            explore=_Student(learner.explore, HEURISTICS[self.teacher](env), lesson),
             terms=lesson.terms,
             loss_keys=(*learner.loss_keys, _LOSS),
             columns={**learner.columns, _LOSS: _COLUMN},
@@ -83,18 +83,18 @@ class Imitation:
         )
 
 
-class _Lesson:
+class _KickstartingLoss:
     """A learner's loss with the cloning loss beside it.
 
     It is what TorchRL's ``BCLoss`` says of the teacher's choices, of the logits that the learner's own loss has just
     worked out of the same sample: cloning takes no pass of its own.
     """
 
-    def __init__(self, plan: Imitation, learner: Learner) -> None:
+    def __init__(self, plan: Kickstarting, learner: Learner) -> None:
         self.plan, self.learner, self.weight = plan, learner, plan.weight
-        learner.loss.actor_network[0].register_forward_hook(self._overhear)
+        learner.loss.actor_network[0].register_forward_hook(self._keep_logits)
 
-    def _overhear(self, actor: nn.Module, given: object, said: TensorDictBase) -> None:
+    def _keep_logits(self, actor: nn.Module, given: object, said: TensorDictBase) -> None:
         self._logits = said.get(LOGITS)
 
     def terms(self, sample: TensorDictBase) -> TensorDictBase:
@@ -110,10 +110,10 @@ class _Lesson:
         return self.learner.schedule(progress)
 
 
-class _Pupil(TensorDictModuleBase):
+class _Student(TensorDictModuleBase):
     """A policy that is told, while the lesson lasts, what its teacher would do."""
 
-    def __init__(self, policy: TensorDictModuleBase, teacher: Heuristic, lesson: _Lesson) -> None:
+    def __init__(self, policy: TensorDictModuleBase, teacher: Heuristic, lesson: _KickstartingLoss) -> None:
         super().__init__()
         self.in_keys, self.out_keys = policy.in_keys, [*policy.out_keys, TEACHER_ACTION]
         self.policy, self._teacher, self._lesson = policy, teacher, lesson
