@@ -1,4 +1,4 @@
-"""The two commands: checks first, works, and ends with one line and an exit code when something fails."""
+"""The commands train and evaluate. They check everything first, and end a failure with one line and an exit code."""
 
 import logging
 import os
@@ -49,12 +49,12 @@ _NOT_RECORDED = ("resume", "debug", "policy", "hydra")
 
 
 def train() -> None:
-    """Train, as ``python train.py`` and ``warp-train`` do; ends the process with the exit code."""
+    """Run ``python train.py`` or ``warp-train``; ends the process with an exit code."""
     _run("train", _train_job)
 
 
 def evaluate() -> None:
-    """Evaluate, as ``python evaluate.py`` and ``warp-evaluate`` do; ends the process with the exit code."""
+    """Run ``python evaluate.py`` or ``warp-evaluate``; ends the process with an exit code."""
     _run("evaluate", _evaluate_job)
 
 
@@ -97,7 +97,7 @@ def _resume(folder: Path, total_frames: Any) -> None:
     training.load_state_dict(run.found.training())
     log.info("resumed %s at %d frames", run.found.path, training.frames)
     if run.settings.total_frames != run.total_before:
-        # Now and not with the next checkpoint: a run that is killed before it goes on to the new total too.
+        # Before the next checkpoint: a run that is killed now must resume with the new total too.
         disk.replace(folder / "config.yaml", OmegaConf.to_yaml(recompose(run.record), resolve=True))
         training.log_new_total(run.total_before)
     _finish(training, world_overrides(run.values))
@@ -112,7 +112,7 @@ def _finish(training: Training, worlds: Sequence[str]) -> None:
 
 
 def _newest(path: str | Path) -> checkpoints.Checkpoint:
-    """Return the newest sound checkpoint, and say which were skipped."""
+    """Return the newest sound checkpoint, and log the skipped ones."""
     found, skipped = checkpoints.newest(path)
     _say_skipped(skipped)
     return found
@@ -126,7 +126,7 @@ def _say_skipped(skipped: Sequence[str]) -> None:
 def _evaluate_job(config: DictConfig) -> None:
     folder = Path(HydraConfig.get().runtime.output_dir)
     if not config.overwrite:
-        check_free(folder, "hydra.run.dir")  # once more: a sweep may have named two jobs' folders alike
+        check_free(folder, "hydra.run.dir")  # again: two jobs of a sweep may have the same folder
     given, name = config.checkpoint, config.policy
     if given is None:
         evaluate_policy(settings(_without_checkpoint(config)), folder, name, world_overrides(plain(config)))
@@ -137,11 +137,11 @@ def _evaluate_job(config: DictConfig) -> None:
 
 
 def _of_worlds(overrides: Sequence[str]) -> list[str]:
-    """Return the overrides of an evaluation that are not the command's own."""
+    """Return an evaluation's overrides without the command's own keys."""
     return [each for each in overrides if not each.startswith(("checkpoint=", "policy=", "overwrite="))]
 
 
-# What a run folder records
+# The saved configuration
 
 
 def _choices() -> dict[str, str]:
@@ -157,14 +157,14 @@ def _without_checkpoint(config: DictConfig) -> dict[str, Any]:
     return plain(config) | {"checkpoint": plain(compose_config("train"))["checkpoint"]}
 
 
-# Checks before any work, and what is said when something fails
+# Checks before any work, and errors
 
 
 def _run(name: str, job: Callable[[DictConfig], None]) -> None:
     arguments = sys.argv[1:]
     debug = "debug=true" in [each.lower() for each in arguments]
-    logging.raiseExceptions = debug  # a log that cannot be written is no second failure
-    os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra's own errors come to fail
+    logging.raiseExceptions = debug  # a full disk must not print a second error
+    os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra then raises its errors instead of printing them
     keep_freed_memory()
     with exit_on_signal():
         try:
@@ -203,7 +203,7 @@ def _check_first(name: str, arguments: Sequence[str]) -> None:
     overrides = [each for each in arguments if not each.startswith("-")]
     flags = [each for each in arguments if each.startswith("-")]
     if any(flag not in _MULTIRUN for flag in flags):
-        return  # Hydra's own flags (--help, --cfg, --config-dir ...) are Hydra's business
+        return  # Hydra handles its own flags (--help, --cfg, --config-dir ...)
     check_overrides(overrides)
     own = [each for each in overrides if not each.startswith("hydra")]
     sweeps = bool(flags) or is_sweep(name, own)
@@ -240,7 +240,7 @@ def _check_training(config: DictConfig, overrides: Sequence[str]) -> None:
 
 
 def _new_total(config: DictConfig, overrides: Sequence[str]) -> Any:
-    """Return the total that a resumed run is to go on to, None where none is asked for."""
+    """Return the new ``total_frames`` of a resumed run; None if the command line gives none."""
     return config.total_frames if any(each.startswith("total_frames=") for each in overrides) else None
 
 

@@ -1,4 +1,4 @@
-"""A policy assessed: it and the baselines meet the same fires, and what came of it is told, kept and drawn."""
+"""Evaluation of a policy beside the baselines on the same fires: table, ``evaluation.json`` and ``episode.gif``."""
 
 import logging
 from collections.abc import Sequence
@@ -25,10 +25,10 @@ def evaluate_policy(plan: Settings, folder: Path, found: checkpoints.Checkpoint 
     """Evaluate a checkpoint or a heuristic beside the baselines: table, ``evaluation.json`` and ``episode.gif``.
 
     Args:
-        plan: Of the worlds.
-        folder: Where to.
-        found: What is evaluated.
-        worlds: How they differ from their scenario's, as overrides.
+        plan: Settings of the worlds and the evaluation.
+        folder: The output folder.
+        found: The checkpoint, or the heuristic's name.
+        worlds: Overrides by which the worlds differ from their scenario.
     """
     first, folder = plan.evaluation.first_seed, folder.resolve()
     env, one = plan.make_env(plan.evaluation.episodes, first), plan.make_env(1, first)
@@ -56,11 +56,11 @@ def evaluate_policy(plan: Settings, folder: Path, found: checkpoints.Checkpoint 
 
 
 def check_policy(plan: Settings, found: checkpoints.Checkpoint | str) -> None:
-    """Check that a checkpoint or a heuristic can be evaluated, before anything is made for it.
+    """Check that a checkpoint or a heuristic can be evaluated, before any output is written.
 
     Raises:
-        CheckpointError: If its weights do not fit.
-        ConfigError: If it does not fit the environment.
+        CheckpointError: If the weights do not fit the networks.
+        ConfigError: If the policy does not fit the environment.
     """
     one = plan.make_env(1, plan.evaluation.first_seed)
     _actors(plan, found, one, one)
@@ -69,7 +69,7 @@ def check_policy(plan: Settings, found: checkpoints.Checkpoint | str) -> None:
 def _actors(
     plan: Settings, found: checkpoints.Checkpoint | str, env: WildfireEnv, one: WildfireEnv
 ) -> tuple[str, str, TensorDictModuleBase, TensorDictModuleBase]:
-    """Return a policy's name, its mode, and who acts in many worlds and in one."""
+    """Return the policy's name and mode, the policy for many worlds, and the policy for one."""
     if isinstance(found, str):
         return found, "sampled", HEURISTICS[found](env), HEURISTICS[found](one)
     try:
@@ -83,8 +83,8 @@ _PLAYED: dict[str, tuple[Settings, dict[str, Episodes]]] = {}
 
 
 def _baselines(plan: Settings, env: WildfireEnv, names: Sequence[str]) -> dict[str, Episodes]:
-    """Return the episodes of heuristics; the jobs of a sweep that meet the same worlds play them once."""
+    """Return the episodes of heuristics; jobs of a sweep with the same worlds play them once."""
     worlds = repr((plan.world, plan.observation, plan.reward, plan.evaluation, plan.device))
-    _, played = _PLAYED.setdefault(worlds, (plan, {}))  # the plan stays alive: no other can come to print the same
+    _, played = _PLAYED.setdefault(worlds, (plan, {}))  # keeps the plan alive: a repr may hold addresses of objects
     played |= play_heuristics(env, plan.evaluation.first_seed, [name for name in names if name not in played])
     return {name: played[name] for name in names}

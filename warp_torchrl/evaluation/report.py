@@ -31,17 +31,17 @@ def report(
     """Return the content of ``evaluation.json``.
 
     Args:
-        scenario: Its name.
+        scenario: Name of the scenario.
         policy: Name of the policy, with its mode.
         first_seed: Seed of world 0.
-        episodes: The policy's.
-        others: The heuristics' on the same worlds, by name.
-        other_modes: The same policy's, acting in another mode, by name.
-        left_out: The same policy's with an agent left out, by the agent's name.
-        method: What the policy is called beside others; its name where None.
-        configuration: Tells policies of one method that were trained differently apart.
-        world_overrides: How the worlds differ from the scenario's, as overrides.
-        frames: World steps that the policy was trained for; None where it was not.
+        episodes: Episodes of the policy.
+        others: Episodes of the baselines in the same worlds, by name.
+        other_modes: Episodes of the policy in its other mode, by name.
+        left_out: Episodes of the policy without an agent, by the agent's name.
+        method: The policy's name in tables of many runs; None takes ``policy``.
+        configuration: Digest that distinguishes policies of one method.
+        world_overrides: Overrides by which the worlds differ from the scenario.
+        frames: World steps of training; None for a heuristic.
     """
     if "noop" in others:
         episodes = episodes | {"averted": episodes["saved"] - others["noop"]["saved"]}
@@ -105,7 +105,7 @@ def table(content: Mapping[str, Any]) -> str:
 
 
 def place(content: Mapping[str, Any]) -> str:
-    """Return what the worlds of a report are called: their scenario, and how they differ from it."""
+    """Return the name of a report's worlds: the scenario and its overrides."""
     return " ".join((content["scenario"], *content.get("world_overrides", ())))
 
 
@@ -123,5 +123,5 @@ def _behaviour_lines(content: Mapping[str, Any]) -> list[str]:
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write a file whole or not at all."""
+    """Write a JSON file atomically."""
     disk.replace(path, json.dumps(content, indent=1))

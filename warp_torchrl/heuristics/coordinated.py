@@ -1,4 +1,4 @@
-"""The team shares the front of the fire out."""
+"""The baseline in which agents divide the fire front among themselves."""
 
 import math
 
@@ -18,11 +18,11 @@ from warp_torchrl.world.state import WorldState
 
 
 class Coordinated(Heuristic):
-    """Shares the front out: agents claim distinct cells of it by distance and threat, so that they spread round the
-    fire and its head is attacked first; on the way, and there, they put out what they can reach.
+    """Assigns distinct cells of the fire front to the agents by distance and fire risk, so that they spread around the
+    fire and attack its head first. Agents extinguish whatever they can reach.
     """
 
-    risk_weight = 6.0  # cells of way that a full threat is worth
+    risk_weight = 6.0  # value of fire risk 1 [cells of distance]
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
@@ -33,7 +33,7 @@ class Coordinated(Heuristic):
         return extinguish_or(move_towards(state, self.env, target_or_water(state, self.env, claims)), mask)
 
     def value(self, state: WorldState) -> tuple[Tensor, Tensor]:
-        """Return what each cell is worth [cells of way], float32 [B, H, W], and which are of the front, bool."""
+        """Return each cell's value [cells of distance], float32 [B, H, W], and the fire front, bool [B, H, W]."""
         fire = can_be_put_out(state, self.env)
         threat = self.env.world.forecast(state).fire_risk()
         front = fire & (threat > 0.01)

@@ -1,4 +1,4 @@
-"""Baselines in which each agent acts for itself."""
+"""Baselines without coordination: each agent acts on its own."""
 
 import torch
 from torch import Tensor
@@ -18,7 +18,7 @@ from warp_torchrl.world.state import WorldState
 
 
 class NoOp(Heuristic):
-    """Does nothing: stays, or where the team cannot stay, chooses an action that has no effect."""
+    """Stays, or if the team has no such action, chooses one without effect."""
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
@@ -26,7 +26,7 @@ class NoOp(Heuristic):
 
 
 class Random(Heuristic):
-    """Draws one of the actions that do something, the same ones on the same seed."""
+    """Draws uniformly among the actions that the mask allows; the same seed gives the same draws."""
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
@@ -35,8 +35,8 @@ class Random(Heuristic):
 
 
 class Local(Heuristic):
-    """Sees only the square of ``radius`` cells about itself: puts out what it can reach, else goes to the nearest
-    fire it sees, else sweeps the map, first fanning out across it and then from one random point to the next.
+    """Sees only cells within Chebyshev distance ``radius``: extinguishes what it can reach, else goes to the nearest
+    fire in sight, else searches the map: first the agents fan out, then each goes from one random point to the next.
     """
 
     radius = 5
@@ -50,7 +50,7 @@ class Local(Heuristic):
         return extinguish_or(move_towards(state, self.env, target_or_water(state, self.env, target)), mask)
 
     def _waypoint(self, state: WorldState) -> Tensor:
-        """Return where each agent sweeps to, int64 [B, A, 2]: fanning out over the map, later random points."""
+        """Return each agent's next search point, int64 [B, A, 2]: fanned out at first, then random."""
         size = torch.tensor(state.cells.shape[1:], device=state.cells.device)
         agents = state.vehicles.position.shape[1]
         leg = state.step // size.max()
@@ -63,7 +63,7 @@ class Local(Heuristic):
 
 
 class Greedy(Heuristic):
-    """Puts out what it can reach, else goes to the nearest fire of the map."""
+    """Extinguishes what it can reach, else goes to the nearest fire on the map."""
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
