@@ -13,7 +13,7 @@ from warp_torchrl.adapters.worlds import NumpyStep, Worlds, action_number
 
 RENDER_MODES = ("rgb_array",)
 KEYS = {"w": 0, "e": 1, "d": 2, "c": 3, "x": 4, "z": 5, "a": 6, "q": 7, " ": 8, "f": 9, "s": 10}
-"""Actions by key: moves are about ``s``, which stays, as they are on the keyboard; space puts out fire, f clears."""
+"""Action of each key: the keys around ``s`` move, ``s`` stays, space extinguishes, f clears."""
 Observation = np.ndarray | dict[str, np.ndarray]
 
 
@@ -72,7 +72,7 @@ class FireExtinguishingEnv(gymnasium.Env[Observation, int]):
 
         Args:
             seed: Of the world.
-            options: There are none.
+            options: Not used.
 
         Returns:
             Observation and info.
@@ -95,7 +95,7 @@ class FireExtinguishingEnv(gymnasium.Env[Observation, int]):
 
         Raises:
             RuntimeError: Before the first reset, and after the episode's end.
-            ValueError: If the action is none.
+            ValueError: If the action is out of range.
         """
         if self._worlds.ended[0]:
             raise RuntimeError("the episode has ended: call reset() before step()")
@@ -105,11 +105,11 @@ class FireExtinguishingEnv(gymnasium.Env[Observation, int]):
         return observation, float(now.reward[0, 0]), bool(now.terminated[0]), bool(now.truncated[0]), info
 
     def action_masks(self) -> np.ndarray:
-        """Return which actions would do something, bool [actions]; sb3-contrib asks for it by this name."""
+        """Return the action mask, bool [actions]; sb3-contrib calls this method."""
         return self._mask.copy()
 
     def get_keys_to_action(self) -> dict[tuple[int, ...], int]:
-        """Return actions by the codes of keys, ``KEYS``; ``gymnasium.utils.play`` asks for it by this name."""
+        """Return ``KEYS`` with key codes; ``gymnasium.utils.play`` calls this method."""
         return {(ord(key),): action for key, action in KEYS.items() if action < self._worlds.n_actions}
 
     def render(self) -> np.ndarray | None:
@@ -126,7 +126,7 @@ gym_env = FireExtinguishingEnv
 
 
 def check_alone(worlds: Worlds, scenario: str) -> None:
-    """Refuse teams, which Gymnasium has no place for.
+    """Check that the team has one agent, as Gymnasium needs.
 
     Raises:
         ValueError: If there is more than one agent.

@@ -92,7 +92,7 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
 
     @property
     def np_random(self) -> np.random.Generator:
-        """Return numpy's generator, which the worlds do not draw from: SuperSuit asks for it by this name."""
+        """Return a numpy generator, which the worlds do not use; SuperSuit reads this attribute."""
         if self._np_random is None:
             self._np_random, _ = seeding.np_random()
         return self._np_random
@@ -104,7 +104,7 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
 
         Args:
             seed: Of the world.
-            options: There are none.
+            options: Not used.
 
         Returns:
             Observations and infos by agent.
@@ -132,7 +132,7 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
 
         Raises:
             RuntimeError: Before the first reset, and after the episode's end.
-            ValueError: If an agent is missing or unknown, or an action is none.
+            ValueError: If an agent is missing or unknown, or an action is out of range.
         """
         now = self._worlds.step(self._joint(actions))
         observations, infos = self._by_agent(now)
@@ -145,11 +145,11 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
         return observations, rewards, dict.fromkeys(everyone, terminated), dict.fromkeys(everyone, truncated), infos
 
     def state(self) -> np.ndarray:
-        """Return what the central critic sees, float32 [C, 16, 16]."""
+        """Return the central critic's state, float32 [C, 16, 16]."""
         return self._worlds.state()[0]
 
     def render(self) -> np.ndarray | None:
-        """Return the picture, uint8 [H * s, W * s, 3], in mode ``rgb_array``; show it to people in mode ``human``."""
+        """Return the image, uint8 [H * s, W * s, 3], in mode ``rgb_array``; display it in mode ``human``."""
         return self._screen.render()
 
     def close(self) -> None:
@@ -174,9 +174,9 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
 
 
 parallel_env = FireExtinguishingEnvParallel
-"""The same, as PettingZoo's environments are called."""
+"""The same class under PettingZoo's usual name."""
 
 
 def env(*args: Any, **kwargs: Any) -> AECEnv:
-    """Return the same as an ``AECEnv``, whose agents are asked one after the other; arguments of ``parallel_env``."""
+    """Return an ``AECEnv``, in which agents act in turns; arguments of ``parallel_env``."""
     return parallel_to_aec(parallel_env(*args, **kwargs))

@@ -83,13 +83,13 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
 
         Args:
             seed: World i draws with ``seed + i``, or with ``seed[i]``.
-            options: There are none; ``reset_mask`` is refused, since worlds start anew by themselves.
+            options: Not used; ``reset_mask`` is an error, since finished worlds reset themselves.
 
         Returns:
-            Observations, batched, and infos: an array for each metric, and ``_name``, where it holds.
+            Batched observations, and infos: an array for each metric, and its mask ``_name``.
 
         Raises:
-            ValueError: If a seed is no whole number in 0..2**62, or there are not as many as worlds.
+            ValueError: If a seed is no whole number in 0..2**62, or their number is not B.
         """
         if options is not None and "reset_mask" in options:
             raise ValueError("options['reset_mask'] must be left out: finished worlds start anew by themselves")
@@ -98,7 +98,7 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
         return now.of_agent(slice(None), 0), self._info(now)
 
     def step(self, actions: np.ndarray) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Let every agent act; start the next episode where this step or the last ended one, by ``autoreset_mode``.
+        """Step every world; reset those that ended in this step or the last, by ``autoreset_mode``.
 
         Args:
             actions: Whole numbers, [B].
@@ -133,7 +133,7 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
         return given.astype(np.int64)
 
     def _info(self, now: NumpyStep, where: np.ndarray | None = None) -> dict[str, Any]:
-        """Return infos as Gymnasium batches them: 0 and false where there are none."""
+        """Return infos batched as Gymnasium does: 0 and false in worlds without one."""
         where = np.ones(self.num_envs, dtype=bool) if where is None else where
         values = {name: (value.T * where).T for name, value in now.info_of_agent(slice(None), 0).items()}
         return {**values, **{f"_{name}": where.copy() for name in values}}

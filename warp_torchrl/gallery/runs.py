@@ -1,4 +1,4 @@
-"""Run folders, read for their curves: ``metrics.csv`` and what was trained, without instantiating anything."""
+"""Reads run folders for learning curves, without instantiating anything from their configuration."""
 
 import csv
 import math
@@ -17,20 +17,20 @@ from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError, newest
 
 FRAMES, SECONDS = "time/frames", "time/seconds"
 MOST_ROWS = 400
-"""Rows of a file beyond which they are averaged over bins."""
+"""Files of more rows are averaged over bins."""
 _LARGEST, _LARGEST_CONFIG = 100_000_000, 1_000_000  # bytes
 
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """A run folder: what was trained, and its numbers.
+    """Configuration and metrics of a run folder.
 
     Attributes:
         columns: Columns of ``metrics.csv``, [rows] each, NaN where a value is missing.
         rows_per_bin: Rows that one of these stands for.
         names: Algorithm and teacher, reward, observation and scenario; the folder's own name where nothing is recorded.
-        alike: The same for runs that differ in their seed alone.
-        mark: What tells it from others of the same names.
+        alike: Equal for runs that differ in their seed only.
+        mark: Distinguishes runs of the same names.
         scenario: Its name.
         n_agents: A; None where it is not recorded.
         seed: None where it is not recorded.
@@ -47,7 +47,7 @@ class Run:
 
 
 def run_folders(paths: Sequence[Path]) -> list[Path]:
-    """Return the run folders that are meant, each once: itself, or all below the folder of a sweep."""
+    """Return the run folders of the given paths, each once: a run itself, or all runs of a sweep."""
     found: dict[Path, Path] = {}
     for path in paths:
         if not path.is_dir():
@@ -115,7 +115,7 @@ def _check_time(columns: Mapping[str, np.ndarray]) -> None:
         raise ValueError("it has no rows")
     for name in (FRAMES, SECONDS):
         times = columns.get(name, columns[FRAMES])
-        if not (np.diff(times, prepend=0.0) > 0.0).all():  # nor is that so of NaN
+        if not (np.diff(times, prepend=0.0) > 0.0).all():  # False for NaN too
             raise ValueError(f"{name} must be in every row, positive, and grow")
 
 
