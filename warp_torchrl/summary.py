@@ -63,7 +63,8 @@ def _baselines(found: Mapping[_Key, Sequence[Mapping[str, Any]]]) -> list[Entry]
     held: dict[tuple[str, str, tuple[int, ...]], list[Mapping[str, Any]]] = {}
     for (scenario, _, _, seeds), runs in found.items():
         for run in runs:
-            for name, episodes in _baseline_episodes(run).items():
+            former = run.get("yardstick_episodes", {})  # the key in earlier evaluations
+            for name, episodes in run.get("baseline_episodes", former).items():
                 if (scenario, name, "", seeds) not in found:
                     held.setdefault((scenario, name, seeds), []).append(episodes)
     return [
@@ -71,11 +72,6 @@ def _baselines(found: Mapping[_Key, Sequence[Mapping[str, Any]]]) -> list[Entry]
         for (scenario, name, seeds), episodes in held.items()
         if all(each == episodes[0] for each in episodes)
     ]
-
-
-def _baseline_episodes(run: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return what an evaluation keeps of each baseline's episodes; earlier ones call it ``yardstick_episodes``."""
-    return run.get("baseline_episodes", run.get("yardstick_episodes", {}))
 
 
 def _of_episodes(runs: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
