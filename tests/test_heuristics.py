@@ -74,8 +74,8 @@ def test_the_nearest_fire_is_the_one_that_a_search_of_the_whole_map_finds():
     fire[3] = False
     distance, index = nearest_fire(state, fire)
     everywhere = chebyshev_distance(state.vehicles.position, fire).flatten(2)
-    taste = uniform(state.key, 0, Stream.POLICY, tuple(everywhere.shape[1:]))
-    best = (everywhere + taste).min(dim=-1)
+    tie_break = uniform(state.key, 0, Stream.POLICY, tuple(everywhere.shape[1:]))
+    best = (everywhere + tie_break).min(dim=-1)
     assert (distance == best.values.floor()).all() and (distance[3] == FAR).all()
     burning = fire.flatten(1).any(dim=1)
     assert (index[burning] == best.indices[burning]).all()
@@ -85,7 +85,7 @@ def test_agents_to_whom_nothing_is_worth_a_claim_stay(make_small_env):
     env = make_small_env(1)
     env.reset()
     nothing = torch.full((1, 1, 3), -torch.inf)
-    claims = claim_cells(env.world_state, torch.tensor([[0, 1, 2]]), nothing, elbow_room=1, discount=2.0, taken=1.0)
+    claims = claim_cells(env.world_state, torch.tensor([[0, 1, 2]]), nothing, spacing=1, discount=2.0, taken=1.0)
     assert (claims == env.world_state.vehicles.position).all()
 
 
@@ -96,7 +96,7 @@ def test_coordinated_agents_claim_different_fires():
     value, front = HEURISTICS["coordinated"](env).value(state)
     cells, valid = list_cells(front)
     worth = value.flatten(1).gather(1, cells).masked_fill(~valid, -torch.inf)[:, None]
-    claims = claim_cells(state, cells, worth, elbow_room=3, discount=6.0, taken=1000.0)
+    claims = claim_cells(state, cells, worth, spacing=3, discount=6.0, taken=1000.0)
     index = claims[..., 0] * 32 + claims[..., 1]
     for world in range(8):
         assert len(set(index[world].tolist())) == 4
@@ -142,8 +142,8 @@ def test_half_of_a_mixed_team_digs():
     team = Team(n_agents=5, roles=("ugv", "uav", "ugv", "ugv", "ugv"))
     env = one_fire(team)
     env.reset()
-    assert HEURISTICS["ring"](env).diggers(env.world_state).tolist() == [True, False, True, True, True]
-    assert HEURISTICS["mixed"](env).diggers(env.world_state).tolist() == [True, False, False, True, False]
+    assert HEURISTICS["ring"](env).line_builders(env.world_state).tolist() == [True, False, True, True, True]
+    assert HEURISTICS["mixed"](env).line_builders(env.world_state).tolist() == [True, False, False, True, False]
 
 
 @pytest.mark.parametrize("name", ["local", "greedy", "coordinated"])

@@ -35,10 +35,11 @@ def test_runs_that_were_trained_alike_are_gathered(sweep):
     assert other.scenario == "other"
 
 
-def test_baselines_are_those_of_any_evaluation_that_holds_them(sweep):
+@pytest.mark.parametrize("key", ["baseline_episodes", "yardstick_episodes"])  # the latter in earlier evaluations
+def test_baselines_are_those_of_any_evaluation_that_holds_them(sweep, key):
     path = sweep / "0" / "evaluation.json"
     held = {"saved": [0.2, 0.3, 0.4], "success": [0.0, 0.0, 1.0]}
-    content = json.loads(path.read_text()) | {"yardstick_episodes": {"noop": held, "local": held}}
+    content = json.loads(path.read_text()) | {key: {"noop": held, "local": held}}
     path.write_text(json.dumps(content))
     entries = {(entry.scenario, entry.policy): entry for entry in gather(sweep)}
     assert entries["tiny", "noop"].saved.tolist() == [[0.2, 0.3, 0.4]]
@@ -53,7 +54,7 @@ def test_baselines_that_met_other_worlds_are_left_out(sweep):
             "noop": {"saved": [saved] * 3, "success": [0.0] * 3},
             "random": {"saved": [0.1] * 3, "success": [0.0] * 3},
         }
-        path.write_text(json.dumps(json.loads(path.read_text()) | {"yardstick_episodes": held}))
+        path.write_text(json.dumps(json.loads(path.read_text()) | {"baseline_episodes": held}))
     assert [entry.policy for entry in gather(sweep)] == ["random", "mappo", "local", "local"]
 
 
@@ -98,7 +99,7 @@ def test_other_metrics_are_shown_where_they_were_evaluated(sweep, capsys):
         for episode, number in zip(content["episodes"], numbers, strict=True):
             episode["division"] = number
         path.write_text(
-            json.dumps(content | {"yardstick_episodes": {"noop": {"saved": [0.1] * 3, "success": [0.0] * 3}}})
+            json.dumps(content | {"baseline_episodes": {"noop": {"saved": [0.1] * 3, "success": [0.0] * 3}}})
         )
     main([str(sweep), "--show", "division", "saved"])
     header, _, *rows = capsys.readouterr().out.splitlines()

@@ -2,9 +2,9 @@
 
 import os
 
-# GNU OpenMP's waiting threads spin for milliseconds by default: beside any other load on the machine a step of small
-# tensors was seen to take 30 times as long. A short spin costs next to nothing on a free machine and keeps most of the
-# speed on a busy one. Read when torch is first imported; a setting of the user's own stays.
+# GNU OpenMP's waiting threads spin for milliseconds by default. On a busy machine a step of small tensors then took 30
+# times as long; a short spin avoids this and costs almost nothing on an idle one. torch reads the variable when it is
+# first imported; a value set by the user stays.
 if "OMP_WAIT_POLICY" not in os.environ:
     os.environ.setdefault("GOMP_SPINCOUNT", "1000")
 

@@ -1,4 +1,4 @@
-"""What a user asks for by name: environments and trained policies."""
+"""Environments and trained policies by name."""
 
 import json
 from collections.abc import Sequence
@@ -32,11 +32,11 @@ def make_env(
         scenario: One of ``conf/scenario``.
         n_worlds: B.
         device: Where the worlds live.
-        seed: World i draws with ``seed + i``; None draws a seed when it is first needed, so that copies differ.
-        seeds: Seeds of the worlds one by one, in place of ``seed``.
+        seed: World i has seed ``seed + i``; None draws a seed on first use, so that copies differ.
+        seeds: Seed of each world, instead of ``seed``.
         overrides: In the command line's grammar, ``["fire=paper", "team.n_agents=3"]``.
         validate: Check actions on CUDA too.
-        compile: Fuse what can be with ``torch.compile``.
+        compile: Compile the step with ``torch.compile``.
 
     Returns:
         A TorchRL ``EnvBase`` of batch size [B].
@@ -60,18 +60,18 @@ def make_env(
 
 
 def load_policy(path: str | Path, mode: str = "best") -> TrainedPolicy:
-    """Load a trained policy: decentralised, observation and mask in, action out.
+    """Load a trained decentralised policy, which reads observation and mask and writes the action.
 
-    Only the manifest, the configuration and the policy's parameters are read; all are verified first.
+    It reads only the manifest, the configuration and the policy's parameters, and verifies them first.
 
     Args:
-        path: A run folder (its newest sound checkpoint), one checkpoint folder, or the name of a policy that comes with
-            the package: ``default``, ``single`` or ``skirmish``, where no folder has that name.
-        mode: ``sampled``, ``deterministic``, or ``best``: as was found on training seeds.
+        path: A run folder (its newest sound checkpoint), a checkpoint folder, or the name of a shipped policy:
+            ``default``, ``single`` or ``skirmish``, unless a folder has that name.
+        mode: ``sampled``, ``deterministic``, or ``best``: the better of the two on training seeds.
 
     Returns:
-        A ``TensorDictModule``; any number of worlds. Its ``mode`` says how it acts outside of TorchRL's
-        ``set_exploration_type``; with its ``overrides`` any environment shows what it was trained to read.
+        A ``TensorDictModule`` for any number of worlds. It acts in its ``mode`` outside of TorchRL's
+        ``set_exploration_type``; its ``overrides`` give an environment the observation that it was trained with.
 
     Raises:
         CheckpointError: If there is no sound checkpoint, or it does not fit.
@@ -92,7 +92,7 @@ def policy_of(found: checkpoints.Checkpoint, mode: str = "best") -> TrainedPolic
     try:
         policy = algorithm.policy(found.manifest.signature, model)
         policy.load_state_dict(weights)
-    except Exception as error:  # whatever a signature or weights that do not fit make torch and TorchRL raise
+    except Exception as error:  # torch and TorchRL raise many types for weights that do not fit
         reason = " ".join(str(error).split())
         raise checkpoints.CheckpointError(f"{found.path} is of another architecture: {reason}") from None
     chosen = (found.manifest.mode or "sampled") if mode == "best" else mode

@@ -1,7 +1,7 @@
-"""Hands a trained policy on: ``python -m warp_torchrl.export RUN FOLDER``.
+"""Exports a trained policy: ``python -m warp_torchrl.export RUN FOLDER``.
 
-The folder holds what acting takes, verified as a checkpoint is, and nothing that only training needs: it can be
-evaluated, loaded and shipped, and no run goes on from it.
+The folder holds a checkpoint without its training state. It can be evaluated, loaded and shipped; no run resumes from
+it.
 """
 
 import argparse

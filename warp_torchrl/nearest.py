@@ -1,4 +1,4 @@
-"""Names that a user may have meant."""
+"""Suggestions for mistyped names."""
 
 from collections.abc import Iterable
 from difflib import SequenceMatcher, get_close_matches
@@ -7,10 +7,10 @@ _MOST = 2  # names that are offered
 
 
 def nearest(name: str, known: Iterable[str]) -> list[str]:
-    """Return the known names that a mistyped one may stand for, the likeliest first; none where none is near.
+    """Return the known names closest to a mistyped one, the likeliest first; none if none is close.
 
-    A key below a group, ``algorithm.gama``, is looked for in its group, then by its own name elsewhere, then as a
-    whole, then by names like its own.
+    The last part of a dotted key, ``algorithm.gama``, is first compared within its group, then with equal last parts
+    elsewhere; then the whole key with all keys, and at last its last part with all last parts.
     """
     known = list(dict.fromkeys(known))
     group, _, last = name.lower().rpartition(".")

@@ -1,4 +1,4 @@
-"""A trained policy, as it is handed to users: on TorchRL's tensordicts, and on the adapters' numpy observations."""
+"""Trained policies for users: on TorchRL's tensordicts, and on the adapters' numpy observations."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import nullcontext
@@ -24,18 +24,18 @@ _ROLE_ENTRIES = slice(SELF_SIZE - len(Action) - len(ROLE_NAMES), SELF_SIZE - len
 _ROLE_INDEX = {role.name: index for index, role in enumerate(ROLES.values())}
 
 MODES = {"sampled": ExplorationType.RANDOM, "deterministic": ExplorationType.DETERMINISTIC}
-"""How a policy acts, by name."""
+"""TorchRL's exploration type of each mode."""
 AgentObservation = np.ndarray | Mapping[str, np.ndarray]
 
 
 class TrainedPolicy(TensorDictModuleBase):
-    """A decentralised policy that acts as it was found to act best, unless TorchRL's exploration type is set.
+    """A decentralised policy that acts in its own mode, unless TorchRL's exploration type is set.
 
     Args:
-        module: Observation and mask in, action out.
+        module: Reads observation and mask, writes the action.
         mode: ``sampled`` or ``deterministic``.
-        trained: What it was trained to see and do.
-        overrides: With which any environment shows what the policy was trained to read, and understands what it says:
+        trained: Inputs and outputs that it was trained with.
+        overrides: Give any environment the observation that the policy was trained with:
             ``make_env("large", overrides=policy.overrides)``.
     """
 
@@ -47,10 +47,10 @@ class TrainedPolicy(TensorDictModuleBase):
         self.module, self.mode, self.trained, self.overrides = module, mode, trained, tuple(overrides)
 
     def fitted(self, env: EnvBase) -> "TrainedPolicy":
-        """Return the policy for an environment that may show more channels, or have more actions, than it knows.
+        """Return the policy adapted to an environment that may have more channels or actions than it was trained with.
 
         Raises:
-            ValueError: If the environment lacks what the policy was trained to see or do; which by name.
+            ValueError: If the environment lacks a channel or action of the policy; the message names it.
         """
         here = signature(env)
         if self.is_by_agent and here.n_agents != self.trained.n_agents:
@@ -62,7 +62,7 @@ class TrainedPolicy(TensorDictModuleBase):
 
     @property
     def is_by_agent(self) -> bool:
-        """Return whether it has a network for each agent, and so fits teams of one size alone."""
+        """Return whether it has a network for each agent; then it fits one team size only."""
         return any(isinstance(module, AgentNetworks) for module in self.modules())
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
@@ -72,22 +72,21 @@ class TrainedPolicy(TensorDictModuleBase):
             return self.module(tensordict)
 
     def numpy_policy(self) -> "NumpyPolicy":
-        """Return the policy as a function of the adapters' observations, ``act(observation, info)``."""
+        """Return the policy for the adapters' numpy observations, called as ``act(observation, info)``."""
         return NumpyPolicy(self)
 
 
 class NumpyPolicy:
     """A trained policy on the numpy observations of ``warp_torchrl.adapters``, in either layout.
 
-    It is decentralised: each agent's action comes from its own observation and mask. So one agent may ask alone, a
-    team together, a batch of worlds too; but a policy with a network for each agent (``sharing: none``) must be given
-    the whole team, in the order of ``possible_agents``. A policy with a network for each role (``sharing: role``)
-    reads an agent's role off its name (``bulldozer_0``) or, where it has none, off its ``self``. A policy that
-    remembers (``memory``) does so for each name that it is given; agents without names that are asked one by one need
-    a ``numpy_policy()`` each.
+    Each agent's action depends on its own observation and mask alone, so it takes one agent, a team, or a batch of
+    worlds. A policy with a network for each agent (``sharing: none``) needs the whole team, in the order of
+    ``possible_agents``. A policy with a network for each role (``sharing: role``) reads the role from the agent's name
+    (``bulldozer_0``), or from its ``self`` if it has no name. A recurrent policy (``memory``) keeps a hidden state for
+    each name; agents without names need a ``numpy_policy()`` each.
 
     Args:
-        policy: What acts, in its own mode; where it samples, it draws from torch's generator.
+        policy: Acts in its own mode; sampled actions use torch's generator.
     """
 
     def __init__(self, policy: TrainedPolicy) -> None:
@@ -109,16 +108,16 @@ class NumpyPolicy:
         """Choose actions.
 
         Args:
-            observation: One agent's, as Gymnasium's adapters and each of PettingZoo's agents have it, or a dict of
-                agents' by name. Worlds may come first, [B, ...].
-            info: What came with it; needed in preset ``paper`` alone, whose mask is there unless its layout is flat.
+            observation: Of one agent, as in the Gymnasium adapter, or a dict by agent name, as in PettingZoo. A batch
+                of worlds comes first, [B, ...].
+            info: The same step's info. Only preset ``paper`` needs it: its mask is there unless the layout is flat.
 
         Returns:
-            The agent's action, or a dict by agent's name; for a batch of worlds int64 [B] in place of a number.
+            The agent's action, or a dict by agent name; int64 [B] for a batch of worlds.
 
         Raises:
-            ValueError: If an entry is missing or of another shape or type than the policy was trained on, or the
-                policy needs the whole team or an agent's role and was not given it.
+            ValueError: If an entry is missing, or its shape or type differs from training, or the whole team or an
+                agent's role is needed and missing.
         """
         alone = self._is_of_one(observation)
         team: Mapping[str, Any] = {"": observation} if alone else cast("Mapping[str, Any]", observation)
@@ -136,7 +135,7 @@ class NumpyPolicy:
         return numbers[0] if alone else dict(zip(team, numbers))
 
     def _is_of_one(self, observation: AgentObservation | Mapping[str, AgentObservation]) -> bool:
-        """Return whether an observation is one agent's and not a team's."""
+        """Return whether an observation is of one agent, not of a team."""
         if isinstance(observation, Mapping):
             return bool({FLAT, *self._entries} & observation.keys())
         if "" not in self._entries:
@@ -146,7 +145,7 @@ class NumpyPolicy:
         return True
 
     def _of_agent(self, name: str, seen: Any, info: Mapping[str, Any]) -> dict[Any, np.ndarray]:
-        """Return what the policy reads of one agent, by key."""
+        """Return the policy's inputs of one agent, by key."""
         who = f" of {name}" if name else ""
         is_flat = isinstance(seen, Mapping) and FLAT in seen
         if is_flat:
@@ -185,14 +184,14 @@ class NumpyPolicy:
         return np.moveaxis(action if worlds else action[0], -1, 0)
 
     def _recall(self, names: list[str], worlds: Sequence[int], size: int) -> Tensor:
-        """Return what each agent remembers, float32 [B, A, M]; 0 where it has not acted in these worlds."""
+        """Return each agent's hidden state, float32 [B, A, M]; 0 if it has not acted in this batch of worlds."""
         nothing = torch.zeros(*worlds, size, device=self._device)
         known = [self._memory.get(name, nothing) for name in names]
         return torch.stack([each if each.shape == nothing.shape else nothing for each in known], dim=-2)
 
 
 def _role(name: str, own: np.ndarray | None) -> int:
-    """Return the role's index that a name or an agent's ``self`` tells."""
+    """Return the index of an agent's role, from its name or else from its ``self``."""
     kind = name.rpartition("_")[0]
     if kind in _ROLE_INDEX:
         return _ROLE_INDEX[kind]

@@ -1,4 +1,4 @@
-"""The fire alone, for those who study it without vehicles."""
+"""Fire simulation without vehicles."""
 
 import math
 
@@ -25,7 +25,7 @@ def simulate(
     cell_size: float = 30.0,
     stage_age: Tensor | None = None,
 ) -> Tensor:
-    """Run the fire alone, by the same code as the environment.
+    """Simulate the fire without vehicles, with the environment's own code.
 
     Args:
         cells: The paper's codes, uint8 [B, H, W]: 0 empty, 1..10 tree age, 11..15 fire.
@@ -34,11 +34,11 @@ def simulate(
         wind: (u east, v north) of the air's motion [m/s], or a wind component.
         fire: One of ``conf/fire``, ``paper`` being the complete automaton, or a ``Fire``.
         ticks: Fire ticks to run.
-        first_tick: Ticks that were run before; a run cut in two goes on where it stopped.
-        seed: World i draws with ``seed + i``.
+        first_tick: Ticks already run, to continue a simulation.
+        seed: World i has seed ``seed + i``.
         cell_size: Side of a cell [m].
-        stage_age: Ticks that each burning cell has spent in its stage, uint8 [B, H, W], of a run cut in two under law
-            ``hazard``, where a stage lasts many; None is 0. ``fire_history`` returns it.
+        stage_age: Ticks that each burning cell has spent in its stage, uint8 [B, H, W]; None is 0. Needed to continue a
+            simulation under law ``hazard``, where a stage lasts several ticks. ``fire_history`` returns it.
 
     Returns:
         The codes after the ticks, uint8 [B, H, W].
@@ -62,12 +62,12 @@ def fire_history(
     cell_size: float = 30.0,
     stage_age: Tensor | None = None,
 ) -> FireHistory:
-    """Run the fire alone, as ``simulate`` does, and keep when each cell caught fire.
+    """Simulate the fire as ``simulate`` does, and record when each cell ignites.
 
-    Many fires on one map are one call: ``cover.expand(1000, -1, -1)``.
+    One call simulates many fires on one map: ``cover.expand(1000, -1, -1)``.
 
     Args:
-        cells: As for ``simulate``, and so are the others.
+        cells: See ``simulate``.
         cover: See ``simulate``.
         elevation: See ``simulate``.
         wind: See ``simulate``.
@@ -79,8 +79,8 @@ def fire_history(
         stage_age: See ``simulate``.
 
     Returns:
-        Arrival times, burning cells in time and the codes at the end; ``burn_probability()`` over the worlds,
-        ``burned_area()`` in time.
+        Arrival times, burning cells over time and the final codes; ``burn_probability()`` over the worlds,
+        ``burned_area()`` over time.
 
     Raises:
         ValueError: If a shape, type, code or number does not fit.
@@ -101,7 +101,7 @@ def _start(
     cell_size: float,
     stage_age: Tensor | None,
 ) -> tuple[WorldState, Fire, Wind]:
-    """Return the checked worlds at their start, and the components that names and numbers stand for."""
+    """Check the arguments; return the initial state, the fire and the wind."""
     for name, plane, top in (("cells", cells, EMBER), ("cover", cover, max(Cover)), ("stage_age", stage_age, 255)):
         if plane is None:
             continue
@@ -139,7 +139,7 @@ def _start(
 
 
 def _automaton(fire: str | Fire) -> Fire:
-    """Return the automaton that a name of ``conf/fire`` stands for."""
+    """Return a fire, built from ``conf/fire`` if given by name."""
     if isinstance(fire, str):
         return build(plain(compose_config("train", [f"fire={fire}"]))["fire"], "fire")
     return fire

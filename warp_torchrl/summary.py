@@ -1,6 +1,6 @@
-"""What runs came to: one table and one figure from their ``evaluation.json`` files.
+"""Summarises runs: one table and one figure from their ``evaluation.json`` files.
 
-A sweep ends with them; ``python -m warp_torchrl.summary FOLDER ...`` makes them of any runs.
+A sweep writes both at its end; ``python -m warp_torchrl.summary FOLDER ...`` makes them for any runs.
 """
 
 import argparse
@@ -21,20 +21,20 @@ _Key = tuple[str, str, str, tuple[int, ...]]  # scenario, method, configuration,
 
 
 class Entry(NamedTuple):
-    """A policy on a scenario, over all the runs that were trained alike."""
+    """Results of a policy on a scenario, over all runs that differ in their seed only."""
 
     scenario: str
     policy: str
     saved: np.ndarray  # [runs, n]
     success: np.ndarray  # [runs, n]
     seeds: tuple[int, ...]
-    metrics: Mapping[str, np.ndarray] = {}  # by name, [runs, n], NaN where an episode has none; a baseline's are none
+    metrics: Mapping[str, np.ndarray] = {}  # by name, [runs, n], NaN where an episode has none; empty for baselines
 
 
 def gather(*folders: Path) -> list[Entry]:
-    """Return what the ``evaluation.json`` files under folders hold, the baselines that they were measured by included.
+    """Return the results in the ``evaluation.json`` files under folders, baselines included.
 
-    Runs that differ in their seed alone are one entry.
+    Runs that differ in their seed only are one entry.
     """
     found: dict[_Key, list[Mapping[str, Any]]] = {}
     for path in (path for folder in folders for path in sorted(folder.glob("**/evaluation.json"))):
@@ -56,14 +56,15 @@ def gather(*folders: Path) -> list[Entry]:
 
 
 def _baselines(found: Mapping[_Key, Sequence[Mapping[str, Any]]]) -> list[Entry]:
-    """Return the baselines that have no evaluation of their own, as others hold them.
+    """Return the baselines in other policies' evaluations that have no evaluation of their own.
 
-    Those that did not save the same in each met other worlds, under the scenario's name, and are left out.
+    A baseline whose episodes differ between evaluations played in different worlds, and is left out.
     """
     held: dict[tuple[str, str, tuple[int, ...]], list[Mapping[str, Any]]] = {}
     for (scenario, _, _, seeds), runs in found.items():
         for run in runs:
-            for name, episodes in run.get("yardstick_episodes", {}).items():
+            former = run.get("yardstick_episodes", {})  # the key in earlier evaluations
+            for name, episodes in run.get("baseline_episodes", former).items():
                 if (scenario, name, "", seeds) not in found:
                     held.setdefault((scenario, name, seeds), []).append(episodes)
     return [
@@ -83,11 +84,11 @@ def _differ(found: Mapping[_Key, Any], scenario: str, method: str) -> bool:
 
 
 def table(entries: Sequence[Entry], against: str | None = None) -> str:
-    """Return the entries as a Markdown table, best first in each scenario, each compared with one of them.
+    """Return a Markdown table of the entries, best first in each scenario, each compared with one policy.
 
     Args:
         entries: Policies on scenarios.
-        against: With which policy; by default, and where a scenario lacks it, with the best.
+        against: The policy to compare with; by default, or if a scenario lacks it, the best one.
     """
     lines = [
         f"| scenario | policy | runs | fires | saved % | 95 % | iqm % | success % | to {against or 'the best'} | 95 % "
@@ -122,10 +123,10 @@ def table(entries: Sequence[Entry], against: str | None = None) -> str:
 
 
 def metrics_table(entries: Sequence[Entry], names: Sequence[str]) -> str:
-    """Return means of metrics as a Markdown table, best first in each scenario; a dash where no episode has one.
+    """Return a Markdown table of mean metrics, best policy first in each scenario; a dash where no episode has a value.
 
     Raises:
-        ValueError: If no policy was evaluated with a metric.
+        ValueError: If no policy has the metric.
     """
     known = list(dict.fromkeys(name for entry in entries for name in entry.metrics))
     for name in names:
@@ -145,7 +146,7 @@ def _mean_of_known(values: np.ndarray | None) -> str:
 
 
 def draw(entries: Sequence[Entry], path: Path) -> None:
-    """Draw saved trees with their intervals, and the share of fires on which each policy saves so much.
+    """Draw the trees saved with their intervals, and the performance profile of each policy.
 
     Raises:
         ImportError: If Matplotlib is not installed.
@@ -174,7 +175,7 @@ def draw(entries: Sequence[Entry], path: Path) -> None:
 
 
 _LABEL_WIDTH = 32  # characters in a line
-_ROOM_BESIDE = 87.0  # a bar's number stands beside it up to here, and in it beyond
+_ROOM_BESIDE = 87.0  # longer bars have their number inside
 
 
 def _draw_bars(axes: Any, group: Sequence[Entry], styles: Mapping[str, Mapping[str, Any]]) -> None:
@@ -191,7 +192,7 @@ def _draw_bars(axes: Any, group: Sequence[Entry], styles: Mapping[str, Mapping[s
 
 
 def line_style(index: int) -> dict[str, Any]:
-    """Return the colour and the dashes of a figure's line by its place."""
+    """Return the colour and the dashes of line number ``index`` of a figure."""
     colours = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7", "#555555", "#F0E442")  # Okabe, Ito
     dashes = ("-", "--", "-.", ":")
     return {"color": colours[index % len(colours)], "linestyle": dashes[index // len(colours) % len(dashes)]}
@@ -210,7 +211,7 @@ def _range(bounds: Sequence[float], sign: str = "") -> str:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Print the table of the runs that the command line names, and draw the figure where it says so."""
+    """Print the table of the given runs, and draw the figure if asked to."""
     parser = argparse.ArgumentParser(prog="python -m warp_torchrl.summary", description=__doc__)
     parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER", help="runs, or folders of runs")
     parser.add_argument("--against", metavar="POLICY", help="compare with this policy instead of the best")
@@ -233,5 +234,5 @@ def main(arguments: list[str] | None = None) -> None:
 
 if __name__ == "__main__":
     if hasattr(signal, "SIGPIPE"):
-        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # who reads the first lines only, with head, is done then
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # ends quietly when piped into head
     main()

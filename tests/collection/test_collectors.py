@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from warp_torchrl.collection.collectors import Process, WorkerDied
+from warp_torchrl.collection.collectors import MultiProcess, WorkerDied
 from warp_torchrl.config.compose import Record, compose_config, plain
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.seeds import first_world_seed
@@ -108,7 +108,7 @@ def test_workers_must_share_the_worlds():
     with pytest.raises(ConfigError, match=r"collector\.workers must divide n_worlds, 4, got 3"):
         settings(plain(compose_config("train", [*TINY, "collector=process", "collector.workers=3"])))
     with pytest.raises(ValueError, match="workers must be in"):
-        Process(workers=0)
+        MultiProcess(workers=0)
 
 
 def test_a_missing_ray_is_told(monkeypatch):

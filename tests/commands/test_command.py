@@ -254,7 +254,7 @@ def test_a_finished_run_is_trained_longer_and_goes_on_to_the_new_total(run_here,
     assert code == 128 + signal.SIGTERM and checkpoint.newest(run)[0].manifest.frames == 96
     assert "total_frames was 64 and is 128: " in (run / "train.log").read_text()
     with monkeypatch.context() as patched:
-        patched.setattr(command_module, "assess", signalled(command_module.assess, signal.SIGTERM))
+        patched.setattr(command_module, "evaluate_policy", signalled(command_module.evaluate_policy, signal.SIGTERM))
         code, *_ = run_here("train.py", "resume=run")
     assert code == 128 + signal.SIGTERM and checkpoint.newest(run)[0].manifest.frames == 128
     assert (run / "evaluation.json").read_bytes() == first, "it is replaced by the next one alone"
@@ -276,7 +276,7 @@ def test_a_run_that_was_stopped_goes_on_to_a_new_total_even_if_killed_at_once(ru
         run_here("train.py", *SHORT)
     with monkeypatch.context() as patched:
         patched.setattr(Training, "train", lambda training: None)  # dies before it saves anything
-        patched.setattr(command_module, "assess", lambda *args: sys.exit(9))
+        patched.setattr(command_module, "evaluate_policy", lambda *args: sys.exit(9))
         assert run_here("train.py", "resume=run", "total_frames=96")[0] == 9
     code, errors, _ = run_here("train.py", "resume=run")
     assert code == 0, errors
@@ -352,7 +352,7 @@ SHORT = [*TINY, "total_frames=64", "evaluation.episodes=2", "evaluation.mode=sam
         (checkpoint.disk, "save_tensors", 1, signal.SIGTERM, [32]),
         pytest.param(checkpoint, "_drop", 2, signal.SIGUSR1, [32, 64], marks=pytest.mark.stress),
         pytest.param(Training, "_learn", 2, signal.SIGINT, [32, 64], marks=pytest.mark.stress),
-        (command_module, "assess", 1, signal.SIGINT, [32, 64]),
+        (command_module, "evaluate_policy", 1, signal.SIGINT, [32, 64]),
     ],
     ids=["in a save", "in the last save", "in the last iteration", "in the evaluation"],
 )
@@ -388,7 +388,7 @@ def test_a_second_run_in_a_folder_is_refused_and_the_first_goes_on(tmp_path, run
 def test_a_run_that_died_before_its_first_checkpoint_may_start_again(tmp_path, run_here, monkeypatch):
     (tmp_path / "run" / "checkpoints" / ".32.tmp").mkdir(parents=True)
     (tmp_path / "run" / "config.yaml").write_text("old: 1")
-    monkeypatch.setattr(command_module, "assess", lambda *args, **options: None)
+    monkeypatch.setattr(command_module, "evaluate_policy", lambda *args, **options: None)
     code, errors, _ = run_here("train.py", *SHORT)
     assert code == 0, errors
     assert "old: 1" not in (tmp_path / "run" / "config.yaml").read_text()

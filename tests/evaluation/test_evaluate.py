@@ -2,7 +2,7 @@
 
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.settings import settings
-from warp_torchrl.evaluation import evaluate as assessment
+from warp_torchrl.evaluation import evaluate as evaluation_module
 from warp_torchrl.evaluation.play import play_heuristics
 
 TINY = ["landscape.size=12", "horizon=16"]
@@ -15,12 +15,12 @@ def test_the_jobs_of_a_sweep_play_the_baselines_once(monkeypatch):
         asked.append(list(names))
         return play_heuristics(env, first_seed, names)
 
-    monkeypatch.setattr(assessment, "play_heuristics", note)
-    monkeypatch.setattr(assessment, "_PLAYED", {})
+    monkeypatch.setattr(evaluation_module, "play_heuristics", note)
+    monkeypatch.setattr(evaluation_module, "_PLAYED", {})
 
     def baselines(names, *overrides):
         plan = settings(plain(compose_config("train", ["evaluation.episodes=3", *TINY, *overrides])))
-        return assessment._baselines(plan, plan.make_env(3, plan.evaluation.first_seed), names)
+        return evaluation_module._baselines(plan, plan.make_env(3, plan.evaluation.first_seed), names)
 
     first = baselines(["noop", "local"])
     again = baselines(["local", "noop"], "seed=7", "algorithm=ppo")

@@ -65,7 +65,8 @@ def test_another_class_of_the_same_fields_is_told_and_another_module_is_not(writ
     config, _ = written
     moved = {**config, "wind": {**config["wind"], "_target_": "warp_torchrl.wind.Uniform"}}
     other = {**config, "wind": {**config["wind"], "_target_": "warp_torchrl.world.wind.Calm"}}
-    assert _other_classes(moved, config) == []
+    renamed = {**config, "collector": {**config["collector"], "_target_": "warp_torchrl.collectors.Direct"}}
+    assert _other_classes(moved, config) == _other_classes(renamed, config) == []
     assert _other_classes(other, config) == ["wind is Calm and was Uniform"]
 
 

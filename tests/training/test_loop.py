@@ -402,7 +402,7 @@ def test_a_longer_training_has_its_schedules_where_its_own_total_puts_them(finis
     )
     longer.load_state_dict(newest(tmp_path / "run")[0].training())
     with caplog.at_level("INFO", logger="warp_torchrl"):
-        longer.tell_new_total(192)
+        longer.log_new_total(192)
     assert longer.learner.optimizer.param_groups[0]["lr"] == pytest.approx(0.55e-3)
     said = "total_frames was 192 and is 384: what changes over a training goes on as at 50.0 % of the new total"
     assert caplog.messages == [f"{said}, train/learning_rate 0.0001 -> 0.00055"]

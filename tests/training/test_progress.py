@@ -1,6 +1,6 @@
 """What a training tells of itself."""
 
-from warp_torchrl.training.progress import line, told_of_batches
+from warp_torchrl.training.progress import batch_size_notice, line
 
 ROW = {"time/frames": 104, "time/seconds": 3.2, "time/fps": 40.4, "world/saved": None, "rollout/ep_rew_mean": -1.234,
        "train/loss": 0.5}  # fmt: skip
@@ -15,9 +15,9 @@ def test_whole_batches_end_at_a_hundred_per_cent():
 
 
 def test_it_is_told_where_whole_batches_are_not_what_was_asked_for():
-    assert told_of_batches(128, 4, 8) is None
-    assert told_of_batches(20, 4, 8) == (
+    assert batch_size_notice(128, 4, 8) is None
+    assert batch_size_notice(20, 4, 8) == (
         "total_frames=20 is less than one batch: one batch is 32 frames, n_worlds=4 x collector.steps=8, and one is "
         "trained on"
     )
-    assert told_of_batches(100, 4, 8).endswith(": training ends at 128 frames, not at total_frames=100")
+    assert batch_size_notice(100, 4, 8).endswith(": training ends at 128 frames, not at total_frames=100")

@@ -1,4 +1,4 @@
-"""The environment in other tools' clothes: PettingZoo and Gymnasium views of one ``WildfireEnv``, without physics."""
+"""Adapters: PettingZoo and Gymnasium interfaces of a ``WildfireEnv``."""
 
 from warp_torchrl.adapters.gymnasium import FireExtinguishingEnv, gym_env
 from warp_torchrl.adapters.pettingzoo import FireExtinguishingEnvParallel, parallel_env

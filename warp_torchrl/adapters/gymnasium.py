@@ -9,11 +9,11 @@ import torch
 from gymnasium import spaces
 
 from warp_torchrl.adapters.screen import FRAMES_PER_SECOND, Screen
-from warp_torchrl.adapters.worlds import Seen, Worlds, action_number
+from warp_torchrl.adapters.worlds import NumpyStep, Worlds, action_number
 
 RENDER_MODES = ("rgb_array",)
 KEYS = {"w": 0, "e": 1, "d": 2, "c": 3, "x": 4, "z": 5, "a": 6, "q": 7, " ": 8, "f": 9, "s": 10}
-"""Actions by key: moves are about ``s``, which stays, as they are on the keyboard; space puts out fire, f clears."""
+"""Action of each key: the keys around ``s`` move, ``s`` stays, space extinguishes, f clears."""
 Observation = np.ndarray | dict[str, np.ndarray]
 
 
@@ -72,7 +72,7 @@ class FireExtinguishingEnv(gymnasium.Env[Observation, int]):
 
         Args:
             seed: Of the world.
-            options: There are none.
+            options: Not used.
 
         Returns:
             Observation and info.
@@ -82,7 +82,7 @@ class FireExtinguishingEnv(gymnasium.Env[Observation, int]):
         """
         now = self._worlds.reset(seed)
         super().reset(seed=None if seed is None else int(seed))
-        return self._shown(now)
+        return self._unpack(now)
 
     def step(self, action: int) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Let the agent act.
@@ -95,28 +95,28 @@ class FireExtinguishingEnv(gymnasium.Env[Observation, int]):
 
         Raises:
             RuntimeError: Before the first reset, and after the episode's end.
-            ValueError: If the action is none.
+            ValueError: If the action is out of range.
         """
         if self._worlds.ended[0]:
             raise RuntimeError("the episode has ended: call reset() before step()")
         number = action_number("action", action, self._worlds.n_actions)
         now = self._worlds.step(np.array([[number]], dtype=np.int64))
-        observation, info = self._shown(now)
+        observation, info = self._unpack(now)
         return observation, float(now.reward[0, 0]), bool(now.terminated[0]), bool(now.truncated[0]), info
 
     def action_masks(self) -> np.ndarray:
-        """Return which actions would do something, bool [actions]; sb3-contrib asks for it by this name."""
+        """Return the action mask, bool [actions]; sb3-contrib calls this method."""
         return self._mask.copy()
 
     def get_keys_to_action(self) -> dict[tuple[int, ...], int]:
-        """Return actions by the codes of keys, ``KEYS``; ``gymnasium.utils.play`` asks for it by this name."""
+        """Return ``KEYS`` with key codes; ``gymnasium.utils.play`` calls this method."""
         return {(ord(key),): action for key, action in KEYS.items() if action < self._worlds.n_actions}
 
     def render(self) -> np.ndarray | None:
         """Return the picture, uint8 [H * s, W * s, 3], in mode ``rgb_array``."""
         return self._screen.render()
 
-    def _shown(self, now: Seen) -> tuple[Observation, dict[str, Any]]:
+    def _unpack(self, now: NumpyStep) -> tuple[Observation, dict[str, Any]]:
         self._mask = now.action_mask[0, 0].astype(bool)
         return now.of_agent(0, 0), now.info_of_agent(0, 0)
 
@@ -126,7 +126,7 @@ gym_env = FireExtinguishingEnv
 
 
 def check_alone(worlds: Worlds, scenario: str) -> None:
-    """Refuse teams, which Gymnasium has no place for.
+    """Check that the team has one agent, as Gymnasium needs.
 
     Raises:
         ValueError: If there is more than one agent.

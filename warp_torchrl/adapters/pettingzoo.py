@@ -11,7 +11,7 @@ from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
 from warp_torchrl.adapters.screen import FRAMES_PER_SECOND, Screen
-from warp_torchrl.adapters.worlds import Seen, Worlds, action_number
+from warp_torchrl.adapters.worlds import NumpyStep, Worlds, action_number
 
 RENDER_MODES = ("human", "rgb_array")
 Observation = np.ndarray | dict[str, np.ndarray]
@@ -92,7 +92,7 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
 
     @property
     def np_random(self) -> np.random.Generator:
-        """Return numpy's generator, which the worlds do not draw from: SuperSuit asks for it by this name."""
+        """Return a numpy generator, which the worlds do not use; SuperSuit reads this attribute."""
         if self._np_random is None:
             self._np_random, _ = seeding.np_random()
         return self._np_random
@@ -104,7 +104,7 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
 
         Args:
             seed: Of the world.
-            options: There are none.
+            options: Not used.
 
         Returns:
             Observations and infos by agent.
@@ -132,7 +132,7 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
 
         Raises:
             RuntimeError: Before the first reset, and after the episode's end.
-            ValueError: If an agent is missing or unknown, or an action is none.
+            ValueError: If an agent is missing or unknown, or an action is out of range.
         """
         now = self._worlds.step(self._joint(actions))
         observations, infos = self._by_agent(now)
@@ -145,11 +145,11 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
         return observations, rewards, dict.fromkeys(everyone, terminated), dict.fromkeys(everyone, truncated), infos
 
     def state(self) -> np.ndarray:
-        """Return what the central critic sees, float32 [C, 16, 16]."""
+        """Return the central critic's state, float32 [C, 16, 16]."""
         return self._worlds.state()[0]
 
     def render(self) -> np.ndarray | None:
-        """Return the picture, uint8 [H * s, W * s, 3], in mode ``rgb_array``; show it to people in mode ``human``."""
+        """Return the image, uint8 [H * s, W * s, 3], in mode ``rgb_array``; display it in mode ``human``."""
         return self._screen.render()
 
     def close(self) -> None:
@@ -167,16 +167,16 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
         ]
         return np.array([numbers], dtype=np.int64)
 
-    def _by_agent(self, now: Seen) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
+    def _by_agent(self, now: NumpyStep) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         agents = list(enumerate(self.possible_agents))
         observations = {name: now.of_agent(0, index) for index, name in agents}
         return observations, {name: now.info_of_agent(0, index) for index, name in agents}
 
 
 parallel_env = FireExtinguishingEnvParallel
-"""The same, as PettingZoo's environments are called."""
+"""The same class under PettingZoo's usual name."""
 
 
 def env(*args: Any, **kwargs: Any) -> AECEnv:
-    """Return the same as an ``AECEnv``, whose agents are asked one after the other; arguments of ``parallel_env``."""
+    """Return an ``AECEnv``, in which agents act in turns; arguments of ``parallel_env``."""
     return parallel_to_aec(parallel_env(*args, **kwargs))

@@ -1,4 +1,4 @@
-"""Where pictures of a world go: an array, a window, or the terminal."""
+"""Render modes: an array, a window, or text in the terminal."""
 
 import shutil
 import sys
@@ -13,27 +13,26 @@ FRAMES_PER_SECOND = 8
 
 
 class Viewer(Protocol):
-    """Shows pictures to people."""
+    """Displays frames."""
 
     def show(self, frame: np.ndarray) -> None:
-        """Show a picture, uint8 [H, W, 3]."""
+        """Display a frame, uint8 [H, W, 3]."""
 
     def close(self) -> None:
-        """Take the picture away."""
+        """Close the display."""
 
 
 class Screen:
-    """Shows a world as its render mode says.
+    """Renders a world in a render mode.
 
     Args:
-        draw: Returns the picture, uint8 [H, W, 3].
-        render_mode: ``human``, for people: a window, or the terminal where there is no display or no pygame;
-            ``rgb_array``, an array; or None, nothing.
-        modes: Those that there are.
-        title: Of the window.
+        draw: Returns the frame, uint8 [H, W, 3].
+        render_mode: ``human``, a window, or the terminal without a display or pygame; ``rgb_array``, an array; or None.
+        modes: Supported modes.
+        title: Title of the window.
 
     Raises:
-        ValueError: If the mode is none of them.
+        ValueError: If the mode is not supported.
     """
 
     def __init__(
@@ -45,12 +44,12 @@ class Screen:
         self._viewer = viewer(title) if render_mode == "human" else None
 
     def refresh(self) -> None:
-        """Show people the world as it is now."""
+        """Display the current world in mode ``human``."""
         if self._viewer is not None:
             self._viewer.show(self._draw())
 
     def render(self) -> np.ndarray | None:
-        """Return the picture, uint8 [H, W, 3], in mode ``rgb_array``; show it to people in mode ``human``."""
+        """Return the frame, uint8 [H, W, 3], in mode ``rgb_array``; display it in mode ``human``."""
         if self._mode is None:
             logger.warn("render() shows nothing: make the environment with a render_mode")
         self.refresh()
@@ -63,7 +62,7 @@ class Screen:
 
 
 def viewer(title: str) -> Viewer:
-    """Return pygame's window where there is a display, else the terminal."""
+    """Return a pygame window, or the terminal without a display or pygame."""
     if find_spec("pygame") is None:
         return Terminal()
     import pygame
@@ -72,16 +71,16 @@ def viewer(title: str) -> Viewer:
         pygame.display.init()
     except pygame.error:
         return Terminal()
-    # Without a display pygame draws where nobody looks.
+    # Without a display pygame may draw off-screen.
     return Terminal() if pygame.display.get_driver() == "offscreen" else Window(pygame, title)
 
 
 class Window:
-    """A window of pygame's.
+    """A pygame window.
 
     Args:
-        pygame: The module, whose display is ready.
-        title: Of the window.
+        pygame: The module, with its display initialised.
+        title: Title of the window.
     """
 
     def __init__(self, pygame: Any, title: str) -> None:
@@ -89,7 +88,7 @@ class Window:
         pygame.display.set_caption(title)
 
     def show(self, frame: np.ndarray) -> None:
-        """Show a picture, uint8 [H, W, 3], for as long as one lasts."""
+        """Display a frame, uint8 [H, W, 3], for its duration."""
         pygame, size = self._pygame, frame.shape[1::-1]
         surface = pygame.display.get_surface()
         if surface is None or surface.get_size() != size:
@@ -105,25 +104,25 @@ class Window:
 
 
 class Terminal:
-    """Pictures as text on standard output: each over the one before on a terminal, else one below the other."""
+    """Displays frames as text on standard output; on a terminal each frame replaces the last."""
 
     def show(self, frame: np.ndarray) -> None:
-        """Show a picture, uint8 [H, W, 3], as large as the terminal allows."""
+        """Display a frame, uint8 [H, W, 3], as large as fits the terminal."""
         columns, lines = shutil.get_terminal_size()
         start = "\x1b[H\x1b[2J" if sys.stdout.isatty() else ""
         print(start + as_text(frame, columns, lines - 1), flush=True)
 
     def close(self) -> None:
-        """Leave the last picture where it is."""
+        """Do nothing: the last frame stays."""
 
 
 def as_text(frame: np.ndarray, columns: int, lines: int) -> str:
-    """Return a picture as coloured half blocks, two of its squares to a character.
+    """Return a frame as coloured half blocks, two squares of the frame in one character.
 
     Args:
         frame: uint8 [H, W, 3].
-        columns: Of the text, at most.
-        lines: Of the text, at most.
+        columns: Largest number of columns.
+        lines: Largest number of lines.
     """
     height, width = frame.shape[:2]
     side = max(-(-width // columns), -(-height // (2 * lines)))

@@ -11,7 +11,7 @@ from gymnasium.vector.utils import batch_space
 
 from warp_torchrl.adapters.gymnasium import Observation, check_alone
 from warp_torchrl.adapters.screen import FRAMES_PER_SECOND
-from warp_torchrl.adapters.worlds import Seen, Worlds, whole_number
+from warp_torchrl.adapters.worlds import NumpyStep, Worlds, whole_number
 
 
 class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
@@ -83,13 +83,13 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
 
         Args:
             seed: World i draws with ``seed + i``, or with ``seed[i]``.
-            options: There are none; ``reset_mask`` is refused, since worlds start anew by themselves.
+            options: Not used; ``reset_mask`` is an error, since finished worlds reset themselves.
 
         Returns:
-            Observations, batched, and infos: an array for each metric, and ``_name``, where it holds.
+            Batched observations, and infos: an array for each metric, and its mask ``_name``.
 
         Raises:
-            ValueError: If a seed is no whole number in 0..2**62, or there are not as many as worlds.
+            ValueError: If a seed is no whole number in 0..2**62, or their number is not B.
         """
         if options is not None and "reset_mask" in options:
             raise ValueError("options['reset_mask'] must be left out: finished worlds start anew by themselves")
@@ -98,7 +98,7 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
         return now.of_agent(slice(None), 0), self._info(now)
 
     def step(self, actions: np.ndarray) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Let every agent act; start the next episode where this step or the last ended one, by ``autoreset_mode``.
+        """Step every world; reset those that ended in this step or the last, by ``autoreset_mode``.
 
         Args:
             actions: Whole numbers, [B].
@@ -132,13 +132,13 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
             raise ValueError(f"actions must be in 0..{n_actions - 1}, got {given.min()}..{given.max()}")
         return given.astype(np.int64)
 
-    def _info(self, now: Seen, where: np.ndarray | None = None) -> dict[str, Any]:
-        """Return infos as Gymnasium batches them: 0 and false where there are none."""
+    def _info(self, now: NumpyStep, where: np.ndarray | None = None) -> dict[str, Any]:
+        """Return infos batched as Gymnasium does: 0 and false in worlds without one."""
         where = np.ones(self.num_envs, dtype=bool) if where is None else where
         values = {name: (value.T * where).T for name, value in now.info_of_agent(slice(None), 0).items()}
         return {**values, **{f"_{name}": where.copy() for name in values}}
 
-    def _final(self, last: Seen, ended: np.ndarray) -> dict[str, Any]:
+    def _final(self, last: NumpyStep, ended: np.ndarray) -> dict[str, Any]:
         """Return the last observations and infos of the episodes that ended."""
         if not ended.any():
             return {}

@@ -1,4 +1,4 @@
-"""A ``WildfireEnv`` seen through numpy: what every adapter holds."""
+"""The numpy interface of a ``WildfireEnv``, shared by all adapters."""
 
 import json
 import operator
@@ -15,11 +15,11 @@ from warp_torchrl.config.construction import ConfigError, UnknownKeyError
 from warp_torchrl.env.flat import FLAT, flattened
 
 LAYOUTS = ("dict", "flat")
-"""An agent's observation as its entries by name, or as one vector beside its mask."""
+"""An agent's observation as a dict of its entries, or as one vector and the mask."""
 
 
-class Seen(NamedTuple):
-    """What a reset or a step shows, as numpy; A agents in each of B worlds."""
+class NumpyStep(NamedTuple):
+    """The numpy results of a reset or a step, for B worlds of A agents."""
 
     observation: dict[str, np.ndarray]  # [B, A, ...] each; "" where the observation is one array
     action_mask: np.ndarray  # int8 [B, A, actions]
@@ -30,7 +30,7 @@ class Seen(NamedTuple):
     layout: str
 
     def of_agent(self, world: int | slice, agent: int) -> np.ndarray | dict[str, np.ndarray]:
-        """Return one agent's observation, as its space has it."""
+        """Return one agent's observation in its observation space."""
         entries = {name: value[world, agent] for name, value in self.observation.items()}
         mask = self.action_mask[world, agent]
         if self.layout == "flat":
@@ -38,9 +38,9 @@ class Seen(NamedTuple):
         return entries.get("", {**entries, "action_mask": mask})
 
     def info_of_agent(self, world: int | slice, agent: int) -> dict[str, np.ndarray]:
-        """Return the world's metrics, and the agent's mask where its observation has none.
+        """Return the world's metrics, and the agent's mask if its observation has none.
 
-        It is never in both: TorchRL's ``PettingZooWrapper`` then fails.
+        TorchRL's ``PettingZooWrapper`` fails if both have it.
         """
         info = {name: value[world] for name, value in self.info.items()}
         has_mask = self.layout == "flat" or "" not in self.observation
@@ -48,11 +48,11 @@ class Seen(NamedTuple):
 
 
 class UnknownKeywordError(ConfigError, TypeError):
-    """A keyword that is neither an argument nor a key of the configuration: a ``TypeError``, as of any function."""
+    """A keyword that is neither an argument nor a configuration key; a ``TypeError``, as of any function."""
 
 
 class Worlds:
-    """One environment made by ``make_env``, in and out as numpy, and whether its worlds may be stepped.
+    """An environment from ``make_env`` with numpy inputs and outputs.
 
     Args:
         scenario: One of ``conf/scenario``.
@@ -82,7 +82,7 @@ class Worlds:
         if layout not in LAYOUTS:
             raise ValueError(f"layout must be {' or '.join(LAYOUTS)}, got {layout!r}")
         self._layout = layout
-        named = [f"{name}={written(name, value)}" for name, value in more.items()]
+        named = [f"{name}={as_override(name, value)}" for name, value in more.items()]
         first = None if seed is None else whole_number("seed", seed)
         try:
             self.env = make_env(
@@ -96,9 +96,9 @@ class Worlds:
 
     @property
     def observation_space(self) -> spaces.Box | spaces.Dict:
-        """Return a new space of one agent's observation: one Box in preset ``paper``, else a flat Dict with its mask.
+        """Return one agent's observation space: a Box in preset ``paper``, else a flat Dict with the mask.
 
-        In layout ``flat`` it is one Box and the mask in every preset.
+        In layout ``flat`` it is a Dict of one Box and the mask in every preset.
         """
         bounds = {name: space.bounds() for name, space in self.env.observation.spaces(self.env.world).items()}
         ends = [{name: bound[end].numpy() for name, bound in bounds.items()} for end in (0, 1)]
@@ -111,7 +111,7 @@ class Worlds:
 
     @property
     def state_space(self) -> spaces.Box:
-        """Return a new space of a world's central state."""
+        """Return the space of a world's central state."""
         space = self.env.full_observation_spec_unbatched["state"].space
         return spaces.Box(space.low.numpy(force=True), space.high.numpy(force=True))
 
@@ -122,7 +122,7 @@ class Worlds:
 
     @property
     def now(self) -> TensorDictBase:
-        """Return what the environment last gave.
+        """Return the environment's last output.
 
         Raises:
             RuntimeError: Before the first reset.
@@ -140,11 +140,11 @@ class Worlds:
         """
         return self.now["done"][:, 0].numpy(force=True)
 
-    def reset(self, seed: int | Sequence[int] | None = None) -> Seen:
-        """Start episode 0 of the seeds given, world i's being ``seed + i``; without, the next episode of each world.
+    def reset(self, seed: int | Sequence[int] | None = None) -> NumpyStep:
+        """Start episode 0 of given seeds, ``seed + i`` in world i, or without a seed each world's next episode.
 
         Raises:
-            ValueError: If a seed is not a whole number in 0..2**62, or there are not as many as worlds.
+            ValueError: If a seed is not a whole number in 0..2**62, or their number is not B.
         """
         n_worlds = self.env.batch_size[0]
         if isinstance(seed, (list, tuple, np.ndarray)):
@@ -153,47 +153,47 @@ class Worlds:
             first = whole_number("seed", seed)
             self.env.set_seeds(range(first, first + n_worlds))
         self._now = self.env.reset()
-        return self._seen(np.zeros((n_worlds, self.env.n_agents), np.float32))
+        return self._to_numpy(np.zeros((n_worlds, self.env.n_agents), np.float32))
 
-    def step(self, action: np.ndarray) -> Seen:
+    def step(self, action: np.ndarray) -> NumpyStep:
         """Advance every world by one step; a finished one stays as it is, with reward 0.
 
         Args:
-            action: int64 [B, A], checked.
+            action: Valid actions, int64 [B, A].
         """
         given = torch.from_numpy(action).to(self.env.device)
         self._now = self.env.step(TensorDict({"agents": {"action": given}}, batch_size=self.env.batch_size))["next"]
-        return self._seen(self.now["agents", "reward"][..., 0].numpy(force=True))
+        return self._to_numpy(self.now["agents", "reward"][..., 0].numpy(force=True))
 
-    def restart(self, which: np.ndarray, reward: np.ndarray) -> Seen:
+    def restart(self, which: np.ndarray, reward: np.ndarray) -> NumpyStep:
         """Start the next episode in some worlds.
 
         Args:
             which: bool [B].
-            reward: float32 [B, A], of the step before.
+            reward: Rewards of the last step, float32 [B, A].
         """
         asked = torch.from_numpy(which).to(self.env.device)[:, None]
         self._now = self.env.reset(self.now.exclude(("agents", "reward")).set("_reset", asked))
-        return self._seen(reward)
+        return self._to_numpy(reward)
 
     def state(self) -> np.ndarray:
         """Return the central state, float32 [B, C, 16, 16]."""
         return self.now["state"].numpy(force=True).copy()
 
     def frames(self) -> np.ndarray:
-        """Return pictures, uint8 [B, H * s, W * s, 3]."""
+        """Return a frame of each world, uint8 [B, H * s, W * s, 3]."""
         return self.env.render().numpy(force=True)
 
     def picture(self) -> np.ndarray:
-        """Return the picture of world 0, uint8 [H * s, W * s, 3]."""
+        """Return a frame of world 0, uint8 [H * s, W * s, 3]."""
         return self.frames()[0]
 
-    def _seen(self, reward: np.ndarray) -> Seen:
+    def _to_numpy(self, reward: np.ndarray) -> NumpyStep:
         agents, info = self.now["agents"], self.now["info"]
-        seen = agents["observation"]
-        named = {"": seen} if isinstance(seen, torch.Tensor) else dict(seen.items())
+        observation = agents["observation"]
+        named = {"": observation} if isinstance(observation, torch.Tensor) else dict(observation.items())
         rows = torch.cat(list(info.values()), dim=-1).to(torch.float64).T.numpy(force=True)
-        return Seen(
+        return NumpyStep(
             observation={name: value.numpy(force=True) for name, value in named.items()},
             action_mask=agents["action_mask"].to(torch.int8).numpy(force=True),
             reward=reward,
@@ -205,10 +205,10 @@ class Worlds:
 
 
 def action_number(name: str, action: object, n_actions: int) -> int:
-    """Return a given action, or the only one of an array [1], as a number.
+    """Return an action, or the only one in an array [1], as an ``int``.
 
     Raises:
-        ValueError: If it is not a whole number, or not one of the actions.
+        ValueError: If it is not a whole number or out of range.
     """
     number = whole_number(name, action[0] if isinstance(action, np.ndarray) and action.shape == (1,) else action)
     if not 0 <= number < n_actions:
@@ -217,10 +217,10 @@ def action_number(name: str, action: object, n_actions: int) -> int:
 
 
 def whole_number(name: str, value: Any) -> int:
-    """Return a given whole number, of Python, numpy or torch, as Python's.
+    """Return a whole number of Python, numpy or torch as an ``int``.
 
     Raises:
-        ValueError: If it is none; true and false are none.
+        ValueError: If the value is not a whole number; a ``bool`` is not.
     """
     try:
         if isinstance(value, bool):
@@ -231,7 +231,7 @@ def whole_number(name: str, value: Any) -> int:
         raise ValueError(f"{name} must be a whole number, got {given} ({type(value).__name__})") from None
 
 
-def written(name: str, value: object) -> str:
+def as_override(name: str, value: object) -> str:
     """Return an override's value in the command line's grammar.
 
     Raises:

@@ -43,17 +43,17 @@ class Algorithm:
         check_fields(self, **_RANGES, **ranges)
 
     def check_batch(self, frames_per_batch: int) -> None:
-        """Check that batches of so many world steps can be learnt from.
+        """Check that the algorithm can learn from batches of this many world steps.
 
         Raises:
-            ValueError: If not.
+            ValueError: If it cannot.
         """
 
     def check_model(self, model: Mlp) -> None:
-        """Check that networks of a model can be learnt.
+        """Check that the algorithm can train the networks of a model.
 
         Raises:
-            ValueError: If not.
+            ValueError: If it cannot.
         """
 
     def rate_at(self, progress: float, optimizer: torch.optim.Optimizer) -> float:

@@ -80,7 +80,7 @@ class Ddpg(EpsilonGreedy):
         return TensorDictSequential(model.actor(shape), choose)
 
     def explorer(self, policy: TensorDictModuleBase, shape: Signature) -> TensorDictSequential:
-        """Return the policy, some of whose actions are drawn anew, with the one-hot of what is done in the end."""
+        """Return the epsilon-greedy policy, which also writes the one-hot of the final action."""
         told = TensorDictModule(_OneHot(shape.n_actions), in_keys=[ACTION], out_keys=[ACTION_ONE_HOT])
         return TensorDictSequential(policy, self.epsilon_greedy(shape, self.epsilon), told)
 

@@ -29,11 +29,11 @@ TEAM_VALUE = "chosen_action_value"
 
 @dataclass(frozen=True, kw_only=True)
 class Dqn(EpsilonGreedy):
-    """Q-learning with epsilon-greedy exploration; a policy that is evaluated as sampled explores as at the end.
+    """Q-learning with epsilon-greedy exploration; in mode ``sampled`` an evaluated policy uses ``epsilon_end``.
 
     Attributes:
         mixer: ``none``, each agent learns its own values from its own reward (double DQN); ``vdn``, their sum is
-            learnt from the team's mean reward; ``qmix``, a monotonic network that reads the whole state mixes them.
+            learned from the team's mean reward; ``qmix``, a monotonic network that reads the whole state mixes them.
         mixer_hidden: Width of QMIX's mixing layer.
 
     Raises:
@@ -48,7 +48,7 @@ class Dqn(EpsilonGreedy):
         super().check(mixer_hidden=(1, 8192), **ranges)
 
     def policy(self, shape: Signature, model: Mlp) -> TensorDictSequential:
-        """Return the team's decentralised policy: the action of highest value, or some other one now and then."""
+        """Return the team's decentralised epsilon-greedy policy."""
         return TensorDictSequential(*self._values(shape, model), self.epsilon_greedy(shape, self.epsilon_end))
 
     def _values(self, shape: Signature, model: Mlp) -> tuple[TensorDictModule, QValueModule]:
@@ -61,7 +61,7 @@ class Dqn(EpsilonGreedy):
         return model.action_value(shape), choose
 
     def explorer(self, policy: TensorDictModuleBase, shape: Signature) -> TensorDictSequential:
-        """Return the policy with an epsilon that falls."""
+        """Return the policy with a decreasing epsilon."""
         return TensorDictSequential(*policy.module[:-1], self.epsilon_greedy(shape, self.epsilon))
 
     def loss(self, policy: TensorDictModuleBase, shape: Signature, model: Mlp, device: torch.device) -> LossModule:

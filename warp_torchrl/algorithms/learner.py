@@ -1,4 +1,4 @@
-"""What the training loop needs of an algorithm: a record without an algorithm's name."""
+"""The interface between the training loop and an algorithm."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -11,14 +11,14 @@ from torchrl.objectives import LossModule
 
 
 class Stateful(Protocol):
-    """Anything that a checkpoint keeps."""
+    """An object with a state that a checkpoint keeps."""
 
     def state_dict(self) -> dict[str, Any]:
         """Return tensors and plain values."""
         ...
 
     def load_state_dict(self, state_dict: dict[str, Any]) -> Any:
-        """Restore them."""
+        """Restore what ``state_dict`` returned."""
         ...
 
 
@@ -27,19 +27,19 @@ class Learner:
     """An algorithm, ready to learn.
 
     Attributes:
-        policy: Observation and mask in, action out: what is saved and evaluated.
-        explore: What the collector runs.
+        policy: Reads observation and mask, writes the action; it is saved and evaluated.
+        explore: The policy that the collector runs.
         loss: TorchRL's loss module; it holds every parameter that is trained.
-        terms: Called with a sample, returns what is minimised and shown: the loss, and what may be added to it.
+        terms: Called with a sample, returns the terms of the loss and the values to log.
         loss_keys: Entries of the terms that are summed and minimised.
         columns: Names of ``metrics.csv`` by entry of the terms.
         optimizer: Over the loss's parameters.
         max_grad_norm: Gradients are clipped to this norm.
         store: Takes in a collected batch [B, T].
-        samples: Returns what is learnt from before the next batch, one optimiser step for each sample.
+        samples: Returns the minibatches until the next batch; each is one optimiser step.
         after_step: Called with each sample once the optimiser has stepped.
-        schedule: Sets what changes with progress in 0..1, and returns it as columns.
-        keeps: What else a checkpoint must hold for an exact resume, by name.
+        schedule: Sets the scheduled hyperparameters for progress in 0..1, and returns them as columns.
+        keeps: Further objects that an exact resume needs, by name.
     """
 
     policy: TensorDictModuleBase

@@ -1,4 +1,4 @@
-"""What the off-policy algorithms share: a replay memory, target networks, and when they learn."""
+"""Base of the off-policy algorithms: replay memory, target networks, and schedule of updates."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,14 +19,14 @@ from warp_torchrl.algorithms.replay import ReplayMemory, check_prioritised, repl
 from warp_torchrl.models import ACTION, ACTION_MASK, REWARD, Mlp, Signature, signature
 
 AGENT_KEYS = {"reward": REWARD, "done": ("agents", "done"), "terminated": ("agents", "terminated")}
-"""Where TorchRL's losses find what each agent's values are learnt from; a team's end is each agent's."""
+"""Keys of TorchRL's losses for values of each agent; the team's end is each agent's end."""
 TEAM_REWARD = "team_reward"
-"""The mean over the agents, what a value of the whole team is learnt from."""
+"""Key of the team's mean reward, for a value of the whole team."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class OffPolicy(Algorithm):
-    """What DQN, SAC and DDPG have in common.
+    """Base class of DQN, SAC and DDPG.
 
     Attributes:
         capacity: World steps that the replay memory holds; the oldest fall out.
@@ -72,10 +72,10 @@ class OffPolicy(Algorithm):
             )
 
     def check_model(self, model: Mlp) -> None:
-        """Check that nothing need be remembered: transitions are replayed one by one.
+        """Check that the actors are not recurrent: transitions are replayed one by one.
 
         Raises:
-            ValueError: If actors should remember.
+            ValueError: If they are.
         """
         if model.memory:
             raise ValueError(
@@ -135,7 +135,7 @@ class OffPolicy(Algorithm):
         return replay_buffer(self.replay, self.capacity, self.minibatch_size, device)
 
     def targets(self, loss: LossModule) -> TargetNetUpdater:
-        """Return what moves the target networks."""
+        """Return TorchRL's updater of the target networks."""
         if self.target_interval:
             # TorchRL counts the steps between two copies, not the steps from one to the next.
             return HardUpdate(loss, value_network_update_interval=self.target_interval - 1)
@@ -146,11 +146,11 @@ class OffPolicy(Algorithm):
         raise TypeError(f"{type(self).__name__} does not say how it acts: define policy()")
 
     def explorer(self, policy: TensorDictModuleBase, shape: Signature) -> TensorDictModuleBase:
-        """Return what the collector runs: the policy itself, where it explores by sampling."""
+        """Return the collector's policy; by default the policy itself, which explores by sampling."""
         return policy
 
     def explore_at(self, progress: float, explore: TensorDictModuleBase) -> dict[str, float]:
-        """Set how much is explored at progress in 0..1, and return it as columns."""
+        """Set the exploration at progress in 0..1, and return it as columns."""
         return {}
 
     def loss(self, policy: TensorDictModuleBase, shape: Signature, model: Mlp, device: torch.device) -> LossModule:
@@ -168,10 +168,10 @@ class OffPolicy(Algorithm):
 
 @dataclass(frozen=True, kw_only=True)
 class EpsilonGreedy(OffPolicy):
-    """What DQN and DDPG have in common: a share of the actions is drawn among the open ones.
+    """Epsilon-greedy exploration of DQN and DDPG, among the actions that the mask allows.
 
     Attributes:
-        epsilon: That share at the start.
+        epsilon: Share of random actions at the start.
         epsilon_end: At the end.
         epsilon_until: Progress in 0..1 at which the end is reached; it falls linearly.
 
@@ -208,7 +208,7 @@ class EpsilonGreedy(OffPolicy):
 
 
 def transitions(loss: LossModule, batch: TensorDictBase) -> TensorDictBase:
-    """Return what a loss reads of a batch, with the team's end for each agent; [B, T] -> [B T]."""
+    """Return a loss's inputs from a batch, with the team's end for each agent; [B, T] -> [B T]."""
     reward = batch["next", *REWARD]
     batch["next", TEAM_REWARD] = reward.mean(dim=-2)
     for name in ("done", "terminated"):

@@ -1,4 +1,4 @@
-"""What the on-policy algorithms share: actors and critics, advantages over time, and what falls with progress."""
+"""Base of the on-policy algorithms: actors, critics, advantages and schedules."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -50,7 +50,7 @@ KEYS = {
 
 @dataclass(frozen=True, kw_only=True)
 class OnPolicy(Algorithm):
-    """What PPO and A2C have in common.
+    """Base class of PPO and A2C.
 
     Attributes:
         central_critic: Values of the state and each agent's observation, or of the latter alone.
@@ -137,7 +137,7 @@ class OnPolicy(Algorithm):
         raise TypeError(f"{type(self).__name__} does not say what it minimises: define loss()")
 
     def passes(self) -> int:
-        """Return how often each collected step is seen."""
+        """Return the number of passes over each batch."""
         return 1
 
     def columns(self) -> dict[str, str]:
@@ -149,7 +149,7 @@ class OnPolicy(Algorithm):
         }
 
     def constants(self) -> dict[str, float]:
-        """Return columns that do not change."""
+        """Return the columns that are constant."""
         return {}
 
 
@@ -162,7 +162,7 @@ def with_advantages(loss: LossModule, batch: TensorDictBase, hold: Hold, whole: 
 
     Args:
         loss: Whose values and estimator they are of.
-        batch: As it was collected, [B, T].
+        batch: The collected batch, [B, T].
         hold: Makes what is read of it.
         whole: Whether to return sequences [B, T], and not steps [B T].
     """
@@ -189,9 +189,9 @@ def _as_it_is(batch: TensorDictBase) -> TensorDictBase:
 
 
 def _add_values(loss: LossModule, batch: TensorDictBase, hold: Hold) -> None:
-    """Add the values of each step's state and of the one that it led to, in one pass of the critic and a little.
+    """Add the values of each step's state and next state, with little more than one pass of the critic.
 
-    What a step led to is the next step's state, but where an episode or the batch ended.
+    The next state is the following step's state, except at the end of an episode or of the batch.
     """
     keys = loss.critic_network.in_keys
     ends = batch["next", "done"][..., 0].clone()

@@ -43,14 +43,14 @@ def replay_buffer(kind: str, capacity: int, minibatch_size: int, device: torch.d
 
 
 def weighted(sample: TensorDictBase) -> TensorDictBase:
-    """Give each agent its sample's weight of prioritised replay, as TorchRL's losses want them; others as they are."""
+    """Expand the importance weights of prioritised replay to the agents, as TorchRL's losses need; else no change."""
     weight = sample.get("priority_weight", None)
     return sample if weight is None else sample.set("priority_weight", weight[:, None].expand(sample["agents"].shape))
 
 
 @dataclass(frozen=True)
 class ReplayMemory:
-    """A replay buffer as checkpoints keep it: what it holds, not the room that it has.
+    """A replay buffer whose state is its stored transitions, without its empty capacity.
 
     Attributes:
         buffer: TorchRL's.
@@ -59,7 +59,7 @@ class ReplayMemory:
     buffer: ReplayBuffer
 
     def state_dict(self) -> dict[str, Any]:
-        """Return the transitions, the batch sizes of their nested parts, and where the next one goes."""
+        """Return the transitions, the batch sizes of nested tensordicts, and the write position."""
         state = self.buffer.state_dict() | {"_storage": {}, "sizes": {}}
         places = torch.arange(len(self.buffer))
         for name in _TREES & state["_sampler"].keys():  # objects of the extension, which only pickle could write
@@ -73,7 +73,7 @@ class ReplayMemory:
         return state
 
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
-        """Restore them; the rest of the room stays empty."""
+        """Restore what ``state_dict`` returned; the rest of the buffer stays empty."""
         self.buffer.empty()
         if state_dict["_storage"]:
             length = len(next(iter(state_dict["_storage"].values())))

@@ -19,8 +19,8 @@ class Sac(OffPolicy):
     """Discrete SAC: each agent's actor against the smaller of two local action values; it explores by sampling.
 
     Attributes:
-        temperature: Weight of the entropy at the start; it is learnt.
-        target_entropy: What the entropy is drawn to, as a share of that of a uniform choice among all actions.
+        temperature: Initial weight of the entropy; it is learned.
+        target_entropy: Target of the entropy, as a share of the entropy of a uniform choice among all actions.
 
     Raises:
         ValueError: If a value is out of its range, or prioritised replay does not work here.

@@ -1,4 +1,4 @@
-"""Where batches and replayed transitions are held: TorchRL's storage, written and read a row at a time."""
+"""Storage of batches and replayed transitions: TorchRL's, with whole-row copies."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -10,10 +10,10 @@ from torchrl.data import LazyTensorStorage
 
 
 class RowStorage(LazyTensorStorage):
-    """TorchRL's storage, which copies transitions whole.
+    """TorchRL's storage with copies of whole rows.
 
-    Where a tensor says which, torch copies number by number, which for observations in bytes takes several times as
-    long as a slice, or ``index_select``, does.
+    Indexing by a tensor copies element by element, which for uint8 observations takes several times as long as a slice
+    or ``index_select``.
     """
 
     def set(self, cursor: int | Sequence[int] | slice | Tensor, data: Any, *, set_cursor: bool = True) -> None:

@@ -135,7 +135,7 @@ def main(arguments: list[str] | None = None) -> None:
     if options.plot is not None and find_spec("matplotlib") is None:
         parser.error("--plot needs matplotlib (extra figures)")
     keep_freed_memory()
-    logging.getLogger("torchrl").setLevel(logging.WARNING)  # it would tell the standard output of its buffers
+    logging.getLogger("torchrl").setLevel(logging.WARNING)  # it prints about its buffers to standard output
     described = machine(options.device)
     if not options.json:
         print(header(described), flush=True)

@@ -66,7 +66,7 @@ def environment_speed(
 
 
 def random_play(env: "WildfireEnv") -> Callable[[int], None]:
-    """Return what plays on at random for a number of steps, resetting worlds as they end."""
+    """Return a function that plays random actions for a number of steps, and resets worlds as they end."""
     now = env.reset()
 
     def play(steps: int) -> None:

@@ -1,4 +1,4 @@
-"""What was measured on: the machine, its threads, and the versions of what matters."""
+"""The machine of a benchmark: processor, threads and library versions."""
 
 import os
 import platform
@@ -16,7 +16,7 @@ from warp_torchrl.benchmark.timing import is_alone
 
 
 def machine(device: str) -> dict[str, Any]:
-    """Return what a reader must know of the machine to compare figures with those of another."""
+    """Return the machine's properties that a comparison of figures needs."""
     return {
         "platform": platform.platform(),
         "processor": _processor(),
@@ -43,7 +43,7 @@ def header(found: dict[str, Any]) -> str:
 
 
 def peak_memory() -> float:
-    """Return the most memory that this process has held so far [GiB]."""
+    """Return the peak memory of this process [GiB]."""
     unit = 1 if sys.platform == "darwin" else 1024  # bytes there, KiB elsewhere
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 2**30
 

@@ -1,4 +1,4 @@
-"""The bulldozers of one NumPy world: moves, acts, what they see and what they earn, all agents at once."""
+"""The bulldozers of one NumPy world: moves, acts, observations and rewards, all agents at once."""
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -78,7 +78,7 @@ class NumpyTeam:
         return int(np.count_nonzero(wants_water | wants_clear))
 
     def observe(self) -> np.ndarray:
-        """Return what the agents see, float32 [A, 3 (2 r + 1)^2]: see ``warp_torchrl.observation.Paper``."""
+        """Return the agents' observations, float32 [A, 3 (2 r + 1)^2]: see ``warp_torchrl.observation.Paper``."""
         radius = self.radius
         self._frame[radius:-radius, radius:-radius] = self.world.on_map(self.world.cells)
         row, column = self.places

@@ -1,6 +1,6 @@
-"""One world in NumPy that plays the same law: what the software is measured against.
+"""One world in NumPy with the same law, for comparisons of speed.
 
-As fast as one reasonably writes it: float32, whole-array operations, buffers and chances that are made once an episode.
+It is reasonably optimised: float32, whole-array operations, buffers and probabilities computed once per episode.
 The map lies in one row with a border of empty cells, so that neighbours are contiguous slices.
 """
 

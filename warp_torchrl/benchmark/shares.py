@@ -1,4 +1,4 @@
-"""Where the time of the training loop goes."""
+"""Shares of the training loop's time."""
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator
@@ -17,10 +17,10 @@ _COLLECTING = ("collector", "environment", "policy")
 
 
 class Stopwatch:
-    """Adds up the seconds of each part of what goes on.
+    """Sums the time of each part of a program [s].
 
     Args:
-        now: Tells the time.
+        now: Returns the time [s].
     """
 
     def __init__(self, now: Clock) -> None:
@@ -28,7 +28,7 @@ class Stopwatch:
         self._now, self._last = now, now()
 
     def lap(self, part: str) -> None:
-        """Count the time since the last lap as this part's."""
+        """Add the time since the last lap to a part."""
         now = self._now()
         self.seconds[part] += now - self._last
         self._last = now
@@ -121,7 +121,7 @@ def _timed(watch: Stopwatch, call: Callable[..., Any], before: str, after: str) 
 
 @contextmanager
 def _replaced(owner: Any, name: str, other: Any) -> Iterator[None]:
-    """Put something in an attribute's place until the context ends."""
+    """Replace an attribute until the context ends."""
     own = vars(owner).get(name)
     setattr(owner, name, other)
     try:

@@ -14,7 +14,7 @@ NAME = "SuperSuit + SB3 PPO"
 
 
 def reason_against(plan: Settings) -> str | None:
-    """Return why a plan cannot be trained with Stable-Baselines3, or None where it can."""
+    """Return why Stable-Baselines3 cannot train these settings; None if it can."""
     missing = [name for name in ("supersuit", "stable_baselines3") if find_spec(name) is None]
     if missing:
         return f"{' and '.join(missing)} not installed (extra interop)"
@@ -24,7 +24,7 @@ def reason_against(plan: Settings) -> str | None:
 
 
 def open_stable_baselines(plan: Settings) -> tuple[Callable[[], object], Callable[[], None]]:
-    """Return what learns from one batch of a plan's size, and what closes the worlds.
+    """Return a function that learns from one batch of the settings' size, and a function that closes the worlds.
 
     Networks, epochs, minibatch, worlds and steps are the plan's; each agent has its own sample, as SB3 counts them.
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 Column = tuple[str, Callable[[Mapping[str, Any]], str]]
-"""A heading, and what stands under it in a row."""
+"""A heading, and a function from a row to its cell."""
 
 
 def table(columns: Sequence[Column], rows: Sequence[Mapping[str, Any]]) -> str:

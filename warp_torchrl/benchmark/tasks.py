@@ -1,4 +1,4 @@
-"""How hard the scenarios are, and what the rewards make of policies."""
+"""Calibration of scenarios by the baselines, and ranking of the baselines by each reward."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -28,20 +28,20 @@ SCENARIOS = (
     "paper_sarl",
     "paper_marl",
 )
-"""What ``tasks`` plays unless it is told; ``giant`` takes long, and ``landfire`` needs its rasters."""
+"""Default scenarios of ``tasks``; ``giant`` takes long, and ``landfire`` needs its rasters."""
 EPISODES = 256
 FIRST_SEED = 1_000_000
 
 
 def calibrate(scenario: str, device: str, episodes: int, overrides: Sequence[str] = ()) -> dict[str, Any]:
-    """Return the trees that each heuristic saves on the evaluation seeds of a scenario."""
+    """Return the trees saved by each heuristic on the evaluation seeds of a scenario."""
     env = make_env(scenario, n_worlds=episodes, seed=FIRST_SEED, device=device, overrides=overrides)
     rows = play_heuristics(env, FIRST_SEED, tuple(HEURISTICS))
     return {"scenario": scenario, "episodes": episodes} | {name: summarise(rows[name]["saved"]) for name in HEURISTICS}
 
 
 def rank_rewards(scenario: str, device: str, episodes: int, overrides: Sequence[str] = ()) -> dict[str, Any]:
-    """Return what each reward, unscaled and unshaped, pays the baselines, and how much they save, by policy [n]."""
+    """Return the baselines' returns under each reward, unscaled and unshaped, and their trees saved, by policy [n]."""
     env = make_env(scenario, n_worlds=episodes, seed=FIRST_SEED, device=device, overrides=overrides)
     rewards = [Efficiency(), Time(horizon=env.world.horizon), Coverage(), Collaborative(), Adaptive(), Paper()]
     returns: dict[str, dict[str, np.ndarray]] = {"saved": {}}
@@ -60,7 +60,7 @@ def rank_rewards(scenario: str, device: str, episodes: int, overrides: Sequence[
 
 
 def mean_returns(row: dict[str, Any]) -> dict[str, Any]:
-    """Return what ``rank_rewards`` found with the mean of the episodes in place of each."""
+    """Return a row of ``rank_rewards`` with the mean over its episodes."""
     means = {
         name: {policy: float(values.mean()) for policy, values in returns.items()}
         for name, returns in row["returns"].items()
@@ -69,9 +69,9 @@ def mean_returns(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def disagreements(returns: dict[str, np.ndarray], saved: dict[str, np.ndarray]) -> list[str]:
-    """Return the pairs of policies that a reward ranks surely against the trees saved.
+    """Return the pairs of policies that a reward ranks against the trees saved.
 
-    Only pairs count whose paired differences in trees saved and in return both have 95 % intervals without 0.
+    A pair counts if the 95 % intervals of both paired differences, in trees saved and in return, exclude 0.
 
     Args:
         returns: Return of each episode by policy, [n].

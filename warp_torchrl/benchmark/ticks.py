@@ -1,4 +1,4 @@
-"""What a tick of the fire costs a cell, eager and compiled, and in NumPy."""
+"""Cost of a fire tick per cell: eager, compiled, and in NumPy."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -18,7 +18,7 @@ from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.world import World, advance
 
 _TICKS = 10  # in a repeat, and before
-_NUMPY_WORLDS = 16  # of those that ours ticks: one after the other, each costs the same
+_NUMPY_WORLDS = 16  # NumPy ticks one world after the other, so a few are enough
 
 
 def tick_cost(

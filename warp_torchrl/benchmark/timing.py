@@ -1,6 +1,6 @@
-"""How times are taken: contenders turn and turn about, so that a busy machine slows all alike, and medians of repeats.
+"""Timing: medians of repeats, with the contenders in alternation, so that other load slows all of them alike.
 
-On one thread it is the process's own processor time, which another's load does not change; else the wall clock.
+On one thread it measures processor time, which other load does not change; else the wall clock.
 """
 
 import statistics
@@ -19,7 +19,7 @@ def is_alone(device: str) -> bool:
 
 
 def clock(device: str) -> Clock:
-    """Return what tells the time [s], after all work that a device was given."""
+    """Return a clock [s] that first waits for the device to finish its work."""
     if device == "cpu":
         return time.process_time if is_alone(device) else time.perf_counter
 

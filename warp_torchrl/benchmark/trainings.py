@@ -1,4 +1,4 @@
-"""How fast training is: collecting and learning, as ``train.py`` does, and with the paper's software."""
+"""Speed of training: collecting and learning, as ``train.py`` does, and with the paper's software."""
 
 import tempfile
 from collections.abc import Callable, Sequence

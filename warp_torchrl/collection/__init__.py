@@ -1,1 +1,1 @@
-"""How experience is collected: in this process, in others, with a teacher beside."""
+"""Collection of experience: in this process or in workers, optionally with a teacher."""

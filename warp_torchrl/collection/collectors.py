@@ -1,4 +1,4 @@
-"""How batches are collected: in this process, in several, or on a Ray cluster, by TorchRL's collectors."""
+"""Collection of batches by TorchRL's collectors: in-process, multi-process, or on a Ray cluster."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -14,46 +14,46 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.validation import check_fields
 
 MakeEnv = Callable[[int, int], WildfireEnv]
-"""Makes so many worlds, the first with this seed."""
+"""Called with a number of worlds and the seed of the first."""
 
 
-_FOR_EVER = 10**12  # batches; TorchRL's Ray collector takes no -1
+_UNLIMITED = 10**12  # batches; TorchRL's Ray collector takes no -1
 
 
 class WorkerDied(Exception):  # noqa: N818
-    """A process that collects has ended before its time."""
+    """A worker process ended unexpectedly."""
 
 
 class Collection(Protocol):
-    """Collecting under way."""
+    """A running collection."""
 
     def __iter__(self) -> Iterator[TensorDictBase]:
-        """Yield batches [B, T], for ever."""
+        """Yield batches [B, T] without end."""
         ...
 
     def refresh(self) -> None:
-        """Let those who collect act as the learner does now."""
+        """Give the workers the learner's current weights."""
         ...
 
     def state_dict(self) -> dict[str, Any]:
-        """Return what a checkpoint keeps of it."""
+        """Return what a checkpoint keeps."""
         ...
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Go on from there."""
+        """Restore what ``state_dict`` returned."""
         ...
 
     def close(self) -> None:
-        """End it."""
+        """Shut the collector down."""
         ...
 
 
 @dataclass(frozen=True, kw_only=True)
-class Direct:
-    """Collects in this process: exact resume.
+class InProcess:
+    """Collects in this process. A resumed run is exact.
 
     Attributes:
-        steps: World steps a batch, for each world.
+        steps: Steps of each world in a batch.
 
     Raises:
         ValueError: If steps is not in 1..100000.
@@ -65,21 +65,21 @@ class Direct:
         check_fields(self, steps=(1, 100_000))
 
     def check_worlds(self, n_worlds: int) -> None:
-        """Any number of worlds will do."""
+        """Accept any number of worlds."""
 
     def open(self, env: WildfireEnv, learner: Learner, make_env: MakeEnv, seed: int) -> Collection:
-        """Return the worlds of ``env``, played by the learner; finished ones are reset at once."""
-        return _Here(env, learner, self.steps)
+        """Return a collection in ``env`` with the learner's policy; it resets finished worlds at once."""
+        return _InProcessCollection(env, learner, self.steps)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Process(Direct):
-    """Collects in processes of this machine, each with its share of the worlds, while no one learns.
+class MultiProcess(InProcess):
+    """Collects in worker processes, each with an equal share of the worlds; they wait while the learner learns.
 
-    World i has the seed that it has with ``direct``. A resumed run goes on with fires that it has not met.
+    World i has the same seed as in-process. A resumed run goes on with new episodes.
 
     Attributes:
-        workers: Processes.
+        workers: Number of processes.
 
     Raises:
         ValueError: If a value is out of its range.
@@ -91,16 +91,16 @@ class Process(Direct):
         check_fields(self, steps=(1, 100_000), workers=(1, 1024))
 
     def check_worlds(self, n_worlds: int) -> None:
-        """Check that the workers can share the worlds.
+        """Check that the workers can share the worlds equally.
 
         Raises:
-            ValueError: If not equally.
+            ValueError: If they cannot.
         """
         if n_worlds % self.workers:
             raise ValueError(f"workers must divide n_worlds, {n_worlds}, got {self.workers}")
 
     def open(self, env: WildfireEnv, learner: Learner, make_env: MakeEnv, seed: int) -> Collection:
-        """Return worlds like those of ``env``, played by the learner elsewhere."""
+        """Return a collection in workers, with as many worlds as ``env`` and the learner's policy."""
         share = env.batch_size[0] // self.workers
         starts = [seed + worker * share for worker in range(self.workers)]
         frames = self.steps * env.batch_size[0]
@@ -113,25 +113,25 @@ class Process(Direct):
                 num_collectors=self.workers,
                 sync=True,
                 frames_per_batch=frames,
-                total_frames=frames * _FOR_EVER,
+                total_frames=frames * _UNLIMITED,
                 **self.backend(),
             )
 
-        return _Elsewhere(start, self.steps, env.device)
+        return _MultiProcessCollection(start, self.steps, env.device)
 
     def backend(self) -> dict[str, Any]:
-        """Return what TorchRL's collector is told of where it works."""
+        """Return the backend and its options for TorchRL's collector."""
         return {"backend": "process", "backend_options": {"auto_register_policy_transforms": False}}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ray(Process):
-    """Collects in workers of a Ray cluster; otherwise as ``Process``. Needs the extra ``ray``.
+class Ray(MultiProcess):
+    """Collects in workers of a Ray cluster; otherwise as ``MultiProcess``. Needs the extra ``ray``.
 
     Attributes:
-        address: The cluster's, ``auto`` for the one that this machine belongs to; None starts one here.
-        cpus: CPUs that Ray sets aside for a worker.
-        gpus: GPUs, or a share of one; the worlds live there where ``device`` is cuda.
+        address: Address of the cluster; ``auto`` takes the cluster of this machine, None starts a local one.
+        cpus: CPUs that Ray reserves for a worker.
+        gpus: GPUs, or a share of one, for a worker; its worlds live there where ``device`` is cuda.
 
     Raises:
         ValueError: If a value is out of its range, or Ray is not installed.
@@ -149,7 +149,7 @@ class Ray(Process):
             raise ValueError('workers need Ray: pip install "warp_torchrl[ray]"') from None
 
     def backend(self) -> dict[str, Any]:
-        """Return what TorchRL's collector is told of where it works."""
+        """Return the backend and its options for TorchRL's collector."""
         options = {
             "ray_init_config": {"address": self.address, "log_to_driver": False},
             "remote_configs": {"num_cpus": self.cpus, "num_gpus": self.gpus},
@@ -158,8 +158,8 @@ class Ray(Process):
         return {"backend": "ray", "backend_options": options}
 
 
-class _Here:
-    """One collector, in this process."""
+class _InProcessCollection:
+    """A collector in this process."""
 
     def __init__(self, env: WildfireEnv, learner: Learner, steps: int) -> None:
         self.env = env
@@ -177,15 +177,15 @@ class _Here:
         return iter(self._collector)
 
     def refresh(self) -> None:
-        """Nothing to do: the policy is the learner's own."""
+        """Do nothing: the collector shares the learner's policy."""
 
     def state_dict(self) -> dict[str, Any]:
-        """Return the worlds and what the collector carries over to its next batch."""
+        """Return the environment's state and the tensordict that the collector carries over to its next batch."""
         carrier = self._collector._carrier.flatten_keys(".")
         return {"env": self.env.state_dict(), "carrier": {name: value.clone() for name, value in carrier.items()}}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Go on as if never stopped."""
+        """Restore what ``state_dict`` returned: the next batch is as if the run had never stopped."""
         self.env.load_state_dict(state["env"])
         here = self._collector._carrier.flatten_keys(".")
         other = [
@@ -196,7 +196,7 @@ class _Here:
         if other:
             raise ValueError(f"the worlds must have the entries that the run had, and lack {', '.join(other)}")
         carrier = TensorDict(state["carrier"], batch_size=self.env.batch_size).unflatten_keys(".")
-        shaped = self._collector._carrier.empty(recurse=True)  # keeps the batch sizes of the nested parts
+        shaped = self._collector._carrier.empty(recurse=True)  # keeps the batch sizes of nested tensordicts
         self._collector._carrier = shaped.update(carrier.to(self.env.device))
 
     def close(self) -> None:
@@ -204,8 +204,8 @@ class _Here:
         self._collector.shutdown()
 
 
-class _Elsewhere:
-    """One collector with workers, started with the first batch."""
+class _MultiProcessCollection:
+    """A collector with workers, which start with the first batch."""
 
     def __init__(self, start: Callable[[int], BaseCollector], steps: int, device: torch.device) -> None:
         self._start, self._steps, self._device = start, steps, device
@@ -214,12 +214,12 @@ class _Elsewhere:
 
     def __iter__(self) -> Iterator[TensorDictBase]:
         try:
-            # No world has had more episodes than steps: from that number on, they are new.
+            # A world has had at most as many episodes as steps, so episodes from this number on are new.
             self._collector = self._start(self._played)
             for batch in self._collector:
                 self._played += self._steps
                 yield batch.exclude("collector").flatten(0, -2).to(self._device)  # [workers, B / workers, T]
-        except Exception as error:  # whatever the backend raises: nothing of ours runs in here
+        except Exception as error:  # each backend raises its own types
             what = "the collector's workers did not start" if self._collector is None else "a worker has ended"
             raise WorkerDied(f"{what}: {_reason(self._collector, error)}") from error
 
@@ -229,11 +229,11 @@ class _Elsewhere:
             self._collector.update_policy_weights_()
 
     def state_dict(self) -> dict[str, Any]:
-        """Return how far each world was played."""
+        """Return the number of steps of each world."""
         return {"played": self._played}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Go on in new worlds."""
+        """Restore the number of steps; the next episodes are new ones."""
         self._played = int(state["played"])
 
     def close(self) -> None:
@@ -243,7 +243,7 @@ class _Elsewhere:
 
 
 def _worlds(make_env: MakeEnv, count: int, seed: int, first_episode: int) -> WildfireEnv:
-    """Return a worker's worlds, and give it random numbers of its own for the actions."""
+    """Return a worker's environment, and seed the worker's generator for sampled actions."""
     torch.manual_seed((seed + 2**40 * first_episode) % 2**64)
     env = make_env(count, seed)
     env.set_seeds(range(seed, seed + count), first_episode)
@@ -251,7 +251,7 @@ def _worlds(make_env: MakeEnv, count: int, seed: int, first_episode: int) -> Wil
 
 
 def _reason(collector: BaseCollector | None, error: Exception) -> str:
-    """Return which worker has ended and how, where it can be known, in one line."""
+    """Return one line: which worker ended and how, where the backend knows it."""
     ended = []
     for index, process in enumerate(getattr(collector, "procs", ())):
         try:

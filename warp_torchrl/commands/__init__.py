@@ -1,1 +1,1 @@
-"""The two commands and their sweeps."""
+"""The commands train and evaluate, and their sweeps."""

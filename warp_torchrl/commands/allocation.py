@@ -1,19 +1,18 @@
-"""Memory that is freed and soon asked for again stays with the process, where the C library can be told so."""
+"""Settings of the C library's memory allocator."""
 
 import ctypes
 import sys
 
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # M_TRIM_THRESHOLD, M_MMAP_THRESHOLD of glibc's malloc.h
 _LARGEST = 2**31 - 1
-_LARGE = 2**30  # blocks from here on go back to the system as ever [bytes]
+_LARGE = 2**30  # larger blocks still go back to the system [bytes]
 
 
 def keep_freed_memory() -> bool:
-    """Tell glibc to keep what is freed, and return whether it does so from now on.
+    """Let glibc keep freed memory for reuse, and return whether it will.
 
-    By default it gives large blocks back to the system and gets them anew, page by page: training on CPUs does so with
-    every minibatch. The process may stay as large as it once was. The commands ask for it; the library leaves its
-    user's process as it is.
+    By default glibc returns large blocks to the system and gets them again page by page; training on CPUs does this
+    with every minibatch. The process may then stay at its largest size. Only the commands call this, not the library.
     """
     if not sys.platform.startswith("linux"):
         return False

@@ -1,4 +1,4 @@
-"""The two commands: checks first, works, and ends with one line and an exit code when something fails."""
+"""The commands train and evaluate. They check everything first, and end a failure with one line and an exit code."""
 
 import logging
 import os
@@ -14,7 +14,7 @@ from omegaconf import DictConfig, OmegaConf
 
 from warp_torchrl.commands.allocation import keep_freed_memory
 from warp_torchrl.commands.failure import fail
-from warp_torchrl.commands.sweep import SweepSummary, conclude_early, forget_failure, jobs, note_failure
+from warp_torchrl.commands.sweep import SweepSummary, jobs, remove_failure, save_failure, summarise_unfinished
 from warp_torchrl.config.compose import (
     Record,
     compose_config,
@@ -29,7 +29,7 @@ from warp_torchrl.config.compose import (
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.grammar import check_flags, check_overrides
 from warp_torchrl.config.settings import COMPONENTS, settings
-from warp_torchrl.evaluation.evaluate import assess, check_assessment
+from warp_torchrl.evaluation.evaluate import check_policy, evaluate_policy
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.runs import checkpoint as checkpoints
@@ -39,7 +39,7 @@ from warp_torchrl.runs.resumption import resumption
 from warp_torchrl.runs.shipped import find_policy
 from warp_torchrl.runs.transfer import check_start
 from warp_torchrl.training.loop import Training
-from warp_torchrl.training.signals import Stopped, obeyed
+from warp_torchrl.training.signals import Stopped, exit_on_signal
 
 log = logging.getLogger("warp_torchrl")
 
@@ -49,12 +49,12 @@ _NOT_RECORDED = ("resume", "debug", "policy", "hydra")
 
 
 def train() -> None:
-    """Train, as ``python train.py`` and ``warp-train`` do; ends the process with the exit code."""
+    """Run ``python train.py`` or ``warp-train``; ends the process with an exit code."""
     _run("train", _train_job)
 
 
 def evaluate() -> None:
-    """Evaluate, as ``python evaluate.py`` and ``warp-evaluate`` do; ends the process with the exit code."""
+    """Run ``python evaluate.py`` or ``warp-evaluate``; ends the process with an exit code."""
     _run("evaluate", _evaluate_job)
 
 
@@ -97,9 +97,9 @@ def _resume(folder: Path, total_frames: Any) -> None:
     training.load_state_dict(run.found.training())
     log.info("resumed %s at %d frames", run.found.path, training.frames)
     if run.settings.total_frames != run.total_before:
-        # Now and not with the next checkpoint: a run that is killed before it goes on to the new total too.
+        # Before the next checkpoint: a run that is killed now must resume with the new total too.
         disk.replace(folder / "config.yaml", OmegaConf.to_yaml(recompose(run.record), resolve=True))
-        training.tell_new_total(run.total_before)
+        training.log_new_total(run.total_before)
     _finish(training, world_overrides(run.values))
 
 
@@ -108,11 +108,11 @@ def _finish(training: Training, worlds: Sequence[str]) -> None:
         training.train()
     finally:
         training.close()
-    assess(training.settings, training.run, checkpoints.newest(training.run)[0], worlds)
+    evaluate_policy(training.settings, training.run, checkpoints.newest(training.run)[0], worlds)
 
 
 def _newest(path: str | Path) -> checkpoints.Checkpoint:
-    """Return the newest sound checkpoint, and say which were skipped."""
+    """Return the newest sound checkpoint, and log the skipped ones."""
     found, skipped = checkpoints.newest(path)
     _say_skipped(skipped)
     return found
@@ -126,22 +126,22 @@ def _say_skipped(skipped: Sequence[str]) -> None:
 def _evaluate_job(config: DictConfig) -> None:
     folder = Path(HydraConfig.get().runtime.output_dir)
     if not config.overwrite:
-        check_free(folder, "hydra.run.dir")  # once more: a sweep may have named two jobs' folders alike
+        check_free(folder, "hydra.run.dir")  # again: two jobs of a sweep may have the same folder
     given, name = config.checkpoint, config.policy
     if given is None:
-        assess(settings(_without_checkpoint(config)), folder, name, world_overrides(plain(config)))
+        evaluate_policy(settings(_without_checkpoint(config)), folder, name, world_overrides(plain(config)))
         return
     found = _newest(find_policy(given))
     values = plain(recompose(found.record(), _of_worlds(HydraConfig.get().overrides.task)))
-    assess(settings(values), folder, found, world_overrides(values))
+    evaluate_policy(settings(values), folder, found, world_overrides(values))
 
 
 def _of_worlds(overrides: Sequence[str]) -> list[str]:
-    """Return the overrides of an evaluation that are not the command's own."""
+    """Return an evaluation's overrides without the command's own keys."""
     return [each for each in overrides if not each.startswith(("checkpoint=", "policy=", "overwrite="))]
 
 
-# What a run folder records
+# The saved configuration
 
 
 def _choices() -> dict[str, str]:
@@ -157,16 +157,16 @@ def _without_checkpoint(config: DictConfig) -> dict[str, Any]:
     return plain(config) | {"checkpoint": plain(compose_config("train"))["checkpoint"]}
 
 
-# Checks before any work, and what is said when something fails
+# Checks before any work, and errors
 
 
 def _run(name: str, job: Callable[[DictConfig], None]) -> None:
     arguments = sys.argv[1:]
     debug = "debug=true" in [each.lower() for each in arguments]
-    logging.raiseExceptions = debug  # a log that cannot be written is no second failure
-    os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra's own errors come to fail
+    logging.raiseExceptions = debug  # a full disk must not print a second error
+    os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra then raises its errors instead of printing them
     keep_freed_memory()
-    with obeyed():
+    with exit_on_signal():
         try:
             _check_first(name, arguments)
             _start_hydra(name, job, arguments, debug)
@@ -182,18 +182,18 @@ def _start_hydra(name: str, job: Callable[[DictConfig], None], arguments: list[s
 
     def guarded(config: DictConfig) -> None:
         try:
-            forget_failure()
+            remove_failure()
             job(config)
         except Exception as error:
             code, line = fail(error, debug)
             if HydraConfig.get().mode != RunMode.MULTIRUN or isinstance(error, Stopped):
                 sys.exit(code)
-            note_failure(code, line)  # the other jobs go on
+            save_failure(code, line)  # the other jobs go on
 
     try:
         hydra.main(version_base="1.3", config_path=str(conf_folder()), config_name=name)(guarded)()
     except Exception:
-        conclude_early()
+        summarise_unfinished()
         raise
 
 
@@ -203,7 +203,7 @@ def _check_first(name: str, arguments: Sequence[str]) -> None:
     overrides = [each for each in arguments if not each.startswith("-")]
     flags = [each for each in arguments if each.startswith("-")]
     if any(flag not in _MULTIRUN for flag in flags):
-        return  # Hydra's own flags (--help, --cfg, --config-dir ...) are Hydra's business
+        return  # Hydra handles its own flags (--help, --cfg, --config-dir ...)
     check_overrides(overrides)
     own = [each for each in overrides if not each.startswith("hydra")]
     sweeps = bool(flags) or is_sweep(name, own)
@@ -240,7 +240,7 @@ def _check_training(config: DictConfig, overrides: Sequence[str]) -> None:
 
 
 def _new_total(config: DictConfig, overrides: Sequence[str]) -> Any:
-    """Return the total that a resumed run is to go on to, None where none is asked for."""
+    """Return the new ``total_frames`` of a resumed run; None if the command line gives none."""
     return config.total_frames if any(each.startswith("total_frames=") for each in overrides) else None
 
 
@@ -253,10 +253,10 @@ def _check_evaluation(config: DictConfig, overrides: Sequence[str]) -> None:
     if not isinstance(config.overwrite, bool):
         raise ConfigError(f"overwrite must be true or false, got {config.overwrite!r}")
     if config.checkpoint is None:
-        check_assessment(settings(_without_checkpoint(config)), config.policy)
+        check_policy(settings(_without_checkpoint(config)), config.policy)
         return
     found, _ = checkpoints.newest(find_policy(str(config.checkpoint)))
-    check_assessment(settings(plain(recompose(found.record(), _of_worlds(overrides)))), found)
+    check_policy(settings(plain(recompose(found.record(), _of_worlds(overrides)))), found)
 
 
 def _with_run_folder(arguments: Sequence[str]) -> list[str]:

@@ -1,4 +1,4 @@
-"""How a command that failed ends: one line, the last of stderr, and an exit code that says of what kind it was."""
+"""The end of a failed command: one line on stderr, and an exit code for the kind of error."""
 
 import errno
 import sys
@@ -17,7 +17,7 @@ _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 
 
 def fail(error: Exception, debug: bool) -> tuple[int, str]:
-    """Say what failed in one line, the last of stderr, and return the exit code and the line."""
+    """Print the error as the last line of stderr; return the exit code and the line."""
     if debug:
         traceback.print_exc()
     code, line = _diagnose(error)
@@ -38,7 +38,7 @@ def _diagnose(error: Exception) -> tuple[int, str]:
         return NUMERICAL, line
     if isinstance(error, WorkerDied):
         return 1, line
-    if isinstance(error.__cause__, OSError):  # logging says that a handler cannot be configured, and not why
+    if isinstance(error.__cause__, OSError):  # logging hides the reason in the cause
         error = error.__cause__
     if isinstance(error, OSError) and (error.filename is not None or error.errno in _NO_ROOM):
         return DISK, f"{error.filename or Path.cwd()}: {error.strerror}"

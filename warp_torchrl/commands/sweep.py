@@ -1,4 +1,4 @@
-"""Sweeps: the jobs that a command line asks for, the ones that failed, and the summary of the others."""
+"""Sweeps: list the jobs of a command line, keep their failures, and summarise the results."""
 
 import json
 import sys
@@ -24,10 +24,10 @@ class Failure:
     """A job of a sweep that failed.
 
     Attributes:
-        job: Its number.
-        overrides: What its command line would have been.
-        code: The exit code that it would have had.
-        reason: One line.
+        job: Number of the job.
+        overrides: The job's overrides.
+        code: Exit code of the failure.
+        reason: The error in one line.
     """
 
     job: int
@@ -40,7 +40,7 @@ def jobs(overrides: Sequence[str]) -> list[list[str]]:
     """Return the overrides of each job of a sweep.
 
     Raises:
-        ConfigError: If an override is not of Hydra's grammar.
+        ConfigError: If Hydra cannot parse an override.
     """
     try:
         parsed = OverridesParser.create().parse_overrides(list(overrides))
@@ -55,13 +55,13 @@ def jobs(overrides: Sequence[str]) -> list[list[str]]:
     return [list(job) for job in product(*choices)]
 
 
-def forget_failure() -> None:
-    """Remove what an earlier sweep into the same folder left of this job."""
+def remove_failure() -> None:
+    """Remove the failure that an earlier sweep into the same folder left for this job."""
     Path(HydraConfig.get().runtime.output_dir, FAILURE).unlink(missing_ok=True)
 
 
-def note_failure(code: int, reason: str) -> None:
-    """Leave word of a failed job in its folder, for the end of the sweep, whatever process runs the job."""
+def save_failure(code: int, reason: str) -> None:
+    """Write a failed job's error into its folder: another process may run the end of the sweep."""
     job = HydraConfig.get().job
     failure = Failure(job=int(job.num), overrides=" ".join(HydraConfig.get().overrides.task), code=code, reason=reason)
     folder = Path(HydraConfig.get().runtime.output_dir)
@@ -70,45 +70,45 @@ def note_failure(code: int, reason: str) -> None:
 
 
 def failures(folder: Path) -> list[Failure]:
-    """Return the jobs of a sweep's folder that failed, in their order."""
+    """Return the failed jobs in a sweep's folder, in order of their numbers."""
     found = [Failure(**json.loads(path.read_text(encoding="utf-8"))) for path in folder.glob(f"**/{FAILURE}")]
     return sorted(found, key=lambda each: each.job)
 
 
 class SweepSummary(Callback):
-    """Ends a sweep with one table and one figure of all its evaluations, and with the jobs that failed.
+    """Ends a sweep with a table and a figure of all its evaluations, and a line for each failed job.
 
     Attributes:
-        exit_code: The first failed job's; 0 where none failed.
-        folder: Of the sweep that has begun and not ended.
+        exit_code: Exit code of the first failed job; 0 if none failed.
+        folder: Folder of the running sweep.
     """
 
     exit_code: ClassVar[int] = 0
     folder: ClassVar[Path | None] = None
 
     def on_multirun_start(self, config: DictConfig, **kwargs: Any) -> None:
-        """Remember the sweep's folder: a launcher that gives up does not come to the end."""
+        """Keep the sweep's folder: a launcher that gives up never calls ``on_multirun_end``."""
         SweepSummary.folder = Path(str(config.hydra.sweep.dir))
 
     def on_multirun_end(self, config: DictConfig, **kwargs: Any) -> None:
         """Write ``summary.md`` and ``summary.png`` into the sweep's folder, and print the table."""
-        failed = _conclude(Path(str(config.hydra.sweep.dir)))
+        failed = _write_summary(Path(str(config.hydra.sweep.dir)))
         SweepSummary.exit_code = failed[0].code if failed else 0
         SweepSummary.folder = None
 
 
-def conclude_early() -> None:
-    """Tell what there is of a sweep whose launcher gave up, as joblib's and submitit's do where a worker is killed."""
+def summarise_unfinished() -> None:
+    """Summarise a sweep whose launcher gave up, as joblib's and submitit's do when a worker is killed."""
     folder, SweepSummary.folder = SweepSummary.folder, None
     if folder is None or not folder.is_dir():
         return
-    _conclude(folder)
+    _write_summary(folder)
     for log in sorted(folder.glob("**/*.log")):
         if not ((log.parent / "evaluation.json").exists() or (log.parent / FAILURE).exists()):
             print(f"error: the job in {log.parent} did not end", file=sys.stderr, flush=True)
 
 
-def _conclude(folder: Path) -> list[Failure]:
+def _write_summary(folder: Path) -> list[Failure]:
     entries = summary.gather(folder)
     if entries:
         _summarise(entries, folder)

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import torch
 
-from warp_torchrl.collection.imitation import Imitation
+from warp_torchrl.collection.kickstarting import Kickstarting
 from warp_torchrl.config.construction import ConfigError, build, construct
 from warp_torchrl.config.seeds import BEYOND_EVALUATION, FIRST_EVALUATED, SEEDS, WORLDS
 from warp_torchrl.env import WildfireEnv
@@ -119,7 +119,7 @@ class Settings:
     compile: bool
     checkpoint: CheckpointPlan
     evaluation: EvaluationPlan
-    imitation: Imitation
+    imitation: Kickstarting
 
     def __post_init__(self) -> None:
         if not 1 <= self.n_worlds <= WORLDS:
@@ -181,7 +181,7 @@ def settings(config: Mapping[str, Any]) -> Settings:
     values["world"] = built["world"]
     values["checkpoint"] = construct(CheckpointPlan, config["checkpoint"], "checkpoint")
     values["evaluation"] = construct(EvaluationPlan, config["evaluation"], "evaluation")
-    values["imitation"] = construct(Imitation, config["imitation"], "imitation")
+    values["imitation"] = construct(Kickstarting, config["imitation"], "imitation")
     _check_together(config)
     made = construct(Settings, values, "")
     with _told("algorithm"):

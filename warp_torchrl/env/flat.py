@@ -1,17 +1,17 @@
-"""An agent's observation as one vector, and back: for learners that read one array, and for policies that do not."""
+"""Conversion between an agent's observation and one vector, for learners that read one array."""
 
 from collections.abc import Mapping
 
 import numpy as np
 
 FLAT = "observation"
-"""Where the vector stands, beside ``action_mask``, as PettingZoo's tutorials and Tianshou read it."""
+"""Key of the vector beside ``action_mask``, as in PettingZoo's tutorials and Tianshou."""
 Shapes = Mapping[str, tuple[tuple[int, ...], str]]
-"""Shape and type's name of one agent's entries, by name."""
+"""Shape and dtype of one agent's entries, by name."""
 
 
 def flattened(entries: Mapping[str, np.ndarray], n_batch: int = 0) -> np.ndarray:
-    """Return entries one after the other in the order of their names, float32 [..., n]; bytes are divided by 255.
+    """Concatenate entries in alphabetical order of their names, float32 [..., n]; uint8 is divided by 255.
 
     Args:
         entries: By name, [..., shape] each.
@@ -22,7 +22,7 @@ def flattened(entries: Mapping[str, np.ndarray], n_batch: int = 0) -> np.ndarray
 
 
 def unflattened(vector: np.ndarray, shapes: Shapes, what: str = FLAT) -> dict[str, np.ndarray]:
-    """Return the entries that ``flattened`` put into a vector [..., n], to the bit.
+    """Invert ``flattened`` exactly: return the entries of a vector [..., n].
 
     Args:
         vector: float32.

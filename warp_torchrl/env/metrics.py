@@ -1,4 +1,4 @@
-"""What an episode came to, as fractions in 0..1."""
+"""Metrics of an episode, as fractions in 0..1."""
 
 import torch
 from torch import Tensor

@@ -1,6 +1,6 @@
-"""A step of the worlds, and what is observed and earned by it.
+"""One step of the worlds with its observations and rewards.
 
-Compiled, it is two functions: one moves and acts, ticks the fire, counts and forecasts; the other observes what came.
+Compiled, it is two functions: one moves the agents, ticks the fire and makes the forecast; the other observes.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from warp_torchrl.world.world import World
 
 
 class Observations(NamedTuple):
-    """What is observed in worlds; of all of them B, of agents A."""
+    """Observations, masks, metrics and central state of B worlds with A agents."""
 
     entries: dict[str, Tensor]
     """Of the agents' observation, [B, A, ...] each."""
@@ -31,7 +31,7 @@ class Observations(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A step, and what came of it."""
+    """A transition with its observations and rewards."""
 
     transition: Transition
     observations: Observations
@@ -42,7 +42,7 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True)
 class Scene:
-    """The rules of the worlds, and what is observed and earned in them.
+    """World, observation and reward as one step.
 
     Attributes:
         world: The scenario's rules.
@@ -57,11 +57,11 @@ class Scene:
     compile: bool = False
 
     def observe(self, state: WorldState) -> Observations:
-        """Return what is observed in worlds."""
+        """Observe the worlds."""
         return _observe(self.world, self.observation, state, self.world.forecast(state))
 
     def step(self, before: WorldState, action: Tensor) -> Step:
-        """Return a step of the worlds, with actions int64 [B, A]."""
+        """Step the worlds with actions int64 [B, A]."""
         if self.compile:
             return self._compiled_step(before, action)
         transition = self.world.step(before, action)
@@ -79,16 +79,16 @@ class Scene:
 
 
 def compiles(reward: Reward) -> bool:
-    """Return whether a reward is compiled with the step: one of ours that reads counts and distances, and no map.
+    """Return whether a reward is compiled with the step: only built-in rewards that read counts and distances are.
 
-    Those that loop over maps, and a user's own, are computed beside it.
+    Rewards that loop over maps, and a user's own, are computed outside of the compiled functions.
     """
     reads_counts = type(reward) in (Efficiency, Time, Collaborative)
     return reads_counts and (reward.shaping == 0.0 or reward.potential == "distance")
 
 
 def _advance(world: World, state: WorldState, action: Tensor) -> tuple[WorldState, Outcome, Forecast]:
-    """Return the worlds after a step, what the actions came to, and the forecast."""
+    """Return the worlds after a step, the outcome of the actions, and the forecast."""
     transition = world.step(state, action)
     return transition.after, transition.outcome, world.forecast(transition.after)
 
@@ -96,7 +96,7 @@ def _advance(world: World, state: WorldState, action: Tensor) -> tuple[WorldStat
 def _observe_and_earn(
     world: World, observation: Observation, reward: Reward | None, transition: Transition, forecast: Forecast
 ) -> tuple[Observations, Tensor | None]:
-    """Return what is observed after a step, and what it earns if there is a reward to ask."""
+    """Return the observations after a step, and its reward if one is given."""
     observed = _observe(world, observation, transition.after, forecast)
     return observed, None if reward is None else reward(transition)
 

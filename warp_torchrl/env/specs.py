@@ -1,4 +1,4 @@
-"""TorchRL's specs of the environment: the shape, type and range of everything that goes in and comes out."""
+"""TorchRL specs of the environment: shape, dtype and range of every input and output."""
 
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ _FLAGS = ("done", "terminated", "truncated")
 
 
 class Specs(NamedTuple):
-    """The four that an environment has."""
+    """The four specs of an environment."""
 
     observation: Composite
     action: Composite
@@ -25,7 +25,7 @@ class Specs(NamedTuple):
 
 
 def make_specs(world: World, observation: Observation, n_worlds: int, device: torch.device) -> Specs:
-    """Return the specs of so many worlds, with the team's entries nested under ``agents``."""
+    """Return the specs of ``n_worlds`` worlds; the team's entries are nested under ``agents``."""
     batch, team = (n_worlds,), (n_worlds, world.team.n_agents)
     n_actions = world.team.n_actions
 

@@ -1,4 +1,4 @@
-"""The environment: joins world, observation, reward and metrics to TorchRL. It has no physics of its own."""
+"""The TorchRL environment: connects world, observation, reward and metrics to ``EnvBase``."""
 
 import secrets
 from collections import OrderedDict
@@ -40,7 +40,7 @@ class WildfireEnv(EnvBase):
         device: Where the worlds live.
         validate: Check on every device that actions are in range, which costs a synchronisation on CUDA; by default
             they are checked on the CPU only.
-        fuse: Fuse what can be with ``torch.compile``, which takes a while at the first steps.
+        fuse: Compile the step with ``torch.compile``; the first steps are then slow.
 
     Raises:
         ValueError: If ``n_worlds`` is not positive, ``seeds`` are not as many, a seed is out of range, or there is no
@@ -80,7 +80,7 @@ class WildfireEnv(EnvBase):
         self._state: WorldState | None = None
         self._resets = ResetCache(self._start)
         self.watcher: Callable[[Transition], None] | None = None
-        """Is shown every step's transition, for those who study behaviour."""
+        """Called with the transition of every step, to measure behaviour."""
         self._episode_reward = torch.zeros(n_worlds, device=self.device)
         self._seeds: Tensor | None = None
         self._episodes = torch.zeros(n_worlds, dtype=torch.int64, device=self.device)
@@ -92,7 +92,7 @@ class WildfireEnv(EnvBase):
         self.observation_spec, self.action_spec = specs.observation, specs.action
         self.reward_spec, self.done_spec = specs.reward, specs.done
 
-    # What users ask for
+    # Interface for users
 
     @property
     def n_agents(self) -> int:
@@ -101,7 +101,7 @@ class WildfireEnv(EnvBase):
 
     @property
     def seeds(self) -> Tensor:
-        """Return each world's seed, int64 [B]; where none was given, they are drawn now."""
+        """Return each world's seed, int64 [B]; draw them now if none were given."""
         if self._seeds is None:
             first = 2**31 + secrets.randbelow(2**31)  # the seeds below are for training and evaluation
             self._seeds = torch.arange(first, first + self.batch_size[0], device=self.device)
@@ -109,7 +109,7 @@ class WildfireEnv(EnvBase):
 
     @property
     def world_state(self) -> WorldState:
-        """Return the worlds as they are now; clone them to keep them.
+        """Return the current worlds; clone them to keep them.
 
         Raises:
             RuntimeError: Before the first reset.
@@ -123,14 +123,14 @@ class WildfireEnv(EnvBase):
         return render(self.world_state, self.world.team.table(self.device).index, scale)
 
     def set_seeds(self, seeds: Sequence[int], first_episode: int = 0) -> None:
-        """Give each world a seed of its own, in force from the next reset.
+        """Set the seed of each world from the next reset on.
 
         Args:
-            seeds: One a world, in 0..2^62.
+            seeds: One for each world, in 0..2^62.
             first_episode: Number of the next episode.
 
         Raises:
-            ValueError: If their number or a seed's range is wrong.
+            ValueError: If the number of seeds is not B, or a seed is out of range.
         """
         if len(seeds) != self.batch_size[0]:
             raise ValueError(f"seeds must be {self.batch_size[0]} numbers, one a world, got {len(seeds)}")
@@ -141,7 +141,7 @@ class WildfireEnv(EnvBase):
         self._resets.clear()
 
     def set_state(self, state: WorldState) -> TensorDictBase:
-        """Go on from given worlds, and return what a reset would have returned for them.
+        """Replace the worlds, and return their tensordict as a reset would.
 
         Raises:
             ValueError: If the batch, the map or the team differs from this environment's.
@@ -156,7 +156,7 @@ class WildfireEnv(EnvBase):
         return self._observe(self._state)
 
     def state_dict(self, *args: object, **kwargs: object) -> OrderedDict[str, Any]:
-        """Return all that changes in the environment: seeds, episodes, worlds, returns."""
+        """Return the environment's state: seeds, episodes, worlds and returns."""
         worlds = {} if self._state is None else self._state.what_changes()
         return OrderedDict(  # as a module's is: TorchRL's EnvCreator looks into these alone
             seeds=self.seeds.clone(),
@@ -170,7 +170,7 @@ class WildfireEnv(EnvBase):
 
         Args:
             state_dict: Entries by name.
-            strict: Whether all must be there; else what is missing stays as it is.
+            strict: Whether all entries must be given; else missing ones keep their value.
 
         Raises:
             ValueError: If an entry is missing or of another shape or type.
@@ -193,7 +193,7 @@ class WildfireEnv(EnvBase):
         self._state = state
         self._resets.clear()
 
-    # What TorchRL asks for
+    # Interface for TorchRL
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
         mask = None if tensordict is None else tensordict.get("_reset", None)
@@ -211,7 +211,7 @@ class WildfireEnv(EnvBase):
         return seen[rows]  # TorchRL reads those of the worlds that were reset
 
     def maybe_reset(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Reset the worlds that have ended, as TorchRL would: what it does with masks is done to their rows alone."""
+        """Reset the worlds that have ended; equal to TorchRL's, but it writes their rows only."""
         done = tensordict.get("done", None)
         if done is None or done.all():
             return super().maybe_reset(tensordict)
@@ -228,7 +228,7 @@ class WildfireEnv(EnvBase):
         return out
 
     def _start_again(self, index: Tensor) -> TensorDict:
-        """Start the next episode of some worlds, and return what is observed in them."""
+        """Start the next episode of some worlds, and return their tensordict."""
         self.world_state[index], seen = self._resets.pop(index, self.seeds, self._episodes)
         self._episodes = self._episodes.index_add(0, index, torch.ones_like(index))
         self._episode_reward = self._episode_reward.index_fill(0, index, 0.0)
@@ -251,7 +251,7 @@ class WildfireEnv(EnvBase):
 
     @property
     def _scene(self) -> Scene:
-        """Return what is played, and how it is looked at, as they are now: another reward may be assigned."""
+        """Return the current scene; users may assign another reward at any time."""
         return Scene(self.world, self.observation, self.reward_function, self._fuses)
 
     def _set_seed(self, seed: int | None) -> None:

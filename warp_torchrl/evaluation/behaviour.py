@@ -1,4 +1,4 @@
-"""How a team behaves, as numbers: who works where, at the head or the rear, how early, and what shuts the fire in."""
+"""Measures of a team's behaviour: division of labour, head attack, contested targets, containment and firebreaks."""
 
 import numpy as np
 import torch
@@ -11,14 +11,14 @@ from warp_torchrl.world.state import Transition, WorldState, is_burning, is_tree
 SECTORS = 8
 SHUFFLES = 64
 BEHAVIOUR = ("division", "head_attack", "contested", "containment", "lead_time", "unused_breaks")
-"""Names of the numbers, in the order of tables."""
+"""Names of the measures, in the order of tables."""
 
 
 class Behaviour:
-    """Watches the steps of worlds that are played without resets; ``WildfireEnv.watcher`` takes it.
+    """Measures one episode of each world; assign it to ``WildfireEnv.watcher``.
 
     Args:
-        state: The worlds at their start.
+        state: The initial worlds.
     """
 
     def __init__(self, state: WorldState) -> None:
@@ -34,7 +34,7 @@ class Behaviour:
         self._state = state
 
     def __call__(self, transition: Transition) -> None:
-        """Take note of one step."""
+        """Count one step."""
         before, after, outcome = transition.before, transition.after, transition.outcome
         width = before.cells.shape[2]
         place = torch.stack((outcome.target // width, outcome.target % width), dim=-1)
@@ -54,14 +54,14 @@ class Behaviour:
         self._state = after
 
     def summary(self) -> dict[str, np.ndarray]:
-        """Return the numbers of each world's episode, float64 [B]; NaN where an episode has none.
+        """Return the measures of each world's episode, float64 [B]; NaN where an episode has no value.
 
-        ``division``: mutual information of agent and sector of the fire over credited acts, less its mean when the
-        sectors are shuffled among the acts [bits]. ``head_attack``: mean cosine of the wind and the way from the
-        fire's centre to the act. ``contested``: share of the cells put out that a team-mate went for in the same
-        step. ``containment``: share of rays from the middle of all that burned or was put out to the border that meet
-        a firebreak or a tree that was put out and stands. ``lead_time``: steps from a clearing until fire stands beside
-        it. ``unused_breaks``: share of clearings that fire never reached.
+        ``division``: mutual information of agent and sector of the fire over credited acts, minus its mean when the
+        sectors are shuffled among the acts [bits]. ``head_attack``: mean cosine between the wind and the direction
+        from the fire's centre to the act. ``contested``: share of extinguished cells that a team-mate targeted in the
+        same step. ``containment``: share of rays from the centre of all burned and extinguished cells to the border
+        that meet a firebreak or a standing extinguished tree. ``lead_time``: steps from a clearing until fire is
+        adjacent to it. ``unused_breaks``: share of clearings that fire never reached.
         """
         state = self._state
         touched = is_burning(state.cells) | state.burned | state.extinguished
@@ -81,13 +81,13 @@ class Behaviour:
 
 
 def _contested(target: Tensor, extinguished: Tensor, redundant: Tensor) -> Tensor:
-    """Return how many cells that were put out a team-mate went for too, float32 [B]."""
+    """Return the number of extinguished cells that a team-mate targeted too, float32 [B]."""
     same = (target[:, :, None] == target[:, None, :]) & extinguished[:, :, None] & redundant[:, None, :]
     return same.any(dim=2).to(torch.float32).sum(dim=1)
 
 
 def mutual_information(counts: np.ndarray) -> np.ndarray:
-    """Return the mutual information of the two indices of tables of counts [..., rows, columns], [...] [bits]."""
+    """Return the mutual information of row and column in tables of counts [..., rows, columns], [...] [bits]."""
     share = counts / np.maximum(counts.sum((-2, -1), keepdims=True), 1.0)
     alone = share.sum(-1, keepdims=True) * share.sum(-2, keepdims=True)
     ratio = np.divide(share, alone, out=np.ones_like(share), where=share > 0.0)
@@ -95,10 +95,10 @@ def mutual_information(counts: np.ndarray) -> np.ndarray:
 
 
 def divided(counts: np.ndarray) -> np.ndarray:
-    """Return how much more the sector tells of the agent than chance would, float64 [B] [bits].
+    """Return the mutual information of agent and sector above chance, float64 [B] [bits].
 
-    The information in small tables is above 0 by chance alone; tables with the same margins, as shuffling gives them,
-    say by how much.
+    Mutual information of small tables is above 0 by chance; the mean over shuffled tables with the same margins is
+    subtracted.
 
     Args:
         counts: Acts by agent and sector, [B, A, sectors].

@@ -1,4 +1,4 @@
-"""A policy assessed: it and the baselines meet the same fires, and what came of it is told, kept and drawn."""
+"""Evaluation of a policy beside the baselines on the same fires: table, ``evaluation.json`` and ``episode.gif``."""
 
 import logging
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.settings import Settings
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation.method import method
-from warp_torchrl.evaluation.play import BASELINES, Episodes, LeftOut, play, play_heuristics, record_episode
+from warp_torchrl.evaluation.play import BASELINES, Episodes, WithoutAgent, play, play_heuristics, record_episode
 from warp_torchrl.evaluation.report import report, table, write_json
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.policy import MODES
@@ -21,14 +21,14 @@ from warp_torchrl.runs import disk
 log = logging.getLogger("warp_torchrl")
 
 
-def assess(plan: Settings, folder: Path, found: checkpoints.Checkpoint | str, worlds: Sequence[str]) -> None:
+def evaluate_policy(plan: Settings, folder: Path, found: checkpoints.Checkpoint | str, worlds: Sequence[str]) -> None:
     """Evaluate a checkpoint or a heuristic beside the baselines: table, ``evaluation.json`` and ``episode.gif``.
 
     Args:
-        plan: Of the worlds.
-        folder: Where to.
-        found: What is evaluated.
-        worlds: How they differ from their scenario's, as overrides.
+        plan: Settings of the worlds and the evaluation.
+        folder: The output folder.
+        found: The checkpoint, or the heuristic's name.
+        worlds: Overrides by which the worlds differ from their scenario.
     """
     first, folder = plan.evaluation.first_seed, folder.resolve()
     env, one = plan.make_env(plan.evaluation.episodes, first), plan.make_env(1, first)
@@ -41,24 +41,26 @@ def assess(plan: Settings, folder: Path, found: checkpoints.Checkpoint | str, wo
         frames = found.manifest.frames
         other_modes = {f"trained, {other}": play(env, actor, first, other) for other in MODES if other != mode}
     if plan.evaluation.leave_one_out:
-        left_out = {agent: play(env, LeftOut(actor, index), first, mode) for index, agent in enumerate(env.agent_names)}
+        left_out = {
+            agent: play(env, WithoutAgent(actor, index), first, mode) for index, agent in enumerate(env.agent_names)
+        }
     content = report(
         plan.scenario, name, first, episodes, others, other_modes, left_out, learner, digest, worlds, frames
     )
     folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / "evaluation.json", content)
     print(table(content), flush=True)
-    with disk.telling(folder / "episode.gif"):
+    with disk.with_path(folder / "episode.gif"):
         record_episode(folder / "episode.gif", one, filmed, f"{plan.scenario}\n{name}", first, mode)
     log.info("wrote evaluation.json and episode.gif into %s", folder)
 
 
-def check_assessment(plan: Settings, found: checkpoints.Checkpoint | str) -> None:
-    """Check that a checkpoint or a heuristic can be evaluated, before anything is made for it.
+def check_policy(plan: Settings, found: checkpoints.Checkpoint | str) -> None:
+    """Check that a checkpoint or a heuristic can be evaluated, before any output is written.
 
     Raises:
-        CheckpointError: If its weights do not fit.
-        ConfigError: If it does not fit the environment.
+        CheckpointError: If the weights do not fit the networks.
+        ConfigError: If the policy does not fit the environment.
     """
     one = plan.make_env(1, plan.evaluation.first_seed)
     _actors(plan, found, one, one)
@@ -67,7 +69,7 @@ def check_assessment(plan: Settings, found: checkpoints.Checkpoint | str) -> Non
 def _actors(
     plan: Settings, found: checkpoints.Checkpoint | str, env: WildfireEnv, one: WildfireEnv
 ) -> tuple[str, str, TensorDictModuleBase, TensorDictModuleBase]:
-    """Return a policy's name, its mode, and who acts in many worlds and in one."""
+    """Return the policy's name and mode, the policy for many worlds, and the policy for one."""
     if isinstance(found, str):
         return found, "sampled", HEURISTICS[found](env), HEURISTICS[found](one)
     try:
@@ -81,8 +83,8 @@ _PLAYED: dict[str, tuple[Settings, dict[str, Episodes]]] = {}
 
 
 def _baselines(plan: Settings, env: WildfireEnv, names: Sequence[str]) -> dict[str, Episodes]:
-    """Return the episodes of heuristics; the jobs of a sweep that meet the same worlds play them once."""
+    """Return the episodes of heuristics; jobs of a sweep with the same worlds play them once."""
     worlds = repr((plan.world, plan.observation, plan.reward, plan.evaluation, plan.device))
-    _, played = _PLAYED.setdefault(worlds, (plan, {}))  # the plan stays alive: no other can come to print the same
+    _, played = _PLAYED.setdefault(worlds, (plan, {}))  # keeps the plan alive: a repr may hold addresses of objects
     played |= play_heuristics(env, plan.evaluation.first_seed, [name for name in names if name not in played])
     return {name: played[name] for name in names}

@@ -1,4 +1,4 @@
-"""What a trained policy is called beside others, from how it was trained."""
+"""Names of trained policies in tables, from their configuration."""
 
 import json
 from collections.abc import Mapping
@@ -11,9 +11,9 @@ _NOT_TRAINED_BY = ("seed", "device", "evaluation", "checkpoint")
 
 
 def method(record: Record) -> tuple[str, str]:
-    """Return what a trained policy is called in a sweep, and a digest of what it was trained by but for the seed."""
+    """Return a trained policy's name in tables, and a digest of its configuration without the seed."""
     names = [record.choices[group] for group in ("algorithm", "reward", "observation")]
-    names += [*unusual(record), *taught(record)]
+    names += [*unusual(record), *teacher_label(record)]
     values = {key: value for key, value in record.values.items() if key not in _NOT_TRAINED_BY}
     return " ".join(names), sha256(json.dumps(_with_floats(values), sort_keys=True).encode()).hexdigest()
 
@@ -25,25 +25,25 @@ _USUAL = {
     ("observation", "radius"): 5,
     ("reward", "barrier_rule"): "cut_off",
 }
-"""What a policy's name does not tell, since most have it."""
+"""Values that a policy's name leaves out."""
 _PAPERS_RADIUS = 3
 
 
 def unusual(record: Record) -> list[str]:
-    """Return what is unusual in how a policy was trained, as its overrides have it."""
+    """Return a policy's unusual settings, as overrides."""
     usual = _USUAL | ({("observation", "radius"): _PAPERS_RADIUS} if record.choices["observation"] == "paper" else {})
     found = {(group, key): record.values.get(group, {}).get(key) for group, key in usual}
     return [f"{key[1]}={value}" for key, value in found.items() if value is not None and value != usual[key]]
 
 
-def taught(record: Record) -> list[str]:
-    """Return how a policy that had a teacher must be called, in one piece; none where it had none."""
+def teacher_label(record: Record) -> list[str]:
+    """Return the part of a policy's name that names its teacher; empty without a teacher."""
     teacher = record.values.get("imitation", {}).get("teacher")
     return [f"taught by {teacher}"] if teacher else []
 
 
 def _with_floats(node: Any) -> Any:
-    """Return plain values with every number as a float: 0 and 0.0 say the same."""
+    """Return plain values with integers as floats, so that 0 and 0.0 have the same digest."""
     if isinstance(node, Mapping):
         return {key: _with_floats(value) for key, value in node.items()}
     if isinstance(node, list):

@@ -1,4 +1,4 @@
-"""Paired evaluation of any policy: every policy meets the same worlds, on seeds that training never sees."""
+"""Paired evaluation: every policy plays the same worlds, on seeds outside of training."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,10 +19,10 @@ from warp_torchrl.models import ACTION, ACTION_MASK, memory_apart
 from warp_torchrl.policy import MODES
 
 BASELINES = ("noop", "random", "local", "greedy", "coordinated")
-"""Policies that every table shows."""
+"""Baselines of every table."""
 
 Episodes = dict[str, np.ndarray]
-"""Each metric at the end of each episode, float64 [n]."""
+"""Final metrics of n episodes, float64 [n] each."""
 
 
 def play(
@@ -33,18 +33,18 @@ def play(
     recorder: EpisodeRecorder | None = None,
     watch: bool = False,
 ) -> Episodes:
-    """Play one episode in each world of an environment, without resets, until all have ended.
+    """Play one episode in each world of an environment until all have ended.
 
-    The draws of a sampled policy are seeded by ``first_seed``; the global generator is left as it was, and so is what
-    a policy remembers.
+    ``first_seed`` also seeds the draws of a sampled policy. The global generator and a recurrent policy's hidden state
+    are restored.
 
     Args:
-        env: Its worlds become episode 0 of ``first_seed``, ``first_seed + 1``, ...
+        env: Its worlds start episode 0 of the seeds ``first_seed``, ``first_seed + 1``, ...
         policy: Any policy.
         first_seed: Seed of world 0.
         mode: ``sampled`` or ``deterministic``.
-        recorder: Is shown world 0 after every step.
-        watch: Whether to add the numbers of ``BEHAVIOUR``.
+        recorder: Records world 0 after every step.
+        watch: Whether to add the measures of ``BEHAVIOUR``.
 
     Returns:
         The metrics of each world.
@@ -69,12 +69,12 @@ def play(
     return episodes if behaviour is None else episodes | behaviour.summary()
 
 
-class LeftOut(TensorDictModuleBase):
-    """A policy whose team lacks one agent: that one stays where it is, or, where it cannot, does nothing.
+class WithoutAgent(TensorDictModuleBase):
+    """A policy without one agent, which takes an action without effect at every step.
 
     Args:
-        policy: The whole team's.
-        agent: Index of the one left out.
+        policy: Policy of the whole team.
+        agent: Index of the agent.
     """
 
     in_keys: ClassVar = [ACTION_MASK]
@@ -102,7 +102,7 @@ def play_heuristics(env: WildfireEnv, first_seed: int, names: Sequence[str] = BA
 def record_episode(
     path: Path, env: WildfireEnv, policy: TensorDictModuleBase, title: str, seed: int, mode: str
 ) -> None:
-    """Draw one episode, of an environment with one world, as a GIF."""
+    """Play one episode in an environment of one world, and write it as a GIF."""
     recorder = EpisodeRecorder(title=title, roles=env.world.team.agent_roles)
     play(env, policy, seed, mode, recorder)
     recorder.save(path)

@@ -31,17 +31,17 @@ def report(
     """Return the content of ``evaluation.json``.
 
     Args:
-        scenario: Its name.
+        scenario: Name of the scenario.
         policy: Name of the policy, with its mode.
         first_seed: Seed of world 0.
-        episodes: The policy's.
-        others: The heuristics' on the same worlds, by name.
-        other_modes: The same policy's, acting in another mode, by name.
-        left_out: The same policy's with an agent left out, by the agent's name.
-        method: What the policy is called beside others; its name where None.
-        configuration: Tells policies of one method that were trained differently apart.
-        world_overrides: How the worlds differ from the scenario's, as overrides.
-        frames: World steps that the policy was trained for; None where it was not.
+        episodes: Episodes of the policy.
+        others: Episodes of the baselines in the same worlds, by name.
+        other_modes: Episodes of the policy in its other mode, by name.
+        left_out: Episodes of the policy without an agent, by the agent's name.
+        method: The policy's name in tables of many runs; None takes ``policy``.
+        configuration: Digest that distinguishes policies of one method.
+        world_overrides: Overrides by which the worlds differ from the scenario.
+        frames: World steps of training; None for a heuristic.
     """
     if "noop" in others:
         episodes = episodes | {"averted": episodes["saved"] - others["noop"]["saved"]}
@@ -62,8 +62,8 @@ def report(
         "metrics": _summaries(episodes),
         "episodes": rows,
         "versus": {name: compare(episodes["saved"], other["saved"]) for name, other in others.items()},
-        "yardsticks": {name: _summaries(other) for name, other in others.items()},
-        "yardstick_episodes": {
+        "baselines": {name: _summaries(other) for name, other in others.items()},
+        "baseline_episodes": {
             name: {metric: other[metric].tolist() for metric in ("saved", "success")} for name, other in others.items()
         },
         "other_modes": {name: _summaries(other) for name, other in (other_modes or {}).items()},
@@ -85,7 +85,7 @@ def table(content: Mapping[str, Any]) -> str:
         f"{'policy':<22}{'saved %':>8}{'95 % interval':>16}{'iqm %':>8}{'success %':>11}{'control':>9}{'cleared %':>11}"
     )
     lines = [f"{place(content)}: {len(content['seeds'])} fires, seeds from {content['seeds'][0]}", header]
-    rows = {**content["yardsticks"], **content["other_modes"], content["policy"]: content["metrics"]}
+    rows = {**content["baselines"], **content["other_modes"], content["policy"]: content["metrics"]}
     for name, summary in rows.items():
         saved = summary["saved"]
         interval = "{:.1f} .. {:.1f}".format(*(100.0 * bound for bound in saved["ci95"]))
@@ -105,7 +105,7 @@ def table(content: Mapping[str, Any]) -> str:
 
 
 def place(content: Mapping[str, Any]) -> str:
-    """Return what the worlds of a report are called: their scenario, and how they differ from it."""
+    """Return the name of a report's worlds: the scenario and its overrides."""
     return " ".join((content["scenario"], *content.get("world_overrides", ())))
 
 
@@ -123,5 +123,5 @@ def _behaviour_lines(content: Mapping[str, Any]) -> list[str]:
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write a file whole or not at all."""
+    """Write a JSON file atomically."""
     disk.replace(path, json.dumps(content, indent=1))

@@ -1,7 +1,7 @@
-"""What a set of episodes says, and how sure it is: means with bootstrap intervals, and paired comparisons.
+"""Statistics of episodes: means with bootstrap intervals, and paired comparisons.
 
-Values are one number an episode: [n] over world seeds, or [runs, n] of a policy trained several times. Intervals are
-hierarchical: training seeds are resampled, then world seeds, the same ones for every policy (Agarwal et al. 2021).
+Values are one number for each episode: [n] over world seeds, or [runs, n] for several training seeds. The bootstrap is
+hierarchical: it resamples training seeds, then world seeds, the same ones for every policy (Agarwal et al. 2021).
 """
 
 from collections.abc import Callable
@@ -36,7 +36,7 @@ def _mean(values: np.ndarray) -> np.ndarray:
 def summarise(values: np.ndarray) -> dict[str, Any]:
     """Return the interquartile mean and the mean of values [n] or [runs, n], each with its 95 % interval.
 
-    NaN, an episode without the number, is left out of [n]; without any value the entries are None.
+    NaN in [n], an episode without a value, is dropped; the entries are None if no value is left.
     """
     values = values[~np.isnan(values)] if values.ndim == 1 else values
     if not values.size:
@@ -51,15 +51,15 @@ def summarise(values: np.ndarray) -> dict[str, Any]:
 
 
 def compare(saved: np.ndarray, other: np.ndarray) -> dict[str, Any]:
-    """Return how much more a policy saves than another, paired by world, and how often; with 95 % intervals.
+    """Return the difference in trees saved between two policies, paired by world, with 95 % intervals.
 
     Args:
-        saved: Trees saved, [n] or [runs, n].
-        other: The other policy's on the same worlds, [n] or [runs, n].
+        saved: Share of trees saved by the policy, [n] or [runs, n].
+        other: Share of trees saved by the other policy in the same worlds, [n] or [runs, n].
 
     Returns:
-        ``saved_difference`` and ``ci95``; ``probability_of_improvement``, the chance that a run of the policy saves
-        more on a world than one of the other (ties count half), and ``probability_ci95``.
+        ``saved_difference`` and ``ci95``; ``probability_of_improvement``, the probability that a run of the policy
+        saves more in a world than a run of the other (ties count half), and ``probability_ci95``.
     """
     mine, theirs = np.atleast_2d(saved), np.atleast_2d(other)
     difference = mine - theirs.mean(axis=0)

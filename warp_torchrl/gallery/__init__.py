@@ -1,1 +1,1 @@
-"""Figures of the world, those of the paper and ours: ``python -m warp_torchrl.gallery``."""
+"""Figures of the paper and of the fire laws: ``python -m warp_torchrl.gallery``."""

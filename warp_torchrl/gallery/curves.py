@@ -1,7 +1,7 @@
 """Learning curves of runs, from their ``metrics.csv``: those that the WARP-CA paper shows, and the forest saved.
 
-Runs that differ in their seed alone are one line, their mean, in a band from the lowest to the highest of them. Nothing
-is smoothed, but that files of many rows are averaged over bins, which the figure says.
+Runs that differ in their seed only are one line, their mean, with a band from minimum to maximum. Values are not
+smoothed; files of many rows are averaged over bins, and the figure says so.
 """
 
 import math
@@ -59,7 +59,7 @@ class Line(NamedTuple):
 
 
 def curve_figures(paths: Sequence[Path]) -> dict[str, Callable[[], "Figure"]]:
-    """Return what draws each figure of runs, by name.
+    """Return a function for each figure of the runs, by name.
 
     Args:
         paths: Run folders, and folders of a sweep, whose every run is taken.
@@ -111,8 +111,8 @@ def gather(runs: Sequence[Run]) -> list[Line]:
     for run in runs:
         found.setdefault(run.alike, []).append(run)
     recorded = [run.names for run in runs if len(run.names) > 1]
-    told = [place for place, names in enumerate(zip(*recorded)) if place == 0 or len(set(names)) > 1]
-    names = [_name(alike[0].names, told) for alike in found.values()]
+    shown = [place for place, names in enumerate(zip(*recorded)) if place == 0 or len(set(names)) > 1]
+    names = [_name(alike[0].names, shown) for alike in found.values()]
     count = Counter(names)
     seen: Counter[tuple[str, ...]] = Counter()
     lines, looks, scenarios = [], _Places(), _Places()
@@ -125,15 +125,15 @@ def gather(runs: Sequence[Run]) -> list[Line]:
 
 
 class _Places(dict[Hashable, int]):
-    """Numbers things in the order in which they are first asked for."""
+    """Assigns consecutive numbers to keys on first use."""
 
     def of(self, thing: Hashable) -> int:
-        """Return a thing's number."""
+        """Return the number of a key."""
         return self.setdefault(thing, len(self))
 
 
-def _name(names: tuple[str, ...], told: Sequence[int]) -> str:
-    return names[0] if len(names) == 1 else " ".join(names[place] for place in told)
+def _name(names: tuple[str, ...], shown: Sequence[int]) -> str:
+    return names[0] if len(names) == 1 else " ".join(names[place] for place in shown)
 
 
 def _how_many(runs: Sequence[Run]) -> str:
@@ -149,7 +149,7 @@ _DASHES = ("-", (0, (5, 1.5)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (3, 1.2
 
 
 def _look(learner: int, scenario: int) -> dict[str, Any]:
-    """Return a line's look: its learner's colour and dashes, which grey keeps apart, and its scenario's width."""
+    """Return a line's style: colour and dashes by learner, distinct in grey, and width by scenario."""
     dashes = _DASHES[learner % len(_DASHES)]
     return {"color": line_style(learner)["color"], "linestyle": dashes, "linewidth": 1.1 + 0.6 * scenario}
 
@@ -193,7 +193,7 @@ def saved_curves(lines: Sequence[Line]) -> "Figure":
 def _sheet(
     panels: Sequence[Sequence[str]], size: tuple[float, float], title: str, lines: Sequence[Line]
 ) -> tuple["Figure", dict[str, "Axes"]]:
-    """Return a sheet with what its lines mean above and below, and room for it."""
+    """Return a figure with title, caption and legend, and its axes."""
     from matplotlib.lines import Line2D
 
     columns, title = _legend_columns(lines, size[0]), title + _caption(lines)
@@ -237,7 +237,7 @@ def _steps(lines: Sequence[Line]) -> tuple[float, str]:
 
 
 def _caption(lines: Sequence[Line]) -> str:
-    """Return what is said of seeds that are drawn together, and of rows that are."""
+    """Return the caption's notes on averaged seeds and averaged rows."""
     longest = max(run.rows_per_bin for line in lines for run in line.runs)
     several = any(len(line.runs) > 1 for line in lines)
     seeds = "\nmean over seeds in a band from minimum to maximum, as far as all of them reach" if several else ""

@@ -1,4 +1,4 @@
-"""What the figures share: sheets, palettes, maps, scale bars, wind arrows and legends.
+"""Shared parts of the figures: sheets, palettes, maps, scale bars, wind arrows and legends.
 
 Matplotlib is imported here alone, and only when something is drawn. A map has its axes in kilometres, north up.
 """
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 INK, SOFT, GRID = "#222222", "#666666", "#d9d9d9"
 BLUE, ORANGE, VERMILION, SKY, PURPLE = "#0072B2", "#E69F00", "#D55E00", "#56B4E9", "#CC79A7"  # Okabe and Ito 2008
-COVER_COLOURS = {  # they differ in lightness, so that they stay apart in grey and without the red or the green cone
+COVER_COLOURS = {  # of different lightness: distinct in grey and with colour blindness
     Cover.LAKE: (24, 58, 116),
     Cover.WETLAND: (112, 172, 196),
     Cover.GRASSLAND: (240, 226, 160),
@@ -34,7 +34,7 @@ COVER_COLOURS = {  # they differ in lightness, so that they stay apart in grey a
 CELL = 30.0
 """Side of a cell of the maps that are drawn from noise [m]."""
 _DPI = 130
-_LARGEST = 250_000  # bytes; a repository keeps every version of its figures
+_LARGEST = 250_000  # bytes; git keeps every version of a figure
 _STYLE = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
@@ -80,7 +80,7 @@ def sheet(
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Draw with the gallery's settings, whatever the user's own are."""
+    """Draw with the gallery's Matplotlib settings instead of the user's."""
     import matplotlib
 
     with matplotlib.rc_context():

@@ -1,4 +1,4 @@
-"""Laws of the fire as a whole: round fronts, ellipses in the wind, and the sizes of fires."""
+"""Figures of the fire laws: round fronts, ellipses in wind, and fire sizes."""
 
 from typing import TYPE_CHECKING
 

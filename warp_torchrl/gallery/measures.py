@@ -1,4 +1,4 @@
-"""The numbers behind the figures, measured on the automaton itself; nothing here draws."""
+"""Measurements of the automaton for the figures."""
 
 import math
 from typing import Literal
@@ -16,7 +16,7 @@ from warp_torchrl.world.wind import Calm, Wind
 
 Kernel = Literal["alexandridis", "ellipse"]
 CALM_HAZARD = 0.05
-"""Hazard that a burning cell sets on a neighbour in a tick without wind, where ellipses are measured."""
+"""Calm hazard of a burning cell on a neighbour in one tick, in measurements of ellipses."""
 
 
 def snapshots(

@@ -1,4 +1,4 @@
-"""Run folders, read for their curves: ``metrics.csv`` and what was trained, without instantiating anything."""
+"""Reads run folders for learning curves, without instantiating anything from their configuration."""
 
 import csv
 import math
@@ -12,25 +12,25 @@ import numpy as np
 import yaml
 
 from warp_torchrl.config.compose import Record
-from warp_torchrl.evaluation.method import method, taught, unusual
+from warp_torchrl.evaluation.method import method, teacher_label, unusual
 from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError, newest
 
 FRAMES, SECONDS = "time/frames", "time/seconds"
 MOST_ROWS = 400
-"""Rows of a file beyond which they are averaged over bins."""
+"""Files of more rows are averaged over bins."""
 _LARGEST, _LARGEST_CONFIG = 100_000_000, 1_000_000  # bytes
 
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """A run folder: what was trained, and its numbers.
+    """Configuration and metrics of a run folder.
 
     Attributes:
         columns: Columns of ``metrics.csv``, [rows] each, NaN where a value is missing.
         rows_per_bin: Rows that one of these stands for.
         names: Algorithm and teacher, reward, observation and scenario; the folder's own name where nothing is recorded.
-        alike: The same for runs that differ in their seed alone.
-        mark: What tells it from others of the same names.
+        alike: Equal for runs that differ in their seed only.
+        mark: Distinguishes runs of the same names.
         scenario: Its name.
         n_agents: A; None where it is not recorded.
         seed: None where it is not recorded.
@@ -47,7 +47,7 @@ class Run:
 
 
 def run_folders(paths: Sequence[Path]) -> list[Path]:
-    """Return the run folders that are meant, each once: itself, or all below the folder of a sweep."""
+    """Return the run folders of the given paths, each once: a run itself, or all runs of a sweep."""
     found: dict[Path, Path] = {}
     for path in paths:
         if not path.is_dir():
@@ -115,7 +115,7 @@ def _check_time(columns: Mapping[str, np.ndarray]) -> None:
         raise ValueError("it has no rows")
     for name in (FRAMES, SECONDS):
         times = columns.get(name, columns[FRAMES])
-        if not (np.diff(times, prepend=0.0) > 0.0).all():  # nor is that so of NaN
+        if not (np.diff(times, prepend=0.0) > 0.0).all():  # False for NaN too
             raise ValueError(f"{name} must be in every row, positive, and grow")
 
 
@@ -124,15 +124,15 @@ def _recorded(found: Checkpoint, record: Record) -> dict[str, Any]:
         algorithm, reward, observation = (
             str(record.choices[group]) for group in ("algorithm", "reward", "observation")
         )
-        names = (" ".join((algorithm, *unusual(record), *taught(record))), reward, observation)
+        names = (" ".join((algorithm, *unusual(record), *teacher_label(record))), reward, observation)
         _, digest = method(record)
         n_agents, seed = record.values["team"]["n_agents"], str(record.values["seed"])
     except (KeyError, TypeError, AttributeError):
         raise ValueError(f"{found.path / 'config.json'} does not hold a run's configuration") from None
     scenario = str(found.manifest.scenario)
     alike = " ".join((scenario, *names, digest))
-    told = {"names": (*names, scenario), "alike": alike, "mark": digest[:6]}
-    return told | {"scenario": scenario, "n_agents": n_agents, "seed": seed}
+    fields = {"names": (*names, scenario), "alike": alike, "mark": digest[:6]}
+    return fields | {"scenario": scenario, "n_agents": n_agents, "seed": seed}
 
 
 def _not_recorded(folder: Path) -> dict[str, Any]:
@@ -145,10 +145,10 @@ def _not_recorded(folder: Path) -> dict[str, Any]:
             raise ValueError(f"{path} is not a run's configuration") from None
     content = content if isinstance(content, dict) else {}
     team, scenario = content.get("team"), content.get("scenario")
-    told = {"names": (folder.name,), "alike": str(folder), "mark": f"in {folder.parent.name}"}
+    fields = {"names": (folder.name,), "alike": str(folder), "mark": f"in {folder.parent.name}"}
     n_agents = team.get("n_agents") if isinstance(team, dict) else None
     scenario = scenario if isinstance(scenario, str) else "not recorded"
-    return told | {"scenario": scenario, "n_agents": n_agents, "seed": None}
+    return fields | {"scenario": scenario, "n_agents": n_agents, "seed": None}
 
 
 def bin_means(values: np.ndarray, size: int) -> np.ndarray:

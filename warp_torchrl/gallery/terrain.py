@@ -1,4 +1,4 @@
-"""The ground: noise, its scales, and land cover."""
+"""Figures of terrain: noise, its scales, and land cover."""
 
 from typing import TYPE_CHECKING, Literal
 

@@ -1,4 +1,4 @@
-"""The air: the paper's wind field, a uniform wind and one that wanders."""
+"""Figure of winds: the paper's field, a uniform wind and a wandering one."""
 
 import math
 from typing import TYPE_CHECKING

@@ -1,6 +1,6 @@
-"""Policies without learning, the baselines. Each is usable wherever a policy is: tensordict in, action out.
+"""Heuristic policies, the baselines. Each is a TensorDictModule like any policy.
 
-They read the worlds through the environment: all but ``local`` see every cell, which no learned policy does.
+They read the state through the environment: all but ``local`` see every cell, which no learned policy does.
 """
 
 from warp_torchrl.heuristics.base import Heuristic, idle_action
@@ -17,7 +17,7 @@ HEURISTICS: dict[str, type[Heuristic]] = {
     "ring": Ring,
     "mixed": Mixed,
 }
-"""Policies by name."""
+"""Heuristic policies by name."""
 
 __all__ = [
     "HEURISTICS",

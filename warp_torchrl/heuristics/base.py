@@ -1,4 +1,4 @@
-"""What all heuristics share: how they are called, and what they see and do."""
+"""Base class and shared functions of the heuristics."""
 
 import math
 from typing import ClassVar
@@ -16,16 +16,16 @@ from warp_torchrl.world.state import Action, Cover, WorldState, is_burning
 
 
 class Heuristic(TensorDictModuleBase):
-    """A baseline for the teams of one environment.
+    """A heuristic policy for one environment.
 
     Args:
-        env: The environment whose worlds it acts in.
+        env: The environment whose state it reads.
     """
 
     in_keys = [("agents", "action_mask")]  # noqa: RUF012
     out_keys = [("agents", "action")]  # noqa: RUF012
-    remembers: ClassVar[bool] = False
-    """Whether what it does depends on more than the state."""
+    is_stateful: ClassVar[bool] = False
+    """Whether its actions depend on more than the current state."""
 
     def __init__(self, env: WildfireEnv) -> None:
         super().__init__()
@@ -33,7 +33,7 @@ class Heuristic(TensorDictModuleBase):
 
     @property
     def env(self) -> WildfireEnv:
-        """Return the environment it acts in."""
+        """Return the environment."""
         return self._env[0]
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
@@ -42,31 +42,31 @@ class Heuristic(TensorDictModuleBase):
         return tensordict.set(("agents", "action"), action)
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
-        """Return the actions, int64 [B, A], for worlds and action masks [B, A, 10 or 11]."""
+        """Return the actions, int64 [B, A], for worlds and action masks, bool [B, A, actions]."""
         raise TypeError(f"{type(self).__name__} does not say what to do: define choose()")
 
 
 def idle_action(mask: Tensor) -> Tensor:
-    """Return the action that does nothing, int64 [...], of action masks [..., 10 or 11]: stay, or a masked one."""
+    """Return an action without effect, int64 [...]: stay, or else one that the mask [..., actions] forbids."""
     if mask.shape[-1] > Action.STAY:
         return torch.full(mask.shape[:-1], int(Action.STAY), device=mask.device)
     return mask.to(torch.uint8).argmin(dim=-1)
 
 
 def can_be_put_out(state: WorldState, env: WildfireEnv) -> Tensor:
-    """Return the burning cells that an agent could put out, bool [B, H, W]."""
+    """Return the burning cells that an agent can extinguish, bool [B, H, W]."""
     return is_burning(state.cells) & (state.cells <= env.world.fire.last_spreading)
 
 
 def list_cells(mask: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the marked cells of each world in row-major order, so that work can grow with them, not with the map.
+    """Return the marked cells of each world in row-major order, so that later work scales with them, not with the map.
 
     Args:
         mask: bool [B, H, W].
 
     Returns:
-        Flat indices, int64 [B, K], K the most that any world has (1 where none has any), and which of them are cells
-        and not padding, bool [B, K].
+        Flat indices, int64 [B, K], with K the largest count of any world, at least 1; and which indices are not
+        padding, bool [B, K].
     """
     marked = mask.flatten(1)
     counts = marked.sum(dim=1)
@@ -76,7 +76,7 @@ def list_cells(mask: Tensor) -> tuple[Tensor, Tensor]:
     return index, torch.arange(index.shape[1], device=mask.device) < counts[:, None]
 
 
-def way_to(state: WorldState, cells: Tensor) -> Tensor:
+def chebyshev_distance(state: WorldState, cells: Tensor) -> Tensor:
     """Return the Chebyshev distance from each agent to cells [B, K], float32 [B, A, K]."""
     gap = state.vehicles.position[:, :, None] - place(cells, state)[:, None]
     return gap.abs().amax(dim=-1).to(torch.float32)
@@ -85,14 +85,13 @@ def way_to(state: WorldState, cells: Tensor) -> Tensor:
 def nearest_fire(state: WorldState, fire: Tensor) -> tuple[Tensor, Tensor]:
     """Return each agent's distance to the nearest fire, float32 [B, A], ``FAR`` where none burns, and its flat index.
 
-    Equally near ones are told apart by a draw of each agent's own: agents that stand together and see the same would
-    otherwise do the same for ever.
+    Each agent breaks ties by its own random draw: agents in one cell would otherwise act alike for ever.
     """
     cells, valid = list_cells(fire)
     agents = torch.arange(state.vehicles.position.shape[1], device=cells.device)[:, None]
     draw = (agents * fire[0].numel() + cells[:, None]).to(torch.int32)
-    taste = uniform_at(state.key, 0, Stream.POLICY, draw.flatten(1)).view(draw.shape)
-    best = (way_to(state, cells) + taste).masked_fill_(~valid[:, None], float(FAR)).min(dim=-1)
+    tie_break = uniform_at(state.key, 0, Stream.POLICY, draw.flatten(1)).view(draw.shape)
+    best = (chebyshev_distance(state, cells) + tie_break).masked_fill_(~valid[:, None], float(FAR)).min(dim=-1)
     return best.values.floor(), cells.gather(1, best.indices)
 
 
@@ -102,10 +101,10 @@ def place(index: Tensor, state: WorldState) -> Tensor:
     return torch.stack((index // width, index % width), dim=-1)
 
 
-def approach(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
-    """Return the move that brings each agent nearest to its target, int64 [B, A].
+def move_towards(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
+    """Return the move that brings each agent closest to its target, int64 [B, A].
 
-    Turning straight back costs as much as a cell of way, so that agents slide along a lake instead of swinging.
+    Reversing costs one cell of distance, so that agents follow a lake's shore instead of oscillating.
     """
     vehicles, team = state.vehicles, env.world.team
     offsets = torch.tensor(DIRECTIONS, device=target.device)
@@ -118,8 +117,8 @@ def approach(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
     return way.masked_fill(~team.open_moves(state), float(FAR)).argmin(dim=-1)
 
 
-def or_refill(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
-    """Return the targets of agents with water, and the nearest lake or the base for those whose tank is empty."""
+def target_or_water(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
+    """Return the given targets, but the nearest lake or the base for agents with an empty tank, int64 [B, A, 2]."""
     if not env.world.team.tank:
         return target
     water = state.landscape.cover == Cover.LAKE
@@ -129,23 +128,21 @@ def or_refill(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
     return torch.where((state.vehicles.tank == 0)[..., None], place(index, state), target)
 
 
-def claim_cells(
-    state: WorldState, cells: Tensor, value: Tensor, elbow_room: int, discount: float, taken: float
-) -> Tensor:
-    """Return a cell for each agent, int64 [B, A, 2], the best of value less way, one agent after the other.
+def claim_cells(state: WorldState, cells: Tensor, value: Tensor, spacing: int, discount: float, taken: float) -> Tensor:
+    """Assign a cell to each agent by greedy matching of value minus distance, int64 [B, A, 2].
 
-    In each of as many rounds as there are agents, the best pair of an agent without a claim and a cell is taken, and
-    the cells about it are discounted for the others. An agent whom no cell is worth anything stays where it is.
+    Each round assigns the best pair of a cell and an agent without one, then lowers the value of the cells near it for
+    the other agents. An agent for which every cell has value -inf keeps its own position.
 
     Args:
         state: The worlds.
-        cells: Flat indices of the cells to share out, int64 [B, K].
-        value: What each is worth to each agent [cells of way], -inf for nothing, float32 [B, 1 or A, K].
-        elbow_room: Cells about a claim that the others avoid.
-        discount: What avoiding them is worth [cells of way].
-        taken: What avoiding the claimed cell itself is worth.
+        cells: Flat indices of the candidate cells, int64 [B, K].
+        value: Value of each cell for each agent [cells of distance], float32 [B, 1 or A, K]; -inf excludes a cell.
+        spacing: Chebyshev distance within which an assigned cell lowers the value of others [cells].
+        discount: Amount by which it lowers them [cells of distance].
+        taken: Further amount for the assigned cell itself [cells of distance].
     """
-    gain = value - way_to(state, cells)
+    gain = value - chebyshev_distance(state, cells)
     worlds, agents, count = gain.shape
     place_of = place(cells, state)
     claim = state.vehicles.position.clone()
@@ -157,11 +154,11 @@ def claim_cells(
         worth = torch.isfinite(best.values)[:, None]
         claim[rows, agent] = torch.where(worth, claimed, claim[rows, agent])
         distance = (place_of - claimed[:, None]).abs().amax(dim=-1)
-        gain -= (discount * (distance <= elbow_room) + taken * (distance == 0))[:, None]
+        gain -= (discount * (distance <= spacing) + taken * (distance == 0))[:, None]
         gain[rows, agent] = -math.inf
     return claim
 
 
 def extinguish_or(move: Tensor, mask: Tensor) -> Tensor:
-    """Return extinguish where it is open, else the move."""
+    """Return extinguish where the mask allows it, else the move."""
     return torch.where(mask[..., Action.EXTINGUISH], int(Action.EXTINGUISH), move)

@@ -1,24 +1,24 @@
-"""Baselines in which each agent acts for itself."""
+"""Baselines without coordination: each agent acts on its own."""
 
 import torch
 from torch import Tensor
 
 from warp_torchrl.heuristics.base import (
     Heuristic,
-    approach,
     can_be_put_out,
     extinguish_or,
     idle_action,
+    move_towards,
     nearest_fire,
-    or_refill,
     place,
+    target_or_water,
 )
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import WorldState
 
 
 class NoOp(Heuristic):
-    """Does nothing: stays, or where the team cannot stay, chooses an action that has no effect."""
+    """Stays, or if the team has no such action, chooses one without effect."""
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
@@ -26,7 +26,7 @@ class NoOp(Heuristic):
 
 
 class Random(Heuristic):
-    """Draws one of the actions that do something, the same ones on the same seed."""
+    """Draws uniformly among the actions that the mask allows; the same seed gives the same draws."""
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
@@ -35,8 +35,8 @@ class Random(Heuristic):
 
 
 class Local(Heuristic):
-    """Sees only the square of ``radius`` cells about itself: puts out what it can reach, else goes to the nearest
-    fire it sees, else sweeps the map, first fanning out across it and then from one random point to the next.
+    """Sees only cells within Chebyshev distance ``radius``: extinguishes what it can reach, else goes to the nearest
+    fire in sight, else searches the map: first the agents fan out, then each goes from one random point to the next.
     """
 
     radius = 5
@@ -47,10 +47,10 @@ class Local(Heuristic):
         distance, index = nearest_fire(state, fire)
         sees = distance <= self.radius
         target = torch.where(sees[..., None], place(index, state), self._waypoint(state))
-        return extinguish_or(approach(state, self.env, or_refill(state, self.env, target)), mask)
+        return extinguish_or(move_towards(state, self.env, target_or_water(state, self.env, target)), mask)
 
     def _waypoint(self, state: WorldState) -> Tensor:
-        """Return where each agent sweeps to, int64 [B, A, 2]: fanning out over the map, later random points."""
+        """Return each agent's next search point, int64 [B, A, 2]: fanned out at first, then random."""
         size = torch.tensor(state.cells.shape[1:], device=state.cells.device)
         agents = state.vehicles.position.shape[1]
         leg = state.step // size.max()
@@ -63,10 +63,10 @@ class Local(Heuristic):
 
 
 class Greedy(Heuristic):
-    """Puts out what it can reach, else goes to the nearest fire of the map."""
+    """Extinguishes what it can reach, else goes to the nearest fire on the map."""
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
         _, index = nearest_fire(state, can_be_put_out(state, self.env))
-        target = or_refill(state, self.env, place(index, state))
-        return extinguish_or(approach(state, self.env, target), mask)
+        target = target_or_water(state, self.env, place(index, state))
+        return extinguish_or(move_towards(state, self.env, target), mask)

@@ -1,4 +1,4 @@
-"""The team shuts the fire in with firebreaks."""
+"""Baselines that enclose the fire with firebreaks."""
 
 import math
 
@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.heuristics.base import approach, claim_cells, extinguish_or, list_cells, or_refill
+from warp_torchrl.heuristics.base import claim_cells, extinguish_or, list_cells, move_towards, target_or_water
 from warp_torchrl.heuristics.coordinated import Coordinated
 from warp_torchrl.world.fast.distances import distance_to_nearest
 from warp_torchrl.world.geometry import grow
@@ -14,52 +14,52 @@ from warp_torchrl.world.state import Action, WorldState, is_burning, is_tree
 
 
 class Ring(Coordinated):
-    """Clears a ring about the fire, at the distance at which it can be closed in time; where several fires are near
-    each other it goes round them all. When the fire gets over it, a wider one is planned; when it is closed, or none
-    can be, agents that have water attack the front as ``Coordinated`` does, and so do those that cannot clear.
+    """Clears a ring around the fires, at the smallest distance at which it can be closed in time. If fire crosses the
+    ring, it plans a wider one. Agents that cannot clear attack the front as ``Coordinated`` does, and so do all agents
+    once the ring is closed, or if none is possible.
     """
 
-    remembers = True
-    pace = 1.0  # cells that a front makes in one of the paper's ticks
-    effort = 2.0  # steps for each cell of the ring: go there, clear it
+    is_stateful = True
+    pace = 1.0  # speed of a fire front [cells per tick of the paper]
+    effort = 2.0  # steps for each cell of the ring: move, clear
 
     def __init__(self, env: WildfireEnv) -> None:
         super().__init__(env)
         self._plan = torch.zeros(0, dtype=torch.bool)  # [B, H, W], the ring; empty before the first step
         self._inside = torch.zeros(0, dtype=torch.bool)  # [B, H, W], what it encloses
 
-    def diggers(self, state: WorldState) -> Tensor:
-        """Return which agents work on the ring, bool [A]."""
+    def line_builders(self, state: WorldState) -> Tensor:
+        """Return the agents that clear the ring, bool [A]."""
         return self.env.world.team.table(state.cells.device).clears
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
-        self._revise(state)
+        self._update_plan(state)
         todo = self._plan & is_tree(state.cells) & (state.alpha > 0.0)
-        digs = self.diggers(state) & todo.flatten(1).any(dim=1)[:, None]
+        builds = self.line_builders(state) & todo.flatten(1).any(dim=1)[:, None]
         value, front = self.value(state)
         cells, valid = list_cells(todo | front)
         worth = value.flatten(1).gather(1, cells).masked_fill_(~(front.flatten(1).gather(1, cells) & valid), -math.inf)
         unbroken = torch.zeros_like(worth).masked_fill_(~(todo.flatten(1).gather(1, cells) & valid), -math.inf)
-        worth = torch.where(digs[..., None], unbroken[:, None], worth[:, None])
-        claims = claim_cells(state, cells, worth, elbow_room=1, discount=2.0, taken=1000.0)
-        attack = extinguish_or(approach(state, self.env, or_refill(state, self.env, claims)), mask)
+        worth = torch.where(builds[..., None], unbroken[:, None], worth[:, None])
+        claims = claim_cells(state, cells, worth, spacing=1, discount=2.0, taken=1000.0)
+        attack = extinguish_or(move_towards(state, self.env, target_or_water(state, self.env, claims)), mask)
         there = (claims == state.vehicles.position).all(dim=-1) & mask[..., Action.CLEAR]
-        dig = torch.where(there, int(Action.CLEAR), approach(state, self.env, claims))
-        return torch.where(digs, dig, attack)
+        build = torch.where(there, int(Action.CLEAR), move_towards(state, self.env, claims))
+        return torch.where(builds, build, attack)
 
-    def _revise(self, state: WorldState) -> None:
-        """Plan a ring in worlds that begin, and where the fire has got over the one there was."""
+    def _update_plan(self, state: WorldState) -> None:
+        """Plan a ring in worlds at step 0, and where fire has crossed the former ring."""
         burning = is_burning(state.cells)
         if self._plan.shape != burning.shape:
             self._plan, self._inside = torch.zeros_like(burning), torch.zeros_like(burning)
         stale = (state.step == 0) | (burning & ~self._inside).flatten(1).any(dim=1)
         index = stale.nonzero()[:, 0]
         if len(index):
-            self._plan[index], self._inside[index] = self._lay(state[index], burning[index])
+            self._plan[index], self._inside[index] = self._plan_ring(state[index], burning[index])
 
-    def _lay(self, state: WorldState, burning: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the nearest ring that can be closed in time and what it encloses; none where none can be."""
+    def _plan_ring(self, state: WorldState, burning: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the smallest ring that can be closed in time, and the cells inside; both empty if there is none."""
         world = self.env.world
         reach = max(burning.shape[1:]) // 2
         away = torch.full(burning.shape, reach, device=burning.device)  # cells to the fire, ``reach`` at most
@@ -73,7 +73,7 @@ class Ring(Coordinated):
         distance = torch.arange(1, reach, device=burning.device)
         farthest = distance_to_nearest(state.vehicles.position, burning).amax(dim=1)
         way = farthest[:, None] - distance
-        workers = self.diggers(state).sum().clamp(min=1)
+        workers = self.line_builders(state).sum().clamp(min=1)
         need = way.clamp(min=0) + self.effort * cells[:, 1:reach] / workers
         steps = world.steps_per_tick * world.fire.ticks_per_stage / self.pace
         fits = need <= (distance - 1) * steps
@@ -82,9 +82,9 @@ class Ring(Coordinated):
 
 
 class Mixed(Ring):
-    """Every other agent that can clear works on the ring; the others attack the front."""
+    """Every second agent that can clear works on the ring; the others attack the front."""
 
-    def diggers(self, state: WorldState) -> Tensor:
-        """Return which agents work on the ring, bool [A]."""
-        clears = super().diggers(state)
+    def line_builders(self, state: WorldState) -> Tensor:
+        """Return the agents that clear the ring, bool [A]."""
+        clears = super().line_builders(state)
         return clears & (clears.cumsum(0) % 2 == 1)

@@ -1,4 +1,4 @@
-"""What the team earns: the paper's five conservation rewards, and its award for each act.
+"""Rewards: the paper's five conservation rewards, and its award for each act.
 
 A reward is a component: called with a transition it returns [B, A, 1].
 """

@@ -1,4 +1,4 @@
-"""What all rewards have in common: the team's share, scale and potential-based shaping."""
+"""Base class of rewards: team share, scale and potential-based shaping."""
 
 from dataclasses import dataclass, fields
 from typing import Literal
@@ -46,7 +46,7 @@ class Reward:
         check_fields(self, **{**finite, **ranges})
 
     def __call__(self, transition: Transition) -> Tensor:
-        """Return the reward of each agent, float32 [B, A, 1]; 0 in a world that had ended before."""
+        """Return the reward of each agent, float32 [B, A, 1]; 0 in a world that had already ended."""
         own = self.own(transition)
         if self.shaping > 0.0:
             own = own + self.shaping * self._shaping(transition)
@@ -55,7 +55,7 @@ class Reward:
         return (reward * ~transition.before.done[:, None])[..., None]
 
     def own(self, transition: Transition) -> Tensor:
-        """Return what each agent earns before sharing and shaping, float32 [B, A]."""
+        """Return each agent's reward before sharing and shaping, float32 [B, A]."""
         raise TypeError(f"{type(self).__name__} does not say what an agent earns: define own()")
 
     def phi(self, state: WorldState) -> Tensor:

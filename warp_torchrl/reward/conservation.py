@@ -2,9 +2,9 @@
 
     Q = (w_p T_p + w_e T_e - w_c T_c - w_b T_b) / N0      (WARP-CA, conservation metric)
 
-is what the forest is worth. Each reward makes a value R of it and of what the team did, and is telescoped, r_t = R(t) -
-R(t-1), so that an episode earns R(end) - R(start), however it was played. The trees are the team's; each agent pays
-for its own acts, as many times as there are agents, so that the team's mean is R.
+is the value of the forest. Each reward computes a value R from Q and the team's acts, and pays its difference, r_t =
+R(t) - R(t-1), so that the return of an episode is R(end) - R(start). All agents share the value of the trees; each
+agent pays A times for its own acts, so that the team's mean is R.
 """
 
 from dataclasses import dataclass
@@ -21,14 +21,14 @@ from warp_torchrl.world.state import Transition, WorldState, is_burning
 
 @dataclass(frozen=True, kw_only=True)
 class Conservation(Reward):
-    """What the five have in common.
+    """Base class of the five conservation rewards.
 
     Attributes:
         preserved: w_p, weight of each tree untouched by fire or agents [1 / initial tree].
-        extinguished: w_e, of each that was put out and stands.
-        cleared: w_c, of each that was cleared.
-        burned: w_b, of each that burned to ash.
-        act: w_a, of each extinguish or clear action [1].
+        extinguished: w_e, weight of each tree that was extinguished and stands.
+        cleared: w_c, weight of each cleared tree.
+        burned: w_b, weight of each tree that burned to ash.
+        act: w_a, cost of each extinguish or clear action [1].
     """
 
     preserved: float = 1.0
@@ -38,7 +38,7 @@ class Conservation(Reward):
     act: float = 5e-4
 
     def own(self, transition: Transition) -> Tensor:
-        """Return each agent's part, float32 [B, A]."""
+        """Return each agent's reward before sharing and shaping, float32 [B, A]."""
         before, after = transition.before, transition.after
         gained = self.value(after) - self.value(before) + self.bonus(transition)
         acts = after.vehicles.acts - before.vehicles.acts
@@ -60,13 +60,13 @@ class Conservation(Reward):
         return self.worth(state)
 
     def bonus(self, transition: Transition) -> Tensor | float:
-        """Return what a step adds that no state holds, float32 [B]."""
+        """Return a step's reward that is no difference of states, float32 [B]."""
         return 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Efficiency(Conservation):
-    """Conservation reward 1: keep and save trees, with few actions.
+    """Conservation reward 1: preserve and save trees with few actions.
 
     R = Q - w_a A_total      (WARP-CA, eq. of the action efficiency)
     """
@@ -74,12 +74,12 @@ class Efficiency(Conservation):
 
 @dataclass(frozen=True, kw_only=True)
 class Time(Conservation):
-    """Conservation reward 2: ... and soon.
+    """Conservation reward 2: also save time.
 
         R = Q - zeta T_total / T_max - w_a A_total
 
-    The paper prints -zeta / T_total, which rewards slowness against its own text: ``rule: printed`` pays that once, at
-    the end.
+    The paper prints -zeta / T_total, which rewards slow teams and contradicts its text. ``rule: printed`` pays that
+    term once, at the end.
 
     Attributes:
         zeta: Weight of the time until the episode's end.
@@ -99,7 +99,7 @@ class Time(Conservation):
         return self.worth(state) - self.zeta / self.horizon * state.step
 
     def bonus(self, transition: Transition) -> Tensor | float:
-        """Return -zeta / T_total at the end of an episode where that is the rule, float32 [B]."""
+        """Return -zeta / T_total at the end of an episode under rule ``printed``, else 0, float32 [B]."""
         if self.rule == "share":
             return 0.0
         return -self.zeta / transition.after.step.clamp(min=1) * transition.after.done
@@ -107,14 +107,14 @@ class Time(Conservation):
 
 @dataclass(frozen=True, kw_only=True)
 class Coverage(Conservation):
-    """Conservation reward 3: ... in every part of the map.
+    """Conservation reward 3: also protect every block of the map.
 
         R = Q + sum over blocks of omega a_block [under 5 % of the block's trees burn or have burned] - w_a A_total
 
     Attributes:
         omega: Weight of each block.
         side: Side of a block [cells].
-        least: Share of a block's trees from which it counts as burned.
+        least: Share of lost trees from which a block counts as burned.
     """
 
     act: float = 0.0
@@ -136,15 +136,15 @@ class Coverage(Conservation):
 
 @dataclass(frozen=True, kw_only=True)
 class Collaborative(Conservation):
-    """Conservation reward 4: ... together.
+    """Conservation reward 4: also act together.
 
         R = eta max(Q, 0) + min(Q, 0) - w_a A_total,   eta = 1 + bonus x share of agents with a useful act lately
 
-    so that idling never softens a loss; ``rule: printed`` has eta on all of Q.
+    eta multiplies only positive Q, so that idling never reduces a loss; with ``rule: printed`` it multiplies all of Q.
 
     Attributes:
-        together: Greatest addition to eta.
-        window: Steps for which a credited act counts as lately.
+        together: Largest bonus in eta.
+        window: Steps for which a credited act counts as recent.
         rule: ``positive`` or ``printed``.
     """
 
@@ -164,7 +164,7 @@ class Collaborative(Conservation):
 
 @dataclass(frozen=True, kw_only=True)
 class Adaptive(Conservation):
-    """Conservation reward 5: ... where the fire goes.
+    """Conservation reward 5: also act where the fire spreads.
 
         R = Q + theta_1 r_1 + theta_2 r_2 + theta_3 r_3 - w_a A_total
 

@@ -16,20 +16,20 @@ from warp_torchrl.world.state import Action, Transition, is_burning, is_tree
 class Paper(Reward):
     """The paper's reward, an award for each act (WARP-CA, reward table), divided by ``divisor``.
 
-    A barrier of +50 for each tree cleared near fire, as printed, is farmed: agents clear instead of fighting. So the
-    barrier pays 50 x the share of the initial trees that the step's clearing cuts off from the fire, split among the
-    agents that cleared; ``barrier_rule: printed`` pays the printed one.
+    With the printed barrier of +50 for each tree cleared near fire, agents clear trees instead of fighting the fire. So
+    the barrier pays 50 x the share of the initial trees that the step's clearing cuts off from the fire, split among
+    the agents that cleared; ``barrier_rule: printed`` pays the printed award.
 
     Attributes:
-        move: Of each move, blocked ones too.
-        extinguish: Of each fire put out.
-        failed: Of each extinguish or clear that did nothing.
-        clear: Of each tree cleared.
-        far_clear: Of each tree cleared farther than ``near`` from fire, added.
-        barrier: Of a barrier.
+        move: Award of each move, also a blocked one.
+        extinguish: Award of each fire extinguished.
+        failed: Award of each extinguish or clear without effect.
+        clear: Award of each tree cleared.
+        far_clear: Further award of each tree cleared farther than ``near`` from fire.
+        barrier: Award of a barrier.
         barrier_rule: ``cut_off`` or ``printed``.
         near: Distance [cells].
-        divisor: Of all of it.
+        divisor: Divides the sum of all awards.
     """
 
     move: float = -0.2
@@ -43,7 +43,7 @@ class Paper(Reward):
     divisor: float = 50.0
 
     def own(self, transition: Transition) -> Tensor:
-        """Return each agent's part, float32 [B, A]."""
+        """Return each agent's award before sharing and shaping, float32 [B, A]."""
         outcome, before = transition.outcome, transition.before
         action, cleared = outcome.action, outcome.cleared
         distance = distance_to_nearest(transition.after.vehicles.position, is_burning(before.cells))

@@ -1,1 +1,1 @@
-"""Runs on disk: folders, checkpoints, logs, and how a run goes on."""
+"""Runs on disk: folders, checkpoints, logs and resumption."""

@@ -1,4 +1,4 @@
-"""Checkpoints: complete or invisible, verified before they are read, the newest found by listing.
+"""Checkpoints: written atomically, and verified before they are read.
 
 ``checkpoints/<frames>/`` holds ``policy.pt`` and ``training.pt`` (tensors and plain values, read with
 ``weights_only=True``), ``config.json``, and ``manifest.json``, see ``warp_torchrl.runs.manifest``.
@@ -47,18 +47,18 @@ class RunFolderInUse(Exception):  # noqa: N818
 
 @dataclass(frozen=True, kw_only=True)
 class Checkpoint:
-    """A checkpoint whose files were verified; reading them can still fail only if the disk changes.
+    """A checkpoint with verified files.
 
     Attributes:
-        path: Its folder.
-        manifest: What it says of itself.
+        path: The checkpoint's folder.
+        manifest: Content of ``manifest.json``.
     """
 
     path: Path
     manifest: Manifest
 
     def record(self) -> Record:
-        """Return the configuration it was trained with."""
+        """Return the training's configuration."""
         content = read_json(self.path / "config.json")
         choices, values = content.get("choices"), content.get("values")
         if not (isinstance(choices, dict) and isinstance(values, dict)):
@@ -70,15 +70,15 @@ class Checkpoint:
         return self._load("policy.pt")
 
     def training(self) -> dict[str, Any]:
-        """Return everything a run needs to go on."""
+        """Return the training state, for a resume."""
         self.check_goes_on()
         return self._load(TRAINING)
 
     def check_goes_on(self) -> None:
-        """Check that training can go on from here.
+        """Check that the checkpoint has a training state.
 
         Raises:
-            CheckpointError: If it is a policy alone, see ``export``.
+            CheckpointError: If it is an exported policy, see ``export``.
         """
         if TRAINING not in self.manifest.files:
             raise CheckpointError(f"{self.path} holds a policy alone: it acts, and nothing goes on from it")
@@ -103,38 +103,38 @@ def save(
     keep: int,
     stays: Callable[[int], bool] = lambda frames: True,
 ) -> Path:
-    """Write a checkpoint, then drop all but ``keep``: the newest two stay, and the newest of the others that may.
+    """Write a checkpoint, then delete old ones: the newest two stay, and the newest others that ``stays`` allows.
 
-    It appears under its name only when every file is on the disk: temporary folder, fsync, one rename, fsync. What a
-    killed save left goes first; unsound ones that the run went past go when this one is safe.
+    The checkpoint appears under its name only when every file is on the disk: temporary folder, fsync, rename, fsync.
+    Temporary folders of killed saves are deleted first, newer unsound checkpoints after this one is safe.
 
     Args:
-        run: Its run folder.
-        frames: Its name.
-        scenario: See ``Manifest``, as for signature and mode.
-        signature: Of the policy.
-        mode: None before it is known.
+        run: The run folder.
+        frames: World steps trained; names the folder.
+        scenario: See ``Manifest``.
+        signature: See ``Manifest``.
+        mode: See ``Manifest``.
         record: The configuration.
-        policy: Parameters.
-        training: What a run needs to go on.
-        keep: How many stay, at least two.
-        stays: Says of a checkpoint's frames whether it may stay when there are two newer ones.
+        policy: The policy's parameters.
+        training: The training state.
+        keep: Number of checkpoints to keep, at least two.
+        stays: Called with a checkpoint's frames; returns whether it may stay when two are newer.
 
     Returns:
-        Its folder.
+        The checkpoint's folder.
 
     Raises:
-        OSError: If the disk refuses; the checkpoints that were there stay.
+        OSError: If a write fails; the older checkpoints stay.
     """
     parent = run / "checkpoints"
     final, draft = parent / f"{frames}", parent / f".{frames}.tmp"
-    with disk.telling(parent):
+    with disk.with_path(parent):
         parent.mkdir(parents=True, exist_ok=True)
     for leftover in parent.glob(".*.tmp"):
         shutil.rmtree(leftover, ignore_errors=True)
     if not _is_sound(final):
         try:
-            with disk.telling(draft):
+            with disk.with_path(draft):
                 draft.mkdir()
                 disk.save_tensors(draft / "policy.pt", dict(policy))
                 disk.save_tensors(draft / TRAINING, dict(training))
@@ -148,17 +148,17 @@ def save(
 
 
 def export(found: Checkpoint, folder: Path) -> None:
-    """Write a checkpoint's policy, and nothing that only training needs, into a new folder.
+    """Write a checkpoint without its training state into a new folder.
 
     Raises:
-        FileExistsError: If there is such a folder.
-        OSError: If the disk refuses.
+        FileExistsError: If the folder exists.
+        OSError: If a write fails.
     """
     manifest, draft = found.manifest, folder.with_name(f".{folder.name}.tmp")
     if folder.exists():
         raise FileExistsError(f"{folder} exists")
     shutil.rmtree(draft, ignore_errors=True)
-    with disk.telling(draft):
+    with disk.with_path(draft):
         draft.mkdir(parents=True)
         for name in manifest.files:
             if name != TRAINING:
@@ -179,10 +179,10 @@ def newest(path: Path | str) -> tuple[Checkpoint, list[str]]:
         path: A run folder, or one checkpoint folder.
 
     Returns:
-        The checkpoint, and a line for each newer one that was skipped, with the reason.
+        The checkpoint, and for each newer unsound one a line with the reason.
 
     Raises:
-        CheckpointError: If there is none.
+        CheckpointError: If no checkpoint is sound.
     """
     path = Path(path)
     if (path / MANIFEST).exists() or path.parent.name == "checkpoints":
@@ -200,10 +200,10 @@ def newest(path: Path | str) -> tuple[Checkpoint, list[str]]:
 
 
 class RunFolderLock:
-    """Holds a run folder for one writer; the operating system lets go of it when the process ends.
+    """Locks a run folder for one process; the operating system releases the lock when the process ends.
 
     Raises:
-        RunFolderInUse: If another process holds it.
+        RunFolderInUse: If another process has the lock.
     """
 
     def __init__(self, run: Path) -> None:
@@ -216,7 +216,7 @@ class RunFolderLock:
             raise RunFolderInUse(f"{run} is in use: another process trains into it") from None
 
     def release(self) -> None:
-        """Let another process have it."""
+        """Release the lock."""
         self._file.close()
 
 
@@ -230,7 +230,7 @@ def _publish(draft: Path, final: Path) -> None:
 
 
 def _drop(run: Path, newest: Path, keep: int, stays: Callable[[int], bool]) -> None:
-    """Keep so many checkpoints up to the newest: those beyond it are unsound, or a run would have gone on from them."""
+    """Delete old checkpoints, and those newer than this one: they are unsound, or the run would have resumed there."""
     listed = _listed(run)
     place = listed.index(newest)
     older = [folder for folder in listed[place + 2 :] if stays(int(folder.name))]

@@ -1,22 +1,22 @@
-"""Where an evaluation may write: where nothing else is, unless it is told to replace what is there."""
+"""The output folder of an evaluation: it must hold nothing else, unless ``overwrite=true``."""
 
 from pathlib import Path
 
 from warp_torchrl.config.construction import ConfigError
 
-_OF_HYDRA = (".hydra", "multirun.yaml")  # which comes before the evaluation, as its logs do
+_OF_HYDRA = (".hydra", "multirun.yaml")  # Hydra writes these, and logs, before the evaluation
 _NAMED = 3
 
 
 def check_free(folder: Path, key: str) -> None:
-    """Check that a folder is new, is empty, or holds nothing but logs.
+    """Check that a folder does not exist, is empty, or holds nothing but logs.
 
     Args:
-        folder: Need not be there.
-        key: Of the configuration, which names it.
+        folder: The output folder.
+        key: The configuration key that names it.
 
     Raises:
-        ConfigError: If it holds anything else.
+        ConfigError: If the folder holds anything else.
     """
     there = [each.name for each in folder.iterdir()] if folder.is_dir() else []
     held = [name for name in there if name not in _OF_HYDRA and not name.endswith(".log")]

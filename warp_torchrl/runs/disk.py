@@ -1,4 +1,4 @@
-"""Files that last: on the disk when a call returns, replaced whole or not at all, and a refusal told with its path."""
+"""Durable, atomic writes; their errors name the path."""
 
 import os
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ import torch
 
 
 def sync(path: Path) -> None:
-    """Wait until a file's content, or a folder's list of names, is on the disk."""
+    """Flush a file or a folder to the disk (fsync)."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -19,14 +19,14 @@ def sync(path: Path) -> None:
 
 
 def replace(path: Path, text: str) -> None:
-    """Write a file so that a reader, or the next start after a crash, finds the old one or the new one.
+    """Replace a file atomically: readers find the old or the new content, also after a crash.
 
     Raises:
-        OSError: With the path; the old file stays.
+        OSError: If the write fails, with the path; the old file stays.
     """
     draft = path.with_name(f".{path.name}.tmp")
     try:
-        with telling(path):
+        with with_path(path):
             draft.write_text(text, encoding="utf-8", newline="")
             sync(draft)
             draft.replace(path)
@@ -36,12 +36,12 @@ def replace(path: Path, text: str) -> None:
 
 
 def save_tensors(path: Path, content: Any) -> None:
-    """Write tensors and plain values with ``torch.save``, of a tensor that is part of another that part alone.
+    """Write tensors and plain values with ``torch.save``; of a view, only its own elements.
 
     Raises:
-        OSError: With the path, where torch says only that its position is not the one that it expected.
+        OSError: If the write fails, with the path; torch itself reports only an unexpected file position.
     """
-    with telling(path), path.open("wb") as file:
+    with with_path(path), path.open("wb") as file:
         writer = _Writer(file)
         try:
             torch.save(_apart(content), cast(BinaryIO, writer))
@@ -52,14 +52,14 @@ def save_tensors(path: Path, content: Any) -> None:
 
 
 def size(content: Any) -> int:
-    """Return how many bytes the tensors in nested mappings hold."""
+    """Return the size of the tensors in nested mappings [bytes]."""
     if isinstance(content, dict):
         return sum(size(each) for each in content.values())
     return content.nbytes if isinstance(content, torch.Tensor) else 0
 
 
 def _apart(content: Any) -> Any:
-    """Return nested mappings with their tensors on their own: torch writes all the memory that a tensor is part of."""
+    """Return nested mappings with views cloned: torch would write the whole storage of a view."""
     if isinstance(content, dict):
         return {key: _apart(each) for key, each in content.items()}
     is_part = isinstance(content, torch.Tensor) and content.nbytes < content.untyped_storage().nbytes()
@@ -67,8 +67,8 @@ def _apart(content: Any) -> Any:
 
 
 @contextmanager
-def telling(path: Path) -> Iterator[None]:
-    """Give an OSError the path, which Python leaves out where a write fails."""
+def with_path(path: Path) -> Iterator[None]:
+    """Add the path to an ``OSError``; Python leaves it out if a write fails."""
     try:
         yield
     except OSError as error:
@@ -77,14 +77,14 @@ def telling(path: Path) -> Iterator[None]:
 
 
 class _Writer:
-    """A file that remembers why the disk refused a write."""
+    """A file that keeps the ``OSError`` of a failed write, which torch hides."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
         self.refusal: OSError | None = None
 
     def write(self, data: bytes) -> int:
-        """Write."""
+        """Write bytes; keep the error if it fails."""
         try:
             return self._file.write(data)
         except OSError as error:
@@ -92,5 +92,5 @@ class _Writer:
             raise
 
     def flush(self) -> None:
-        """Hand what is buffered to the operating system."""
+        """Flush the buffer to the operating system."""
         self._file.flush()

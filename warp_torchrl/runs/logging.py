@@ -1,4 +1,4 @@
-"""Where a run's numbers go: ``metrics.csv`` always, and a tracker where one is asked for."""
+"""Loggers: ``metrics.csv`` always, and a tracker if chosen."""
 
 import csv
 import io
@@ -18,16 +18,16 @@ log = logging.getLogger("warp_torchrl")
 
 
 class MetricsFile:
-    """``metrics.csv``: one row an iteration, complete after a crash, cut back on resume.
+    """``metrics.csv``: one row for each iteration, complete after a crash, truncated on resume.
 
-    The first row fixes the columns. A value that an iteration does not have is left empty.
+    The first row sets the columns. A missing value is an empty cell.
 
     Args:
         path: The file.
-        keep_rows: Rows that stay when it exists; the others were written after the checkpoint.
+        keep_rows: Rows to keep on resume; the others were written after the checkpoint.
 
     Raises:
-        ValueError: If there are fewer.
+        ValueError: If the file has fewer rows.
     """
 
     def __init__(self, path: Path, keep_rows: int = 0) -> None:
@@ -38,11 +38,11 @@ class MetricsFile:
             self._columns = self._cut(keep_rows)
 
     def add(self, row: Mapping[str, float | None]) -> None:
-        """Append a row; it is on its way to the disk when this returns.
+        """Append a row. ``sync`` flushes it to the disk.
 
         Raises:
             ValueError: If a column is new.
-            OSError: If the disk refuses.
+            OSError: If the write fails.
         """
         lines = []
         if self._columns is None:
@@ -54,20 +54,20 @@ class MetricsFile:
         values = [row.get(column) for column in self._columns]
         lines.append(["" if value is None else repr(value) for value in values])
         mode = "w" if len(lines) > 1 else "a"
-        with disk.telling(self.path), self.path.open(mode, newline="", encoding="utf-8") as file:
+        with disk.with_path(self.path), self.path.open(mode, newline="", encoding="utf-8") as file:
             csv.writer(file).writerows(lines)
         self.rows += 1
 
     def sync(self) -> None:
-        """Wait until every row is on the disk."""
+        """Flush every row to the disk."""
         if self.rows:
             disk.sync(self.path)
 
     def _cut(self, rows: int) -> list[str]:
-        """Drop all but the first rows, and return the columns."""
+        """Truncate the file to its first rows, and return the columns."""
         lines = []
         if self.path.exists():
-            with self.path.open(newline="", encoding="utf-8", errors="replace") as file:  # the last row may be torn
+            with self.path.open(newline="", encoding="utf-8", errors="replace") as file:  # a crash may cut the last row
                 lines = list(islice(csv.reader(file), rows + 1))
         if len(lines) <= rows:
             raise ValueError(f"{self.path} must hold the {rows} rows of the checkpoint, got {max(len(lines) - 1, 0)}")
@@ -78,14 +78,14 @@ class MetricsFile:
 
 
 class Tracker(Protocol):
-    """What a run needs of a tracker."""
+    """A tracker of a run's metrics."""
 
     def log(self, row: Mapping[str, float | None], frames: int) -> None:
         """Send a row."""
         ...
 
     def close(self) -> None:
-        """Finish."""
+        """Finish the tracker's run."""
         ...
 
 
@@ -94,11 +94,11 @@ class _Silent:
         """Send nothing."""
 
     def close(self) -> None:
-        """Finish nothing."""
+        """Do nothing."""
 
 
 class _TorchRlTracker:
-    """One of TorchRL's loggers; the first failure ends the tracking and never the training."""
+    """One of TorchRL's loggers; its first error ends the tracking, never the training."""
 
     def __init__(self, name: str, run: Path, **options: object) -> None:
         self._name = name
@@ -108,7 +108,7 @@ class _TorchRlTracker:
             self._fail(error)
 
     def log(self, row: Mapping[str, float | None], frames: int) -> None:
-        """Send a row under the names of ``metrics.csv``."""
+        """Send a row, with the column names of ``metrics.csv``."""
         if self._logger is None:
             return
         try:
@@ -136,7 +136,7 @@ class _TorchRlTracker:
 
 @dataclass(frozen=True, kw_only=True)
 class CsvOnly:
-    """No tracker: ``metrics.csv`` is always written."""
+    """No tracker; a run always writes ``metrics.csv``."""
 
     def open(self, run: Path) -> Tracker:
         """Return a tracker for a run folder."""
@@ -148,9 +148,9 @@ class Wandb:
     """Weights & Biases.
 
     Attributes:
-        project: Its project.
-        mode: ``offline`` keeps everything in the run folder, to be synced later; ``online`` sends it.
-        group: Its group; null puts the runs of a sweep into one, named as the sweep's folder.
+        project: Name of the project.
+        mode: ``offline`` writes into the run folder, to sync later; ``online`` sends.
+        group: Name of the group; null groups the runs of a sweep under the name of its folder.
     """
 
     project: str = "warp_torchrl"

@@ -1,4 +1,4 @@
-"""What a checkpoint says of itself: ``manifest.json``, with the size and sha256 of every file, and its own."""
+"""``manifest.json`` of a checkpoint, with the size and sha256 of every file and a sha256 of its own content."""
 
 import hashlib
 import json
@@ -16,33 +16,33 @@ from warp_torchrl.observation import DEFAULT, PICTURE
 from warp_torchrl.world.state import Action
 
 FORMAT = 2
-"""Version of the layout that is written."""
-_READ = (1, FORMAT)  # 1 had no seal
+"""Version of the format that checkpoints are written in."""
+_READ = (1, FORMAT)  # 1 has no sha256 of its own
 MANIFEST = "manifest.json"
 TRAINING = "training.pt"
-_POLICY = ("policy.pt", "config.json")  # what acting takes
+_POLICY = ("policy.pt", "config.json")  # of an exported policy
 _FILES = ("policy.pt", TRAINING, "config.json")
 _LARGEST_JSON = 1_000_000
 _FORMER_NAMES = {"view": DEFAULT, "picture": PICTURE}
 _FORMER_ACTIONS = tuple(action.name.lower() for action in Action)
-"""Names of channels and actions in manifests that do not tell them."""
+"""Channels and actions of manifests without names."""
 
 
 class CheckpointError(Exception):
-    """No sound checkpoint, told in one line."""
+    """There is no sound checkpoint; the message is one line."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Manifest:
-    """What a checkpoint says of itself.
+    """Content of ``manifest.json``.
 
     Attributes:
-        format: Version of the layout.
+        format: Version of the format.
         frames: World steps trained.
         scenario: Name of the scenario.
         signature: Inputs and outputs of the policy.
-        mode: How the policy acts best on training seeds, ``sampled`` or ``deterministic``; None before that is known.
-        versions: Of the libraries that wrote it.
+        mode: The better mode on training seeds, ``sampled`` or ``deterministic``; None before it is known.
+        versions: Versions of the libraries that wrote the checkpoint.
         files: Size and sha256 by file name.
     """
 
@@ -60,12 +60,12 @@ class Manifest:
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """Return what a checkpoint says of itself, once every file was found to be as it says.
+    """Read a checkpoint's manifest, and verify every file against it.
 
     Raises:
-        CheckpointError: If a file is missing, altered, or not ours.
+        CheckpointError: If a file is missing, altered, or not of a known format.
     """
-    manifest = _told(folder)
+    manifest = _parse_manifest(folder)
     for name, entry in manifest.files.items():
         path, size = folder / name, entry["size"]
         if not path.is_file() or path.stat().st_size != size:
@@ -75,7 +75,7 @@ def read_manifest(folder: Path) -> Manifest:
     return manifest
 
 
-def _told(folder: Path) -> Manifest:
+def _parse_manifest(folder: Path) -> Manifest:
     path = folder / MANIFEST
     content = read_json(path)
     if content.get("format") not in _READ:
@@ -98,16 +98,16 @@ def _told(folder: Path) -> Manifest:
 
 
 def _sealed(content: Mapping[str, Any]) -> bytes:
-    """Return the one text that a manifest with this content has: any other byte in the file is an alteration."""
+    """Return the exact bytes of a manifest with this content and its sha256."""
     digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()
     return json.dumps({**content, "sha256": digest}, indent=1).encode()
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Return the mapping that a file of ours holds.
+    """Return the mapping in a JSON file.
 
     Raises:
-        CheckpointError: If it cannot be read or holds something else.
+        CheckpointError: If the file cannot be read or holds no mapping.
     """
     try:
         if path.stat().st_size > _LARGEST_JSON:
@@ -121,7 +121,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def write_manifest(folder: Path, frames: int, scenario: str, signature: Signature, mode: str | None) -> None:
-    """Write what a folder that holds the other files says of itself; see ``Manifest``."""
+    """Write the manifest of a folder that holds the other files; see ``Manifest``."""
     libraries = {"torch": torch, "torchrl": torchrl, "tensordict": tensordict}
     manifest = Manifest(
         format=FORMAT,
@@ -145,7 +145,7 @@ def _sha256(path: Path) -> str:
 
 
 def first_line(error: Exception) -> str:
-    """Return the first line of what an error says."""
+    """Return the first line of an error's message."""
     return (str(error).splitlines() or [type(error).__name__])[0]
 
 
@@ -160,10 +160,10 @@ def _signature_to_json(signature: Signature) -> dict[str, Any]:
 def _signature_from_json(content: dict[str, Any]) -> Signature:
     def entry(node: dict[str, Any], names: tuple[str, ...] = ()) -> Entry:
         shape = tuple(int(side) for side in node["shape"])
-        told = tuple(str(name) for name in node.get("names", names if len(names) == shape[0] else ()))
-        if told and len(told) != shape[0]:
-            raise ValueError(f"{len(told)} names of {shape[0]} channels")
-        return Entry(shape, str(node["dtype"]), told)
+        channels = tuple(str(name) for name in node.get("names", names if len(names) == shape[0] else ()))
+        if channels and len(channels) != shape[0]:
+            raise ValueError(f"{len(channels)} names of {shape[0]} channels")
+        return Entry(shape, str(node["dtype"]), channels)
 
     observation = {str(name): entry(node, _FORMER_NAMES.get(name, ())) for name, node in content["observation"].items()}
     actions = tuple(str(name) for name in content.get("actions", _FORMER_ACTIONS[: int(content["n_actions"])]))

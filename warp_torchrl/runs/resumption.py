@@ -1,4 +1,4 @@
-"""What a resumed run goes on with: the configuration of its checkpoint, of which the total alone may change."""
+"""Resumption: a run goes on with its checkpoint's configuration, in which only ``total_frames`` may change."""
 
 import json
 import reprlib
@@ -18,20 +18,21 @@ _LARGEST = 1_000_000  # bytes
 _MISSING = "not there"
 _MAY_CHANGE = ("total_frames", "resume", "debug")
 _NAMED = 3
+_RENAMED = {"Direct": "InProcess", "Process": "MultiProcess"}  # classes, as earlier runs wrote them
 
 
 @dataclass(frozen=True, kw_only=True)
 class Resumption:
-    """A run that goes on.
+    """A run to resume.
 
     Attributes:
-        found: Its newest sound checkpoint.
-        skipped: A line for each newer one, with what is wrong with it.
-        record: Its configuration, with the total that it goes on to.
-        values: The same, whole and plain.
-        settings: The same, built.
-        total_before: The total that it had when it was saved.
-        is_finished: Whether it was trained to its end and evaluated there.
+        found: The newest sound checkpoint.
+        skipped: For each newer unsound checkpoint a line with the reason.
+        record: The saved configuration, with the new ``total_frames``.
+        values: The full configuration as plain values.
+        settings: The settings built from it.
+        total_before: ``total_frames`` of the checkpoint.
+        is_finished: Whether the run was trained to its end and evaluated.
     """
 
     found: Checkpoint
@@ -44,16 +45,16 @@ class Resumption:
 
 
 def resumption(folder: Path, total_frames: Any = None) -> Resumption:
-    """Find out what a run goes on with.
+    """Return the checkpoint and the configuration from which a run resumes.
 
     Args:
-        folder: Its run folder.
-        total_frames: The new total; None: that of its ``config.yaml``, or of the checkpoint where there is none.
+        folder: The run folder.
+        total_frames: The new total; None takes that of ``config.yaml``, or else of the checkpoint.
 
     Raises:
         CheckpointError: If there is no sound checkpoint.
-        ConfigError: If ``config.yaml`` has other values than the checkpoint, but for the total, or the run has come as
-            far as the new total.
+        ConfigError: If ``config.yaml`` differs from the checkpoint in more than the total, or the new total is already
+            reached.
     """
     found, skipped = newest(folder)
     record = found.record()
@@ -79,21 +80,21 @@ def resumption(folder: Path, total_frames: Any = None) -> Resumption:
 
 
 def _evaluated(path: Path) -> int | None:
-    """Return how far the policy was trained that a run's evaluation is of; None where there is none."""
+    """Return the frames of the policy in a run's ``evaluation.json``; None if there is no evaluation."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))["frames"]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
 
 
-# What was edited
+# Edits of config.yaml
 
 
 def read_config(path: Path) -> dict[str, Any]:
-    """Return what a ``config.yaml`` says, nothing resolved or instantiated; nothing where there is none.
+    """Return the content of a ``config.yaml``, not resolved or instantiated; empty if there is no file.
 
     Raises:
-        ConfigError: If it cannot be read.
+        ConfigError: If the file cannot be read.
     """
     if not path.exists():
         return {}
@@ -117,7 +118,7 @@ def _check_unedited(folder: Path, held: Mapping[str, Any], record: Record, train
 
 
 def edits(held: Mapping[Any, Any], trained: Mapping[str, Any], prefix: str = "") -> list[str]:
-    """Return what differs in value between a ``config.yaml`` and a record, a text for each key."""
+    """Return a text for each key whose value differs between a ``config.yaml`` and a saved configuration."""
     held = {str(key): value for key, value in held.items() if key != "_target_"}
     found = []
     for key in sorted({*held, *trained} - {*(() if prefix else _MAY_CHANGE)}):
@@ -130,10 +131,11 @@ def edits(held: Mapping[Any, Any], trained: Mapping[str, Any], prefix: str = "")
 
 
 def _other_classes(held: Mapping[str, Any], trained: Mapping[str, Any]) -> list[str]:
-    """Return the components of which a ``config.yaml`` names another class; modules may have moved."""
+    """Return a text for each component whose class differs; its module may differ."""
 
     def name(node: Any) -> str:
-        return str(node.get("_target_")).rpartition(".")[2] if isinstance(node, Mapping) else ""
+        written = str(node.get("_target_")).rpartition(".")[2] if isinstance(node, Mapping) else ""
+        return _RENAMED.get(written, written)
 
     pairs = {group: (name(held.get(group)), name(trained[group])) for group in COMPONENTS}
     return [f"{group} is {there} and was {here}" for group, (there, here) in pairs.items() if there != here]
@@ -142,7 +144,7 @@ def _other_classes(held: Mapping[str, Any], trained: Mapping[str, Any]) -> list[
 def _is_same(there: Any, here: Any) -> bool:
     if isinstance(there, list) and isinstance(here, list):
         return len(there) == len(here) and all(map(_is_same, there, here))
-    if isinstance(there, str) and isinstance(here, (int, float)):  # 1e-3 is a text to YAML
+    if isinstance(there, str) and isinstance(here, (int, float)):  # YAML reads 1e-3 as text
         try:
             there = float(there)
         except ValueError:

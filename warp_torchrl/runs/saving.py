@@ -1,29 +1,29 @@
-"""When a run saves: every so many frames, and by the clock, which takes a hundredth of the run's time and no more."""
+"""When a run saves: at intervals of frames, and at intervals of time that cost at most 1 % of the run."""
 
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 SHARE = 0.01
-"""Of the run's time, what saves may take before the clock asks for another."""
+"""Largest share of the run's time that saves by the clock may take."""
 
 
 def passes(interval: int, frames: int, batch: int) -> bool:
-    """Return whether a batch, with which a run came to so many frames, reached a multiple of the interval."""
+    """Return whether the last batch, which ended at ``frames``, passed a multiple of the interval."""
     return frames // interval > (frames - batch) // interval
 
 
 class SaveClock:
-    """Says when a run should save that has not saved for long.
+    """Decides by the clock when a run should save.
 
-    The first save is due at once, each later one ``minutes`` after the one before, but none until all saves, and one
-    more at the pace of the last, fit into a hundredth of the time since the start: where a replay memory makes saves
-    slow they are rare. It draws no random number.
+    The first save is due at once, each later one ``minutes`` after the last. A save waits while all saves, with the
+    expected time of the next one, would take more than 1 % of the time since the start; so slow saves, of a large
+    replay memory, are rare.
 
     Args:
-        minutes: Between saves; 0: none is ever due.
-        size: Tells what a save would write [bytes].
-        now: Tells the time [s].
+        minutes: Minutes between saves; 0 disables them.
+        size: Returns the size of a save [bytes].
+        now: Returns the time [s].
     """
 
     def __init__(self, minutes: float, size: Callable[[], int], now: Callable[[], float] = time.monotonic) -> None:
@@ -39,7 +39,7 @@ class SaveClock:
 
     @contextmanager
     def timed(self) -> Iterator[None]:
-        """Count what is done within it as a save."""
+        """Time the body as a save."""
         before = self._now()
         yield
         self._last = self._now()
@@ -48,5 +48,5 @@ class SaveClock:
         self.saves += 1
 
     def share(self) -> float:
-        """Return the share of the time since the start that saves took, 0..1."""
+        """Return the share of the run's time that saves took, 0..1."""
         return self._spent / max(self._now() - self._start, 1e-9)

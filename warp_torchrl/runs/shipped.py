@@ -1,4 +1,4 @@
-"""The trained policies that come with the package, by name."""
+"""The shipped policies, by name."""
 
 from pathlib import Path
 
@@ -7,22 +7,22 @@ from warp_torchrl.runs.manifest import MANIFEST, CheckpointError
 
 
 def policies_folder() -> Path:
-    """Return the folder of the policies: inside the package when installed, in ``docs`` in a checkout."""
+    """Return the folder of the shipped policies: in the installed package, or in ``docs`` of a checkout."""
     package = Path(__file__).parents[1]
     inside = package / "policies"
     return inside if inside.is_dir() else package.parent / "docs" / "policies"
 
 
 def policy_names() -> list[str]:
-    """Return the names of the policies."""
+    """Return the names of the shipped policies."""
     return sorted(manifest.parent.name for manifest in policies_folder().glob(f"*/{MANIFEST}"))
 
 
 def find_policy(given: str | Path) -> Path:
-    """Return the folder that a path or the name of a policy stands for; a path that exists goes before a name.
+    """Return the folder of a path or of a shipped policy's name; an existing path comes first.
 
     Raises:
-        CheckpointError: If it is one word that is neither.
+        CheckpointError: If a single word is neither.
     """
     path, names = Path(given), policy_names()
     if path.exists() or len(path.parts) != 1:

@@ -1,4 +1,4 @@
-"""What a run that begins with another one's networks takes over."""
+"""Start of a run from another run's learned parameters."""
 
 from torch import Tensor
 from torchrl.objectives import LossModule
@@ -8,24 +8,24 @@ from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError
 
 
 def check_start(settings: Settings, found: Checkpoint) -> None:
-    """Check that training can begin with another run's networks, before anything is made for it.
+    """Check that training can start from another run's learned parameters.
 
     Raises:
-        CheckpointError: If it is a policy alone, or was trained by another kind of loss or other networks.
+        CheckpointError: If the checkpoint is an exported policy, or has another kind of loss or other networks.
     """
     found.check_goes_on()
     batch = settings.collector.steps * settings.n_worlds
-    learnt(found, settings.algorithm.build(settings.make_env(1, 0), settings.model, batch).loss)
+    learned_parameters(found, settings.algorithm.build(settings.make_env(1, 0), settings.model, batch).loss)
 
 
-def learnt(found: Checkpoint, loss: LossModule) -> dict[str, Tensor]:
-    """Return what a checkpoint's loss has learnt, the state of networks and of value normalisation, by name.
+def learned_parameters(found: Checkpoint, loss: LossModule) -> dict[str, Tensor]:
+    """Return the networks' parameters and the value normalisation of a checkpoint's loss, by name.
 
     Raises:
-        CheckpointError: If it does not fit this loss.
+        CheckpointError: If their names or shapes differ from this loss's.
     """
     own, given = (
-        {name: each for name, each in state.items() if _is_learnt(name)}
+        {name: each for name, each in state.items() if _is_learned(name)}
         for state in (loss.state_dict(), found.training()["loss"])
     )
     if {name: each.shape for name, each in own.items()} != {name: each.shape for name, each in given.items()}:
@@ -33,6 +33,6 @@ def learnt(found: Checkpoint, loss: LossModule) -> dict[str, Tensor]:
     return given
 
 
-def _is_learnt(name: str) -> bool:
-    """Return whether an entry of a loss's state is a parameter or the running scale of values, and not a setting."""
+def _is_learned(name: str) -> bool:
+    """Return whether an entry of a loss's state is a parameter or the value normalisation, not a setting."""
     return "_params." in name or name.startswith("value_norm.")

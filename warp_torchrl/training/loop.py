@@ -1,4 +1,4 @@
-"""The one training loop. It names no algorithm: what differs between them is data of the learner."""
+"""The one training loop for all algorithms; what differs between them is a field of ``Learner``."""
 
 import logging
 import time
@@ -24,10 +24,10 @@ from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs import disk
 from warp_torchrl.runs.logging import MetricsFile, Tracker
 from warp_torchrl.runs.saving import SaveClock, passes
-from warp_torchrl.runs.transfer import learnt
-from warp_torchrl.training.progress import TRAIN_COLUMNS, episode_columns, line, told_of_batches
+from warp_torchrl.runs.transfer import learned_parameters
+from warp_torchrl.training.progress import TRAIN_COLUMNS, batch_size_notice, episode_columns, line
 from warp_torchrl.training.reward_scale import RewardScale
-from warp_torchrl.training.signals import Noted, Stopped
+from warp_torchrl.training.signals import DeferredSignals, Stopped
 from warp_torchrl.world.fast.compile import compile_function
 
 log = logging.getLogger("warp_torchrl")
@@ -39,11 +39,11 @@ class NumericalFailure(Exception):  # noqa: N818
 
 
 class Training:
-    """A run: everything that moves, and how it is saved.
+    """A training run: collect, learn, log, save and resume.
 
     Args:
         settings: What to train.
-        record: The configuration as the run folder keeps it.
+        record: The configuration that checkpoints keep.
         run: The run folder.
     """
 
@@ -56,7 +56,7 @@ class Training:
         learner = settings.algorithm.build(self.env, settings.model, self.frames_per_batch)
         if settings.compile:
             learner.terms = compile_function(learner.terms)
-        self.learner: Learner = settings.imitation.taught(learner, self.env)
+        self.learner: Learner = settings.imitation.kickstart(learner, self.env)
         self.reward_scale = RewardScale(settings.reward.gamma) if settings.reward.normalise else None
         self.collection = settings.collector.open(self.env, self.learner, settings.make_training_env, first)
         self.frames = 0
@@ -68,13 +68,13 @@ class Training:
         self._scheduled = self.learner.schedule(0.0)
 
     def train(self) -> None:
-        """Train until ``total_frames``, saving on the way and at the end.
+        """Train until ``total_frames``; save checkpoints on the way and at the end.
 
         Raises:
-            Stopped: By a signal, after saving.
+            Stopped: If a signal asked the run to stop; it has saved.
             NumericalFailure: If a reward, loss or gradient is not finite.
         """
-        with Noted() as signals:
+        with DeferredSignals() as signals:
             tracker = self.settings.logger.open(self.run)
             try:
                 self._train(signals, tracker)
@@ -82,15 +82,15 @@ class Training:
                 self.save()
                 log.info("saved %d times, in %.2f %% of the time", self.clock.saves, 100.0 * self.clock.share())
             finally:
-                tracker.close()  # after the last save: a server may keep it waiting
+                tracker.close()  # after the last save: a slow server may delay it
             if signals.received:
                 raise Stopped(signals.received, self.run)
 
-    def _train(self, signals: Noted, tracker: Tracker) -> None:
+    def _train(self, signals: DeferredSignals, tracker: Tracker) -> None:
         total = self.settings.total_frames
-        told = told_of_batches(total, self.settings.n_worlds, self.settings.collector.steps)
-        if told is not None and self.frames < total:
-            log.log(logging.WARNING if total < self.frames_per_batch else logging.INFO, told)
+        notice = batch_size_notice(total, self.settings.n_worlds, self.settings.collector.steps)
+        if notice is not None and self.frames < total:
+            log.log(logging.WARNING if total < self.frames_per_batch else logging.INFO, notice)
         bar = tqdm(total=total, initial=self.frames, unit="frame", disable=None, dynamic_ncols=True)
         start, next_line = time.perf_counter() - self.seconds, 0.0
         try:
@@ -118,19 +118,19 @@ class Training:
 
     _last_seconds = 0.0
 
-    def _batches(self, signals: Noted) -> Iterator[TensorDictBase]:
-        """Yield batches; where a worker dies, save first what was learnt."""
+    def _batches(self, signals: DeferredSignals) -> Iterator[TensorDictBase]:
+        """Yield batches; if a worker dies, save a checkpoint before the error goes on."""
         try:
             yield from self.collection
         except WorkerDied:
             if self.frames > self.saved_at:
                 self.save()
-            if signals.received:  # which workers of the same terminal get too
+            if signals.received:  # a terminal sends its signals to the workers too
                 raise Stopped(signals.received, self.run) from None
             raise
 
     def _learn(self, batch: TensorDictBase) -> dict[str, float | None]:
-        """Learn from one batch [B, T] and return the row of metrics."""
+        """Learn from one batch [B, T] and return its row of ``metrics.csv``."""
         learner = self.learner
         row = episode_columns(batch)
         if not batch["next", *REWARD].isfinite().all():
@@ -155,14 +155,14 @@ class Training:
         return row
 
     def _schedule(self) -> None:
-        """Set what changes with progress; the columns that it gives belong to the next row."""
+        """Update the scheduled hyperparameters; their columns belong to the next row."""
         self._scheduled = self.learner.schedule(min(1.0, self.frames / self.settings.total_frames))
 
-    def tell_new_total(self, before: int) -> None:
-        """Log what goes another way from here on than in a training of another length.
+    def log_new_total(self, before: int) -> None:
+        """Log the scheduled hyperparameters that change because ``total_frames`` was changed.
 
         Args:
-            before: The ``total_frames`` that this training had.
+            before: The former ``total_frames``.
         """
         old, total = self.learner.schedule(min(1.0, self.frames / before)), self.settings.total_frames
         self._schedule()
@@ -174,13 +174,13 @@ class Training:
         )  # fmt: skip
 
     def _update(self, sample: TensorDictBase) -> dict[str, Tensor]:
-        """Take one optimiser step and return the loss's terms; nothing is read back from the device but finiteness."""
+        """Take one optimiser step and return the loss terms; only the check for finite values reads from the device."""
         learner = self.learner
         terms = learner.terms(sample)
         loss = sum(terms[key] for key in learner.loss_keys)
         loss.backward()
         norm = torch.nn.utils.clip_grad_norm_(learner.loss.parameters(), learner.max_grad_norm)
-        if not torch.isfinite(norm + loss.detach()):  # one look at the device for both
+        if not torch.isfinite(norm + loss.detach()):  # one synchronisation for both
             raise NumericalFailure(
                 f"after {self.frames} frames the loss, {float(loss.detach()):g}, or its gradient, of norm "
                 f"{float(norm):g}, is not finite; the weights were left as they were, and the last checkpoint stands"
@@ -199,7 +199,7 @@ class Training:
         return float(play(env, self.learner.policy, plan.first_seed)["saved"].mean())
 
     def _better_mode(self) -> str:
-        """Return how the policy does better on training seeds, sampled or deterministic."""
+        """Return the mode, sampled or deterministic, that saves more on training seeds."""
         chosen = self.settings.evaluation.mode
         if chosen != "best":
             return chosen
@@ -209,7 +209,7 @@ class Training:
         return max(saved, key=saved.__getitem__)
 
     def save(self) -> Path:
-        """Write a checkpoint of everything."""
+        """Write a checkpoint and return its folder."""
         with self.clock.timed():
             self.metrics.sync()
             path = checkpoints.save(
@@ -228,24 +228,24 @@ class Training:
         return path
 
     def _size(self) -> int:
-        """Return the bytes of the tensors that a checkpoint holds."""
+        """Return the size of a checkpoint's tensors [bytes]."""
         return disk.size(self.state_dict())
 
     def _is_regular(self, frames: int) -> bool:
-        """Return whether a checkpoint of so many frames is one of the interval, whatever the clock does."""
+        """Return whether ``checkpoint.interval`` asks for a checkpoint at this number of frames."""
         return passes(self.settings.checkpoint.interval, frames, self.frames_per_batch)
 
     def start_from(self, found: checkpoints.Checkpoint) -> None:
-        """Begin with another run's networks, and their value normalisation, and with nothing else of it.
+        """Load another run's networks and value normalisation; everything else starts anew.
 
         Raises:
-            CheckpointError: If it trained by another kind of loss or other networks.
+            CheckpointError: If that run had another kind of loss or other networks.
         """
         loss = self.learner.loss
-        loss.load_state_dict({**loss.state_dict(), **learnt(found, loss)})
+        loss.load_state_dict({**loss.state_dict(), **learned_parameters(found, loss)})
 
     def state_dict(self) -> dict[str, Any]:
-        """Return everything that a run needs to go on exactly as if never stopped."""
+        """Return everything that an exact resume needs."""
         return {
             "loss": dict(self.learner.loss.state_dict()),
             "keeps": {name: each.state_dict() for name, each in self.learner.keeps.items()},
@@ -270,7 +270,7 @@ class Training:
         try:
             self._restore(state)
             self.metrics = MetricsFile(self.run / "metrics.csv", keep_rows=int(state["rows"]))
-        except Exception as error:  # whatever a state that does not fit makes torch and TorchRL raise
+        except Exception as error:  # torch and TorchRL raise many types for a state that does not fit
             self._restore(before)
             if isinstance(error, OSError):
                 raise
@@ -279,7 +279,7 @@ class Training:
 
     def _restore(self, state: Mapping[str, Any]) -> None:
         differing = self.learner.loss.state_dict().keys() ^ state["loss"].keys()
-        if differing:  # tensordict loads what it is given by any names, and says that all were met
+        if differing:  # tensordict does not report missing or unexpected names
             raise ValueError(f"{min(differing)} is in one of the two alone")
         self.learner.loss.load_state_dict(state["loss"])
         self.learner.optimizer.load_state_dict(state["optimizer"])

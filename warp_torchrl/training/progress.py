@@ -1,4 +1,4 @@
-"""What a training tells of itself: the rows of ``metrics.csv`` and the lines of the log."""
+"""The rows of ``metrics.csv`` and the lines of the log."""
 
 from collections.abc import Mapping
 
@@ -20,7 +20,7 @@ TRAIN_COLUMNS = (
 
 
 def episode_columns(batch: TensorDictBase) -> dict[str, float | None]:
-    """Return the means over the episodes that ended in a batch, None where none did."""
+    """Return the mean metrics of the episodes that ended in a batch [B, T]; None where none ended."""
     done = batch["next", "done"][..., 0]
     info = batch["next", "info"]
     count = int(done.sum())
@@ -30,11 +30,11 @@ def episode_columns(batch: TensorDictBase) -> dict[str, float | None]:
 
 
 def line(row: Mapping[str, float | None], total: int) -> str:
-    """Return the log's line of a row.
+    """Return a row as a line of the log.
 
     Args:
-        row: Of ``metrics.csv``.
-        total: World steps in all.
+        row: A row of ``metrics.csv``.
+        total: World steps of the whole training.
     """
 
     def show(name: str, pattern: str) -> str:
@@ -48,13 +48,13 @@ def line(row: Mapping[str, float | None], total: int) -> str:
     )
 
 
-def told_of_batches(total: int, n_worlds: int, steps: int) -> str | None:
-    """Return what is said where a training cannot end at its number of frames, since it takes whole batches.
+def batch_size_notice(total: int, n_worlds: int, steps: int) -> str | None:
+    """Return a notice where ``total_frames`` is no multiple of the batch size; None where it is.
 
     Args:
-        total: World steps in all, as asked for.
+        total: World steps of the whole training.
         n_worlds: Worlds in a batch.
-        steps: World steps of each of them in a batch.
+        steps: World steps of each world in a batch.
     """
     batch = n_worlds * steps
     if total % batch == 0:

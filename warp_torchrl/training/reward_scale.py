@@ -1,4 +1,4 @@
-"""Rewards of unit scale, whatever the reward function."""
+"""Reward normalisation."""
 
 import torch
 from tensordict import TensorDictBase
@@ -8,22 +8,22 @@ from warp_torchrl.models import REWARD
 
 
 class RewardScale:
-    """Divides rewards by the running standard deviation of their discounted sums, as they come in.
+    """Divides rewards by the running standard deviation of their discounted sums.
 
-    The mean is left as it is: shifting rewards would pay for longer or for shorter episodes. TorchRL's normalising
-    transforms shift.
+    It does not subtract the mean, as TorchRL's normalising transforms do: a shift would reward longer or shorter
+    episodes.
 
     Args:
-        gamma: Discount of the sums.
+        gamma: Discount factor.
     """
 
     def __init__(self, gamma: float) -> None:
         self.gamma = gamma
-        self._sums: Tensor | None = None  # [B, A], of the episodes that go on
+        self._sums: Tensor | None = None  # [B, A], of the episodes not yet finished
         self._moments = torch.zeros(3, dtype=torch.float64)  # count, mean, sum of squared departures
 
     def __call__(self, batch: TensorDictBase) -> None:
-        """Scale the rewards of a batch [B, T] in place, after taking note of them."""
+        """Update the statistics with a batch [B, T], then scale its rewards in place."""
         reward = batch["next", *REWARD]
         rewards, done = reward[..., 0], batch["next", "done"]
         if self._sums is None:
@@ -50,7 +50,7 @@ class RewardScale:
         self._moments = torch.stack((total, mean + gap * new / total, squares))
 
     def state_dict(self) -> dict[str, Tensor]:
-        """Return what changes."""
+        """Return the running statistics."""
         sums = {} if self._sums is None else {"sums": self._sums.clone()}
         return {"moments": self._moments.clone(), **sums}
 

@@ -1,4 +1,4 @@
-"""What asks a command to stop: noted where a run can save first, obeyed at once elsewhere."""
+"""Stop signals: deferred while a run trains, so that it can save first; elsewhere they end the process at once."""
 
 import os
 import signal
@@ -16,7 +16,7 @@ class Stopped(Exception):  # noqa: N818
     """A signal asked the run to stop; it has saved.
 
     Attributes:
-        number: The signal's.
+        number: Number of the signal.
     """
 
     def __init__(self, number: int, run: Path) -> None:
@@ -24,17 +24,17 @@ class Stopped(Exception):  # noqa: N818
         self.number = number
 
 
-class Noted:
-    """Within it the first signal is only noted; a second one ends the process.
+class DeferredSignals:
+    """Context that records the first signal; a second one ends the process.
 
     Attributes:
-        received: The first signal's number; 0 before.
+        received: Number of the first signal; 0 if there was none.
     """
 
     def __init__(self) -> None:
         self.received = 0
 
-    def __enter__(self) -> "Noted":
+    def __enter__(self) -> "DeferredSignals":
         self._before = _watch(self._note)
         return self
 
@@ -48,8 +48,8 @@ class Noted:
 
 
 @contextmanager
-def obeyed() -> Iterator[None]:
-    """Within it a signal ends the process with its exit code, in one line."""
+def exit_on_signal() -> Iterator[None]:
+    """Within this context a signal ends the process with one line and the signal's exit code."""
     before = _watch(_leave)
     try:
         yield
@@ -58,7 +58,7 @@ def obeyed() -> Iterator[None]:
 
 
 def _leave(number: int, frame: FrameType | None) -> None:
-    # Not print(): what was interrupted may be in the middle of one.
+    # os.write and not print: the signal may have interrupted a print.
     os.write(_STDERR, f"error: stopped by signal {signal.Signals(number).name}\n".encode())
     raise SystemExit(128 + number)
 
@@ -66,7 +66,7 @@ def _leave(number: int, frame: FrameType | None) -> None:
 def _watch(handler: Callable[[int, FrameType | None], None]) -> dict[int, Any]:
     try:
         return {number: signal.signal(number, handler) for number in _WATCHED}
-    except ValueError:  # not in the main thread, where signals cannot be watched
+    except ValueError:  # Python allows signal handlers in the main thread only
         return {}
 
 

@@ -8,7 +8,7 @@ from tensordict import TensorDict
 from torch.nn.functional import cross_entropy
 from torchrl.objectives import BCLoss
 
-from warp_torchrl.collection.imitation import TEACHERS, Imitation
+from warp_torchrl.collection.kickstarting import TEACHERS, Kickstarting
 from warp_torchrl.config.compose import Record, compose_config, plain
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.settings import settings
@@ -34,24 +34,24 @@ def configured(*overrides):
     return settings(plain(compose_config("train", [*TINY, *overrides])))
 
 
-def pupil(folder, *overrides):
+def student(folder, *overrides):
     return Training(configured("imitation.teacher=greedy", *overrides), Record(), folder)
 
 
 def test_the_teacher_tells_what_it_would_do_in_the_pupils_states(tmp_path):
-    training = pupil(tmp_path)
+    training = student(tmp_path)
     teacher = HEURISTICS["greedy"](training.env)
     now = training.env.reset()
     for _ in range(5):
         expected = teacher.choose(training.env.world_state, now[ACTION_MASK])
         training.learner.explore(now)
         assert torch.equal(now[TEACHER_ACTION], expected)
-        assert not torch.equal(now[ACTION], expected), "the pupil acts"
+        assert not torch.equal(now[ACTION], expected), "the student acts"
         now = training.env.step(now)["next"]
 
 
 def test_the_lesson_falls_to_nothing(tmp_path):
-    training = pupil(tmp_path, "imitation.weight=2.0", "imitation.until=0.5")
+    training = student(tmp_path, "imitation.weight=2.0", "imitation.until=0.5")
     sample = sample_of(training)
     whole = {}
     for progress in (0.0, 0.125, 0.25, 0.5, 1.0):
@@ -72,7 +72,7 @@ def sample_of(training):
 
 
 def test_the_cloning_loss_by_hand(tmp_path):
-    training = pupil(tmp_path)
+    training = student(tmp_path)
     sample = sample_of(training)
     logits = training.learner.policy[0](sample.select(*training.learner.policy[0].in_keys))[LOGITS]
     by_hand = [
@@ -89,7 +89,7 @@ def test_the_cloning_loss_by_hand(tmp_path):
 @pytest.mark.filterwarnings("ignore")  # TorchRL's, of a target network that it declares and does not make
 def test_the_cloning_loss_is_torchrls(tmp_path):
     """Of the same network and choices: its value and its gradients, though it takes no pass of its own."""
-    training = pupil(tmp_path, "model.facing=north")
+    training = student(tmp_path, "model.facing=north")
     sample, actor = sample_of(training), training.learner.policy[0]
     theirs = BCLoss(actor, loss_function=lambda said, chosen: cross_entropy(said.flatten(0, -2), chosen.flatten()))
     theirs.set_keys(action=LOGITS)
@@ -104,7 +104,7 @@ def test_the_cloning_loss_is_torchrls(tmp_path):
 
 
 def test_the_learners_own_terms_and_state_stay_as_they_are(tmp_path):
-    taught, alone = pupil(tmp_path), Training(configured(), Record(), tmp_path)
+    taught, alone = student(tmp_path), Training(configured(), Record(), tmp_path)
     sample = sample_of(taught)
     mine, theirs = taught.learner.terms(sample.clone()), alone.learner.terms(sample.clone())
     assert isinstance(mine, TensorDict) and set(mine.keys()) - set(theirs.keys()) == {"loss_bc"}
@@ -114,7 +114,7 @@ def test_the_learners_own_terms_and_state_stay_as_they_are(tmp_path):
 
 
 def test_a_pupil_comes_to_do_what_its_teacher_does(tmp_path):
-    training = pupil(tmp_path, "total_frames=960", "imitation.until=1.0", "algorithm.epochs=4")
+    training = student(tmp_path, "total_frames=960", "imitation.until=1.0", "algorithm.epochs=4")
     agreed = []
     for batch in training.collection:
         agreed.append(float((batch[ACTION] == batch[TEACHER_ACTION]).float().mean()))
@@ -149,7 +149,7 @@ def test_teachers_do_not_remember():
 
 def test_without_a_teacher_the_learner_is_as_it_was(tmp_path):
     training = Training(configured(), Record(), tmp_path)
-    assert Imitation().taught(training.learner, training.env) is training.learner
+    assert Kickstarting().kickstart(training.learner, training.env) is training.learner
 
 
 def test_a_policy_with_a_teacher_is_called_so():
