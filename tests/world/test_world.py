@@ -332,9 +332,9 @@ def test_a_finished_world_stays_as_it_is(world: World) -> None:
     state = start(world, range(48))
     for _ in range(45):
         transition = world.step(state, chosen(world, state))
-        frozen, outcome = state.done, transition.outcome
+        frozen, result = state.done, transition.result
         assert differing(state[frozen], transition.after[frozen]) == []
-        assert not (outcome.moved | outcome.extinguished | outcome.cleared | outcome.redundant)[frozen].any()
+        assert not (result.moved | result.extinguished | result.cleared | result.redundant)[frozen].any()
         assert (transition.after.step == state.step + ~frozen).all()
         state = transition.after
     assert state.done.all()

@@ -13,7 +13,7 @@ from warp_torchrl.observation import Observation, central_state
 from warp_torchrl.reward import Collaborative, Efficiency, Reward, Time
 from warp_torchrl.world.fast.compile import compiled
 from warp_torchrl.world.fast.road import in_bytes, in_flags
-from warp_torchrl.world.state import Forecast, Outcome, Transition, WorldState
+from warp_torchrl.world.state import ActionResult, Forecast, Transition, WorldState
 from warp_torchrl.world.world import World
 
 
@@ -69,8 +69,8 @@ class Scene:
 
     def _compiled_step(self, before: WorldState, action: Tensor) -> Step:
         given, earns = in_bytes(before), self.reward if compiles(self.reward) else None
-        after, outcome, forecast = compiled(_advance)(self.world, given, action)
-        transition = Transition(before=given, outcome=outcome, after=after)
+        after, result, forecast = compiled(_advance)(self.world, given, action)
+        transition = Transition(before=given, result=result, after=after)
         observed, reward = compiled(_observe_and_earn, in_parts=True)(
             self.world, self.observation, earns, transition, forecast
         )
@@ -87,10 +87,10 @@ def compiles(reward: Reward) -> bool:
     return reads_counts and (reward.shaping == 0.0 or reward.potential == "distance")
 
 
-def _advance(world: World, state: WorldState, action: Tensor) -> tuple[WorldState, Outcome, Forecast]:
+def _advance(world: World, state: WorldState, action: Tensor) -> tuple[WorldState, ActionResult, Forecast]:
     """Return the worlds after a step, what the actions came to, and the forecast."""
     transition = world.step(state, action)
-    return transition.after, transition.outcome, world.forecast(transition.after)
+    return transition.after, transition.result, world.forecast(transition.after)
 
 
 def _observe_and_earn(

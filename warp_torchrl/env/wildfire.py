@@ -14,7 +14,7 @@ from warp_torchrl.env.render import render
 from warp_torchrl.env.reset_cache import ResetCache, Start
 from warp_torchrl.env.scene import Observations, Scene
 from warp_torchrl.env.specs import make_specs
-from warp_torchrl.observation import Observation, Surroundings
+from warp_torchrl.observation import Observation, Surroundings, state_names
 from warp_torchrl.reward import Efficiency, Reward
 from warp_torchrl.world.fast.compile import check_compiler
 from warp_torchrl.world.role import ROLES
@@ -74,6 +74,7 @@ class WildfireEnv(EnvBase):
         self._fuses = fuse
         names, roles = self.world.team.agent_names, self.world.team.agent_roles
         self.agent_names, self.action_names = names, self.world.team.action_names
+        self.role_names, self.state_names = self.world.team.role_names, state_names(self.world.team)
         self.channel_names = {name: space.names for name, space in self.observation.spaces(self.world).items()}
         self.group_map = {"agents": list(names)}
         self.role_map = {role: [n for n, r in zip(names, roles) if r == role] for role in ROLES if role in roles}
@@ -120,7 +121,7 @@ class WildfireEnv(EnvBase):
 
     def render(self, scale: int = 12) -> Tensor:
         """Draw the worlds, uint8 [B, H * scale, W * scale, 3]."""
-        return render(self.world_state, self.world.team.table(self.device).index, scale)
+        return render(self.world_state, self.world.team.table(self.device).flies, scale)
 
     def set_seeds(self, seeds: Sequence[int], first_episode: int = 0) -> None:
         """Give each world a seed of its own, in force from the next reset.

@@ -41,7 +41,10 @@ def assess(plan: Settings, folder: Path, found: checkpoints.Checkpoint | str, wo
         frames = found.manifest.frames
         other_modes = {f"trained, {other}": play(env, actor, first, other) for other in MODES if other != mode}
     if plan.evaluation.leave_one_out:
-        left_out = {agent: play(env, LeftOut(actor, index), first, mode) for index, agent in enumerate(env.agent_names)}
+        left_out = {
+            agent: play(env, LeftOut(actor, index, env.world.team), first, mode)
+            for index, agent in enumerate(env.agent_names)
+        }
     content = report(
         plan.scenario, name, first, episodes, others, other_modes, left_out, learner, digest, worlds, frames
     )

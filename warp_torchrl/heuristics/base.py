@@ -13,6 +13,7 @@ from warp_torchrl.world.fast.distances import FAR, nearest
 from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.random import Stream, uniform_at
 from warp_torchrl.world.state import Action, Cover, WorldState, is_burning
+from warp_torchrl.world.team import Team
 
 
 class Heuristic(TensorDictModuleBase):
@@ -42,13 +43,13 @@ class Heuristic(TensorDictModuleBase):
         return tensordict.set(("agents", "action"), action)
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
-        """Return the actions, int64 [B, A], for worlds and action masks [B, A, 10 or 11]."""
+        """Return the actions, int64 [B, A], for worlds and action masks [B, A, actions]."""
         raise TypeError(f"{type(self).__name__} does not say what to do: define choose()")
 
 
-def idle_action(mask: Tensor) -> Tensor:
-    """Return the action that does nothing, int64 [...], of action masks [..., 10 or 11]: stay, or a masked one."""
-    if mask.shape[-1] > Action.STAY:
+def idle_action(mask: Tensor, team: Team) -> Tensor:
+    """Return the action that does nothing, int64 [...], of action masks [..., actions]: stay, or a masked one."""
+    if team.allow_stay:
         return torch.full(mask.shape[:-1], int(Action.STAY), device=mask.device)
     return mask.to(torch.uint8).argmin(dim=-1)
 

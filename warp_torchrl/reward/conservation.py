@@ -195,10 +195,10 @@ class Adaptive(Conservation):
 
     def bonus(self, transition: Transition) -> Tensor:
         """Return theta_1 times the trees put out downwind in this step, a share of N0, float32 [B]."""
-        before, outcome = transition.before, transition.outcome
+        before, result = transition.before, transition.result
         width = before.cells.shape[2]
-        place = torch.stack((outcome.target // width, outcome.target % width), dim=-1)
+        place = torch.stack((result.target // width, result.target % width), dim=-1)
         downwind = alignment(place, centre(is_burning(before.cells)), before.wind) >= 0.0
-        new = ~before.extinguished.flatten(1).gather(1, outcome.target)
-        count = (outcome.extinguished & downwind & new).sum(dim=1)
+        new = ~before.extinguished.flatten(1).gather(1, result.target)
+        count = (result.extinguished & downwind & new).sum(dim=1)
         return self.downwind * count / before.tally.initial

@@ -23,7 +23,10 @@ class Cover(IntEnum):
 
 
 class Action(IntEnum):
-    """The paper's ten actions A = {0..9}, and ``STAY``. 0..7 move N, NE, E, SE, S, SW, W, NW."""
+    """The paper's ten actions A = {0..9}, and ``STAY`` where a team may stay. 0..7 move N, NE, E, SE, S, SW, W, NW.
+
+    These are the first actions of every team; those of other abilities follow, see ``Team.action_names``.
+    """
 
     NORTH = 0
     NORTH_EAST = 1
@@ -188,15 +191,24 @@ _FOLLOWS = ("ground.alpha", "ground.slope", "air.gain", "air.table")
 
 
 @dataclass(eq=False, repr=False)
-class Outcome(Batch):
+class ActionResult(Batch):
     """What each agent's action of one step came to."""
 
     action: Tensor  # int64 [B,A], as chosen
     moved: Tensor  # bool [B,A], changed cell
-    extinguished: Tensor  # bool [B,A], put a fire out, credited
-    cleared: Tensor  # bool [B,A], cleared a tree, credited
+    credited: Tensor  # bool [B,A], did what it should to its target, and first of those who did
     redundant: Tensor  # bool [B,A], acted on a target that a team-mate of lower index took
-    target: Tensor  # int64 [B,A], flat index of the cell acted on, valid where extinguished or cleared
+    target: Tensor  # int64 [B,A], flat index of the cell acted on, valid where credited or redundant
+
+    @property
+    def extinguished(self) -> Tensor:
+        """Return which agents put a fire out, credited, bool [B, A]."""
+        return self.credited & (self.action == int(Action.EXTINGUISH))
+
+    @property
+    def cleared(self) -> Tensor:
+        """Return which agents cleared a tree, credited, bool [B, A]."""
+        return self.credited & (self.action == int(Action.CLEAR))
 
 
 @dataclass(eq=False, repr=False)
@@ -204,7 +216,7 @@ class Transition(Batch):
     """One step of every world: all that rewards, metrics and pictures read."""
 
     before: WorldState
-    outcome: Outcome
+    result: ActionResult
     after: WorldState
 
 

@@ -140,10 +140,10 @@ class World:
             The transition; ``before`` is ``state`` itself.
         """
         active = ~state.done
-        after, outcome = self.team.act(state, action, active, self.fire.last_spreading, self.fire.wet_for)
+        after, result = self.team.act(state, action, active, self.fire.last_spreading, self.fire.wet_for)
         due = active & ((state.step + 1) % self.steps_per_tick == 0)
         after = self._tick(after, due)
-        return Transition(before=state, outcome=outcome, after=self._advance_clock(after, active))
+        return Transition(before=state, result=result, after=self._advance_clock(after, active))
 
     def restored(self, state: WorldState) -> WorldState:
         """Return worlds with what follows from their landscape and wind made anew."""
