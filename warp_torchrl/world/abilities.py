@@ -74,7 +74,10 @@ class Ability:
         raise TypeError(f"{type(self).__name__} does not say what is possible: define mask()")
 
     def act(self, now: Situation, choice: Tensor) -> Deed:
-        """Return what its actions would do, for each agent's choice of them, int64 [B, A]."""
+        """Return what its actions would do, for each agent's choice of them, int64 [B, A].
+
+        Of an ability with one action the choice means nothing.
+        """
         raise TypeError(f"{type(self).__name__} does not say what is done: define act()")
 
 

@@ -2,14 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
+from operator import add, or_
 from typing import Literal, NamedTuple
 
 import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.abilities import ABILITIES, PAPER_ABILITIES, Ability, Situation, neighbourhood
+from warp_torchrl.world.abilities import ABILITIES, PAPER_ABILITIES, Ability, Deed, Situation, neighbourhood
 from warp_torchrl.world.role import ROLES, RoleTable, role_names, role_table
 from warp_torchrl.world.start import starting_cells
 from warp_torchrl.world.state import Action, ActionResult, Cover, Vehicles, WorldState
@@ -29,11 +30,17 @@ class Skill(NamedTuple):
     def is_chosen(self, action: Tensor) -> Tensor:
         """Return where an action is one of its own, bool, shape of the actions, int64."""
         count = len(self.ability.actions)
-        return action == self.first if count == 1 else (action >= self.first) & (action < self.first + count)
+        if count == 1:
+            return action == self.first
+        below = action < self.first + count
+        return below & (action >= self.first) if self.first else below
 
-    def choice(self, action: Tensor) -> Tensor:
-        """Return which of its actions each action is, int64; something where it is none of them."""
-        return (action - self.first).clamp(0, len(self.ability.actions) - 1)
+    def act(self, now: Situation, action: Tensor) -> tuple[Tensor, Deed]:
+        """Return which agents would do something if their action is one of its own, bool [B, A], and what."""
+        count = len(self.ability.actions)
+        choice = (action - self.first if self.first else action).clamp(0, count - 1) if count > 1 else action
+        deed = self.ability.act(now, choice)
+        return deed.possible if self.of_all else deed.possible & now.roles.can[self.name], deed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,8 +127,11 @@ class Team:
 
     def table(self, device: torch.device) -> RoleTable:
         """Return the agents' roles and abilities as tensors of shape [A]."""
-        names = tuple(skill.name for skill in self.skills)
-        return role_table(tuple(self.agent_roles), self.role_names, names, device)
+        return role_table(*self._named, device)
+
+    @cached_property
+    def _named(self) -> tuple[tuple[str, ...], ...]:
+        return tuple(self.agent_roles), self.role_names, tuple(skill.name for skill in self.skills)
 
     def place(self, key: Tensor, cover: Tensor, burning: Tensor) -> Vehicles:
         """Return the team at the start of an episode; see ``starting_cells``."""
@@ -177,27 +187,29 @@ class Team:
         state, moved = self._move(state, action, active)
         now = self._situation(state, last_spreading, wet_ticks)
         target = now.own_cell
-        chosen = spent = acting = torch.zeros_like(action, dtype=torch.bool)
-        deeds = []
+        vehicles, tank = state.vehicles, state.vehicles.tank
+        chosen, deeds = [], []
         for skill in self.skills:
             if skill.ability.moves:
                 continue
             wanted = skill.is_chosen(action) & active
-            deed = skill.ability.act(now, skill.choice(action))
-            done = wanted & deed.possible & self._has(skill, now)
-            target = target if deed.target is None else torch.where(done, deed.target, target)
-            spent = spent if deed.takes_water is None else spent | (wanted & deed.takes_water)
-            chosen, acting = chosen | wanted, acting | done
+            possible, deed = skill.act(now, action)
+            done = wanted & possible
+            if deed.target is not None:
+                target = torch.where(done, deed.target, target)
+            if deed.takes_water is not None:
+                tank = tank - (wanted & deed.takes_water & (vehicles.tank > 0)).to(torch.int32)
+            chosen.append(wanted)
             deeds.append((done, deed.becomes))
+        acting = reduce(or_, [done for done, _ in deeds])
         redundant = _is_second(target, acting)
         credited = acting & ~redundant
-        vehicles = state.vehicles
         after = _changed(state, target, [(done & credited, becomes) for done, becomes in deeds])
         after = after.replace(
             vehicles=vehicles.replace(
-                tank=self._refill(state, vehicles.tank - (spent & (vehicles.tank > 0)).to(torch.int32)),
+                tank=self._refill(state, tank),
                 last_action=torch.where(active, action, vehicles.last_action),
-                acts=vehicles.acts + chosen,
+                acts=vehicles.acts + reduce(or_, chosen),
                 redundant=vehicles.redundant + redundant,
                 last_useful=torch.where(credited, state.step[:, None], vehicles.last_useful),
             )
@@ -208,26 +220,20 @@ class Team:
         return Situation(state, self.table(state.cells.device), self.extinguish_p, last_spreading, wet_ticks)
 
     @staticmethod
-    def _has(skill: Skill, now: Situation) -> Tensor | bool:
-        """Return which agents have an ability, bool [A], or True."""
-        return True if skill.of_all else now.roles.can[skill.name]
-
-    def _mask(self, skill: Skill, now: Situation) -> Tensor:
+    def _mask(skill: Skill, now: Situation) -> Tensor:
         mask = skill.ability.mask(now)
         return mask if skill.of_all else mask & now.roles.can[skill.name][:, None]
 
     def _move(self, state: WorldState, action: Tensor, active: Tensor) -> tuple[WorldState, Tensor]:
         """Return the worlds after the moves, and which agents moved, bool [B, A]."""
-        has_moved = torch.zeros_like(action, dtype=torch.bool)
-        now = self._situation(state, 0)
-        position = state.vehicles.position
+        now, position, moved = self._situation(state, 0), state.vehicles.position, []
         for skill in self.skills:
             if skill.ability.moves:
-                deed = skill.ability.act(now, skill.choice(action))
-                moved = skill.is_chosen(action) & active & deed.possible & self._has(skill, now)
-                position = position if deed.step is None else position + deed.step * moved[..., None]
-                has_moved = has_moved | moved
-        return state.replace(vehicles=state.vehicles.replace(position=position)), has_moved
+                possible, deed = skill.act(now, action)
+                moved.append(skill.is_chosen(action) & active & possible)
+                if deed.step is not None:
+                    position = position + deed.step * moved[-1][..., None]
+        return state.replace(vehicles=state.vehicles.replace(position=position)), reduce(or_, moved)
 
     def _refill(self, state: WorldState, tank: Tensor) -> Tensor:
         """Fill the tanks of vehicles beside a lake or at the base."""
@@ -250,17 +256,13 @@ def _changed(state: WorldState, target: Tensor, deeds: list[tuple[Tensor, Mappin
         target: Flat index of the cell of each agent's act.
         deeds: Of each ability the agents whose act is credited, bool [B, A], and what planes hold there afterwards.
     """
-    changes: dict[str, Tensor] = {}
-    for credited, becomes in deeds:
-        for name, value in becomes.items():
-            plane = getattr(state, name).view(torch.uint8)
-            change = credited * (value - plane.flatten(1).gather(1, target))
-            changes[name] = change if name not in changes else changes[name] + change
+    planes = {name: getattr(state, name) for _, becomes in deeds for name in becomes}
     after = {}
-    for name, change in changes.items():
-        plane = getattr(state, name)
-        codes = plane.view(torch.uint8).flatten(1).scatter_add(1, target, change)
-        after[name] = codes.view_as(plane).view(plane.dtype)
+    for name, plane in planes.items():
+        codes = plane.view(torch.uint8).flatten(1)
+        old = codes.gather(1, target)
+        changes = [credited * (becomes[name] - old) for credited, becomes in deeds if name in becomes]
+        after[name] = codes.scatter_add(1, target, reduce(add, changes)).view_as(plane).view(plane.dtype)
     return state.replace(**after)
 
 
