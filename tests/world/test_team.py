@@ -6,7 +6,7 @@ from torch import Tensor
 
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.random import Stream, uniform
-from warp_torchrl.world.state import Action, ActionResult, Cover, WorldState, is_burning
+from warp_torchrl.world.state import Action, ActionResult, Cover, WorldState, count_trees, is_burning
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.wind import Calm
@@ -292,10 +292,12 @@ def test_a_wet_tree_can_be_cleared_and_is_counted_as_cleared() -> None:
     world = World(landscape=Perlin(size=4), team=Team(n_agents=1), steps_per_tick=1000)
     state = draw("a... .... .... ....", at=[(0, 0)])
     state = world.step(state, torch.tensor([[EXTINGUISH]])).after
-    assert (state.tally.extinguished.item(), state.tally.cleared.item()) == (1, 0)
+    counts = count_trees(state)
+    assert (counts.extinguished.item(), counts.cleared.item()) == (1, 0)
     state = state.replace(terminated=torch.tensor([False]))
     state = world.step(state, torch.tensor([[CLEAR]])).after
-    assert (state.tally.extinguished.item(), state.tally.cleared.item()) == (0, 1)
+    counts = count_trees(state)
+    assert (counts.extinguished.item(), counts.cleared.item()) == (0, 1)
 
 
 # Several agents.

@@ -13,7 +13,7 @@ from torch import Tensor
 from torch.nn.functional import interpolate
 
 from warp_torchrl.world.role import ROLES
-from warp_torchrl.world.state import EMPTY, FIRST_FIRE, OLDEST, Cover, WorldState, is_burning
+from warp_torchrl.world.state import EMPTY, FIRST_FIRE, OLDEST, Cover, WorldState, count_trees, is_burning
 
 # The fire front, 11..13, is lighter than any ground; 14 stays 16 units of CIE Lab off without the red or green cone.
 _GROUND = {  # without a tree, youngest tree, oldest tree
@@ -221,9 +221,9 @@ def _paste_strip(panel: Image.Image, colours: np.ndarray, x: int, y: int, width:
 
 def _draw_numbers(panel: Image.Image, state: WorldState) -> None:
     """Write the clock and the share of the trees, and draw what became of the trees as a bar."""
-    tally = state.tally
-    fates = torch.stack((tally.preserved + tally.extinguished, tally.burning, tally.cleared), dim=1)
-    share = (fates[0] / tally.initial).cpu()
+    counts = count_trees(state)
+    fates = torch.stack((counts.preserved + counts.extinguished, counts.burning, counts.cleared), dim=1)
+    share = (fates[0] / counts.initial).cpu()
     clock = (("Step", f"{int(state.step)}"), ("Fire tick", f"{int(state.tick)}"))
     for place, (name, value) in enumerate((*clock, ("Saved", f"{share[0]:.1%}"), ("Burning", f"{share[1]:.1%}"))):
         x, y = _COLUMN * (place % 2), 69 + 46 * (place // 2)

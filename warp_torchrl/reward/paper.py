@@ -77,4 +77,4 @@ def _cut_off(transition: Transition) -> Tensor:
     threatened = flood(torch.cat((fire, fire)), torch.cat((fuel | new_break, fuel)))
     was, still = (threatened & torch.cat((fuel, fuel))).chunk(2)
     lost = was.sum((1, 2)) - still.sum((1, 2))
-    return lost / before.tally.initial
+    return lost / transition.counts_before.initial

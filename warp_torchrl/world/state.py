@@ -63,7 +63,7 @@ class Landscape(Batch):
 
 
 @dataclass(eq=False, repr=False)
-class Tally(Batch):
+class TreeCounts(Batch):
     """Counts of the initial trees by fate; they add up to ``initial`` (trees that regrow are counted apart)."""
 
     initial: Tensor  # int32 [B], N0, trees before ignition
@@ -149,7 +149,6 @@ class WorldState(Batch):
     firebreak: Tensor  # bool [B,H,W], cleared by an agent
     wet: Tensor  # uint8 [B,H,W], ticks for which the cell cannot ignite
     vehicles: Vehicles
-    tally: Tally
     key: Tensor  # int64 [B], key of the world's draws in this episode
     step: Tensor  # int32 [B], agent steps since the start of the episode
     tick: Tensor  # int32 [B], fire ticks since ignition
@@ -218,6 +217,8 @@ class Transition(Batch):
     before: WorldState
     result: ActionResult
     after: WorldState
+    counts_before: TreeCounts  # of ``before``
+    counts_after: TreeCounts  # of ``after``
 
 
 def is_burning(cells: Tensor) -> Tensor:
@@ -230,7 +231,7 @@ def is_tree(cells: Tensor) -> Tensor:
     return between(cells, 1, OLDEST)
 
 
-def count_trees(state: WorldState) -> Tally:
+def count_trees(state: WorldState) -> TreeCounts:
     """Count the initial trees by fate.
 
         T_p + T_e + T_c + T_b + burning = N0      (WARP-CA, conservation metric)
@@ -249,7 +250,7 @@ def count_trees(state: WorldState) -> Tally:
         unburned & burning,
         burning,
     )
-    return Tally(
+    return TreeCounts(
         initial=trees,
         preserved=standing - extinguished,
         extinguished=extinguished,
