@@ -186,9 +186,9 @@ def test_the_numpy_team_plays_and_earns_the_same():
         np.testing.assert_allclose(reward, now["agents", "reward"][0, :, 0], atol=2e-5)
         if bool(state.done[0]):
             break
-    tally = state.tally
-    assert peer.counts() == (tally.preserved, tally.extinguished, tally.cleared, tally.burned)
-    assert tally.extinguished > 0 and tally.cleared > 0 and tally.burned > 0
+    counts = env.tree_counts
+    assert peer.counts() == (counts.preserved, counts.extinguished, counts.cleared, counts.burned)
+    assert counts.extinguished > 0 and counts.cleared > 0 and counts.burned > 0
 
 
 def test_the_numpy_environment_keeps_pettingzoos_interface():

@@ -22,7 +22,7 @@ from warp_torchrl.models import Entry, Signature
 from warp_torchrl.runs import checkpoint as checkpoints
 
 ACTIONS = tuple(f"action_{code}" for code in range(11))
-SIGNATURE = Signature({"view": Entry((3, 5, 5), "uint8")}, Entry((9, 16, 16), "float32"), 2, ACTIONS, 2)
+SIGNATURE = Signature({"view": Entry((3, 5, 5), "uint8")}, Entry((9, 16, 16), "float32"), 2, ACTIONS, ("ugv", "uav"))
 ALL = sorted({name for row in SINGLE + MULTI for name in row} | {"world/saved"})
 
 

@@ -15,13 +15,9 @@ from torchrl.envs.utils import ExplorationType, exploration_type, set_exploratio
 from warp_torchrl.env.flat import FLAT, unflattened
 from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, ROLE, Signature, recurrent_actors, signature
 from warp_torchrl.models.fitting import fitted
-from warp_torchrl.models.networks import AgentNetworks, Network
-from warp_torchrl.observation import SELF_SIZE
-from warp_torchrl.world.role import ROLE_NAMES, ROLES
+from warp_torchrl.models.networks import AgentNetworks
+from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.state import Action
-
-_ROLE_ENTRIES = slice(SELF_SIZE - len(Action) - len(ROLE_NAMES), SELF_SIZE - len(Action))  # of ``self``
-_ROLE_INDEX = {role.name: index for index, role in enumerate(ROLES.values())}
 
 MODES = {"sampled": ExplorationType.RANDOM, "deterministic": ExplorationType.DETERMINISTIC}
 """TorchRL's exploration type of each mode."""
@@ -37,14 +33,21 @@ class TrainedPolicy(TensorDictModuleBase):
         trained: Inputs and outputs that it was trained with.
         overrides: Give any environment the observation that the policy was trained with:
             ``make_env("large", overrides=policy.overrides)``.
+        shown: What the environment shows that it acts in; None, what it was trained to see.
     """
 
     def __init__(
-        self, module: TensorDictModuleBase, mode: str, trained: Signature, overrides: Sequence[str] = ()
+        self,
+        module: TensorDictModuleBase,
+        mode: str,
+        trained: Signature,
+        overrides: Sequence[str] = (),
+        shown: Signature | None = None,
     ) -> None:
         super().__init__()
         self.in_keys, self.out_keys = module.in_keys, module.out_keys
         self.module, self.mode, self.trained, self.overrides = module, mode, trained, tuple(overrides)
+        self.shown = trained if shown is None else shown
 
     def fitted(self, env: EnvBase) -> "TrainedPolicy":
         """Return the policy adapted to an environment that may have more channels or actions than it was trained with.
@@ -58,7 +61,7 @@ class TrainedPolicy(TensorDictModuleBase):
                 f"it has a network for each of {self.trained.n_agents} agents, this team has {here.n_agents}"
             )
         module = fitted(self.module, self.trained, here, fallback=int(Action.EXTINGUISH))
-        return TrainedPolicy(module, self.mode, self.trained, self.overrides)
+        return TrainedPolicy(module, self.mode, self.trained, self.overrides, here)
 
     @property
     def is_by_agent(self) -> bool:
@@ -92,12 +95,12 @@ class NumpyPolicy:
     def __init__(self, policy: TrainedPolicy) -> None:
         self._policy = policy
         modules = list(policy.modules())
-        network = next(module for module in modules if isinstance(module, Network))
-        keys = [key for key in policy.in_keys if key[: len(OBSERVATION)] == OBSERVATION]
-        self._entries = {"".join(key[len(OBSERVATION) :]): entry for key, entry in zip(keys, network.encoder.entries)}
+        read = ("".join(key[len(OBSERVATION) :]) for key in policy.in_keys if key[: len(OBSERVATION)] == OBSERVATION)
+        self._entries = {name: policy.shown.observation[name] for name in read}
         self._shapes = {name: (entry.shape, entry.dtype) for name, entry in self._entries.items()}
         self._n_agents = next((len(each.networks) for each in modules if isinstance(each, AgentNetworks)), None)
         self._by_role = ROLE in policy.in_keys
+        self._role_index = {ROLES[role].name: at for at, role in enumerate(policy.shown.roles) if role in ROLES}
         self._recurrent = recurrent_actors(policy)
         self._memory: dict[str, Tensor] = {}  # float32 [B, M] of each agent
         self._device = next(policy.parameters()).device
@@ -164,7 +167,7 @@ class NumpyPolicy:
                 raise ValueError(f"{rule}, got {value.dtype} {list(value.shape)}")
             read[(*OBSERVATION, entry) if entry else OBSERVATION] = value
         if self._by_role:
-            read[ROLE] = np.full(mask.shape[:-1], _role(name, entries.get("self")))
+            read[ROLE] = np.full(mask.shape[:-1], self._role(name, entries.get("self")))
         return read
 
     @torch.no_grad()
@@ -189,15 +192,16 @@ class NumpyPolicy:
         known = [self._memory.get(name, nothing) for name in names]
         return torch.stack([each if each.shape == nothing.shape else nothing for each in known], dim=-2)
 
-
-def _role(name: str, own: np.ndarray | None) -> int:
-    """Return the index of an agent's role, from its name or else from its ``self``."""
-    kind = name.rpartition("_")[0]
-    if kind in _ROLE_INDEX:
-        return _ROLE_INDEX[kind]
-    if own is None:
-        raise ValueError(
-            f"this policy has a network for each role: observations must be in a dict by agent, such as "
-            f"{{'{next(iter(_ROLE_INDEX))}_0': ...}}, got {name or 'one without a name'}"
-        )
-    return int(np.asarray(own)[..., _ROLE_ENTRIES].reshape(-1, len(ROLE_NAMES))[0].argmax())
+    def _role(self, name: str, own: np.ndarray | None) -> int:
+        """Return the index of an agent's role, from its name or else from its ``self``."""
+        kind = name.rpartition("_")[0]
+        if kind in self._role_index:
+            return self._role_index[kind]
+        if own is None:
+            raise ValueError(
+                f"this policy has a network for each role: observations must be in a dict by agent, such as "
+                f"{{'{next(iter(self._role_index))}_0': ...}}, got {name or 'one without a name'}"
+            )
+        told = self._entries["self"].names
+        columns = [told.index(f"role_{role}") for role in self._policy.shown.roles]
+        return int(np.asarray(own)[..., columns].reshape(-1, len(columns))[0].argmax())

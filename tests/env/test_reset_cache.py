@@ -5,6 +5,7 @@ from tensordict import TensorDict
 
 from tests.conftest import small_world
 from warp_torchrl.env.reset_cache import ResetCache
+from warp_torchrl.world.state import count_trees
 
 SEEDS = torch.tensor([10, 11, 12, 13])
 
@@ -18,17 +19,19 @@ class Counting:
     def __call__(self, seeds, episodes):
         self.asked.append(len(seeds))
         worlds = small_world().reset(seeds, episodes)
-        return worlds, TensorDict({"seed": seeds.clone(), "episode": episodes.clone()}, batch_size=seeds.shape)
+        counts = count_trees(worlds)
+        return worlds, counts, TensorDict({"seed": seeds.clone(), "episode": episodes.clone()}, batch_size=seeds.shape)
 
 
 def test_what_is_taken_is_the_next_episode_of_those_worlds():
     starts, episodes = ResetCache(Counting()), torch.tensor([1, 1, 1, 1])
     for index in ([2], [0, 1], [2], [2, 3], [1]):  # world 2 twice before world 3 at all
-        worlds, seen = starts.pop(torch.tensor(index), SEEDS, episodes)
+        worlds, counts, seen = starts.pop(torch.tensor(index), SEEDS, episodes)
         assert seen["seed"].tolist() == SEEDS[index].tolist()
         assert seen["episode"].tolist() == episodes[index].tolist()
         wanted = small_world().reset(SEEDS[index], episodes[index])
         assert torch.equal(worlds.cells, wanted.cells) and torch.equal(worlds.key, wanted.key)
+        assert torch.equal(counts.initial, count_trees(wanted).initial)
         episodes = episodes.index_add(0, torch.tensor(index), torch.ones(len(index), dtype=torch.int64))
 
 
@@ -45,12 +48,12 @@ def test_forgotten_resets_are_made_anew():
     starts = ResetCache(make)
     starts.pop(torch.tensor([0]), SEEDS, torch.zeros_like(SEEDS))
     starts.clear()
-    _, seen = starts.pop(torch.tensor([1]), SEEDS + 5, torch.zeros_like(SEEDS))
+    *_, seen = starts.pop(torch.tensor([1]), SEEDS + 5, torch.zeros_like(SEEDS))
     assert make.asked == [4, 4] and seen["seed"].tolist() == [16]
 
 
 def test_what_was_taken_stays_as_it_is():
     starts, episodes = ResetCache(Counting()), torch.zeros_like(SEEDS)
-    _, seen = starts.pop(torch.tensor([0]), SEEDS, episodes)
+    *_, seen = starts.pop(torch.tensor([0]), SEEDS, episodes)
     starts.pop(torch.tensor([0]), SEEDS, episodes + 1)
     assert seen["episode"].tolist() == [0]

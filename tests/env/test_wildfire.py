@@ -13,7 +13,7 @@ from warp_torchrl import WildfireEnv, make_env
 from warp_torchrl.observation import Local, Paper, Surroundings
 from warp_torchrl.reward import Efficiency
 from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.state import Action
+from warp_torchrl.world.state import Action, count_trees
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.wind import Paper as PaperWind
@@ -86,10 +86,38 @@ def test_only_the_worlds_that_ask_are_reset(make_small_env):
     assert (env.world_state.cells[[0, 2]] == before.cells[[0, 2]]).all()
     assert (env.world_state.cells[1] == fresh.world_state.cells[0]).all(), "episode 1 of seed 1"
     assert (after["agents", "observation", "view"][[0, 2]] == now["agents", "observation", "view"][[0, 2]]).all()
-    assert (
-        after["agents", "observation", "view"][1]
-        == fresh._observe(fresh.world_state)["agents", "observation", "view"][0]
-    ).all()
+    assert (after["agents", "observation", "view"][1] == fresh._observe()["agents", "observation", "view"][0]).all()
+
+
+def test_the_counts_of_trees_are_those_of_the_worlds_now(make_small_env):
+    env = make_small_env(5, small_world(horizon=9, team=Team(n_agents=3)))
+    counted = []
+    env.watcher = lambda transition: counted.append(
+        [transition.counts_before.leaves(), count_trees(transition.before).leaves()]
+    )
+
+    def check():
+        now, known = count_trees(env.world_state).leaves(), env.tree_counts.leaves()
+        assert all(torch.equal(known[name], now[name]) for name in now)
+
+    with pytest.raises(RuntimeError, match="call reset"):
+        _ = env.tree_counts
+    now = env.reset()
+    for _ in range(30):  # over several ends, of all worlds and of some
+        now["agents", "action"] = env.action_spec.rand()["agents", "action"]
+        now = env.step_and_maybe_reset(now)[1]
+        check()
+    now["_reset"] = torch.tensor([[True], [False], [True], [False], [False]])
+    env.reset(now)
+    check()
+    saved = env.state_dict()
+    env.step(env.action_spec.rand())
+    assert all(torch.equal(known[name], now[name]) for known, now in counted for name in now)
+    env.load_state_dict(saved)
+    check()
+    env.set_state(env.world_state.replace(cells=torch.zeros_like(env.world_state.cells)))
+    check()
+    assert (env.tree_counts.alight == 0).all()
 
 
 def test_a_rollout_goes_on_after_worlds_end(make_small_env):
@@ -202,7 +230,7 @@ def test_set_state_goes_on_from_given_worlds(make_small_env):
     env.reset(), other.reset()
     stepped(env, team_of(env))
     seen = other.set_state(env.world_state)
-    assert (seen["state"] == env._observe(env.world_state)["state"]).all()
+    assert (seen["state"] == env._observe()["state"]).all()
     assert (stepped(env, team_of(env))["state"] == stepped(other, team_of(other))["state"]).all()
     with pytest.raises(ValueError, match="state must have"):
         other.set_state(_reset_state(make_small_env(1)))

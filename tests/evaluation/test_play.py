@@ -64,7 +64,7 @@ def test_behaviour_is_seen_only_where_it_is_asked_for(make_small_env):
 def test_a_team_without_an_agent_does_worse(make_small_env):
     env = make_small_env(32)
     whole = play(env, Coordinated(env), 0)
-    lamed = play(env, WithoutAgent(Coordinated(env), 1), 0)
+    lamed = play(env, WithoutAgent(Coordinated(env), 1, env.world.team), 0)
     assert whole["saved"].mean() > lamed["saved"].mean() + 0.05
     content = report("tiny", "coordinated", 0, whole, {}, left_out={"bulldozer_1": lamed})
     assert content["left_out"]["bulldozer_1"]["saved_difference"] > 0.05
@@ -75,7 +75,7 @@ def test_the_agent_left_out_stays_where_it_is(make_small_env):
     env = make_small_env(4)
     now = env.reset()
     start = env.world_state.vehicles.position.clone()
-    policy = WithoutAgent(Greedy(env), 0)
+    policy = WithoutAgent(Greedy(env), 0, env.world.team)
     for _ in range(10):
         now = env.step(policy(now))["next"]
     after = env.world_state.vehicles.position

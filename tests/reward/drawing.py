@@ -4,7 +4,7 @@ import torch
 
 from tests.conftest import small_world
 from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.state import Action, count_trees
+from warp_torchrl.world.state import Action
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.array import Array
 
@@ -29,7 +29,7 @@ def drawn(rows, positions, *, steps_per_tick=1000, fire=None):
         burned=torch.zeros_like(state.burned),
         vehicles=state.vehicles.replace(position=torch.tensor(positions)[None]),
     )
-    return state.replace(tally=count_trees(state)), world
+    return state, world
 
 
 def earned(reward, state, world, *actions):

@@ -8,7 +8,7 @@ import torch
 from tests.conftest import small_world
 from warp_torchrl.reward import Adaptive, Collaborative, Coverage, Efficiency, Paper, Reward, Time
 from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.state import Action
+from warp_torchrl.world.state import Action, count_trees
 
 from .drawing import EAST, EXTINGUISH, FIELD, drawn, earned
 
@@ -23,8 +23,8 @@ def test_shaping_pays_the_way_to_the_fire():
 def test_the_distance_potential_is_nought_where_nothing_burns():
     state, world = drawn(FIELD, [[0, 0]])
     out = world.step(state, torch.tensor([[EXTINGUISH]])).after
-    assert state.tally.alight.item() == 1 and out.tally.alight.item() == 0
-    assert Efficiency().phi(state).item() < 0.0 == Efficiency().phi(out).item()
+    assert count_trees(state).alight.item() == 1 and count_trees(out).alight.item() == 0
+    assert Efficiency().phi(state, count_trees(state)).item() < 0.0 == Efficiency().phi(out, count_trees(out)).item()
 
 
 def test_the_exposure_potential_pays_for_fuel_out_of_reach():
@@ -45,7 +45,7 @@ def test_shaping_adds_minus_the_first_potential_to_the_return(make_small_env, re
         env = make_small_env(3, quick, reward=reward(shaping=weight, gamma=gamma, potential=potential))
         env.reset()
         if weight:
-            potential = env.reward_function.phi(env.world_state).mean(1)
+            potential = env.reward_function.phi(env.world_state, env.tree_counts).mean(1)
         total, discount = 0.0, 1.0
         while not env.world_state.done.all():
             action = torch.full((3, 2), EAST)

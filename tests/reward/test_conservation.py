@@ -8,6 +8,7 @@ from tests.conftest import small_world
 from warp_torchrl.reward import Adaptive, Collaborative, Coverage, Efficiency, Time
 from warp_torchrl.world.batch import concatenated
 from warp_torchrl.world.fire import Fire
+from warp_torchrl.world.state import count_trees
 from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.world import in_wind
 
@@ -69,7 +70,7 @@ BLOCKS = ["T" * 16, "TFTTTTTTTTTTTTTT", *["T" * 16] * 6]  # two blocks of 8 x 8,
 def test_coverage_charges_a_block_from_which_too_much_burns():
     state, world = drawn(BLOCKS, [[7, 15]], steps_per_tick=1, fire=SURE)
     # 1 of 64 trees burns, 1.6 %: the block is spared. After the tick 9 of 64: it is lost. Q falls by 8 / 128.
-    assert Coverage().value(state).item() == pytest.approx(127 / 128 + 0.04)
+    assert Coverage().value(state, count_trees(state)).item() == pytest.approx(127 / 128 + 0.04)
     assert earned(Coverage(), state, world, STAY) == pytest.approx([-8 / 128 - 0.02])
 
 
@@ -90,7 +91,7 @@ def test_assets_are_weighed_by_the_mean_of_the_whole_map_of_each_world():
     both = concatenated([state, state])
     weighed = both.landscape.replace(assets=torch.stack((assets, 10.0 * assets)))
     both = both.replace(ground=both.ground.replace(landscape=weighed))
-    assert Coverage().value(both).tolist() == pytest.approx([248 / 256 + 0.02 * 11 / 3] * 2)
+    assert Coverage().value(both, count_trees(both)).tolist() == pytest.approx([248 / 256 + 0.02 * 11 / 3] * 2)
 
 
 def test_collaborative_multiplies_by_those_who_were_useful_lately():
@@ -105,7 +106,7 @@ def test_a_useful_act_counts_for_sixteen_steps():
     useful = state.vehicles.replace(last_useful=torch.tensor([[4, -1]], dtype=torch.int32))
     for step, eta in ((5, 1.25), (20, 1.25), (21, 1.0)):
         now = state.replace(vehicles=useful, step=torch.tensor([step], dtype=torch.int32))
-        assert Collaborative().value(now).item() == pytest.approx(eta * 15 / 16)
+        assert Collaborative().value(now, count_trees(now)).item() == pytest.approx(eta * 15 / 16)
 
 
 def test_collaborative_does_not_soften_a_loss_unless_printed():
@@ -128,7 +129,7 @@ def test_adaptive_by_hand():
 def test_adaptive_charges_the_fuel_within_three_cells_of_fire():
     # Of 81 trees the one in the middle burns; within three cells of it stand 7 x 7 - 1 = 48.
     state, _ = drawn(["T" * 9] * 4 + ["TTTTFTTTT"] + ["T" * 9] * 4, [[0, 0]])
-    assert Adaptive(contained=0.0).value(state).item() == pytest.approx(80 / 81 - 0.1 * 48 / 81)
+    assert Adaptive(contained=0.0).value(state, count_trees(state)).item() == pytest.approx(80 / 81 - 0.1 * 48 / 81)
 
 
 def test_adaptive_pays_for_the_downwind_half_and_once():
@@ -152,13 +153,13 @@ def test_each_telescopes_to_its_closed_form(make_small_env, reward):
     env = make_small_env(8, small_world(horizon=60, landscape=Perlin(size=12, relief=40.0)), reward=component)
     torch.manual_seed(0)
     now = env.reset()
-    start, total = component.value(env.world_state), torch.zeros(8)
+    start, total = component.value(env.world_state, env.tree_counts), torch.zeros(8)
     for _ in range(60):
         now = env.step(env.rand_action(now))["next"]
         total += now["agents", "reward"].mean(1)[:, 0]
     assert now["done"].all()
     state = env.world_state
-    wanted = component.value(state) - start - component.act * state.vehicles.acts.sum(1)
+    wanted = component.value(state, count_trees(state)) - start - component.act * state.vehicles.acts.sum(1)
     torch.testing.assert_close(total, wanted, atol=1e-5, rtol=0)
     assert wanted.abs().min() > 1e-3
 
@@ -171,7 +172,7 @@ def test_q_is_that_of_the_metrics(make_small_env):
         now = env.step(env.rand_action(now))["next"]
     info = now["info"]
     wanted = info["saved"] - 0.1 * info["extinguished"] - 0.5 * info["cleared"] - info["burned"]
-    torch.testing.assert_close(Efficiency().worth(env.world_state), wanted[:, 0], atol=1e-6, rtol=0)
+    torch.testing.assert_close(Efficiency().worth(env.tree_counts), wanted[:, 0], atol=1e-6, rtol=0)
 
 
 @pytest.mark.parametrize("barrier", ["lake", "firebreak", "wet"])
@@ -180,9 +181,10 @@ def test_adaptive_counts_every_kind_of_barrier_as_containment(barrier):
     state, _ = drawn(["TTTTT", "TTTTT", "TTFTT", "TTTTT", "TTTTT"], [[0, 0], [4, 4]])
     ring = torch.ones(1, 5, 5, dtype=torch.bool)
     ring[:, 2, 2] = False
-    open_ground = Adaptive(exposed=0.0).value(state)
+    counts = count_trees(state)
+    open_ground = Adaptive(exposed=0.0).value(state, counts)
     if barrier == "lake":
         state = state.replace(ground=state.ground.replace(alpha=torch.where(ring, 0.0, state.alpha)))
     else:
         state = state.replace(**{barrier: ring.to(getattr(state, barrier).dtype)})
-    assert (Adaptive(exposed=0.0).value(state) - open_ground).item() == pytest.approx(0.1)
+    assert (Adaptive(exposed=0.0).value(state, counts) - open_ground).item() == pytest.approx(0.1)

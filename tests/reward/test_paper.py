@@ -3,6 +3,7 @@
 import pytest
 
 from warp_torchrl.reward import Paper
+from warp_torchrl.world.state import count_trees
 
 from .drawing import CLEAR, EAST, EXTINGUISH, FIELD, STAY, drawn, earned
 
@@ -31,7 +32,7 @@ def test_the_barrier_pays_what_it_cuts_off_and_the_printed_one_pays_any_clearing
     state, world = drawn(rows, [[2, 3]])
     initial = 9 + 1 + 12  # left block, bridge, right block; the fire is one of the left ones
     cut = earned(Paper(), state, world, CLEAR)[0]
-    assert state.tally.initial.item() == initial
+    assert count_trees(state).initial.item() == initial
     assert cut == pytest.approx((1 + 50 * 12 / initial) / 50)
     elsewhere, _ = drawn(rows, [[0, 0]])
     assert earned(Paper(), elsewhere, world, CLEAR) == pytest.approx([1 / 50])

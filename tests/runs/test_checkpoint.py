@@ -16,7 +16,7 @@ from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.checkpoint import CheckpointError, RunFolderInUse, RunFolderLock, newest
 
 ACTIONS = tuple(f"action_{code}" for code in range(11))
-SIGNATURE = Signature({"view": Entry((3, 5, 5), "uint8")}, Entry((9, 16, 16), "float32"), 2, ACTIONS, 2)
+SIGNATURE = Signature({"view": Entry((3, 5, 5), "uint8")}, Entry((9, 16, 16), "float32"), 2, ACTIONS, ("ugv", "uav"))
 
 
 def saved(run, frames, keep=3, **options):

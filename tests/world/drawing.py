@@ -13,7 +13,7 @@ from torch import Tensor
 
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.random import world_key
-from warp_torchrl.world.state import Cover, Landscape, WorldState, count_trees
+from warp_torchrl.world.state import Cover, Landscape, WorldState
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.world import initial_state
 
@@ -87,12 +87,11 @@ def draw(
     places = torch.tensor(at or [(0, 0)] * team.n_agents)
     vehicles = vehicles.replace(position=in_each(places))
     state = initial_state(land, fire, air.expand(worlds, *air.shape), key, vehicles, 30.0)
-    state = state.replace(
+    return state.replace(
         cells=in_each(cells),
         age=in_each(trees * burning),
         firebreak=in_each(marks(drawing, FIREBREAK)),
     )
-    return state.replace(tally=count_trees(state))
 
 
 def drawn(state: WorldState, world: int = 0) -> str:

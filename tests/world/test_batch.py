@@ -9,13 +9,13 @@ from torch import Tensor
 from warp_torchrl.world.batch import Batch, concatenated
 from warp_torchrl.world.burn import FireHistory
 from warp_torchrl.world.state import (
+    ActionResult,
     Air,
     Forecast,
     Ground,
     Landscape,
-    Outcome,
-    Tally,
     Transition,
+    TreeCounts,
     Vehicles,
     WorldState,
 )
@@ -111,5 +111,6 @@ def test_a_batch_moves_to_a_device() -> None:
 
 
 def test_batches_are_compared_by_what_they_are_and_not_by_their_tensors() -> None:
-    for kind in (Landscape, Ground, Air, Forecast, Tally, Vehicles, WorldState, Outcome, Transition, FireHistory):
+    parts = Landscape, Ground, Air, Forecast, TreeCounts, Vehicles, ActionResult
+    for kind in (*parts, WorldState, Transition, FireHistory):
         assert kind.__eq__ is object.__eq__ and kind.__hash__ is object.__hash__, kind.__name__

@@ -4,6 +4,7 @@ import pytest
 import torch
 
 from warp_torchrl.world.front import alignment, block_shares, centre, containment, exposure, sector
+from warp_torchrl.world.state import count_trees
 
 from .drawing import draw, marks
 
@@ -35,9 +36,11 @@ def test_sectors_go_round_clockwise_from_the_east() -> None:
 def test_exposure_is_the_share_of_trees_near_fire() -> None:
     # 9 cells, one of them alight: 8 within one cell, of 9 initial trees; a lake and an ember's like do not count.
     state = draw("TTT TaT TTT")
-    assert exposure(state, 1).item() == pytest.approx(8 / 9)
-    assert exposure(draw(FIELD), 3).item() == pytest.approx(48 / 225)
-    assert exposure(draw("TTT TTT TTT"), 3).item() == 0.0
+    assert exposure(state, count_trees(state), 1).item() == pytest.approx(8 / 9)
+    state = draw(FIELD)
+    assert exposure(state, count_trees(state), 3).item() == pytest.approx(48 / 225)
+    state = draw("TTT TTT TTT")
+    assert exposure(state, count_trees(state), 3).item() == 0.0
 
 
 def test_containment_counts_the_rays_that_meet_a_barrier() -> None:

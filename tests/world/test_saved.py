@@ -4,6 +4,7 @@ import pytest
 import torch
 
 from warp_torchrl.world.saved import filled
+from warp_torchrl.world.state import count_trees
 from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.world import World
 
@@ -25,6 +26,7 @@ def test_worlds_of_earlier_names_are_read() -> None:
     saved = start(0)
     earlier = {name.replace("ground.landscape", "landscape"): leaf for name, leaf in saved.what_changes().items()}
     earlier["wind"] = earlier.pop("air.wind")
+    earlier |= {f"tally.{name}": leaf for name, leaf in count_trees(saved).leaves().items()}
     earlier |= {"alpha": saved.alpha, "slope": saved.ground.slope, "gain": saved.air.wind, "chances": saved.air.wind}
     assert differing(WORLD.restored(filled(start(40), earlier)), saved) == []
 

@@ -6,7 +6,7 @@ from torch import Tensor
 
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.random import Stream, uniform
-from warp_torchrl.world.state import Action, Cover, Outcome, WorldState, is_burning
+from warp_torchrl.world.state import Action, ActionResult, Cover, WorldState, count_trees, is_burning
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.wind import Calm
@@ -19,7 +19,7 @@ UGV, UAV = Team(n_agents=1), Team(n_agents=1, roles=("uav",))
 LAST_SPREADING, WET_TICKS = 14, 10
 
 
-def act(team: Team, state: WorldState, *actions: int, active: bool = True) -> tuple[WorldState, Outcome]:
+def act(team: Team, state: WorldState, *actions: int, active: bool = True) -> tuple[WorldState, ActionResult]:
     """Let each agent of one world do its action, without a tick."""
     action = torch.tensor([actions])
     return team.act(state, action, torch.tensor([active]), LAST_SPREADING, WET_TICKS)
@@ -42,9 +42,9 @@ MOVES = {N: (1, 2), NE: (1, 3), E: (2, 3), SE: (3, 3), S: (3, 2), SW: (3, 1), W:
 @pytest.mark.parametrize("action", MOVES)
 def test_a_bulldozer_moves_one_cell(action: int) -> None:
     state = draw("..... ..... ..... ..... .....", at=[(2, 2)])
-    after, outcome = act(UGV, state, action)
+    after, result = act(UGV, state, action)
     assert places(after) == [MOVES[action]]
-    assert outcome.moved.tolist() == [[True]]
+    assert result.moved.tolist() == [[True]]
     assert after.vehicles.last_action.tolist() == [[action]]
 
 
@@ -61,9 +61,9 @@ def test_a_bulldozer_is_stopped_by_the_border_a_lake_and_fire() -> None:
     state = draw(".~.. ae.. ....")
     assert mask_of(UGV, state) == {EXTINGUISH, STAY}
     for action in MOVES:
-        after, outcome = act(UGV, state, action)
+        after, result = act(UGV, state, action)
         assert places(after) == [(0, 0)]
-        assert outcome.moved.tolist() == [[False]]
+        assert result.moved.tolist() == [[False]]
 
 
 @pytest.mark.parametrize(
@@ -116,10 +116,10 @@ def test_agents_move_before_anybody_acts() -> None:
     # Agent 0 puts out the fire that agent 1 wants to drive into: too late for the move.
     team = Team(n_agents=2)
     state = draw(".a.", team=team, at=[(0, 0), (0, 2)])
-    after, outcome = act(team, state, EXTINGUISH, W)
+    after, result = act(team, state, EXTINGUISH, W)
     assert drawn(after) == ".T."
     assert places(after) == [(0, 0), (0, 2)]
-    assert outcome.moved.tolist() == [[False, False]]
+    assert result.moved.tolist() == [[False, False]]
 
 
 # Extinguish.
@@ -138,20 +138,20 @@ def test_agents_move_before_anybody_acts() -> None:
     ],
 )
 def test_the_youngest_fire_goes_out_own_cell_first_then_in_reading_order(before: str, after: str) -> None:
-    state, outcome = act(UGV, draw(before, at=[(1, 1)]), EXTINGUISH)
+    state, result = act(UGV, draw(before, at=[(1, 1)]), EXTINGUISH)
     assert drawn(state) == after
-    assert outcome.extinguished.tolist() == [[True]]
+    assert result.extinguished.tolist() == [[True]]
     (changed,) = [i for i, (a, b) in enumerate(zip(before.replace(" ", ""), after.replace(" ", ""))) if a != b]
-    assert outcome.target.tolist() == [[changed]]
+    assert result.target.tolist() == [[changed]]
 
 
 def test_only_the_3_by_3_neighbourhood_is_in_reach() -> None:
     state = draw("a...a ..... ..... ..... a.a.a", at=[(2, 2)])
     assert EXTINGUISH not in mask_of(UGV, state)
-    after, outcome = act(UGV, state, EXTINGUISH)
+    after, result = act(UGV, state, EXTINGUISH)
     assert drawn(after) == drawn(state)
-    assert outcome.extinguished.tolist() == [[False]]
-    assert outcome.redundant.tolist() == [[False]]
+    assert result.extinguished.tolist() == [[False]]
+    assert result.redundant.tolist() == [[False]]
 
 
 def test_nobody_reaches_over_the_edge_of_the_map() -> None:
@@ -195,8 +195,8 @@ def test_a_tree_that_was_put_out_stays_wet_for_ten_ticks() -> None:
 def test_the_last_stage_can_be_put_out_only_if_it_spreads(stages: int, puts_out: bool) -> None:
     state = draw(".e.")
     last = Fire(burning_stages=stages).last_spreading
-    after, outcome = UGV.act(state, torch.tensor([[EXTINGUISH]]), torch.tensor([True]), last, WET_TICKS)
-    assert outcome.extinguished.tolist() == [[puts_out]]
+    after, result = UGV.act(state, torch.tensor([[EXTINGUISH]]), torch.tensor([True]), last, WET_TICKS)
+    assert result.extinguished.tolist() == [[puts_out]]
     assert drawn(after) == (".T." if puts_out else ".e.")
     assert UGV.action_mask(state, last)[0, 0, EXTINGUISH].item() is puts_out
 
@@ -209,9 +209,9 @@ def test_both_roles_put_fire_out() -> None:
 def test_a_tree_can_be_put_out_twice() -> None:
     state, _ = act(UGV, draw("a.", at=[(0, 1)]), EXTINGUISH)
     state = state.replace(cells=torch.tensor([[[12, 0]]], dtype=torch.uint8), age=torch.tensor([[[6, 0]]]).byte())
-    state, outcome = act(UGV, state, EXTINGUISH)
+    state, result = act(UGV, state, EXTINGUISH)
     assert drawn(state) == "6."
-    assert outcome.extinguished.all()
+    assert result.extinguished.all()
     assert state.extinguished[0, 0].tolist() == [True, False]
     assert state.wet[0, 0].tolist() == [10, 0]
 
@@ -220,42 +220,42 @@ def test_putting_out_may_fail() -> None:
     # 4000 worlds at 0.3: 1200 succeed, deviation 29; five of them, false alarm 6e-7. Failures change nothing.
     team = Team(n_agents=1, extinguish_p=0.3)
     state = draw(".a.", team=team, worlds=4000)
-    after, outcome = team.act(state, torch.full((4000, 1), EXTINGUISH), torch.ones(4000, dtype=torch.bool), 14, 10)
-    assert abs(outcome.extinguished.sum().item() - 1200) < 5 * 29
-    assert torch.equal(after.cells[:, 0, 1] == 10, outcome.extinguished[:, 0])
-    assert torch.equal(after.cells[:, 0, 1] == 11, ~outcome.extinguished[:, 0])
-    assert not outcome.redundant.any()
+    after, result = team.act(state, torch.full((4000, 1), EXTINGUISH), torch.ones(4000, dtype=torch.bool), 14, 10)
+    assert abs(result.extinguished.sum().item() - 1200) < 5 * 29
+    assert torch.equal(after.cells[:, 0, 1] == 10, result.extinguished[:, 0])
+    assert torch.equal(after.cells[:, 0, 1] == 11, ~result.extinguished[:, 0])
+    assert not result.redundant.any()
 
 
 @pytest.mark.parametrize("p, puts_out", [(0.0, False), (1.0, True)])
 def test_certain_success_and_failure_are_certain(p: float, puts_out: bool) -> None:
     team = Team(n_agents=1, extinguish_p=p)
     state = draw(".a.", team=team, worlds=500)
-    _, outcome = team.act(state, torch.full((500, 1), EXTINGUISH), torch.ones(500, dtype=torch.bool), 14, 10)
-    assert (outcome.extinguished == puts_out).all()
+    _, result = team.act(state, torch.full((500, 1), EXTINGUISH), torch.ones(500, dtype=torch.bool), 14, 10)
+    assert (result.extinguished == puts_out).all()
 
 
 def test_the_second_tries_where_the_first_has_failed() -> None:
     # Each succeeds with 1/2: the fire is out in 3/4 of the worlds, credited once; redundant where both succeed, 1/4.
     team = Team(n_agents=2, extinguish_p=0.5)
     state = draw(".a.", team=team, at=[(0, 0), (0, 2)], worlds=4000)
-    after, outcome = team.act(state, torch.full((4000, 2), EXTINGUISH), torch.ones(4000, dtype=torch.bool), 14, 10)
-    assert torch.equal(outcome.extinguished.sum(1) == 1, after.cells[:, 0, 1] == 10)
-    assert outcome.extinguished.sum(1).max() == 1
+    after, result = team.act(state, torch.full((4000, 2), EXTINGUISH), torch.ones(4000, dtype=torch.bool), 14, 10)
+    assert torch.equal(result.extinguished.sum(1) == 1, after.cells[:, 0, 1] == 10)
+    assert result.extinguished.sum(1).max() == 1
     # Deviation of both sqrt(4000 * 3 / 16) = 27.4; five of them.
     assert abs((after.cells[:, 0, 1] == 10).sum().item() - 3000) < 137
-    assert abs(outcome.redundant[:, 1].sum().item() - 1000) < 137
-    assert not outcome.redundant[:, 0].any()
+    assert abs(result.redundant[:, 1].sum().item() - 1000) < 137
+    assert not result.redundant[:, 0].any()
 
 
 # Clear.
 
 
 def test_clearing_makes_a_firebreak_for_ever() -> None:
-    state, outcome = act(UGV, draw("TTT TTT", at=[(1, 1)]), CLEAR)
+    state, result = act(UGV, draw("TTT TTT", at=[(1, 1)]), CLEAR)
     assert drawn(state) == "TTT T.T"
-    assert outcome.cleared.tolist() == [[True]]
-    assert outcome.target.tolist() == [[4]]
+    assert result.cleared.tolist() == [[True]]
+    assert result.target.tolist() == [[4]]
     assert state.firebreak[0].tolist() == [[False] * 3, [False, True, False]]
     fire = Fire(growth=True, p_regrow=1.0, beta=1e6)
     for u in (0.5, 0.999, 0.0, 0.999):
@@ -272,19 +272,19 @@ def test_a_tree_of_any_age_can_be_cleared(cell: str) -> None:
 @pytest.mark.parametrize("cell", ".#~ae")
 def test_what_is_no_tree_cannot_be_cleared(cell: str) -> None:
     state = draw(f"{cell}.")
-    after, outcome = act(UGV, state, CLEAR)
+    after, result = act(UGV, state, CLEAR)
     assert CLEAR not in mask_of(UGV, state)
     assert drawn(after) == drawn(state)
     assert torch.equal(after.firebreak, state.firebreak)
-    assert outcome.cleared.tolist() == [[False]]
+    assert result.cleared.tolist() == [[False]]
 
 
 def test_an_aircraft_cannot_clear() -> None:
     state = draw("TT", team=UAV)
     assert CLEAR not in mask_of(UAV, state)
-    after, outcome = act(UAV, state, CLEAR)
+    after, result = act(UAV, state, CLEAR)
     assert drawn(after) == "TT"
-    assert outcome.cleared.tolist() == [[False]]
+    assert result.cleared.tolist() == [[False]]
     assert after.vehicles.acts.tolist() == [[1]]
 
 
@@ -292,10 +292,12 @@ def test_a_wet_tree_can_be_cleared_and_is_counted_as_cleared() -> None:
     world = World(landscape=Perlin(size=4), team=Team(n_agents=1), steps_per_tick=1000)
     state = draw("a... .... .... ....", at=[(0, 0)])
     state = world.step(state, torch.tensor([[EXTINGUISH]])).after
-    assert (state.tally.extinguished.item(), state.tally.cleared.item()) == (1, 0)
+    counts = count_trees(state)
+    assert (counts.extinguished.item(), counts.cleared.item()) == (1, 0)
     state = state.replace(terminated=torch.tensor([False]))
     state = world.step(state, torch.tensor([[CLEAR]])).after
-    assert (state.tally.extinguished.item(), state.tally.cleared.item()) == (0, 1)
+    counts = count_trees(state)
+    assert (counts.extinguished.item(), counts.cleared.item()) == (0, 1)
 
 
 # Several agents.
@@ -304,10 +306,10 @@ def test_a_wet_tree_can_be_cleared_and_is_counted_as_cleared() -> None:
 def test_one_target_is_credited_to_the_lower_index() -> None:
     team = Team(n_agents=4, roles=("ugv", "uav"))
     state = draw("..... ..a.. .....", team=team, at=[(0, 4), (1, 1), (1, 3), (2, 2)])
-    after, outcome = act(team, state, EXTINGUISH, EXTINGUISH, EXTINGUISH, EXTINGUISH)
+    after, result = act(team, state, EXTINGUISH, EXTINGUISH, EXTINGUISH, EXTINGUISH)
     assert drawn(after) == "..... ..T.. ....."
-    assert outcome.extinguished.tolist() == [[False, True, False, False]]  # agent 0 is out of reach
-    assert outcome.redundant.tolist() == [[False, False, True, True]]
+    assert result.extinguished.tolist() == [[False, True, False, False]]  # agent 0 is out of reach
+    assert result.redundant.tolist() == [[False, False, True, True]]
     assert after.vehicles.acts.tolist() == [[1, 1, 1, 1]]
     assert after.vehicles.redundant.tolist() == [[0, 0, 1, 1]]
     assert after.wet.sum() == 10
@@ -316,37 +318,37 @@ def test_one_target_is_credited_to_the_lower_index() -> None:
 def test_one_tree_is_cleared_once() -> None:
     team = Team(n_agents=2)
     state = draw(".T.", team=team, at=[(0, 1), (0, 1)])
-    after, outcome = act(team, state, CLEAR, CLEAR)
+    after, result = act(team, state, CLEAR, CLEAR)
     assert drawn(after) == "..."
-    assert outcome.cleared.tolist() == [[True, False]]
-    assert outcome.redundant.tolist() == [[False, True]]
+    assert result.cleared.tolist() == [[True, False]]
+    assert result.redundant.tolist() == [[False, True]]
 
 
 def test_different_targets_are_all_done() -> None:
     team = Team(n_agents=3)
     state = draw("a...b ..T..", team=team, at=[(0, 1), (0, 3), (1, 2)])
-    after, outcome = act(team, state, EXTINGUISH, EXTINGUISH, CLEAR)
+    after, result = act(team, state, EXTINGUISH, EXTINGUISH, CLEAR)
     assert drawn(after) == "T...T ....."
-    assert outcome.extinguished.tolist() == [[True, True, False]]
-    assert outcome.cleared.tolist() == [[False, False, True]]
-    assert not outcome.redundant.any()
+    assert result.extinguished.tolist() == [[True, True, False]]
+    assert result.cleared.tolist() == [[False, False, True]]
+    assert not result.redundant.any()
 
 
 def test_an_agent_that_moves_over_a_target_of_another_is_not_redundant() -> None:
     team = Team(n_agents=2)
     state = draw("T.a", team=team, at=[(0, 0), (0, 0)])
-    _, outcome = act(team, state, CLEAR, E)
-    assert outcome.cleared.tolist() == [[True, False]]
-    assert outcome.redundant.tolist() == [[False, False]]
+    _, result = act(team, state, CLEAR, E)
+    assert result.cleared.tolist() == [[True, False]]
+    assert result.redundant.tolist() == [[False, False]]
 
 
 def test_a_second_fire_is_not_taken_by_the_redundant_agent() -> None:
     # Both see the younger fire in the north-west first.
     team = Team(n_agents=2)
     state = draw("a.. ... ..b", team=team, at=[(1, 1), (1, 1)])
-    after, outcome = act(team, state, EXTINGUISH, EXTINGUISH)
+    after, result = act(team, state, EXTINGUISH, EXTINGUISH)
     assert drawn(after) == "T.. ... ..b"
-    assert outcome.redundant.tolist() == [[False, True]]
+    assert result.redundant.tolist() == [[False, True]]
 
 
 # Tank.
@@ -372,18 +374,18 @@ def test_an_empty_tank_puts_nothing_out() -> None:
     team = Team(n_agents=1, tank=3)
     state = with_tank(draw("..... ..a.. .....", team=team, at=[(1, 1)]), 0)
     assert EXTINGUISH not in mask_of(team, state)
-    after, outcome = act(team, state, EXTINGUISH)
+    after, result = act(team, state, EXTINGUISH)
     assert drawn(after) == drawn(state)
-    assert outcome.extinguished.tolist() == [[False]]
+    assert result.extinguished.tolist() == [[False]]
     assert after.vehicles.tank.tolist() == [[0]]
 
 
 def test_an_empty_agent_does_not_take_the_credit_from_the_next() -> None:
     team = Team(n_agents=2, tank=3)
     state = with_tank(draw("..... ..a.. .....", team=team, at=[(1, 1), (1, 3)]), 0, 2)
-    after, outcome = act(team, state, EXTINGUISH, EXTINGUISH)
-    assert outcome.extinguished.tolist() == [[False, True]]
-    assert outcome.redundant.tolist() == [[False, False]]
+    after, result = act(team, state, EXTINGUISH, EXTINGUISH)
+    assert result.extinguished.tolist() == [[False, True]]
+    assert result.redundant.tolist() == [[False, False]]
     assert after.vehicles.tank.tolist() == [[0, 1]]
 
 
@@ -423,16 +425,16 @@ def test_an_aircraft_over_a_lake_fills_its_tank() -> None:
 def test_a_redundant_act_spends_water_too() -> None:
     team = Team(n_agents=2, tank=3)
     state = with_tank(draw("..... ..a.. .....", team=team, at=[(1, 1), (1, 3)]), 3, 3)
-    after, outcome = act(team, state, EXTINGUISH, EXTINGUISH)
-    assert outcome.redundant.tolist() == [[False, True]]
+    after, result = act(team, state, EXTINGUISH, EXTINGUISH)
+    assert result.redundant.tolist() == [[False, True]]
     assert after.vehicles.tank.tolist() == [[2, 2]]
 
 
 def test_without_a_tank_water_is_unlimited() -> None:
     state = draw("a.a a.a", at=[(0, 1)])
     for _ in range(4):
-        state, outcome = act(UGV, state, EXTINGUISH)
-        assert outcome.extinguished.all()
+        state, result = act(UGV, state, EXTINGUISH)
+        assert result.extinguished.all()
     assert drawn(state) == "T.T T.T"
     assert state.vehicles.tank.tolist() == [[-1]]
 
@@ -445,9 +447,9 @@ def test_a_vehicle_that_can_do_nothing_is_shown_one_action() -> None:
     for team, wanted in ((Team(n_agents=1, allow_stay=False), {EXTINGUISH}), (Team(n_agents=1), {STAY})):
         state = draw("~~~ ~.~ ~~~", team=team, at=[(1, 1)])
         assert mask_of(team, state) == wanted
-        after, outcome = act(team, state, EXTINGUISH)
+        after, result = act(team, state, EXTINGUISH)
         assert drawn(after) == drawn(state)
-        assert not outcome.extinguished.any()
+        assert not result.extinguished.any()
 
 
 def test_without_stay_there_are_ten_actions() -> None:
@@ -530,9 +532,9 @@ def test_counters_count_chosen_acts_and_not_moves() -> None:
 def test_in_a_world_that_has_ended_nobody_does_anything() -> None:
     state = draw("Ta. ...", at=[(0, 0)])
     for action in range(11):
-        after, outcome = act(UGV, state, action, active=False)
+        after, result = act(UGV, state, action, active=False)
         assert all(torch.equal(plane, state.leaves()[name]) for name, plane in after.leaves().items())
-        assert not (outcome.moved | outcome.extinguished | outcome.cleared | outcome.redundant).any()
+        assert not (result.moved | result.extinguished | result.cleared | result.redundant).any()
 
 
 def place(team: Team, drawing: str, worlds: int) -> WorldState:

@@ -166,7 +166,7 @@ def test_teams_that_stay_away_meet_the_same_fire() -> None:
 def test_a_fire_lives_after_every_reset(size: int | tuple[int, int]) -> None:
     state = start(World(landscape=Perlin(size=size), team=Team(n_agents=1)), range(512))
     assert (is_burning(state.cells).sum((1, 2)) > 0).all()
-    assert torch.equal(state.tally.alight, is_burning(state.cells).sum((1, 2), dtype=torch.int32))
+    assert torch.equal(count_trees(state).alight, is_burning(state.cells).sum((1, 2), dtype=torch.int32))
     assert not state.done.any()
 
 
@@ -196,7 +196,7 @@ def test_the_head_start_is_ticks_of_the_fire() -> None:
 
 def test_trees_are_counted_before_ignition() -> None:
     state = start(World(ignition=Ignition(head_start=2)), range(16))
-    assert torch.equal(state.tally.initial, (state.landscape.age > 0).sum((1, 2), dtype=torch.int32))
+    assert torch.equal(count_trees(state).initial, (state.landscape.age > 0).sum((1, 2), dtype=torch.int32))
     assert torch.equal(state.initial, state.landscape.age > 0)
 
 
@@ -262,7 +262,7 @@ def test_a_fire_that_no_longer_burns_has_ended_its_world() -> None:
     assert drawn(transition.after) == "... ..."
     assert transition.after.terminated.tolist() == [True]
     assert transition.after.truncated.tolist() == [False]
-    assert transition.after.tally.burned.tolist() == [1]
+    assert transition.counts_after.burned.tolist() == [1]
 
 
 def test_embers_keep_a_world_going() -> None:
@@ -332,9 +332,9 @@ def test_a_finished_world_stays_as_it_is(world: World) -> None:
     state = start(world, range(48))
     for _ in range(45):
         transition = world.step(state, chosen(world, state))
-        frozen, outcome = state.done, transition.outcome
+        frozen, result = state.done, transition.result
         assert differing(state[frozen], transition.after[frozen]) == []
-        assert not (outcome.moved | outcome.extinguished | outcome.cleared | outcome.redundant)[frozen].any()
+        assert not (result.moved | result.extinguished | result.cleared | result.redundant)[frozen].any()
         assert (transition.after.step == state.step + ~frozen).all()
         state = transition.after
     assert state.done.all()
@@ -391,11 +391,12 @@ def test_every_first_tree_is_accounted_for_at_every_step(ledger_world: World) ->
             "extinguished": first & ~ash & is_tree(now) & put_out,
             "preserved": first & ~ash & is_tree(now) & ~put_out,
         }
+        counts = count_trees(state)
         for name, cells in fates.items():
-            assert torch.equal(getattr(state.tally, name), cells.sum((1, 2), dtype=torch.int32)), name
-        assert torch.equal(sum(getattr(state.tally, name) for name in fates), first.sum((1, 2), dtype=torch.int32))
-        assert torch.equal(state.tally.initial, first.sum((1, 2), dtype=torch.int32))
-        assert torch.equal(state.tally.alight, is_burning(now).sum((1, 2), dtype=torch.int32))
+            assert torch.equal(getattr(counts, name), cells.sum((1, 2), dtype=torch.int32)), name
+        assert torch.equal(sum(getattr(counts, name) for name in fates), first.sum((1, 2), dtype=torch.int32))
+        assert torch.equal(counts.initial, first.sum((1, 2), dtype=torch.int32))
+        assert torch.equal(counts.alight, is_burning(now).sum((1, 2), dtype=torch.int32))
     assert ash.any()
     assert put_out.any()
     assert cleared.any()
@@ -408,7 +409,7 @@ def test_burned_never_unburns_and_a_firebreak_stays(ledger_world: World) -> None
         assert not (state.burned & ~after.burned).any()
         assert not (state.firebreak & ~after.firebreak).any()
         assert not (state.extinguished & ~after.extinguished).any()
-        assert (after.tally.burned >= state.tally.burned).all()
+        assert (count_trees(after).burned >= count_trees(state).burned).all()
         assert (after.cells[after.firebreak] == 0).all()
         assert torch.equal(after.age > 0, is_burning(after.cells))
         assert torch.equal(after.initial, state.initial)
@@ -432,7 +433,7 @@ def test_cells_change_only_as_the_automaton_allows(ledger_world: World) -> None:
         state = after
 
 
-def test_the_tally_by_hand() -> None:
+def test_the_counts_of_trees_by_hand() -> None:
     # Ten trees: one put out, one on fire, one cleared, two burned (one of them regrown as a seedling), five untouched;
     # a seedling on ground that was bare counts nowhere.
     state = draw("TTTTa ...#T 111TT", age_on_fire=3)
@@ -443,12 +444,12 @@ def test_the_tally_by_hand() -> None:
     extinguished[0, 0, 0] = True
     burned = torch.zeros_like(initial)
     burned[0, 1, 2] = burned[0, 2, 2] = True
-    tally = count_trees(state.replace(initial=initial, extinguished=extinguished, burned=burned))
-    counts = {name: getattr(tally, name).item() for name in ("initial", "preserved", "extinguished", "cleared")}
+    found = count_trees(state.replace(initial=initial, extinguished=extinguished, burned=burned))
+    counts = {name: getattr(found, name).item() for name in ("initial", "preserved", "extinguished", "cleared")}
     # Row 0: 1 put out, 3 untouched, 1 on fire. Row 1: 1 ash, 1 cleared, 1 untouched. Row 2: 1 regrown, 2 untouched.
     assert counts == {"initial": 11, "preserved": 6, "extinguished": 1, "cleared": 1}
-    assert (tally.burned.item(), tally.burning.item(), tally.alight.item()) == (2, 1, 1)
-    assert tally.saved().item() == pytest.approx(7 / 11)
+    assert (found.burned.item(), found.burning.item(), found.alight.item()) == (2, 1, 1)
+    assert found.saved().item() == pytest.approx(7 / 11)
 
 
 def test_ground_and_air_are_replaced_whole() -> None:

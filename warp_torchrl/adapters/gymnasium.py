@@ -110,7 +110,8 @@ class FireExtinguishingEnv(gymnasium.Env[Observation, int]):
 
     def get_keys_to_action(self) -> dict[tuple[int, ...], int]:
         """Return ``KEYS`` with key codes; ``gymnasium.utils.play`` calls this method."""
-        return {(ord(key),): action for key, action in KEYS.items() if action < self._worlds.n_actions}
+        stays = self._worlds.env.world.team.allow_stay
+        return {(ord(key),): action for key, action in KEYS.items() if action < KEYS["s"] or stays}
 
     def render(self) -> np.ndarray | None:
         """Return the picture, uint8 [H * s, W * s, 3], in mode ``rgb_array``."""

@@ -3,7 +3,7 @@
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.state import TreeCounts, WorldState
 
 METRICS = (
     "saved",
@@ -21,7 +21,7 @@ METRICS = (
 SUCCESS_LEVEL = 0.6
 
 
-def metrics(state: WorldState, horizon: int) -> dict[str, Tensor]:
+def metrics(state: WorldState, counts: TreeCounts, horizon: int) -> dict[str, Tensor]:
     """Return the metrics of each world's episode so far, float32 [B] each.
 
     ``saved``, ``burned``, ``extinguished``, ``cleared``, ``burning``: shares of the initial trees, saved being those
@@ -32,21 +32,22 @@ def metrics(state: WorldState, horizon: int) -> dict[str, Tensor]:
 
     Args:
         state: The worlds.
+        counts: Of their trees.
         horizon: Agent steps to an episode.
     """
-    tally, vehicles = state.tally, state.vehicles
+    vehicles = state.vehicles
     acts = vehicles.acts.sum(1)
     agent_steps = (state.step * vehicles.acts.shape[1]).clamp(min=1)
-    saved = tally.saved()
+    saved = counts.saved()
     return {
         "saved": saved,
-        "burned": tally.burned / tally.initial,
-        "extinguished": tally.extinguished / tally.initial,
-        "cleared": tally.cleared / tally.initial,
-        "burning": tally.burning / tally.initial,
+        "burned": counts.burned / counts.initial,
+        "extinguished": counts.extinguished / counts.initial,
+        "cleared": counts.cleared / counts.initial,
+        "burning": counts.burning / counts.initial,
         "burning_area": state.burning_area / horizon,
         "control_time": state.step / horizon,
         "actions": acts / agent_steps,
         "redundant": vehicles.redundant.sum(1) / acts.clamp(min=1),
-        "success": ((tally.alight == 0) & (saved >= SUCCESS_LEVEL)).to(torch.float32),
+        "success": ((counts.alight == 0) & (saved >= SUCCESS_LEVEL)).to(torch.float32),
     }

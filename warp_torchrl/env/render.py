@@ -12,8 +12,8 @@ from PIL import Image, ImageDraw, ImageFont
 from torch import Tensor
 from torch.nn.functional import interpolate
 
-from warp_torchrl.world.role import ROLE_NAMES
-from warp_torchrl.world.state import EMPTY, FIRST_FIRE, OLDEST, Cover, WorldState, is_burning
+from warp_torchrl.world.role import ROLES
+from warp_torchrl.world.state import EMPTY, FIRST_FIRE, OLDEST, Cover, WorldState, count_trees, is_burning
 
 # The fire front, 11..13, is lighter than any ground; 14 stays 16 units of CIE Lab off without the red or green cone.
 _GROUND = {  # without a tree, youngest tree, oldest tree
@@ -33,12 +33,12 @@ _MOST_FRAMES, _FRAME_MS, _LAST_FRAME_MS = 130, 120, 2000  # 130: an episode of 2
 _font = lru_cache(maxsize=16)(ImageFont.load_default)
 
 
-def render(state: WorldState, roles: Tensor | None, scale: int = 12) -> Tensor:
+def render(state: WorldState, flies: Tensor | None, scale: int = 12) -> Tensor:
     """Draw each world.
 
     Args:
         state: The worlds, batch size [B].
-        roles: Index of each agent's role in ``ROLE_NAMES``, int64 [A]; None leaves the agents out.
+        flies: Which agents are aircraft, bool [A]; None leaves the agents out.
         scale: Side of a cell [pixels].
 
     Returns:
@@ -50,9 +50,9 @@ def render(state: WorldState, roles: Tensor | None, scale: int = 12) -> Tensor:
     if scale < 1:
         raise ValueError(f"scale must be at least 1 pixel, got {scale}")
     image = _ground_colours(state).repeat_interleave(scale, dim=1).repeat_interleave(scale, dim=2)
-    if roles is None:
+    if flies is None:
         return image
-    return _stamp(image, state.vehicles.position * scale + scale // 2, roles, scale)
+    return _stamp(image, state.vehicles.position * scale + scale // 2, flies.to(torch.int64), scale)
 
 
 class EpisodeRecorder:
@@ -65,7 +65,7 @@ class EpisodeRecorder:
 
     def __init__(self, title: str, roles: Sequence[str]):
         self._title = title
-        self._roles = torch.tensor([ROLE_NAMES.index(role) for role in roles])
+        self._flies = torch.tensor([ROLES[role].flies for role in roles])
         self._frames: list[Image.Image] = []
         self._seen, self._stride = 0, 1
 
@@ -81,8 +81,8 @@ class EpisodeRecorder:
     def frame(self, state: WorldState) -> Image.Image:
         """Return the picture of world 0 of a batch, RGB."""
         state = state[:1]
-        picture = Image.fromarray(_fitted_map(state, self._roles))
-        panel = _legend(self._title, tuple(self._roles.unique().tolist())).copy()
+        picture = Image.fromarray(_fitted_map(state, self._flies))
+        panel = _legend(self._title, tuple(self._flies.to(torch.int64).unique().tolist())).copy()
         _draw_numbers(panel, state)
         _draw_wind(panel, *state.wind.mean((0, 2, 3)).tolist())
         height = max(panel.height, picture.height)
@@ -159,15 +159,15 @@ def _stamp(image: Tensor, centre: Tensor, roles: Tensor, scale: int = 1) -> Tens
     return torch.where((top > 0)[..., None], paint, image)
 
 
-def _fitted_map(state: WorldState, roles: Tensor) -> np.ndarray:
+def _fitted_map(state: WorldState, flies: Tensor) -> np.ndarray:
     """Return the map of one world with its longer side near 384 pixels, uint8 [h, w, 3]; a large one is averaged."""
-    roles, (height, width) = roles.to(state.cells.device), state.cells.shape[1:]
+    flies, (height, width) = flies.to(state.cells.device), state.cells.shape[1:]
     shrink = max(height, width) / _MAP_SIDE
     if shrink <= 1.5:
-        return render(state, roles, max(1, round(1 / shrink)))[0].cpu().numpy()
+        return render(state, flies, max(1, round(1 / shrink)))[0].cpu().numpy()
     colours = _ground_colours(state).movedim(3, 1).float()
     image = interpolate(colours, (math.ceil(height / shrink), math.ceil(width / shrink)), mode="area").round()
-    return _stamp(image.byte().movedim(1, 3), (state.vehicles.position / shrink).long(), roles)[0].cpu().numpy()
+    return _stamp(image.byte().movedim(1, 3), (state.vehicles.position / shrink).long(), flies.long())[0].cpu().numpy()
 
 
 @lru_cache(maxsize=1)
@@ -221,9 +221,9 @@ def _paste_strip(panel: Image.Image, colours: np.ndarray, x: int, y: int, width:
 
 def _draw_numbers(panel: Image.Image, state: WorldState) -> None:
     """Write the clock and the share of the trees, and draw what became of the trees as a bar."""
-    tally = state.tally
-    fates = torch.stack((tally.preserved + tally.extinguished, tally.burning, tally.cleared), dim=1)
-    share = (fates[0] / tally.initial).cpu()
+    counts = count_trees(state)
+    fates = torch.stack((counts.preserved + counts.extinguished, counts.burning, counts.cleared), dim=1)
+    share = (fates[0] / counts.initial).cpu()
     clock = (("Step", f"{int(state.step)}"), ("Fire tick", f"{int(state.tick)}"))
     for place, (name, value) in enumerate((*clock, ("Saved", f"{share[0]:.1%}"), ("Burning", f"{share[1]:.1%}"))):
         x, y = _COLUMN * (place % 2), 69 + 46 * (place // 2)

@@ -10,10 +10,10 @@ import torch
 from tensordict import TensorDict
 from torch import Tensor
 
-from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.state import TreeCounts, WorldState
 
-Start = tuple[WorldState, TensorDict]
-"""Worlds at the start of an episode, and what is observed there."""
+Start = tuple[WorldState, TreeCounts, TensorDict]
+"""Worlds at the start of an episode, the counts of their trees, and what is observed there."""
 
 
 class ResetCache:
@@ -41,16 +41,16 @@ class ResetCache:
             episodes: Numbers of their next episodes, int64 [B].
 
         Returns:
-            The worlds and what is observed, [n] each.
+            The worlds, the counts of their trees and what is observed, [n] each.
         """
         if self._next is None:
             self._next = self._make(seeds, episodes)
             self._made = torch.ones_like(seeds, dtype=torch.bool)
         elif not self._made[index].all():
             missing = (~self._made).nonzero()[:, 0]
-            worlds, seen = self._make(seeds[missing], episodes[missing])
-            self._next[0][missing], self._next[1][missing] = worlds, seen
+            for known, made in zip(self._next, self._make(seeds[missing], episodes[missing]), strict=True):
+                known[missing] = made
             self._made[missing] = True
         self._made[index] = False
-        worlds, seen = self._next
-        return worlds[index], seen[index]
+        worlds, counts, seen = self._next
+        return worlds[index], counts[index], seen[index]

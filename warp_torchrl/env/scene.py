@@ -13,7 +13,7 @@ from warp_torchrl.observation import Observation, central_state
 from warp_torchrl.reward import Collaborative, Efficiency, Reward, Time
 from warp_torchrl.world.fast.compile import compiled
 from warp_torchrl.world.fast.road import in_bytes, in_flags
-from warp_torchrl.world.state import Forecast, Outcome, Transition, WorldState
+from warp_torchrl.world.state import ActionResult, Forecast, Transition, TreeCounts, WorldState
 from warp_torchrl.world.world import World
 
 
@@ -56,21 +56,23 @@ class Scene:
     reward: Reward
     compile: bool = False
 
-    def observe(self, state: WorldState) -> Observations:
-        """Observe the worlds."""
-        return _observe(self.world, self.observation, state, self.world.forecast(state))
+    def observe(self, state: WorldState, counts: TreeCounts) -> Observations:
+        """Observe the worlds, given their counts of trees."""
+        return _observe(self.world, self.observation, state, counts, self.world.forecast(state))
 
-    def step(self, before: WorldState, action: Tensor) -> Step:
-        """Step the worlds with actions int64 [B, A]."""
+    def step(self, before: WorldState, counts: TreeCounts, action: Tensor) -> Step:
+        """Step the worlds, given their counts of trees, with actions int64 [B, A]."""
         if self.compile:
-            return self._compiled_step(before, action)
-        transition = self.world.step(before, action)
-        return Step(transition, self.observe(transition.after), self.reward(transition))
+            return self._compiled_step(before, counts, action)
+        transition = self.world.step(before, action, counts)
+        return Step(transition, self.observe(transition.after, transition.counts_after), self.reward(transition))
 
-    def _compiled_step(self, before: WorldState, action: Tensor) -> Step:
+    def _compiled_step(self, before: WorldState, counts: TreeCounts, action: Tensor) -> Step:
         given, earns = in_bytes(before), self.reward if compiles(self.reward) else None
-        after, outcome, forecast = compiled(_advance)(self.world, given, action)
-        transition = Transition(before=given, outcome=outcome, after=after)
+        after, result, counts_after, forecast = compiled(_advance)(self.world, given, counts, action)
+        transition = Transition(
+            before=given, result=result, after=after, counts_before=counts, counts_after=counts_after
+        )
         observed, reward = compiled(_observe_and_earn, in_parts=True)(
             self.world, self.observation, earns, transition, forecast
         )
@@ -87,24 +89,28 @@ def compiles(reward: Reward) -> bool:
     return reads_counts and (reward.shaping == 0.0 or reward.potential == "distance")
 
 
-def _advance(world: World, state: WorldState, action: Tensor) -> tuple[WorldState, Outcome, Forecast]:
-    """Return the worlds after a step, the outcome of the actions, and the forecast."""
-    transition = world.step(state, action)
-    return transition.after, transition.outcome, world.forecast(transition.after)
+def _advance(
+    world: World, state: WorldState, counts: TreeCounts, action: Tensor
+) -> tuple[WorldState, ActionResult, TreeCounts, Forecast]:
+    """Return the worlds after a step, the results of the actions, the counts of trees, and the forecast."""
+    made = world.step(state, action, counts)
+    return made.after, made.result, made.counts_after, world.forecast(made.after)
 
 
 def _observe_and_earn(
     world: World, observation: Observation, reward: Reward | None, transition: Transition, forecast: Forecast
 ) -> tuple[Observations, Tensor | None]:
     """Return the observations after a step, and its reward if one is given."""
-    observed = _observe(world, observation, transition.after, forecast)
+    observed = _observe(world, observation, transition.after, transition.counts_after, forecast)
     return observed, None if reward is None else reward(transition)
 
 
-def _observe(world: World, observation: Observation, state: WorldState, forecast: Forecast) -> Observations:
+def _observe(
+    world: World, observation: Observation, state: WorldState, counts: TreeCounts, forecast: Forecast
+) -> Observations:
     return Observations(
         observation(state, world, forecast),
         world.action_mask(state),
-        metrics(state, world.horizon),
+        metrics(state, counts, world.horizon),
         central_state(state, world, forecast),
     )

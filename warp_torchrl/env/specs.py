@@ -6,8 +6,7 @@ import torch
 from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 
 from warp_torchrl.env.metrics import METRICS
-from warp_torchrl.observation import STATE, STATE_SIDE, Observation, Space
-from warp_torchrl.world.role import ROLES
+from warp_torchrl.observation import STATE_SIDE, Observation, Space, state_names
 from warp_torchrl.world.world import World
 
 EPISODE_METRICS = (*METRICS, "episode_reward", "episode_length")
@@ -40,9 +39,10 @@ def make_specs(world: World, observation: Observation, n_worlds: int, device: to
     seen = of_team(
         observation=spaces[""] if "" in spaces else Composite(spaces, shape=team, device=device),
         action_mask=Binary(n_actions, shape=(*team, n_actions), dtype=torch.bool, device=device),
-        role=Categorical(len(ROLES), shape=team, dtype=torch.int64, device=device),
+        role=Categorical(len(world.team.role_names), shape=team, dtype=torch.int64, device=device),
     )
-    seen["state"] = Bounded(-3.0, 256.0, shape=(*batch, len(STATE), STATE_SIDE, STATE_SIDE), device=device)
+    planes = len(state_names(world.team))
+    seen["state"] = Bounded(-3.0, 256.0, shape=(*batch, planes, STATE_SIDE, STATE_SIDE), device=device)
     seen["info"] = Composite(
         {name: Unbounded(shape=(*batch, 1), device=device) for name in EPISODE_METRICS}, shape=batch, device=device
     )

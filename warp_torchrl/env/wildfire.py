@@ -14,12 +14,12 @@ from warp_torchrl.env.render import render
 from warp_torchrl.env.reset_cache import ResetCache, Start
 from warp_torchrl.env.scene import Observations, Scene
 from warp_torchrl.env.specs import make_specs
-from warp_torchrl.observation import Observation, Surroundings
+from warp_torchrl.observation import Observation, Surroundings, state_names
 from warp_torchrl.reward import Efficiency, Reward
 from warp_torchrl.world.fast.compile import check_compiler
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.saved import filled
-from warp_torchrl.world.state import Transition, WorldState
+from warp_torchrl.world.state import Transition, TreeCounts, WorldState, count_trees
 from warp_torchrl.world.world import World
 
 
@@ -74,10 +74,12 @@ class WildfireEnv(EnvBase):
         self._fuses = fuse
         names, roles = self.world.team.agent_names, self.world.team.agent_roles
         self.agent_names, self.action_names = names, self.world.team.action_names
+        self.role_names, self.state_names = self.world.team.role_names, state_names(self.world.team)
         self.channel_names = {name: space.names for name, space in self.observation.spaces(self.world).items()}
         self.group_map = {"agents": list(names)}
         self.role_map = {role: [n for n, r in zip(names, roles) if r == role] for role in ROLES if role in roles}
         self._state: WorldState | None = None
+        self._counts: TreeCounts | None = None  # of the state's trees
         self._resets = ResetCache(self._start)
         self.watcher: Callable[[Transition], None] | None = None
         """Called with the transition of every step, to measure behaviour."""
@@ -118,9 +120,20 @@ class WildfireEnv(EnvBase):
             raise RuntimeError("the environment has no state yet: call reset() first")
         return self._state
 
+    @property
+    def tree_counts(self) -> TreeCounts:
+        """Return the counts of the worlds' trees as they are now, by what became of them.
+
+        Raises:
+            RuntimeError: Before the first reset.
+        """
+        if self._counts is None:
+            raise RuntimeError("the environment has no state yet: call reset() first")
+        return self._counts
+
     def render(self, scale: int = 12) -> Tensor:
         """Draw the worlds, uint8 [B, H * scale, W * scale, 3]."""
-        return render(self.world_state, self.world.team.table(self.device).index, scale)
+        return render(self.world_state, self.world.team.table(self.device).flies, scale)
 
     def set_seeds(self, seeds: Sequence[int], first_episode: int = 0) -> None:
         """Set the seed of each world from the next reset on.
@@ -150,10 +163,9 @@ class WildfireEnv(EnvBase):
         got = (*state.cells.shape, state.vehicles.position.shape[1])
         if got != expected:
             raise ValueError(f"state must have [worlds, rows, columns, agents] {list(expected)}, got {list(got)}")
-        given = state.to(self.device).clone()
-        self._state = given
+        self._enter(state.to(self.device).clone())
         self._episode_reward.zero_()
-        return self._observe(self._state)
+        return self._observe()
 
     def state_dict(self, *args: object, **kwargs: object) -> OrderedDict[str, Any]:
         """Return the environment's state: seeds, episodes, worlds and returns."""
@@ -190,7 +202,7 @@ class WildfireEnv(EnvBase):
         self._seeds = state_dict["seeds"].to(self.device).clone()
         self._episodes = state_dict["episodes"].to(self.device).clone()
         self._episode_reward = state_dict["episode_reward"].to(self.device).clone()
-        self._state = state
+        self._enter(state)
         self._resets.clear()
 
     # Interface for TorchRL
@@ -199,10 +211,10 @@ class WildfireEnv(EnvBase):
         mask = None if tensordict is None else tensordict.get("_reset", None)
         if mask is None or self._state is None or mask.all():
             self._resets.clear()
-            self._state = self.world.reset(self.seeds, self._episodes)
+            self._enter(self.world.reset(self.seeds, self._episodes))
             self._episodes = self._episodes + 1
             self._episode_reward = torch.zeros_like(self._episode_reward)
-            return self._observe(self._state)
+            return self._observe()
         index = mask.flatten().nonzero()[:, 0]
         seen = self._start_again(index)
         rows = torch.zeros(len(mask), dtype=torch.int64, device=self.device).index_copy_(
@@ -229,19 +241,21 @@ class WildfireEnv(EnvBase):
 
     def _start_again(self, index: Tensor) -> TensorDict:
         """Start the next episode of some worlds, and return their tensordict."""
-        self.world_state[index], seen = self._resets.pop(index, self.seeds, self._episodes)
+        self.world_state[index], self.tree_counts[index], seen = self._resets.pop(index, self.seeds, self._episodes)
         self._episodes = self._episodes.index_add(0, index, torch.ones_like(index))
         self._episode_reward = self._episode_reward.index_fill(0, index, 0.0)
         return seen
 
     def _start(self, seeds: Tensor, episodes: Tensor) -> Start:
         worlds = self.world.reset(seeds, episodes)
-        return worlds, self._observe(worlds, torch.zeros(len(seeds), device=self.device))
+        counts = count_trees(worlds)
+        observed = self._scene.observe(worlds, counts)
+        return worlds, counts, self._pack(worlds, observed, torch.zeros(len(seeds), device=self.device))
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         action = self._checked(tensordict.get(("agents", "action"), None))
-        transition, observed, reward = self._scene.step(self.world_state, action)
-        self._state = transition.after
+        transition, observed, reward = self._scene.step(self.world_state, self.tree_counts, action)
+        self._state, self._counts = transition.after, transition.counts_after
         self._episode_reward = self._episode_reward + reward.mean(1)[:, 0]
         out = self._pack(transition.after, observed, self._episode_reward)
         if self.watcher is not None:
@@ -276,10 +290,14 @@ class WildfireEnv(EnvBase):
             )
         return action
 
-    def _observe(self, state: WorldState, episode_reward: Tensor | None = None) -> TensorDict:
+    def _enter(self, state: WorldState | None) -> None:
+        """Go on from some worlds."""
+        self._state, self._counts = state, None if state is None else count_trees(state)
+
+    def _observe(self) -> TensorDict:
         """Return observations, mask, central state, flags and metrics of the worlds."""
-        observed = self._scene.observe(state)
-        return self._pack(state, observed, self._episode_reward if episode_reward is None else episode_reward)
+        observed = self._scene.observe(self.world_state, self.tree_counts)
+        return self._pack(self.world_state, observed, self._episode_reward)
 
     def _pack(self, state: WorldState, observed: Observations, episode_reward: Tensor) -> TensorDict:
         """Pack observations, masks and metrics into TorchRL's layout."""

@@ -35,17 +35,17 @@ class Behaviour:
 
     def __call__(self, transition: Transition) -> None:
         """Count one step."""
-        before, after, outcome = transition.before, transition.after, transition.outcome
+        before, after, result = transition.before, transition.after, transition.result
         width = before.cells.shape[2]
-        place = torch.stack((outcome.target // width, outcome.target % width), dim=-1)
+        place = torch.stack((result.target // width, result.target % width), dim=-1)
         middle = centre(is_burning(before.cells))
-        acted = (outcome.extinguished | outcome.cleared).to(torch.float32)
-        put_out = outcome.extinguished.to(torch.float32)
+        acted = (result.extinguished | result.cleared).to(torch.float32)
+        put_out = result.extinguished.to(torch.float32)
         self._counts.scatter_add_(2, sector(place, middle, SECTORS)[..., None], acted[..., None])
         self._cosine += (alignment(place, middle, before.wind) * acted).sum(dim=1)
         self._acts += acted.sum(dim=1)
         self._targets += put_out.sum(dim=1)
-        self._contested += _contested(outcome.target, outcome.extinguished, outcome.redundant)
+        self._contested += _contested(result.target, result.extinguished, result.redundant)
         new = after.firebreak & ~before.firebreak
         step = before.step[:, None, None]
         self._cleared_at = torch.where(new, step, self._cleared_at)

@@ -42,7 +42,8 @@ def evaluate_policy(plan: Settings, folder: Path, found: checkpoints.Checkpoint 
         other_modes = {f"trained, {other}": play(env, actor, first, other) for other in MODES if other != mode}
     if plan.evaluation.leave_one_out:
         left_out = {
-            agent: play(env, WithoutAgent(actor, index), first, mode) for index, agent in enumerate(env.agent_names)
+            agent: play(env, WithoutAgent(actor, index, env.world.team), first, mode)
+            for index, agent in enumerate(env.agent_names)
         }
     content = report(
         plan.scenario, name, first, episodes, others, other_modes, left_out, learner, digest, worlds, frames

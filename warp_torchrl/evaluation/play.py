@@ -17,6 +17,7 @@ from warp_torchrl.evaluation.behaviour import Behaviour
 from warp_torchrl.heuristics import HEURISTICS, idle_action
 from warp_torchrl.models import ACTION, ACTION_MASK, memory_apart
 from warp_torchrl.policy import MODES
+from warp_torchrl.world.team import Team
 
 BASELINES = ("noop", "random", "local", "greedy", "coordinated")
 """Baselines of every table."""
@@ -75,20 +76,21 @@ class WithoutAgent(TensorDictModuleBase):
     Args:
         policy: Policy of the whole team.
         agent: Index of the agent.
+        team: The team.
     """
 
     in_keys: ClassVar = [ACTION_MASK]
     out_keys: ClassVar = [ACTION]
 
-    def __init__(self, policy: TensorDictModuleBase, agent: int) -> None:
+    def __init__(self, policy: TensorDictModuleBase, agent: int, team: Team) -> None:
         super().__init__()
-        self.policy, self.agent = policy, agent
+        self.policy, self.agent, self.team = policy, agent, team
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write the team's actions, int64 [B, A]."""
         out = self.policy(tensordict)
         mask = tensordict.get(ACTION_MASK)[:, self.agent]
-        idle = idle_action(mask)
+        idle = idle_action(mask, self.team)
         action = out.get(ACTION).clone()
         action[:, self.agent] = idle
         return out.set(ACTION, action)

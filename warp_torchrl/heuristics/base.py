@@ -13,6 +13,7 @@ from warp_torchrl.world.fast.distances import FAR, nearest
 from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.random import Stream, uniform_at
 from warp_torchrl.world.state import Action, Cover, WorldState, is_burning
+from warp_torchrl.world.team import Team
 
 
 class Heuristic(TensorDictModuleBase):
@@ -46,9 +47,9 @@ class Heuristic(TensorDictModuleBase):
         raise TypeError(f"{type(self).__name__} does not say what to do: define choose()")
 
 
-def idle_action(mask: Tensor) -> Tensor:
+def idle_action(mask: Tensor, team: Team) -> Tensor:
     """Return an action without effect, int64 [...]: stay, or else one that the mask [..., actions] forbids."""
-    if mask.shape[-1] > Action.STAY:
+    if team.allow_stay:
         return torch.full(mask.shape[:-1], int(Action.STAY), device=mask.device)
     return mask.to(torch.uint8).argmin(dim=-1)
 

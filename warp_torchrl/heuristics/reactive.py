@@ -22,7 +22,7 @@ class NoOp(Heuristic):
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
-        return idle_action(mask)
+        return idle_action(mask, self.env.world.team)
 
 
 class Random(Heuristic):

@@ -30,7 +30,7 @@ class Ring(Coordinated):
 
     def line_builders(self, state: WorldState) -> Tensor:
         """Return the agents that clear the ring, bool [A]."""
-        return self.env.world.team.table(state.cells.device).clears
+        return self.env.world.team.table(state.cells.device).can["clear"]
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""

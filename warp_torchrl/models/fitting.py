@@ -5,7 +5,7 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
-from warp_torchrl.models.signature import ACTION_MASK, Entry, Signature
+from warp_torchrl.models.signature import ACTION, ACTION_MASK, ROLE, Entry, Signature
 
 
 class Fitted(TensorDictModuleBase):
@@ -13,29 +13,36 @@ class Fitted(TensorDictModuleBase):
 
     Args:
         policy: Observation and mask in, action out.
-        channels: Index of each channel that it reads by key, int64 [C].
-        n_actions: Actions that it knows, the first of the environment's.
-        fallback: The action that is opened where none of those does anything.
+        channels: Of each entry that shows more, by key, the dimension to choose along and what to choose, int64 [C].
+        actions: The environment's code of each action that it knows, int64 [actions].
+        fallback: The action of its own that is opened where none of those does anything.
     """
 
     def __init__(
-        self, policy: TensorDictModuleBase, channels: dict[tuple[str, ...], Tensor], n_actions: int, fallback: int
+        self,
+        policy: TensorDictModuleBase,
+        channels: dict[tuple[str, ...], tuple[int, Tensor]],
+        actions: Tensor,
+        fallback: int,
     ) -> None:
         super().__init__()
         self.in_keys, self.out_keys = policy.in_keys, policy.out_keys
-        self.policy, self.channels, self.n_actions, self.fallback = policy, channels, n_actions, fallback
+        self.policy, self.channels, self.actions, self.fallback = policy, channels, actions, fallback
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write the team's actions, int64 [B, A], and what else the policy writes."""
         seen = tensordict.select(*self.in_keys, strict=False)
-        for key, index in self.channels.items():
+        for key, (dim, index) in self.channels.items():
             entry = seen.get(key)
-            seen.set(key, entry.index_select(-3, index.to(entry.device)))
+            seen.set(key, entry.index_select(dim, index.to(entry.device)))
         if ACTION_MASK in seen.keys(include_nested=True):
-            mask = seen.get(ACTION_MASK)[..., : self.n_actions].clone()
+            mask = seen.get(ACTION_MASK)
+            mask = mask.index_select(-1, self.actions.to(mask.device))
             mask[..., self.fallback] |= ~mask.any(dim=-1)
             seen.set(ACTION_MASK, mask)
-        return tensordict.update(self.policy(seen).select(*self.out_keys, strict=False))
+        out = self.policy(seen).select(*self.out_keys, strict=False)
+        action = out.get(ACTION)
+        return tensordict.update(out.set(ACTION, self.actions.to(action.device)[action]))
 
 
 def fitted(policy: TensorDictModuleBase, trained: Signature, here: Signature, fallback: int) -> TensorDictModuleBase:
@@ -45,18 +52,24 @@ def fitted(policy: TensorDictModuleBase, trained: Signature, here: Signature, fa
         policy: Observation and mask in, action out.
         trained: What it was trained to see and do.
         here: What the environment shows, and lets it do.
-        fallback: The action that is opened where none that it knows does anything.
+        fallback: The action of its own that is opened where none that it knows does anything.
 
     Raises:
-        ValueError: If the environment lacks an entry, a channel or an action, or has it in another form; which one.
+        ValueError: If the environment lacks an entry, a channel or an action, or has it in another form, or has a role
+            that a policy with a network for each does not know; which one.
     """
-    if (trained.observation, trained.actions) == (here.observation, here.actions):
+    if (trained.observation, trained.actions, trained.roles) == (here.observation, here.actions, here.roles):
         return policy
-    if trained.actions != here.actions[: len(trained.actions)]:
-        lacking = [name for name in trained.actions if name not in here.actions]
+    lacking = [name for name in trained.actions if name not in here.actions]
+    if lacking:
         raise ValueError(
             f"it was trained with {len(trained.actions)} actions, this environment has {len(here.actions)}: "
-            f"{', '.join(lacking) or 'in another order'}"
+            f"{', '.join(lacking)}"
+        )
+    if ROLE in policy.in_keys and here.roles != trained.roles[: len(here.roles)]:
+        raise ValueError(
+            f"it has a network for each of the roles {', '.join(trained.roles)}, this environment has "
+            f"{', '.join(here.roles)}"
         )
     keys = dict(zip(trained.observation, trained.observation_keys(), strict=True))
     channels = {}
@@ -65,8 +78,8 @@ def fitted(policy: TensorDictModuleBase, trained: Signature, here: Signature, fa
             raise ValueError(f"it was trained to see {name or 'a vector'}, which this environment does not show")
         index = _places(name, entry, here.observation[name])
         if index is not None:
-            channels[keys[name]] = index
-    return Fitted(policy, channels, len(trained.actions), fallback)
+            channels[keys[name]] = -len(entry.shape), index
+    return Fitted(policy, channels, torch.tensor([here.actions.index(name) for name in trained.actions]), fallback)
 
 
 def _places(name: str, trained: Entry, here: Entry) -> Tensor | None:

@@ -146,7 +146,8 @@ class Mlp:
         if central:
             network, keys = Central(network, len(signature.state.shape), action, unread), [STATE, *keys]
         if self.facing == "fire":
-            if not can_be_held({name: entry.shape for name, entry in signature.observation.items()}):
+            shapes = {name: entry.shape for name, entry in signature.observation.items()}
+            if not can_be_held(shapes, signature.observation["self"].names if "self" in shapes else ()):
                 raise ValueError("model.facing must be north where observations are of no preset, got fire")
             actions = out if key in (LOGITS, ACTION_VALUE) else 0
             network = FacingFire(network, keys, actions, _fire_channel(signature))

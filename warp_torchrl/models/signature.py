@@ -24,7 +24,10 @@ VALUE = ("agents", "state_value")
 
 
 class Entry(NamedTuple):
-    """Shape of one agent's (or the critic's) entry, its type's name, and the names of its channels where it has any."""
+    """Shape of one agent's (or the critic's) entry, its type's name, and the names along its first dimension.
+
+    Those are of a map's channels, or of a vector's numbers; there may be none.
+    """
 
     shape: tuple[int, ...]
     dtype: str
@@ -38,12 +41,17 @@ class Signature(NamedTuple):
     state: Entry
     n_agents: int
     actions: tuple[str, ...]  # by name, in order
-    n_roles: int
+    roles: tuple[str, ...]  # by name, in the order of their index
 
     @property
     def n_actions(self) -> int:
         """Return the number of actions."""
         return len(self.actions)
+
+    @property
+    def n_roles(self) -> int:
+        """Return the number of roles."""
+        return len(self.roles)
 
     def observation_keys(self) -> list[tuple[str, ...]]:
         """Return the tensordict keys of the observation's entries."""
@@ -51,7 +59,7 @@ class Signature(NamedTuple):
 
 
 def signature(env: EnvBase) -> Signature:
-    """Read the signature off an environment's specs, and its names of channels and actions."""
+    """Read the signature off an environment's specs, and its names of channels, actions and roles."""
     specs = env.full_observation_spec_unbatched
     seen = specs[OBSERVATION]
     named = dict(seen.items()) if hasattr(seen, "items") else {"": seen}
@@ -62,6 +70,5 @@ def signature(env: EnvBase) -> Signature:
         return Entry(shape, str(spec.dtype).removeprefix("torch."), fit)
 
     observation = {name: entry(spec, 1, env.channel_names.get(name, ())) for name, spec in sorted(named.items())}
-    return Signature(
-        observation, entry(specs["state"], 0), specs[ACTION_MASK].shape[0], env.action_names, specs[ROLE].n
-    )
+    state = entry(specs["state"], 0, env.state_names)
+    return Signature(observation, state, specs[ACTION_MASK].shape[0], env.action_names, env.role_names)

@@ -8,6 +8,7 @@ from warp_torchrl.observation.coarse import (
     STATE_SIDE,
     central_state,
     picture,
+    state_names,
 )
 from warp_torchrl.observation.frame import Frame, can_be_held, frame_of, held, held_state
 from warp_torchrl.observation.own import SELF_SIZE, WIND_SCALE, own_vector
@@ -40,4 +41,5 @@ __all__ = [
     "held_state",
     "own_vector",
     "picture",
+    "state_names",
 ]

@@ -16,7 +16,7 @@ from torch import Tensor
 
 from warp_torchrl.world.fast.bytes import at_least, byte, equal, to_codes, to_int32
 from warp_torchrl.world.fast.squares import Window, window
-from warp_torchrl.world.role import ROLE_NAMES
+from warp_torchrl.world.role import PAPER_ROLES
 from warp_torchrl.world.state import FIRST_FIRE, Forecast, WorldState, is_burning, is_tree
 from warp_torchrl.world.world import World
 
@@ -40,7 +40,7 @@ class Look(NamedTuple):
     wet: Tensor  # ticks for which the cell cannot ignite
     alpha: Tensor  # flammability, 255 times
     fire_risk: Tensor  # ``Forecast.fire_risk``, 255 times
-    others: Tensor  # 63 for each other agent of each role, four at most, [B, A, R, V, V]
+    others: Tensor  # 63 for each other agent of each of ``Team.role_names``, four at most, [B, A, R, V, V]
 
 
 class Channel(NamedTuple):
@@ -141,13 +141,13 @@ def threat(look: Look) -> Tensor:
 @channel(high=252)
 def other_ugv(look: Look) -> Tensor:
     """Return where other ground vehicles are, 63 each, four at most."""
-    return look.others[:, :, ROLE_NAMES.index("ugv")]
+    return look.others[:, :, PAPER_ROLES.index("ugv")]
 
 
 @channel(high=252)
 def other_uav(look: Look) -> Tensor:
     """Return where other aircraft are, 63 each, four at most."""
-    return look.others[:, :, ROLE_NAMES.index("uav")]
+    return look.others[:, :, PAPER_ROLES.index("uav")]
 
 
 DEFAULT = tuple(CHANNELS)
@@ -179,7 +179,7 @@ def look_at(state: WorldState, world: World, forecast: Forecast, radius: int) ->
         wet=wet,
         alpha=alpha,
         fire_risk=fire_risk,
-        others=_others(state.vehicles.position, world.team.table(state.cells.device).index, radius),
+        others=_others(state, world, radius),
     )
 
 
@@ -205,9 +205,10 @@ def stages(cells: Tensor) -> Tensor:
     return (cells - (FIRST_FIRE - 1)) * byte(is_burning(cells)) * 51
 
 
-def _others(position: Tensor, role: Tensor, radius: int) -> Tensor:
+def _others(state: WorldState, world: World, radius: int) -> Tensor:
     """Return where the other agents of each role are, 63 each, at most 4 to a cell, uint8 [B, A, R, V, V]."""
-    side, roles = 2 * radius + 1, len(ROLE_NAMES)
+    position, role = state.vehicles.position, world.team.table(state.cells.device).index
+    side, roles = 2 * radius + 1, len(world.team.role_names)
     row, column = (position[:, None] - position[:, :, None] + radius).unbind(-1)  # of each in each other's square
     is_near = (row >= 0) & (row < side) & (column >= 0) & (column < side)
     is_near &= ~torch.eye(len(role), dtype=torch.bool, device=role.device)

@@ -8,8 +8,9 @@ from warp_torchrl.observation.channels import ELEVATION_SCALE
 from warp_torchrl.observation.own import WIND_SCALE, steps_to_tick, time_left
 from warp_torchrl.world.fast.blocks import block_means
 from warp_torchrl.world.fast.squares import window
-from warp_torchrl.world.role import ROLE_NAMES
+from warp_torchrl.world.role import PAPER_ROLES
 from warp_torchrl.world.state import Forecast, WorldState, is_burning
+from warp_torchrl.world.team import Team
 from warp_torchrl.world.world import World
 
 PICTURE = ("fire", "fuel", "team_mates")
@@ -17,10 +18,11 @@ PICTURE = ("fire", "fuel", "team_mates")
 CENTRED_HIGHS = (255, 255, 252)
 """Largest number in each of them, where the picture is centred."""
 PICTURE_SIDE = 8
-STATE = ("fire", "fuel", "front", "threat", "ugv", "uav", "elevation", "clock_and_wind")
+STATE = ("fire", "fuel", "front", "threat", *PAPER_ROLES, "elevation", "clock_and_wind")
 """Channels of the critic's ``state``: ``front`` is what fire is expected to ignite in a tick, ``threat`` the chance of
 trees to ignite, and the quarters of ``clock_and_wind`` are filled with the time left, the steps to the tick, and the
 wind to the east and to the north."""
+_FIRST_ROLE = STATE.index(PAPER_ROLES[0])
 STATE_SIDE = 16
 
 
@@ -49,12 +51,17 @@ def centred_picture(state: WorldState, forecast: Forecast) -> Tensor:
     return torch.stack((about.of(fire), about.of(fuel), (mates.clamp_(max=4) * 63).to(torch.uint8)), dim=2)
 
 
+def state_names(team: Team) -> tuple[str, ...]:
+    """Return the channels of the critic's ``state``: ``STATE``, with the team's further roles beside the paper's."""
+    return (*STATE[:_FIRST_ROLE], *team.role_names, *STATE[_FIRST_ROLE + len(PAPER_ROLES) :])
+
+
 def central_state(state: WorldState, world: World, forecast: Forecast) -> Tensor:
-    """Return what the central critic sees, float32 [B, C, 16, 16] in the channels ``STATE``, for any map size."""
+    """Return what the central critic sees, float32 [B, C, 16, 16], see ``state_names``, for any map size."""
     worlds, blocks = state.cells.shape[0], (STATE_SIDE, STATE_SIDE)
     maps = is_burning(state.cells), forecast.fuel, forecast.expected_ignitions, forecast.ignition_probability
     index = world.team.table(state.cells.device).index * STATE_SIDE**2 + _block(state, STATE_SIDE)
-    agents = torch.zeros(worlds, len(ROLE_NAMES) * STATE_SIDE**2, device=state.cells.device)
+    agents = torch.zeros(worlds, len(world.team.role_names) * STATE_SIDE**2, device=state.cells.device)
     agents = agents.scatter_add(1, index, torch.ones_like(index, dtype=torch.float32)).view(worlds, -1, *blocks)
     wind = (state.wind.mean((2, 3)) / WIND_SCALE).clamp(-3.0, 3.0)
     constants = torch.stack((time_left(state, world), steps_to_tick(state, world), wind[:, 0], wind[:, 1]), dim=1)

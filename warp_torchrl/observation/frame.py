@@ -17,9 +17,8 @@ from torch import Tensor
 
 from warp_torchrl.observation.channels import DEFAULT, FIRE
 from warp_torchrl.observation.coarse import PICTURE, PICTURE_SIDE, STATE
-from warp_torchrl.observation.own import IDENTITY_SIZE, LAST_ACTION, PLACE, SELF_SIZE, WIND
+from warp_torchrl.observation.own import IDENTITY_SIZE, LAST_ACTION, PLACE, SELF, SELF_SIZE, WIND
 from warp_torchrl.world.geometry import DIRECTIONS
-from warp_torchrl.world.state import Action
 
 FIRE_CHANNEL = DEFAULT.index(FIRE)
 """Which channel of a view tells where fire is, unless others are chosen."""
@@ -52,12 +51,14 @@ class Frame:
         return maps.flatten(-2).gather(-1, cell).view(maps.shape)
 
     def actions(self, entries: Tensor) -> Tensor:
-        """Return an entry for each action on the map [..., 10 or 11] in the order of what they are in the frame."""
-        return entries.gather(-1, _actions(True, entries.device)[self.index, : entries.shape[-1]])
+        """Return an entry for each action on the map [..., actions] in the order of what they are in the frame."""
+        return entries.gather(-1, _actions(True, entries.shape[-1], entries.device)[self.index])
 
     def action(self, action: Tensor) -> Tensor:
         """Return what actions on the map, int64 [...], are in the frame."""
-        return _actions(False, action.device)[self.index, action]
+        n_moves = len(DIRECTIONS)
+        move = _actions(False, n_moves, action.device)[self.index, action.clamp(max=n_moves - 1)]
+        return torch.where(action < n_moves, move, action)
 
     def units(self, features: Tensor) -> Tensor:
         """Return features [..., 8 m], m for each of the eight ways to hold the map, as they are in the frame.
@@ -77,11 +78,16 @@ class Frame:
 
     def actions_on_map(self, entries: Tensor) -> Tensor:
         """Undo ``actions``."""
-        return entries.gather(-1, _actions(False, entries.device)[self.index, : entries.shape[-1]])
+        return entries.gather(-1, _actions(False, entries.shape[-1], entries.device)[self.index])
 
 
-def can_be_held(shapes: Mapping[str, tuple[int, ...]]) -> bool:
-    """Return whether observations of these shapes, by name, are of a preset that shows the fire."""
+def can_be_held(shapes: Mapping[str, tuple[int, ...]], own_names: tuple[str, ...] = ()) -> bool:
+    """Return whether observations are of a preset that shows the fire.
+
+    Args:
+        shapes: Of the entries, by name.
+        own_names: Names of the numbers of ``self``, which tell it where a team has further roles or actions.
+    """
     sides = {name: shape[-1] for name, shape in shapes.items()}
     if set(shapes) == {""}:
         side = math.isqrt(sides[""] // 3)
@@ -91,7 +97,7 @@ def can_be_held(shapes: Mapping[str, tuple[int, ...]]) -> bool:
     pictures = {(len(PICTURE), side, side) for side in (PICTURE_SIDE, 2 * PICTURE_SIDE - 1)}
     return (
         shapes["view"][1:] == (sides["view"], sides["view"])
-        and sides["self"] in (SELF_SIZE, SELF_SIZE + IDENTITY_SIZE)
+        and (sides["self"] in (SELF_SIZE, SELF_SIZE + IDENTITY_SIZE) or own_names[:SELF_SIZE] == SELF)
         and shapes.get("picture", (len(PICTURE), PICTURE_SIDE, PICTURE_SIDE)) in pictures
     )
 
@@ -180,7 +186,7 @@ def _shown(maps: Tensor, frame: Frame, start: Tensor) -> Tensor:
 
 
 _FIRE = STATE.index("fire")
-_AGENTS = slice(STATE.index("ugv"), STATE.index("uav") + 1)
+_AGENTS = slice(STATE.index("ugv"), STATE.index("elevation") - len(STATE))  # further roles stand beside these
 _SELF_PARTS = [
     PLACE.stop,
     WIND.start - PLACE.stop,
@@ -270,13 +276,13 @@ def _products(in_frame: bool, device: torch.device) -> Tensor:
     return (way if in_frame else way.argsort(-1)).to(device)
 
 
-@lru_cache(maxsize=8)
-def _actions(in_frame: bool, device: torch.device) -> Tensor:
-    """Return which action on the map each one in a frame is, or the other way round, int64 [8, 11]."""
+@lru_cache(maxsize=16)
+def _actions(in_frame: bool, count: int, device: torch.device) -> Tensor:
+    """Return which action on the map each one in a frame is, or the other way round, int64 [8, count]."""
     moves = torch.tensor(DIRECTIONS)
     frames = Frame(torch.arange(_SYMMETRIES)[:, None].expand(-1, len(moves)))
     turned = frames.vectors(moves.expand(_SYMMETRIES, -1, -1))
     index = (turned[:, :, None] == moves).all(-1).to(torch.int64).argmax(-1)  # of each move on the map
     index = index.argsort(-1) if in_frame else index
-    others = torch.arange(len(moves), len(Action)).expand(_SYMMETRIES, -1)
+    others = torch.arange(len(moves), count).expand(_SYMMETRIES, -1)
     return torch.cat((index, others), dim=-1).to(device)

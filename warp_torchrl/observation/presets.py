@@ -11,7 +11,7 @@ from torch import Tensor
 
 from warp_torchrl.observation.channels import CHANNELS, DEFAULT, ages, check_channels, stages
 from warp_torchrl.observation.coarse import CENTRED_HIGHS, PICTURE, PICTURE_SIDE, centred_picture, picture
-from warp_torchrl.observation.own import IDENTITY_SIZE, SELF_SIZE, identity, own_vector
+from warp_torchrl.observation.own import own_names, own_vector
 from warp_torchrl.observation.view import egocentric_view
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.fast.squares import window
@@ -26,7 +26,7 @@ class Space(NamedTuple):
     dtype: torch.dtype
     low: float
     high: float | tuple[float, ...]  # of all numbers, or one for each channel
-    names: tuple[str, ...] = ()  # of the channels, where the entry has any
+    names: tuple[str, ...] = ()  # of the channels of a map or the entries of a vector, where they have any
 
     def bounds(self) -> tuple[Tensor, Tensor]:
         """Return the least and the largest value of each number, both of the entry's shape and type."""
@@ -40,7 +40,7 @@ class Local:
     """What an agent sees of its own surroundings, and nothing else.
 
     ``view`` is the square of 2 r + 1 cells about the agent, north up, uint8, in channels that are chosen by name from
-    ``observation.channels.CHANNELS``. ``self`` is what it knows of itself, see ``SELF_SIZE``.
+    ``observation.channels.CHANNELS``. ``self`` is what it knows of itself, see ``own_names``.
 
     Attributes:
         radius: r [cells].
@@ -63,17 +63,15 @@ class Local:
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
         side, highs = 2 * self.radius + 1, tuple(CHANNELS[name].high for name in self.channels)
+        own = own_names(world.team, self.identity)
         return {
             "view": Space((len(highs), side, side), torch.uint8, 0, highs, self.channels),
-            "self": Space((SELF_SIZE + IDENTITY_SIZE * self.identity,), torch.float32, -3.0, 3.0),
+            "self": Space((len(own),), torch.float32, -3.0, 3.0, own),
         }
 
     def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
         """Return ``view`` uint8 [B, A, C, V, V] and ``self`` float32 [B, A, F]."""
-        own = own_vector(state, world)
-        if self.identity:
-            who = identity(own.shape[1], own.device)
-            own = torch.cat((own, who.expand(len(own), -1, -1)), dim=-1)
+        own = own_vector(state, world, self.identity)
         return {"view": egocentric_view(state, world, forecast, self.radius, self.channels), "self": own}
 
 

@@ -8,7 +8,7 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.fast.distances import distance_to_nearest
 from warp_torchrl.world.front import exposure
-from warp_torchrl.world.state import Transition, WorldState, is_burning
+from warp_torchrl.world.state import Transition, TreeCounts, WorldState, is_burning
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,14 +58,14 @@ class Reward:
         """Return each agent's reward before sharing and shaping, float32 [B, A]."""
         raise TypeError(f"{type(self).__name__} does not say what an agent earns: define own()")
 
-    def phi(self, state: WorldState) -> Tensor:
+    def phi(self, state: WorldState, counts: TreeCounts) -> Tensor:
         """Return the potential of each agent, float32 [B, A]; 0 where nothing burns."""
         if self.potential == "exposure":
-            return (-0.5 * exposure(state))[:, None].expand(-1, state.vehicles.position.shape[1])
+            return (-0.5 * exposure(state, counts))[:, None].expand(-1, state.vehicles.position.shape[1])
         height = state.cells.shape[1]
         distance = distance_to_nearest(state.vehicles.position, is_burning(state.cells))
-        return -0.5 / height * distance * (state.tally.alight > 0)[:, None]
+        return -0.5 / height * distance * (counts.alight > 0)[:, None]
 
     def _shaping(self, transition: Transition) -> Tensor:
-        after = self.phi(transition.after) * ~transition.after.terminated[:, None]
-        return self.gamma * after - self.phi(transition.before)
+        after = self.phi(transition.after, transition.counts_after) * ~transition.after.terminated[:, None]
+        return self.gamma * after - self.phi(transition.before, transition.counts_before)

@@ -16,7 +16,7 @@ from torch.nn.functional import avg_pool2d
 
 from warp_torchrl.reward.base import Reward
 from warp_torchrl.world.front import alignment, block_shares, centre, containment, exposure
-from warp_torchrl.world.state import Transition, WorldState, is_burning
+from warp_torchrl.world.state import Transition, TreeCounts, WorldState, is_burning
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,24 +40,24 @@ class Conservation(Reward):
     def own(self, transition: Transition) -> Tensor:
         """Return each agent's reward before sharing and shaping, float32 [B, A]."""
         before, after = transition.before, transition.after
-        gained = self.value(after) - self.value(before) + self.bonus(transition)
+        gained = self.value(after, transition.counts_after) - self.value(before, transition.counts_before)
+        gained = gained + self.bonus(transition)
         acts = after.vehicles.acts - before.vehicles.acts
         return gained[:, None] - self.act * acts.shape[1] * acts
 
-    def worth(self, state: WorldState) -> Tensor:
+    def worth(self, counts: TreeCounts) -> Tensor:
         """Return Q, float32 [B]."""
-        tally = state.tally
         worth = (
-            self.preserved * tally.preserved
-            + self.extinguished * tally.extinguished
-            - self.cleared * tally.cleared
-            - self.burned * tally.burned
+            self.preserved * counts.preserved
+            + self.extinguished * counts.extinguished
+            - self.cleared * counts.cleared
+            - self.burned * counts.burned
         )
-        return worth / tally.initial
+        return worth / counts.initial
 
-    def value(self, state: WorldState) -> Tensor:
+    def value(self, state: WorldState, counts: TreeCounts) -> Tensor:
         """Return R without the cost of acts, float32 [B]."""
-        return self.worth(state)
+        return self.worth(counts)
 
     def bonus(self, transition: Transition) -> Tensor | float:
         """Return a step's reward that is no difference of states, float32 [B]."""
@@ -92,11 +92,11 @@ class Time(Conservation):
     rule: Literal["share", "printed"] = "share"
     horizon: int = 256
 
-    def value(self, state: WorldState) -> Tensor:
+    def value(self, state: WorldState, counts: TreeCounts) -> Tensor:
         """Return R without the cost of acts, float32 [B]."""
         if self.rule == "printed":
-            return self.worth(state)
-        return self.worth(state) - self.zeta / self.horizon * state.step
+            return self.worth(counts)
+        return self.worth(counts) - self.zeta / self.horizon * state.step
 
     def bonus(self, transition: Transition) -> Tensor | float:
         """Return -zeta / T_total at the end of an episode under rule ``printed``, else 0, float32 [B]."""
@@ -122,16 +122,16 @@ class Coverage(Conservation):
     side: int = 8
     least: float = 0.05
 
-    def value(self, state: WorldState) -> Tensor:
+    def value(self, state: WorldState, counts: TreeCounts) -> Tensor:
         """Return R without the cost of acts, float32 [B]."""
         lost = state.burned | is_burning(state.cells)
         spared = block_shares(lost, state.initial, self.side) < self.least
         assets = state.landscape.assets
         if assets is None:
-            return self.worth(state) + self.omega * spared.sum((1, 2))
+            return self.worth(counts) + self.omega * spared.sum((1, 2))
         worth = avg_pool2d(assets[:, None], self.side, ceil_mode=True, count_include_pad=False)[:, 0]
         worth = worth / worth.mean((1, 2), keepdim=True).clamp(min=1e-6)
-        return self.worth(state) + self.omega * (worth * spared).sum((1, 2))
+        return self.worth(counts) + self.omega * (worth * spared).sum((1, 2))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,12 +153,12 @@ class Collaborative(Conservation):
     window: int = 16
     rule: Literal["positive", "printed"] = "positive"
 
-    def value(self, state: WorldState) -> Tensor:
+    def value(self, state: WorldState, counts: TreeCounts) -> Tensor:
         """Return R without the cost of acts, float32 [B]."""
         last = state.vehicles.last_useful
         lately = (last >= 0) & (state.step[:, None] - last <= self.window)
         eta = 1.0 + self.together * lately.to(torch.float32).mean(dim=1)
-        worth = self.worth(state)
+        worth = self.worth(counts)
         return eta * worth if self.rule == "printed" else eta * worth.clamp(min=0.0) + worth.clamp(max=0.0)
 
 
@@ -185,20 +185,20 @@ class Adaptive(Conservation):
     contained: float = 0.1
     reach: int = 3
 
-    def value(self, state: WorldState) -> Tensor:
+    def value(self, state: WorldState, counts: TreeCounts) -> Tensor:
         """Return R without r_1 and the cost of acts, float32 [B]."""
         barrier = (state.alpha == 0.0) | state.firebreak | (state.wet > 0)
         shape = self.contained * containment(is_burning(state.cells), barrier) - self.exposed * exposure(
-            state, self.reach
+            state, counts, self.reach
         )
-        return self.worth(state) + shape
+        return self.worth(counts) + shape
 
     def bonus(self, transition: Transition) -> Tensor:
         """Return theta_1 times the trees put out downwind in this step, a share of N0, float32 [B]."""
-        before, outcome = transition.before, transition.outcome
+        before, result = transition.before, transition.result
         width = before.cells.shape[2]
-        place = torch.stack((outcome.target // width, outcome.target % width), dim=-1)
+        place = torch.stack((result.target // width, result.target % width), dim=-1)
         downwind = alignment(place, centre(is_burning(before.cells)), before.wind) >= 0.0
-        new = ~before.extinguished.flatten(1).gather(1, outcome.target)
-        count = (outcome.extinguished & downwind & new).sum(dim=1)
-        return self.downwind * count / before.tally.initial
+        new = ~before.extinguished.flatten(1).gather(1, result.target)
+        count = (result.extinguished & downwind & new).sum(dim=1)
+        return self.downwind * count / transition.counts_before.initial

@@ -44,15 +44,15 @@ class Paper(Reward):
 
     def own(self, transition: Transition) -> Tensor:
         """Return each agent's award before sharing and shaping, float32 [B, A]."""
-        outcome, before = transition.outcome, transition.before
-        action, cleared = outcome.action, outcome.cleared
+        result, before = transition.result, transition.before
+        action, cleared = result.action, result.cleared
         distance = distance_to_nearest(transition.after.vehicles.position, is_burning(before.cells))
         is_near = distance <= self.near
-        failed = (action == int(Action.EXTINGUISH)) & ~outcome.extinguished
+        failed = (action == int(Action.EXTINGUISH)) & ~result.extinguished
         failed |= (action == int(Action.CLEAR)) & ~cleared
         award = (
             self.move * (action <= int(Action.NORTH_WEST))
-            + self.extinguish * outcome.extinguished
+            + self.extinguish * result.extinguished
             + self.failed * failed
             + self.clear * cleared
             + self.far_clear * (cleared & ~is_near)
@@ -77,4 +77,4 @@ def _cut_off(transition: Transition) -> Tensor:
     threatened = flood(torch.cat((fire, fire)), torch.cat((fuel | new_break, fuel)))
     was, still = (threatened & torch.cat((fuel, fuel))).chunk(2)
     lost = was.sum((1, 2)) - still.sum((1, 2))
-    return lost / before.tally.initial
+    return lost / transition.counts_before.initial

@@ -12,7 +12,9 @@ import torch
 import torchrl
 
 from warp_torchrl.models import Entry, Signature
-from warp_torchrl.observation import DEFAULT, PICTURE
+from warp_torchrl.observation import DEFAULT, PICTURE, STATE
+from warp_torchrl.observation.own import IDENTITY, SELF
+from warp_torchrl.world.role import PAPER_ROLES
 from warp_torchrl.world.state import Action
 
 FORMAT = 2
@@ -23,9 +25,14 @@ TRAINING = "training.pt"
 _POLICY = ("policy.pt", "config.json")  # of an exported policy
 _FILES = ("policy.pt", TRAINING, "config.json")
 _LARGEST_JSON = 1_000_000
-_FORMER_NAMES = {"view": DEFAULT, "picture": PICTURE}
+_FORMER_NAMES = {
+    "view": (DEFAULT,),
+    "picture": (PICTURE,),
+    "self": (SELF, (*SELF, *IDENTITY)),
+    "state": (STATE,),
+}
 _FORMER_ACTIONS = tuple(action.name.lower() for action in Action)
-"""Channels and actions of manifests without names."""
+"""Channels and actions of manifests without names; one entry had two lengths."""
 
 
 class CheckpointError(Exception):
@@ -154,19 +161,22 @@ def _signature_to_json(signature: Signature) -> dict[str, Any]:
         "observation": {name: entry._asdict() for name, entry in signature.observation.items()},
         "state": signature.state._asdict(),
         "n_actions": signature.n_actions,
+        "n_roles": signature.n_roles,
     }
 
 
 def _signature_from_json(content: dict[str, Any]) -> Signature:
-    def entry(node: dict[str, Any], names: tuple[str, ...] = ()) -> Entry:
-        shape = tuple(int(side) for side in node["shape"])
-        channels = tuple(str(name) for name in node.get("names", names if len(names) == shape[0] else ()))
-        if channels and len(channels) != shape[0]:
-            raise ValueError(f"{len(channels)} names of {shape[0]} channels")
-        return Entry(shape, str(node["dtype"]), channels)
+    former = _FORMER_NAMES if "roles" not in content else {}
 
-    observation = {str(name): entry(node, _FORMER_NAMES.get(name, ())) for name, node in content["observation"].items()}
+    def entry(name: str, node: dict[str, Any]) -> Entry:
+        shape = tuple(int(side) for side in node["shape"])
+        names = next((names for names in former.get(name, ()) if len(names) == shape[0]), ())
+        told = tuple(str(each) for each in node.get("names") or names)
+        if told and len(told) != shape[0]:
+            raise ValueError(f"{len(told)} names of {shape[0]} channels")
+        return Entry(shape, str(node["dtype"]), told)
+
+    observation = {str(name): entry(name, node) for name, node in content["observation"].items()}
     actions = tuple(str(name) for name in content.get("actions", _FORMER_ACTIONS[: int(content["n_actions"])]))
-    return Signature(
-        observation, entry(content["state"]), int(content["n_agents"]), actions, int(content.get("n_roles", 2))
-    )
+    roles = tuple(str(name) for name in content.get("roles", PAPER_ROLES))
+    return Signature(observation, entry("state", content["state"]), int(content["n_agents"]), actions, roles)

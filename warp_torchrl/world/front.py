@@ -8,7 +8,7 @@ from torch import Tensor
 from torch.nn.functional import avg_pool2d
 
 from warp_torchrl.world.geometry import grow
-from warp_torchrl.world.state import WorldState, is_burning, is_tree
+from warp_torchrl.world.state import TreeCounts, WorldState, is_burning, is_tree
 
 RAYS = 32
 """Rays from a fire's centre on which barriers are looked for."""
@@ -57,11 +57,11 @@ def sector(place: Tensor, middle: Tensor, count: int = 8) -> Tensor:
     return (turn.remainder(1.0) * count).to(torch.int64).clamp(max=count - 1)
 
 
-def exposure(state: WorldState, reach: int = 3) -> Tensor:
+def exposure(state: WorldState, counts: TreeCounts, reach: int = 3) -> Tensor:
     """Return the trees that could burn within a Chebyshev distance ``reach`` of fire, a share of N0, float32 [B]."""
     fuel = is_tree(state.cells) & (state.alpha > 0.0)
     near = grow(is_burning(state.cells), reach) & fuel
-    return near.sum((1, 2)) / state.tally.initial
+    return near.sum((1, 2)) / counts.initial
 
 
 def containment(fire: Tensor, barrier: Tensor) -> Tensor:

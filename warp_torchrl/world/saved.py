@@ -8,7 +8,8 @@ _FORMER = {"wind": "air.wind"} | {
     f"landscape.{name}": f"ground.landscape.{name}" for name in ("cover", "age", "elevation", "assets", "corner")
 }
 """Names of entries in runs that were saved before ground and air were made whole."""
-_NO_LONGER = ("alpha", "slope", "gain", "chances")
+_NO_LONGER = ("alpha", "slope", "gain", "chances", "tally")
+"""What follows from the other entries, and was once saved beside them."""
 
 
 def filled(template: WorldState, entries: dict[str, Tensor]) -> WorldState:
@@ -17,7 +18,8 @@ def filled(template: WorldState, entries: dict[str, Tensor]) -> WorldState:
     Raises:
         ValueError: If an entry is missing, unknown, or of another shape or type.
     """
-    entries = {_FORMER.get(name, name): value for name, value in entries.items() if name not in _NO_LONGER}
+    kept = {name: value for name, value in entries.items() if name.split(".")[0] not in _NO_LONGER}
+    entries = {_FORMER.get(name, name): value for name, value in kept.items()}
     expected = template.what_changes()
     if set(expected) != set(entries):
         raise ValueError(f"worlds must have the entries {sorted(expected)}, got {sorted(entries)}")

@@ -23,7 +23,10 @@ class Cover(IntEnum):
 
 
 class Action(IntEnum):
-    """The paper's ten actions A = {0..9}, and ``STAY``. 0..7 move N, NE, E, SE, S, SW, W, NW."""
+    """The paper's ten actions A = {0..9}, and ``STAY`` where a team may stay. 0..7 move N, NE, E, SE, S, SW, W, NW.
+
+    These are the first actions of every team; those of other abilities follow, see ``Team.action_names``.
+    """
 
     NORTH = 0
     NORTH_EAST = 1
@@ -60,7 +63,7 @@ class Landscape(Batch):
 
 
 @dataclass(eq=False, repr=False)
-class Tally(Batch):
+class TreeCounts(Batch):
     """Counts of the initial trees by fate; they add up to ``initial`` (trees that regrow are counted apart)."""
 
     initial: Tensor  # int32 [B], N0, trees before ignition
@@ -146,7 +149,6 @@ class WorldState(Batch):
     firebreak: Tensor  # bool [B,H,W], cleared by an agent
     wet: Tensor  # uint8 [B,H,W], ticks for which the cell cannot ignite
     vehicles: Vehicles
-    tally: Tally
     key: Tensor  # int64 [B], key of the world's draws in this episode
     step: Tensor  # int32 [B], agent steps since the start of the episode
     tick: Tensor  # int32 [B], fire ticks since ignition
@@ -188,15 +190,24 @@ _FOLLOWS = ("ground.alpha", "ground.slope", "air.gain", "air.table")
 
 
 @dataclass(eq=False, repr=False)
-class Outcome(Batch):
+class ActionResult(Batch):
     """What each agent's action of one step came to."""
 
     action: Tensor  # int64 [B,A], as chosen
     moved: Tensor  # bool [B,A], changed cell
-    extinguished: Tensor  # bool [B,A], put a fire out, credited
-    cleared: Tensor  # bool [B,A], cleared a tree, credited
+    credited: Tensor  # bool [B,A], did what it should to its target, and first of those who did
     redundant: Tensor  # bool [B,A], acted on a target that a team-mate of lower index took
-    target: Tensor  # int64 [B,A], flat index of the cell acted on, valid where extinguished or cleared
+    target: Tensor  # int64 [B,A], flat index of the cell acted on, valid where credited or redundant
+
+    @property
+    def extinguished(self) -> Tensor:
+        """Return which agents put a fire out, credited, bool [B, A]."""
+        return self.credited & (self.action == int(Action.EXTINGUISH))
+
+    @property
+    def cleared(self) -> Tensor:
+        """Return which agents cleared a tree, credited, bool [B, A]."""
+        return self.credited & (self.action == int(Action.CLEAR))
 
 
 @dataclass(eq=False, repr=False)
@@ -204,8 +215,10 @@ class Transition(Batch):
     """One step of every world: all that rewards, metrics and pictures read."""
 
     before: WorldState
-    outcome: Outcome
+    result: ActionResult
     after: WorldState
+    counts_before: TreeCounts  # of ``before``
+    counts_after: TreeCounts  # of ``after``
 
 
 def is_burning(cells: Tensor) -> Tensor:
@@ -218,7 +231,7 @@ def is_tree(cells: Tensor) -> Tensor:
     return between(cells, 1, OLDEST)
 
 
-def count_trees(state: WorldState) -> Tally:
+def count_trees(state: WorldState) -> TreeCounts:
     """Count the initial trees by fate.
 
         T_p + T_e + T_c + T_b + burning = N0      (WARP-CA, conservation metric)
@@ -237,7 +250,7 @@ def count_trees(state: WorldState) -> Tally:
         unburned & burning,
         burning,
     )
-    return Tally(
+    return TreeCounts(
         initial=trees,
         preserved=standing - extinguished,
         extinguished=extinguished,

@@ -1,29 +1,46 @@
-"""The vehicles: where they start, how they move, put fire out and clear trees."""
+"""The vehicles: where they start, and how a step makes one of what each of them does."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Literal
+from functools import cached_property, reduce
+from operator import add, or_
+from typing import Literal, NamedTuple
 
 import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.geometry import DIRECTIONS
-from warp_torchrl.world.random import Stream, uniform
-from warp_torchrl.world.role import ROLES, RoleTable, role_table
+from warp_torchrl.world.abilities import ABILITIES, PAPER_ABILITIES, Ability, Deed, Situation, neighbourhood
+from warp_torchrl.world.role import ROLES, RoleTable, role_names, role_table
 from warp_torchrl.world.start import starting_cells
-from warp_torchrl.world.state import (
-    FIRST_FIRE,
-    Action,
-    Cover,
-    Outcome,
-    Vehicles,
-    WorldState,
-    is_burning,
-    is_tree,
-)
+from warp_torchrl.world.state import Action, ActionResult, Cover, Vehicles, WorldState
 
-_NEIGHBOURHOOD = ((0, 0), (-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1))
+STAY = "stay"
+"""Name of the action that does nothing."""
+
+
+class Skill(NamedTuple):
+    """An ability of a team."""
+
+    name: str
+    ability: Ability
+    first: int  # code of its first action
+    of_all: bool  # whether every agent has it
+
+    def is_chosen(self, action: Tensor) -> Tensor:
+        """Return where an action is one of its own, bool, shape of the actions, int64."""
+        count = len(self.ability.actions)
+        if count == 1:
+            return action == self.first
+        below = action < self.first + count
+        return below & (action >= self.first) if self.first else below
+
+    def act(self, now: Situation, action: Tensor) -> tuple[Tensor, Deed]:
+        """Return which agents would do something if their action is one of its own, bool [B, A], and what."""
+        count = len(self.ability.actions)
+        choice = (action - self.first if self.first else action).clamp(0, count - 1) if count > 1 else action
+        deed = self.ability.act(now, choice)
+        return deed.possible if self.of_all else deed.possible & now.roles.can[self.name], deed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +50,7 @@ class Team:
     Attributes:
         n_agents: Vehicles.
         roles: Role of each vehicle, repeated as often as needed: ``[ugv, uav]`` alternates.
-        allow_stay: Whether there is an eleventh action, stay.
+        allow_stay: Whether there is an action that does nothing, stay.
         extinguish_p: Chance that putting a fire out succeeds.
         tank: Extinguish acts that a vehicle carries water for; None is unlimited, 0 none at all. It fills up beside a
             lake and at the corner where the team started.
@@ -54,16 +71,48 @@ class Team:
         check_fields(self, n_agents=(1, 256), extinguish_p=(0.0, 1.0), tank=(0, 10_000))
         if not self.roles or any(role not in ROLES for role in self.roles):
             raise ValueError(f"roles must be a list of {', '.join(ROLES)}, got {list(self.roles)}")
+        unknown = {name for role in self.roles for name in ROLES[role].abilities} - ABILITIES.keys()
+        if unknown:
+            raise ValueError(f"abilities of a role must be of {', '.join(ABILITIES)}, got {', '.join(sorted(unknown))}")
 
     @property
     def n_actions(self) -> int:
-        """Return the number of actions, 10, or 11 with stay."""
-        return 11 if self.allow_stay else 10
+        """Return the number of actions."""
+        return len(self.action_names)
+
+    @cached_property
+    def action_names(self) -> tuple[str, ...]:
+        """Return the names of the actions, ``north`` and so on, by their codes.
+
+        The paper's ten come first, then ``stay`` where it is allowed, then those of the other abilities of its roles.
+        """
+        paper = tuple(action for name in PAPER_ABILITIES for action in ABILITIES[name].actions)
+        return (*paper, *([STAY] if self.allow_stay else ()), *self.further_actions)
 
     @property
-    def action_names(self) -> tuple[str, ...]:
-        """Return the names of the actions, ``north`` and so on, by their codes."""
-        return tuple(action.name.lower() for action in Action)[: self.n_actions]
+    def further_actions(self) -> tuple[str, ...]:
+        """Return the names of the actions that are not the paper's, nor stay."""
+        return tuple(action for name in self._further for action in ABILITIES[name].actions)
+
+    @property
+    def _further(self) -> list[str]:
+        named = (name for role in self.roles for name in ROLES[role].abilities)
+        return [name for name in dict.fromkeys(named) if name not in PAPER_ABILITIES]
+
+    @cached_property
+    def skills(self) -> tuple[Skill, ...]:
+        """Return the abilities of the team, in the order of its actions."""
+        names, codes = (*PAPER_ABILITIES, *self._further), self.action_names
+        kinds = [ROLES[role] for role in self.roles]
+        return tuple(
+            Skill(name, made, codes.index(made.actions[0]), all(name in kind.abilities for kind in kinds))
+            for name, made in ((name, ABILITIES[name]) for name in names)
+        )
+
+    @cached_property
+    def role_names(self) -> tuple[str, ...]:
+        """Return the roles by their index: the paper's two, then the team's others."""
+        return role_names(self.roles)
 
     @property
     def agent_roles(self) -> list[str]:
@@ -78,7 +127,11 @@ class Team:
 
     def table(self, device: torch.device) -> RoleTable:
         """Return the agents' roles and abilities as tensors of shape [A]."""
-        return role_table(tuple(self.agent_roles), device)
+        return role_table(*self._named, device)
+
+    @cached_property
+    def _named(self) -> tuple[tuple[str, ...], ...]:
+        return tuple(self.agent_roles), self.role_names, tuple(skill.name for skill in self.skills)
 
     def place(self, key: Tensor, cover: Tensor, burning: Tensor) -> Vehicles:
         """Return the team at the start of an episode; see ``starting_cells``."""
@@ -95,52 +148,19 @@ class Team:
         )
 
     def open_moves(self, state: WorldState) -> Tensor:
-        """Return which of the eight moves each agent can make, bool [B, A, 8].
-
-        Ground vehicles cannot enter a lake or a burning cell; aircraft fly two cells over anything; nobody leaves
-        the map.
-        """
-        height, width = state.cells.shape[1:]
-        roles = self.table(state.cells.device)
-        away = _offsets(state.cells.device) * roles.stride[:, None, None]
-        index, inside = _places(state.vehicles.position, away, height, width)
-        index = index.flatten(1)
-        ground, cells = (plane.flatten(1).gather(1, index) for plane in (state.landscape.cover, state.cells))
-        blocked = ((ground == int(Cover.LAKE)) | is_burning(cells)).view_as(inside)
-        return inside & (~blocked | roles.flies[:, None])
-
-    def nearby_fire(self, state: WorldState, last_spreading: int) -> tuple[Tensor, Tensor]:
-        """Return the fire that each agent would put out: the youngest of its 3 x 3 neighbourhood.
-
-        Ties go to the agent's own cell, then in row-major order.
-
-        Returns:
-            Flat index of the cell, int64 [B, A], and whether there is one that can be put out, bool [B, A].
-        """
-        height, width = state.cells.shape[1:]
-        index, inside = _places(state.vehicles.position, _neighbourhood(state.cells.device), height, width)
-        codes = state.cells.flatten(1).gather(1, index.flatten(1)).view_as(index).to(torch.int64)
-        fits = inside & (codes >= FIRST_FIRE) & (codes <= last_spreading)
-        order = torch.arange(len(_NEIGHBOURHOOD), device=codes.device)
-        best = torch.where(fits, codes * 16 + order, 1 << 20).argmin(dim=-1, keepdim=True)
-        return index.gather(-1, best)[..., 0], fits.any(dim=-1)
+        """Return which of the eight moves each agent can make, bool [B, A, 8]."""
+        return self._mask(self.skills[0], self._situation(state, 0))
 
     def action_mask(self, state: WorldState, last_spreading: int) -> Tensor:
-        """Return which actions would do something, bool [B, A, 10 or 11].
+        """Return which actions would do something, bool [B, A, actions].
 
         Stay is always open. Without it, an agent that can do nothing at all is shown ``EXTINGUISH``, which then does
         nothing: a policy needs one action to choose.
         """
-        _, has_fire = self.nearby_fire(state, last_spreading)
-        vehicles = state.vehicles
-        own = state.cells.flatten(1).gather(1, self._own_index(state))
-        can = [
-            self.open_moves(state),
-            (has_fire & (vehicles.tank != 0))[..., None],
-            (is_tree(own) & self.table(own.device).clears)[..., None],
-        ]
+        now = self._situation(state, last_spreading)
+        can = [self._mask(skill, now) for skill in self.skills]
         if self.allow_stay:
-            can.append(torch.ones_like(can[-1]))
+            can.insert(len(PAPER_ABILITIES), torch.ones_like(can[-1][..., :1]))
         open_actions = torch.cat(can, dim=-1)
         if not self.allow_stay:
             open_actions[..., Action.EXTINGUISH] |= ~open_actions.any(dim=-1)
@@ -148,8 +168,8 @@ class Team:
 
     def act(
         self, state: WorldState, action: Tensor, active: Tensor, last_spreading: int, wet_ticks: int
-    ) -> tuple[WorldState, Outcome]:
-        """Let the agents move, then let them put out fire and clear trees.
+    ) -> tuple[WorldState, ActionResult]:
+        """Let the agents move, then let them put out fire, clear trees, and do what else their roles can.
 
         Two agents at one target: it is done once, credited to the lower index; the other's act counts as redundant.
 
@@ -165,121 +185,88 @@ class Team:
         """
         active = active[:, None]
         state, moved = self._move(state, action, active)
-        fire_index, has_fire = self.nearby_fire(state, last_spreading)
-        own_index = self._own_index(state)
-        own = state.cells.flatten(1).gather(1, own_index)
-        wants_water = (action == int(Action.EXTINGUISH)) & active
-        wants_clear = (action == int(Action.CLEAR)) & active
-        has_water = state.vehicles.tank != 0
-        hit = wants_water & has_fire & has_water & self._succeeds(state)
-        cut = wants_clear & is_tree(own) & self.table(own.device).clears
-        target = torch.where(hit, fire_index, own_index)
-        redundant = _is_second(target, hit | cut)
-        hit_first, cut_first = hit & ~redundant, cut & ~redundant
-        vehicles = state.vehicles
-        spent = (wants_water & has_fire & (vehicles.tank > 0)).to(torch.int32)
-        after = self._apply(state, target, hit_first, cut_first, wet_ticks)
+        now = self._situation(state, last_spreading, wet_ticks)
+        target = now.own_cell
+        vehicles, tank = state.vehicles, state.vehicles.tank
+        chosen, deeds = [], []
+        for skill in self.skills:
+            if skill.ability.moves:
+                continue
+            wanted = skill.is_chosen(action) & active
+            possible, deed = skill.act(now, action)
+            done = wanted & possible
+            if deed.target is not None:
+                target = torch.where(done, deed.target, target)
+            if deed.takes_water is not None:
+                tank = tank - (wanted & deed.takes_water & (vehicles.tank > 0)).to(torch.int32)
+            chosen.append(wanted)
+            deeds.append((done, deed.becomes))
+        acting = reduce(or_, [done for done, _ in deeds])
+        redundant = _is_second(target, acting)
+        credited = acting & ~redundant
+        after = _changed(state, target, [(done & credited, becomes) for done, becomes in deeds])
         after = after.replace(
             vehicles=vehicles.replace(
-                tank=self._refill(state, vehicles.tank - spent),
+                tank=self._refill(state, tank),
                 last_action=torch.where(active, action, vehicles.last_action),
-                acts=vehicles.acts + (wants_water | wants_clear),
+                acts=vehicles.acts + reduce(or_, chosen),
                 redundant=vehicles.redundant + redundant,
-                last_useful=torch.where(hit_first | cut_first, state.step[:, None], vehicles.last_useful),
+                last_useful=torch.where(credited, state.step[:, None], vehicles.last_useful),
             )
         )
-        outcome = Outcome(
-            action=action,
-            moved=moved,
-            extinguished=hit_first,
-            cleared=cut_first,
-            redundant=redundant,
-            target=target,
-        )
-        return after, outcome
+        return after, ActionResult(action=action, moved=moved, credited=credited, redundant=redundant, target=target)
+
+    def _situation(self, state: WorldState, last_spreading: int, wet_ticks: int = 0) -> Situation:
+        return Situation(state, self.table(state.cells.device), self.extinguish_p, last_spreading, wet_ticks)
+
+    @staticmethod
+    def _mask(skill: Skill, now: Situation) -> Tensor:
+        mask = skill.ability.mask(now)
+        return mask if skill.of_all else mask & now.roles.can[skill.name][:, None]
 
     def _move(self, state: WorldState, action: Tensor, active: Tensor) -> tuple[WorldState, Tensor]:
-        direction = action.clamp(max=7)
-        is_open = self.open_moves(state).gather(-1, direction[..., None])[..., 0]
-        moved = is_open & (action < len(DIRECTIONS)) & active
-        roles = self.table(action.device)
-        stride = (roles.stride * moved)[..., None]
-        position = state.vehicles.position + _offsets(action.device)[direction] * stride
-        return state.replace(vehicles=state.vehicles.replace(position=position)), moved
-
-    def _succeeds(self, state: WorldState) -> Tensor | bool:
-        if self.extinguish_p == 1.0:
-            return True
-        return uniform(state.key, state.step, Stream.ACTION, (self.n_agents,)) < self.extinguish_p
+        """Return the worlds after the moves, and which agents moved, bool [B, A]."""
+        now, position, moved = self._situation(state, 0), state.vehicles.position, []
+        for skill in self.skills:
+            if skill.ability.moves:
+                possible, deed = skill.act(now, action)
+                moved.append(skill.is_chosen(action) & active & possible)
+                if deed.step is not None:
+                    position = position + deed.step * moved[-1][..., None]
+        return state.replace(vehicles=state.vehicles.replace(position=position)), reduce(or_, moved)
 
     def _refill(self, state: WorldState, tank: Tensor) -> Tensor:
         """Fill the tanks of vehicles beside a lake or at the base."""
         if self.tank is None:
             return tank
-        height, width = state.cells.shape[1:]
-        position = state.vehicles.position
-        index, inside = _places(position, _neighbourhood(tank.device), height, width)
-        cover = state.landscape.cover.flatten(1).gather(1, index.flatten(1)).view_as(index)
+        index, inside = neighbourhood(state)
+        cover = Situation.at(state.cover, index.flatten(1)).view_as(index)
         by_lake = ((cover == int(Cover.LAKE)) & inside).any(dim=-1)
-        at_base = (position == state.vehicles.base[:, None]).all(dim=-1)
+        at_base = (state.vehicles.position == state.vehicles.base[:, None]).all(dim=-1)
         return torch.where(by_lake | at_base, self.tank, tank)
 
-    @staticmethod
-    def _apply(state: WorldState, target: Tensor, hit: Tensor, cut: Tensor, wet_ticks: int) -> WorldState:
-        """Write the credited acts into the maps, as sums of differences so that their order does not matter."""
 
-        def add(plane: Tensor, difference: Tensor) -> Tensor:
-            codes = plane.view(torch.uint8).flatten(1)
-            return codes.scatter_add(1, target, difference.to(torch.uint8)).view_as(plane).view(plane.dtype)
+def _changed(state: WorldState, target: Tensor, deeds: list[tuple[Tensor, Mapping[str, Tensor | int]]]) -> WorldState:
+    """Return worlds with what credited acts make of their targets, int64 [B, A].
 
-        def there(plane: Tensor) -> Tensor:
-            return plane.view(torch.uint8).flatten(1).gather(1, target)
+    It is written as sums of differences, so that the order of the agents does not matter.
 
-        old, age = there(state.cells), there(state.age)
-        return state.replace(
-            cells=add(state.cells, hit * (age - old) - cut * old),
-            age=add(state.age, -(hit * age)),
-            extinguished=add(state.extinguished, hit * (1 - there(state.extinguished))),
-            firebreak=add(state.firebreak, cut),
-            wet=add(state.wet, hit * (wet_ticks - there(state.wet))),
-        )
-
-    @staticmethod
-    def _own_index(state: WorldState) -> Tensor:
-        position = state.vehicles.position
-        return position[..., 0] * state.cells.shape[2] + position[..., 1]
+    Args:
+        state: The worlds before.
+        target: Flat index of the cell of each agent's act.
+        deeds: Of each ability the agents whose act is credited, bool [B, A], and what planes hold there afterwards.
+    """
+    planes = {name: getattr(state, name) for _, becomes in deeds for name in becomes}
+    after = {}
+    for name, plane in planes.items():
+        codes = plane.view(torch.uint8).flatten(1)
+        old = codes.gather(1, target)
+        changes = [credited * (becomes[name] - old) for credited, becomes in deeds if name in becomes]
+        after[name] = codes.scatter_add(1, target, reduce(add, changes)).view_as(plane).view(plane.dtype)
+    return state.replace(**after)
 
 
 def _is_second(target: Tensor, acting: Tensor) -> Tensor:
     """Return which agents act on a target that an acting agent of lower index has, bool [B, A]."""
     same = (target[:, :, None] == target[:, None, :]) & acting[:, :, None] & acting[:, None, :]
     return same.tril(diagonal=-1).any(dim=-1)
-
-
-def _places(position: Tensor, away: Tensor, height: int, width: int) -> tuple[Tensor, Tensor]:
-    """Return where places about the agents are, row * W + column, and which of them are on the map.
-
-    Those off the map are moved to its edge.
-
-    Args:
-        position: int64 [B, A, 2] [cells].
-        away: (rows, columns) from an agent to each, int64 [n, 2] or [A, n, 2] [cells].
-        height: H of the map [cells].
-        width: W.
-
-    Returns:
-        int64 [B, A, n] and bool [B, A, n].
-    """
-    row, column = position[..., 0, None] + away[..., 0], position[..., 1, None] + away[..., 1]
-    on_row, on_column = row.clamp(0, height - 1), column.clamp(0, width - 1)
-    return on_row * width + on_column, (on_row == row) & (on_column == column)
-
-
-@lru_cache(maxsize=8)
-def _offsets(device: torch.device) -> Tensor:
-    return torch.tensor(DIRECTIONS, device=device)
-
-
-@lru_cache(maxsize=8)
-def _neighbourhood(device: torch.device) -> Tensor:
-    return torch.tensor(_NEIGHBOURHOOD, device=device)

@@ -19,8 +19,8 @@ from warp_torchrl.world.state import (
     Cover,
     Forecast,
     Landscape,
-    Tally,
     Transition,
+    TreeCounts,
     Vehicles,
     WorldState,
     count_trees,
@@ -125,9 +125,9 @@ class World:
         for _ in range(self.ignition.head_start):
             spreads = (state.cells >= FIRST_FIRE) & (state.cells < EMBER)
             state = self._tick(state, spreads.flatten(1).any(dim=1))
-        return state.replace(tally=count_trees(state))
+        return state
 
-    def step(self, state: WorldState, action: Tensor) -> Transition:
+    def step(self, state: WorldState, action: Tensor, counts: TreeCounts | None = None) -> Transition:
         """Advance every world that has not ended by one agent step.
 
         Agents move; agents act; on every ``steps_per_tick``-th step the fire ticks; the clock advances.
@@ -135,15 +135,23 @@ class World:
         Args:
             state: The worlds, batch size [B].
             action: int64 [B, A], ``Action`` codes.
+            counts: ``count_trees(state)``, where it is known; None counts.
 
         Returns:
             The transition; ``before`` is ``state`` itself.
         """
         active = ~state.done
-        after, outcome = self.team.act(state, action, active, self.fire.last_spreading, self.fire.wet_for)
+        after, result = self.team.act(state, action, active, self.fire.last_spreading, self.fire.wet_for)
         due = active & ((state.step + 1) % self.steps_per_tick == 0)
         after = self._tick(after, due)
-        return Transition(before=state, outcome=outcome, after=self._advance_clock(after, active))
+        counts_after = count_trees(after)
+        return Transition(
+            before=state,
+            result=result,
+            after=self._advance_clock(after, counts_after, active),
+            counts_before=count_trees(state) if counts is None else counts,
+            counts_after=counts_after,
+        )
 
     def restored(self, state: WorldState) -> WorldState:
         """Return worlds with what follows from their landscape and wind made anew."""
@@ -163,13 +171,11 @@ class World:
             return advance(state, self.fire, self.air, due)
         return road.advance_rows(state, due, lambda rows, ticks: advance(rows, self.fire, self.air, ticks))
 
-    def _advance_clock(self, state: WorldState, active: Tensor) -> WorldState:
-        tally = count_trees(state)
+    def _advance_clock(self, state: WorldState, counts: TreeCounts, active: Tensor) -> WorldState:
         step = state.step + active
-        terminated = (tally.alight == 0) & self.fire.burns_out
-        share_burning = tally.burning / tally.initial
+        terminated = (counts.alight == 0) & self.fire.burns_out
+        share_burning = counts.burning / counts.initial
         return state.replace(
-            tally=tally,
             step=step,
             burning_area=state.burning_area + share_burning * active,
             terminated=state.terminated | terminated,
@@ -195,7 +201,7 @@ def initial_state(
     no = torch.zeros_like(cells, dtype=torch.bool)
     zero = torch.zeros_like(key, dtype=torch.int32)
     made = fire.ground(ground, cell_size)
-    state = WorldState(
+    return WorldState(
         ground=made,
         air=road.air(fire, wind, made),
         cells=cells.clone(),
@@ -207,7 +213,6 @@ def initial_state(
         firebreak=no.clone(),
         wet=none.clone(),
         vehicles=vehicles,
-        tally=Tally(*[zero] * 7),
         key=key,
         step=zero.clone(),
         tick=zero.clone(),
@@ -215,7 +220,6 @@ def initial_state(
         terminated=zero > 0,
         truncated=zero > 0,
     )
-    return state.replace(tally=count_trees(state))
 
 
 def advance(state: WorldState, fire: Fire, wind: Wind, due: Tensor) -> WorldState:

@@ -45,7 +45,7 @@ def test_worlds_are_the_same(overrides):
                 assert torch.equal(value, worlds[name]), name
         for name, value in left.items(include_nested=True, leaves_only=True):
             torch.testing.assert_close(right[name], value, rtol=1e-5, atol=1e-6)
-        burning += int(eager.world_state.tally.alight.sum())
+        burning += int(eager.tree_counts.alight.sum())
     assert burning > 500
 
 
