@@ -76,9 +76,11 @@ def _try_fit_number(value: object, kind: object) -> tuple[bool, object]:
     if isinstance(value, bool) or not isinstance(value, Real):
         return False, value
     if kind is float:
-        return True, value if type(value) is float else float(value)
-    is_whole = isinstance(value, Integral) or float(value).is_integer()  # 1e6 is how many are written
-    return is_whole, int(value) if is_whole and type(value) is not int else value
+        return True, float(value)
+    if isinstance(value, Integral):
+        return True, int(value)
+    number = float(value)  # 1e6 is how many are written
+    return number.is_integer(), int(number) if number.is_integer() else value
 
 
 def _try_fit_tuple(value: object, items: tuple[object, ...]) -> tuple[bool, object]:

@@ -76,14 +76,14 @@ def test_a_world_without_arguments_is_the_scenario_default():
     assert make_env().world == World()
 
 
-def test_no_scenario_repeats_a_default():
+def test_no_scenario_repeats_a_default_but_its_size_which_each_landscape_has_another_of():
     for path in (conf_folder() / "scenario").glob("*.yaml"):
         held = OmegaConf.to_container(OmegaConf.load(path), resolve=False)
         composed = compose_config("train", [f"scenario={path.stem}"])
         for name, value in held.items():
             if name in COMPONENTS:
                 usual = defaults(component(composed[name]["_target_"]))
-                assert not [key for key in value if value[key] == usual[key] and path.stem != "hazard"], path.stem
+                assert not [key for key in value if value[key] == usual[key] and key != "size"], path.stem
 
 
 def test_train_yaml_repeats_no_default_of_a_run():

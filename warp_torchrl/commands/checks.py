@@ -61,7 +61,7 @@ def _fatal(config: DictConfig) -> Iterator[None]:
 def _check(name: str | None, config: DictConfig) -> None:
     overrides = list(config.hydra.overrides.task)
     check_choices(overrides)
-    values = plain(OmegaConf.masked_copy(config, [key for key in config if key != "hydra"]))
+    values = plain(OmegaConf.masked_copy(config, [str(key) for key in config if key != "hydra"]))
     (_check_evaluation if name == "evaluate" else _check_training)(values, overrides)
 
 

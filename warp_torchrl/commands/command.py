@@ -96,7 +96,7 @@ def _resume(folder: Path, total_frames: Any) -> None:
     if run.settings.total_frames != run.total_before:
         # Now and not with the next checkpoint: a run that is killed before it goes on to the new total too.
         disk.replace(folder / "config.yaml", OmegaConf.to_yaml(recompose(run.record), resolve=True))
-        training.tellnew_total(run.total_before)
+        training.tell_new_total(run.total_before)
     _finish(training, world_overrides(run.values))
 
 
