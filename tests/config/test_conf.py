@@ -102,6 +102,15 @@ def test_a_folder_of_the_users_own_is_filled_in_too(tmp_path):
             compose("top", overrides=["reward.preserve=2.0"])
 
 
+def test_a_file_that_builds_on_another_keeps_its_values_and_has_its_own_class_s_fields_too(tmp_path):
+    (tmp_path / "base.yaml").write_text("_target_: warp_torchrl.world.fire.Fire\nbeta: 0.5\n")
+    built_on = "defaults: [base, _self_]\n_target_: warp_torchrl.world.hazard.HazardFire\ntau: 3.0\n"
+    (tmp_path / "top.yaml").write_text(built_on)
+    with initialize_config_dir(str(tmp_path), version_base="1.3"):
+        fire = compose("top")
+    assert (fire.beta, fire.tau, fire.refinement, fire.slope_gain) == (0.5, 3.0, 8, 0.115)
+
+
 def _derived(component):
     return {each.name for each in fields(component) if each.name.startswith("_")}
 

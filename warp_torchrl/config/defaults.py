@@ -53,8 +53,12 @@ def _left_out(config_path: str, node: DictConfig) -> dict[str, Any]:
         run = {**defaults(World), **defaults(Settings)}
         return {name: value for name, value in run.items() if name not in COMPONENTS}
     kind = component(node["_target_"]) if "_target_" in node else None
-    return {} if kind is None else {"_target_": node["_target_"], **defaults(kind)}
+    if kind is None:
+        return {}
+    # A file that builds on another leaves to that one what its class inherits.
+    own = kind.__annotations__ if "defaults" in node else defaults(kind)
+    return {"_target_": node["_target_"], **{name: value for name, value in defaults(kind).items() if name in own}}
 
 
+# Hydra's registry refuses a second source of a scheme, unless both have one name: hence the name and the assignment.
 SourcesRegistry.instance().types[FileConfigSource.scheme()] = FileConfigSource
-# Hydra keeps its own where another has the same scheme, unless it is called alike and is there first: both hold.
