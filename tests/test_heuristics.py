@@ -110,7 +110,7 @@ def one_fire(team, side=19, steps_per_tick=12, **options):
         landscape=land,
         wind=Calm(),
         team=team,
-        ignition=Ignition(region=0.01, head_start=0),
+        ignition=Ignition(count=1, region=0.01, head_start=0),
         steps_per_tick=steps_per_tick,
         horizon=240,
         **options,

@@ -1,6 +1,8 @@
-"""The one check that components make of their own fields."""
+"""The one check of values against the type hints and ranges of a component's fields."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from numbers import Integral, Real
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
@@ -8,10 +10,12 @@ from warp_torchrl.nearest import did_you_mean
 
 
 def check_fields(component: Any, **ranges: tuple[float, float]) -> None:
-    """Check a dataclass's fields: choices, whole numbers, and ranges.
+    """Check a dataclass's fields against their type hints and ranges.
+
+    A value that fits a hint in another form takes the hint's: 3 becomes 3.0 where a float is due, a list a tuple.
 
     Args:
-        component: A dataclass instance.
+        component: A dataclass instance; it may be frozen.
         ranges: Lowest and highest value by field; a field that may be None is checked where it is not. Where a field
             may be a pair, from low to high, both ends are checked, and their order.
 
@@ -20,24 +24,85 @@ def check_fields(component: Any, **ranges: tuple[float, float]) -> None:
     """
     hints = get_type_hints(type(component))
     for name in (each.name for each in fields(component) if each.init):
-        value, hint = getattr(component, name), hints[name]
-        kinds = set(get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,))
-        if get_origin(hint) is Literal and (value not in get_args(hint) or isinstance(value, bool)):
-            words = [str(word) for word in get_args(hint)]
-            raise ValueError(f"{name} must be one of {', '.join(words)}, got {value}{did_you_mean(value, words)}")
-        if value is None and NoneType in kinds:
-            continue
-        may_be_pair = name in ranges and any(get_origin(kind) is tuple for kind in kinds)
-        is_pair = may_be_pair and isinstance(value, tuple | list)
-        ends = value if is_pair else (value,)
-        if is_pair and len(value) != 2:
-            raise ValueError(f"{name} must be one number or a pair from low to high, got {list(value)}")
-        is_whole = kinds - {NoneType} == {int} or (may_be_pair and float not in kinds)
-        if is_whole and any(type(end) is not int for end in ends):
-            raise ValueError(f"{name} must be a whole number, got {value!r}")
-        if name in ranges:
-            low, high = ranges[name]
-            if not all(low <= end <= high for end in ends):
-                raise ValueError(f"{name} must be in [{low:g}, {high:g}], got {value}")
-            if not ends[0] <= ends[-1]:
-                raise ValueError(f"{name} must be a pair from low to high, got {list(value)}")
+        value = getattr(component, name)
+        fitted = fit(value, hints[name], name)
+        if fitted is not value:
+            object.__setattr__(component, name, fitted)
+        if name in ranges and fitted is not None:
+            _check_range(name, fitted, *ranges[name])
+
+
+def _check_range(name: str, value: Any, low: float, high: float) -> None:
+    ends = value if isinstance(value, tuple) else (value,)
+    if not all(low <= end <= high for end in ends):
+        raise ValueError(f"{name} must be in [{low:g}, {high:g}], got {value}")
+    if not ends[0] <= ends[-1]:
+        raise ValueError(f"{name} must be a pair from low to high, got {list(value)}")
+
+
+def fit(value: object, hint: object, name: str) -> object:
+    """Return a value in the form of a type hint.
+
+    Raises:
+        ValueError: With the name, what the hint asks for and the value.
+    """
+    choices = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+    for choice in choices:
+        fits, fitted = _try_fit(value, choice)
+        if fits:
+            return fitted
+    kinds = " or ".join(_describe(choice) for choice in choices)
+    words = [str(word) for choice in choices if get_origin(choice) is Literal for word in get_args(choice)]
+    raise ValueError(f"{name} must be {kinds}, got {value!r}{did_you_mean(value, words)}")
+
+
+def _try_fit(value: object, hint: object) -> tuple[bool, object]:
+    origin = get_origin(hint)
+    if hint is Any:
+        return True, value
+    if hint in (None, NoneType):
+        return value is None, None
+    if origin is Literal:
+        return value in get_args(hint) and not isinstance(value, bool), value
+    if origin is tuple:
+        return _try_fit_tuple(value, get_args(hint))
+    if hint in (int, float):
+        return _try_fit_number(value, hint)
+    kind = origin or hint
+    return isinstance(kind, type) and isinstance(value, kind), value
+
+
+def _try_fit_number(value: object, kind: object) -> tuple[bool, object]:
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return False, value
+    if kind is float:
+        return True, float(value)
+    if isinstance(value, Integral):
+        return True, int(value)
+    number = float(value)  # 1e6 is how many are written
+    return number.is_integer(), int(number) if number.is_integer() else value
+
+
+def _try_fit_tuple(value: object, items: tuple[object, ...]) -> tuple[bool, object]:
+    if not isinstance(value, Sequence) or isinstance(value, str):
+        return False, value
+    kinds = [items[0]] * len(value) if items[-1] is Ellipsis else list(items)
+    if len(kinds) != len(value):
+        return False, value
+    fitted = [_try_fit(each, kind) for each, kind in zip(value, kinds, strict=True)]
+    return all(fits for fits, _ in fitted), tuple(each for _, each in fitted)
+
+
+def _describe(hint: object) -> str:
+    origin = get_origin(hint)
+    if hint in (None, NoneType):
+        return "null"
+    if origin is Literal:
+        return " or ".join(str(choice) for choice in get_args(hint))
+    if origin is tuple:
+        items = get_args(hint)
+        return f"a list of {_describe(items[0])}" if items[-1] is Ellipsis else f"a list of {len(items)} values"
+    if origin is Mapping:
+        return "a mapping"
+    names: dict[object, str] = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}
+    return names.get(hint, getattr(hint, "__name__", str(hint)))

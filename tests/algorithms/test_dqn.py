@@ -182,7 +182,7 @@ def test_prioritised_replay_works_or_says_why_not(make_small_env):
         ("epsilon_end", 1.5),
         ("tau", 0.0),
         ("capacity", 0),
-        ("capacity", 1e4),
+        ("capacity", 1.5),
         ("minibatch_size", 0),
         ("warm_up", 10**6),
         ("mixer", "sum"),

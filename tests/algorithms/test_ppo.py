@@ -104,7 +104,7 @@ def test_gae_by_hand():
 def test_one_pass_of_the_critic_values_what_two_would(make_small_env):
     """Episodes end at the horizon of 5 and the batch at 8: what a step led to is not always the next step's state."""
     env = make_small_env(6, small_world(horizon=5))
-    learner = Ppo().build(env, Mlp(actor_hidden=(8,), critic_hidden=(8,)), 48)
+    learner = Ppo().build(env, Mlp(actor_hidden=(8,), critic_hidden=(8,), dtype="float32"), 48)
     batch, loss = collected(env, learner, 8), learner.loss
     assert int(batch["next", "done"][:, :-1].sum()) > 0, "an episode ends before the batch does"
     two = MultiAgentGAE(gamma=0.99, lmbda=0.95, value_network=loss.critic_network)

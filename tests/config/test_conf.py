@@ -6,23 +6,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hydra import compose, initialize_config_dir
+from omegaconf import OmegaConf
 from torch._inductor.exc import InvalidCxxCompiler
 
+from warp_torchrl.api import make_env
 from warp_torchrl.config.compose import (
     Record,
     compose_config,
     conf_folder,
-    is_sweep,
     plain,
     recompose,
     without_targets,
     world_overrides,
 )
-from warp_torchrl.config.construction import ConfigError, build
-from warp_torchrl.config.settings import COMPONENTS, settings
+from warp_torchrl.config.construction import ConfigError, build, component
+from warp_torchrl.config.defaults import defaults
+from warp_torchrl.config.settings import COMPONENTS, Settings, settings
 from warp_torchrl.world.gridded import Gridded
 from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.raster import Raster
+from warp_torchrl.world.world import World
 
 SCENARIOS = sorted(path.stem for path in (conf_folder() / "scenario").glob("*.yaml") if path.stem != "landfire")
 EXPERIMENTS = sorted(path.stem for path in (conf_folder() / "experiment").glob("*.yaml"))
@@ -31,7 +35,7 @@ LANDFIRE = Path(__file__).parents[3] / "shared" / "landscapes" / "landfire"
 
 
 @pytest.mark.parametrize(("group", "option"), [each for each in OPTIONS if each[0] in COMPONENTS])
-def test_every_option_builds_and_holds_every_field(group, option):
+def test_every_option_builds_and_shows_every_field(group, option):
     if (group, option) == ("collector", "ray"):
         pytest.importorskip("ray", reason="Ray is not installed")
     node = plain(compose_config("train", [f"{group}={option}"]))[group]
@@ -39,10 +43,72 @@ def test_every_option_builds_and_holds_every_field(group, option):
     if option in needs_a_file:
         with pytest.raises(ConfigError, match=rf"{group}\.path must name"):
             build(node, group)
-        component = needs_a_file[option]
+        made = needs_a_file[option]
     else:
-        component = build(node, group)
-    assert set(node) - {"_target_"} == {each.name for each in fields(component) if each.init} - _derived(component)
+        made = build(node, group)
+    assert set(node) - {"_target_"} == {each.name for each in fields(made) if each.init} - _derived(made)
+
+
+@pytest.mark.parametrize(("group", "option"), [each for each in OPTIONS if each[0] in COMPONENTS])
+def test_no_option_repeats_a_default_of_its_class(group, option):
+    held = OmegaConf.to_container(OmegaConf.load(conf_folder() / group / f"{option}.yaml"), resolve=False)
+    usual = defaults(component(held.pop("_target_")))
+    assert not [name for name, value in held.items() if name in usual and usual[name] == value]
+
+
+ONE_FOR_A_CLASS = [
+    *("mappo", "a2c", "dqn", "sac", "ddpg"),
+    *("efficiency", "coverage", "collaborative", "adaptive"),
+    *("perlin", "uniform", "wandering", "calm", "spread", "hazard", "ugv", "central", "surroundings", "local"),
+    *("mlp", "cnn", "direct", "process", "csv", "wandb", "tensorboard"),
+]
+
+
+@pytest.mark.parametrize("option", ONE_FOR_A_CLASS)
+def test_a_class_without_arguments_is_its_option(option):
+    ((group, _),) = [each for each in OPTIONS if each[1] == option and each[0] in COMPONENTS]
+    node = plain(compose_config("train", ["scenario=default", f"{group}={option}"]))[group]
+    assert component(node["_target_"])() == build(node, group)
+
+
+def test_a_world_without_arguments_is_the_scenario_default():
+    assert settings(plain(compose_config("train", ["scenario=default"]))).world == World()
+    assert make_env().world == World()
+
+
+def test_no_scenario_repeats_a_default_but_its_size_which_each_landscape_has_another_of():
+    for path in (conf_folder() / "scenario").glob("*.yaml"):
+        held = OmegaConf.to_container(OmegaConf.load(path), resolve=False)
+        composed = compose_config("train", [f"scenario={path.stem}"])
+        for name, value in held.items():
+            if name in COMPONENTS:
+                usual = defaults(component(composed[name]["_target_"]))
+                assert not [key for key in value if value[key] == usual[key] and key != "size"], path.stem
+
+
+def test_train_yaml_repeats_no_default_of_a_run():
+    held = OmegaConf.load(conf_folder() / "train.yaml")
+    assert not set(held) & {*defaults(Settings), *defaults(World)} - set(COMPONENTS)
+
+
+def test_a_folder_of_the_users_own_is_filled_in_too(tmp_path):
+    (tmp_path / "reward").mkdir()
+    (tmp_path / "reward" / "mine.yaml").write_text("_target_: warp_torchrl.reward.Efficiency\nact: 0.25\n")
+    (tmp_path / "top.yaml").write_text("defaults: [{reward: mine}]\n")
+    with initialize_config_dir(str(tmp_path), version_base="1.3"):
+        reward = compose("top", overrides=["reward.preserved=2.0"]).reward
+        assert (reward.act, reward.preserved, reward.burned) == (0.25, 2.0, 1.0)
+        with pytest.raises(Exception, match="preserve"):
+            compose("top", overrides=["reward.preserve=2.0"])
+
+
+def test_a_file_that_builds_on_another_keeps_its_values_and_has_its_own_class_s_fields_too(tmp_path):
+    (tmp_path / "base.yaml").write_text("_target_: warp_torchrl.world.fire.Fire\nbeta: 0.5\n")
+    built_on = "defaults: [base, _self_]\n_target_: warp_torchrl.world.hazard.HazardFire\ntau: 3.0\n"
+    (tmp_path / "top.yaml").write_text(built_on)
+    with initialize_config_dir(str(tmp_path), version_base="1.3"):
+        fire = compose("top")
+    assert (fire.beta, fire.tau, fire.refinement, fire.slope_gain) == (0.5, 3.0, 8, 0.115)
 
 
 def _derived(component):
@@ -167,12 +233,6 @@ def test_a_number_that_is_whole_is_a_whole_number_however_it_is_written():
     numbers = [plan.total_frames, plan.collector.steps, plan.world.landscape.size, plan.observation.radius]
     numbers += [*plan.model.actor_hidden, plan.algorithm.epochs]
     assert numbers == [1_000_000, 64, 20, 3, 16, 2] and {type(each) for each in numbers} == {int}
-
-
-def test_an_unknown_experiment_is_no_sweep():
-    with pytest.raises(ConfigError, match="experiment must be one of algorithms"):
-        is_sweep("train", ["seed=1", "experiment=nowhere"])
-    assert is_sweep("train", ["experiment=algorithms"]) and not is_sweep("train", ["experiment=paper_sarl"])
 
 
 def recorded(*overrides):

@@ -15,7 +15,7 @@ from .drawing import EAST, EXTINGUISH, FIELD, drawn, earned
 
 def test_shaping_pays_the_way_to_the_fire():
     state, world = drawn(FIELD, [[1, 3]])
-    shaped = Efficiency(shaping=1.0, gamma=0.9, act=0.0)
+    shaped = Efficiency(scale=1.0, shaping=1.0, gamma=0.9, act=0.0)
     # distance 2 -> 1, H = 4: 0.9 x (-0.5 x 1/4) - (-0.5 x 2/4) = 0.1375
     assert earned(shaped, state, world, int(Action.WEST)) == pytest.approx([0.1375])
 
@@ -29,7 +29,7 @@ def test_the_distance_potential_is_nought_where_nothing_burns():
 
 def test_the_exposure_potential_pays_for_fuel_out_of_reach():
     state, world = drawn(FIELD, [[0, 0]])
-    shaped = Efficiency(shaping=1.0, potential="exposure", gamma=0.9, act=0.0)
+    shaped = Efficiency(scale=1.0, shaping=1.0, potential="exposure", gamma=0.9, act=0.0)
     # All 15 trees are within three cells: Phi = -0.5 x 15 / 16; put out, the end, Phi = 0.
     assert earned(shaped, state, world, EXTINGUISH) == pytest.approx([0.9 / 16 + 0.5 * 15 / 16])
 
@@ -42,7 +42,7 @@ def test_shaping_adds_minus_the_first_potential_to_the_return(make_small_env, re
     quick = small_world(fire=Fire(alpha=(0.0, 0.0, 0.0, 1e-6, 0.0)), horizon=400)
     returns = []
     for weight in (0.0, 1.0):
-        env = make_small_env(3, quick, reward=reward(shaping=weight, gamma=gamma, potential=potential))
+        env = make_small_env(3, quick, reward=reward(scale=1.0, shaping=weight, gamma=gamma, potential=potential))
         env.reset()
         if weight:
             potential = env.reward_function.phi(env.world_state, env.tree_counts).mean(1)

@@ -1,11 +1,13 @@
 """The five conservation rewards, worked out by hand, and their closed forms."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 import torch
 
 from tests.conftest import small_world
-from warp_torchrl.reward import Adaptive, Collaborative, Coverage, Efficiency, Time
+from warp_torchrl import reward as rewards
 from warp_torchrl.world.batch import concatenated
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.state import count_trees
@@ -15,6 +17,10 @@ from warp_torchrl.world.world import in_wind
 from .drawing import CLEAR, EXTINGUISH, FIELD, STAY, drawn, earned
 
 SURE = Fire(alpha=(0, 0, 0, 1.0, 0), diagonal="unit", wind_gain=0.0, wind_focus=0.0)
+Efficiency, Time, Coverage, Collaborative, Adaptive = (
+    partial(each, scale=1.0, shaping=0.0)
+    for each in (rewards.Efficiency, rewards.Time, rewards.Coverage, rewards.Collaborative, rewards.Adaptive)
+)
 CONSERVATION = [Efficiency, Time, Coverage, Collaborative, Adaptive]
 
 

@@ -83,7 +83,7 @@ def test_an_npz_file_holds_u_and_v(tmp_path) -> None:
         ({"u": U, "v": V * 1000.0}, "v must be in"),
         ({"u": U, "v": V, "speed": "*vel*"}, "bearing must be given with speed"),
         ({"u": U, "v": V, "ticks_per_field": 0}, "ticks_per_field must be"),
-        ({"u": U, "v": V, "resample": "nearest"}, "resample must be one of"),
+        ({"u": U, "v": V, "resample": "nearest"}, "resample must be refuse or bilinear, got 'nearest'"),
         ({"u": [["a"]], "v": V}, "u must hold numbers in"),
     ],
 )

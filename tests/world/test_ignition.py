@@ -21,7 +21,7 @@ def fuel_everywhere(worlds: int, height: int, width: int) -> Tensor:
 
 
 def test_a_fire_is_a_patch_of_3_by_3() -> None:
-    lit = Ignition()(keys(256), fuel_everywhere(256, 15, 11))
+    lit = Ignition(count=1)(keys(256), fuel_everywhere(256, 15, 11))
     assert (lit.sum((1, 2)) == 9).all()
     rows, columns = lit.any(dim=2), lit.any(dim=1)
     assert (rows.sum(dim=1) == 3).all()
@@ -30,7 +30,7 @@ def test_a_fire_is_a_patch_of_3_by_3() -> None:
 
 @pytest.mark.parametrize("radius, cells", [(0, 1), (1, 9), (2, 25)])
 def test_the_radius_makes_the_patch(radius: int, cells: int) -> None:
-    lit = Ignition(radius=radius)(keys(64), fuel_everywhere(64, 20, 20))
+    lit = Ignition(count=1, radius=radius)(keys(64), fuel_everywhere(64, 20, 20))
     assert (lit.sum((1, 2)) == cells).all()
 
 
@@ -44,7 +44,7 @@ def test_only_fuel_is_lit() -> None:
 def test_a_centre_lies_in_the_middle_of_height_and_of_width_and_anywhere_there() -> None:
     # 0.6 of 10 rows and 20 columns: rows 2..7, columns 4..15 (cell middles within 30 % of the map's middle).
     # 12 000 worlds over 72 cells, 71 degrees of freedom; false alarm 2e-6.
-    lit = Ignition(radius=0)(keys(12_000), fuel_everywhere(12_000, 10, 20))
+    lit = Ignition(count=1, radius=0)(keys(12_000), fuel_everywhere(12_000, 10, 20))
     counts = lit.sum(dim=0).double()
     middle = torch.zeros(10, 20, dtype=torch.bool)
     middle[2:8, 4:16] = True
@@ -55,7 +55,7 @@ def test_a_centre_lies_in_the_middle_of_height_and_of_width_and_anywhere_there()
 
 def test_a_map_without_fuel_in_the_middle_is_lit_elsewhere() -> None:
     fuel = marks("x....... ........ ........ ........ ........ ........ ........ .......x", "x").expand(64, 8, 8)
-    lit = Ignition(radius=1)(keys(64), fuel)
+    lit = Ignition(count=1, radius=1)(keys(64), fuel)
     assert (lit.sum((1, 2)) == 1).all()
     assert lit[:, 0, 0].any()
     assert lit[:, 7, 7].any()
@@ -64,7 +64,7 @@ def test_a_map_without_fuel_in_the_middle_is_lit_elsewhere() -> None:
 def test_fuel_in_the_middle_comes_first() -> None:
     fuel = marks("xxxxx xxxxx xx.xx xxxxx xxxxx", "x")
     fuel[2, 2] = True
-    lit = Ignition(radius=0, region=0.1)(keys(64), fuel.expand(64, 5, 5))
+    lit = Ignition(count=1, radius=0, region=0.1)(keys(64), fuel.expand(64, 5, 5))
     assert lit[:, 2, 2].all()
 
 
@@ -83,7 +83,7 @@ def test_several_fires_start_on_different_cells() -> None:
 
 
 def test_a_fire_is_a_function_of_the_key_alone() -> None:
-    batch = Ignition()(keys(64), fuel_everywhere(64, 12, 9))
-    assert torch.equal(batch[20:21], Ignition()(keys(1, first=20), fuel_everywhere(1, 12, 9)))
-    assert torch.equal(batch[20:27], Ignition()(keys(7, first=20), fuel_everywhere(7, 12, 9)))
+    batch = Ignition(count=1)(keys(64), fuel_everywhere(64, 12, 9))
+    assert torch.equal(batch[20:21], Ignition(count=1)(keys(1, first=20), fuel_everywhere(1, 12, 9)))
+    assert torch.equal(batch[20:27], Ignition(count=1)(keys(7, first=20), fuel_everywhere(7, 12, 9)))
     assert not torch.equal(batch[0], batch[1])

@@ -40,6 +40,7 @@ class Dqn(EpsilonGreedy):
         ValueError: If a value is out of its range, or prioritised replay does not work here.
     """
 
+    updates: int = 128
     mixer: Literal["none", "vdn", "qmix"] = "none"
     mixer_hidden: int = 32
 

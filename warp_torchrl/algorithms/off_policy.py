@@ -41,10 +41,13 @@ class OffPolicy(Algorithm):
         ValueError: If a value is out of its range, or prioritised replay does not work here.
     """
 
+    learning_rate: float = 5e-4
+    learning_rate_end: float = 0.1
+    max_grad_norm: float = 10.0
     capacity: int = 50_000
     warm_up: int = 8192
     minibatch_size: int = 256
-    updates: int = 128
+    updates: int = 64
     replay: Literal["uniform", "prioritised"] = "uniform"
     target_interval: int = 0
     tau: float = 0.01

@@ -67,8 +67,8 @@ class OnPolicy(Algorithm):
 
     central_critic: bool = True
     lmbda: float = 0.95
-    entropy_coeff: float = 0.01
-    entropy_coeff_end: float = 0.001
+    entropy_coeff: float = 0.005
+    entropy_coeff_end: float = 0.0005
     critic_coeff: float = 1.0
     minibatch_size: int = 1024
 

@@ -14,7 +14,7 @@ from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.state import Action, Cover
 
 _WIND = 4.0  # m/s, as conf/wind/uniform.yaml
-_REWARD = Efficiency(scale=5.0, shaping=1.0)  # as conf/reward/efficiency.yaml
+_REWARD = Efficiency()
 
 
 class NumpyFireEnv(ParallelEnv[str, np.ndarray, int]):

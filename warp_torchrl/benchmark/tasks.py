@@ -1,6 +1,7 @@
 """Calibration of scenarios by the baselines, and ranking of the baselines by each reward."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import combinations
 from typing import Any
 
@@ -11,7 +12,7 @@ from warp_torchrl.api import make_env
 from warp_torchrl.evaluation.play import BASELINES, play, play_heuristics
 from warp_torchrl.evaluation.statistics import compare, summarise
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.reward import Adaptive, Collaborative, Coverage, Efficiency, Paper, Time
+from warp_torchrl.reward import Adaptive, Collaborative, Coverage, Efficiency, Paper, Reward, Time
 from warp_torchrl.world.state import Transition
 
 SCENARIOS = (
@@ -43,7 +44,9 @@ def calibrate(scenario: str, device: str, episodes: int, overrides: Sequence[str
 def rank_rewards(scenario: str, device: str, episodes: int, overrides: Sequence[str] = ()) -> dict[str, Any]:
     """Return the baselines' returns under each reward, unscaled and unshaped, and their trees saved, by policy [n]."""
     env = make_env(scenario, n_worlds=episodes, seed=FIRST_SEED, device=device, overrides=overrides)
-    rewards = [Efficiency(), Time(horizon=env.world.horizon), Coverage(), Collaborative(), Adaptive(), Paper()]
+    kinds: list[Callable[..., Reward]] = [Efficiency, Coverage, Collaborative, Adaptive, Paper]
+    kinds.insert(1, partial(Time, horizon=env.world.horizon))
+    rewards = [kind(scale=1.0, shaping=0.0) for kind in kinds]
     returns: dict[str, dict[str, np.ndarray]] = {"saved": {}}
     for policy in BASELINES:
         totals = {type(reward).__name__.lower(): torch.zeros(episodes, device=device) for reward in rewards}

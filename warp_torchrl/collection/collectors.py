@@ -59,7 +59,7 @@ class InProcess:
         ValueError: If steps is not in 1..100000.
     """
 
-    steps: int = 64
+    steps: int = 32
 
     def __post_init__(self) -> None:
         check_fields(self, steps=(1, 100_000))

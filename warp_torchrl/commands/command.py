@@ -13,14 +13,14 @@ from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 
 from warp_torchrl.commands.allocation import keep_freed_memory
+from warp_torchrl.commands.checks import new_total, of_worlds, without_checkpoint
 from warp_torchrl.commands.failure import fail
-from warp_torchrl.commands.sweep import SweepSummary, jobs, remove_failure, save_failure, summarise_unfinished
+from warp_torchrl.commands.sweep import SweepSummary, remove_failure, save_failure, summarise_unfinished
 from warp_torchrl.config.compose import (
+    HYDRA_ERRORS,
     Record,
-    compose_config,
     conf_folder,
-    is_sweep,
-    output_folder,
+    explain,
     plain,
     recompose,
     without_targets,
@@ -29,15 +29,12 @@ from warp_torchrl.config.compose import (
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.grammar import check_flags, check_overrides
 from warp_torchrl.config.settings import COMPONENTS, settings
-from warp_torchrl.evaluation.evaluate import check_policy, evaluate_policy
-from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.nearest import did_you_mean
+from warp_torchrl.evaluation.evaluate import evaluate_policy
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs import disk
 from warp_torchrl.runs.destination import check_free
 from warp_torchrl.runs.resumption import resumption
 from warp_torchrl.runs.shipped import find_policy
-from warp_torchrl.runs.transfer import check_start
 from warp_torchrl.training.loop import Training
 from warp_torchrl.training.signals import Stopped, exit_on_signal
 
@@ -67,7 +64,7 @@ def _train_job(config: DictConfig) -> None:
     lock = checkpoints.RunFolderLock(folder)
     try:
         if resumed:
-            _resume(folder, _new_total(config, HydraConfig.get().overrides.task))
+            _resume(folder, new_total(config, HydraConfig.get().overrides.task))
         else:
             _start(folder, config)
     finally:
@@ -129,16 +126,11 @@ def _evaluate_job(config: DictConfig) -> None:
         check_free(folder, "hydra.run.dir")  # again: two jobs of a sweep may have the same folder
     given, name = config.checkpoint, config.policy
     if given is None:
-        evaluate_policy(settings(_without_checkpoint(config)), folder, name, world_overrides(plain(config)))
+        evaluate_policy(settings(without_checkpoint(plain(config))), folder, name, world_overrides(plain(config)))
         return
     found = _newest(find_policy(given))
-    values = plain(recompose(found.record(), _of_worlds(HydraConfig.get().overrides.task)))
+    values = plain(recompose(found.record(), of_worlds(HydraConfig.get().overrides.task)))
     evaluate_policy(settings(values), folder, found, world_overrides(values))
-
-
-def _of_worlds(overrides: Sequence[str]) -> list[str]:
-    """Return an evaluation's overrides without the command's own keys."""
-    return [each for each in overrides if not each.startswith(("checkpoint=", "policy=", "overwrite="))]
 
 
 # The saved configuration
@@ -153,11 +145,7 @@ def _values(config: DictConfig) -> dict[str, Any]:
     return {key: value for key, value in without_targets(plain(config)).items() if key not in _NOT_RECORDED}
 
 
-def _without_checkpoint(config: DictConfig) -> dict[str, Any]:
-    return plain(config) | {"checkpoint": plain(compose_config("train"))["checkpoint"]}
-
-
-# Checks before any work, and errors
+# The start of a command, and errors
 
 
 def _run(name: str, job: Callable[[DictConfig], None]) -> None:
@@ -168,8 +156,11 @@ def _run(name: str, job: Callable[[DictConfig], None]) -> None:
     keep_freed_memory()
     with exit_on_signal():
         try:
-            _check_first(name, arguments)
+            _check_grammar(arguments)
             _start_hydra(name, job, arguments, debug)
+        except HYDRA_ERRORS as error:
+            overrides = [each for each in arguments if not each.startswith("-")]
+            sys.exit(fail(explain(error, name, overrides), debug)[0])
         except Exception as error:
             sys.exit(fail(error, debug)[0])
         sys.exit(SweepSummary.exit_code)
@@ -197,66 +188,11 @@ def _start_hydra(name: str, job: Callable[[DictConfig], None], arguments: list[s
         raise
 
 
-def _check_first(name: str, arguments: Sequence[str]) -> None:
-    """Compose and check every job of the command line before the first run folder is made."""
+def _check_grammar(arguments: Sequence[str]) -> None:
+    """Check what can be read before Hydra composes: ``CheckFirst`` checks what it composed."""
     check_flags(arguments)
-    overrides = [each for each in arguments if not each.startswith("-")]
-    flags = [each for each in arguments if each.startswith("-")]
-    if any(flag not in _MULTIRUN for flag in flags):
-        return  # Hydra handles its own flags (--help, --cfg, --config-dir ...)
-    check_overrides(overrides)
-    own = [each for each in overrides if not each.startswith("hydra")]
-    sweeps = bool(flags) or is_sweep(name, own)
-    listed = jobs(own) if sweeps else [own]
-    for job in listed:
-        config = compose_config(name, job)
-        if name == "train":
-            _check_training(config, job)
-        else:
-            _check_evaluation(config, job)
-    if name == "evaluate" and not config.overwrite:
-        of_hydra = [each for each in overrides if each.startswith("hydra")]
-        key = "hydra.sweep.dir" if sweeps else "hydra.run.dir"
-        check_free(output_folder(name, [*listed[0], *of_hydra], sweeps), key)
-
-
-def _check_training(config: DictConfig, overrides: Sequence[str]) -> None:
-    if config.resume is None:
-        plan = settings(plain(config))
-        plan.check_training()
-        if config.start_from is not None:
-            check_start(plan, checkpoints.newest(find_policy(config.start_from))[0])
-        return
-    others = [each for each in overrides if each.split("=")[0] not in ("resume", "debug", "total_frames")]
-    if others:
-        raise ConfigError(
-            f"resume goes on with the folder's own configuration, of which total_frames alone may change; leave out "
-            f"{', '.join(others)}"
-        )
-    folder = Path(str(config.resume))
-    if (folder / checkpoints.MANIFEST).exists():
-        raise ConfigError(f"resume must be a run folder, got one of its checkpoints: {folder}")
-    resumption(folder, _new_total(config, overrides)).settings.check_training()
-
-
-def _new_total(config: DictConfig, overrides: Sequence[str]) -> Any:
-    """Return the new ``total_frames`` of a resumed run; None if the command line gives none."""
-    return config.total_frames if any(each.startswith("total_frames=") for each in overrides) else None
-
-
-def _check_evaluation(config: DictConfig, overrides: Sequence[str]) -> None:
-    if (config.checkpoint is None) == (config.policy is None):
-        raise ConfigError("give either checkpoint=PATH or policy=NAME")
-    if config.policy is not None and config.policy not in HEURISTICS:
-        hint = did_you_mean(config.policy, HEURISTICS)
-        raise ConfigError(f"policy must be one of {', '.join(HEURISTICS)}, got {config.policy}{hint}")
-    if not isinstance(config.overwrite, bool):
-        raise ConfigError(f"overwrite must be true or false, got {config.overwrite!r}")
-    if config.checkpoint is None:
-        check_policy(settings(_without_checkpoint(config)), config.policy)
-        return
-    found, _ = checkpoints.newest(find_policy(str(config.checkpoint)))
-    check_policy(settings(plain(recompose(found.record(), _of_worlds(overrides)))), found)
+    if all(each in _MULTIRUN for each in arguments if each.startswith("-")):  # others may have arguments of their own
+        check_overrides([each for each in arguments if not each.startswith("-")])
 
 
 def _with_run_folder(arguments: Sequence[str]) -> list[str]:

@@ -16,11 +16,11 @@ from typing import Any, cast
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 from hydra.errors import HydraException
-from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from warp_torchrl.config.construction import ConfigError, UnknownKeyError
+from warp_torchrl.config.construction import ConfigError, UnknownKeyError, component
+from warp_torchrl.config.defaults import defaults
 from warp_torchrl.config.grammar import check_overrides, several_values
 from warp_torchrl.config.settings import COMPONENTS, WORLD_KEYS
 from warp_torchrl.nearest import did_you_mean
@@ -45,12 +45,7 @@ def compose_config(name: str, overrides: Sequence[str] = ()) -> DictConfig:
     Raises:
         ConfigError: If an override does not fit, in one line.
     """
-    for override in overrides:
-        group, _, option = override.partition("=")
-        if group in (*COMPONENTS, "scenario") and not _OPTION.fullmatch(option.strip("'\"")):
-            # Hydra merges lists of options and follows paths; a run folder could not tell them, nor resume.
-            several = "; -m sweeps over several" if "," in option else ""
-            raise ConfigError(f"{group} must be one of the files of conf/{group}, got {option}{several}")
+    check_choices(overrides)
     config = _compose(name, overrides)
     try:
         OmegaConf.resolve(config)
@@ -59,36 +54,27 @@ def compose_config(name: str, overrides: Sequence[str] = ()) -> DictConfig:
     return config
 
 
-def is_sweep(name: str, overrides: Sequence[str]) -> bool:
-    """Return whether an experiment among the overrides is a sweep in itself.
+def check_choices(overrides: Sequence[str]) -> None:
+    """Check that each group has one option, by its name.
+
+    Hydra merges lists of options and follows paths; a run folder could not tell them, nor resume.
 
     Raises:
-        ConfigError: If there is no such experiment, in one line.
+        ConfigError: If not, in one line.
     """
-    chosen = [each for each in overrides if each.startswith("experiment=")]
-    return bool(chosen) and _compose(name, chosen, with_hydra=True).hydra.mode == RunMode.MULTIRUN
+    for override in overrides:
+        group, _, option = override.partition("=")
+        if group in (*COMPONENTS, "scenario") and not _OPTION.fullmatch(option.strip("'\"")):
+            several = "; -m sweeps over several" if "," in option else ""
+            raise ConfigError(f"{group} must be one of the files of conf/{group}, got {option}{several}")
 
 
-def output_folder(name: str, overrides: Sequence[str], sweeps: bool) -> Path:
-    """Return the folder into which a command, or its sweep, will write.
-
-    Raises:
-        ConfigError: If an override does not fit, in one line.
-    """
-    hydra = _compose(name, overrides, with_hydra=True).hydra
-    try:
-        return Path(hydra.sweep.dir if sweeps else hydra.run.dir)
-    except OmegaConfBaseException as error:
-        raise ConfigError(one_line(error)) from None
-
-
-def _compose(name: str, overrides: Sequence[str], with_hydra: bool = False) -> DictConfig:
+def _compose(name: str, overrides: Sequence[str]) -> DictConfig:
     try:
         folder = conf_folder()
-        return deepcopy(_composed(folder, _last_change(folder), name, tuple(overrides), with_hydra))
+        return deepcopy(_composed(folder, _last_change(folder), name, tuple(overrides)))
     except HYDRA_ERRORS as error:
-        check_overrides(overrides)
-        raise _told(error, _known_keys(name, overrides)) from None
+        raise explain(error, name, overrides) from None
     except ValueError as error:
         raise ConfigError(f"{one_line(error)}, in {' '.join(overrides)}") from None
 
@@ -98,7 +84,7 @@ def _known_keys(name: str, overrides: Sequence[str]) -> list[str]:
     chosen = tuple(each for each in overrides if each.partition("=")[0] in (*COMPONENTS, *GROUPS))
     for choices in (chosen, ()):
         try:
-            config = _composed(conf_folder(), _last_change(conf_folder()), name, choices, False)
+            config = _composed(conf_folder(), _last_change(conf_folder()), name, choices)
         except HYDRA_ERRORS:
             continue
         return [*_keys(plain(config)), *GROUPS]
@@ -106,22 +92,27 @@ def _known_keys(name: str, overrides: Sequence[str]) -> list[str]:
 
 
 @lru_cache(maxsize=64)
-def _composed(folder: Path, last_change: int, name: str, overrides: tuple[str, ...], with_hydra: bool) -> DictConfig:
+def _composed(folder: Path, last_change: int, name: str, overrides: tuple[str, ...]) -> DictConfig:
     """Return a composed configuration, which takes Hydra a fifth of a second: once for each state of the files."""
     GlobalHydra.instance().clear()
     with initialize_config_dir(str(folder), version_base="1.3"):
-        return compose(name, overrides=list(overrides), return_hydra_config=with_hydra)
+        return compose(name, overrides=list(overrides))
 
 
 def _last_change(folder: Path) -> int:
     return max(path.stat().st_mtime_ns for path in (folder, *folder.glob("**/*")))
 
 
-def _told(error: Exception, known: Sequence[str]) -> ConfigError:
-    """Return Hydra's error as ours."""
+def explain(error: Exception, name: str, overrides: Sequence[str]) -> ConfigError:
+    """Return the error that Hydra raised on composing ``conf/<name>.yaml`` as ours, in one line.
+
+    Raises:
+        ConfigError: If an override is not of Hydra's grammar.
+    """
+    check_overrides(overrides)
     unknown = re.match(r"Could not override '([^']*)'", str(error))
-    told = one_line(error, known)
-    return UnknownKeyError(told, unknown[1]) if unknown else ConfigError(told)
+    line = one_line(error, _known_keys(name, overrides))
+    return UnknownKeyError(line, unknown[1]) if unknown else ConfigError(line)
 
 
 def one_line(error: Exception, known: Sequence[str] = ()) -> str:
@@ -149,7 +140,12 @@ def _options_with(key: str) -> list[str]:
     """Return the options of a key's group whose files have it."""
     group, _, name = key.partition(".")
     files = sorted((conf_folder() / group).glob("*.yaml")) if group in COMPONENTS and name else []
-    return [f"{group}={path.stem}" for path in files if name in cast("DictConfig", OmegaConf.load(path))]
+    return [f"{group}={path.stem}" for path in files if name in defaults(_class_of(path))]
+
+
+def _class_of(path: Path) -> type:
+    """Return the class that an option's file names."""
+    return cast("type", component(cast("DictConfig", OmegaConf.load(path))["_target_"]))
 
 
 # What is written into a run folder, and read back

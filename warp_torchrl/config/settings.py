@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
 import torch
@@ -12,6 +12,7 @@ from warp_torchrl.config.construction import ConfigError, build, construct
 from warp_torchrl.config.seeds import BEYOND_EVALUATION, FIRST_EVALUATED, SEEDS, WORLDS
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.nearest import did_you_mean
+from warp_torchrl.validation import check_fields
 from warp_torchrl.world.fast.compile import check_compiler
 from warp_torchrl.world.world import World
 
@@ -55,6 +56,7 @@ class CheckpointPlan:
     keep: int = 2
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if self.interval < 1:
             raise ValueError(f"interval must be at least 1 frame, got {self.interval}")
         if not 0.0 <= self.minutes <= 1e6:
@@ -85,6 +87,7 @@ class EvaluationPlan:
     leave_one_out: bool = False
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if self.interval < 0:
             raise ValueError(f"interval must be 0 or more frames, got {self.interval}")
         if not 1 <= self.episodes <= 1_000_000:
@@ -100,6 +103,24 @@ class EvaluationPlan:
 class Settings:
     """Everything that a run needs, checked: the components, built, and the run's own numbers.
 
+    Attributes:
+        scenario: Its name.
+        world: The rules of the scenario.
+        observation: What agents observe.
+        reward: What they are paid for.
+        model: The networks.
+        algorithm: How they learn.
+        collector: Where they collect.
+        logger: The tracker, beside ``metrics.csv``.
+        n_worlds: Worlds in the batch.
+        total_frames: World steps in all; agent steps are frames x agents.
+        seed: 0 to 2^31; no world of one is a world of another, or of an evaluation.
+        device: ``cpu``, ``cuda`` or ``cuda:<number>``.
+        compile: Fuse steps and losses of training with ``torch.compile``: faster after a minute or two.
+        checkpoint: When training saves.
+        evaluation: How policies are evaluated.
+        imitation: How a team learns from a teacher.
+
     Raises:
         ValueError: If a value is out of its range.
     """
@@ -112,16 +133,17 @@ class Settings:
     algorithm: Any
     collector: Any
     logger: Any
-    n_worlds: int
-    total_frames: int
-    seed: int
-    device: str
-    compile: bool
-    checkpoint: CheckpointPlan
-    evaluation: EvaluationPlan
-    imitation: Kickstarting
+    n_worlds: int = 256
+    total_frames: int = 2_000_000
+    seed: int = 0
+    device: str = "cpu"
+    compile: bool = False
+    checkpoint: CheckpointPlan = field(default_factory=CheckpointPlan)
+    evaluation: EvaluationPlan = field(default_factory=EvaluationPlan)
+    imitation: Kickstarting = field(default_factory=Kickstarting)
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if not 1 <= self.n_worlds <= WORLDS:
             raise ValueError(f"n_worlds must be in 1..{WORLDS}, got {self.n_worlds}")
         if not 1 <= self.total_frames <= 10**15:
@@ -173,15 +195,13 @@ def settings(config: Mapping[str, Any]) -> Settings:
         if key not in known:
             has = f"it has {', '.join(sorted(known - {'world'}))}"
             raise ConfigError(f"{key} is not a key of the configuration; {has}{did_you_mean(key, known)}")
-    for key in (*COMPONENTS, "checkpoint", "evaluation", "imitation"):
+    for key in COMPONENTS:
         if key not in config:
             raise ConfigError(f"{key} must be given")
     built = build_components(config)
-    values = {each.name: built.get(each.name, config.get(each.name)) for each in fields(Settings)}
-    values["world"] = built["world"]
-    values["checkpoint"] = construct(CheckpointPlan, config["checkpoint"], "checkpoint")
-    values["evaluation"] = construct(EvaluationPlan, config["evaluation"], "evaluation")
-    values["imitation"] = construct(Kickstarting, config["imitation"], "imitation")
+    parts = {"checkpoint": CheckpointPlan, "evaluation": EvaluationPlan, "imitation": Kickstarting}
+    built |= {name: construct(kind, config.get(name, {}), name) for name, kind in parts.items()}
+    values = _chosen(Settings, {**config, **built})
     _check_together(config)
     made = construct(Settings, values, "")
     with _told("algorithm"):
@@ -215,8 +235,12 @@ def build_components(config: Mapping[str, Any], names: Sequence[str] = COMPONENT
         ConfigError: With key, value and rule.
     """
     built = {name: build(config[name], name) for name in names}
-    world = {each.name: built.get(each.name, config.get(each.name)) for each in fields(World)}
-    return {**built, "world": construct(World, world, "")}
+    return {**built, "world": construct(World, _chosen(World, {**config, **built}), "")}
+
+
+def _chosen(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return those values that are fields of a dataclass."""
+    return {each.name: values[each.name] for each in fields(kind) if each.name in values}
 
 
 def _check_together(config: Mapping[str, Any]) -> None:

@@ -65,12 +65,12 @@ class Mlp:
     activation: Literal["tanh", "relu"] = "tanh"
     facing: Literal["north", "fire"] = "fire"
     memory: int = 0
-    dtype: Literal["auto", "float32", "bfloat16"] = "float32"
+    dtype: Literal["auto", "float32", "bfloat16"] = "auto"
 
     def __post_init__(self) -> None:
+        check_fields(self, memory=(0, 8192))
         for name in ("actor_hidden", "critic_hidden"):
             check_sizes(name, getattr(self, name))
-        check_fields(self, memory=(0, 8192))
         if self.memory % 8:
             raise ValueError(f"memory must be a multiple of 8, got {self.memory}")
 
@@ -187,6 +187,8 @@ class Cnn(Mlp):
         ValueError: If a size is out of range or the kernel is even.
     """
 
+    activation: Literal["tanh", "relu"] = "relu"
+    dtype: Literal["auto", "float32", "bfloat16"] = "float32"
     channels: tuple[int, ...] = (16, 16)
     kernel_size: int = 3
 

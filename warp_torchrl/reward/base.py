@@ -35,7 +35,7 @@ class Reward:
 
     team_share: float = 1.0
     scale: float = 1.0
-    shaping: float = 0.0
+    shaping: float = 1.0
     potential: Literal["distance", "exposure"] = "distance"
     gamma: float = 0.99
     normalise: bool = False

@@ -31,6 +31,7 @@ class Conservation(Reward):
         act: w_a, cost of each extinguish or clear action [1].
     """
 
+    scale: float = 5.0
     preserved: float = 1.0
     extinguished: float = 0.9
     cleared: float = 0.5

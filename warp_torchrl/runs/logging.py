@@ -13,6 +13,7 @@ from typing import Literal, Protocol
 from torchrl.record.loggers import get_logger
 
 from warp_torchrl.runs import disk
+from warp_torchrl.validation import check_fields
 
 log = logging.getLogger("warp_torchrl")
 
@@ -156,6 +157,9 @@ class Wandb:
     project: str = "warp_torchrl"
     mode: Literal["offline", "online"] = "offline"
     group: str | None = None
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
     def open(self, run: Path) -> Tracker:
         """Return a tracker for a run folder."""

@@ -25,7 +25,7 @@ class Ignition:
         ValueError: If a value is out of its range.
     """
 
-    count: int = 1
+    count: int = 2
     radius: int = 1
     region: float = 0.6
     head_start: int = 1

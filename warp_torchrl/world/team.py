@@ -60,7 +60,7 @@ class Team:
         ValueError: If a value is out of its range or a role is unknown.
     """
 
-    n_agents: int = 2
+    n_agents: int = 4
     roles: tuple[str, ...] = ("ugv",)
     allow_stay: bool = True
     extinguish_p: float = 1.0

@@ -116,7 +116,7 @@ def test_a_caller_who_changes_his_array_does_not_change_the_landscape() -> None:
     [
         ({}, "^path must name an .npz file with cover where cover is not passed, got None"),
         ({"cover": [[3] * 4] * 4, "path": "x.npz"}, "^path must be null where arrays are passed, got x.npz and cover"),
-        ({"path": 7}, "^path must name an .npz file of plain arrays, 7 is not one"),
+        ({"path": 7}, "^path must be a text or PathLike or null, got 7"),
         ({"cover": "forest"}, "^cover must hold numbers in two dimensions"),
         ({"cover": [["f"] * 4] * 4}, "^cover must hold numbers"),
         ({"cover": [[3] * 4, [3] * 5] * 2}, "^cover must be an array of numbers"),

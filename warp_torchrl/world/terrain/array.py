@@ -48,7 +48,7 @@ class Array:
             shapes differ, a code is not in 0..4, an age not in 0..10, an elevation not finite, or no window fits.
     """
 
-    path: str | None = field(default=None, compare=False)
+    path: str | PathLike[str] | None = field(default=None, compare=False)
     cover: Sequence[Sequence[int]] | np.ndarray | Tensor | None = field(default=None, repr=False, compare=False)
     elevation: Sequence[Sequence[float]] | np.ndarray | Tensor | None = field(default=None, repr=False, compare=False)
     age: Sequence[Sequence[int]] | np.ndarray | Tensor | None = field(default=None, repr=False, compare=False)

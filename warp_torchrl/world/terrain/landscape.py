@@ -131,7 +131,6 @@ class Perlin:
     independent_elevation: bool = False
 
     def __post_init__(self) -> None:
-        map_size(self.size)
         check_fields(
             self,
             scale=(1.0, 1e4),
@@ -140,6 +139,7 @@ class Perlin:
             lacunarity=(1.0, 8.0),
             relief=(0.0, 10_000.0),
         )
+        map_size(self.size)
         if max(self._finest()) > 32.0:
             raise ValueError(
                 f"lacunarity ** (octaves - 1) / scale must be at most 32 lattice steps a cell, "

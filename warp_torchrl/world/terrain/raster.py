@@ -80,8 +80,8 @@ class Raster:
     _crop: Crop = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        map_size(self.size)
         check_fields(self, full_age=(1e-6, 1e6), resolution=(0.1, 100_000.0), min_fuel=(0.0, 1.0))
+        map_size(self.size)
         if self.age is not None and self.canopy is not None:
             raise ValueError(f"canopy must be null where age makes the trees, got {self.canopy} and {self.age}")
         if self.resolution is not None and self.resample == "refuse":

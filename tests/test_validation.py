@@ -1,0 +1,45 @@
+"""A value that does not fit is told in the same words from a yaml file and from Python."""
+
+import numpy as np
+import pytest
+
+from warp_torchrl.config.construction import ConfigError, construct
+from warp_torchrl.models import Mlp
+from warp_torchrl.reward import Efficiency
+from warp_torchrl.runs.logging import Wandb
+from warp_torchrl.world.fire import Fire
+from warp_torchrl.world.ignition import Ignition
+from warp_torchrl.world.terrain.landscape import Perlin
+from warp_torchrl.world.wind import Uniform
+from warp_torchrl.world.world import World
+
+BAD = [
+    (Uniform, "speed", "fast", "speed must be a number, got 'fast'"),
+    (Uniform, "speed", None, "speed must be a number, got None"),
+    (Uniform, "speed", True, "speed must be a number, got True"),
+    (Uniform, "speed", 61.0, "speed must be in [0, 60], got 61.0"),
+    (Fire, "growth", 1, "growth must be true or false, got 1"),
+    (Fire, "neighbours", 7, "neighbours must be 4 or 8, got 7"),
+    (Fire, "kernel", "elipse", "kernel must be alexandridis or ellipse, got 'elipse': did you mean ellipse?"),
+    (Ignition, "count", 1.5, "count must be a whole number, got 1.5"),
+    (Perlin, "scale", (1.0, 2.0, 3.0), "scale must be a number or a list of 2 values, got (1.0, 2.0, 3.0)"),
+    (Mlp, "actor_hidden", 64, "actor_hidden must be a list of a whole number, got 64"),
+    (Wandb, "mode", "onlin", "mode must be offline or online, got 'onlin': did you mean online?"),
+    (World, "fire", "paper", "fire must be Fire, got 'paper'"),
+    (Efficiency, "shaping", [], "shaping must be a number, got []"),
+]
+
+
+@pytest.mark.parametrize(("kind", "field", "value", "told"), BAD)
+def test_python_and_yaml_are_answered_alike(kind, field, value, told):
+    with pytest.raises(ValueError) as direct:
+        kind(**{field: value})
+    with pytest.raises(ConfigError) as composed:
+        construct(kind, {field: value}, "part")
+    assert str(direct.value) == told and str(composed.value) == f"part.{told}"
+
+
+def test_a_value_takes_the_form_of_its_hint():
+    made = [Uniform(speed=4).speed, Uniform(speed=np.float32(4.0)).speed, Ignition(count=3.0).count]
+    assert made == [4.0, 4.0, 3] and [type(each) for each in made] == [float, float, int]
+    assert Mlp(actor_hidden=[16.0]).actor_hidden == (16,) and Perlin(scale=[10, 20]).scale == (10.0, 20.0)

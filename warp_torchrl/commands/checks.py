@@ -1,0 +1,115 @@
+"""Checks before any work: each job of a command line is checked as Hydra composed it, before a folder is made."""
+
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from hydra.core.global_hydra import GlobalHydra
+from hydra.experimental.callback import Callback
+from omegaconf import DictConfig, OmegaConf
+
+from warp_torchrl.commands.failure import fail
+from warp_torchrl.commands.sweep import jobs
+from warp_torchrl.config.compose import HYDRA_ERRORS, check_choices, explain, plain, recompose
+from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.config.settings import settings
+from warp_torchrl.evaluation.evaluate import check_policy
+from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.nearest import did_you_mean
+from warp_torchrl.runs import checkpoint as checkpoints
+from warp_torchrl.runs.destination import check_free
+from warp_torchrl.runs.resumption import resumption
+from warp_torchrl.runs.shipped import find_policy
+from warp_torchrl.runs.transfer import check_start
+
+
+class CheckFirst(Callback):
+    """Checks a command's jobs when Hydra has composed its configuration; a mistake ends the process."""
+
+    def on_run_start(self, config: DictConfig, config_name: str | None = None, **kwargs: Any) -> None:
+        """Check the one job of a command."""
+        with _fatal(config):
+            _check(config_name, config)
+            if config_name == "evaluate" and not config.overwrite:
+                check_free(Path(str(config.hydra.run.dir)), "hydra.run.dir")
+
+    def on_multirun_start(self, config: DictConfig, config_name: str | None = None, **kwargs: Any) -> None:
+        """Check every job of a sweep."""
+        loader = GlobalHydra.instance().config_loader()
+        with _fatal(config):
+            for job in jobs(config.hydra.overrides.task):
+                try:
+                    composed = loader.load_sweep_config(config, job)
+                except HYDRA_ERRORS as error:
+                    raise explain(error, str(config_name), job) from None
+                _check(config_name, composed)
+            if config_name == "evaluate" and not config.overwrite:
+                check_free(Path(str(config.hydra.sweep.dir)), "hydra.sweep.dir")
+
+
+@contextmanager
+def _fatal(config: DictConfig) -> Iterator[None]:
+    """End the process with the exit code of a mistake: Hydra would go on with a warning."""
+    try:
+        yield
+    except Exception as error:
+        sys.exit(fail(error, config.get("debug") is True)[0])
+
+
+def _check(name: str | None, config: DictConfig) -> None:
+    overrides = list(config.hydra.overrides.task)
+    check_choices(overrides)
+    values = plain(OmegaConf.masked_copy(config, [str(key) for key in config if key != "hydra"]))
+    (_check_evaluation if name == "evaluate" else _check_training)(values, overrides)
+
+
+def _check_training(values: Mapping[str, Any], overrides: Sequence[str]) -> None:
+    if values["resume"] is None:
+        plan = settings(values)
+        plan.check_training()
+        if values["start_from"] is not None:
+            check_start(plan, checkpoints.newest(find_policy(values["start_from"]))[0])
+        return
+    others = [each for each in overrides if each.split("=")[0] not in ("resume", "debug", "total_frames")]
+    if others:
+        raise ConfigError(
+            f"resume goes on with the folder's own configuration, of which total_frames alone may change; leave out "
+            f"{', '.join(others)}"
+        )
+    folder = Path(str(values["resume"]))
+    if (folder / checkpoints.MANIFEST).exists():
+        raise ConfigError(f"resume must be a run folder, got one of its checkpoints: {folder}")
+    resumption(folder, new_total(values, overrides)).settings.check_training()
+
+
+def new_total(values: Mapping[str, Any], overrides: Sequence[str]) -> Any:
+    """Return the total that a resumed run is to go on to, None where none is asked for."""
+    return values["total_frames"] if any(each.startswith("total_frames=") for each in overrides) else None
+
+
+def _check_evaluation(values: Mapping[str, Any], overrides: Sequence[str]) -> None:
+    checkpoint, policy = values["checkpoint"], values["policy"]
+    if (checkpoint is None) == (policy is None):
+        raise ConfigError("give either checkpoint=PATH or policy=NAME")
+    if policy is not None and policy not in HEURISTICS:
+        hint = did_you_mean(policy, HEURISTICS)
+        raise ConfigError(f"policy must be one of {', '.join(HEURISTICS)}, got {policy}{hint}")
+    if not isinstance(values["overwrite"], bool):
+        raise ConfigError(f"overwrite must be true or false, got {values['overwrite']!r}")
+    if checkpoint is None:
+        check_policy(settings(without_checkpoint(values)), policy)
+        return
+    found, _ = checkpoints.newest(find_policy(str(checkpoint)))
+    check_policy(settings(plain(recompose(found.record(), of_worlds(overrides)))), found)
+
+
+def of_worlds(overrides: Sequence[str]) -> list[str]:
+    """Return the overrides of an evaluation that are not the command's own."""
+    return [each for each in overrides if not each.startswith(("checkpoint=", "policy=", "overwrite="))]
+
+
+def without_checkpoint(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a configuration of an evaluation without its ``checkpoint``, which names one and does not make any."""
+    return {key: value for key, value in values.items() if key != "checkpoint"}

@@ -1,0 +1,64 @@
+"""Default values stand once, in the dataclasses: a yaml file holds what differs from those of the class that it names.
+
+Where Hydra reads a yaml file, in ``conf/`` or in a folder of the user's own, the fields that the file leaves out are
+filled in. So ``--cfg job`` shows every value, every field can be overridden, and a key that is no field is refused.
+"""
+
+from collections.abc import Mapping
+from dataclasses import MISSING, fields, is_dataclass
+from typing import Any
+
+from hydra._internal.core_plugins import file_config_source
+from hydra._internal.sources_registry import SourcesRegistry
+from hydra.plugins.config_source import ConfigResult
+from omegaconf import DictConfig, OmegaConf
+
+from warp_torchrl.config.construction import component
+from warp_torchrl.config.settings import COMPONENTS, Settings
+from warp_torchrl.world.world import World
+
+
+def defaults(kind: type) -> dict[str, Any]:
+    """Return the default values of a dataclass's fields as plain values; a field without one is left out."""
+    found = {}
+    for each in fields(kind):
+        default = each.default if each.default_factory is MISSING else each.default_factory()
+        if each.init and default is not MISSING:
+            found[each.name] = _plain(default)
+    return found
+
+
+def _plain(value: Any) -> Any:
+    if is_dataclass(value) and not isinstance(value, type):
+        return defaults(type(value))
+    if isinstance(value, Mapping):
+        return {key: _plain(each) for key, each in value.items()}
+    return [_plain(each) for each in value] if isinstance(value, tuple | list) else value
+
+
+class FileConfigSource(file_config_source.FileConfigSource):
+    """Hydra's source of yaml files, which fills in the fields that a file leaves out."""
+
+    def load_config(self, config_path: str) -> ConfigResult:
+        """Return the content of a yaml file, ``train`` or an option of a group, with every field of its class."""
+        result = super().load_config(config_path)
+        if isinstance(result.config, DictConfig):
+            result.config = OmegaConf.merge(_left_out(config_path, result.config), result.config)
+        return result
+
+
+def _left_out(config_path: str, node: DictConfig) -> dict[str, Any]:
+    """Return the default values of what a yaml file configures."""
+    if config_path.removesuffix(".yaml") == "train":
+        run = {**defaults(World), **defaults(Settings)}
+        return {name: value for name, value in run.items() if name not in COMPONENTS}
+    kind = component(node["_target_"]) if "_target_" in node else None
+    if kind is None:
+        return {}
+    # A file that builds on another leaves to that one what its class inherits.
+    own = kind.__annotations__ if "defaults" in node else defaults(kind)
+    return {"_target_": node["_target_"], **{name: value for name, value in defaults(kind).items() if name in own}}
+
+
+# Hydra's registry refuses a second source of a scheme, unless both have one name: hence the name and the assignment.
+SourcesRegistry.instance().types[FileConfigSource.scheme()] = FileConfigSource
