@@ -16,8 +16,8 @@ from warp_torchrl.benchmark.numpy_terrain import new_ground
 from warp_torchrl.benchmark.shares import training_shares
 from warp_torchrl.benchmark.tasks import disagreements
 from warp_torchrl.benchmark.ticks import numpy_copy
-from warp_torchrl.config.compose import Record, compose_config, plain
-from warp_torchrl.config.settings import settings
+from warp_torchrl.config.compose import SavedConfig, compose_config, plain
+from warp_torchrl.config.run_config import run_config
 from warp_torchrl.training.loop import Training
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import Action
@@ -116,8 +116,8 @@ def test_everything_is_printed_as_json(capsys):
 
 
 def test_nothing_of_the_stopwatch_stays(tmp_path):
-    plan = settings(plain(compose_config("train", ["n_worlds=2", "collector.steps=4"])))
-    training = Training(plan, Record(), tmp_path)
+    plan = run_config(plain(compose_config("train", ["n_worlds=2", "collector.steps=4"])))
+    training = Training(plan, SavedConfig(), tmp_path)
     learner = training.learner
     owners = (training.env, learner, learner.explore, learner.loss, learner.optimizer, torch.nn.utils)
     before = [{name: id(value) for name, value in vars(owner).items()} for owner in owners]

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from warp_torchrl.config.compose import Record
+from warp_torchrl.config.compose import SavedConfig
 from warp_torchrl.gallery.__main__ import main
 from warp_torchrl.gallery.curves import (
     MULTI,
@@ -46,7 +46,7 @@ def write_run(folder, seed=0, n_agents=2, scenario="skirmish", steps=32, frames=
         scenario=scenario,
         signature=SIGNATURE,
         mode="sampled",
-        record=Record(choices=choices, values={"seed": seed, "team": {"n_agents": n_agents}, "steps": steps}),
+        record=SavedConfig(choices=choices, values={"seed": seed, "team": {"n_agents": n_agents}, "steps": steps}),
         policy={},
         training={},
         keep=2,
@@ -304,7 +304,7 @@ def test_a_config_that_is_not_one_is_told_in_one_line(content, tmp_path, capsys,
 
 
 def test_a_checkpoint_without_a_configuration_is_told_in_one_line(tmp_path, capsys, matplotlib, monkeypatch):
-    monkeypatch.setattr(checkpoints.Checkpoint, "record", lambda self: Record(choices={}, values={}))
+    monkeypatch.setattr(checkpoints.Checkpoint, "record", lambda self: SavedConfig(choices={}, values={}))
     assert "config.json does not hold" in the_one_line(capsys, write_run(tmp_path))
 
 

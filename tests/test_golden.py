@@ -9,8 +9,8 @@ import torch
 
 from tests.forgery import forge
 from warp_torchrl import load_policy, make_env
-from warp_torchrl.config.compose import plain, recompose
-from warp_torchrl.config.settings import settings
+from warp_torchrl.config.compose import plain, restore
+from warp_torchrl.config.run_config import run_config
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.models import ACTION
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
@@ -23,7 +23,7 @@ RELEASES = sorted(path.name for path in GOLDEN.iterdir() if path.is_dir())
 def found_now(release):
     """What a golden policy does on four fires."""
     run = GOLDEN / release
-    plan = settings(plain(recompose(newest(run)[0].record())))
+    plan = run_config(plain(restore(newest(run)[0].record())))
     policy, env = load_policy(run), plan.make_env(plan.evaluation.episodes, plan.evaluation.first_seed)
     episodes = play(env, policy, plan.evaluation.first_seed, policy.mode)
     actions = load_policy(run, "deterministic")(env.reset())[ACTION]
@@ -41,7 +41,7 @@ def test_a_golden_policy_acts_as_it_did(release):
 def test_a_golden_run_goes_on_or_is_refused_by_the_name_of_what_is_missing(release, tmp_path):
     run = shutil.copytree(GOLDEN / release, tmp_path / "run")
     found, skipped = newest(run)
-    training = Training(settings(plain(recompose(found.record(), ["total_frames=96"]))), found.record(), run)
+    training = Training(run_config(plain(restore(found.record(), ["total_frames=96"]))), found.record(), run)
     try:
         training.load_state_dict(found.training())
     except CheckpointError as error:  # a later world has other entries; the policy must still act

@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from warp_torchrl import load_policy, make_env
-from warp_torchrl.config.compose import compose_config, plain, recompose, without_targets
-from warp_torchrl.config.settings import settings
+from warp_torchrl.config.compose import compose_config, plain, restore, without_targets
+from warp_torchrl.config.run_config import run_config
 from warp_torchrl.evaluation.play import play, play_heuristics
 from warp_torchrl.runs.checkpoint import CheckpointError, export, newest
 from warp_torchrl.runs.shipped import find_policy, policy_names
@@ -61,7 +61,7 @@ def test_it_is_small_and_tells_of_no_machine(scenario):
 def test_it_is_trained_by_the_experiment_of_its_name(scenario):
     record = newest(SHIPPED / scenario)[0].record()
     config = compose_config("train", [f"experiment={scenario}", f"seed={record.values['seed']}"])
-    expected, values = (without_targets(plain(each)) for each in (config, recompose(record)))
+    expected, values = (without_targets(plain(each)) for each in (config, restore(record)))
     assert {name: values[name] for name in record.values} == {name: expected[name] for name in record.values}
     assert {"reward", "observation", "imitation", "algorithm", "model", "total_frames"} <= set(record.values)
 
@@ -70,7 +70,7 @@ def test_it_is_trained_by_the_experiment_of_its_name(scenario):
 def test_it_saves_far_more_than_local(scenario):
     """On 12 fires the difference's standard error is below 6 points; its expectation is 27 and more."""
     policy, found = load_policy(SHIPPED / scenario), newest(SHIPPED / scenario)[0]
-    env = settings(plain(recompose(found.record()))).make_env(12, 1_000_000)
+    env = run_config(plain(restore(found.record()))).make_env(12, 1_000_000)
     saved = play(env, policy, 1_000_000, policy.mode)["saved"].mean()
     local = play_heuristics(env, 1_000_000, ["local"])["local"]["saved"].mean()
     assert saved > local + 0.12, (saved, local)
@@ -80,6 +80,6 @@ def test_it_saves_far_more_than_local(scenario):
 def test_any_environment_shows_it_what_it_reads(scenario):
     policy = load_policy(SHIPPED / scenario)
     env = make_env("water", n_worlds=3, overrides=policy.overrides)
-    trained_in = settings(plain(recompose(newest(SHIPPED / scenario)[0].record()))).make_env(1, 0)
+    trained_in = run_config(plain(restore(newest(SHIPPED / scenario)[0].record()))).make_env(1, 0)
     assert env.observation == trained_in.observation
     assert env.rollout(3, policy)["agents", "action"].shape == (3, 3, 4)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import torch
 
-from warp_torchrl.config.compose import compose_config, plain, recompose
+from warp_torchrl.config.compose import compose_config, plain, restore
 from warp_torchrl.config.construction import build
-from warp_torchrl.config.settings import ENVIRONMENT, build_components
+from warp_torchrl.config.run_config import ENVIRONMENT, build_components
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.policy import TrainedPolicy
 from warp_torchrl.runs import checkpoint as checkpoints
@@ -86,7 +86,7 @@ def policy_of(found: checkpoints.Checkpoint, mode: str = "best") -> TrainedPolic
     if mode not in ("best", "sampled", "deterministic"):
         raise ValueError(f"mode must be best, sampled or deterministic, got {mode}")
     record = found.record()
-    config = plain(recompose(record))
+    config = plain(restore(record))
     algorithm, model = build(config["algorithm"], "algorithm"), build(config["model"], "model")
     weights = found.policy()
     try:

@@ -8,7 +8,7 @@ from torch.nn.functional import smooth_l1_loss
 from warp_torchrl.algorithms.dqn import Dqn
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.settings import settings
+from warp_torchrl.config.run_config import run_config
 from warp_torchrl.models import ACTION, ACTION_MASK, ACTION_VALUE, OBSERVATION, REWARD, Mlp
 
 SMALL = Mlp(actor_hidden=(8,), critic_hidden=(8,))
@@ -198,7 +198,7 @@ def test_a_batch_must_fit_into_the_memory(make_small_env):
     with pytest.raises(ValueError, match="capacity must be at least a batch"):
         Dqn(capacity=16, warm_up=8).build(make_small_env(4), SMALL, 32)
     with pytest.raises(ConfigError, match=r"algorithm\.capacity must be at least a batch"):
-        settings(plain(compose_config("train", ["algorithm=dqn", "algorithm.warm_up=10", "algorithm.capacity=100"])))
+        run_config(plain(compose_config("train", ["algorithm=dqn", "algorithm.warm_up=10", "algorithm.capacity=100"])))
 
 
 def test_the_observation_is_kept_as_bytes(make_small_env):

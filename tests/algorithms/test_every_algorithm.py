@@ -6,7 +6,7 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from tests.conftest import small_world
 from warp_torchrl.config.compose import compose_config, conf_folder, plain
-from warp_torchrl.config.settings import settings
+from warp_torchrl.config.run_config import run_config
 from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, REWARD, Cnn, Mlp
 from warp_torchrl.world.team import Team
 
@@ -20,7 +20,7 @@ def algorithm(name, *overrides):
     if name in REPLAYS:
         overrides = ("algorithm.capacity=512", "algorithm.warm_up=64", "algorithm.updates=8", *overrides)
     overrides = (f"algorithm={name}", "algorithm.minibatch_size=64", "n_worlds=16", "collector.steps=8", *overrides)
-    return settings(plain(compose_config("train", list(overrides)))).algorithm
+    return run_config(plain(compose_config("train", list(overrides)))).algorithm
 
 
 def collected(env, learner, steps):

@@ -9,10 +9,10 @@ import pytest
 import torch
 
 from warp_torchrl.collection.collectors import MultiProcess, WorkerDied
-from warp_torchrl.config.compose import Record, compose_config, plain
+from warp_torchrl.config.compose import SavedConfig, compose_config, plain
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.seeds import first_world_seed
-from warp_torchrl.config.settings import settings
 from warp_torchrl.runs.checkpoint import newest
 from warp_torchrl.training.loop import Training
 
@@ -32,7 +32,7 @@ TINY = [
 
 
 def training(folder: Path, *overrides: str) -> Training:
-    return Training(settings(plain(compose_config("train", [*TINY, *overrides]))), Record(), folder)
+    return Training(run_config(plain(compose_config("train", [*TINY, *overrides]))), SavedConfig(), folder)
 
 
 def first_batches(folder: Path, *overrides: str) -> list:
@@ -99,14 +99,14 @@ def test_a_resumed_run_meets_new_fires(tmp_path, here):
     finally:
         run.close()
     assert not torch.equal(batch["state"][:, 0], here[0]["state"][:, 0])
-    env = run.settings.make_env(4, first_world_seed(1234))
+    env = run.run_config.make_env(4, first_world_seed(1234))
     env.set_seeds(range(first_world_seed(1234), first_world_seed(1234) + 4), first_episode=12)
     assert torch.equal(env.reset()["state"], batch["state"][:, 0])
 
 
 def test_workers_must_share_the_worlds():
     with pytest.raises(ConfigError, match=r"collector\.workers must divide n_worlds, 4, got 3"):
-        settings(plain(compose_config("train", [*TINY, "collector=process", "collector.workers=3"])))
+        run_config(plain(compose_config("train", [*TINY, "collector=process", "collector.workers=3"])))
     with pytest.raises(ValueError, match="workers must be in"):
         MultiProcess(workers=0)
 
@@ -114,4 +114,4 @@ def test_workers_must_share_the_worlds():
 def test_a_missing_ray_is_told(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(ConfigError, match=r"collector\.workers need Ray: pip install"):
-        settings(plain(compose_config("train", [*TINY, "collector=ray"])))
+        run_config(plain(compose_config("train", [*TINY, "collector=ray"])))

@@ -9,9 +9,9 @@ from torch.nn.functional import cross_entropy
 from torchrl.objectives import BCLoss
 
 from warp_torchrl.collection.kickstarting import TEACHERS, Kickstarting
-from warp_torchrl.config.compose import Record, compose_config, plain
+from warp_torchrl.config.compose import SavedConfig, compose_config, plain
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.settings import settings
+from warp_torchrl.config.run_config import run_config
 from warp_torchrl.evaluation.method import method
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, TEACHER_ACTION
@@ -31,11 +31,11 @@ TINY = [
 
 
 def configured(*overrides):
-    return settings(plain(compose_config("train", [*TINY, *overrides])))
+    return run_config(plain(compose_config("train", [*TINY, *overrides])))
 
 
 def student(folder, *overrides):
-    return Training(configured("imitation.teacher=greedy", *overrides), Record(), folder)
+    return Training(configured("imitation.teacher=greedy", *overrides), SavedConfig(), folder)
 
 
 def test_the_teacher_tells_what_it_would_do_in_the_pupils_states(tmp_path):
@@ -104,7 +104,7 @@ def test_the_cloning_loss_is_torchrls(tmp_path):
 
 
 def test_the_learners_own_terms_and_state_stay_as_they_are(tmp_path):
-    taught, alone = student(tmp_path), Training(configured(), Record(), tmp_path)
+    taught, alone = student(tmp_path), Training(configured(), SavedConfig(), tmp_path)
     sample = sample_of(taught)
     mine, theirs = taught.learner.terms(sample.clone()), alone.learner.terms(sample.clone())
     assert isinstance(mine, TensorDict) and set(mine.keys()) - set(theirs.keys()) == {"loss_bc"}
@@ -148,14 +148,18 @@ def test_teachers_do_not_remember():
 
 
 def test_without_a_teacher_the_learner_is_as_it_was(tmp_path):
-    training = Training(configured(), Record(), tmp_path)
+    training = Training(configured(), SavedConfig(), tmp_path)
     assert Kickstarting().kickstart(training.learner, training.env) is training.learner
 
 
 def test_a_policy_with_a_teacher_is_called_so():
-    record = Record(choices={"algorithm": "mappo", "reward": "time", "observation": "local"}, values={"seed": 1})
-    taught = Record(choices=record.choices, values={"seed": 2, "imitation": {"teacher": "greedy", "until": 0.3}})
-    as_floats = Record(choices=record.choices, values={"seed": 1, "sizes": [1.0], "reward": {"act": 0.0}, "on": True})
-    as_integers = Record(choices=record.choices, values={"seed": 2, "sizes": [1], "reward": {"act": 0}, "on": True})
+    record = SavedConfig(choices={"algorithm": "mappo", "reward": "time", "observation": "local"}, values={"seed": 1})
+    taught = SavedConfig(choices=record.choices, values={"seed": 2, "imitation": {"teacher": "greedy", "until": 0.3}})
+    as_floats = SavedConfig(
+        choices=record.choices, values={"seed": 1, "sizes": [1.0], "reward": {"act": 0.0}, "on": True}
+    )
+    as_integers = SavedConfig(
+        choices=record.choices, values={"seed": 2, "sizes": [1], "reward": {"act": 0}, "on": True}
+    )
     assert method(as_floats) == method(as_integers) != method(record)
     assert method(record)[0] == "mappo time local" and method(taught)[0] == "mappo time local taught by greedy"

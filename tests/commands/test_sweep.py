@@ -2,7 +2,7 @@
 
 import pytest
 
-from warp_torchrl.config.compose import Record, compose_config, plain
+from warp_torchrl.config.compose import SavedConfig, compose_config, plain
 from warp_torchrl.evaluation.method import method
 
 
@@ -23,13 +23,13 @@ def test_a_policy_is_called_by_what_is_unusual(overrides, named):
     chosen = dict(each.split("=") for each in overrides)
     usual = {"algorithm": "mappo", "reward": "efficiency", "observation": "surroundings"}
     choices = {group: chosen.get(group, option) for group, option in usual.items()}
-    record = Record(choices=choices, values=plain(compose_config("train", overrides)))
+    record = SavedConfig(choices=choices, values=plain(compose_config("train", overrides)))
     assert method(record)[0] == named
 
 
 def test_a_record_from_before_a_key_tells_nothing_of_it():
     choices = {"algorithm": "mappo", "reward": "time", "observation": "local"}
-    assert method(Record(choices=choices, values={"model": {"sharing": "team"}}))[0] == "mappo time local"
+    assert method(SavedConfig(choices=choices, values={"model": {"sharing": "team"}}))[0] == "mappo time local"
 
 
 def test_runs_that_are_saved_at_other_times_are_alike():
@@ -40,5 +40,5 @@ def test_runs_that_are_saved_at_other_times_are_alike():
         [],
         ["algorithm.gamma=0.5", "reward.gamma=0.5"],
     )
-    digests = [method(Record(choices=choices, values=plain(compose_config("train", each))))[1] for each in plans]
+    digests = [method(SavedConfig(choices=choices, values=plain(compose_config("train", each))))[1] for each in plans]
     assert digests[0] == digests[1] == digests[2] != digests[3]

@@ -12,17 +12,17 @@ from torch._inductor.exc import InvalidCxxCompiler
 
 from warp_torchrl.api import make_env
 from warp_torchrl.config.compose import (
-    Record,
+    SavedConfig,
     compose_config,
     conf_folder,
     plain,
-    recompose,
+    restore,
     without_targets,
     world_overrides,
 )
 from warp_torchrl.config.construction import ConfigError, build, component
 from warp_torchrl.config.defaults import defaults
-from warp_torchrl.config.settings import COMPONENTS, Settings, settings
+from warp_torchrl.config.run_config import COMPONENTS, RunConfig, run_config
 from warp_torchrl.world.gridded import Gridded
 from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.raster import Raster
@@ -72,7 +72,7 @@ def test_a_class_without_arguments_is_its_option(option):
 
 
 def test_a_world_without_arguments_is_the_scenario_default():
-    assert settings(plain(compose_config("train", ["scenario=default"]))).world == World()
+    assert run_config(plain(compose_config("train", ["scenario=default"]))).world == World()
     assert make_env().world == World()
 
 
@@ -88,7 +88,7 @@ def test_no_scenario_repeats_a_default_but_its_size_which_each_landscape_has_ano
 
 def test_train_yaml_repeats_no_default_of_a_run():
     held = OmegaConf.load(conf_folder() / "train.yaml")
-    assert not set(held) & {*defaults(Settings), *defaults(World)} - set(COMPONENTS)
+    assert not set(held) & {*defaults(RunConfig), *defaults(World)} - set(COMPONENTS)
 
 
 def test_a_folder_of_the_users_own_is_filled_in_too(tmp_path):
@@ -119,7 +119,7 @@ def _derived(component):
 def test_an_array_runs_in_every_scenario_cropped_to_its_size(scenario, tmp_path):
     np.savez(tmp_path / "land.npz", cover=np.full((40, 50), 3))
     overrides = [f"scenario={scenario}", "landscape=array", f"landscape.path={tmp_path / 'land.npz'}"]
-    plan = settings(plain(compose_config("train", overrides)))
+    plan = run_config(plain(compose_config("train", overrides)))
     env = plan.make_env(2, 0)
     env.reset()
     side = plan.world.size[0]
@@ -128,13 +128,13 @@ def test_an_array_runs_in_every_scenario_cropped_to_its_size(scenario, tmp_path)
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_every_scenario_is_a_run(scenario):
-    plan = settings(plain(compose_config("train", [f"scenario={scenario}"])))
+    plan = run_config(plain(compose_config("train", [f"scenario={scenario}"])))
     assert plan.scenario == scenario and plan.world.horizon == 8 * plan.world.size[0]
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
 def test_every_experiment_is_a_run(experiment):
-    plan = settings(plain(compose_config("train", [f"experiment={experiment}"])))
+    plan = run_config(plain(compose_config("train", [f"experiment={experiment}"])))
     assert plan.total_frames >= plan.n_worlds * plan.collector.steps
 
 
@@ -142,7 +142,7 @@ def test_the_landfire_scenario_runs_on_its_raster():
     if not LANDFIRE.is_dir():
         pytest.skip(f"no landscape at {LANDFIRE}")
     pytest.importorskip("rasterio")
-    plan = settings(plain(compose_config("train", ["scenario=landfire", f"landscape.path={LANDFIRE}"])))
+    plan = run_config(plain(compose_config("train", ["scenario=landfire", f"landscape.path={LANDFIRE}"])))
     env = plan.make_env(2, 0)
     env.rollout(6, break_when_any_done=False)
     assert env.world_state.ground.slope is not None and env.world.side_of_cell == 30.0
@@ -150,7 +150,7 @@ def test_the_landfire_scenario_runs_on_its_raster():
 
 def test_the_landfire_scenario_has_no_path_of_its_own():
     with pytest.raises(ConfigError, match=r"landscape\.path"):
-        settings(plain(compose_config("train", ["scenario=landfire"])))
+        run_config(plain(compose_config("train", ["scenario=landfire"])))
 
 
 MISTAKES = [
@@ -223,13 +223,13 @@ MISTAKES = [
 @pytest.mark.parametrize(("override", "message"), MISTAKES)
 def test_mistakes_are_told_in_one_line(override, message):
     with pytest.raises(ConfigError, match=message) as error:
-        settings(plain(compose_config("train", override.split())))
+        run_config(plain(compose_config("train", override.split())))
     assert "\n" not in str(error.value)
 
 
 def test_a_number_that_is_whole_is_a_whole_number_however_it_is_written():
     overrides = ["total_frames=1e6", "collector.steps=6.4e1", "landscape.size=20.0", "observation.radius=3.0"]
-    plan = settings(plain(compose_config("train", [*overrides, "model.actor_hidden=[16.0]", "algorithm.epochs=2e0"])))
+    plan = run_config(plain(compose_config("train", [*overrides, "model.actor_hidden=[16.0]", "algorithm.epochs=2e0"])))
     numbers = [plan.total_frames, plan.collector.steps, plan.world.landscape.size, plan.observation.radius]
     numbers += [*plan.model.actor_hidden, plan.algorithm.epochs]
     assert numbers == [1_000_000, 64, 20, 3, 16, 2] and {type(each) for each in numbers} == {int}
@@ -237,24 +237,24 @@ def test_a_number_that_is_whole_is_a_whole_number_however_it_is_written():
 
 def recorded(*overrides):
     config = compose_config("train", overrides)
-    return Record(choices={"scenario": "single", "observation": "local"}, values=without_targets(plain(config)))
+    return SavedConfig(choices={"scenario": "single", "observation": "local"}, values=without_targets(plain(config)))
 
 
 def test_a_recorded_configuration_comes_back():
     record = recorded("scenario=single", "observation=local", "seed=5", "team.n_agents=3")
-    config = recompose(record)
+    config = restore(record)
     assert config.seed == 5 and config.team.n_agents == 3 and config.scenario == "single"
     assert config.observation._target_.endswith("Local")
 
 
 def test_overrides_come_before_what_is_recorded():
     record = recorded("scenario=single", "observation=local", "wind.speed=9")
-    config = recompose(record, ["team.n_agents=2", "fire=paper"])
+    config = restore(record, ["team.n_agents=2", "fire=paper"])
     assert config.team.n_agents == 2 and config.fire.beta == 0.65 and config.wind.speed == 9
 
 
 def test_another_scenario_takes_the_whole_world_from_it():
-    config = recompose(recorded("scenario=single", "observation=local", "wind.speed=9"), ["scenario=large"])
+    config = restore(recorded("scenario=single", "observation=local", "wind.speed=9"), ["scenario=large"])
     assert config.team.n_agents == 8 and config.horizon == 512 and config.wind.speed == 4.0
     assert config.observation._target_.endswith("Local")
 
@@ -262,10 +262,10 @@ def test_another_scenario_takes_the_whole_world_from_it():
 def test_classes_never_come_from_a_record():
     values = {"fire": {"_target_": "os.system"}}
     with pytest.raises(ConfigError, match=r"os\.system"):
-        settings(plain(recompose(Record(choices={}, values=values))))
+        run_config(plain(restore(SavedConfig(choices={}, values=values))))
     for choices in ({"scenario": "../../evil"}, {"hydra": "x"}):
         with pytest.raises(ConfigError, match="not one of our options"):
-            recompose(Record(choices=choices, values={}))
+            restore(SavedConfig(choices=choices, values={}))
 
 
 def test_a_yaml_file_that_was_edited_is_read_anew(tmp_path, monkeypatch):
@@ -305,8 +305,8 @@ def test_only_training_asks_for_a_compiler(monkeypatch):
         raise InvalidCxxCompiler
 
     monkeypatch.setattr("torch._inductor.cpp_builder.get_cpp_compiler", none)
-    plan = settings(plain(compose_config("train", ["compile=true"])))
+    plan = run_config(plain(compose_config("train", ["compile=true"])))
     with pytest.raises(ConfigError, match="compile must be false here"):
         plan.check_training()
     assert plan.make_env(1, 0).reset()["done"].shape == (1, 1)  # what was trained elsewhere is played here
-    settings(plain(compose_config("train", []))).check_training()
+    run_config(plain(compose_config("train", []))).check_training()

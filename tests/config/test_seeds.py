@@ -4,10 +4,10 @@ from itertools import pairwise
 
 import pytest
 
-from warp_torchrl.config.compose import Record, compose_config, plain
+from warp_torchrl.config.compose import SavedConfig, compose_config, plain
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.seeds import BEYOND_EVALUATION, FIRST_EVALUATED, SEEDS, WORLDS, first_world_seed
-from warp_torchrl.config.settings import settings
 from warp_torchrl.runs.checkpoint import newest
 from warp_torchrl.training.loop import Training
 
@@ -31,15 +31,15 @@ def test_training_and_evaluation_share_no_world():
 
 def test_evaluations_end_before_the_worlds_of_training():
     last = [f"evaluation.first_seed={BEYOND_EVALUATION - 3}", "evaluation.episodes=3"]
-    plan = settings(plain(compose_config("train", last))).evaluation
+    plan = run_config(plain(compose_config("train", last))).evaluation
     assert plan.first_seed + plan.episodes == BEYOND_EVALUATION
     with pytest.raises(ConfigError, match=r"evaluation\.first_seed must be in"):
-        settings(plain(compose_config("train", [last[0], "evaluation.episodes=4"])))
+        run_config(plain(compose_config("train", [last[0], "evaluation.episodes=4"])))
 
 
 @pytest.mark.parametrize("seed", [1234, SEEDS])
 def test_any_whole_number_is_a_seed(seed):
-    plan = settings(plain(compose_config("train", [f"seed={seed}", "landscape.size=12"])))
+    plan = run_config(plain(compose_config("train", [f"seed={seed}", "landscape.size=12"])))
     env = plan.make_training_env(3, first_world_seed(plan.seed))
     assert env.reset()["done"].shape == (3, 1)
 
@@ -47,7 +47,7 @@ def test_any_whole_number_is_a_seed(seed):
 def test_a_run_of_a_large_seed_trains_and_finds_its_mode(tmp_path):
     small = ["landscape.size=8", "horizon=8", "n_worlds=2", "collector.steps=4", "total_frames=16"]
     small += ["algorithm.minibatch_size=8", "evaluation.episodes=2", "model.actor_hidden=[8]", "seed=2147483648"]
-    run = Training(settings(plain(compose_config("train", small))), Record(), tmp_path)
+    run = Training(run_config(plain(compose_config("train", small))), SavedConfig(), tmp_path)
     run.train()
     assert run.env.state_dict()["seeds"].tolist() == list(worlds(SEEDS)[:2])
     assert newest(tmp_path)[0].manifest.mode in ("sampled", "deterministic")

@@ -12,7 +12,7 @@ from warp_torchrl.algorithms.a2c import A2c
 from warp_torchrl.algorithms.ppo import Ppo
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.settings import settings
+from warp_torchrl.config.run_config import run_config
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.models import (
     ACTION,
@@ -236,4 +236,4 @@ def test_who_replays_does_not_remember():
     rule = "^model.memory must be 0 where the algorithm replays, got 8: choose mappo, ippo, ppo or a2c$"
     for name in ("dqn", "vdn", "qmix", "sac", "ddpg", "maddpg"):
         with pytest.raises(ConfigError, match=rule):
-            settings(plain(compose_config("train", [f"algorithm={name}", "model.memory=8"])))
+            run_config(plain(compose_config("train", [f"algorithm={name}", "model.memory=8"])))

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from tests.forgery import forge
-from warp_torchrl.config.compose import Record, recompose
+from warp_torchrl.config.compose import SavedConfig, restore
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.models import Entry, Signature
 from warp_torchrl.runs import checkpoint as checkpoints
@@ -26,7 +26,7 @@ def saved(run, frames, keep=3, **options):
         scenario="tiny",
         signature=SIGNATURE,
         mode="sampled",
-        record=Record(choices={"algorithm": "mappo"}, values={"seed": 3}),
+        record=SavedConfig(choices={"algorithm": "mappo"}, values={"seed": 3}),
         policy={"weight": torch.arange(4.0)},
         training={"frames": frames, "random": torch.get_rng_state()},
         keep=keep,
@@ -40,7 +40,7 @@ def test_what_was_saved_comes_back(tmp_path):
     found, skipped = newest(run)
     assert not skipped and found.manifest.frames == 100 and found.manifest.signature == SIGNATURE
     assert found.policy()["weight"].tolist() == [0, 1, 2, 3] and found.training()["frames"] == 100
-    assert found.record() == Record(choices={"algorithm": "mappo"}, values={"seed": 3})
+    assert found.record() == SavedConfig(choices={"algorithm": "mappo"}, values={"seed": 3})
 
 
 def test_the_newest_is_found_by_number_and_old_ones_go(tmp_path):
@@ -198,7 +198,7 @@ def test_a_forged_configuration_is_refused_in_one_line(tmp_path, content):
 
 def test_a_configuration_that_reads_the_environment_is_refused(tmp_path):
     with pytest.raises(ConfigError, match="must be a plain value"):
-        recompose(Record(choices={}, values={"landscape": {"path": "${oc.env:HOME}"}}))
+        restore(SavedConfig(choices={}, values={"landscape": {"path": "${oc.env:HOME}"}}))
 
 
 def test_the_format_before_the_seal_is_read(tmp_path):

@@ -47,9 +47,9 @@ def test_nothing_grows(tmp_path):
                 run.metrics.add({"time/frames": run.frames, **row})
             run.save()
             policy = load_policy(run.run)
-            play(run.settings.make_env(4, 1_000_000), policy, 1_000_000, policy.mode)
+            play(run.run_config.make_env(4, 1_000_000), policy, 1_000_000, policy.mode)
             frames += 320
-            assert len(list((run.run / "checkpoints").iterdir())) <= run.settings.checkpoint.keep
+            assert len(list((run.run / "checkpoints").iterdir())) <= run.run_config.checkpoint.keep
         times.append(minutes)
         samples.append(sample())
     memory, descriptors, threads = (np.array(each) for each in zip(*samples))

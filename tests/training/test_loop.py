@@ -12,8 +12,8 @@ import pytest
 import torch
 
 from warp_torchrl.api import policy_of
-from warp_torchrl.config.compose import Record, compose_config, conf_folder, plain, without_targets
-from warp_torchrl.config.settings import settings
+from warp_torchrl.config.compose import SavedConfig, compose_config, conf_folder, plain, without_targets
+from warp_torchrl.config.run_config import run_config
 from warp_torchrl.models import ACTION
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
@@ -46,7 +46,7 @@ TINIER = ["horizon=10", "collector.steps=4", "total_frames=96", "checkpoint.inte
 def tiny(run, *overrides):
     config = compose_config("train", [*TINY, *overrides])
     values = {k: v for k, v in without_targets(plain(config)).items() if k not in ("resume", "debug")}
-    return Training(settings(plain(config)), Record(choices={}, values=values), run)
+    return Training(run_config(plain(config)), SavedConfig(choices={}, values=values), run)
 
 
 def rows(run):
@@ -195,7 +195,7 @@ def test_checkpoints_are_written_on_the_way_and_at_the_end(finished):
 
 def test_a_loaded_policy_acts_as_the_trained_one(finished):
     run, training = finished
-    env = training.settings.make_env(5, 77)
+    env = training.run_config.make_env(5, 77)
     now = env.reset()
     loaded = policy_of(newest(run)[0], "deterministic")
     with torch.no_grad():

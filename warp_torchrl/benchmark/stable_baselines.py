@@ -7,13 +7,13 @@ import torch
 
 from warp_torchrl.algorithms.ppo import Ppo
 from warp_torchrl.benchmark.environments import paper_stack
-from warp_torchrl.config.settings import Settings
+from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.models import Mlp
 
 NAME = "SuperSuit + SB3 PPO"
 
 
-def reason_against(plan: Settings) -> str | None:
+def reason_against(plan: RunConfig) -> str | None:
     """Return why Stable-Baselines3 cannot train these settings; None if it can."""
     missing = [name for name in ("supersuit", "stable_baselines3") if find_spec(name) is None]
     if missing:
@@ -23,7 +23,7 @@ def reason_against(plan: Settings) -> str | None:
     return None
 
 
-def open_stable_baselines(plan: Settings) -> tuple[Callable[[], object], Callable[[], None]]:
+def open_stable_baselines(plan: RunConfig) -> tuple[Callable[[], object], Callable[[], None]]:
     """Return a function that learns from one batch of the settings' size, and a function that closes the worlds.
 
     Networks, epochs, minibatch, worlds and steps are the plan's; each agent has its own sample, as SB3 counts them.

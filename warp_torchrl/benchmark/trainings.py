@@ -9,8 +9,8 @@ from typing import Any
 from warp_torchrl.benchmark.shares import training_shares
 from warp_torchrl.benchmark.stable_baselines import NAME, open_stable_baselines, reason_against
 from warp_torchrl.benchmark.timing import spread, take_turns
-from warp_torchrl.config.compose import Record, compose_config, plain
-from warp_torchrl.config.settings import settings
+from warp_torchrl.config.compose import SavedConfig, compose_config, plain
+from warp_torchrl.config.run_config import run_config
 from warp_torchrl.training.loop import Training
 
 
@@ -28,13 +28,13 @@ def training_speed(
     Returns:
         A row for each way to train, with ``agent_steps_per_second``; and the shares of our training loop.
     """
-    plan = settings(plain(compose_config("train", [*overrides, f"device={device}"])))
+    plan = run_config(plain(compose_config("train", [*overrides, f"device={device}"])))
     agents = plan.world.team.n_agents
     common = {"scenario": plan.scenario, "size": "{} x {}".format(*plan.world.size), "agents": agents}
     common["worlds"] = plan.n_worlds
     reason = reason_against(plan) if with_peer else None
     with ExitStack() as stack:
-        training = Training(plan, Record(), Path(stack.enter_context(tempfile.TemporaryDirectory())))
+        training = Training(plan, SavedConfig(), Path(stack.enter_context(tempfile.TemporaryDirectory())))
         stack.callback(training.close)
         batches = iter(training.collection)
         contenders: dict[str, Callable[[], object]] = {"training": lambda: training._learn(next(batches))}

@@ -12,9 +12,9 @@ from omegaconf import DictConfig, OmegaConf
 
 from warp_torchrl.commands.failure import fail
 from warp_torchrl.commands.sweep import jobs
-from warp_torchrl.config.compose import HYDRA_ERRORS, check_choices, explain, plain, recompose
+from warp_torchrl.config.compose import HYDRA_ERRORS, check_choices, explain, plain, restore
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.settings import settings
+from warp_torchrl.config.run_config import run_config
 from warp_torchrl.evaluation.evaluate import check_policy
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.nearest import did_you_mean
@@ -67,7 +67,7 @@ def _check(name: str | None, config: DictConfig) -> None:
 
 def _check_training(values: Mapping[str, Any], overrides: Sequence[str]) -> None:
     if values["resume"] is None:
-        plan = settings(values)
+        plan = run_config(values)
         plan.check_training()
         if values["start_from"] is not None:
             check_start(plan, checkpoints.newest(find_policy(values["start_from"]))[0])
@@ -81,7 +81,7 @@ def _check_training(values: Mapping[str, Any], overrides: Sequence[str]) -> None
     folder = Path(str(values["resume"]))
     if (folder / checkpoints.MANIFEST).exists():
         raise ConfigError(f"resume must be a run folder, got one of its checkpoints: {folder}")
-    resumption(folder, new_total(values, overrides)).settings.check_training()
+    resumption(folder, new_total(values, overrides)).run_config.check_training()
 
 
 def new_total(values: Mapping[str, Any], overrides: Sequence[str]) -> Any:
@@ -99,10 +99,10 @@ def _check_evaluation(values: Mapping[str, Any], overrides: Sequence[str]) -> No
     if not isinstance(values["overwrite"], bool):
         raise ConfigError(f"overwrite must be true or false, got {values['overwrite']!r}")
     if checkpoint is None:
-        check_policy(settings(without_checkpoint(values)), policy)
+        check_policy(run_config(without_checkpoint(values)), policy)
         return
     found, _ = checkpoints.newest(find_policy(str(checkpoint)))
-    check_policy(settings(plain(recompose(found.record(), of_worlds(overrides)))), found)
+    check_policy(run_config(plain(restore(found.record(), of_worlds(overrides)))), found)
 
 
 def of_worlds(overrides: Sequence[str]) -> list[str]:

@@ -18,17 +18,17 @@ from warp_torchrl.commands.failure import fail
 from warp_torchrl.commands.sweep import SweepSummary, remove_failure, save_failure, summarise_unfinished
 from warp_torchrl.config.compose import (
     HYDRA_ERRORS,
-    Record,
+    SavedConfig,
     conf_folder,
     explain,
     plain,
-    recompose,
+    restore,
     without_targets,
     world_overrides,
 )
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.grammar import check_flags, check_overrides
-from warp_torchrl.config.settings import COMPONENTS, settings
+from warp_torchrl.config.run_config import COMPONENTS, run_config
 from warp_torchrl.evaluation.evaluate import evaluate_policy
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs import disk
@@ -77,8 +77,8 @@ def _start(folder: Path, config: DictConfig) -> None:
     if (folder / "evaluation.json").exists():
         raise ConfigError(f"hydra.run.dir: {folder} holds an evaluation, which training would replace; take another")
     disk.replace(folder / "config.yaml", OmegaConf.to_yaml(config, resolve=True))
-    record = Record(choices=_choices(), values=_values(config))
-    training = Training(settings(plain(config)), record, folder)
+    record = SavedConfig(choices=_choices(), values=_values(config))
+    training = Training(run_config(plain(config)), record, folder)
     if config.start_from is not None:
         training.start_from(_newest(find_policy(config.start_from)))
     _finish(training, world_overrides(plain(config)))
@@ -90,12 +90,12 @@ def _resume(folder: Path, total_frames: Any) -> None:
     if run.is_finished:
         log.info("%s is finished; total_frames=MORE trains it longer", folder)
         return
-    training = Training(run.settings, run.record, folder)
+    training = Training(run.run_config, run.record, folder)
     training.load_state_dict(run.found.training())
     log.info("resumed %s at %d frames", run.found.path, training.frames)
-    if run.settings.total_frames != run.total_before:
+    if run.run_config.total_frames != run.total_before:
         # Before the next checkpoint: a run that is killed now must resume with the new total too.
-        disk.replace(folder / "config.yaml", OmegaConf.to_yaml(recompose(run.record), resolve=True))
+        disk.replace(folder / "config.yaml", OmegaConf.to_yaml(restore(run.record), resolve=True))
         training.log_new_total(run.total_before)
     _finish(training, world_overrides(run.values))
 
@@ -105,7 +105,7 @@ def _finish(training: Training, worlds: Sequence[str]) -> None:
         training.train()
     finally:
         training.close()
-    evaluate_policy(training.settings, training.run, checkpoints.newest(training.run)[0], worlds)
+    evaluate_policy(training.run_config, training.run, checkpoints.newest(training.run)[0], worlds)
 
 
 def _newest(path: str | Path) -> checkpoints.Checkpoint:
@@ -126,11 +126,11 @@ def _evaluate_job(config: DictConfig) -> None:
         check_free(folder, "hydra.run.dir")  # again: two jobs of a sweep may have the same folder
     given, name = config.checkpoint, config.policy
     if given is None:
-        evaluate_policy(settings(without_checkpoint(plain(config))), folder, name, world_overrides(plain(config)))
+        evaluate_policy(run_config(without_checkpoint(plain(config))), folder, name, world_overrides(plain(config)))
         return
     found = _newest(find_policy(given))
-    values = plain(recompose(found.record(), of_worlds(HydraConfig.get().overrides.task)))
-    evaluate_policy(settings(values), folder, found, world_overrides(values))
+    values = plain(restore(found.record(), of_worlds(HydraConfig.get().overrides.task)))
+    evaluate_policy(run_config(values), folder, found, world_overrides(values))
 
 
 # The saved configuration

@@ -22,7 +22,7 @@ from omegaconf.errors import OmegaConfBaseException
 from warp_torchrl.config.construction import ConfigError, UnknownKeyError, component
 from warp_torchrl.config.defaults import defaults
 from warp_torchrl.config.grammar import check_overrides, several_values
-from warp_torchrl.config.settings import COMPONENTS, WORLD_KEYS
+from warp_torchrl.config.run_config import COMPONENTS, WORLD_KEYS
 from warp_torchrl.nearest import did_you_mean
 
 OmegaConf.register_new_resolver("pid", os.getpid, replace=True, use_cache=True)  # a sweep's jobs get its own process's
@@ -156,7 +156,7 @@ _BEFORE = {"model.facing": "north"}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Record:
+class SavedConfig:
     """A configuration as a run folder keeps it: which option each group had, and every value.
 
     Attributes:
@@ -210,7 +210,7 @@ def _composed_worlds(choices: Sequence[str]) -> dict[str, Any]:
     return {key: composed[key] for key in WORLD_KEYS}
 
 
-def recompose(record: Record, overrides: Sequence[str] = ()) -> DictConfig:
+def restore(record: SavedConfig, overrides: Sequence[str] = ()) -> DictConfig:
     """Compose the configuration of a record anew from this package's own files, and lay its values over it.
 
     Classes come from our yaml files alone. Values that an override touches are the override's; an override of

@@ -14,7 +14,7 @@ from hydra.plugins.config_source import ConfigResult
 from omegaconf import DictConfig, OmegaConf
 
 from warp_torchrl.config.construction import component
-from warp_torchrl.config.settings import COMPONENTS, Settings
+from warp_torchrl.config.run_config import COMPONENTS, RunConfig
 from warp_torchrl.world.world import World
 
 
@@ -50,7 +50,7 @@ class FileConfigSource(file_config_source.FileConfigSource):
 def _left_out(config_path: str, node: DictConfig) -> dict[str, Any]:
     """Return the default values of what a yaml file configures."""
     if config_path.removesuffix(".yaml") == "train":
-        run = {**defaults(World), **defaults(Settings)}
+        run = {**defaults(World), **defaults(RunConfig)}
         return {name: value for name, value in run.items() if name not in COMPONENTS}
     kind = component(node["_target_"]) if "_target_" in node else None
     if kind is None:

@@ -8,7 +8,7 @@ from tensordict.nn import TensorDictModuleBase
 
 from warp_torchrl.api import policy_of
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.settings import Settings
+from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation.method import method
 from warp_torchrl.evaluation.play import BASELINES, Episodes, WithoutAgent, play, play_heuristics, record_episode
@@ -21,11 +21,11 @@ from warp_torchrl.runs import disk
 log = logging.getLogger("warp_torchrl")
 
 
-def evaluate_policy(plan: Settings, folder: Path, found: checkpoints.Checkpoint | str, worlds: Sequence[str]) -> None:
+def evaluate_policy(plan: RunConfig, folder: Path, found: checkpoints.Checkpoint | str, worlds: Sequence[str]) -> None:
     """Evaluate a checkpoint or a heuristic beside the baselines: table, ``evaluation.json`` and ``episode.gif``.
 
     Args:
-        plan: Settings of the worlds and the evaluation.
+        plan: RunConfig of the worlds and the evaluation.
         folder: The output folder.
         found: The checkpoint, or the heuristic's name.
         worlds: Overrides by which the worlds differ from their scenario.
@@ -56,7 +56,7 @@ def evaluate_policy(plan: Settings, folder: Path, found: checkpoints.Checkpoint 
     log.info("wrote evaluation.json and episode.gif into %s", folder)
 
 
-def check_policy(plan: Settings, found: checkpoints.Checkpoint | str) -> None:
+def check_policy(plan: RunConfig, found: checkpoints.Checkpoint | str) -> None:
     """Check that a checkpoint or a heuristic can be evaluated, before any output is written.
 
     Raises:
@@ -68,7 +68,7 @@ def check_policy(plan: Settings, found: checkpoints.Checkpoint | str) -> None:
 
 
 def _actors(
-    plan: Settings, found: checkpoints.Checkpoint | str, env: WildfireEnv, one: WildfireEnv
+    plan: RunConfig, found: checkpoints.Checkpoint | str, env: WildfireEnv, one: WildfireEnv
 ) -> tuple[str, str, TensorDictModuleBase, TensorDictModuleBase]:
     """Return the policy's name and mode, the policy for many worlds, and the policy for one."""
     if isinstance(found, str):
@@ -80,10 +80,10 @@ def _actors(
     return f"trained, {policy.mode}", policy.mode, policy, policy
 
 
-_PLAYED: dict[str, tuple[Settings, dict[str, Episodes]]] = {}
+_PLAYED: dict[str, tuple[RunConfig, dict[str, Episodes]]] = {}
 
 
-def _baselines(plan: Settings, env: WildfireEnv, names: Sequence[str]) -> dict[str, Episodes]:
+def _baselines(plan: RunConfig, env: WildfireEnv, names: Sequence[str]) -> dict[str, Episodes]:
     """Return the episodes of heuristics; jobs of a sweep with the same worlds play them once."""
     worlds = repr((plan.world, plan.observation, plan.reward, plan.evaluation, plan.device))
     _, played = _PLAYED.setdefault(worlds, (plan, {}))  # keeps the plan alive: a repr may hold addresses of objects

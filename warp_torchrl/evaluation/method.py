@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from hashlib import sha256
 from typing import Any
 
-from warp_torchrl.config.compose import Record
+from warp_torchrl.config.compose import SavedConfig
 
 _NOT_TRAINED_BY = ("seed", "device", "evaluation", "checkpoint")
 
 
-def method(record: Record) -> tuple[str, str]:
+def method(record: SavedConfig) -> tuple[str, str]:
     """Return a trained policy's name in tables, and a digest of its configuration without the seed."""
     names = [record.choices[group] for group in ("algorithm", "reward", "observation")]
     names += [*unusual(record), *teacher_label(record)]
@@ -29,14 +29,14 @@ _USUAL = {
 _PAPERS_RADIUS = 3
 
 
-def unusual(record: Record) -> list[str]:
+def unusual(record: SavedConfig) -> list[str]:
     """Return a policy's unusual settings, as overrides."""
     usual = _USUAL | ({("observation", "radius"): _PAPERS_RADIUS} if record.choices["observation"] == "paper" else {})
     found = {(group, key): record.values.get(group, {}).get(key) for group, key in usual}
     return [f"{key[1]}={value}" for key, value in found.items() if value is not None and value != usual[key]]
 
 
-def teacher_label(record: Record) -> list[str]:
+def teacher_label(record: SavedConfig) -> list[str]:
     """Return the part of a policy's name that names its teacher; empty without a teacher."""
     teacher = record.values.get("imitation", {}).get("teacher")
     return [f"taught by {teacher}"] if teacher else []

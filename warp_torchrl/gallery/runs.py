@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from warp_torchrl.config.compose import Record
+from warp_torchrl.config.compose import SavedConfig
 from warp_torchrl.evaluation.method import method, teacher_label, unusual
 from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError, newest
 
@@ -119,7 +119,7 @@ def _check_time(columns: Mapping[str, np.ndarray]) -> None:
             raise ValueError(f"{name} must be in every row, positive, and grow")
 
 
-def _recorded(found: Checkpoint, record: Record) -> dict[str, Any]:
+def _recorded(found: Checkpoint, record: SavedConfig) -> dict[str, Any]:
     try:
         algorithm, reward, observation = (
             str(record.choices[group]) for group in ("algorithm", "reward", "observation")

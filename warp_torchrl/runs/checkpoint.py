@@ -14,7 +14,7 @@ from typing import Any
 
 import torch
 
-from warp_torchrl.config.compose import Record
+from warp_torchrl.config.compose import SavedConfig
 from warp_torchrl.models import Signature
 from warp_torchrl.runs import disk
 from warp_torchrl.runs.manifest import (
@@ -57,13 +57,13 @@ class Checkpoint:
     path: Path
     manifest: Manifest
 
-    def record(self) -> Record:
+    def record(self) -> SavedConfig:
         """Return the training's configuration."""
         content = read_json(self.path / "config.json")
         choices, values = content.get("choices"), content.get("values")
         if not (isinstance(choices, dict) and isinstance(values, dict)):
             raise CheckpointError(f"{self.path / 'config.json'} must hold choices and values")
-        return Record(choices=choices, values=values)
+        return SavedConfig(choices=choices, values=values)
 
     def policy(self) -> dict[str, torch.Tensor]:
         """Return the policy's parameters."""
@@ -97,7 +97,7 @@ def save(
     scenario: str,
     signature: Signature,
     mode: str | None,
-    record: Record,
+    record: SavedConfig,
     policy: Mapping[str, torch.Tensor],
     training: Mapping[str, Any],
     keep: int,

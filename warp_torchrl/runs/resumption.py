@@ -9,9 +9,9 @@ from typing import Any
 
 import yaml
 
-from warp_torchrl.config.compose import Record, plain, recompose
+from warp_torchrl.config.compose import SavedConfig, plain, restore
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.settings import COMPONENTS, Settings, settings
+from warp_torchrl.config.run_config import COMPONENTS, RunConfig, run_config
 from warp_torchrl.runs.checkpoint import Checkpoint, newest
 
 _LARGEST = 1_000_000  # bytes
@@ -30,16 +30,16 @@ class Resumption:
         skipped: For each newer unsound checkpoint a line with the reason.
         record: The saved configuration, with the new ``total_frames``.
         values: The full configuration as plain values.
-        settings: The settings built from it.
+        run_config: Its components, built.
         total_before: ``total_frames`` of the checkpoint.
         is_finished: Whether the run was trained to its end and evaluated.
     """
 
     found: Checkpoint
     skipped: list[str]
-    record: Record
+    record: SavedConfig
     values: dict[str, Any]
-    settings: Settings
+    run_config: RunConfig
     total_before: int
     is_finished: bool
 
@@ -58,12 +58,12 @@ def resumption(folder: Path, total_frames: Any = None) -> Resumption:
     """
     found, skipped = newest(folder)
     record = found.record()
-    held, trained = read_config(folder / "config.yaml"), plain(recompose(record))
+    held, trained = read_config(folder / "config.yaml"), plain(restore(record))
     _check_unedited(folder, held, record, trained)
     before = trained["total_frames"]
     asked = total_frames if total_frames is not None else held.get("total_frames", before)
-    values = plain(recompose(replace(record, values={**record.values, "total_frames": asked})))
-    made = settings(values)
+    values = plain(restore(replace(record, values={**record.values, "total_frames": asked})))
+    made = run_config(values)
     frames, is_new = found.manifest.frames, total_frames is not None or made.total_frames != before
     if is_new and made.total_frames <= frames:
         raise ConfigError(f"total_frames must be more than the {frames} that {folder} has had, got {made.total_frames}")
@@ -73,7 +73,7 @@ def resumption(folder: Path, total_frames: Any = None) -> Resumption:
         skipped=skipped,
         record=replace(record, values={**record.values, "total_frames": made.total_frames}),
         values=values,
-        settings=made,
+        run_config=made,
         total_before=before,
         is_finished=is_trained and _evaluated(folder / "evaluation.json") == frames,
     )
@@ -107,7 +107,7 @@ def read_config(path: Path) -> dict[str, Any]:
     return content
 
 
-def _check_unedited(folder: Path, held: Mapping[str, Any], record: Record, trained: Mapping[str, Any]) -> None:
+def _check_unedited(folder: Path, held: Mapping[str, Any], record: SavedConfig, trained: Mapping[str, Any]) -> None:
     found = edits(held, record.values) + _other_classes(held, trained) if held else []
     if found:
         more = f", and {len(found) - _NAMED} more" if len(found) > _NAMED else ""

@@ -3,19 +3,19 @@
 from torch import Tensor
 from torchrl.objectives import LossModule
 
-from warp_torchrl.config.settings import Settings
+from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError
 
 
-def check_start(settings: Settings, found: Checkpoint) -> None:
+def check_start(run_config: RunConfig, found: Checkpoint) -> None:
     """Check that training can start from another run's learned parameters.
 
     Raises:
         CheckpointError: If the checkpoint is an exported policy, or has another kind of loss or other networks.
     """
     found.check_goes_on()
-    batch = settings.collector.steps * settings.n_worlds
-    learned_parameters(found, settings.algorithm.build(settings.make_env(1, 0), settings.model, batch).loss)
+    batch = run_config.collector.steps * run_config.n_worlds
+    learned_parameters(found, run_config.algorithm.build(run_config.make_env(1, 0), run_config.model, batch).loss)
 
 
 def learned_parameters(found: Checkpoint, loss: LossModule) -> dict[str, Tensor]:

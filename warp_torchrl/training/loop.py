@@ -14,9 +14,9 @@ from tqdm import tqdm
 
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.collection.collectors import WorkerDied
-from warp_torchrl.config.compose import Record
+from warp_torchrl.config.compose import SavedConfig
+from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.config.seeds import WORLDS, first_world_seed
-from warp_torchrl.config.settings import Settings
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.models import REWARD, signature
 from warp_torchrl.policy import MODES
@@ -42,27 +42,27 @@ class Training:
     """A training run: collect, learn, log, save and resume.
 
     Args:
-        settings: What to train.
+        run_config: What to train.
         record: The configuration that checkpoints keep.
         run: The run folder.
     """
 
-    def __init__(self, settings: Settings, record: Record, run: Path) -> None:
-        torch.manual_seed(settings.seed)
-        self.settings, self.record, self.run = settings, record, run
-        first = first_world_seed(settings.seed)
-        self.env = settings.make_training_env(settings.n_worlds, first)
-        self.frames_per_batch = settings.collector.steps * settings.n_worlds
-        learner = settings.algorithm.build(self.env, settings.model, self.frames_per_batch)
-        if settings.compile:
+    def __init__(self, run_config: RunConfig, record: SavedConfig, run: Path) -> None:
+        torch.manual_seed(run_config.seed)
+        self.run_config, self.record, self.run = run_config, record, run
+        first = first_world_seed(run_config.seed)
+        self.env = run_config.make_training_env(run_config.n_worlds, first)
+        self.frames_per_batch = run_config.collector.steps * run_config.n_worlds
+        learner = run_config.algorithm.build(self.env, run_config.model, self.frames_per_batch)
+        if run_config.compile:
             learner.terms = compile_function(learner.terms)
-        self.learner: Learner = settings.imitation.kickstart(learner, self.env)
-        self.reward_scale = RewardScale(settings.reward.gamma) if settings.reward.normalise else None
-        self.collection = settings.collector.open(self.env, self.learner, settings.make_training_env, first)
+        self.learner: Learner = run_config.imitation.kickstart(learner, self.env)
+        self.reward_scale = RewardScale(run_config.reward.gamma) if run_config.reward.normalise else None
+        self.collection = run_config.collector.open(self.env, self.learner, run_config.make_training_env, first)
         self.frames = 0
         self.seconds = 0.0
         self.saved_at = 0
-        self.clock = SaveClock(settings.checkpoint.minutes, self._size)
+        self.clock = SaveClock(run_config.checkpoint.minutes, self._size)
         self.mode: str | None = None
         self.metrics = MetricsFile(run / "metrics.csv")
         self._scheduled = self.learner.schedule(0.0)
@@ -75,7 +75,7 @@ class Training:
             NumericalFailure: If a reward, loss or gradient is not finite.
         """
         with DeferredSignals() as signals:
-            tracker = self.settings.logger.open(self.run)
+            tracker = self.run_config.logger.open(self.run)
             try:
                 self._train(signals, tracker)
                 self.mode = self.mode or self._better_mode()
@@ -87,8 +87,8 @@ class Training:
                 raise Stopped(signals.received, self.run)
 
     def _train(self, signals: DeferredSignals, tracker: Tracker) -> None:
-        total = self.settings.total_frames
-        notice = batch_size_notice(total, self.settings.n_worlds, self.settings.collector.steps)
+        total = self.run_config.total_frames
+        notice = batch_size_notice(total, self.run_config.n_worlds, self.run_config.collector.steps)
         if notice is not None and self.frames < total:
             log.log(logging.WARNING if total < self.frames_per_batch else logging.INFO, notice)
         bar = tqdm(total=total, initial=self.frames, unit="frame", disable=None, dynamic_ncols=True)
@@ -156,7 +156,7 @@ class Training:
 
     def _schedule(self) -> None:
         """Update the scheduled hyperparameters; their columns belong to the next row."""
-        self._scheduled = self.learner.schedule(min(1.0, self.frames / self.settings.total_frames))
+        self._scheduled = self.learner.schedule(min(1.0, self.frames / self.run_config.total_frames))
 
     def log_new_total(self, before: int) -> None:
         """Log the scheduled hyperparameters that change because ``total_frames`` was changed.
@@ -164,7 +164,7 @@ class Training:
         Args:
             before: The former ``total_frames``.
         """
-        old, total = self.learner.schedule(min(1.0, self.frames / before)), self.settings.total_frames
+        old, total = self.learner.schedule(min(1.0, self.frames / before)), self.run_config.total_frames
         self._schedule()
         changed = {name: (old[name], value) for name, value in self._scheduled.items() if value != old[name]}
         columns = ", ".join(f"{name} {was:.3g} -> {now:.3g}" for name, (was, now) in changed.items())
@@ -192,19 +192,19 @@ class Training:
         return {name: terms[name].detach().mean() for name in wanted}
 
     def _evaluate(self, frames: int) -> float | None:
-        plan = self.settings.evaluation
+        plan = self.run_config.evaluation
         if not plan.interval or not passes(plan.interval, self.frames, frames):
             return None
-        env = self.settings.make_env(plan.episodes, plan.first_seed)
+        env = self.run_config.make_env(plan.episodes, plan.first_seed)
         return float(play(env, self.learner.policy, plan.first_seed)["saved"].mean())
 
     def _better_mode(self) -> str:
         """Return the mode, sampled or deterministic, that saves more on training seeds."""
-        chosen = self.settings.evaluation.mode
+        chosen = self.run_config.evaluation.mode
         if chosen != "best":
             return chosen
-        first = first_world_seed(self.settings.seed)
-        env = self.settings.make_env(min(self.settings.evaluation.episodes, WORLDS), first)
+        first = first_world_seed(self.run_config.seed)
+        env = self.run_config.make_env(min(self.run_config.evaluation.episodes, WORLDS), first)
         saved = {mode: play(env, self.learner.policy, first, mode)["saved"].mean() for mode in MODES}
         return max(saved, key=saved.__getitem__)
 
@@ -215,13 +215,13 @@ class Training:
             path = checkpoints.save(
                 self.run,
                 frames=self.frames,
-                scenario=self.settings.scenario,
+                scenario=self.run_config.scenario,
                 signature=signature(self.env),
                 mode=self.mode,
                 record=self.record,
                 policy=self.learner.policy.state_dict(),
                 training=self.state_dict(),
-                keep=self.settings.checkpoint.keep,
+                keep=self.run_config.checkpoint.keep,
                 stays=self._is_regular,
             )
         self.saved_at = self.frames
@@ -233,7 +233,7 @@ class Training:
 
     def _is_regular(self, frames: int) -> bool:
         """Return whether ``checkpoint.interval`` asks for a checkpoint at this number of frames."""
-        return passes(self.settings.checkpoint.interval, frames, self.frames_per_batch)
+        return passes(self.run_config.checkpoint.interval, frames, self.frames_per_batch)
 
     def start_from(self, found: checkpoints.Checkpoint) -> None:
         """Load another run's networks and value normalisation; everything else starts anew.

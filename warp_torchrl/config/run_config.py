@@ -1,4 +1,4 @@
-"""The settings of a run: every value checked, every component built, from a composed configuration as plain values."""
+"""The configuration of a run: every value checked, every component built, from plain values."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -39,7 +39,7 @@ COMMAND_KEYS = ("resume", "start_from", "debug", "policy", "overwrite")
 
 
 @dataclass(frozen=True, kw_only=True)
-class CheckpointPlan:
+class CheckpointConfig:
     """When training saves.
 
     Attributes:
@@ -66,7 +66,7 @@ class CheckpointPlan:
 
 
 @dataclass(frozen=True, kw_only=True)
-class EvaluationPlan:
+class EvaluationConfig:
     """How policies are evaluated.
 
     Attributes:
@@ -100,7 +100,7 @@ class EvaluationPlan:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Settings:
+class RunConfig:
     """Everything that a run needs, checked: the components, built, and the run's own numbers.
 
     Attributes:
@@ -138,8 +138,8 @@ class Settings:
     seed: int = 0
     device: str = "cpu"
     compile: bool = False
-    checkpoint: CheckpointPlan = field(default_factory=CheckpointPlan)
-    evaluation: EvaluationPlan = field(default_factory=EvaluationPlan)
+    checkpoint: CheckpointConfig = field(default_factory=CheckpointConfig)
+    evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
     imitation: Kickstarting = field(default_factory=Kickstarting)
 
     def __post_init__(self) -> None:
@@ -184,13 +184,13 @@ class Settings:
         return self.make_env(n_worlds, seed, fuse=self.compile)
 
 
-def settings(config: Mapping[str, Any]) -> Settings:
+def run_config(config: Mapping[str, Any]) -> RunConfig:
     """Check a composed configuration and build what it describes.
 
     Raises:
         ConfigError: With key, value and rule.
     """
-    known = {each.name for each in fields(Settings)} | {*COMPONENTS, *WORLD_KEYS, *COMMAND_KEYS}
+    known = {each.name for each in fields(RunConfig)} | {*COMPONENTS, *WORLD_KEYS, *COMMAND_KEYS}
     for key in config:
         if key not in known:
             has = f"it has {', '.join(sorted(known - {'world'}))}"
@@ -199,24 +199,24 @@ def settings(config: Mapping[str, Any]) -> Settings:
         if key not in config:
             raise ConfigError(f"{key} must be given")
     built = build_components(config)
-    parts = {"checkpoint": CheckpointPlan, "evaluation": EvaluationPlan, "imitation": Kickstarting}
+    parts = {"checkpoint": CheckpointConfig, "evaluation": EvaluationConfig, "imitation": Kickstarting}
     built |= {name: construct(kind, config.get(name, {}), name) for name, kind in parts.items()}
-    values = _chosen(Settings, {**config, **built})
+    values = _chosen(RunConfig, {**config, **built})
     _check_together(config)
-    made = construct(Settings, values, "")
-    with _told("algorithm"):
+    made = construct(RunConfig, values, "")
+    with _in_section("algorithm"):
         made.algorithm.check_batch(made.n_worlds * made.collector.steps)
-    with _told("model"):
+    with _in_section("model"):
         made.algorithm.check_model(made.model)
-    with _told("collector"):
+    with _in_section("collector"):
         made.collector.check_worlds(made.n_worlds)
-    with _told("imitation"):
+    with _in_section("imitation"):
         made.imitation.check_fits(made.algorithm, made.collector)
     return made
 
 
 @contextmanager
-def _told(section: str) -> Iterator[None]:
+def _in_section(section: str) -> Iterator[None]:
     """Let a mistake name the section of the configuration that it is in."""
     try:
         yield
