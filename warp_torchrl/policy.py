@@ -15,7 +15,7 @@ from torchrl.envs.utils import ExplorationType, exploration_type, set_exploratio
 from warp_torchrl.env.flat import FLAT, unflattened
 from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, ROLE, Signature, recurrent_actors, signature
 from warp_torchrl.models.fitting import fitted
-from warp_torchrl.models.networks import AgentNetworks, Network
+from warp_torchrl.models.networks import AgentNetworks
 from warp_torchrl.observation import SELF_SIZE
 from warp_torchrl.world.role import ROLE_NAMES, ROLES
 from warp_torchrl.world.state import Action
@@ -93,9 +93,7 @@ class NumpyPolicy:
     def __init__(self, policy: TrainedPolicy) -> None:
         self._policy = policy
         modules = list(policy.modules())
-        network = next(module for module in modules if isinstance(module, Network))
-        keys = [key for key in policy.in_keys if key[: len(OBSERVATION)] == OBSERVATION]
-        self._entries = {"".join(key[len(OBSERVATION) :]): entry for key, entry in zip(keys, network.encoder.entries)}
+        self._entries = policy.trained.observation
         self._shapes = {name: (entry.shape, entry.dtype) for name, entry in self._entries.items()}
         self._n_agents = next((len(each.networks) for each in modules if isinstance(each, AgentNetworks)), None)
         self._by_role = ROLE in policy.in_keys
@@ -158,7 +156,7 @@ class NumpyPolicy:
             raise ValueError(f"{where}{who} must have {', '.join(missing)}, got {', '.join(entries) or 'nothing'}")
         mask = np.asarray(entries["action_mask"], dtype=bool)
         read: dict[Any, np.ndarray] = {ACTION_MASK: mask}
-        for entry, (shape, dtype, _) in self._entries.items():
+        for entry, (shape, dtype, *_) in self._entries.items():
             value, expected = np.asarray(entries[entry]), (*mask.shape[:-1], *shape)
             if value.shape != expected or value.dtype != dtype:
                 rule = f"{entry or 'observation'}{who} must be {dtype} of shape {list(expected)}"

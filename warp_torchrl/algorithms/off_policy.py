@@ -16,7 +16,16 @@ from torchrl.objectives.utils import TargetNetUpdater
 from warp_torchrl.algorithms.algorithm import Algorithm, falling
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.algorithms.replay import ReplayMemory, check_prioritised, replay_buffer, weighted
-from warp_torchrl.models import ACTION, ACTION_MASK, REWARD, Mlp, Signature, signature
+from warp_torchrl.models import (
+    ACTION,
+    ACTION_MASK,
+    CANONICAL_STATE,
+    REWARD,
+    CanonicalBatch,
+    Mlp,
+    Signature,
+    signature,
+)
 
 AGENT_KEYS = {"reward": REWARD, "done": ("agents", "done"), "terminated": ("agents", "terminated")}
 """Where TorchRL's losses find what each agent's values are learnt from; a team's end is each agent's."""
@@ -101,6 +110,7 @@ class OffPolicy(Algorithm):
         memory = self.memory(env.device)
         targets = self.targets(loss)
         explore = self.explorer(policy, shape).to(env.device)
+        canonical = model.canonical_batch(shape, state=CANONICAL_STATE in loss.in_keys, restored=True)
 
         def samples() -> Iterator[TensorDictBase]:
             enough = len(memory) >= max(self.warm_up, self.minibatch_size)
@@ -123,11 +133,11 @@ class OffPolicy(Algorithm):
             columns=self.columns(),
             optimizer=optimizer,
             max_grad_norm=self.max_grad_norm,
-            store=lambda batch: memory.extend(transitions(loss, batch)),
+            store=lambda batch: memory.extend(transitions(loss, batch, canonical)),
             samples=samples,
             after_step=after_step,
             schedule=schedule,
-            keeps={"replay": ReplayMemory(memory), "targets": targets},
+            keeps={"replay": ReplayMemory(memory, canonical), "targets": targets},
         )
 
     def memory(self, device: torch.device) -> ReplayBuffer:
@@ -207,8 +217,9 @@ class EpsilonGreedy(OffPolicy):
         return {"rollout/exploration_rate": epsilon}
 
 
-def transitions(loss: LossModule, batch: TensorDictBase) -> TensorDictBase:
+def transitions(loss: LossModule, batch: TensorDictBase, canonical: CanonicalBatch) -> TensorDictBase:
     """Return what a loss reads of a batch, with the team's end for each agent; [B, T] -> [B T]."""
+    batch = canonical(batch).set("next", canonical(batch["next"]))
     reward = batch["next", *REWARD]
     batch["next", TEAM_REWARD] = reward.mean(dim=-2)
     for name in ("done", "terminated"):

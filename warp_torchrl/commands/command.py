@@ -28,6 +28,7 @@ from warp_torchrl.config.compose import (
 )
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.grammar import check_flags, check_overrides
+from warp_torchrl.config.renamed import renamed_overrides
 from warp_torchrl.config.settings import COMPONENTS, settings
 from warp_torchrl.evaluation.evaluate import assess, check_assessment
 from warp_torchrl.heuristics import HEURISTICS
@@ -161,7 +162,7 @@ def _without_checkpoint(config: DictConfig) -> dict[str, Any]:
 
 
 def _run(name: str, job: Callable[[DictConfig], None]) -> None:
-    arguments = sys.argv[1:]
+    arguments = renamed_overrides(sys.argv[1:])
     debug = "debug=true" in [each.lower() for each in arguments]
     logging.raiseExceptions = debug  # a log that cannot be written is no second failure
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra's own errors come to fail

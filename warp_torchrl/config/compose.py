@@ -22,6 +22,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from warp_torchrl.config.construction import ConfigError, UnknownKeyError
 from warp_torchrl.config.grammar import check_overrides, several_values
+from warp_torchrl.config.renamed import renamed_overrides
 from warp_torchrl.config.settings import COMPONENTS, WORLD_KEYS
 from warp_torchrl.nearest import did_you_mean
 
@@ -45,6 +46,7 @@ def compose_config(name: str, overrides: Sequence[str] = ()) -> DictConfig:
     Raises:
         ConfigError: If an override does not fit, in one line.
     """
+    overrides = renamed_overrides(overrides)
     for override in overrides:
         group, _, option = override.partition("=")
         if group in (*COMPONENTS, "scenario") and not _OPTION.fullmatch(option.strip("'\"")):
@@ -155,7 +157,7 @@ def _options_with(key: str) -> list[str]:
 # What is written into a run folder, and read back
 
 _OPTION = re.compile(r"[A-Za-z0-9_]+")
-_BEFORE = {"model.facing": "north"}
+_BEFORE = {"model.symmetry": "none"}
 """What runs did whose record has none of a key yet."""
 
 

@@ -6,6 +6,7 @@ from torch.nn.functional import one_hot
 
 from warp_torchrl.observation.channels import ELEVATION_SCALE
 from warp_torchrl.observation.own import WIND_SCALE, steps_to_tick, time_left
+from warp_torchrl.symmetry import Planes, Target, TeamPlanes
 from warp_torchrl.world.fast.blocks import block_means
 from warp_torchrl.world.fast.squares import window
 from warp_torchrl.world.role import ROLE_NAMES
@@ -22,6 +23,14 @@ STATE = ("fire", "fuel", "front", "threat", "ugv", "uav", "elevation", "clock_an
 trees to ignite, and the quarters of ``clock_and_wind`` are filled with the time left, the steps to the tick, and the
 wind to the east and to the north."""
 STATE_SIDE = 16
+STATE_SYMMETRY = TeamPlanes(len(STATE), STATE.index("fire"), (STATE.index("ugv"), len(ROLE_NAMES)))
+"""How the state turns with the map."""
+
+
+def picture_symmetry(centred: bool) -> Planes:
+    """Return how the picture turns with the map; agents turn towards its fire where their view shows none."""
+    fire = Target(PICTURE.index("fire"), order=1, near=0.5, is_share=True, in_middle=centred)
+    return Planes(len(PICTURE), fire)
 
 
 def picture(state: WorldState, forecast: Forecast) -> Tensor:

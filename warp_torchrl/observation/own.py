@@ -6,17 +6,26 @@ import torch
 from torch import Tensor
 from torch.nn.functional import one_hot
 
+from warp_torchrl.symmetry import TIME_LEFT, Part, Vector
 from warp_torchrl.world.role import ROLE_NAMES
 from warp_torchrl.world.state import Action, WorldState
 from warp_torchrl.world.world import World
 
-IDENTITY_SIZE = 4
+SELF = Vector(
+    (
+        Part("place", ("row", "column")),
+        Part("scalar", (TIME_LEFT,)),
+        Part("vector", ("wind_east", "wind_north")),
+        Part("scalar", ("steps_to_tick", "tank", "has_tank", "may_refill", *ROLE_NAMES)),
+        Part("actions", tuple(action.name.lower() for action in Action)),
+    )
+)
+"""Entries of ``self``: place, time left, wind, steps to the tick, tank, whether it has a tank, whether it may refill
+here, role (one-hot), last action (one-hot, zeros before the first)."""
+SELF_SIZE = len(SELF.names)
+"""How many they are."""
+IDENTITY = Part("scalar", ("cos_1", "sin_1", "cos_2", "sin_2"))
 """Entries of ``self`` that tell an agent from its team-mates, see ``identity``."""
-SELF_SIZE = 9 + len(ROLE_NAMES) + len(Action)
-"""Entries of ``self``: row, column, time left, wind east and north, steps to the tick, tank, whether it has a tank,
-whether it may refill here, role (one-hot), last action (one-hot, zeros before the first)."""
-PLACE, TIME_LEFT, WIND, LAST_ACTION = slice(0, 2), 2, slice(3, 5), slice(9 + len(ROLE_NAMES), SELF_SIZE)
-"""Where ``self`` tells of the agent's row and column, of the time left, of the wind, and of its last action."""
 WIND_SCALE = 20.0
 """Wind that an observation shows as 1 [m/s]."""
 
@@ -43,11 +52,6 @@ def own_vector(state: WorldState, world: World) -> Tensor:
         (vehicles.position == vehicles.base[:, None]).all(-1).to(torch.float32),
     ]
     return torch.cat((torch.stack(columns, dim=-1), roles, last), dim=-1)
-
-
-def begins(own: Tensor) -> Tensor:
-    """Return whether the first step of an episode is to come, bool [...], from ``self`` [..., F]."""
-    return own[..., TIME_LEFT] == 1.0
 
 
 def identity(n_agents: int, device: torch.device) -> Tensor:

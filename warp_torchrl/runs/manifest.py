@@ -2,8 +2,9 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,8 @@ import torch
 import torchrl
 
 from warp_torchrl.models import Entry, Signature
-from warp_torchrl.observation import DEFAULT, PICTURE
+from warp_torchrl.observation import DEFAULT, PICTURE, STATE_SYMMETRY, former_symmetry
+from warp_torchrl.symmetry import Symmetry, from_plain, to_plain
 from warp_torchrl.world.state import Action
 
 FORMAT = 2
@@ -150,23 +152,32 @@ def first_line(error: Exception) -> str:
 
 
 def _signature_to_json(signature: Signature) -> dict[str, Any]:
+    def entry(each: Entry) -> dict[str, Any]:
+        return each._asdict() | {"symmetry": None if each.symmetry is None else to_plain(each.symmetry)}
+
     return signature._asdict() | {
-        "observation": {name: entry._asdict() for name, entry in signature.observation.items()},
-        "state": signature.state._asdict(),
+        "observation": {name: entry(each) for name, each in signature.observation.items()},
+        "state": entry(signature.state),
         "n_actions": signature.n_actions,
     }
 
 
 def _signature_from_json(content: dict[str, Any]) -> Signature:
-    def entry(node: dict[str, Any], names: tuple[str, ...] = ()) -> Entry:
+    def entry(node: dict[str, Any], names: tuple[str, ...], former: Callable[..., Symmetry | None]) -> Entry:
         shape = tuple(int(side) for side in node["shape"])
         told = tuple(str(name) for name in node.get("names", names if len(names) == shape[0] else ()))
         if told and len(told) != shape[0]:
             raise ValueError(f"{len(told)} names of {shape[0]} channels")
-        return Entry(shape, str(node["dtype"]), told)
+        plain = node.get("symmetry")
+        symmetry = former(shape, told) if "symmetry" not in node else plain and from_plain(plain)
+        if symmetry is not None and not symmetry.fits(shape):
+            raise ValueError(f"{symmetry} is not of shape {shape}")
+        return Entry(shape, str(node["dtype"]), told, symmetry)
 
-    observation = {str(name): entry(node, _FORMER_NAMES.get(name, ())) for name, node in content["observation"].items()}
+    observation = {
+        str(name): entry(node, _FORMER_NAMES.get(name, ()), partial(former_symmetry, name))
+        for name, node in content["observation"].items()
+    }
+    state = entry(content["state"], (), lambda shape, _: STATE_SYMMETRY if STATE_SYMMETRY.fits(shape) else None)
     actions = tuple(str(name) for name in content.get("actions", _FORMER_ACTIONS[: int(content["n_actions"])]))
-    return Signature(
-        observation, entry(content["state"]), int(content["n_agents"]), actions, int(content.get("n_roles", 2))
-    )
+    return Signature(observation, state, int(content["n_agents"]), actions, int(content.get("n_roles", 2)))

@@ -11,6 +11,7 @@ import yaml
 
 from warp_torchrl.config.compose import Record, plain, recompose
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.config.renamed import renamed_values
 from warp_torchrl.config.settings import COMPONENTS, Settings, settings
 from warp_torchrl.runs.checkpoint import Checkpoint, newest
 
@@ -103,7 +104,7 @@ def read_config(path: Path) -> dict[str, Any]:
         content = None
     if not isinstance(content, dict):
         raise ConfigError(f"{path} must be as the run wrote it; without it resume takes what the checkpoint holds")
-    return content
+    return renamed_values(content)
 
 
 def _check_unedited(folder: Path, held: Mapping[str, Any], record: Record, trained: Mapping[str, Any]) -> None:
