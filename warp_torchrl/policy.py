@@ -14,6 +14,7 @@ from torchrl.envs.utils import ExplorationType, exploration_type, set_exploratio
 
 from warp_torchrl.env.flat import FLAT, unflattened
 from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, ROLE, Signature, recurrent_actors, signature
+from warp_torchrl.models.canonical import Canonicalise
 from warp_torchrl.models.fitting import fitted
 from warp_torchrl.models.networks import AgentNetworks
 from warp_torchrl.observation import SELF_SIZE
@@ -43,7 +44,8 @@ class TrainedPolicy(TensorDictModuleBase):
         self, module: TensorDictModuleBase, mode: str, trained: Signature, overrides: Sequence[str] = ()
     ) -> None:
         super().__init__()
-        self.in_keys, self.out_keys = module.in_keys, module.out_keys
+        inner = {key for each in module.modules() if isinstance(each, Canonicalise) for key in each.out_keys}
+        self.in_keys, self.out_keys = module.in_keys, [key for key in module.out_keys if key not in inner]
         self.module, self.mode, self.trained, self.overrides = module, mode, trained, tuple(overrides)
 
     def fitted(self, env: EnvBase) -> "TrainedPolicy":
@@ -69,7 +71,7 @@ class TrainedPolicy(TensorDictModuleBase):
         """Write the team's actions, int64 [B, A]."""
         own = set_exploration_type(MODES[self.mode]) if exploration_type() is None else nullcontext()
         with own:
-            return self.module(tensordict)
+            return tensordict.update(self.module(tensordict.copy()).select(*self.out_keys, strict=False))
 
     def numpy_policy(self) -> "NumpyPolicy":
         """Return the policy as a function of the adapters' observations, ``act(observation, info)``."""
