@@ -159,7 +159,7 @@ def extended(tmp_path_factory):
 
 def test_an_extension_is_one_module_one_yaml_and_one_test(extended):
     _, files = extended
-    assert [Path(path).parts[0] for path in files] == ["warp_torchrl", "conf", "tests"] * 5
+    assert [Path(path).parts[0] for path in files] == ["warp_torchrl", "conf", "tests"] * 6
 
 
 def test_the_extensions_keep_to_their_own_tests_and_the_configuration_s(extended):
