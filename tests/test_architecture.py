@@ -13,7 +13,7 @@ FILES = {
     for path in PACKAGE.rglob("*.py")
 }
 MODULES = sorted(FILES)
-GROUND = ("nearest", "validation")
+GROUND = ("nearest", "symmetry", "validation")
 """What knows nothing of ours but each other, and every floor may use."""
 READS_STATE = [
     *(each for each in MODULES if each.split("/")[0] in ("observation", "reward")),
@@ -73,18 +73,10 @@ def test_tensors_are_compared_with_numbers_and_not_with_members_of_enumerations(
             assert not owners & {"Cover", "Action", "Stream"}, f"line {node.lineno}"
 
 
-READ_OF_OBSERVATIONS = {
-    "models/facing": ("observation/frame",),  # how they are turned
-    "models/model": ("observation/channels", "observation/frame"),
-    "models/memory": ("observation/frame", "observation/own"),  # and whether an episode begins
-}
-
-
 @pytest.mark.parametrize("module", [name for name in MODULES if name.split("/")[0] in ("models", "algorithms")])
 def test_learning_knows_specs_and_not_the_world(module):
     known = ("models", "algorithms", *GROUND)
-    read = READ_OF_OBSERVATIONS.get(module, ())
-    assert all(name.split("/")[0] in known or name in read for name in ours(module))
+    assert all(name.split("/")[0] in known for name in ours(module))
 
 
 @pytest.mark.parametrize("module", [each for each in MODULES if each.split("/")[0] == "env"])

@@ -12,6 +12,7 @@ from warp_torchrl.config.run_config import ENVIRONMENT, build_components
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.policy import TrainedPolicy
 from warp_torchrl.runs import checkpoint as checkpoints
+from warp_torchrl.runs import former
 from warp_torchrl.runs.shipped import find_policy
 
 
@@ -91,7 +92,7 @@ def policy_of(found: checkpoints.Checkpoint, mode: str = "best") -> TrainedPolic
     weights = found.policy()
     try:
         policy = algorithm.policy(found.manifest.signature, model)
-        policy.load_state_dict(weights)
+        policy.load_state_dict(former.parameters(weights, policy.state_dict()))
     except Exception as error:  # torch and TorchRL raise many types for weights that do not fit
         reason = " ".join(str(error).split())
         raise checkpoints.CheckpointError(f"{found.path} is of another architecture: {reason}") from None

@@ -14,6 +14,7 @@ from torchrl.envs.utils import ExplorationType, exploration_type, set_exploratio
 
 from warp_torchrl.env.flat import FLAT, unflattened
 from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, ROLE, Signature, recurrent_actors, signature
+from warp_torchrl.models.canonical import Canonicalise
 from warp_torchrl.models.fitting import fitted
 from warp_torchrl.models.networks import AgentNetworks
 from warp_torchrl.world.role import ROLES
@@ -45,7 +46,8 @@ class TrainedPolicy(TensorDictModuleBase):
         shown: Signature | None = None,
     ) -> None:
         super().__init__()
-        self.in_keys, self.out_keys = module.in_keys, module.out_keys
+        inner = {key for each in module.modules() if isinstance(each, Canonicalise) for key in each.out_keys}
+        self.in_keys, self.out_keys = module.in_keys, [key for key in module.out_keys if key not in inner]
         self.module, self.mode, self.trained, self.overrides = module, mode, trained, tuple(overrides)
         self.shown = trained if shown is None else shown
 
@@ -72,7 +74,7 @@ class TrainedPolicy(TensorDictModuleBase):
         """Write the team's actions, int64 [B, A]."""
         own = set_exploration_type(MODES[self.mode]) if exploration_type() is None else nullcontext()
         with own:
-            return self.module(tensordict)
+            return tensordict.update(self.module(tensordict.copy()).select(*self.out_keys, strict=False))
 
     def numpy_policy(self) -> "NumpyPolicy":
         """Return the policy for the adapters' numpy observations, called as ``act(observation, info)``."""
@@ -160,7 +162,7 @@ class NumpyPolicy:
             raise ValueError(f"{where}{who} must have {', '.join(missing)}, got {', '.join(entries) or 'nothing'}")
         mask = np.asarray(entries["action_mask"], dtype=bool)
         read: dict[Any, np.ndarray] = {ACTION_MASK: mask}
-        for entry, (shape, dtype, _) in self._entries.items():
+        for entry, (shape, dtype, *_) in self._entries.items():
             value, expected = np.asarray(entries[entry]), (*mask.shape[:-1], *shape)
             if value.shape != expected or value.dtype != dtype:
                 rule = f"{entry or 'observation'}{who} must be {dtype} of shape {list(expected)}"

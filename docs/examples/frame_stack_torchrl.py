@@ -15,7 +15,7 @@ def main(steps: int) -> None:
     worlds, length = 16, 16
     view = ("agents", "observation", "view")  # [worlds, agents, channels, rows, columns]
     env = TransformedEnv(make_env("skirmish", n_worlds=worlds), CatFrames(N=4, dim=-3, in_keys=[view], out_keys=[view]))
-    model = Mlp(facing="north")  # how stacked observations are turned, only their maker knows
+    model = Mlp(symmetry="none")  # how stacked observations are turned, only their maker knows
     learner = Ppo(minibatch_size=64).build(env, model, frames_per_batch=worlds * length)
 
     for _ in range(max(1, steps // (worlds * length))):

@@ -5,7 +5,7 @@ import torch
 
 from warp_torchrl.algorithms.a2c import A2c
 from warp_torchrl.algorithms.on_policy import ADVANTAGE, VALUE_TARGET, with_advantages
-from warp_torchrl.models import ACTION, VALUE, Mlp, hold, signature
+from warp_torchrl.models import ACTION, VALUE, Mlp, over_canonical, signature
 
 SMALL = Mlp(actor_hidden=(16,), critic_hidden=(16,))
 
@@ -17,10 +17,10 @@ def test_the_terms_are_those_of_the_textbook(make_small_env, central):
     learner = A2c(central_critic=central, entropy_coeff=0.02, critic_coeff=0.5).build(env, SMALL, 32)
     with torch.no_grad():
         batch = env.rollout(8, learner.explore, break_when_any_done=False)
-    data = with_advantages(learner.loss, batch, hold)
+    data = with_advantages(learner.loss, batch, SMALL.canonical_batch(signature(env), state=central))
     assert data.batch_size == (32,) and data[ADVANTAGE].shape == data[VALUE_TARGET].shape == (32, 2, 1)
     terms = learner.loss(data)
-    distribution = learner.policy.get_dist(data)
+    distribution = over_canonical(learner.policy).get_dist(data)
     log_prob, entropy = distribution.log_prob(data[ACTION]), distribution.entropy()
     with learner.loss.critic_network_params.to_module(learner.loss.critic_network):
         value = learner.loss.critic_network(data.clone())[VALUE]
@@ -38,7 +38,7 @@ def test_the_advantages_of_each_agent_are_standardised_where_asked(make_small_en
     for asked in (False, True):
         torch.manual_seed(1)
         loss = A2c(normalize_advantage=asked).build(env, SMALL, 32).loss
-        found[asked] = with_advantages(loss, batch.clone(), hold)[ADVANTAGE]
+        found[asked] = with_advantages(loss, batch.clone(), SMALL.canonical_batch(signature(env)))[ADVANTAGE]
     plain = found[False]
     torch.testing.assert_close(found[True], (plain - plain.mean(0)) / plain.std(0), rtol=1e-3, atol=1e-4)
     assert (plain.std(0) < 0.9).all()

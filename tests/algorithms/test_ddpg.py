@@ -7,7 +7,7 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from tests.algorithms.test_dqn import three_transitions
 from warp_torchrl.algorithms.ddpg import Ddpg, OneHotChoice
-from warp_torchrl.models import ACTION, ACTION_MASK, ACTION_ONE_HOT, LOGITS, STATE_ACTION_VALUE, Mlp
+from warp_torchrl.models import ACTION, ACTION_MASK, ACTION_ONE_HOT, LOGITS, STATE_ACTION_VALUE, Mlp, over_canonical
 
 SMALL = Mlp(actor_hidden=(8,), critic_hidden=(8,))
 
@@ -21,7 +21,8 @@ def test_the_losses_by_hand(make_small_env, central):
     data = three_transitions(env, learner)
 
     def choice(entries):
-        logits = learner.policy.module[0](entries.select(*learner.policy.module[0].in_keys).clone())[LOGITS]
+        actor = over_canonical(learner.policy.module[0], restored=True)
+        logits = actor(entries.select(*actor.in_keys).clone())[LOGITS]
         return one_hot(logits.masked_fill(~entries[ACTION_MASK], -torch.inf).argmax(-1), 11).float()
 
     def value(entries, action):
@@ -101,7 +102,7 @@ def test_a_share_of_the_actions_is_drawn_and_the_memory_holds_what_was_done(make
     assert [learner.schedule(p)["rollout/exploration_rate"] for p in (0.5, 0.0)] == pytest.approx([0.05, 0.8])
     for weight in learner.policy.parameters():
         weight.data.zero_()
-    learner.policy.module[0].module.network.body[-1].bias.data[10] = 100.0  # stays, whatever the noise
+    over_canonical(learner.policy.module[0]).module.body[-1].bias.data[10] = 100.0  # stays, whatever the noise
     with torch.no_grad():
         batch = env.rollout(4, learner.explore, break_when_any_done=False)
     # 512 actions, all but a share 0.8 (1 - 1 / open actions) of them stay; at 4 to 11 open ones 0.6 to 0.73, +- 0.09.

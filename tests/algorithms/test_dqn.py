@@ -9,7 +9,7 @@ from warp_torchrl.algorithms.dqn import Dqn
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.run_config import run_config
-from warp_torchrl.models import ACTION, ACTION_MASK, ACTION_VALUE, OBSERVATION, REWARD, Mlp
+from warp_torchrl.models import ACTION, ACTION_MASK, ACTION_VALUE, REWARD, Mlp, over_canonical
 
 SMALL = Mlp(actor_hidden=(8,), critic_hidden=(8,))
 
@@ -27,10 +27,9 @@ def three_transitions(env, learner):
 
 def values(learner, params, data):
     """The action values [3, 2, 11] of a set of parameters, as a plain network gives them."""
-    with params.to_module(
-        learner.loss.value_network if hasattr(learner.loss, "value_network") else learner.loss.local_value_network
-    ):
-        network = learner.policy.module[0]
+    loss = learner.loss
+    with params.to_module(loss.value_network if hasattr(loss, "value_network") else loss.local_value_network):
+        network = over_canonical(learner.policy.module[0], restored=True)
         return network(data.select(*network.in_keys).clone())[ACTION_VALUE]
 
 
@@ -70,10 +69,10 @@ def test_the_team_s_value_is_learnt_from_the_mean_reward(make_small_env, mixer):
         following = data["next"]
         best = values(learner, loss.local_value_network_params, following)
         best = best.masked_fill(~following[ACTION_MASK], -torch.inf).amax(-1)
-        state = following["state"] if mixer == "qmix" else None
+        state = following["canonical_state"] if mixer == "qmix" else None
         wanted = torch.tensor([0.75, -0.5, 2.5]) + 0.9 * torch.tensor([1.0, 1.0, 0.0]) * mixed(best, state)
         said = values(learner, loss.local_value_network_params, data).gather(-1, data[ACTION][..., None])[..., 0]
-        said = mixed(said, data["state"] if mixer == "qmix" else None)
+        said = mixed(said, data["canonical_state"] if mixer == "qmix" else None)
     torch.testing.assert_close(loss(data)["loss"].detach(), smooth_l1_loss(said, wanted))
 
 
@@ -81,7 +80,7 @@ def test_qmix_never_falls_when_an_agent_s_value_rises(make_small_env):
     env = make_small_env(8)
     mixer = Dqn(mixer="qmix").build(env, SMALL, 8).loss.mixer_network
     state, own = env.reset()["state"], torch.randn(8, 2, 1)
-    now = TensorDict({("agents", "chosen_action_value"): own, "state": state}, [8])
+    now = TensorDict({("agents", "chosen_action_value"): own, "canonical_state": state}, [8])
     low = mixer(now.clone())["chosen_action_value"]
     for agent in range(2):
         raised = own.clone()
@@ -205,5 +204,6 @@ def test_the_observation_is_kept_as_bytes(make_small_env):
     env = make_small_env(1)
     learner = Dqn(capacity=3, warm_up=1, minibatch_size=3).build(env, SMALL, 3)
     data = three_transitions(env, learner)
-    assert data[(*OBSERVATION, "view")].dtype == data[("next", *OBSERVATION, "view")].dtype == torch.uint8
+    view = ("agents", "canonical_view")
+    assert data[view].dtype == data[("next", *view)].dtype == torch.uint8
     assert "state" not in data.keys() and "info" not in data["next"].keys()

@@ -8,7 +8,7 @@ from torchrl.objectives.value import MultiAgentGAE
 from tests.conftest import small_world
 from warp_torchrl.algorithms.on_policy import ADVANTAGE, VALUE_TARGET, narrowed, with_advantages
 from warp_torchrl.algorithms.ppo import Ppo
-from warp_torchrl.models import REWARD, STATE, VALUE, Cnn, Mlp, hold
+from warp_torchrl.models import CANONICAL_STATE, REWARD, STATE, VALUE, CanonicalBatch, Cnn, Mlp, signature
 from warp_torchrl.observation import Paper, Surroundings
 
 
@@ -31,7 +31,7 @@ def test_advantages_have_a_value_for_each_agent(make_small_env, central):
     env = make_small_env(4)
     learner = Ppo(central_critic=central).build(env, Mlp(actor_hidden=(16,), critic_hidden=(16,)), 32)
     batch = collected(env, learner, 8)
-    prepared = with_advantages(learner.loss, batch, hold)
+    prepared = with_advantages(learner.loss, batch, Mlp().canonical_batch(signature(env), state=central))
     assert prepared.batch_size == (32,)
     assert prepared[ADVANTAGE].shape == prepared[VALUE_TARGET].shape == (32, 2, 1)
     assert not {"next", "info"} & set(prepared.keys())
@@ -40,8 +40,8 @@ def test_advantages_have_a_value_for_each_agent(make_small_env, central):
 @pytest.mark.parametrize(("model", "observation"), [(Mlp, Surroundings()), (Mlp, Paper()), (Cnn, Surroundings())])
 def test_a_state_kept_in_half_precision_changes_no_bit_of_what_is_learnt(make_small_env, model, observation):
     env = make_small_env(3, observation=observation)
-    learner = Ppo(minibatch_size=12).build(env, model(dtype="bfloat16", facing="north"), 12)
-    wide = with_advantages(learner.loss, collected(env, learner, 4), lambda batch: batch)
+    learner = Ppo(minibatch_size=12).build(env, model(dtype="bfloat16", symmetry="none"), 12)
+    wide = with_advantages(learner.loss, collected(env, learner, 4), CanonicalBatch(None))
     narrow = narrowed(wide, torch.bfloat16)
     assert narrow[STATE].dtype == torch.bfloat16 != wide[STATE].dtype
     found = []
@@ -58,7 +58,7 @@ def test_what_is_learnt_from_is_kept_as_the_networks_compute(make_small_env):
     for dtype in ("float32", "bfloat16"):
         learner = Ppo(epochs=1, minibatch_size=12).build(env, Mlp(dtype=dtype, actor_hidden=(8,)), 12)
         learner.store(collected(env, learner, 4))
-        kept[dtype] = next(iter(learner.samples()))[STATE].dtype
+        kept[dtype] = next(iter(learner.samples()))[CANONICAL_STATE].dtype
     assert kept == {"float32": torch.float32, "bfloat16": torch.bfloat16}
 
 
@@ -95,7 +95,7 @@ def test_gae_by_hand():
     batch["next", "done"][:, -1] = True
     batch["next", "terminated"][0, -1] = True
     batch["next", "truncated"][1, -1] = True
-    advantage = with_advantages(learner.loss, batch, hold)[ADVANTAGE].view(2, 3, 2)
+    advantage = with_advantages(learner.loss, batch, Mlp().canonical_batch(signature(env)))[ADVANTAGE].view(2, 3, 2)
     assert advantage[0, :, 0].tolist() == pytest.approx([0.96875, 0.875, 0.5], abs=1e-5)
     assert advantage[1, -1, 0].item() == pytest.approx(0.75, abs=1e-5)
     assert (advantage[..., 0] == advantage[..., 1]).all()
@@ -107,13 +107,14 @@ def test_one_pass_of_the_critic_values_what_two_would(make_small_env):
     learner = Ppo().build(env, Mlp(actor_hidden=(8,), critic_hidden=(8,), dtype="float32"), 48)
     batch, loss = collected(env, learner, 8), learner.loss
     assert int(batch["next", "done"][:, :-1].sum()) > 0, "an episode ends before the batch does"
+    canonical = Mlp().canonical_batch(signature(env))
     two = MultiAgentGAE(gamma=0.99, lmbda=0.95, value_network=loss.critic_network)
     two.set_keys(value=VALUE, reward=REWARD, done="done", terminated="terminated", advantage=ADVANTAGE)
     two.set_keys(value_target=VALUE_TARGET)
     with torch.no_grad():
-        both = hold(batch).set("next", hold(batch["next"]))
+        both = canonical(batch).set("next", canonical(batch["next"]))
         twice = two(both, params=loss.critic_network_params, target_params=loss.target_critic_network_params)
-    once = with_advantages(loss, batch.clone(), hold).view(6, 8)
+    once = with_advantages(loss, batch.clone(), canonical).view(6, 8)
     for key in (ADVANTAGE, VALUE_TARGET):
         torch.testing.assert_close(once[key], twice[key], rtol=1e-5, atol=1e-6)
 
@@ -169,7 +170,8 @@ def test_values_out_of_range_are_refused(field, value):
 def test_the_critic_reads_the_state_unless_it_is_told_not_to(make_small_env):
     env, model = make_small_env(2), Mlp(actor_hidden=(8,), critic_hidden=(8,))
     reads = [
-        STATE in each.build(env, model, 8).loss.critic_network.in_keys for each in (Ppo(), Ppo(central_critic=False))
+        CANONICAL_STATE in each.build(env, model, 8).loss.critic_network.in_keys
+        for each in (Ppo(), Ppo(central_critic=False))
     ]
     assert reads == [True, False]
 

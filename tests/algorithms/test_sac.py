@@ -5,7 +5,7 @@ from torch.nn.functional import smooth_l1_loss
 
 from tests.algorithms.test_dqn import three_transitions
 from warp_torchrl.algorithms.sac import Sac
-from warp_torchrl.models import ACTION, ACTION_MASK, ACTION_VALUE, LOGITS, Mlp
+from warp_torchrl.models import ACTION, ACTION_MASK, ACTION_VALUE, LOGITS, Mlp, over_canonical
 
 SMALL = Mlp(actor_hidden=(8,), critic_hidden=(8,))
 
@@ -20,7 +20,8 @@ def test_the_losses_by_hand(make_small_env):
     data = three_transitions(env, learner)
 
     def policy(entries):
-        logits = learner.policy[0](entries.select(*learner.policy[0].in_keys).clone())[LOGITS]
+        actor = over_canonical(learner.policy[0], restored=True)
+        logits = actor(entries.select(*actor.in_keys).clone())[LOGITS]
         log_prob = logits.masked_fill(~entries[ACTION_MASK], -1e4).log_softmax(-1)
         return log_prob.exp(), log_prob
 

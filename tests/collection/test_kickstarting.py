@@ -14,7 +14,7 @@ from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.run_config import run_config
 from warp_torchrl.evaluation.method import method
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, TEACHER_ACTION
+from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, TEACHER_ACTION, over_canonical
 from warp_torchrl.training.loop import Training
 
 TINY = [
@@ -74,7 +74,8 @@ def sample_of(training):
 def test_the_cloning_loss_by_hand(tmp_path):
     training = student(tmp_path)
     sample = sample_of(training)
-    logits = training.learner.policy[0](sample.select(*training.learner.policy[0].in_keys))[LOGITS]
+    actor = over_canonical(training.learner.policy[0])
+    logits = actor(sample.select(*actor.in_keys))[LOGITS]
     by_hand = [
         math.log(sum(math.exp(each) for each in row)) - row[int(choice)]
         for row, choice in zip(logits.flatten(0, 1).tolist(), sample[TEACHER_ACTION].flatten(), strict=True)
@@ -89,7 +90,7 @@ def test_the_cloning_loss_by_hand(tmp_path):
 @pytest.mark.filterwarnings("ignore")  # TorchRL's, of a target network that it declares and does not make
 def test_the_cloning_loss_is_torchrls(tmp_path):
     """Of the same network and choices: its value and its gradients, though it takes no pass of its own."""
-    training = student(tmp_path, "model.facing=north")
+    training = student(tmp_path, "model.symmetry=none")
     sample, actor = sample_of(training), training.learner.policy[0]
     theirs = BCLoss(actor, loss_function=lambda said, chosen: cross_entropy(said.flatten(0, -2), chosen.flatten()))
     theirs.set_keys(action=LOGITS)

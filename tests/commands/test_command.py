@@ -416,7 +416,7 @@ def test_a_run_starts_from_another_ones_networks_on_another_scenario(trained, ru
     [
         ("nowhere", "nowhere is not a run folder", 4),
         ("alone", "holds a policy alone", 4),
-        ("run model.facing=north", "was trained by another algorithm or other networks", 4),
+        ("run model.symmetry=none", "was trained by another algorithm or other networks", 4),
     ],
 )
 def test_a_start_that_is_none_is_refused_before_anything_is_written(trained, run_here, tmp_path, path, said, expected):

@@ -11,7 +11,7 @@ from warp_torchrl.evaluation.method import method
     [
         ([], "mappo efficiency surroundings"),
         (["algorithm=ippo", "model.sharing=none"], "ippo efficiency surroundings sharing=none"),
-        (["model.facing=north", "observation.radius=7"], "mappo efficiency surroundings facing=north radius=7"),
+        (["model.symmetry=none", "observation.radius=7"], "mappo efficiency surroundings symmetry=none radius=7"),
         (["observation=local", "observation.radius=3"], "mappo efficiency local radius=3"),
         (["model.memory=64"], "mappo efficiency surroundings memory=64"),
         (["observation=paper", "observation.radius=5"], "mappo efficiency paper radius=5"),

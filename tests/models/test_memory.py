@@ -24,10 +24,8 @@ from warp_torchrl.models import (
     Cnn,
     Mlp,
     Recollection,
-    fire_channel,
-    given_held,
-    hold,
     memory_apart,
+    over_canonical,
     recurrent_actors,
     signature,
 )
@@ -37,8 +35,8 @@ from warp_torchrl.world.team import Team
 
 SMALL = {"actor_hidden": (16,), "critic_hidden": (16,), "memory": 8}
 MODELS = {
-    "fire": Mlp(**SMALL),
-    "north": Mlp(**SMALL, facing="north"),
+    "canonical": Mlp(**SMALL),
+    "none of symmetry": Mlp(**SMALL, symmetry="none"),
     "role": Mlp(**SMALL, sharing="role"),
     "none": Mlp(**SMALL, sharing="none"),
     "cnn": Cnn(**SMALL, channels=(4,)),
@@ -70,7 +68,7 @@ def played(env, policy, steps=24):
 
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 def test_a_sequence_says_what_its_steps_said(make_env, model):
-    """... over the ends of episodes, from the memory that it was recorded with, and as agents hold it too."""
+    """... over the ends of episodes, from the memory that it was recorded with, and in canonical orientation too."""
     env = make_env()
     policy = lively(Ppo().policy(signature(env), model))
     played(env, policy, steps=5)  # so that the sequence begins with a memory
@@ -85,8 +83,8 @@ def test_a_sequence_says_what_its_steps_said(make_env, model):
     assert batch["next", "done"].any() and batch[MEMORY][:, 0].any()
     again = policy.module[0](batch.exclude(LOGITS))
     torch.testing.assert_close(again[LOGITS], batch[LOGITS])
-    held = (TensorDict.clone if fire_channel(policy) is None else hold)(batch.exclude(LOGITS))
-    ours = given_held(policy).get_dist(held).log_prob(held[ACTION])
+    canonical = model.canonical_batch(signature(env))(batch.exclude(LOGITS))
+    ours = over_canonical(policy).get_dist(canonical).log_prob(canonical[ACTION])
     torch.testing.assert_close(ours, policy.get_dist(batch).log_prob(batch[ACTION]))
 
 
@@ -109,7 +107,7 @@ def test_what_was_seen_before_counts_until_an_episode_begins(make_env, model):
 
 def test_a_policy_forgets_where_an_episode_begins(make_env):
     env = make_env()
-    policy = lively(Ppo().policy(signature(env), MODELS["fire"]))
+    policy = lively(Ppo().policy(signature(env), MODELS["canonical"]))
     now = env.reset()
     with torch.no_grad(), set_exploration_type(ExplorationType.DETERMINISTIC):
         first = policy(now.clone())[LOGITS].clone()
@@ -133,7 +131,7 @@ def test_a_world_s_memory_is_its_own(make_env):
 
 def test_whoever_acts_elsewhere_remembers_then_what_it_did_before(make_env):
     env, other = make_env(), make_env()
-    policy = lively(Ppo().policy(signature(env), MODELS["fire"]))
+    policy = lively(Ppo().policy(signature(env), MODELS["canonical"]))
     played(env, policy, steps=3)
     kept = Recollection(policy).state_dict()
     assert kept["0"].any()
@@ -153,7 +151,7 @@ def test_what_was_shown_at_first_is_learnt_to_matter_later_by_those_who_remember
     By chance 70 % of 320 guesses are right once in 10^12 times.
     """
     env = make_small_env(16, small_world(horizon=400))
-    model = Mlp(actor_hidden=(32,), critic_hidden=(16,), memory=memory, facing="north")
+    model = Mlp(actor_hidden=(32,), critic_hidden=(16,), memory=memory, symmetry="none")
     rates = {"learning_rate": 1e-2, "learning_rate_end": 1.0, "gamma": 0.5, "entropy_coeff": 0.0}
     learner = kind(minibatch_size=24, **rates).build(env, model, 48)
     shares = []
@@ -191,10 +189,10 @@ def asked(env, learner, cue):
 
 def test_a_minibatch_is_made_of_whole_sequences(make_env):
     env = make_env()
-    learner = Ppo(minibatch_size=50, epochs=1).build(env, MODELS["fire"], 6 * 24)
+    learner = Ppo(minibatch_size=50, epochs=1).build(env, MODELS["canonical"], 6 * 24)
     learner.store(played(env, learner.explore))
     assert [list(sample.shape) for sample in learner.samples()] == [[2, 24]] * 3
-    learner = Ppo(minibatch_size=10, epochs=1).build(env, MODELS["fire"], 6 * 24)
+    learner = Ppo(minibatch_size=10, epochs=1).build(env, MODELS["canonical"], 6 * 24)
     learner.store(played(env, learner.explore))
     assert [list(sample.shape) for sample in learner.samples()] == [[1, 24]] * 6
 
@@ -202,7 +200,7 @@ def test_a_minibatch_is_made_of_whole_sequences(make_env):
 def test_numpy_agents_remember_by_name(make_env):
     """A team that is asked together, agent by agent by name, and on tensordicts does the same."""
     env = make_env(n_worlds=1)
-    policy = lively(Ppo().policy(signature(env), MODELS["fire"]))
+    policy = lively(Ppo().policy(signature(env), MODELS["canonical"]))
     batch = played(env, policy)
     together, apart = (TrainedPolicy(policy, "deterministic", signature(env)).numpy_policy() for _ in range(2))
     with set_exploration_type(ExplorationType.DETERMINISTIC), torch.no_grad():
@@ -223,7 +221,7 @@ def test_numpy_agents_remember_by_name(make_env):
 def test_where_there_is_no_clock_there_is_no_memory(make_small_env):
     env = make_small_env(2, observation=Paper())
     with pytest.raises(ValueError, match=r"^model.memory must be 0 where observations have no clock, got 8$"):
-        Ppo().policy(signature(env), MODELS["north"])
+        Ppo().policy(signature(env), MODELS["none of symmetry"])
 
 
 @pytest.mark.parametrize("memory", [-8, 12, 8200])

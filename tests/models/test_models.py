@@ -16,7 +16,6 @@ from warp_torchrl.models import (
     VALUE,
     Entry,
     Mlp,
-    hold,
     signature,
 )
 from warp_torchrl.models.networks import LinearEncoder
@@ -64,7 +63,7 @@ def test_a_central_critic_does_without_views_where_there_is_a_picture(make_small
     now = env.reset()
     other = now.clone()
     other[(*OBSERVATION, "view")] = 255 - other[(*OBSERVATION, "view")]
-    model = Mlp(sharing=sharing, facing="north")
+    model = Mlp(sharing=sharing, symmetry="none")
     shape = signature(env)
     central = model.critic(shape, central=True)
     assert torch.equal(central(now.clone())[VALUE], central(other.clone())[VALUE]) is not reads
@@ -129,7 +128,7 @@ def test_every_way_of_sharing_fits_and_learns(make_small_env, sharing, observati
         learner = Ppo(central_critic=central, minibatch_size=12).build(env, model, 12)
         with torch.no_grad():
             batch = env.rollout(4, learner.explore, break_when_any_done=False)
-        terms = learner.loss(with_advantages(learner.loss, batch, hold))
+        terms = learner.loss(with_advantages(learner.loss, batch, model.canonical_batch(signature(env), state=central)))
         sum(terms[key] for key in learner.loss_keys).backward()
         gradients = [p.grad for p in learner.loss.parameters() if p.requires_grad]
         assert all(g is not None and g.isfinite().all() for g in gradients)
@@ -137,7 +136,7 @@ def test_every_way_of_sharing_fits_and_learns(make_small_env, sharing, observati
 
 def test_networks_are_chosen_by_the_role_whatever_the_team(make_small_env):
     env = mixed_env(make_small_env)
-    actor, now = Mlp(sharing="role", facing="north").actor(signature(env)), env.reset()
+    actor, now = Mlp(sharing="role", symmetry="none").actor(signature(env)), env.reset()
     assert now["agents", "role"].tolist() == [[0, 1, 0, 1]] * 3
     own = [network(*(now[key] for key in signature(env).observation_keys())) for network in actor.module.networks]
     logits = actor(now)[LOGITS]
@@ -149,7 +148,7 @@ def test_networks_are_chosen_by_the_role_whatever_the_team(make_small_env):
 
 def test_agents_without_sharing_have_a_network_each(make_small_env):
     env = mixed_env(make_small_env)
-    actor, now = Mlp(sharing="none", facing="north").actor(signature(env)), env.reset()
+    actor, now = Mlp(sharing="none", symmetry="none").actor(signature(env)), env.reset()
     before = actor(now.clone())[LOGITS]
     nn.init.zeros_(actor.module.networks[2].body[-1].weight)
     after = actor(now)[LOGITS]

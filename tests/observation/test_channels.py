@@ -64,11 +64,11 @@ def test_a_name_that_is_taken_is_refused():
             return look.cells
 
 
-@pytest.mark.parametrize("facing", ["north", "fire"])
-def test_a_policy_plays_beside_channels_and_actions_that_it_does_not_know(wetland, facing):
+@pytest.mark.parametrize("symmetry", ["none", "canonical"])
+def test_a_policy_plays_beside_channels_and_actions_that_it_does_not_know(wetland, symmetry):
     there, _ = seen_with(*DEFAULT, allow_stay=False)
     torch.manual_seed(0)
-    policy = TrainedPolicy(Ppo().policy(signature(there), Mlp(facing=facing)), "deterministic", signature(there))
+    policy = TrainedPolicy(Ppo().policy(signature(there), Mlp(symmetry=symmetry)), "deterministic", signature(there))
     assert policy.fitted(there).module is policy.module
     here, now = seen_with(wetland, *reversed(DEFAULT))
     alike = now.clone()
@@ -93,9 +93,9 @@ def test_what_a_policy_lacks_is_told_by_name():
         policy.fitted(wider)
 
 
-def test_networks_that_face_the_fire_must_see_it():
+def test_canonical_inputs_take_a_channel_that_shows_fire():
     env, _ = seen_with("age", "threat")
-    with pytest.raises(ValueError, match=r"facing must be north where observation\.channels lack fire_stage"):
+    with pytest.raises(ValueError, match=r"model\.symmetry must be none where no entry shows a target, such as fire"):
         Ppo().policy(signature(env), Mlp())
 
 

@@ -14,7 +14,16 @@ from torchrl.envs.utils import ExplorationType, exploration_type
 from torchrl.objectives import DDPGLoss, ValueEstimators
 
 from warp_torchrl.algorithms.off_policy import AGENT_KEYS, EpsilonGreedy
-from warp_torchrl.models import ACTION, ACTION_MASK, ACTION_ONE_HOT, LOGITS, STATE_ACTION_VALUE, Mlp, Signature
+from warp_torchrl.models import (
+    ACTION,
+    ACTION_MASK,
+    ACTION_ONE_HOT,
+    LOGITS,
+    STATE_ACTION_VALUE,
+    Mlp,
+    Signature,
+    over_canonical,
+)
 
 
 class OneHotChoice(nn.Module):
@@ -86,8 +95,10 @@ class Ddpg(EpsilonGreedy):
 
     def loss(self, policy: TensorDictModuleBase, shape: Signature, model: Mlp, device: torch.device) -> DDPGLoss:
         """Return TorchRL's loss with its value estimator."""
-        critic = model.action_critic(shape, self.central_critic).to(device)
-        loss = DDPGLoss(policy, critic, delay_actor=True, delay_value=True, loss_function="smooth_l1")
+        critic = over_canonical(model.action_critic(shape, self.central_critic), restored=True).to(device)
+        loss = DDPGLoss(
+            over_canonical(policy, restored=True), critic, delay_actor=True, delay_value=True, loss_function="smooth_l1"
+        )
         loss.set_keys(state_action_value=STATE_ACTION_VALUE, **AGENT_KEYS)
         loss.make_value_estimator(ValueEstimators.TD0, gamma=self.gamma)
         return loss

@@ -19,9 +19,9 @@ from warp_torchrl.models import (
     ACTION_MASK,
     ACTION_VALUE,
     CHOSEN_ACTION_VALUE,
-    STATE,
     Mlp,
     Signature,
+    over_canonical,
 )
 
 TEAM_VALUE = "chosen_action_value"
@@ -67,7 +67,7 @@ class Dqn(EpsilonGreedy):
 
     def loss(self, policy: TensorDictModuleBase, shape: Signature, model: Mlp, device: torch.device) -> LossModule:
         """Return TorchRL's loss with its value estimator."""
-        values = TensorDictSequential(*policy.module[:-1])
+        values = over_canonical(TensorDictSequential(*policy.module[:-1]), restored=True)
         if self.mixer == "none":
             loss = DQNLoss(
                 values, action_space="categorical", delay_value=True, double_dqn=True, loss_function="smooth_l1"
@@ -92,5 +92,5 @@ class Dqn(EpsilonGreedy):
             return TensorDictModule(
                 VDNMixer(n_agents=shape.n_agents, device=device), in_keys=[CHOSEN_ACTION_VALUE], out_keys=[TEAM_VALUE]
             )
-        mixer = model.of_state(QMixer(shape.state.shape, self.mixer_hidden, shape.n_agents, device))
-        return TensorDictModule(mixer, in_keys=[CHOSEN_ACTION_VALUE, STATE], out_keys=[TEAM_VALUE])
+        mixer = QMixer(shape.state.shape, self.mixer_hidden, shape.n_agents, device)
+        return TensorDictModule(mixer, in_keys=[CHOSEN_ACTION_VALUE, model.state_key], out_keys=[TEAM_VALUE])

@@ -16,7 +16,16 @@ from torchrl.objectives.utils import TargetNetUpdater
 from warp_torchrl.algorithms.algorithm import Algorithm, falling
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.algorithms.replay import ReplayMemory, check_prioritised, replay_buffer, weighted
-from warp_torchrl.models import ACTION, ACTION_MASK, REWARD, Mlp, Signature, signature
+from warp_torchrl.models import (
+    ACTION,
+    ACTION_MASK,
+    CANONICAL_STATE,
+    REWARD,
+    CanonicalBatch,
+    Mlp,
+    Signature,
+    signature,
+)
 
 AGENT_KEYS = {"reward": REWARD, "done": ("agents", "done"), "terminated": ("agents", "terminated")}
 """Keys of TorchRL's losses for values of each agent; the team's end is each agent's end."""
@@ -104,6 +113,7 @@ class OffPolicy(Algorithm):
         memory = self.memory(env.device)
         targets = self.targets(loss)
         explore = self.explorer(policy, shape).to(env.device)
+        canonical = model.canonical_batch(shape, state=CANONICAL_STATE in loss.in_keys, restored=True)
 
         def samples() -> Iterator[TensorDictBase]:
             enough = len(memory) >= max(self.warm_up, self.minibatch_size)
@@ -126,11 +136,11 @@ class OffPolicy(Algorithm):
             columns=self.columns(),
             optimizer=optimizer,
             max_grad_norm=self.max_grad_norm,
-            store=lambda batch: memory.extend(transitions(loss, batch)),
+            store=lambda batch: memory.extend(transitions(loss, batch, canonical)),
             samples=samples,
             after_step=after_step,
             schedule=schedule,
-            keeps={"replay": ReplayMemory(memory), "targets": targets},
+            keeps={"replay": ReplayMemory(memory, canonical), "targets": targets},
         )
 
     def memory(self, device: torch.device) -> ReplayBuffer:
@@ -210,8 +220,9 @@ class EpsilonGreedy(OffPolicy):
         return {"rollout/exploration_rate": epsilon}
 
 
-def transitions(loss: LossModule, batch: TensorDictBase) -> TensorDictBase:
+def transitions(loss: LossModule, batch: TensorDictBase, canonical: CanonicalBatch) -> TensorDictBase:
     """Return a loss's inputs from a batch, with the team's end for each agent; [B, T] -> [B T]."""
+    batch = canonical(batch).set("next", canonical(batch["next"]))
     reward = batch["next", *REWARD]
     batch["next", TEAM_REWARD] = reward.mean(dim=-2)
     for name in ("done", "terminated"):

@@ -1,8 +1,6 @@
 """Base of the on-policy algorithms: actors, critics, advantages and schedules."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import torch
 from tensordict import TensorDictBase
@@ -17,19 +15,20 @@ from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.algorithms.storage import RowStorage
 from warp_torchrl.models import (
     ACTION,
+    CANONICAL,
+    CANONICAL_STATE,
     LOG_PROB,
     LOGITS,
     OBSERVATION,
     REWARD,
     STATE,
     VALUE,
+    CanonicalBatch,
     Mlp,
     Recollection,
     Signature,
     arithmetic_of,
-    fire_channel,
-    given_held,
-    hold,
+    over_canonical,
     signature,
 )
 
@@ -93,7 +92,7 @@ class OnPolicy(Algorithm):
         shape = signature(env)
         policy = self.policy(shape, model).to(env.device)
         critic = model.critic(shape, self.central_critic).to(env.device)
-        loss = self.loss(given_held(policy), given_held(critic)).to(env.device)
+        loss = self.loss(over_canonical(policy), over_canonical(critic)).to(env.device)
         loss.value_estimator.value_network = None  # it reads the values that ``with_advantages`` adds
         optimizer = torch.optim.Adam(loss.parameters(), lr=self.learning_rate, eps=1e-5, fused=True)
 
@@ -101,8 +100,7 @@ class OnPolicy(Algorithm):
             loss.entropy_coeff.fill_(falling(self.entropy_coeff, self.entropy_coeff_end, progress))
             return {"train/learning_rate": self.rate_at(progress, optimizer), **self.constants()}
 
-        fire = fire_channel(policy)
-        prepare = _as_it_is if fire is None else partial(hold, fire=fire)
+        canonical = model.canonical_batch(shape, state=self.central_critic)
         memory = Recollection(policy)
         steps = frames_per_batch // env.batch_size[0] if memory.actors else 1  # in a row of the buffer
         buffer = TensorDictReplayBuffer(
@@ -113,7 +111,7 @@ class OnPolicy(Algorithm):
 
         def store(batch: TensorDictBase) -> None:
             buffer.empty()
-            valued = with_advantages(loss, batch, prepare, whole=bool(memory.actors))
+            valued = with_advantages(loss, batch, canonical, whole=bool(memory.actors))
             buffer.extend(narrowed(valued, arithmetic_of(critic, env.device.type)))
 
         return Learner(
@@ -153,22 +151,20 @@ class OnPolicy(Algorithm):
         return {}
 
 
-Hold = Callable[[TensorDictBase], TensorDictBase]
-"""Makes what a loss's networks read of what was collected."""
-
-
-def with_advantages(loss: LossModule, batch: TensorDictBase, hold: Hold, whole: bool = False) -> TensorDictBase:
+def with_advantages(
+    loss: LossModule, batch: TensorDictBase, canonical: CanonicalBatch, whole: bool = False
+) -> TensorDictBase:
     """Add advantages and value targets over time, then drop what the loss does not read.
 
     Args:
         loss: Whose values and estimator they are of.
         batch: The collected batch, [B, T].
-        hold: Makes what is read of it.
+        canonical: Makes what the loss's networks read.
         whole: Whether to return sequences [B, T], and not steps [B T].
     """
     with torch.no_grad():
-        batch = hold(batch)
-        _add_values(loss, batch, hold)
+        batch = canonical(batch)
+        _add_values(loss, batch, canonical)
         loss.value_estimator(batch)
     batch = batch.exclude("next", "info", LOGITS, VALUE)
     return batch if whole else batch.reshape(-1)
@@ -179,16 +175,12 @@ def narrowed(batch: TensorDictBase, dtype: torch.dtype) -> TensorDictBase:
 
     They would be made so at every pass, and most of what a minibatch copies is the state.
     """
-    wide = {key: batch.get(key, None) for key in (STATE, OBSERVATION)}
+    wide = {key: batch.get(key, None) for key in (STATE, OBSERVATION, CANONICAL_STATE, CANONICAL)}
     found = {key: value for key, value in wide.items() if isinstance(value, Tensor) and value.dtype == torch.float32}
     return batch.copy().update({key: value.to(dtype) for key, value in found.items()}) if found else batch
 
 
-def _as_it_is(batch: TensorDictBase) -> TensorDictBase:
-    return batch
-
-
-def _add_values(loss: LossModule, batch: TensorDictBase, hold: Hold) -> None:
+def _add_values(loss: LossModule, batch: TensorDictBase, canonical: CanonicalBatch) -> None:
     """Add the values of each step's state and next state, with little more than one pass of the critic.
 
     The next state is the following step's state, except at the end of an episode or of the batch.
@@ -198,7 +190,7 @@ def _add_values(loss: LossModule, batch: TensorDictBase, hold: Hold) -> None:
     ends[:, -1] = True
     with loss.critic_network_params.to_module(loss.critic_network):
         value = loss.critic_network(batch.select(*keys))[VALUE]
-        last = loss.critic_network(hold(batch["next"].select(*keys)[ends]))[VALUE]
+        last = loss.critic_network(canonical(batch["next"][ends]))[VALUE]
     following = value.roll(-1, dims=1)
     following[ends] = last
     batch.set(VALUE, value)

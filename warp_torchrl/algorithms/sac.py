@@ -11,7 +11,7 @@ from torchrl.objectives import DiscreteSACLoss, ValueEstimators
 
 from warp_torchrl.algorithms.algorithm import masked_actor
 from warp_torchrl.algorithms.off_policy import AGENT_KEYS, OffPolicy
-from warp_torchrl.models import ACTION, ACTION_VALUE, Mlp, Signature
+from warp_torchrl.models import ACTION, ACTION_VALUE, Mlp, Signature, over_canonical
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,8 +41,8 @@ class Sac(OffPolicy):
     def loss(self, policy: ProbabilisticActor, shape: Signature, model: Mlp, device: torch.device) -> DiscreteSACLoss:
         """Return TorchRL's loss with its value estimator."""
         loss = DiscreteSACLoss(
-            policy,
-            [model.action_value(shape).to(device) for _ in range(2)],
+            over_canonical(policy, restored=True),
+            [over_canonical(model.action_value(shape), restored=True).to(device) for _ in range(2)],
             action_space="categorical",
             num_actions=shape.n_actions,
             num_qvalue_nets=2,

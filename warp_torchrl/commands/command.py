@@ -28,6 +28,7 @@ from warp_torchrl.config.compose import (
 )
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.grammar import check_flags, check_overrides
+from warp_torchrl.config.renamed import renamed_overrides
 from warp_torchrl.config.run_config import COMPONENTS, run_config
 from warp_torchrl.evaluation.evaluate import evaluate_policy
 from warp_torchrl.runs import checkpoint as checkpoints
@@ -149,7 +150,7 @@ def _values(config: DictConfig) -> dict[str, Any]:
 
 
 def _run(name: str, job: Callable[[DictConfig], None]) -> None:
-    arguments = sys.argv[1:]
+    arguments = renamed_overrides(sys.argv[1:])
     debug = "debug=true" in [each.lower() for each in arguments]
     logging.raiseExceptions = debug  # a full disk must not print a second error
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra then raises its errors instead of printing them

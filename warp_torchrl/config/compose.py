@@ -22,6 +22,7 @@ from omegaconf.errors import OmegaConfBaseException
 from warp_torchrl.config.construction import ConfigError, UnknownKeyError, component
 from warp_torchrl.config.defaults import defaults
 from warp_torchrl.config.grammar import check_overrides, several_values
+from warp_torchrl.config.renamed import renamed_overrides
 from warp_torchrl.config.run_config import COMPONENTS, WORLD_KEYS
 from warp_torchrl.nearest import did_you_mean
 
@@ -45,6 +46,7 @@ def compose_config(name: str, overrides: Sequence[str] = ()) -> DictConfig:
     Raises:
         ConfigError: If an override does not fit, in one line.
     """
+    overrides = renamed_overrides(overrides)
     check_choices(overrides)
     config = _compose(name, overrides)
     try:
@@ -151,7 +153,7 @@ def _class_of(path: Path) -> type:
 # What is written into a run folder, and read back
 
 _OPTION = re.compile(r"[A-Za-z0-9_]+")
-_BEFORE = {"model.facing": "north"}
+_BEFORE = {"model.symmetry": "none"}
 """What runs did whose record has none of a key yet."""
 
 

@@ -14,7 +14,7 @@ from warp_torchrl.env.render import render
 from warp_torchrl.env.reset_cache import ResetCache, Start
 from warp_torchrl.env.scene import Observations, Scene
 from warp_torchrl.env.specs import make_specs
-from warp_torchrl.observation import Observation, Surroundings, state_names
+from warp_torchrl.observation import Observation, Surroundings, state_names, state_symmetry
 from warp_torchrl.reward import Efficiency, Reward
 from warp_torchrl.world.fast.compile import check_compiler
 from warp_torchrl.world.role import ROLES
@@ -75,7 +75,10 @@ class WildfireEnv(EnvBase):
         names, roles = self.world.team.agent_names, self.world.team.agent_roles
         self.agent_names, self.action_names = names, self.world.team.action_names
         self.role_names, self.state_names = self.world.team.role_names, state_names(self.world.team)
-        self.channel_names = {name: space.names for name, space in self.observation.spaces(self.world).items()}
+        spaces = self.observation.spaces(self.world)
+        self.channel_names = {name: space.names for name, space in spaces.items()}
+        self.symmetries = {name: space.symmetry for name, space in spaces.items()}
+        self.state_symmetry = state_symmetry(self.world.team)
         self.group_map = {"agents": list(names)}
         self.role_map = {role: [n for n, r in zip(names, roles) if r == role] for role in ROLES if role in roles}
         self._state: WorldState | None = None

@@ -20,7 +20,7 @@ def method(record: SavedConfig) -> tuple[str, str]:
 
 _USUAL = {
     ("model", "sharing"): "team",
-    ("model", "facing"): "fire",
+    ("model", "symmetry"): "canonical",
     ("model", "memory"): 0,
     ("observation", "radius"): 5,
     ("reward", "barrier_rule"): "cut_off",

@@ -1,10 +1,9 @@
 """Networks over observations: encoders, and the heads of actors and critics.
 
-They know the shapes of what they read, from a ``Signature``, how it looks when a map is turned, and nothing of the
-world.
+They know the shapes of what they read, and how it turns with the map, from a ``Signature``, and nothing of the world.
 """
 
-from warp_torchrl.models.facing import fire_channel, given_held, hold
+from warp_torchrl.models.canonical import CanonicalBatch, over_canonical
 from warp_torchrl.models.memory import Recollection, RecurrentActor, memory_apart, recurrent_actors
 from warp_torchrl.models.model import Cnn, Mlp
 from warp_torchrl.models.networks import arithmetic_of
@@ -13,11 +12,14 @@ from warp_torchrl.models.signature import (
     ACTION_MASK,
     ACTION_ONE_HOT,
     ACTION_VALUE,
+    CANONICAL,
+    CANONICAL_STATE,
     CHOSEN_ACTION_VALUE,
     LOG_PROB,
     LOGITS,
     MEMORY,
     OBSERVATION,
+    ORIENTATION,
     REWARD,
     ROLE,
     STATE,
@@ -34,17 +36,21 @@ __all__ = [
     "ACTION_MASK",
     "ACTION_ONE_HOT",
     "ACTION_VALUE",
+    "CANONICAL",
+    "CANONICAL_STATE",
     "CHOSEN_ACTION_VALUE",
     "LOGITS",
     "LOG_PROB",
     "MEMORY",
     "OBSERVATION",
+    "ORIENTATION",
     "REWARD",
     "ROLE",
     "STATE",
     "STATE_ACTION_VALUE",
     "TEACHER_ACTION",
     "VALUE",
+    "CanonicalBatch",
     "Cnn",
     "Entry",
     "Mlp",
@@ -52,10 +58,8 @@ __all__ = [
     "RecurrentActor",
     "Signature",
     "arithmetic_of",
-    "fire_channel",
-    "given_held",
-    "hold",
     "memory_apart",
+    "over_canonical",
     "recurrent_actors",
     "signature",
 ]

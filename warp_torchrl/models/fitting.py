@@ -84,7 +84,7 @@ def fitted(policy: TensorDictModuleBase, trained: Signature, here: Signature, fa
 
 def _places(name: str, trained: Entry, here: Entry) -> Tensor | None:
     """Return where the channels that were trained with are among those that are here; None where they are the same."""
-    if trained == here:
+    if trained[:3] == here[:3]:
         return None
     lacking = [each for each in trained.names if each not in here.names]
     if lacking and here.names:

@@ -9,20 +9,16 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor, nn
 
+from warp_torchrl.models.canonical import Orientation
 from warp_torchrl.models.networks import Network
-from warp_torchrl.models.signature import FRAME, LOGITS, MEMORY, OBSERVATION, ROLE, Entry
-from warp_torchrl.observation.frame import Frame
-from warp_torchrl.observation.own import begins
-
-BEGINS = "begins"
-"""Whether an episode begins, among what a network with a memory reads."""
+from warp_torchrl.models.signature import LOGITS, MEMORY, ORIENTATION, ROLE, Entry, Key
 
 
 class RecurrentNetwork(nn.Module):
     """A network with a gated recurrent unit (Cho et al. 2014) beside its first layer: what it sees reaches the layers
     above as it does without, and what it remembers is added to that.
 
-    Who faces the fire holds the map another way each few steps. A memory has units for each of the eight ways, which
+    The canonical orientation changes every few steps. A memory has units for each of the eight orientations, which
     change places with them (the regular representation of the square's symmetries, as in Cohen and Welling, "Group
     equivariant convolutional networks", 2016): what was remembered of the map stays true of it.
 
@@ -44,15 +40,15 @@ class RecurrentNetwork(nn.Module):
 
     @property
     def entries(self) -> list[Entry]:
-        """What it reads: what its network does, whether an episode begins, its frame, and the memory."""
+        """What it reads: what its network does, whether an episode begins, its orientation, and the memory."""
         return [*self.network.entries, Entry((), "bool"), Entry((), "int64"), Entry((self.memory,), "float32")]
 
     def forward(self, *inputs: Tensor) -> Tensor:
         """Return its output and what is remembered then, float32 [..., out + M].
 
         Args:
-            inputs: Entries [...], whether an episode begins bool [...], the index of the ``Frame`` that they are held
-                in int64 [...], and the memory before, float32 [..., M], of the map as it is; or, for a sequence, the
+            inputs: Entries [...], whether an episode begins bool [...], the index of their ``Orientation``
+                int64 [...], and the memory before, float32 [..., M], of the map as it is; or, for a sequence, the
                 former with time as dimension 1 and the memory before the first.
         """
         *seen, fresh, index, memory = inputs
@@ -63,17 +59,17 @@ class RecurrentNetwork(nn.Module):
             remembered = self._remember(features.to(torch.float32), (~fresh)[..., None], index, memory)
         with network.arithmetic(device):
             out = network.body[1:](features + self.recall(remembered))
-        return torch.cat((out.to(torch.float32), Frame(index).units_on_map(remembered)), dim=-1)
+        return torch.cat((out.to(torch.float32), Orientation(index).units_back(remembered)), dim=-1)
 
     def _remember(self, features: Tensor, kept: Tensor, index: Tensor, memory: Tensor) -> Tensor:
-        """Return the memory after each step as it is held there; of what was before only what is ``kept`` goes on."""
+        """Return the memory after each step, in its orientation; of what was before only what is ``kept`` goes on."""
         if features.ndim == memory.ndim:
-            return self._step(features, Frame(index).units(kept * memory))
+            return self._step(features, Orientation(index).units(kept * memory))
         after = []
         for now, stays, way in zip(features.unbind(1), kept.unbind(1), index.unbind(1), strict=True):
-            held = self._step(now, Frame(way).units(stays * memory))
-            memory = Frame(way).units_on_map(held)
-            after.append(held)
+            turned = self._step(now, Orientation(way).units(stays * memory))
+            memory = Orientation(way).units_back(turned)
+            after.append(turned)
         return torch.stack(after, dim=1)
 
     def _step(self, features: Tensor, memory: Tensor) -> Tensor:
@@ -85,33 +81,37 @@ class RecurrentActor(TensorDictModuleBase):
 
     Called with the tensordict [B] of one step it goes on from the step before, which must have been of the same
     worlds, and forgets where an episode begins, as the agents' own clock tells. Called with sequences [B, T] it goes on
-    from the memory that each of them was recorded with, and leaves its own as it was. Observations that are held
-    already come with ``FRAME``.
+    from the memory that each of them was recorded with, and leaves its own as it was.
 
     Args:
-        network: Reads the observation's entries, ``BEGINS``, ``FRAME`` and the memory, and the role if there is one
-            for each; writes logits and memory, float32 [..., A, actions + M].
-        keys: Of the observation's entries, and of the role.
+        network: Reads the entries, whether an episode begins, the orientation and the memory, and the role if there is
+            one for each; writes logits and memory, float32 [..., A, actions + M].
+        keys: Of the entries, of the orientation where they have one, and of the role.
         n_actions: Entries of the logits.
         memory: M.
+        clock: Key of the vector that tells the share of the episode that is left, and its place there.
     """
 
-    def __init__(self, network: nn.Module, keys: list[Any], n_actions: int, memory: int) -> None:
+    def __init__(
+        self, network: nn.Module, keys: list[Any], n_actions: int, memory: int, clock: tuple[Key, int]
+    ) -> None:
         super().__init__()
         self.in_keys, self.out_keys = [*keys, MEMORY], [LOGITS, MEMORY]
-        self.network, self.size, self._seen = network, [n_actions, memory], [key for key in keys if key != ROLE]
+        self.network, self.size, self._clock = network, [n_actions, memory], clock
+        self._seen = [key for key in keys if key not in (ROLE, ORIENTATION)]
         self.remembered = torch.zeros(0, 0, memory)  # [B, A, M], of the last step's worlds
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write logits, and the memory before the step."""
-        fresh = begins(tensordict.get((*OBSERVATION, "self")))
+        key, place = self._clock
+        fresh = tensordict.get(key)[..., place] == 1.0
         whole = tensordict.ndim == 2
         before = tensordict.get(MEMORY)[:, 0] if whole else self._before(fresh)
         seen = [tensordict.get(key) for key in self._seen]
         role = [tensordict.get(ROLE)] if ROLE in self.in_keys else []
-        frame = tensordict.get(FRAME, None)
-        frame = torch.zeros_like(fresh, dtype=torch.int64) if frame is None else frame
-        logits, after = self.network(*seen, fresh, frame, before, *role).split(self.size, dim=-1)
+        turned = ORIENTATION in self.in_keys
+        index = tensordict.get(ORIENTATION) if turned else torch.zeros_like(fresh, dtype=torch.int64)
+        logits, after = self.network(*seen, fresh, index, before, *role).split(self.size, dim=-1)
         if not whole:
             tensordict.set(MEMORY, before)
             self.remembered = after.detach()

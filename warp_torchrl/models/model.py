@@ -4,11 +4,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from tensordict.nn import TensorDictModule
+from tensordict.nn import TensorDictModule, TensorDictModuleBase, TensorDictSequential
 from torch import nn
 
-from warp_torchrl.models.facing import FacingFire, StateFacingFire
-from warp_torchrl.models.memory import BEGINS, RecurrentActor, RecurrentNetwork
+from warp_torchrl.models.canonical import (
+    CanonicalBatch,
+    Canonicalise,
+    CanonicaliseAction,
+    CanonicaliseState,
+    Restore,
+)
+from warp_torchrl.models.memory import RecurrentActor, RecurrentNetwork
 from warp_torchrl.models.networks import (
     AgentNetworks,
     Central,
@@ -20,18 +26,21 @@ from warp_torchrl.models.networks import (
 from warp_torchrl.models.signature import (
     ACTION_ONE_HOT,
     ACTION_VALUE,
-    FRAME,
+    CANONICAL_ACTION_ONE_HOT,
+    CANONICAL_STATE,
     LOGITS,
-    MEMORY,
+    ORIENTATION,
     ROLE,
     STATE,
     STATE_ACTION_VALUE,
     VALUE,
     Entry,
+    Key,
     Signature,
+    canonical_key,
+    observation_key,
 )
-from warp_torchrl.observation.channels import DEFAULT, FIRE
-from warp_torchrl.observation.frame import can_be_held
+from warp_torchrl.symmetry import TIME_LEFT, Vector
 from warp_torchrl.validation import check_fields
 
 _ACTIVATIONS = {"tanh": nn.Tanh, "relu": nn.ReLU}
@@ -47,23 +56,24 @@ class Mlp:
         actor_hidden: Sizes of the hidden layers of actors and of the action values that act.
         critic_hidden: Sizes of the critics'.
         activation: ``tanh`` or ``relu``.
-        facing: ``fire``, each network holds the map so that the fire that an agent sees lies between its east and its
-            south-east, see ``FacingFire``: what it learns of one case it knows of all eight. ``north``, as it is given.
+        symmetry: ``canonical``, networks read what an agent sees turned and mirrored so that the fire lies between its
+            east and its south-east, see ``Canonicalise``: what they learn of one case they know of all eight symmetries
+            of the square. ``none``, they read it as it is, north up.
         memory: Units of the recurrent layer by which actors remember what they saw since their episode began, see
             ``RecurrentNetwork``, a multiple of 8; 0, they act on what they see now. On-policy algorithms learn it.
         dtype: ``bfloat16`` computes the layers in half precision (weights stay float32), several times faster on
             processors that have it and several times slower on those that have not; ``auto`` takes it where they do.
 
     Raises:
-        ValueError: If a size is out of range or there is no hidden layer, or, when networks are made, if they should
-            face a fire in observations that are of no preset, or remember where those have no clock.
+        ValueError: If a size is out of range or there is no hidden layer, or, when networks are made, if observations
+            do not say how they turn and should be canonical, or have no clock and should be remembered.
     """
 
     sharing: Literal["team", "role", "none"] = "team"
     actor_hidden: tuple[int, ...] = (128, 128)
     critic_hidden: tuple[int, ...] = (128, 128)
     activation: Literal["tanh", "relu"] = "tanh"
-    facing: Literal["north", "fire"] = "fire"
+    symmetry: Literal["canonical", "none"] = "canonical"
     memory: int = 0
     dtype: Literal["auto", "float32", "bfloat16"] = "auto"
 
@@ -74,33 +84,48 @@ class Mlp:
         if self.memory % 8:
             raise ValueError(f"memory must be a multiple of 8, got {self.memory}")
 
-    def actor(self, signature: Signature) -> TensorDictModule:
+    def actor(self, signature: Signature) -> TensorDictModuleBase:
         """Return the module that writes logits [..., A, actions] from each agent's own observation, and memory."""
-        if self.memory and "self" not in signature.observation:
-            raise ValueError(f"model.memory must be 0 where observations have no clock, got {self.memory}")
         return self._of_agents(signature, self.actor_hidden, signature.n_actions, 0.01, LOGITS, memory=self.memory)
 
-    def action_value(self, signature: Signature) -> TensorDictModule:
+    def action_value(self, signature: Signature) -> TensorDictModuleBase:
         """Return the module that writes each action's value [..., A, actions] from each agent's own observation."""
         return self._of_agents(signature, self.actor_hidden, signature.n_actions, 0.01, ACTION_VALUE)
 
-    def critic(self, signature: Signature, central: bool) -> TensorDictModule:
+    def critic(self, signature: Signature, central: bool) -> TensorDictModuleBase:
         """Return the module that writes values [..., A, 1] from each agent's observation, and the state if central.
 
         A central critic that has the state and each agent's picture does without its view.
         """
         return self._of_agents(signature, self.critic_hidden, 1, 1.0, VALUE, central=central)
 
-    def action_critic(self, signature: Signature, central: bool) -> TensorDictModule:
+    def action_critic(self, signature: Signature, central: bool) -> TensorDictModuleBase:
         """Return the module that writes values [..., A, 1] of actions given as one-hot vectors [..., A, actions].
 
         It reads each agent's observation and own action, and the state and the whole team's actions if central.
         """
         return self._of_agents(signature, self.critic_hidden, 1, 1.0, STATE_ACTION_VALUE, central=central, judges=True)
 
-    def of_state(self, network: nn.Module) -> nn.Module:
-        """Return a network whose last input is the state as one that is given the state as these networks hold it."""
-        return StateFacingFire(network) if self.facing == "fire" else network
+    @property
+    def state_key(self) -> str:
+        """Return the key of the state as these networks read it."""
+        return CANONICAL_STATE if self._is_canonical else STATE
+
+    def canonical_batch(self, signature: Signature, state: bool = True, restored: bool = False) -> CanonicalBatch:
+        """Return what makes the batches from which these networks learn.
+
+        Args:
+            signature: What they fit.
+            state: Whether they read the state.
+            restored: Whether they learn from actions as they are on the map.
+        """
+        if not self._is_canonical:
+            return CanonicalBatch(None)
+        return CanonicalBatch(
+            Canonicalise(signature.observation),
+            CanonicaliseState(signature.state) if state else None,
+            () if restored else signature.actions,
+        )
 
     def _of_agents(
         self,
@@ -108,12 +133,12 @@ class Mlp:
         hidden: tuple[int, ...],
         out: int,
         head_gain: float,
-        key: tuple[str, ...],
+        key: Key,
         *,
         central: bool = False,
         judges: bool = False,
         memory: int = 0,
-    ) -> TensorDictModule | RecurrentActor:
+    ) -> TensorDictModuleBase:
         """Return the module that writes [..., A, out] from each agent's entries.
 
         Args:
@@ -126,34 +151,54 @@ class Mlp:
             judges: Whether it reads the action that was chosen too, and that of the team where it is central.
             memory: Units that it remembers by.
         """
-        entries = list(signature.observation.values())
-        keys: list[str | tuple[str, ...]] = list(signature.observation_keys())
+        names = _read(list(signature.observation), central and not judges)
+        entries, keys = [signature.observation[name] for name in names], [self._key(name) for name in names]
         if judges:
             entries.append(Entry((signature.n_actions,), "float32"))
-            keys.append(ACTION_ONE_HOT)
+            keys.append(CANONICAL_ACTION_ONE_HOT if self._is_canonical else ACTION_ONE_HOT)
         action = len(keys) - 1 if judges else None
-        unread = _unread(list(signature.observation)) if central and not judges else None
-        if unread is not None:
-            del entries[unread]
         if central:
             joint = [Entry((signature.n_agents * signature.n_actions,), "float32")] if judges else []
             entries = [signature.state, *joint, *entries]
         network = self._shared(signature, lambda: self._network(entries, hidden, out, head_gain, memory))
-        if memory:
-            keys += [BEGINS, FRAME, MEMORY]
         if self.sharing == "role":
             keys.append(ROLE)
-        if central:
-            network, keys = Central(network, len(signature.state.shape), action, unread), [STATE, *keys]
-        if self.facing == "fire":
-            shapes = {name: entry.shape for name, entry in signature.observation.items()}
-            if not can_be_held(shapes, signature.observation["self"].names if "self" in shapes else ()):
-                raise ValueError("model.facing must be north where observations are of no preset, got fire")
-            actions = out if key in (LOGITS, ACTION_VALUE) else 0
-            network = FacingFire(network, keys, actions, _fire_channel(signature))
+        module: TensorDictModuleBase
         if memory:
-            return RecurrentActor(network, [key for key in keys if key not in (BEGINS, FRAME, MEMORY)], out, memory)
-        return TensorDictModule(network, in_keys=keys, out_keys=[key])
+            keys += [ORIENTATION] if self._is_canonical else []
+            module = RecurrentActor(network, keys, out, memory, self._clock(signature))
+        elif central:
+            central_network = Central(network, len(signature.state.shape), action)
+            module = TensorDictModule(central_network, in_keys=[self.state_key, *keys], out_keys=[key])
+        else:
+            module = TensorDictModule(network, in_keys=keys, out_keys=[key])
+        return self._sequence(signature, module, central, judges) if self._is_canonical else module
+
+    @property
+    def _is_canonical(self) -> bool:
+        return self.symmetry == "canonical"
+
+    def _key(self, name: str) -> Key:
+        return canonical_key(name) if self._is_canonical else observation_key(name)
+
+    def _sequence(
+        self, signature: Signature, module: TensorDictModuleBase, central: bool, judges: bool
+    ) -> TensorDictSequential:
+        """Return the sequence that makes what a module reads, and restores what it says of actions."""
+        before: list[TensorDictModuleBase] = [Canonicalise(signature.observation)]
+        if central:
+            before.append(CanonicaliseState(signature.state))
+        if judges:
+            before.append(CanonicaliseAction(signature.actions))
+        of_actions = [key for key in module.out_keys if key in (LOGITS, ACTION_VALUE)]
+        return TensorDictSequential(*before, module, *(Restore(key, signature.actions) for key in of_actions))
+
+    def _clock(self, signature: Signature) -> tuple[Key, int]:
+        """Return the key of the entry that tells the time left, and its place there."""
+        for name, entry in signature.observation.items():
+            if isinstance(entry.symmetry, Vector) and TIME_LEFT in entry.symmetry.names:
+                return self._key(name), entry.symmetry.names.index(TIME_LEFT)
+        raise ValueError(f"model.memory must be 0 where observations have no clock, got {self.memory}")
 
     def _shared(self, signature: Signature, make: Callable[[], Network | RecurrentNetwork]) -> nn.Module:
         """Return as many networks as the team has."""
@@ -204,26 +249,9 @@ class Cnn(Mlp):
         )
 
 
-def _fire_channel(signature: Signature) -> int:
-    """Return which channel of a view tells where fire is, whatever the number where there is no view.
-
-    Raises:
-        ValueError: If the view has no such channel.
-    """
-    if "view" not in signature.observation:
-        return 0
-    view = signature.observation["view"]
-    channels = view.names or DEFAULT
-    if len(channels) != view.shape[0]:
-        raise ValueError("model.facing must be north where observations are of no preset, got fire")
-    if FIRE not in channels:
-        raise ValueError(f"model.facing must be north where observation.channels lack {FIRE}, got fire")
-    return channels.index(FIRE)
-
-
-def _unread(names: list[str]) -> int | None:
-    """Return the place of the entry that a central critic of a state does without, a view beside a picture."""
-    return names.index("view") if {"view", "picture"} <= set(names) else None
+def _read(names: list[str], has_state: bool) -> list[str]:
+    """Return the entries that a network reads: a critic that has the state and a picture does without the view."""
+    return [name for name in names if name != "view"] if has_state and {"view", "picture"} <= set(names) else names
 
 
 def check_sizes(name: str, sizes: tuple[int, ...]) -> None:

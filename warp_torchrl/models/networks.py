@@ -179,20 +179,18 @@ class Central(nn.Module):
         network: Reads the state, the joint action where there is one, and then each agent's own entries.
         state_dims: Dimensions of the state without a batch's.
         action: Place of the one-hot actions among the agents' entries; None where the critic does not judge actions.
-        unread: Place of the entry that the network does not read, if there is one.
     """
 
-    def __init__(self, network: nn.Module, state_dims: int, action: int | None, unread: int | None) -> None:
+    def __init__(self, network: nn.Module, state_dims: int, action: int | None) -> None:
         super().__init__()
-        self.network, self.state_dims, self.action, self.unread = network, state_dims, action, unread
+        self.network, self.state_dims, self.action = network, state_dims, action
 
     def forward(self, state: Tensor, *own: Tensor) -> Tensor:
         """Return float32 [..., A, out] from the state [...] and entries [..., A, ...]."""
         shared = [state.unsqueeze(-1 - self.state_dims)]
         if self.action is not None:
             shared.append(own[self.action].flatten(-2).unsqueeze(-2))
-        read = own if self.unread is None else own[: self.unread] + own[self.unread + 1 :]
-        return self.network(*shared, *read)
+        return self.network(*shared, *own)
 
 
 class RoleNetworks(nn.Module):

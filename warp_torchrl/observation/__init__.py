@@ -6,13 +6,14 @@ from warp_torchrl.observation.coarse import (
     PICTURE_SIDE,
     STATE,
     STATE_SIDE,
+    STATE_SYMMETRY,
     central_state,
     picture,
     state_names,
+    state_symmetry,
 )
-from warp_torchrl.observation.frame import Frame, can_be_held, frame_of, held, held_state
 from warp_torchrl.observation.own import SELF_SIZE, WIND_SCALE, own_vector
-from warp_torchrl.observation.presets import Local, Observation, Paper, Space, Surroundings
+from warp_torchrl.observation.presets import Local, Observation, Paper, Space, Surroundings, former_symmetry
 from warp_torchrl.observation.view import egocentric_view
 
 __all__ = [
@@ -24,22 +25,20 @@ __all__ = [
     "SELF_SIZE",
     "STATE",
     "STATE_SIDE",
+    "STATE_SYMMETRY",
     "WIND_SCALE",
-    "Frame",
     "Local",
     "Look",
     "Observation",
     "Paper",
     "Space",
     "Surroundings",
-    "can_be_held",
     "central_state",
     "channel",
     "egocentric_view",
-    "frame_of",
-    "held",
-    "held_state",
+    "former_symmetry",
     "own_vector",
     "picture",
     "state_names",
+    "state_symmetry",
 ]

@@ -6,6 +6,7 @@ from torch.nn.functional import one_hot
 
 from warp_torchrl.observation.channels import ELEVATION_SCALE
 from warp_torchrl.observation.own import WIND_SCALE, steps_to_tick, time_left
+from warp_torchrl.symmetry import Planes, Target, TeamPlanes
 from warp_torchrl.world.fast.blocks import block_means
 from warp_torchrl.world.fast.squares import window
 from warp_torchrl.world.role import PAPER_ROLES
@@ -24,6 +25,14 @@ trees to ignite, and the quarters of ``clock_and_wind`` are filled with the time
 wind to the east and to the north."""
 _FIRST_ROLE = STATE.index(PAPER_ROLES[0])
 STATE_SIDE = 16
+STATE_SYMMETRY = TeamPlanes(len(STATE), STATE.index("fire"), (_FIRST_ROLE, len(PAPER_ROLES)))
+"""How the state turns with the map in teams of the paper's roles."""
+
+
+def picture_symmetry(centred: bool) -> Planes:
+    """Return how the picture turns with the map; agents turn towards its fire where their view shows none."""
+    fire = Target(PICTURE.index("fire"), order=1, near=0.5, is_share=True, in_middle=centred)
+    return Planes(len(PICTURE), fire)
 
 
 def picture(state: WorldState, forecast: Forecast) -> Tensor:
@@ -54,6 +63,11 @@ def centred_picture(state: WorldState, forecast: Forecast) -> Tensor:
 def state_names(team: Team) -> tuple[str, ...]:
     """Return the channels of the critic's ``state``: ``STATE``, with the team's further roles beside the paper's."""
     return (*STATE[:_FIRST_ROLE], *team.role_names, *STATE[_FIRST_ROLE + len(PAPER_ROLES) :])
+
+
+def state_symmetry(team: Team) -> TeamPlanes:
+    """Return how the state turns with the map."""
+    return TeamPlanes(len(state_names(team)), STATE.index("fire"), (_FIRST_ROLE, len(team.role_names)))
 
 
 def central_state(state: WorldState, world: World, forecast: Forecast) -> Tensor:

@@ -6,41 +6,43 @@ import torch
 from torch import Tensor
 from torch.nn.functional import one_hot
 
+from warp_torchrl.symmetry import LAST, TIME_LEFT, Part, Vector
 from warp_torchrl.world.role import PAPER_ROLES
 from warp_torchrl.world.state import Action, WorldState
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.world import World
 
-_NUMBERS = (
-    *("row", "column", "time_left", "wind_east", "wind_north", "steps_to_tick", "tank", "has_tank", "may_refill"),
-)
-SELF = (
-    *_NUMBERS,
-    *(f"role_{role}" for role in PAPER_ROLES),
-    *(f"last_{action.name.lower()}" for action in Action),
+SELF = Vector(
+    (
+        Part("place", ("row", "column")),
+        Part("scalar", (TIME_LEFT,)),
+        Part("vector", ("wind_east", "wind_north")),
+        Part("scalar", ("steps_to_tick", "tank", "has_tank", "may_refill", *(f"role_{role}" for role in PAPER_ROLES))),
+        Part("actions", tuple(f"{LAST}{action.name.lower()}" for action in Action)),
+    )
 )
 """Entries of ``self`` in every team; role and last action are one-hot, the latter zeros before the first."""
-IDENTITY = ("identity_cos_1", "identity_sin_1", "identity_cos_2", "identity_sin_2")
+SELF_SIZE = len(SELF.names)
+"""How many they are."""
+IDENTITY = Part("scalar", ("identity_cos_1", "identity_sin_1", "identity_cos_2", "identity_sin_2"))
 """Entries of ``self`` that tell an agent from its team-mates, see ``identity``."""
-SELF_SIZE, IDENTITY_SIZE = len(SELF), len(IDENTITY)
-PLACE, TIME_LEFT, WIND, LAST_ACTION = slice(0, 2), 2, slice(3, 5), slice(len(_NUMBERS) + len(PAPER_ROLES), SELF_SIZE)
-"""Where ``self`` tells of the agent's row and column, of the time left, of the wind, and of its last action."""
 WIND_SCALE = 20.0
 """Wind that an observation shows as 1 [m/s]."""
 
 
-def own_names(team: Team, identity: bool = False) -> tuple[str, ...]:
-    """Return the names of the entries of ``self``: ``SELF``, the identity if it is shown, then what only this team has.
+def own_entries(team: Team, identity: bool = False) -> Vector:
+    """Return the entries of ``self``, by name and as they turn with the map.
 
-    Those are its roles and its actions beside the paper's.
+    They are ``SELF``, the identity if it is shown, then the team's roles and actions beside the paper's.
     """
-    roles = (f"role_{role}" for role in team.role_names[len(PAPER_ROLES) :])
-    actions = (f"last_{action}" for action in team.further_actions)
-    return (*SELF, *(IDENTITY if identity else ()), *roles, *actions)
+    roles = tuple(f"role_{role}" for role in team.role_names[len(PAPER_ROLES) :])
+    actions = tuple(f"{LAST}{action}" for action in team.further_actions)
+    further = [Part("scalar", names) for names in (roles, actions) if names]
+    return Vector((*SELF.parts, *([IDENTITY] if identity else []), *further))
 
 
 def own_vector(state: WorldState, world: World, shows_identity: bool = False) -> Tensor:
-    """Return what each agent knows of itself, float32 [B, A, F], see ``own_names``."""
+    """Return what each agent knows of itself, float32 [B, A, F], see ``own_entries``."""
     height, width = state.cells.shape[1:]
     vehicles = state.vehicles
     row, column = vehicles.position.to(torch.float32).unbind(-1)
@@ -66,11 +68,6 @@ def own_vector(state: WorldState, world: World, shows_identity: bool = False) ->
     if team.role_names != PAPER_ROLES or team.further_actions:
         parts += [roles[..., len(PAPER_ROLES) :], last[..., len(Action) :]]
     return torch.cat(parts, dim=-1)
-
-
-def begins(own: Tensor) -> Tensor:
-    """Return whether the first step of an episode is to come, bool [...], from ``self`` [..., F]."""
-    return own[..., TIME_LEFT] == 1.0
 
 
 def identity(n_agents: int, device: torch.device) -> Tensor:

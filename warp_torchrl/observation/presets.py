@@ -3,16 +3,25 @@
 Its ``spaces`` tell the environment the shape, type and range of each entry, and called with a state it returns them.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
-from warp_torchrl.observation.channels import CHANNELS, DEFAULT, ages, check_channels, stages
-from warp_torchrl.observation.coarse import CENTRED_HIGHS, PICTURE, PICTURE_SIDE, centred_picture, picture
-from warp_torchrl.observation.own import own_names, own_vector
+from warp_torchrl.observation.channels import CHANNELS, DEFAULT, FIRE, ages, check_channels, stages
+from warp_torchrl.observation.coarse import (
+    CENTRED_HIGHS,
+    PICTURE,
+    PICTURE_SIDE,
+    centred_picture,
+    picture,
+    picture_symmetry,
+)
+from warp_torchrl.observation.own import IDENTITY, SELF, SELF_SIZE, own_entries, own_vector
 from warp_torchrl.observation.view import egocentric_view
+from warp_torchrl.symmetry import Planes, Target, Vector
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.fast.squares import window
 from warp_torchrl.world.state import Forecast, WorldState
@@ -27,6 +36,7 @@ class Space(NamedTuple):
     low: float
     high: float | tuple[float, ...]  # of all numbers, or one for each channel
     names: tuple[str, ...] = ()  # of the channels of a map or the entries of a vector, where they have any
+    symmetry: Planes | Vector | None = None  # how it turns with the map; None: networks read it north up alone
 
     def bounds(self) -> tuple[Tensor, Tensor]:
         """Return the least and the largest value of each number, both of the entry's shape and type."""
@@ -40,7 +50,7 @@ class Local:
     """What an agent sees of its own surroundings, and nothing else.
 
     ``view`` is the square of 2 r + 1 cells about the agent, north up, uint8, in channels that are chosen by name from
-    ``observation.channels.CHANNELS``. ``self`` is what it knows of itself, see ``own_names``.
+    ``observation.channels.CHANNELS``. ``self`` is what it knows of itself, see ``own_entries``.
 
     Attributes:
         radius: r [cells].
@@ -63,10 +73,10 @@ class Local:
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
         side, highs = 2 * self.radius + 1, tuple(CHANNELS[name].high for name in self.channels)
-        own = own_names(world.team, self.identity)
+        own = own_entries(world.team, self.identity)
         return {
-            "view": Space((len(highs), side, side), torch.uint8, 0, highs, self.channels),
-            "self": Space((len(own),), torch.float32, -3.0, 3.0, own),
+            "view": Space((len(highs), side, side), torch.uint8, 0, highs, self.channels, view_symmetry(self.channels)),
+            "self": Space((len(own.names),), torch.float32, -3.0, 3.0, own.names, own),
         }
 
     def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
@@ -96,7 +106,8 @@ class Surroundings(Local):
         side = 2 * PICTURE_SIDE - 1 if self.centred else PICTURE_SIDE
         dtype = torch.uint8 if self.centred else torch.float32
         high: float | tuple[float, ...] = CENTRED_HIGHS if self.centred else 1.0
-        return {**super().spaces(world), "picture": Space((len(PICTURE), side, side), dtype, 0, high, PICTURE)}
+        space = Space((len(PICTURE), side, side), dtype, 0, high, PICTURE, picture_symmetry(self.centred))
+        return {**super().spaces(world), "picture": space}
 
     def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
         """Return ``view``, ``self``, and ``picture`` float32 [B, A, 3, 8, 8]."""
@@ -124,7 +135,7 @@ class Paper:
 
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of the one, nameless entry."""
-        return {"": Space((3 * (2 * self.radius + 1) ** 2,), torch.float32, 0.0, 1.0)}
+        return {"": Space((3 * (2 * self.radius + 1) ** 2,), torch.float32, 0.0, 1.0, symmetry=PAPER_SYMMETRY)}
 
     def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
         """Return one entry, float32 [B, A, 3 (2 r + 1)^2]."""
@@ -133,6 +144,27 @@ class Paper:
         cover = (seen.of(state.landscape.cover) + seen.inside) * 51
         view = torch.stack((cover, ages(cells), stages(cells)), dim=2)
         return {"": view.flatten(2).to(torch.float32).mul_(1.0 / 255.0)}
+
+
+PAPER_SYMMETRY = Planes(3, Target(2), is_flat=True)
+"""How the paper's view turns with the map; its last channel shows fire."""
+
+
+def view_symmetry(channels: Sequence[str]) -> Planes:
+    """Return how a view in channels by name turns with the map; agents turn towards ``FIRE`` if it shows it."""
+    return Planes(len(channels), Target(list(channels).index(FIRE)) if FIRE in channels else None)
+
+
+def former_symmetry(name: str, shape: tuple[int, ...], names: tuple[str, ...]) -> Planes | Vector | None:
+    """Return how an entry of a preset turns, for manifests that do not tell it; None for an entry of no preset."""
+    of_presets: dict[str, Planes | Vector] = {
+        "": PAPER_SYMMETRY,
+        "view": view_symmetry(names),
+        "self": SELF if shape == (SELF_SIZE,) else Vector((*SELF.parts, IDENTITY)),
+        "picture": picture_symmetry(centred=shape[-1] != PICTURE_SIDE),
+    }
+    found = of_presets.get(name)
+    return found if found is not None and found.fits(shape) else None
 
 
 Observation = Surroundings | Local | Paper

@@ -15,6 +15,7 @@ from typing import Any
 import torch
 
 from warp_torchrl.config.compose import SavedConfig
+from warp_torchrl.config.renamed import renamed_values
 from warp_torchrl.models import Signature
 from warp_torchrl.runs import disk
 from warp_torchrl.runs.manifest import (
@@ -63,7 +64,7 @@ class Checkpoint:
         choices, values = content.get("choices"), content.get("values")
         if not (isinstance(choices, dict) and isinstance(values, dict)):
             raise CheckpointError(f"{self.path / 'config.json'} must hold choices and values")
-        return SavedConfig(choices=choices, values=values)
+        return SavedConfig(choices=choices, values=renamed_values(values))
 
     def policy(self) -> dict[str, torch.Tensor]:
         """Return the policy's parameters."""

@@ -2,8 +2,9 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,9 @@ import torch
 import torchrl
 
 from warp_torchrl.models import Entry, Signature
-from warp_torchrl.observation import DEFAULT, PICTURE, STATE
+from warp_torchrl.observation import DEFAULT, PICTURE, STATE, STATE_SYMMETRY, former_symmetry
 from warp_torchrl.observation.own import IDENTITY, SELF
+from warp_torchrl.symmetry import Symmetry, from_plain, to_plain
 from warp_torchrl.world.role import PAPER_ROLES
 from warp_torchrl.world.state import Action
 
@@ -28,7 +30,7 @@ _LARGEST_JSON = 1_000_000
 _FORMER_NAMES = {
     "view": (DEFAULT,),
     "picture": (PICTURE,),
-    "self": (SELF, (*SELF, *IDENTITY)),
+    "self": (SELF.names, (*SELF.names, *IDENTITY.names)),
     "state": (STATE,),
 }
 _FORMER_ACTIONS = tuple(action.name.lower() for action in Action)
@@ -157,26 +159,36 @@ def first_line(error: Exception) -> str:
 
 
 def _signature_to_json(signature: Signature) -> dict[str, Any]:
+    def entry(each: Entry) -> dict[str, Any]:
+        return each._asdict() | {"symmetry": None if each.symmetry is None else to_plain(each.symmetry)}
+
     return signature._asdict() | {
-        "observation": {name: entry._asdict() for name, entry in signature.observation.items()},
-        "state": signature.state._asdict(),
+        "observation": {name: entry(each) for name, each in signature.observation.items()},
+        "state": entry(signature.state),
         "n_actions": signature.n_actions,
         "n_roles": signature.n_roles,
     }
 
 
 def _signature_from_json(content: dict[str, Any]) -> Signature:
-    former = _FORMER_NAMES if "roles" not in content else {}
+    former_names = _FORMER_NAMES if "roles" not in content else {}
 
-    def entry(name: str, node: dict[str, Any]) -> Entry:
+    def entry(name: str, node: dict[str, Any], former: Callable[..., Symmetry | None]) -> Entry:
         shape = tuple(int(side) for side in node["shape"])
-        names = next((names for names in former.get(name, ()) if len(names) == shape[0]), ())
+        names = next((names for names in former_names.get(name, ()) if len(names) == shape[0]), ())
         told = tuple(str(each) for each in node.get("names") or names)
         if told and len(told) != shape[0]:
             raise ValueError(f"{len(told)} names of {shape[0]} channels")
-        return Entry(shape, str(node["dtype"]), told)
+        plain = node.get("symmetry")
+        symmetry = former(shape, told) if "symmetry" not in node else plain and from_plain(plain)
+        if symmetry is not None and not symmetry.fits(shape):
+            raise ValueError(f"{symmetry} is not of shape {shape}")
+        return Entry(shape, str(node["dtype"]), told, symmetry)
 
-    observation = {str(name): entry(name, node) for name, node in content["observation"].items()}
+    observation = {
+        str(name): entry(name, node, partial(former_symmetry, name)) for name, node in content["observation"].items()
+    }
+    state = entry("state", content["state"], lambda shape, _: STATE_SYMMETRY if STATE_SYMMETRY.fits(shape) else None)
     actions = tuple(str(name) for name in content.get("actions", _FORMER_ACTIONS[: int(content["n_actions"])]))
     roles = tuple(str(name) for name in content.get("roles", PAPER_ROLES))
-    return Signature(observation, entry("state", content["state"]), int(content["n_agents"]), actions, roles)
+    return Signature(observation, state, int(content["n_agents"]), actions, roles)

@@ -11,6 +11,7 @@ import yaml
 
 from warp_torchrl.config.compose import SavedConfig, plain, restore
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.config.renamed import renamed_values
 from warp_torchrl.config.run_config import COMPONENTS, RunConfig, run_config
 from warp_torchrl.runs.checkpoint import Checkpoint, newest
 
@@ -104,7 +105,7 @@ def read_config(path: Path) -> dict[str, Any]:
         content = None
     if not isinstance(content, dict):
         raise ConfigError(f"{path} must be as the run wrote it; without it resume takes what the checkpoint holds")
-    return content
+    return renamed_values(content)
 
 
 def _check_unedited(folder: Path, held: Mapping[str, Any], record: SavedConfig, trained: Mapping[str, Any]) -> None:

@@ -4,6 +4,7 @@ from torch import Tensor
 from torchrl.objectives import LossModule
 
 from warp_torchrl.config.run_config import RunConfig
+from warp_torchrl.runs import former
 from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError
 
 
@@ -24,9 +25,10 @@ def learned_parameters(found: Checkpoint, loss: LossModule) -> dict[str, Tensor]
     Raises:
         CheckpointError: If their names or shapes differ from this loss's.
     """
+    now = loss.state_dict()
     own, given = (
         {name: each for name, each in state.items() if _is_learned(name)}
-        for state in (loss.state_dict(), found.training()["loss"])
+        for state in (now, former.parameters(found.training()["loss"], now))
     )
     if {name: each.shape for name, each in own.items()} != {name: each.shape for name, each in given.items()}:
         raise CheckpointError(f"{found.path} was trained by another algorithm or other networks")

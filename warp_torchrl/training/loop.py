@@ -21,7 +21,7 @@ from warp_torchrl.evaluation.play import play
 from warp_torchrl.models import REWARD, signature
 from warp_torchrl.policy import MODES
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs import disk
+from warp_torchrl.runs import disk, former
 from warp_torchrl.runs.logging import MetricsFile, Tracker
 from warp_torchrl.runs.saving import SaveClock, passes
 from warp_torchrl.runs.transfer import learned_parameters
@@ -278,10 +278,12 @@ class Training:
             raise checkpoints.CheckpointError(f"the checkpoint does not fit this configuration: {reason}") from None
 
     def _restore(self, state: Mapping[str, Any]) -> None:
-        differing = self.learner.loss.state_dict().keys() ^ state["loss"].keys()
+        now = self.learner.loss.state_dict()
+        loss = former.parameters(state["loss"], now)
+        differing = now.keys() ^ loss.keys()
         if differing:  # tensordict does not report missing or unexpected names
             raise ValueError(f"{min(differing)} is in one of the two alone")
-        self.learner.loss.load_state_dict(state["loss"])
+        self.learner.loss.load_state_dict(loss)
         self.learner.optimizer.load_state_dict(state["optimizer"])
         for name, each in self.learner.keeps.items():
             each.load_state_dict(state["keeps"][name])

@@ -1,44 +1,40 @@
-"""Frames: a map that is turned or mirrored looks the same to those who face the fire, and they do the same there."""
+"""Canonical inputs: a map that is turned or mirrored is read the same, and agents do the same there."""
 
 import itertools
+from dataclasses import replace
 
 import pytest
 import torch
 from tensordict import TensorDict
+from torchrl.envs import CatFrames, TransformedEnv
 
 from tests.conftest import small_world
 from tests.observation.test_observation import drawn
+from warp_torchrl.algorithms.ddpg import Ddpg
 from warp_torchrl.algorithms.dqn import Dqn
 from warp_torchrl.algorithms.ppo import Ppo
+from warp_torchrl.algorithms.sac import Sac
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import (
     ACTION,
+    ACTION_MASK,
     ACTION_ONE_HOT,
     ACTION_VALUE,
     CHOSEN_ACTION_VALUE,
     LOGITS,
+    OBSERVATION,
+    ORIENTATION,
     STATE_ACTION_VALUE,
     VALUE,
     Cnn,
-    Entry,
     Mlp,
-    given_held,
-    hold,
+    over_canonical,
     signature,
 )
-from warp_torchrl.observation import (
-    DEFAULT,
-    SELF_SIZE,
-    Frame,
-    Local,
-    Paper,
-    Surroundings,
-    can_be_held,
-    frame_of,
-    held,
-    held_state,
-)
+from warp_torchrl.models.canonical import Canonicalise, Orientation, canonical_state, orientation_of, turned
+from warp_torchrl.observation import DEFAULT, SELF_SIZE, STATE_SYMMETRY, Local, Paper, Surroundings
+from warp_torchrl.symmetry import Part, Planes, Target, Vector
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.state import Action
@@ -56,6 +52,7 @@ PRESETS = {
     "paper": Paper(),
 }
 SIZE = 16
+ACTIONS = tuple(action.name.lower() for action in Action)
 
 
 def fighting(observation, n_worlds=6, steps=12):
@@ -110,6 +107,11 @@ def turned_world(state, turn):
     return in_wind(state.replace(vehicles=vehicles, ground=fire.ground(cover, 30.0), **leaves), fire, wind)
 
 
+def symmetries(preset):
+    """Return what the entries of a preset declare."""
+    return {name: space.symmetry for name, space in preset.spaces(small_world()).items()}
+
+
 def seen(now):
     """Return the entries of an observation by name."""
     found = now["agents", "observation"]
@@ -120,7 +122,7 @@ def pulled(preset, state, n_worlds=6):
     """Return which agents see fire more on one side than on the other, bool [B, A]: their frames are not arbitrary."""
     env = fighting(preset, n_worlds, steps=0)
     here, across, mirrored = (
-        frame_of(seen(env.set_state(turned_world(state, turn)))).index
+        orientation_of(seen(env.set_state(turned_world(state, turn))), symmetries(preset)).index
         for turn in ((1, 1, False), (1, 1, True), (-1, -1, False))
     )
     return (here % 2 != across % 2) & (here // 2 == 3 - mirrored // 2)
@@ -142,13 +144,19 @@ def in_both(preset, turn):
 def test_a_turned_world_looks_the_same(name, turn):
     here, there, sees = in_both(PRESETS[name], turn)
     before, after = seen(here), seen(there)
-    frames = frame_of(before), frame_of(after)
+    declared = symmetries(PRESETS[name])
+    orientations = [orientation_of(each, declared) for each in (before, after)]
     for entry in before:
-        ours, theirs = (held(entry, each[entry], frame) for each, frame in zip((before, after), frames))
+        ours, theirs = (turned(each[entry], declared[entry], way) for each, way in zip((before, after), orientations))
         torch.testing.assert_close(theirs[sees], ours[sees], atol=1e-6, rtol=0.0)
-    masks = [frame.actions(now["agents", "action_mask"]) for now, frame in zip((here, there), frames)]
+    masks = [way.by_action(now["agents", "action_mask"], ACTIONS) for now, way in zip((here, there), orientations)]
     assert torch.equal(masks[0][sees], masks[1][sees])
-    torch.testing.assert_close(held_state(there["state"]), held_state(here["state"]), atol=1e-5, rtol=0.0)
+    torch.testing.assert_close(
+        canonical_state(there["state"], STATE_SYMMETRY),
+        canonical_state(here["state"], STATE_SYMMETRY),
+        atol=1e-5,
+        rtol=0.0,
+    )
 
 
 @pytest.mark.parametrize(
@@ -186,7 +194,7 @@ def test_what_is_remembered_of_a_turned_world_is_turned(turn):
         state = env.world_state.clone()
         here, there = (env.set_state(each).clone() for each in (state, turned_world(state, turn)))
         sees = sees & pulled(preset, state, 24)
-        faced.append(frame_of(seen(here)).index)
+        faced.append(orientation_of(seen(here), symmetries(preset)).index)
         ours, theirs = (actor(now)[LOGITS] for actor, now in zip(actors, (here, there)))
         fresh = lively(Mlp(memory=16), fighting(preset, steps=0))(here.clone())[LOGITS]
         expected = torch.empty_like(ours).index_copy_(2, turned_actions(torch.arange(11), turn), ours)
@@ -206,11 +214,11 @@ def lively(model, env):
     return actor.requires_grad_(False)
 
 
-def test_networks_that_face_north_say_something_else():
+def test_networks_without_symmetry_say_something_else():
     """The check on the check."""
     here, there, sees = in_both(PRESETS["whole map"], (-1, 1, True))
     shape = signature(fighting(PRESETS["whole map"], steps=0))
-    critic = Mlp(facing="north").critic(shape, central=True)
+    critic = Mlp(symmetry="none").critic(shape, central=True)
     assert not torch.allclose(critic(there)[VALUE][sees], critic(here)[VALUE][sees], atol=1e-3)
 
 
@@ -218,64 +226,121 @@ def test_a_mixer_says_the_same_of_a_turned_world():
     here, there, _ = in_both(PRESETS["whole map"], (-1, 1, True))
     env = fighting(PRESETS["whole map"], steps=0)
     said = {}
-    for facing in ("fire", "north"):
-        mixer = Dqn(mixer="qmix").build(env, Mlp(facing=facing), 8).loss.mixer_network
+    for symmetry in ("canonical", "none"):
+        model = Mlp(symmetry=symmetry)
+        mixer = Dqn(mixer="qmix").build(env, model, 8).loss.mixer_network
         own = torch.arange(18.0).view(6, 3, 1)
-        said[facing] = [
-            mixer(TensorDict({CHOSEN_ACTION_VALUE: own, "state": now["state"]}, [6]))["chosen_action_value"]
-            for now in (here, there)
+        read = [model.canonical_batch(signature(env), restored=True)(now)[model.state_key] for now in (here, there)]
+        said[symmetry] = [
+            mixer(TensorDict({CHOSEN_ACTION_VALUE: own, model.state_key: state}, [6]))["chosen_action_value"]
+            for state in read
         ]
-    torch.testing.assert_close(*said["fire"], atol=1e-4, rtol=0.0)
-    assert not torch.allclose(*said["north"], atol=1e-3)
+    torch.testing.assert_close(*said["canonical"], atol=1e-4, rtol=0.0)
+    assert not torch.allclose(*said["none"], atol=1e-3)
 
 
 @pytest.mark.parametrize("model", [Mlp(), Mlp(sharing="none"), Cnn()], ids=["team", "none", "cnn"])
 @pytest.mark.parametrize("name", PRESETS)
-def test_a_batch_that_is_held_once_is_learnt_from_as_if_it_were_turned_each_time(name, model):
+def test_a_batch_that_is_turned_once_is_learnt_from_as_if_it_were_turned_each_time(name, model):
     env = fighting(PRESETS[name])
     policy, critic = Ppo().policy(signature(env), model), model.critic(signature(env), central=True)
     with torch.no_grad():
         batch = policy(env.rollout(3, policy))
     kept = batch.clone()
-    held_once = hold(batch)
+    once = model.canonical_batch(signature(env))(batch)
     assert (batch == kept).all(), "what was collected stays as it is"
-    assert (held_once[ACTION] != batch[ACTION]).any()
-    ours, theirs = given_held(policy).get_dist(held_once), policy.get_dist(batch)
-    torch.testing.assert_close(ours.log_prob(held_once[ACTION]), theirs.log_prob(batch[ACTION]))
+    assert (once[ACTION] != batch[ACTION]).any()
+    assert OBSERVATION not in once.keys(True) and "state" not in once.keys()
+    ours, theirs = over_canonical(policy).get_dist(once), policy.get_dist(batch)
+    torch.testing.assert_close(ours.log_prob(once[ACTION]), theirs.log_prob(batch[ACTION]))
     torch.testing.assert_close(ours.entropy(), theirs.entropy())
-    assert torch.equal(given_held(critic)(held_once.clone())[VALUE], critic(batch.clone())[VALUE])
-    again = hold(held_once)
-    for key in held_once.keys(True, True):
-        if key[0] != "next":
-            assert torch.equal(again[key], held_once[key]), key
+    assert torch.equal(over_canonical(critic)(once.clone())[VALUE], critic(batch.clone())[VALUE])
+    anew = model.canonical_batch(signature(env))(batch.exclude(ORIENTATION))
+    for key in (ORIENTATION, ACTION, ACTION_MASK):
+        assert torch.equal(anew[key], once[key]), "what no policy has turned is turned then"
 
 
-def test_networks_given_what_is_held_have_the_same_weights_by_the_same_names():
+def test_what_was_turned_when_it_was_acted_on_is_not_turned_again(monkeypatch):
+    env = fighting(PRESETS["whole map"])
+    learner = Ppo(minibatch_size=8, epochs=2).build(env, Mlp(), 24)
+    counted, turn = [], Canonicalise.forward
+    monkeypatch.setattr(Canonicalise, "forward", lambda self, td: counted.append(td.numel()) or turn(self, td))
+    with torch.no_grad():
+        batch = env.rollout(4, learner.explore, break_when_any_done=False)
+    assert counted == [6] * 4
+    learner.store(batch)
+    for sample in learner.samples():
+        learner.loss(sample)
+    assert counted == [6] * 4 + [6], "besides acting, what the last step led to"
+
+
+@pytest.mark.parametrize("learner", [Dqn(), Dqn(mixer="qmix"), Sac(), Ddpg(), Ddpg(central_critic=True)], ids=repr)
+def test_a_replay_memory_keeps_canonical_entries_in_place_of_the_others(learner):
+    env = fighting(PRESETS["whole map"])
+    learner = replace(learner, warm_up=0, minibatch_size=8, updates=1, capacity=64).build(env, Mlp(), 24)
+    with torch.no_grad():
+        learner.store(env.rollout(4, learner.explore, break_when_any_done=False))
+    (sample,) = learner.samples()
+    for part in (sample, sample["next"]):
+        keys = part.keys(True, True)
+        assert ORIENTATION in keys and ("agents", "canonical_view") in keys
+        assert "state" not in keys and not any(key[:2] == OBSERVATION for key in keys)
+
+
+def test_the_modules_that_learn_are_those_that_act():
     env = fighting(PRESETS["centred"], steps=0)
     policy = Ppo().policy(signature(env), Mlp())
-    ours, theirs = dict(given_held(policy).named_parameters()), dict(policy.named_parameters())
-    assert set(ours) == set(theirs) and all(ours[name] is weight for name, weight in theirs.items())
+    assert over_canonical(policy)[0] is policy.module[0][1]
+    plain = Ppo().policy(signature(env), Mlp(symmetry="none"))
+    assert over_canonical(plain) is plain
 
 
 @pytest.mark.parametrize("name", PRESETS)
-def test_every_preset_can_be_held(name):
-    shapes = {entry: tuple(value.shape[2:]) for entry, value in seen(fighting(PRESETS[name], steps=0).reset()).items()}
-    assert can_be_held(shapes)
+def test_every_entry_of_a_preset_says_how_it_turns(name):
+    assert all(each.symmetry is not None for each in signature(fighting(PRESETS[name], steps=0)).observation.values())
 
 
 @pytest.mark.parametrize(
-    "changed",
-    [{"view": (44, 11, 11)}, {"self": (96,)}, {"picture": (3, 8, 15)}, {"more": (2,)}, {"view": None}],
-    ids=str,
+    ("changed", "rule"),
+    [
+        ({"view": None}, r"does not say in its Space how it turns with the map, as view of shape \[11, 11, 11\]"),
+        ({"self": None}, r"does not say in its Space how it turns with the map, as self"),
+        ({"view": Planes(11), "picture": Planes(3)}, "no entry shows a target, such as fire"),
+        ({"self": Vector((Part("scalar", tuple("abc")),))}, "no entry tells an agent's place"),
+    ],
+    ids=["view", "self", "no target", "no place"],
 )
-def test_what_is_of_no_preset_is_read_north_up(make_small_env, changed):
-    """Of observations that were stacked, cut or added to no one knows how they turn."""
+def test_observations_that_do_not_say_how_they_turn_are_read_as_they_are(make_small_env, changed, rule):
     shape = signature(make_small_env(2))
-    entries = {name: entry.shape for name, entry in shape.observation.items()} | changed
-    other = shape._replace(observation={name: Entry(size, "float32") for name, size in entries.items() if size})
-    with pytest.raises(ValueError, match=r"model\.facing must be north where observations are of no preset, got fire"):
+    entries = {
+        name: entry._replace(symmetry=changed.get(name, entry.symmetry)) for name, entry in shape.observation.items()
+    }
+    other = shape._replace(observation=entries)
+    with pytest.raises(ValueError, match=rf"^model\.symmetry must be none where .*{rule}.*, got canonical$"):
         Mlp().actor(other)
-    assert Mlp(facing="north").actor(other) is not None
+    assert Mlp(symmetry="none").actor(other) is not None
+
+
+def test_what_was_stacked_or_cut_does_not_say_how_it_turns(make_small_env):
+    view = ("agents", "observation", "view")
+    env = TransformedEnv(make_small_env(2), CatFrames(N=4, dim=-3, in_keys=[view], out_keys=[view]))
+    found = signature(env).observation
+    assert found["view"].symmetry is None and found["picture"].symmetry is not None
+
+
+def test_an_agent_turns_to_what_the_first_planes_show_and_else_to_the_next():
+    """Two steps south in the near planes; in the far ones, where the agent is in the north-west corner, east."""
+    near, far = torch.zeros(1, 2, 5, 5), torch.zeros(1, 1, 4, 4)
+    near[0, 1, 4, 2], far[0, 0, 0, 3] = 1.0, 1.0
+    declared = {
+        "far": Planes(1, Target(0, order=1, in_middle=False, is_share=True)),
+        "near": Planes(2, Target(1)),
+        "own": Vector((Part("scalar", ("speed",)), Part("place", ("row", "column")))),
+    }
+    entries = {"far": far, "near": near, "own": torch.tensor([[7.0, 0.125, 0.125]])}
+    assert orientation_of(entries, declared).index == framed(1, 1, True).index
+    near.zero_()
+    assert orientation_of(entries, declared).index == framed(1, 1, False).index
 
 
 @pytest.mark.parametrize("name", ["centred", "local"])
@@ -285,11 +350,12 @@ def test_the_fire_lies_between_east_and_south_east(name):
     cells[8, 8] = 11
     state, world = drawn(cells.tolist(), places)
     entries = PRESETS[name](state, world, world.forecast(state))
-    frame, found = frame_of(entries), 0
+    declared, found = symmetries(PRESETS[name]), 0
     what, channel = ("view", DEFAULT.index("fire_stage")) if name == "local" else ("picture", 0)
     if name == "centred":
         entries["view"].zero_()  # what an agent sees itself goes first, and is not in the middle of a block
-    for plane in held(what, entries[what], frame)[0, :, channel]:
+    way = orientation_of(entries, declared)
+    for plane in turned(entries[what], declared[what], way)[0, :, channel]:
         for row, column in (plane.nonzero() - len(plane) // 2).tolist():
             assert 0 <= row <= column
             found += 1
@@ -297,47 +363,47 @@ def test_the_fire_lies_between_east_and_south_east(name):
 
 
 def framed(rows, columns, swapped):
-    return Frame(torch.tensor(4 * (rows < 0) + 2 * (columns < 0) + swapped))
+    return Orientation(torch.tensor(4 * (rows < 0) + 2 * (columns < 0) + swapped))
 
 
 def test_vectors_maps_and_actions_by_hand():
     # What is two rows up and five columns to the left of one: mirrored both, it is (2, 5) away.
-    mirrored, turned = framed(-1, -1, False), framed(-1, 1, True)
-    assert mirrored.vectors(torch.tensor([-2.0, -5.0])).tolist() == [2.0, 5.0]
-    assert turned.vectors(torch.tensor([-5.0, 2.0])).tolist() == [2.0, 5.0]
+    mirrored, half_turned = framed(-1, -1, False), framed(-1, 1, True)
+    assert mirrored.offsets(torch.tensor([-2.0, -5.0])).tolist() == [2.0, 5.0]
+    assert half_turned.offsets(torch.tensor([-5.0, 2.0])).tolist() == [2.0, 5.0]
     # Rows mirrored, 1 2 / 3 4 is 3 4 / 1 2; rows and columns swapped after that, 3 1 / 4 2.
     one = torch.tensor([[[1, 2], [3, 4]]])
-    assert framed(-1, 1, False).maps(one).tolist() == [[[3, 4], [1, 2]]]
-    assert turned.maps(one).tolist() == [[[3, 1], [4, 2]]]
+    assert framed(-1, 1, False).planes(one).tolist() == [[[3, 4], [1, 2]]]
+    assert half_turned.planes(one).tolist() == [[[3, 1], [4, 2]]]
     # Rows mirrored and then swapped with columns, east in the frame is what is north on the map, and south is east.
     entries = torch.arange(11)
-    said = turned.actions(entries)
+    said = half_turned.by_action(entries, ACTIONS)
     assert (
         said[Action.EAST] == Action.NORTH and said[Action.SOUTH] == Action.EAST and said[Action.CLEAR] == Action.CLEAR
     )
-    assert torch.equal(framed(1, 1, False).actions(entries), entries)
+    assert torch.equal(framed(1, 1, False).by_action(entries, ACTIONS), entries)
 
 
 @pytest.mark.parametrize("n_actions", [10, 11])
 def test_entries_by_action_come_back(n_actions):
-    frame, entries = Frame(torch.arange(8)), torch.randn(8, n_actions)
-    assert torch.equal(frame.actions_on_map(frame.actions(entries)), entries)
-    assert len({tuple(each) for each in frame.actions(torch.arange(n_actions).expand(8, -1)).tolist()}) == 8
+    frame, entries, names = Orientation(torch.arange(8)), torch.randn(8, n_actions), ACTIONS[:n_actions]
+    assert torch.equal(frame.by_action_back(frame.by_action(entries, names), names), entries)
+    assert len({tuple(each) for each in frame.by_action(torch.arange(n_actions).expand(8, -1), names).tolist()}) == 8
 
 
 def test_units_change_places_with_the_ways_to_hold_a_map():
     """From one frame to another they move as they do between what these are of any turned map, and come back."""
-    frames, features = Frame(torch.arange(8)), torch.randn(8, 16)
-    assert torch.equal(frames.units_on_map(frames.units(features)), features)
+    frames, features = Orientation(torch.arange(8)), torch.randn(8, 16)
+    assert torch.equal(frames.units_back(frames.units(features)), features)
     assert torch.equal(framed(1, 1, False).units(features), features)
     basis = torch.eye(2).expand(8, -1, -1)
-    matrices = Frame(torch.arange(8)[:, None].expand(-1, 2)).vectors(basis).transpose(-1, -2)
+    matrices = Orientation(torch.arange(8)[:, None].expand(-1, 2)).offsets(basis).transpose(-1, -2)
 
     def of_turned(frame, turn):
         return (matrices == matrices[frame] @ matrices[turn]).flatten(1).all(1).nonzero().item()
 
     def moved(first, then):
-        return Frame(torch.tensor(then)).units(Frame(torch.tensor(first)).units_on_map(features[0])).tolist()
+        return Orientation(torch.tensor(then)).units(Orientation(torch.tensor(first)).units_back(features[0])).tolist()
 
     for first, then, turn in itertools.product(range(8), repeat=3):
         assert moved(first, then) == moved(of_turned(first, turn), of_turned(then, turn))
@@ -349,24 +415,29 @@ def test_near_fires_count_for_more():
     view = torch.zeros(1, 1, len(DEFAULT), 11, 11, dtype=torch.uint8)
     fire = view[0, 0, DEFAULT.index("fire_stage")]
     fire[4, 5] = fire[9, 5] = 51
-    assert frame_of({"view": view}).index == framed(-1, 1, True).index
+    assert orientation_of({"view": view}, {"view": symmetries(Local())["view"]}).index == framed(-1, 1, True).index
     fire[9, 4] = fire[9, 6] = 204
-    assert frame_of({"view": view}).index == framed(1, 1, True).index, "three of them are more, whatever their stage"
+    assert orientation_of({"view": view}, {"view": symmetries(Local())["view"]}).index == framed(1, 1, True).index, (
+        "three of them are more, whatever their stage"
+    )
 
 
 def test_a_tie_is_a_tie_in_any_batch():
     """Fires at the corners of a diamond pull nowhere: north stays up, in one world and in a thousand."""
     picture = torch.zeros(1000, 1, 3, 8, 8)
     picture[:, :, 0, [1, 5, 3, 3], [3, 3, 1, 5]] = 0.3
+    declared = symmetries(Surroundings())
     entries = {
         "picture": picture,
         "self": torch.full((1000, 1, SELF_SIZE), 3.5 / 8),
         "view": torch.zeros(1000, 1, len(DEFAULT), 11, 11, dtype=torch.uint8),
     }
     for n_worlds in (1, 7, 1000):
-        assert (frame_of({name: entry[:n_worlds] for name, entry in entries.items()}).index == 0).all()
+        assert (orientation_of({name: entry[:n_worlds] for name, entry in entries.items()}, declared).index == 0).all()
     entries["view"][:, 0, DEFAULT.index("fire_stage"), 7, 4] = 51  # two cells down, one to the left
-    assert (frame_of(entries).index == framed(1, -1, True).index).all(), "what it sees itself goes first"
+    assert (orientation_of(entries, declared).index == framed(1, -1, True).index).all(), (
+        "what it sees itself goes first"
+    )
 
 
 def test_the_critics_map_faces_the_fire_and_is_about_what_happens(make_small_env):
@@ -376,7 +447,7 @@ def test_the_critics_map_faces_the_fire_and_is_about_what_happens(make_small_env
     state[0, 4, 10, 5] = state[0, 5, 12, 9] = 1.0  # a bulldozer, an aircraft: their middle is (11, 7)
     state[0, 1, 0, 0] = state[0, 1, 15, 15] = 0.5  # trees
     state[0, 7, :8, :8], state[0, 7, :8, 8:], state[0, 7, 8:, :8], state[0, 7, 8:, 8:] = 0.9, 0.4, 0.1, -0.3
-    shown = held_state(state)[0]
+    shown = canonical_state(state, STATE_SYMMETRY)[0]
     # The fire is nine rows up and four columns to the left: mirrored both, rows and columns swapped, it is at (12, 13),
     # the bulldozer at (10, 5), the aircraft at (6, 3). They fill rows 6 to 12 and columns 3 to 13, whose middles are 9
     # and 8: one row up, so that trees in the corner are lost above and come to row 14 below.
@@ -397,8 +468,8 @@ def test_where_on_the_map_it_burns_makes_no_difference_to_the_critics_map(down, 
     state[1, 4:12, 3:14] = torch.randint(9, (8, 11)) / 8  # trees
     state[4, 4, 2] = 1.0  # a bulldozer
     moved = state.roll((down, across), (1, 2))  # of what is drawn, nothing comes in again on the other side
-    shown = held_state(state)
-    assert torch.equal(held_state(moved), shown)
+    shown = canonical_state(state, STATE_SYMMETRY)
+    assert torch.equal(canonical_state(moved, STATE_SYMMETRY), shown)
     assert shown[0].nonzero().tolist() == [[7, 6], [10, 13]] and shown[4].nonzero().tolist() == [[5, 3]]
     assert shown.sum() == state.sum(), "nothing is lost here"
 
@@ -409,7 +480,7 @@ def test_the_critics_map_loses_no_fire_and_no_agent_and_shows_nothing_off_the_ma
         state[:, plane] = (state[:, plane] < share).to(torch.float32)
     state[::2, :, 9:] = 0.0  # half of the maps are empty to the south
     state[:, 4, 1, 1] += 1.0
-    shown = held_state(state)
+    shown = canonical_state(state, STATE_SYMMETRY)
     sums, before = shown.sum((-2, -1)), state.sum((-2, -1))
     for plane in (0, 4, 5):
         assert torch.equal(sums[:, plane], before[:, plane]), plane

@@ -1,0 +1,50 @@
+"""What is learnt from: a collected batch whose entries are turned once, when it was acted on."""
+
+from dataclasses import dataclass
+
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+
+from warp_torchrl.models.canonical.orientation import Orientation
+from warp_torchrl.models.signature import ACTION, ACTION_MASK, OBSERVATION, ORIENTATION, STATE, TEACHER_ACTION
+
+
+@dataclass(frozen=True)
+class CanonicalBatch:
+    """Replaces what was observed by its canonical entries.
+
+    Attributes:
+        observation: ``Canonicalise``; None where networks read maps as they are, which leaves batches as they are.
+        state: ``CanonicaliseState``, where networks read the state.
+        actions: Names of the actions where actions and masks are turned too; none where networks restore what they
+            write.
+    """
+
+    observation: TensorDictModuleBase | None
+    state: TensorDictModuleBase | None = None
+    actions: tuple[str, ...] = ()
+
+    def __call__(self, batch: TensorDictBase) -> TensorDictBase:
+        """Return a batch [...] without observation and state, with their canonical entries.
+
+        The entries that the policy wrote when it acted are kept; those of a batch without them are made. Entries of
+        its ``next`` stay as they are.
+        """
+        if self.observation is None:
+            return batch
+        out, keys = batch.copy(), batch.keys(include_nested=True)
+        if ORIENTATION not in keys:
+            self.observation(out)
+        if self.state is not None:
+            self.state(out)
+        if self.actions:
+            self._turn_actions(out)
+        return out.exclude(OBSERVATION, STATE)
+
+    def _turn_actions(self, batch: TensorDictBase) -> None:
+        orientation, keys = Orientation(batch.get(ORIENTATION)), batch.keys(include_nested=True)
+        for key in (ACTION, TEACHER_ACTION):
+            if key in keys:
+                batch.set(key, orientation.action(batch.get(key), self.actions))
+        if ACTION_MASK in keys:
+            batch.set(ACTION_MASK, orientation.by_action(batch.get(ACTION_MASK), self.actions))

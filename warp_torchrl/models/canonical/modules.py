@@ -1,0 +1,143 @@
+"""Canonicalise, network, restore: the modules of a sequence that acts and values in canonical orientation."""
+
+from collections.abc import Mapping
+
+from tensordict import TensorDictBase
+from tensordict.nn import ProbabilisticTensorDictSequential, TensorDictModuleBase, TensorDictSequential
+
+from warp_torchrl.models.canonical.entries import Symmetries, orientation_of, place_of, targets, turned
+from warp_torchrl.models.canonical.orientation import Orientation
+from warp_torchrl.models.canonical.state import canonical_state
+from warp_torchrl.models.signature import (
+    ACTION_ONE_HOT,
+    CANONICAL_ACTION_ONE_HOT,
+    CANONICAL_STATE,
+    ORIENTATION,
+    STATE,
+    Entry,
+    Key,
+    canonical_key,
+    observation_key,
+)
+from warp_torchrl.symmetry import Planes, TeamPlanes, Vector
+
+
+class Canonicalise(TensorDictModuleBase):
+    """Turns what each agent observes, and writes its orientation, int64 [..., A].
+
+    Args:
+        observation: The entries, by name.
+
+    Raises:
+        ValueError: If an entry does not declare how it turns, or no entry shows a target.
+    """
+
+    def __init__(self, observation: Mapping[str, Entry]) -> None:
+        super().__init__()
+        self._symmetries = _declared(observation)
+        self._keys = {name: (observation_key(name), canonical_key(name)) for name in observation}
+        self.in_keys = [read for read, _ in self._keys.values()]
+        self.out_keys = [*(written for _, written in self._keys.values()), ORIENTATION]
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Write the entries in canonical orientation."""
+        entries = {name: tensordict.get(read) for name, (read, _) in self._keys.items()}
+        orientation = orientation_of(entries, self._symmetries)
+        for name, (_, written) in self._keys.items():
+            tensordict.set(written, turned(entries[name], self._symmetries[name], orientation))
+        return tensordict.set(ORIENTATION, orientation.index)
+
+
+class CanonicaliseState(TensorDictModuleBase):
+    """Turns the critic's state, see ``canonical_state``.
+
+    Args:
+        state: The entry.
+
+    Raises:
+        ValueError: If it does not declare how it turns.
+    """
+
+    def __init__(self, state: Entry) -> None:
+        super().__init__()
+        if not isinstance(state.symmetry, TeamPlanes):
+            raise ValueError("model.symmetry must be none where the state does not say how it turns, got canonical")
+        self._symmetry = state.symmetry
+        self.in_keys, self.out_keys = [STATE], [CANONICAL_STATE]
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Write the state in canonical orientation."""
+        return tensordict.set(CANONICAL_STATE, canonical_state(tensordict.get(STATE), self._symmetry))
+
+
+class CanonicaliseAction(TensorDictModuleBase):
+    """Turns actions that are given as one-hot vectors [..., A, actions].
+
+    Args:
+        actions: Their names.
+    """
+
+    def __init__(self, actions: tuple[str, ...]) -> None:
+        super().__init__()
+        self._actions = actions
+        self.in_keys, self.out_keys = [ACTION_ONE_HOT, ORIENTATION], [CANONICAL_ACTION_ONE_HOT]
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Write the vectors in canonical orientation."""
+        orientation = Orientation(tensordict.get(ORIENTATION))
+        return tensordict.set(
+            CANONICAL_ACTION_ONE_HOT, orientation.by_action(tensordict.get(ACTION_ONE_HOT), self._actions)
+        )
+
+
+class Restore(TensorDictModuleBase):
+    """Turns numbers of which there is one for each action, [..., A, actions], back to the map.
+
+    Args:
+        key: Where they are.
+        actions: Names of the actions.
+    """
+
+    def __init__(self, key: Key, actions: tuple[str, ...]) -> None:
+        super().__init__()
+        self._actions = actions
+        self.in_keys, self.out_keys = [key, ORIENTATION], [key]
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Write them in the order of the map's actions."""
+        key, orientation = self.out_keys[0], Orientation(tensordict.get(ORIENTATION))
+        return tensordict.set(key, orientation.by_action_back(tensordict.get(key), self._actions))
+
+
+def over_canonical(module: TensorDictModuleBase, restored: bool = False) -> TensorDictModuleBase:
+    """Return the modules of a sequence that read canonical entries, the same objects, to learn from stored batches.
+
+    Args:
+        module: A sequence, or a part of one, which may begin with ``Canonicalise``; others are returned as they are.
+        restored: Whether it writes numbers in the order of the map's actions.
+    """
+    if not any(isinstance(each, (Canonicalise, CanonicaliseState)) for each in module.modules()):
+        return module
+    drops = (Canonicalise, CanonicaliseState) if restored else (Canonicalise, CanonicaliseState, Restore)
+    parts = [over_canonical(each, restored) for each in module.module if not isinstance(each, drops)]
+    if isinstance(module, ProbabilisticTensorDictSequential):
+        return ProbabilisticTensorDictSequential(*parts)
+    return parts[0] if len(parts) == 1 else TensorDictSequential(*parts)
+
+
+def _declared(observation: Mapping[str, Entry]) -> Symmetries:
+    """Return what the entries declare, checked."""
+    declared: dict[str, Planes | Vector] = {}
+    for name, entry in observation.items():
+        if not isinstance(entry.symmetry, (Planes, Vector)):
+            raise ValueError(
+                f"model.symmetry must be none where an entry does not say in its Space how it turns with the map, "
+                f"as {name or 'the observation'} of shape {list(entry.shape)}, got canonical"
+            )
+        declared[name] = entry.symmetry
+    found = [target for _, target, _ in targets(declared)]
+    if not found:
+        raise ValueError("model.symmetry must be none where no entry shows a target, such as fire, got canonical")
+    if place_of(declared) is None and not all(target.in_middle for target in found):
+        raise ValueError("model.symmetry must be none where no entry tells an agent's place, got canonical")
+    return declared

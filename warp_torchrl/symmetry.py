@@ -1,0 +1,166 @@
+"""How the entries of an observation turn with the map: an observation declares it, and networks read it.
+
+A square map has eight symmetries: it may be mirrored north to south, east to west, and along its diagonal (the
+dihedral group D4). The laws of fire and of the team are the same on all eight. Networks may therefore read each
+observation in one canonical orientation (``warp_torchrl.models.canonical``), for which every entry must say what a
+symmetry does to it. What is declared here is plain data, and a checkpoint's manifest keeps it.
+"""
+
+from collections.abc import Mapping
+from math import isqrt, prod
+from typing import Any, NamedTuple
+
+COMPASS = {
+    "north": (-1, 0),
+    "north_east": (-1, 1),
+    "east": (0, 1),
+    "south_east": (1, 1),
+    "south": (1, 0),
+    "south_west": (1, -1),
+    "west": (0, -1),
+    "north_west": (-1, -1),
+}
+"""(row, column) offset of each direction by its name [cells]; rows grow south, columns east."""
+LAST = "last_"
+"""Prefix of the names of numbers that tell an action of before."""
+TIME_LEFT = "time_left"
+"""Name of the scalar that tells which share of an episode is left; it is 1 at an episode's first step alone."""
+
+
+class Target(NamedTuple):
+    """A channel that agents turn towards: the canonical orientation has it between east and south-east.
+
+    Attributes:
+        channel: Its index.
+        order: Of the planes of an observation, those of the lowest order tell the orientation; where they show no
+            target, the next do.
+        near: Distance that is added to that of each target, so that targets at hand count alike [cells of the plane].
+        is_share: Whether targets count by their number; else all numbers over 0 count alike.
+        in_middle: Whether the agent is in the middle of the planes; else the observation's part of kind ``place``
+            tells where it is.
+    """
+
+    channel: int
+    order: int = 0
+    near: float = 2.0
+    is_share: bool = False
+    in_middle: bool = True
+
+
+class Planes(NamedTuple):
+    """Square maps [C, S, S], or the same flattened [C S S]: each number moves with its cell and stays what it is.
+
+    Attributes:
+        channels: C.
+        target: What agents turn towards, if one of the channels shows it.
+        is_flat: Whether they are flattened.
+    """
+
+    channels: int
+    target: Target | None = None
+    is_flat: bool = False
+
+    def fits(self, shape: tuple[int, ...]) -> bool:
+        """Return whether an entry of one agent can be of this kind."""
+        side = isqrt(prod(shape) // self.channels)
+        is_square = shape == ((self.channels * side * side,) if self.is_flat else (self.channels, side, side))
+        return is_square and (self.target is None or 0 <= self.target.channel < self.channels)
+
+
+class Part(NamedTuple):
+    """Consecutive numbers of a vector.
+
+    Attributes:
+        kind: ``scalar``, which do not change; ``place``, row and column as shares 0..1 of the map's height and width;
+            ``vector``, components to the east and to the north; ``actions``, one number for each action or direction,
+            of which those with a name of ``COMPASS``, alone or after ``LAST``, change places.
+        names: Of the numbers, in order.
+    """
+
+    kind: str
+    names: tuple[str, ...]
+
+
+class Vector(NamedTuple):
+    """A vector [F] of parts.
+
+    Attributes:
+        parts: In order.
+    """
+
+    parts: tuple[Part, ...]
+
+    def fits(self, shape: tuple[int, ...]) -> bool:
+        """Return whether an entry of one agent can be of this kind."""
+        pairs = all(len(part.names) == 2 for part in self.parts if part.kind in ("place", "vector"))
+        known = all(part.kind in ("scalar", "place", "vector", "actions") for part in self.parts)
+        return pairs and known and shape == (len(self.names),)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of all numbers."""
+        return tuple(name for part in self.parts for name in part.names)
+
+    def place(self) -> slice | None:
+        """Return where the first part of kind ``place`` is; None where there is none."""
+        first = 0
+        for part in self.parts:
+            if part.kind == "place":
+                return slice(first, first + 2)
+            first += len(part.names)
+        return None
+
+
+class TeamPlanes(NamedTuple):
+    """Square maps [C, S, S] of the whole world with the team on them: what a central critic reads.
+
+    They are turned as the middle of the team would see them, and moved so that the box of all targets and agents is in
+    the middle. The quarters of the last plane hold one number each: two scalars, and a vector to east and north.
+
+    Attributes:
+        channels: C.
+        target: Channel of what the team turns towards, in shares.
+        agents: First of the channels that tell where agents are, and how many there are.
+    """
+
+    channels: int
+    target: int
+    agents: tuple[int, int]
+
+    def fits(self, shape: tuple[int, ...]) -> bool:
+        """Return whether a state can be of this kind."""
+        known = 0 <= self.target < self.channels - 1 and 0 <= self.agents[0] < sum(self.agents) < self.channels
+        return known and len(shape) == 3 and shape[0] == self.channels and shape[1] == shape[2] and shape[1] % 2 == 0
+
+
+Symmetry = Planes | Vector | TeamPlanes
+"""What a symmetry of the map does to an entry."""
+
+
+def to_plain(symmetry: Symmetry) -> dict[str, Any]:
+    """Return a symmetry as a manifest keeps it."""
+    plain = symmetry._asdict()
+    if isinstance(symmetry, Planes) and symmetry.target is not None:
+        plain["target"] = symmetry.target._asdict()
+    if isinstance(symmetry, Vector):
+        plain["parts"] = [part._asdict() for part in symmetry.parts]
+    return {"kind": type(symmetry).__name__, **plain}
+
+
+def from_plain(plain: Mapping[str, Any]) -> Symmetry:
+    """Return the symmetry that a manifest keeps.
+
+    Raises:
+        ValueError: If it is of no kind that is known.
+        TypeError, KeyError: If it has other fields.
+    """
+    kind = plain["kind"]
+    if kind == "Planes":
+        target = plain["target"] and Target(**plain["target"])
+        return Planes(int(plain["channels"]), target or None, bool(plain["is_flat"]))
+    if kind == "Vector":
+        return Vector(tuple(Part(str(each["kind"]), tuple(map(str, each["names"]))) for each in plain["parts"]))
+    if kind == "TeamPlanes":
+        first, count = plain["agents"]
+        return TeamPlanes(int(plain["channels"]), int(plain["target"]), (int(first), int(count)))
+    raise ValueError(f"kind must be Planes, Vector or TeamPlanes, got {kind!r}")
