@@ -110,7 +110,14 @@ def test_a_team_s_own_roles_and_actions_come_last_in_self(allow_stay: bool) -> N
     crew = team(3, allow_stay=allow_stay)
     env = WildfireEnv(small_world(team=crew), observation=Surroundings(identity=True), n_worlds=2)
     names = env.channel_names["self"]
-    assert names == (*SELF, *IDENTITY, "role_sprinkler", "last_sprinkle", "last_jump_south_east", "last_jump_back")
+    assert names == (
+        *SELF.names,
+        *IDENTITY.names,
+        "role_sprinkler",
+        "last_sprinkle",
+        "last_jump_south_east",
+        "last_jump_back",
+    )
     now = env.reset()
     assert now[(*OBSERVATION, "self")][..., names.index("role_sprinkler")].tolist() == [[0.0, 1.0, 0.0]] * 2
     for action, name in enumerate(crew.action_names):
