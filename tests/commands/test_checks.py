@@ -1,4 +1,4 @@
-"""A command's configuration is composed once, and checked before a folder is made."""
+"""A command's configuration is checked as Hydra composed it, before a folder is made."""
 
 import sys
 
@@ -30,12 +30,10 @@ def composed(monkeypatch):
         (evaluate, "overwrite=true", "give either checkpoint=PATH or policy=NAME"),
     ],
 )
-def test_a_mistake_is_found_in_what_hydra_composed_once(
-    composed, monkeypatch, tmp_path, capsys, command, mistake, told
-):
+def test_a_mistake_is_found_in_what_hydra_composed(composed, monkeypatch, tmp_path, capsys, command, mistake, told):
     folder = tmp_path / "run"
     monkeypatch.setattr(sys, "argv", ["command", mistake, f"hydra.run.dir={folder}"])
     with pytest.raises(SystemExit) as ended:
         command()
     assert ended.value.code == 2 and told in capsys.readouterr().err
-    assert len(composed) == 1 and not folder.exists()
+    assert len(composed) == 2 and not folder.exists()  # Hydra does so twice: first to learn whether this is a sweep

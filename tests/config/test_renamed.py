@@ -7,7 +7,7 @@ import shutil
 import pytest
 
 from tests.test_golden import GOLDEN
-from warp_torchrl.config.compose import compose_config, plain, recompose
+from warp_torchrl.config.compose import compose_config, plain, restore
 from warp_torchrl.config.renamed import RENAMED, renamed_overrides, renamed_values
 from warp_torchrl.runs.checkpoint import newest
 from warp_torchrl.runs.resumption import read_config
@@ -47,9 +47,9 @@ def test_values_of_run_folders_keep_their_order_and_get_the_names_of_now():
 def test_shipped_and_former_runs_are_read_by_the_names_of_now(tmp_path):
     record = newest(find_policy("skirmish"))[0].record()
     assert record.values["model"]["symmetry"] == "canonical" and "facing" not in record.values["model"]
-    assert plain(recompose(record))["model"]["symmetry"] == "canonical"
+    assert plain(restore(record))["model"]["symmetry"] == "canonical"
     former = newest(shutil.copytree(GOLDEN / "0.1.0", tmp_path / "run"))[0].record()
-    assert plain(recompose(former))["model"]["symmetry"] == "none", "there was no symmetry in 0.1.0"
+    assert plain(restore(former))["model"]["symmetry"] == "none", "there was no symmetry in 0.1.0"
     (tmp_path / "config.yaml").write_text(json.dumps({"model": {"facing": "fire"}}))
     assert read_config(tmp_path / "config.yaml") == {"model": {"symmetry": "canonical"}}
 

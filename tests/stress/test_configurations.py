@@ -3,7 +3,7 @@
 import pytest
 
 from tests.config.test_conf import MISTAKES
-from warp_torchrl.commands.command import _check_first, train
+from warp_torchrl.commands.command import train
 
 pytestmark = pytest.mark.stress
 
@@ -168,9 +168,14 @@ def test_a_hundred_mistakes_are_refused_and_leave_nothing(tmp_path, monkeypatch,
     assert not wrong and len(INVALID) >= 100
 
 
-def test_thirty_configurations_are_accepted(capfd):
+def test_thirty_configurations_are_accepted(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("warp_torchrl.commands.command._train_job", lambda config: None)
     for line in VALID:
-        _check_first("train", line.split())
+        monkeypatch.setattr("sys.argv", ["train.py", *line.split()])
+        with pytest.raises(SystemExit) as end:
+            train()
+        assert end.value.code == 0, line
     with capfd.disabled():
         print(f"\nvalid configurations accepted / tried: {len(VALID)} / {len(VALID)}")
     assert len(VALID) >= 30

@@ -99,13 +99,13 @@ def tick_table(rows: list[dict[str, Any]]) -> str:
 
 
 def _ours(world: World, state: WorldState, fuse: bool) -> Callable[[], None]:
-    due, tick = torch.ones_like(state.terminated), compiled(advance) if fuse else advance
+    ticks_now, tick = torch.ones_like(state.terminated), compiled(advance) if fuse else advance
     first = in_bytes(state) if fuse else state
 
     def ticks() -> None:
         now = first
         for _ in range(_TICKS):
-            now = tick(now, world.fire, world.air, due)
+            now = tick(now, world.fire, world.air, ticks_now)
 
     return ticks
 

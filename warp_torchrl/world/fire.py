@@ -172,13 +172,13 @@ class Fire:
         )
         return expected * self.spreads(state)
 
-    def tick(self, state: WorldState, u: Tensor, due: Tensor) -> WorldState:
-        """Advance the fire by one tick where it is due.
+    def tick(self, state: WorldState, u: Tensor, ticks_now: Tensor) -> WorldState:
+        """Advance the fire by one tick in the worlds that tick now.
 
         Args:
             state: The worlds before the tick.
             u: Uniform draws in [0, 1), float32 [B, H, W].
-            due: Which worlds tick, bool [B].
+            ticks_now: Which worlds tick, bool [B].
 
         Returns:
             The worlds after it, with new ``cells``, ``age``, ``stage_age``, ``burned``, ``wet`` and ``tick``.
@@ -187,7 +187,7 @@ class Fire:
         return law.tick(
             state,
             u,
-            due,
+            ticks_now,
             q=self.ignition_probability(state),
             grow=_of_codes(self.growing(), state.cells),
             regrow=fertile * law.in_finer_time(self.p_regrow, self.ticks_per_stage),

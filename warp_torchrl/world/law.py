@@ -1,9 +1,8 @@
 """The law of the fire: one tick of the automaton, in plain tensor operations on whole maps.
 
-A tick is synchronous: all of it reads the worlds before the tick. B worlds, H rows, W columns. A direction d is that in
-which fire travels, from the source, which burns, to the target, a tree (``geometry.DIRECTIONS``). The source of each
-rule is the report WARP-CA (arXiv 2407.02613) where no other is named. ``warp_torchrl.world.fast`` computes the same
-numbers faster.
+A tick is synchronous: all of it reads the worlds before the tick. B worlds, H rows, W columns. Fire travels in a
+direction d from the source, which burns, to the target, a tree (``geometry.DIRECTIONS``). Rules are of the report
+WARP-CA (arXiv 2407.02613) where no other source is named. ``warp_torchrl.world.fast`` computes the same faster.
 """
 
 import math
@@ -115,8 +114,10 @@ def in_finer_time(probability: float, ticks: int) -> float:
     return probability if ticks == 1 or probability == 1.0 else -math.expm1(math.log1p(-probability) / ticks)
 
 
-def tick(state: WorldState, u: Tensor, due: Tensor, q: Tensor, grow: Tensor, regrow: Tensor, stage: int) -> WorldState:
-    """Return the worlds after one tick where it is due: trees ignite, grow and regrow, fires age and burn out.
+def tick(
+    state: WorldState, u: Tensor, ticks_now: Tensor, q: Tensor, grow: Tensor, regrow: Tensor, stage: int
+) -> WorldState:
+    """Return the worlds after one tick, in those that tick now: trees ignite, grow and regrow, fires age and burn out.
 
     One uniform draw a cell serves all, since the three exclude each other: a tree ignites where u < q, else it grows
     where u >= 1 - (1 - q) p_grow, and empty ground grows a tree of age 1 where u < p_regrow.
@@ -124,13 +125,13 @@ def tick(state: WorldState, u: Tensor, due: Tensor, q: Tensor, grow: Tensor, reg
     Args:
         state: The worlds before the tick.
         u: float32 [B, H, W] in [0, 1).
-        due: Which worlds tick, bool [B].
+        ticks_now: Which worlds tick, bool [B].
         q: Probability to ignite, float32 [B, H, W].
         grow: p_grow of each cell, float32 [B, H, W]; 0 where no tree grows.
         regrow: p_regrow of each cell, float32 [B, H, W]; 0 where nothing grows anew.
         stage: Ticks that a burning stage lasts.
     """
-    here, cells, burning = due[:, None, None], state.cells, is_burning(state.cells)
+    here, cells, burning = ticks_now[:, None, None], state.cells, is_burning(state.cells)
     waited = torch.zeros_like(cells) if state.stage_age is None else state.stage_age
     ignites, grows, regrows = here & (u < q), here & (u >= 1.0 - grow * (1.0 - q)), here & (u < regrow)
     stage_ends = here & burning & (waited + 1 == stage)
@@ -144,5 +145,5 @@ def tick(state: WorldState, u: Tensor, due: Tensor, q: Tensor, grow: Tensor, reg
         stage_age=None if state.stage_age is None else waited.to(torch.uint8),
         burned=state.burned | burns_out,
         wet=torch.where(here & (state.wet > 0), state.wet - 1, state.wet),
-        tick=state.tick + due,
+        tick=state.tick + ticks_now,
     )

@@ -167,7 +167,7 @@ class Team:
         return open_actions
 
     def act(
-        self, state: WorldState, action: Tensor, active: Tensor, last_spreading: int, wet_ticks: int
+        self, state: WorldState, action: Tensor, running: Tensor, last_spreading: int, wet_ticks: int
     ) -> tuple[WorldState, ActionResult]:
         """Let the agents move, then let them put out fire, clear trees, and do what else their roles can.
 
@@ -176,15 +176,15 @@ class Team:
         Args:
             state: The worlds before the step.
             action: int64 [B, A].
-            active: Which worlds go on, bool [B]; elsewhere nothing happens.
+            running: Which worlds go on, bool [B]; elsewhere nothing happens.
             last_spreading: Cell code of the last stage that can be put out.
             wet_ticks: Ticks for which a tree that was put out stays wet.
 
         Returns:
             The worlds after it, and what each action came to.
         """
-        active = active[:, None]
-        state, moved = self._move(state, action, active)
+        running = running[:, None]
+        state, moved = self._move(state, action, running)
         now = self._situation(state, last_spreading, wet_ticks)
         target = now.own_cell
         vehicles, tank = state.vehicles, state.vehicles.tank
@@ -192,7 +192,7 @@ class Team:
         for skill in self.skills:
             if skill.ability.moves:
                 continue
-            wanted = skill.is_chosen(action) & active
+            wanted = skill.is_chosen(action) & running
             possible, deed = skill.act(now, action)
             done = wanted & possible
             if deed.target is not None:
@@ -208,7 +208,7 @@ class Team:
         after = after.replace(
             vehicles=vehicles.replace(
                 tank=self._refill(state, tank),
-                last_action=torch.where(active, action, vehicles.last_action),
+                last_action=torch.where(running, action, vehicles.last_action),
                 acts=vehicles.acts + reduce(or_, chosen),
                 redundant=vehicles.redundant + redundant,
                 last_useful=torch.where(credited, state.step[:, None], vehicles.last_useful),
@@ -224,13 +224,13 @@ class Team:
         mask = skill.ability.mask(now)
         return mask if skill.of_all else mask & now.roles.can[skill.name][:, None]
 
-    def _move(self, state: WorldState, action: Tensor, active: Tensor) -> tuple[WorldState, Tensor]:
+    def _move(self, state: WorldState, action: Tensor, running: Tensor) -> tuple[WorldState, Tensor]:
         """Return the worlds after the moves, and which agents moved, bool [B, A]."""
         now, position, moved = self._situation(state, 0), state.vehicles.position, []
         for skill in self.skills:
             if skill.ability.moves:
                 possible, deed = skill.act(now, action)
-                moved.append(skill.is_chosen(action) & active & possible)
+                moved.append(skill.is_chosen(action) & running & possible)
                 if deed.step is not None:
                     position = position + deed.step * moved[-1][..., None]
         return state.replace(vehicles=state.vehicles.replace(position=position)), reduce(or_, moved)

@@ -140,15 +140,15 @@ class World:
         Returns:
             The transition; ``before`` is ``state`` itself.
         """
-        active = ~state.done
-        after, result = self.team.act(state, action, active, self.fire.last_spreading, self.fire.wet_for)
-        due = active & ((state.step + 1) % self.steps_per_tick == 0)
-        after = self._tick(after, due)
+        running = ~state.done
+        after, result = self.team.act(state, action, running, self.fire.last_spreading, self.fire.wet_for)
+        ticks_now = running & ((state.step + 1) % self.steps_per_tick == 0)
+        after = self._tick(after, ticks_now)
         counts_after = count_trees(after)
         return Transition(
             before=state,
             result=result,
-            after=self._advance_clock(after, counts_after, active),
+            after=self._advance_clock(after, counts_after, running),
             counts_before=count_trees(state) if counts is None else counts,
             counts_after=counts_after,
         )
@@ -163,21 +163,21 @@ class World:
         return road.forecast(self.fire, state)
 
     def action_mask(self, state: WorldState) -> Tensor:
-        """Return which actions would do something, bool [B, A, 10 or 11]."""
+        """Return which actions would do something, bool [B, A, actions]."""
         return self.team.action_mask(state, self.fire.last_spreading)
 
-    def _tick(self, state: WorldState, due: Tensor) -> WorldState:
+    def _tick(self, state: WorldState, ticks_now: Tensor) -> WorldState:
         if self.steps_per_tick == 1:
-            return advance(state, self.fire, self.air, due)
-        return road.advance_rows(state, due, lambda rows, ticks: advance(rows, self.fire, self.air, ticks))
+            return advance(state, self.fire, self.air, ticks_now)
+        return road.advance_rows(state, ticks_now, lambda rows, ticks: advance(rows, self.fire, self.air, ticks))
 
-    def _advance_clock(self, state: WorldState, counts: TreeCounts, active: Tensor) -> WorldState:
-        step = state.step + active
+    def _advance_clock(self, state: WorldState, counts: TreeCounts, running: Tensor) -> WorldState:
+        step = state.step + running
         terminated = (counts.alight == 0) & self.fire.burns_out
         share_burning = counts.burning / counts.initial
         return state.replace(
             step=step,
-            burning_area=state.burning_area + share_burning * active,
+            burning_area=state.burning_area + share_burning * running,
             terminated=state.terminated | terminated,
             truncated=state.truncated | (step >= self.horizon),
         )
@@ -222,12 +222,12 @@ def initial_state(
     )
 
 
-def advance(state: WorldState, fire: Fire, wind: Wind, due: Tensor) -> WorldState:
-    """Advance fire and wind by one tick where it is due, bool [B]."""
-    after = road.fastest(fire, state.cells.device).tick(state, due)
+def advance(state: WorldState, fire: Fire, wind: Wind, ticks_now: Tensor) -> WorldState:
+    """Advance fire and wind by one tick in the worlds that tick now, bool [B]."""
+    after = road.fastest(fire, state.cells.device).tick(state, ticks_now)
     if not wind.changes:
         return after
-    return in_wind(after, fire, torch.where(due[:, None, None, None], wind.after_tick(after), state.wind))
+    return in_wind(after, fire, torch.where(ticks_now[:, None, None, None], wind.after_tick(after), state.wind))
 
 
 def in_wind(state: WorldState, fire: Fire, wind: Tensor) -> WorldState:

@@ -39,10 +39,10 @@ WINDS = {"calm": Calm(), "uniform": Uniform(speed=7.0), "wandering": Wandering()
 def burning(fire: Fire, relief: float, wind: Wind, ticks: int = 15) -> list[WorldState]:
     """Return six worlds as they are before each of some ticks, the third of which waits."""
     world = World(landscape=Perlin(size=(11, 13), relief=relief), fire=fire, wind=wind)
-    states, due = [world.reset(torch.arange(6), torch.zeros(6, dtype=torch.int64))], torch.arange(6) != 2
+    states, ticks_now = [world.reset(torch.arange(6), torch.zeros(6, dtype=torch.int64))], torch.arange(6) != 2
     for _ in range(ticks):
         wet = torch.where(states[-1].cells == 5, 3, states[-1].wet).to(torch.uint8)
-        states.append(advance(states[-1].replace(wet=wet), fire, world.air, due))
+        states.append(advance(states[-1].replace(wet=wet), fire, world.air, ticks_now))
     return states
 
 
@@ -54,14 +54,14 @@ def whole_map(state: WorldState) -> Tensor:
 @pytest.mark.parametrize("relief", [0.0, 300.0], ids=["level", "slopes"])
 @pytest.mark.parametrize("wind", WINDS.values(), ids=WINDS)
 def test_planes_come_to_what_the_page_does(fire: Fire, relief: float, wind: Wind) -> None:
-    lit, due = 0, torch.arange(6) != 4
+    lit, ticks_now = 0, torch.arange(6) != 4
     for state in burning(fire, relief, wind):
         q = fire.ignition_probability(state)
         expected, probability = Planes(fire).forecast(state)
         assert torch.equal(probability, q) and torch.equal(expected, fire.expected_ignitions(state))
-        after = fire.tick(state, whole_map(state), due)
+        after = fire.tick(state, whole_map(state), ticks_now)
         for road in (Page(fire), Planes(fire), fastest(fire, state.cells.device)):
-            assert differing(road.tick(state, due), after) == []
+            assert differing(road.tick(state, ticks_now), after) == []
         lit += int((q > 0.0).sum())
     assert lit > 300
 
@@ -70,13 +70,13 @@ def test_planes_come_to_what_the_page_does(fire: Fire, relief: float, wind: Wind
 @pytest.mark.parametrize("relief", [0.0, 300.0], ids=["level", "slopes"])
 @pytest.mark.parametrize("wind", WINDS.values(), ids=WINDS)
 def test_the_edge_comes_to_what_the_page_does(fire: Fire, relief: float, wind: Wind) -> None:
-    listed, due = 0, torch.arange(6) != 4
+    listed, ticks_now = 0, torch.arange(6) != 4
     for state in burning(fire, relief, wind):
         road, draws = AtEdge(fire), whole_map(state)
         edge = road.edge(state)
         at_trees = uniform_among(state.key, state.tick, Stream.FIRE, edge.world, edge.place)
         assert torch.equal(at_trees, edge.of(draws))
-        assert differing(road.tick(state, due), fire.tick(state, draws, due)) == []
+        assert differing(road.tick(state, ticks_now), fire.tick(state, draws, ticks_now)) == []
         expected, probability = road.forecast(state)
         assert torch.equal(expected, fire.expected_ignitions(state))
         assert torch.equal(probability, fire.ignition_probability(state))

@@ -34,13 +34,13 @@ class AtEdge:
     def __init__(self, fire: Fire) -> None:
         self.fire = fire
 
-    def tick(self, state: WorldState, due: Tensor) -> WorldState:
-        """Return the worlds after one tick of the fire with their own draws, where it is due, bool [B]."""
+    def tick(self, state: WorldState, ticks_now: Tensor) -> WorldState:
+        """Return the worlds after one tick of the fire with their own draws, in the worlds that tick now, bool [B]."""
         trees = self.edge(state)
         u = uniform_among(state.key, state.tick, Stream.FIRE, trees.world, trees.place)
-        ignites = (u < self._probabilities(state, trees).joined()) & due.index_select(0, trees.world)
+        ignites = (u < self._probabilities(state, trees).joined()) & ticks_now.index_select(0, trees.world)
         lit = trees.cell[ignites]
-        after = age_fires(self.fire, state, due)
+        after = age_fires(self.fire, state, ticks_now)
         after.cells = index_put(after.cells, lit, FIRST_FIRE)
         after.age = index_put(after.age, lit, state.cells.flatten().index_select(0, lit))
         if after.stage_age is not None:

@@ -40,8 +40,8 @@ class Planes:
     def __init__(self, fire: Fire) -> None:
         self.fire = fire
 
-    def tick(self, state: WorldState, due: Tensor) -> WorldState:
-        """Return the worlds after one tick of the fire with their own draws, where it is due, bool [B]."""
+    def tick(self, state: WorldState, ticks_now: Tensor) -> WorldState:
+        """Return the worlds after one tick of the fire with their own draws, in the worlds that tick now, bool [B]."""
         fire, cells = self.fire, state.cells
         u = uniform(state.key, state.tick, Stream.FIRE, tuple(cells.shape[1:]))
         q = self.ignition_probability(state)
@@ -53,11 +53,11 @@ class Planes:
             bare = equal(cells, 0) & holds_trees(state.cover) & ~as_mask(byte(state.firebreak))
             regrows = bare & below(u, in_finer_time(fire.p_regrow, fire.ticks_per_stage))
             grows = regrows if grows is None else grows | regrows
-        state, due_cells = age_fires(fire, state, due), byte(due)[:, None, None]
-        ignite = byte(below(u, q)) * due_cells
+        state, ticking = age_fires(fire, state, ticks_now), byte(ticks_now)[:, None, None]
+        ignite = byte(below(u, q)) * ticking
         after = choose(ignite, FIRST_FIRE, state.cells)
         if grows is not None:
-            after += byte(grows) * due_cells
+            after += byte(grows) * ticking
         waited = None if state.stage_age is None else zero_where(ignite, state.stage_age)
         return state.replace(
             cells=to_uint8(after),
@@ -100,13 +100,13 @@ class Planes:
         return in_place(self.fire.law).susceptibility(state.alpha) * number(is_fuel(self.fire, state))
 
 
-def age_fires(fire: Fire, state: WorldState, due: Tensor) -> WorldState:
-    """Return the worlds after a tick, where it is due, that ignites nothing and lets nothing grow.
+def age_fires(fire: Fire, state: WorldState, ticks_now: Tensor) -> WorldState:
+    """Return the worlds after a tick, in those that tick now, that ignites nothing and lets nothing grow.
 
     What it may yet ignite, ``cells``, ``age`` and ``stage_age``, is ``to_int32``.
     """
-    cells, due_cells = to_int32(state.cells), byte(due)[:, None, None]
-    stage_ends, waited = byte(is_burning(cells)) * due_cells, None
+    cells, ticking = to_int32(state.cells), byte(ticks_now)[:, None, None]
+    stage_ends, waited = byte(is_burning(cells)) * ticking, None
     if state.stage_age is not None:
         waited = to_int32(state.stage_age) + stage_ends
         stage_ends = byte(equal(waited, fire.ticks_per_stage))
@@ -118,8 +118,8 @@ def age_fires(fire: Fire, state: WorldState, due: Tensor) -> WorldState:
         age=zero_where(to_ash, state.age),
         stage_age=waited,
         burned=view_as(state.burned, byte(state.burned) | to_ash),
-        wet=to_uint8(to_int32(state.wet) - byte(at_least(state.wet, 1)) * due_cells),
-        tick=state.tick + due,
+        wet=to_uint8(to_int32(state.wet) - byte(at_least(state.wet, 1)) * ticking),
+        tick=state.tick + ticks_now,
     )
 
 

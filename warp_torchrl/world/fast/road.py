@@ -27,8 +27,8 @@ COVERED = (Fire, HazardFire)
 class Road(Protocol):
     """One way to compute the law's page."""
 
-    def tick(self, state: WorldState, due: Tensor) -> WorldState:
-        """Return the worlds after one tick of the fire with their own draws, where it is due, bool [B]."""
+    def tick(self, state: WorldState, ticks_now: Tensor) -> WorldState:
+        """Return the worlds after one tick of the fire with their own draws, in the worlds that tick now, bool [B]."""
         ...
 
     def forecast(self, state: WorldState) -> tuple[Tensor, Tensor]:
@@ -46,9 +46,11 @@ class Page:
     def __init__(self, fire: Fire) -> None:
         self.fire = fire
 
-    def tick(self, state: WorldState, due: Tensor) -> WorldState:
+    def tick(self, state: WorldState, ticks_now: Tensor) -> WorldState:
         """See ``Road``."""
-        return self.fire.tick(state, uniform(state.key, state.tick, Stream.FIRE, tuple(state.cells.shape[1:])), due)
+        return self.fire.tick(
+            state, uniform(state.key, state.tick, Stream.FIRE, tuple(state.cells.shape[1:])), ticks_now
+        )
 
     def forecast(self, state: WorldState) -> tuple[Tensor, Tensor]:
         """See ``Road``."""
@@ -85,20 +87,22 @@ def air(fire: Fire, wind: Tensor, ground: Ground) -> Air:
     return made.replace(table=pattern_table(fire, made.gain))
 
 
-def advance_rows(state: WorldState, due: Tensor, advance: Callable[[WorldState, Tensor], WorldState]) -> WorldState:
-    """Return ``advance(state, due)``, computed for the worlds that are due alone where few are, on a CPU.
+def advance_rows(
+    state: WorldState, ticks_now: Tensor, advance: Callable[[WorldState, Tensor], WorldState]
+) -> WorldState:
+    """Return ``advance(state, ticks_now)``, on a CPU computed for the worlds that tick alone.
 
     Which ones they are is read back from the device.
     """
-    if due.is_cuda or is_compiling():
-        return advance(state, due)
-    index = due.nonzero()[:, 0]
-    if len(index) == len(due):
-        return advance(state, due)
+    if ticks_now.is_cuda or is_compiling():
+        return advance(state, ticks_now)
+    index = ticks_now.nonzero()[:, 0]
+    if len(index) == len(ticks_now):
+        return advance(state, ticks_now)
     if not len(index):
         return state
     rows = state[index]
-    before, after, leaves = rows.leaves(), advance(rows, due[index]).leaves(), state.leaves()
+    before, after, leaves = rows.leaves(), advance(rows, ticks_now[index]).leaves(), state.leaves()
     changed = [name for name, leaf in after.items() if leaf is not before[name]]
     return state.with_leaves({**leaves, **{name: leaves[name].index_copy(0, index, after[name]) for name in changed}})
 
