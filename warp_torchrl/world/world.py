@@ -163,7 +163,7 @@ class World:
         return road.forecast(self.fire, state)
 
     def action_mask(self, state: WorldState) -> Tensor:
-        """Return which actions would do something, bool [B, A, 10 or 11]."""
+        """Return which actions would do something, bool [B, A, actions]."""
         return self.team.action_mask(state, self.fire.last_spreading)
 
     def _tick(self, state: WorldState, due: Tensor) -> WorldState:
