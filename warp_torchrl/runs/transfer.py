@@ -3,7 +3,9 @@
 from torch import Tensor
 from torchrl.objectives import LossModule
 
+from warp_torchrl.config.compose import plain, recompose
 from warp_torchrl.config.settings import Settings
+from warp_torchrl.models import Mlp
 from warp_torchrl.runs import former
 from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError
 
@@ -16,10 +18,10 @@ def check_start(settings: Settings, found: Checkpoint) -> None:
     """
     found.check_goes_on()
     batch = settings.collector.steps * settings.n_worlds
-    learnt(found, settings.algorithm.build(settings.make_env(1, 0), settings.model, batch).loss)
+    learnt(found, settings.algorithm.build(settings.make_env(1, 0), settings.model, batch).loss, settings.model)
 
 
-def learnt(found: Checkpoint, loss: LossModule) -> dict[str, Tensor]:
+def learnt(found: Checkpoint, loss: LossModule, model: Mlp) -> dict[str, Tensor]:
     """Return what a checkpoint's loss has learnt, the state of networks and of value normalisation, by name.
 
     Raises:
@@ -30,7 +32,9 @@ def learnt(found: Checkpoint, loss: LossModule) -> dict[str, Tensor]:
         {name: each for name, each in state.items() if _is_learnt(name)}
         for state in (now, former.parameters(found.training()["loss"], now))
     )
-    if {name: each.shape for name, each in own.items()} != {name: each.shape for name, each in given.items()}:
+    symmetry = plain(recompose(found.record()))["model"]["symmetry"]  # networks of all have the same parameters
+    shapes, others = ({name: each.shape for name, each in state.items()} for state in (own, given))
+    if shapes != others or symmetry != model.symmetry:
         raise CheckpointError(f"{found.path} was trained by another algorithm or other networks")
     return given
 

@@ -242,7 +242,7 @@ class Training:
             CheckpointError: If it trained by another kind of loss or other networks.
         """
         loss = self.learner.loss
-        loss.load_state_dict({**loss.state_dict(), **learnt(found, loss)})
+        loss.load_state_dict({**loss.state_dict(), **learnt(found, loss, self.settings.model)})
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything that a run needs to go on exactly as if never stopped."""
