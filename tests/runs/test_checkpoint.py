@@ -14,6 +14,7 @@ from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.models import Entry, Signature
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.checkpoint import CheckpointError, RunFolderInUse, RunFolderLock, newest
+from warp_torchrl.symmetry import Planes, to_plain
 
 ACTIONS = tuple(f"action_{code}" for code in range(11))
 SIGNATURE = Signature({"view": Entry((3, 5, 5), "uint8")}, Entry((9, 16, 16), "float32"), 2, ACTIONS, ("ugv", "uav"))
@@ -176,6 +177,19 @@ FORGED = [
     {"format": None},
     {"format": [2]},
 ]
+
+
+@pytest.mark.parametrize("symmetry", [to_plain(Planes(4)), {"kind": "Planes"}, {"kind": "Sphere"}, 7], ids=str)
+def test_a_forged_symmetry_is_refused_in_one_line(tmp_path, symmetry):
+    folder = saved(tmp_path, 1)
+    signature = json.loads((folder / "manifest.json").read_text())["signature"]
+    signature["observation"]["view"]["symmetry"] = to_plain(Planes(3))
+    forge(folder, signature=signature)
+    assert newest(tmp_path)[0].manifest.signature.observation["view"].symmetry == Planes(3)
+    signature["observation"]["view"]["symmetry"] = symmetry
+    forge(folder, signature=signature)
+    with pytest.raises(CheckpointError, match="is not a manifest of format 2$"):
+        newest(tmp_path)
 
 
 @pytest.mark.parametrize("changes", FORGED, ids=str)

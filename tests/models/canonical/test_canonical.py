@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 import torch
 from tensordict import TensorDict
+from torchrl.data import LazyTensorStorage, TensorDictReplayBuffer
 from torchrl.envs import CatFrames, TransformedEnv
 
 from tests.conftest import small_world
@@ -13,6 +14,7 @@ from tests.observation.test_observation import drawn
 from warp_torchrl.algorithms.ddpg import Ddpg
 from warp_torchrl.algorithms.dqn import Dqn
 from warp_torchrl.algorithms.ppo import Ppo
+from warp_torchrl.algorithms.replay import ReplayMemory
 from warp_torchrl.algorithms.sac import Sac
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
@@ -32,8 +34,17 @@ from warp_torchrl.models import (
     over_canonical,
     signature,
 )
-from warp_torchrl.models.canonical import Canonicalise, Orientation, canonical_state, orientation_of, turned
+from warp_torchrl.models.canonical import (
+    CanonicalBatch,
+    Canonicalise,
+    Orientation,
+    canonical_state,
+    orientation_of,
+    turned,
+)
+from warp_torchrl.models.fitting import fitted
 from warp_torchrl.observation import DEFAULT, SELF_SIZE, STATE_SYMMETRY, Local, Paper, Surroundings
+from warp_torchrl.policy import TrainedPolicy
 from warp_torchrl.symmetry import Part, Planes, Target, Vector
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.geometry import DIRECTIONS
@@ -285,6 +296,46 @@ def test_a_replay_memory_keeps_canonical_entries_in_place_of_the_others(learner)
         keys = part.keys(True, True)
         assert ORIENTATION in keys and ("agents", "canonical_view") in keys
         assert "state" not in keys and not any(key[:2] == OBSERVATION for key in keys)
+
+
+def test_transitions_of_former_runs_are_kept_as_those_of_now():
+    """They were kept as they were observed."""
+    env = fighting(PRESETS["whole map"])
+    learner = Dqn(mixer="qmix", warm_up=0, minibatch_size=8, capacity=64).build(env, Mlp(), 24)
+    with torch.no_grad():
+        batch = env.rollout(4, learner.explore, break_when_any_done=False)
+    learner.store(batch.clone())
+    kept, former = learner.keeps["replay"].buffer[:], learner.keeps["replay"].buffer[:].clone()
+    for part, seen in ((former, batch.reshape(-1)), (former["next"], batch["next"].reshape(-1))):
+        for name in ("view", "self", "picture"):
+            part.set((*OBSERVATION, name), seen[(*OBSERVATION, name)])
+            del part["agents", f"canonical_{name}"]
+        part.set("state", seen["state"])
+        del part["canonical_state"], part[ORIENTATION]
+    buffer = TensorDictReplayBuffer(storage=LazyTensorStorage(64), batch_size=8)
+    buffer.extend(former)
+    learner.keeps["replay"].load_state_dict(ReplayMemory(buffer, CanonicalBatch(None)).state_dict())
+    found = learner.keeps["replay"].buffer[:]
+    for key in kept.keys(True, True):
+        if key != "index":
+            assert torch.equal(found[key], kept[key]), key
+
+
+def test_a_policy_that_is_handed_out_writes_no_canonical_entries():
+    env = fighting(PRESETS["whole map"], steps=0)
+    shape = signature(env)
+    policy = TrainedPolicy(Ppo().policy(shape, Mlp()), "sampled", shape)
+    written = policy(env.reset()).keys(True, True)
+    assert {ACTION, LOGITS} <= set(written) and not {ORIENTATION, ("agents", "canonical_view")} & set(written)
+    assert set(policy.out_keys) <= set(written)
+
+
+def test_a_policy_plays_where_entries_say_more_of_how_they_turn_than_they_did():
+    env = fighting(PRESETS["whole map"], steps=0)
+    here = signature(env)
+    silent = here._replace(observation={name: each._replace(symmetry=None) for name, each in here.observation.items()})
+    module = Ppo().policy(silent, Mlp(symmetry="none"))
+    assert fitted(module, silent, here, fallback=8)(env.reset())[ACTION].shape == (6, 3)
 
 
 def test_the_modules_that_learn_are_those_that_act():

@@ -1,0 +1,59 @@
+"""What observations declare of their entries is plain data that a manifest keeps."""
+
+import json
+
+import pytest
+
+from tests.conftest import small_world
+from warp_torchrl.observation import STATE, STATE_SIDE, STATE_SYMMETRY, Local, Paper, Surroundings, former_symmetry
+from warp_torchrl.symmetry import Part, Planes, Target, TeamPlanes, Vector, from_plain, to_plain
+
+PRESETS = [Surroundings(), Surroundings(centred=True, identity=True), Local(channels=("age", "threat")), Paper()]
+SPACES = [(name, space) for preset in PRESETS for name, space in preset.spaces(small_world()).items()]
+
+
+@pytest.mark.parametrize("symmetry", [*(space.symmetry for _, space in SPACES), STATE_SYMMETRY], ids=repr)
+def test_what_is_declared_is_read_back_from_json(symmetry):
+    assert from_plain(json.loads(json.dumps(to_plain(symmetry)))) == symmetry
+
+
+@pytest.mark.parametrize("plain", [{"kind": "Sphere"}, {"kind": "Planes"}, {}], ids=repr)
+def test_what_is_no_symmetry_is_refused(plain):
+    with pytest.raises((ValueError, KeyError)):
+        from_plain(plain)
+
+
+@pytest.mark.parametrize(("name", "space"), SPACES)
+def test_entries_of_presets_in_manifests_that_do_not_tell_turn_as_they_do_now(name, space):
+    assert former_symmetry(name, space.shape, space.names) == space.symmetry
+    assert former_symmetry("mine", space.shape, space.names) is None
+    assert former_symmetry(name, (*space.shape, 2), space.names) is None
+
+
+@pytest.mark.parametrize(
+    ("symmetry", "shape", "fits"),
+    [
+        (Planes(3), (3, 5, 5), True),
+        (Planes(3), (3, 5, 4), False),
+        (Planes(3), (12, 5, 5), False),
+        (Planes(3), (75,), False),
+        (Planes(3, is_flat=True), (75,), True),
+        (Planes(3, Target(3)), (3, 5, 5), False),
+        (Vector((Part("place", ("row", "column")), Part("scalar", ("tank",)))), (3,), True),
+        (Vector((Part("place", ("row", "column")), Part("scalar", ("tank",)))), (4,), False),
+        (Vector((Part("vector", ("east", "north", "up")),)), (3,), False),
+        (Vector((Part("spin", ("up",)),)), (1,), False),
+        (STATE_SYMMETRY, (len(STATE), STATE_SIDE, STATE_SIDE), True),
+        (TeamPlanes(8, 7, (4, 2)), (8, 16, 16), False),
+        (TeamPlanes(8, 0, (7, 2)), (8, 16, 16), False),
+        (TeamPlanes(8, 0, (4, 2)), (8, 15, 15), False),
+    ],
+    ids=repr,
+)
+def test_a_symmetry_fits_entries_of_its_shape(symmetry, shape, fits):
+    assert symmetry.fits(shape) is fits
+
+
+def test_the_place_of_an_agent_is_found_among_the_parts():
+    parts = (Part("scalar", ("a", "b")), Part("place", ("row", "column")), Part("scalar", ("c",)))
+    assert Vector(parts).place() == slice(2, 4) and Vector(parts[:1]).place() is None
