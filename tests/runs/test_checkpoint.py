@@ -188,7 +188,7 @@ def test_a_forged_symmetry_is_refused_in_one_line(tmp_path, symmetry):
     assert newest(tmp_path)[0].manifest.signature.observation["view"].symmetry == Planes(3)
     signature["observation"]["view"]["symmetry"] = symmetry
     forge(folder, signature=signature)
-    with pytest.raises(CheckpointError, match="is not a manifest of format 2$"):
+    with pytest.raises(CheckpointError, match=r"is not a manifest of format 2$"):
         newest(tmp_path)
 
 
