@@ -15,8 +15,8 @@ def check_start(run_config: RunConfig, found: Checkpoint) -> None:
         CheckpointError: If the checkpoint is an exported policy, or has another kind of loss or other networks.
     """
     found.check_goes_on()
-    symmetry = getattr(run_config.model, "symmetry", None)  # networks of either have the same names and shapes
-    if found.record().values.get("model", {}).get("symmetry", symmetry) != symmetry:
+    symmetry = getattr(run_config.model, "symmetry", "none")  # networks of either have the same names and shapes
+    if found.record().values.get("model", {}).get("symmetry", "none") != symmetry:
         raise CheckpointError(f"{found.path} was trained by another algorithm or other networks")
     batch = run_config.collector.steps * run_config.n_worlds
     learned_parameters(found, run_config.algorithm.build(run_config.make_env(1, 0), run_config.model, batch).loss)

@@ -301,7 +301,9 @@ def test_a_replay_memory_keeps_canonical_entries_in_place_of_the_others(learner)
 def test_transitions_of_former_runs_are_kept_as_those_of_now():
     """They were kept as they were observed."""
     env = fighting(PRESETS["whole map"])
-    learner = Dqn(mixer="qmix", warm_up=0, minibatch_size=8, capacity=64).build(env, Mlp(), 24)
+    learner, fresh = (
+        Dqn(mixer="qmix", warm_up=0, minibatch_size=8, capacity=64).build(env, Mlp(), 24) for _ in range(2)
+    )
     with torch.no_grad():
         batch = env.rollout(4, learner.explore, break_when_any_done=False)
     learner.store(batch.clone())
@@ -314,8 +316,8 @@ def test_transitions_of_former_runs_are_kept_as_those_of_now():
         del part["canonical_state"], part[ORIENTATION]
     buffer = TensorDictReplayBuffer(storage=LazyTensorStorage(64), batch_size=8)
     buffer.extend(former)
-    learner.keeps["replay"].load_state_dict(ReplayMemory(buffer, CanonicalBatch(None)).state_dict())
-    found = learner.keeps["replay"].buffer[:]
+    fresh.keeps["replay"].load_state_dict(ReplayMemory(buffer, CanonicalBatch(None)).state_dict())
+    found = fresh.keeps["replay"].buffer[:]
     for key in kept.keys(True, True):
         if key != "index":
             assert torch.equal(found[key], kept[key]), key
