@@ -81,8 +81,7 @@ class WildfireEnv(EnvBase):
         self.state_symmetry = state_symmetry(self.world.team)
         self.group_map = {"agents": list(names)}
         self.role_map = {role: [n for n, r in zip(names, roles) if r == role] for role in ROLES if role in roles}
-        self._state: WorldState | None = None
-        self._counts: TreeCounts | None = None  # of the state's trees
+        self._worlds: tuple[WorldState, TreeCounts] | None = None  # and the counts of their trees
         self._resets = ResetCache(self._start)
         self.watcher: Callable[[Transition], None] | None = None
         """Called with the transition of every step, to measure behaviour."""
@@ -119,9 +118,7 @@ class WildfireEnv(EnvBase):
         Raises:
             RuntimeError: Before the first reset.
         """
-        if self._state is None:
-            raise RuntimeError("the environment has no state yet: call reset() first")
-        return self._state
+        return self._current()[0]
 
     @property
     def tree_counts(self) -> TreeCounts:
@@ -130,9 +127,12 @@ class WildfireEnv(EnvBase):
         Raises:
             RuntimeError: Before the first reset.
         """
-        if self._counts is None:
+        return self._current()[1]
+
+    def _current(self) -> tuple[WorldState, TreeCounts]:
+        if self._worlds is None:
             raise RuntimeError("the environment has no state yet: call reset() first")
-        return self._counts
+        return self._worlds
 
     def render(self, scale: int = 12) -> Tensor:
         """Draw the worlds, uint8 [B, H * scale, W * scale, 3]."""
@@ -172,7 +172,7 @@ class WildfireEnv(EnvBase):
 
     def state_dict(self, *args: object, **kwargs: object) -> OrderedDict[str, Any]:
         """Return the environment's state: seeds, episodes, worlds and returns."""
-        worlds = {} if self._state is None else self._state.what_changes()
+        worlds = {} if self._worlds is None else self.world_state.what_changes()
         return OrderedDict(  # as a module's is: TorchRL's EnvCreator looks into these alone
             seeds=self.seeds.clone(),
             episodes=self._episodes.clone(),
@@ -212,7 +212,7 @@ class WildfireEnv(EnvBase):
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
         mask = None if tensordict is None else tensordict.get("_reset", None)
-        if mask is None or self._state is None or mask.all():
+        if mask is None or self._worlds is None or mask.all():
             self._resets.clear()
             self._enter(self.world.reset(self.seeds, self._episodes))
             self._episodes = self._episodes + 1
@@ -258,7 +258,7 @@ class WildfireEnv(EnvBase):
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         action = self._checked(tensordict.get(("agents", "action"), None))
         transition, observed, reward = self._scene.step(self.world_state, self.tree_counts, action)
-        self._state, self._counts = transition.after, transition.counts_after
+        self._worlds = transition.after, transition.counts_after
         self._episode_reward = self._episode_reward + reward.mean(1)[:, 0]
         out = self._pack(transition.after, observed, self._episode_reward)
         if self.watcher is not None:
@@ -294,8 +294,8 @@ class WildfireEnv(EnvBase):
         return action
 
     def _enter(self, state: WorldState | None) -> None:
-        """Go on from some worlds."""
-        self._state, self._counts = state, None if state is None else count_trees(state)
+        """Replace the worlds and count their trees."""
+        self._worlds = None if state is None else (state, count_trees(state))
 
     def _observe(self) -> TensorDict:
         """Return observations, mask, central state, flags and metrics of the worlds."""
