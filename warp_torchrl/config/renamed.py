@@ -32,8 +32,8 @@ def renamed_values(values: Mapping[str, Any]) -> dict[str, Any]:
     for old, (new, changed) in RENAMED.items():
         group, _, key = old.partition(".")
         if isinstance(now.get(group), Mapping) and key in now[group]:
-            now[group] = {
-                new.partition(".")[2] if name == key else name: changed.get(value, value) if name == key else value
-                for name, value in now[group].items()
-            }
+            renamed = {key: new.partition(".")[2]}
+            now[group] = {renamed.get(name, name): value for name, value in now[group].items()}
+            value = now[group][renamed[key]]
+            now[group][renamed[key]] = changed.get(value, value)
     return now
