@@ -1,0 +1,16 @@
+"""What every model of fire spread tells of a fire's head."""
+
+from dataclasses import dataclass
+
+from torch import Tensor
+
+
+@dataclass(frozen=True)
+class Spread:
+    """The head of a fire that spreads freely; all fields float32 of one shape."""
+
+    head: Tensor  # rate of spread of the head [m/min]
+    direction: Tensor  # where the head goes, degrees clockwise from grid north, 0..360
+    length_to_breadth: Tensor  # of the ellipse that the fire grows into, 1 or more
+    intensity: Tensor  # fireline intensity at the head (Byram 1959) [kW/m]
+    flame_length: Tensor  # at the head [m]
