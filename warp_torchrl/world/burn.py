@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.batch import Batch
-from warp_torchrl.world.fire import Fire
+from warp_torchrl.world.automaton import Automaton
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.state import Landscape, WorldState, is_burning
 from warp_torchrl.world.team import Team
@@ -47,7 +47,7 @@ def start_burning(
     elevation: Tensor | None,
     *,
     wind: Wind,
-    fire: Fire,
+    fire: Automaton,
     first_tick: int,
     stage_age: Tensor | None,
     seed: int,
@@ -62,16 +62,17 @@ def start_burning(
     ground = Landscape(cover=cover, age=cells, elevation=elevation)
     nobody = Team(n_agents=1).place(key, cover, is_burning(cells))
     air = wind(key, (cells.shape[1], cells.shape[2]))
-    state = initial_state(ground, fire, air, key, nobody, cell_size)
+    state = initial_state(ground, fire, air, key, nobody, cell_size, wind.moisture(torch.zeros_like(key)))
+    state = fire.started(state)
     if state.stage_age is not None and stage_age is not None:
         state = state.replace(stage_age=stage_age)
     for tick in range(1, first_tick + 1 if wind.changes else 1):
         state = state.replace(tick=torch.full_like(state.tick, tick))
-        state = in_wind(state, fire, wind.after_tick(state))
+        state = in_wind(state, fire, wind.after_tick(state), wind.moisture(state.tick))
     return state.replace(tick=torch.full_like(state.tick, first_tick))
 
 
-def burn(state: WorldState, fire: Fire, wind: Wind, ticks: int) -> WorldState:
+def burn(state: WorldState, fire: Automaton, wind: Wind, ticks: int) -> WorldState:
     """Return the worlds after so many ticks."""
     everywhere = torch.ones_like(state.terminated)
     for _ in range(ticks):
@@ -79,7 +80,7 @@ def burn(state: WorldState, fire: Fire, wind: Wind, ticks: int) -> WorldState:
     return state
 
 
-def trace(state: WorldState, fire: Fire, wind: Wind, ticks: int, cell_size: float) -> FireHistory:
+def trace(state: WorldState, fire: Automaton, wind: Wind, ticks: int, cell_size: float) -> FireHistory:
     """Burn for so many ticks and keep when each cell caught fire."""
     burning = is_burning(state.cells)
     arrival = torch.where(burning, 0, -1).to(torch.int32)

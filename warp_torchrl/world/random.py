@@ -32,6 +32,7 @@ class Stream(IntEnum):
     POLICY = 10
     GUST = 11
     TERRAIN = 12
+    PACE = 13
 
 
 def world_key(seed: Tensor, episode: Tensor | int = 0) -> Tensor:

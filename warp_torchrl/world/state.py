@@ -94,11 +94,13 @@ class Vehicles(Batch):
 
 @dataclass(eq=False, repr=False)
 class Ground(Batch):
-    """A landscape and all that follows from it for the fire; ``Fire.ground`` makes it."""
+    """A landscape and all that follows from it for the fire; ``Automaton.ground`` makes it."""
 
     landscape: Landscape
     alpha: Tensor  # float32 [B,H,W], flammability
     slope: Tensor | None  # float32 [B,8,H+2,W+1], s_d into a cell, a margin about the map; None where flat
+    pace: Tensor | None = None  # float32 [B,H,W], factor on the times of law ``rate``; None elsewhere
+    cell_size: float = 30.0  # side of a cell [m]
 
     @property
     def slope_into_cell(self) -> Tensor | None:
@@ -113,6 +115,16 @@ class Air(Batch):
     wind: Tensor  # float32 [B,2,1,1] or [B,2,H,W], (u east, v north) of the air's motion [m/s]
     gain: Tensor | None  # float32 [B,8,1,1], w_d / distance_d; None where the wind differs by cell
     table: Tensor | None = None  # float32 [B,G,256], see ``world.fast.table``; None where no road asks for one
+    moisture: Tensor | None = None  # float32 [B,7] [%], see ``Wind.moisture``; None where the fire's own holds
+    travel: Tensor | None = None  # float32 [B,3,H,W], see ``travel.travel``; None but under law ``rate``
+
+
+@dataclass(eq=False, repr=False)
+class Arrivals(Batch):
+    """When the fire reaches each cell at the present rates of spread, and where it comes from; of law ``rate``."""
+
+    minutes: Tensor  # float32 [B,H,W], since ignition; of cells that burn and their neighbours, else ``travel.NEVER``
+    origin: Tensor  # int32 [B,H,W], flat index of the cell that it came from on a straight way, or -1
 
 
 @dataclass(eq=False, repr=False)
@@ -155,6 +167,7 @@ class WorldState(Batch):
     burning_area: Tensor  # float32 [B], sum over steps of burning initial trees / N0, the area under the fire's curve
     terminated: Tensor  # bool [B], no cell burns any more
     truncated: Tensor  # bool [B], the horizon was reached
+    arrivals: Arrivals | None = None  # None but under law ``rate``
 
     def what_changes(self) -> dict[str, Tensor]:
         """Return all tensors by name but those that follow from others, of which they can be made again."""
@@ -186,7 +199,7 @@ class WorldState(Batch):
         return self.terminated | self.truncated
 
 
-_FOLLOWS = ("ground.alpha", "ground.slope", "air.gain", "air.table")
+_FOLLOWS = ("ground.alpha", "ground.slope", "ground.pace", "air.gain", "air.table", "air.travel")
 
 
 @dataclass(eq=False, repr=False)

@@ -41,6 +41,14 @@ class Wind(ABC):
         """Return the field of each world after its tick number ``state.tick``, shape of ``state.wind`` [m/s]."""
         return state.wind
 
+    def moisture(self, tick: Tensor) -> Tensor | None:
+        """Return the moisture of dead and live fuel after tick number ``tick``, int [B], or None where it says none.
+
+        Returns:
+            float32 [B, 7] [%]: dead fuel of 1, 10 and 100 hours, live herbaceous and woody; FFMC and BUI, which are codes.
+        """
+        return None
+
     def over(self, landscape: LandscapeSource) -> "Wind":
         """Return the wind on a landscape's map.
 

@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
+from warp_torchrl.world.automaton import Automaton
 from warp_torchrl.world.batch import concatenated
 from warp_torchrl.world.fast import road
 from warp_torchrl.world.fire import Fire
@@ -53,7 +54,7 @@ class World:
 
     landscape: LandscapeSource = field(default_factory=Perlin)
     wind: Wind = field(default_factory=Uniform)
-    fire: Fire = field(default_factory=Fire)
+    fire: Automaton = field(default_factory=Fire)
     team: Team = field(default_factory=Team)
     ignition: Ignition = field(default_factory=Ignition)
     steps_per_tick: int = 5
@@ -63,7 +64,8 @@ class World:
     def __post_init__(self) -> None:
         check_fields(self, steps_per_tick=(1, 1000), horizon=(1, 1_000_000), cell_size=(0.01, 100_000.0))
         height, width = self.size
-        _ = self.air  # refuses a wind that does not fit the landscape
+        air = self.air  # refuses a wind that does not fit the landscape
+        object.__setattr__(self, "fire", self.fire.over(self.landscape, air, self.side_of_cell))
         if self.team.n_agents > height * width // 4:
             raise ValueError(
                 f"team.n_agents must be at most a quarter of the map's {height * width} cells, got {self.team.n_agents}"
@@ -109,7 +111,7 @@ class World:
     def _start(self, seed: Tensor, episode: Tensor) -> WorldState:
         key = world_key(seed, episode)
         ground = self.landscape(key)
-        fuel = (ground.age >= self.fire.youngest_fuel) & (self.fire.flammability(ground.cover) > 0.0)
+        fuel = (ground.age >= self.fire.youngest_fuel) & (self.fire.flammability(ground) > 0.0)
         lit = self.ignition(key, fuel)
         if not lit.flatten(1).any(dim=1).all():
             raise ValueError("landscape: a map has no tree that can burn, so there is no fire to start")
@@ -118,10 +120,17 @@ class World:
         if (ground.cover.flatten(1).gather(1, index) == int(Cover.LAKE)).any():
             raise ValueError(f"team.n_agents must fit on a map's dry ground, got {self.team.n_agents}")
         state = initial_state(
-            ground, self.fire, self.air(key, self.size, ground.corner), key, vehicles, self.side_of_cell
+            ground,
+            self.fire,
+            self.air(key, self.size, ground.corner),
+            key,
+            vehicles,
+            self.side_of_cell,
+            self.air.moisture(torch.zeros_like(key)),
         )
         cells = state.cells
         state = state.replace(cells=torch.where(lit, FIRST_FIRE, cells), age=torch.where(lit, cells, state.age))
+        state = self.fire.started(state)
         for _ in range(self.ignition.head_start):
             spreads = (state.cells >= FIRST_FIRE) & (state.cells < EMBER)
             state = self._tick(state, spreads.flatten(1).any(dim=1))
@@ -155,8 +164,8 @@ class World:
 
     def restored(self, state: WorldState) -> WorldState:
         """Return worlds with what follows from their landscape and wind made anew."""
-        ground = self.fire.ground(state.landscape, self.side_of_cell)
-        return state.replace(ground=ground, air=road.air(self.fire, state.wind, ground))
+        ground = self.fire.ground(state.landscape, self.side_of_cell, state.key)
+        return state.replace(ground=ground, air=road.air(self.fire, state.wind, state.air.moisture, ground))
 
     def forecast(self, state: WorldState) -> Forecast:
         """Return what the fire is about to do."""
@@ -184,7 +193,13 @@ class World:
 
 
 def initial_state(
-    ground: Landscape, fire: Fire, wind: Tensor, key: Tensor, vehicles: Vehicles, cell_size: float
+    ground: Landscape,
+    fire: Automaton,
+    wind: Tensor,
+    key: Tensor,
+    vehicles: Vehicles,
+    cell_size: float,
+    moisture: Tensor | None = None,
 ) -> WorldState:
     """Return worlds at step 0 in which nothing burns yet.
 
@@ -195,15 +210,16 @@ def initial_state(
         key: World keys, int64 [B].
         vehicles: The team.
         cell_size: Side of a cell [m].
+        moisture: Of ``Wind.moisture``.
     """
     cells = ground.age
     none = torch.zeros_like(cells)
     no = torch.zeros_like(cells, dtype=torch.bool)
     zero = torch.zeros_like(key, dtype=torch.int32)
-    made = fire.ground(ground, cell_size)
+    made = fire.ground(ground, cell_size, key)
     return WorldState(
         ground=made,
-        air=road.air(fire, wind, made),
+        air=road.air(fire, wind, moisture, made),
         cells=cells.clone(),
         age=none,
         stage_age=none.clone() if fire.ticks_per_stage > 1 else None,
@@ -222,14 +238,15 @@ def initial_state(
     )
 
 
-def advance(state: WorldState, fire: Fire, wind: Wind, ticks_now: Tensor) -> WorldState:
+def advance(state: WorldState, fire: Automaton, wind: Wind, ticks_now: Tensor) -> WorldState:
     """Advance fire and wind by one tick in the worlds that tick now, bool [B]."""
     after = road.fastest(fire, state.cells.device).tick(state, ticks_now)
     if not wind.changes:
         return after
-    return in_wind(after, fire, torch.where(ticks_now[:, None, None, None], wind.after_tick(after), state.wind))
+    now = torch.where(ticks_now[:, None, None, None], wind.after_tick(after), state.wind)
+    return in_wind(after, fire, now, wind.moisture(after.tick))
 
 
-def in_wind(state: WorldState, fire: Fire, wind: Tensor) -> WorldState:
-    """Return worlds in another wind, float32 [B, 2, 1, 1] or [B, 2, H, W] [m/s]."""
-    return state.replace(air=road.air(fire, wind, state.ground))
+def in_wind(state: WorldState, fire: Automaton, wind: Tensor, moisture: Tensor | None = None) -> WorldState:
+    """Return worlds in another wind, float32 [B, 2, 1, 1] or [B, 2, H, W] [m/s], and moisture; None keeps theirs."""
+    return road.in_wind(fire, state, wind, state.air.moisture if moisture is None else moisture)

@@ -115,7 +115,7 @@ def turned_world(state, turn):
     wind = torch.stack((south_east[..., 1], -south_east[..., 0]), dim=1)
     cover = state.landscape.replace(cover=turned_map(state.cover, *turn), age=turned_map(state.landscape.age, *turn))
     fire = Fire()
-    return in_wind(state.replace(vehicles=vehicles, ground=fire.ground(cover, 30.0), **leaves), fire, wind)
+    return in_wind(state.replace(vehicles=vehicles, ground=fire.ground(cover, 30.0, state.key), **leaves), fire, wind)
 
 
 def symmetries(preset):

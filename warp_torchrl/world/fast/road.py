@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 from torch.compiler import is_compiling
 
+from warp_torchrl.world.automaton import Automaton
 from warp_torchrl.world.fast.bytes import number
 from warp_torchrl.world.fast.edge import AtEdge
 from warp_torchrl.world.fast.planes import Planes
@@ -43,7 +44,7 @@ class Page:
         fire: The automaton.
     """
 
-    def __init__(self, fire: Fire) -> None:
+    def __init__(self, fire: Automaton) -> None:
         self.fire = fire
 
     def tick(self, state: WorldState, ticks_now: Tensor) -> WorldState:
@@ -57,19 +58,19 @@ class Page:
         return self.fire.expected_ignitions(state), self.fire.ignition_probability(state)
 
 
-def fastest(fire: Fire, device: torch.device) -> Road:
+def fastest(fire: Automaton, device: torch.device) -> Road:
     """Return the fastest road of an automaton on a device.
 
     A CPU computes a tick at the fire's edge alone where trees neither grow nor ignite by themselves, unless whole maps
     are compiled.
     """
-    if type(fire) not in COVERED:
+    if not isinstance(fire, Fire) or type(fire) not in COVERED:
         return Page(fire)
     spreads_alone = not fire.growth and fire.beta == 0.0 and fire.p_regrow == 0.0
     return AtEdge(fire) if spreads_alone and device.type == "cpu" and not is_compiling() else Planes(fire)
 
 
-def forecast(fire: Fire, state: WorldState) -> Forecast:
+def forecast(fire: Automaton, state: WorldState) -> Forecast:
     """Return what the fire is about to do."""
     expected, probability = fastest(fire, state.cells.device).forecast(state)
     return Forecast(
@@ -79,12 +80,38 @@ def forecast(fire: Fire, state: WorldState) -> Forecast:
     )
 
 
-def air(fire: Fire, wind: Tensor, ground: Ground) -> Air:
-    """Return a wind with all that follows from it on some ground, float32 [B, 2, 1, 1] or [B, 2, H, W] [m/s]."""
-    made = fire.air(wind)
-    if made.gain is None or ground.slope is not None or type(fire) not in COVERED:
+def air(fire: Automaton, wind: Tensor, moisture: Tensor | None, ground: Ground) -> Air:
+    """Return a wind with all that follows from it on some ground; the arguments are those of ``Automaton.air``."""
+    made = fire.air(wind, moisture, ground)
+    if not isinstance(fire, Fire) or made.gain is None or ground.slope is not None or type(fire) not in COVERED:
         return made
     return made.replace(table=pattern_table(fire, made.gain))
+
+
+def in_wind(fire: Automaton, state: WorldState, wind: Tensor, moisture: Tensor | None) -> WorldState:
+    """Return worlds in another wind and moisture; the arguments are those of ``Automaton.air``.
+
+    Under law ``rate``, whose air is dear, a CPU makes that of the worlds alone where it differs.
+    """
+    old = state.air
+    if old.travel is None or wind.is_cuda or is_compiling():
+        return fire.in_air(state, air(fire, wind, moisture, state.ground))
+    differs = (wind != old.wind).flatten(1).any(dim=1)
+    if moisture is not None and old.moisture is not None:
+        differs |= (moisture != old.moisture).any(dim=1)
+    index = differs.nonzero()[:, 0]
+    if not len(index):
+        return state
+    rows = state[index]
+    damp = None if moisture is None else moisture[index]
+    changed = fire.in_air(rows, air(fire, wind[index], damp, rows.ground)).leaves()
+    leaves = state.leaves()
+    put = {name: leaves[name].index_copy(0, index, leaf) for name, leaf in changed.items() if _follows_air(name)}
+    return state.with_leaves({**leaves, **put})
+
+
+def _follows_air(name: str) -> bool:
+    return name.startswith(("air.", "arrivals."))
 
 
 def advance_rows(

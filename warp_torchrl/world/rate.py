@@ -1,0 +1,300 @@
+"""The automaton in metres and minutes: fires that spread at the rates of a fuel model."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Literal, Self
+
+import torch
+from torch import Tensor
+from torch.nn.functional import pad
+
+from warp_torchrl.validation import check_fields
+from warp_torchrl.world.automaton import Automaton
+from warp_torchrl.world.fuel_bed import COVER_FUEL, FuelBed, moisture_row
+from warp_torchrl.world.geometry import DIRECTIONS, grow, neighbour_in
+from warp_torchrl.world.random import Stream, uniform
+from warp_torchrl.world.state import (
+    FIRST_FIRE,
+    Air,
+    Arrivals,
+    Ground,
+    Landscape,
+    WorldState,
+    is_burning,
+    is_tree,
+)
+from warp_torchrl.world.terrain.landscape import LandscapeSource
+from warp_torchrl.world.travel import NEVER, NOWHERE, Metric, Places, arrival, duration, travel
+from warp_torchrl.world.wind import Wind
+
+_STAGES = 5
+_LONGEST_WAIT = 255  # ticks, of a byte
+
+
+@dataclass(frozen=True, kw_only=True)
+class RateFire(Automaton):
+    """Law ``rate``: a fire reaches each cell at the rate of spread of its fuel, slope, wind and moisture.
+
+    The rates are those of ``warp_torchrl.rates``; how they make times is written in ``warp_torchrl.world.travel``. A
+    tick is ``minutes_per_tick``. A cell that the fire has reached burns for ``residence`` minutes, and as long as a
+    neighbour that can ignite has not been reached: the fire's edge burns until it has nowhere to go. Then it is ash.
+
+    Rates differ from cell to cell and from fire to fire by log-normal factors of median 1, drawn for each episode:
+    the same ones from its first tick to its last. Without them the arrival times are those of least travel time.
+
+    Attributes:
+        model: Fuel models: ``fbfm13`` (Anderson 1982), ``fbfm40`` (Scott and Burgan 2005) or ``fbp`` (Canadian).
+        minutes_per_tick: Minutes of a tick; None takes as many as the fastest fire needs for a cell of the landscape.
+        residence: Minutes that a cell burns at least.
+        wet_minutes: Minutes for which a tree that was put out cannot ignite.
+        moisture: Percent by name, of those that the wind tells nothing of: see ``fuel_bed.MOISTURES``.
+        fuel_of_cover: Fuel code of lake, wetland, grassland, forest and bare ground, for landscapes without fuel codes;
+            None takes those of ``fuel_bed.COVER_FUEL``.
+        fuel_gain: Factor on the rate of each fuel code that it names.
+        rate_gain: Factor on all rates.
+        wind_gain: Factor on the wind's speed.
+        slope_gain: Factor on the slope's tangent.
+        cell_deviation: Coefficient of variation of the rates from cell to cell.
+        fire_deviation: Coefficient of variation of the rates from fire to fire.
+
+    Raises:
+        ValueError: If a value is out of its range.
+    """
+
+    youngest_fuel: int = 1
+    model: Literal["fbfm13", "fbfm40", "fbp"] = "fbfm40"
+    minutes_per_tick: float | None = None
+    residence: float = 20.0
+    wet_minutes: float = 60.0
+    moisture: Mapping[str, float] = field(default_factory=dict)
+    fuel_of_cover: tuple[int, int, int, int, int] | None = None
+    fuel_gain: Mapping[int, float] = field(default_factory=dict)
+    rate_gain: float = 1.0
+    wind_gain: float = 1.0
+    slope_gain: float = 1.0
+    cell_deviation: float = 0.1
+    fire_deviation: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_fields(
+            self,
+            minutes_per_tick=(1e-3, 1440.0),
+            residence=(0.0, 1e5),
+            wet_minutes=(0.0, 1e5),
+            rate_gain=(0.0, 100.0),
+            wind_gain=(0.0, 10.0),
+            slope_gain=(0.0, 10.0),
+            cell_deviation=(0.0, 2.0),
+            fire_deviation=(0.0, 2.0),
+        )
+        _ = moisture_row(self.moisture), self.bed  # refuse what they do not know
+
+    @property
+    def minutes(self) -> float:
+        """Return the minutes of a tick in force; 1 where no landscape has set them."""
+        return 1.0 if self.minutes_per_tick is None else self.minutes_per_tick
+
+    @property
+    def ticks_per_stage(self) -> int:
+        """Return the ticks that a burning stage lasts: a fifth of the residence."""
+        return min(_LONGEST_WAIT, max(1, round(self.residence / _STAGES / self.minutes)))
+
+    @property
+    def wet_for(self) -> int:
+        """Return the ticks for which a tree that was put out cannot ignite."""
+        return min(_LONGEST_WAIT, math.ceil(self.wet_minutes / self.minutes))
+
+    @property
+    def bed(self) -> FuelBed:
+        """Return the fuels with their factors."""
+        return FuelBed(
+            model=self.model,
+            fuel_of_cover=COVER_FUEL[self.model] if self.fuel_of_cover is None else tuple(self.fuel_of_cover),
+            fuel_gain=self.fuel_gain,
+            rate_gain=self.rate_gain,
+            wind_gain=self.wind_gain,
+            slope_gain=self.slope_gain,
+        )
+
+    def over(self, landscape: LandscapeSource, wind: Wind, cell_size: float) -> Self:
+        """Return the automaton with the minutes that the fastest fire of some worlds needs for a cell."""
+        if self.minutes_per_tick is not None:
+            return self
+        fastest = self.bed.fastest(landscape, wind, cell_size, moisture_row(self.moisture))
+        return replace(self, minutes_per_tick=min(60.0, max(0.05, float(f"{cell_size / fastest:.2g}"))))
+
+    def flammability(self, landscape: Landscape) -> Tensor:
+        """Return the square root of the rate on level ground in a wind of 5 m/s, of the fastest fuel's there."""
+        return self.bed.flammability(landscape, moisture_row(self.moisture))
+
+    def ground(self, landscape: Landscape, cell_size: float, key: Tensor) -> Ground:
+        """See ``Automaton``."""
+        return Ground(
+            landscape=landscape,
+            alpha=self.flammability(landscape),
+            slope=None,
+            pace=self.pace(key, (landscape.cover.shape[1], landscape.cover.shape[2])),
+            cell_size=cell_size,
+        )
+
+    def pace(self, key: Tensor, size: tuple[int, int]) -> Tensor:
+        """Return the factor on the fire's times in each cell, float32 [B, H, W]: 1 over that on its rates."""
+        cells = _log_normal(uniform(key, 0, Stream.PACE, size), self.cell_deviation)
+        fires = _log_normal(uniform(key, 1, Stream.PACE, (1, 1)), self.fire_deviation)
+        return cells * fires
+
+    def air(self, wind: Tensor, moisture: Tensor | None, ground: Ground) -> Air:
+        """See ``Automaton``."""
+        row = moisture_row(self.moisture).to(wind.device)
+        here = row.expand(len(wind), -1) if moisture is None else torch.where(moisture.isnan(), row, moisture)
+        spread = self.bed.spread(ground.landscape, wind, here, ground.cell_size)
+        made = travel(spread.head, spread.direction, spread.length_to_breadth, ground.cell_size)
+        return Air(wind=wind, gain=None, moisture=moisture, travel=made)
+
+    def started(self, state: WorldState) -> WorldState:
+        """Return worlds whose fires have reached the cells that burn at minute 0."""
+        burning = is_burning(state.cells)
+        minutes = torch.where(burning, 0.0, NEVER)
+        return state.replace(arrivals=Arrivals(minutes, torch.where(burning, _own_cell(state.cells), NOWHERE)))
+
+    def in_air(self, state: WorldState, air: Air) -> WorldState:
+        """Return worlds in another air: the fire has gone as far as it has, and goes on at the new rates.
+
+        What a cell has waited, or has to wait, changes by the ratio of the mean rates to or from its neighbours. Every
+        burning cell is an origin from now on.
+        """
+        before, after = self._mean_rate(state, state.air), self._mean_rate(state, air)
+        now = (state.tick * self.minutes)[:, None, None]
+        arrivals = _of(state)
+        ratio = torch.where((before > 0.0) & (after > 0.0), before / after, 1.0)
+        waits = arrivals.minutes < NEVER / 2
+        minutes = torch.where(waits, now + (arrivals.minutes - now) * ratio, arrivals.minutes)
+        origin = torch.where(is_burning(state.cells), _own_cell(state.cells), NOWHERE)
+        return state.replace(air=air, arrivals=Arrivals(minutes, origin))
+
+    def next_arrivals(self, state: WorldState) -> Arrivals:
+        """Return when the fire reaches each cell that can ignite and is beside it, else ``NEVER``."""
+        kept, fuel, spreads = _of(state), self.is_fuel(state) & (state.alpha > 0.0), self.spreads(state)
+        ahead = fuel & (kept.minutes > (state.tick * self.minutes)[:, None, None])
+        times = torch.where(spreads | ahead, kept.minutes, NEVER)
+        reached = torch.where(is_tree(state.cells), NEVER, kept.minutes).flatten(1)
+        row, column = _rows_and_columns(state.cells)
+
+        def time_of(origin: Tensor) -> Tensor:
+            return reached.gather(1, origin.flatten(1).to(torch.int64)).view(origin.shape)
+
+        places = Places(row, column, state.cells.shape[2], time_of)
+        minutes, origin = arrival(
+            _neighbours(times, NEVER), _neighbours(kept.origin, NOWHERE), self._metric(state, state.air), places
+        )
+        beside = grow(spreads) & fuel & (minutes < NEVER / 2)
+        return Arrivals(torch.where(beside, minutes, NEVER), torch.where(beside, origin, NOWHERE))
+
+    def tick(self, state: WorldState, u: Tensor, ticks_now: Tensor) -> WorldState:
+        """See ``Automaton``. What the fire reaches within the tick ignites, at the minute when it does."""
+        return self.tick_to(state, u, ticks_now, self.next_arrivals(state))
+
+    def tick_to(self, state: WorldState, u: Tensor, ticks_now: Tensor, coming: Arrivals) -> WorldState:
+        """Advance as ``tick`` does, with these arrivals."""
+        here = ticks_now[:, None, None]
+        end = ((state.tick + 1) * self.minutes)[:, None, None]
+        reached = coming.minutes <= end
+        after = self.tick_with(state, u, ticks_now, torch.maximum(reached.to(torch.float32), self.spontaneous(state)))
+        after = self._held(state, after)
+        lit = (after.cells == FIRST_FIRE) & ~is_burning(state.cells)
+        kept, waits = _of(state), is_tree(after.cells)
+        minutes = torch.where(lit, torch.where(reached, coming.minutes, end), kept.minutes)
+        origin = torch.where(lit, torch.where(reached, coming.origin, _own_cell(state.cells)), kept.origin)
+        minutes = torch.where(waits, torch.where(here, coming.minutes, kept.minutes), minutes)
+        origin = torch.where(waits, torch.where(here, coming.origin, kept.origin), origin)
+        return after.replace(arrivals=Arrivals(minutes, origin))
+
+    def ignition_probability(self, state: WorldState) -> Tensor:
+        """Return 1 where the fire arrives in the next tick, else a tick's share of the minutes until it does.
+
+        Joined with p_spont; float32 [B, H, W], 0 where nothing can ignite or the fire is not beside the tree.
+        """
+        wait = self.next_arrivals(state).minutes - (state.tick * self.minutes)[:, None, None]
+        spread = (self.minutes / wait.clamp(min=self.minutes)) * (wait < NEVER / 2)
+        return spread if self.beta == 0.0 else torch.maximum(spread, self.spontaneous(state))
+
+    def expected_ignitions(self, state: WorldState) -> Tensor:
+        """Return how many neighbours each burning cell would reach in a tick of its own, float32 [B, H, W]; else 0.
+
+        A neighbour that takes several ticks counts for its share of them.
+        """
+        total = torch.zeros_like(state.alpha)
+        fuel = self.is_fuel(state) & (state.alpha > 0.0)
+        for direction, rate in enumerate(self._rates_into(state, state.air)):
+            share = (rate * self.minutes).clamp(max=1.0) * fuel
+            total = total + neighbour_in((direction + 4) % 8, share)
+        return total * self.spreads(state)
+
+    def _held(self, before: WorldState, after: WorldState) -> WorldState:
+        """Return the worlds after a tick in which cells at the end of the last stage that spreads wait for neighbours."""
+        open_cells = self.is_fuel(after) & (after.alpha > 0.0)
+        holds = (before.cells == self.last_spreading) & (after.cells != before.cells) & grow(open_cells)
+        kept = {
+            name: torch.where(holds, getattr(before, name), getattr(after, name))
+            for name in ("cells", "age", "stage_age", "burned")
+            if getattr(after, name) is not None
+        }
+        return after.replace(**kept)
+
+    def _metric(self, state: WorldState, air: Air) -> Metric:
+        made, pace = air.travel, state.ground.pace
+        if made is None or pace is None:
+            raise ValueError("the worlds must be those of a fire with rates of spread")
+        return made[:, 0] * pace, made[:, 1] * pace, made[:, 2] * pace
+
+    def _rates_into(self, state: WorldState, air: Air) -> list[Tensor]:
+        """Return 1 / F into each cell from its neighbour in each direction, float32 [B, H, W] each [1/min]."""
+        metric = self._metric(state, air)
+        return [
+            1.0 / duration(metric, torch.full_like(metric[0], -column), torch.full_like(metric[0], row)).clamp(min=1e-9)
+            for row, column in DIRECTIONS
+        ]
+
+    def _mean_rate(self, state: WorldState, air: Air) -> Tensor:
+        """Return the sum of the rates from a burning cell to fuel, and from burning cells to fuel, float32 [B, H, W]."""
+        burning = self.spreads(state)
+        fuel = (self.is_fuel(state) & (state.alpha > 0.0)).to(torch.float32)
+        into, out = torch.zeros_like(fuel), torch.zeros_like(fuel)
+        for direction, rate in enumerate(self._rates_into(state, air)):
+            into = into + rate * neighbour_in(direction, burning.to(torch.float32))
+            out = out + neighbour_in((direction + 4) % 8, rate * fuel)
+        return torch.where(burning, out, into * fuel)
+
+
+def _of(state: WorldState) -> Arrivals:
+    if state.arrivals is None:
+        raise ValueError("the worlds must be those of a fire with rates of spread")
+    return state.arrivals
+
+
+def _log_normal(u: Tensor, variation: float) -> Tensor:
+    """Return log-normal factors of median 1 and a coefficient of variation, from uniform draws in [0, 1)."""
+    deviation = math.sqrt(math.log1p(variation * variation))
+    return torch.exp(deviation * math.sqrt(2.0) * torch.erfinv((2.0 * u - 1.0).clamp(-1.0 + 1e-6, 1.0 - 1e-6)))
+
+
+def _neighbours(plane: Tensor, beyond: float) -> Tensor:
+    """Return what each cell's neighbours hold, [8, B, H, W]."""
+    height, width = plane.shape[-2:]
+    padded = pad(plane, (1, 1, 1, 1), value=beyond)
+    return torch.stack(
+        [padded[..., 1 + row : 1 + row + height, 1 + column : 1 + column + width] for row, column in DIRECTIONS]
+    )
+
+
+def _rows_and_columns(cells: Tensor) -> tuple[Tensor, Tensor]:
+    row = torch.arange(cells.shape[1], dtype=torch.int32, device=cells.device)[:, None]
+    column = torch.arange(cells.shape[2], dtype=torch.int32, device=cells.device)
+    return row.expand(cells.shape), column.expand(cells.shape)
+
+
+def _own_cell(cells: Tensor) -> Tensor:
+    row, column = _rows_and_columns(cells)
+    return row * cells.shape[2] + column
