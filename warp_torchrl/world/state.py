@@ -59,6 +59,7 @@ class Landscape(Batch):
     age: Tensor  # uint8 [B,H,W], tree age before the fire, 0..10
     elevation: Tensor | None  # float32 [B,H,W] [m]; None where every world is flat
     assets: Tensor | None = None  # float32 [B,H,W], what each cell is worth, any unit; None: all alike
+    fuel: Tensor | None = None  # int16 [B,H,W], class codes of the fuel layer; None where there is none
     corner: Tensor | None = None  # int64 [B,2], (row, column) of the map's first cell in its source; None: at (0, 0)
 
 

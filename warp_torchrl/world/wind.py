@@ -6,6 +6,7 @@ of an episode, [B, 2, 1, 1] where it is the same over the map and [B, 2, H, W] w
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import torch
@@ -48,6 +49,12 @@ class Wind(ABC):
             float32 [B, 7] [%]: dead fuel of 1, 10 and 100 hours, live herbaceous and woody; FFMC and BUI, which are codes.
         """
         return None
+
+    def hours(
+        self, key: Tensor, size: tuple[int, int], corner: Tensor | None = None
+    ) -> Iterator[tuple[Tensor, Tensor | None]]:
+        """Return the fields that it is known to have, each with its moisture: here that of the start."""
+        yield self(key, size, corner), self.moisture(torch.zeros_like(key))
 
     def over(self, landscape: LandscapeSource) -> "Wind":
         """Return the wind on a landscape's map.

@@ -1,0 +1,158 @@
+"""The fuel of landscapes, and the rates at which fire spreads in it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+from torch.nn.functional import pad
+
+from warp_torchrl.rates.fbp import fbp_spread
+from warp_torchrl.rates.spread import Spread
+from warp_torchrl.world.random import world_key
+from warp_torchrl.world.state import Landscape
+from warp_torchrl.world.terrain.landscape import LandscapeSource, map_size
+from warp_torchrl.world.wind import Wind
+
+MOISTURES: Mapping[str, float] = {
+    "dead_1h": 6.0,
+    "dead_10h": 7.0,
+    "dead_100h": 8.0,
+    "live_herbaceous": 60.0,
+    "live_woody": 90.0,
+    "ffmc": 90.0,
+    "bui": 60.0,
+}
+"""Moisture where nothing else is said: per cent of dry weight, "low" dead and two-thirds cured fuels (Scott and Burgan
+2005, tables 3 and 4); of the Canadian model its two codes."""
+
+COVER_FUEL: Mapping[str, tuple[int, int, int, int, int]] = {
+    "fbfm13": (98, 8, 1, 10, 99),
+    "fbfm40": (98, 161, 102, 165, 99),
+    "fbp": (102, 11, 31, 2, 101),
+}
+"""Fuel code of lake, wetland, grassland, forest and bare ground in each model, for landscapes without fuel codes."""
+
+_REFERENCE_WIND = 5.0  # m/s, of flammability
+_SAMPLES = 4  # worlds in which the fastest fire is looked for
+
+
+@dataclass(frozen=True, kw_only=True)
+class FuelBed:
+    """Fuels of one model, and factors on how they burn. See ``RateFire`` for the attributes."""
+
+    model: str
+    fuel_of_cover: tuple[int, ...]
+    fuel_gain: Mapping[int, float]
+    rate_gain: float
+    wind_gain: float
+    slope_gain: float
+
+    def __post_init__(self) -> None:
+        if self.model not in COVER_FUEL:
+            raise ValueError(f"model must be one of {', '.join(COVER_FUEL)}, got {self.model}")
+        for code, gain in self.fuel_gain.items():
+            if not (str(code).isdigit() and 0.0 <= gain <= 100.0):
+                raise ValueError(f"fuel_gain must map fuel codes to factors in [0, 100], got {code}: {gain}")
+
+    def fuel(self, landscape: Landscape) -> Tensor:
+        """Return the fuel codes of landscapes, int16 [B, H, W]."""
+        if landscape.fuel is not None:
+            return landscape.fuel
+        table = torch.tensor(self.fuel_of_cover, dtype=torch.int16, device=landscape.cover.device)
+        return table.index_select(0, landscape.cover.flatten().to(torch.int32)).view(landscape.cover.shape)
+
+    def spread(self, landscape: Landscape, wind: Tensor, moisture: Tensor, cell_size: float) -> Spread:
+        """Return what a fire's head does in each cell, float32 [B, H, W] each.
+
+        Args:
+            landscape: The landscapes.
+            wind: (u east, v north) of the air's motion at 10 m, float32 [B, 2, 1, 1] or [B, 2, H, W] [m/s].
+            moisture: float32 [B, 7], in the order of ``MOISTURES``.
+            cell_size: Side of a cell [m].
+        """
+        rise = gradient(landscape.elevation, landscape.cover, cell_size) * self.slope_gain
+        steepness = torch.rad2deg(torch.atan(rise.square().sum(1).clamp(min=1e-12).sqrt()))
+        aspect = bearing(-rise[:, 0], -rise[:, 1])
+        speed = wind.square().sum(1).clamp(min=1e-12).sqrt() * self.wind_gain
+        fuel = self.fuel(landscape)
+        spread = self.rates(fuel, speed, bearing(-wind[:, 0], -wind[:, 1]), steepness, aspect, moisture)
+        factor = torch.full_like(spread.head, self.rate_gain)
+        for code, gain in self.fuel_gain.items():
+            factor = torch.where(fuel == int(code), factor * gain, factor)
+        return Spread(
+            head=spread.head * factor,
+            direction=spread.direction,
+            length_to_breadth=spread.length_to_breadth,
+            intensity=spread.intensity * factor,
+            flame_length=spread.flame_length * factor.pow(0.46),
+        )
+
+    def rates(
+        self, fuel: Tensor, speed: Tensor, bearing_from: Tensor, slope: Tensor, aspect: Tensor, moisture: Tensor
+    ) -> Spread:
+        """Return the rates of the model itself, without factors; what stands for a world is [B, 1, 1]."""
+        columns = dict(zip(MOISTURES, moisture[:, :, None, None].unbind(1), strict=True))
+        return fbp_spread(
+            fuel,
+            wind_speed=speed,
+            wind_bearing=bearing_from,
+            slope=slope,
+            aspect=aspect,
+            ffmc=columns["ffmc"],
+            bui=columns["bui"],
+        )
+
+    def flammability(self, landscape: Landscape, moisture: Tensor) -> Tensor:
+        """Return the square root of each cell's rate on level ground, of the fastest fuel's, float32 [B, H, W]."""
+        fuel = self.fuel(landscape)
+        codes = torch.arange(int(fuel.min()), int(fuel.max()) + 1, device=fuel.device)
+        zero = torch.zeros(1, 1, 1, device=fuel.device)
+        rates = self.rates(codes[None, None], zero + _REFERENCE_WIND, zero, zero, zero, moisture[None].to(fuel.device))
+        share = (rates.head / rates.head.max().clamp(min=1e-6)).sqrt()[0, 0]
+        return share.index_select(0, (fuel - codes[0]).flatten().to(torch.int32)).view(fuel.shape)
+
+    def fastest(self, landscape: LandscapeSource, wind: Wind, cell_size: float, moisture: Tensor) -> float:
+        """Return the highest rate in a few worlds over the hours that the wind knows [m/min]; 1e-3 at least."""
+        key = world_key(torch.arange(_SAMPLES))
+        ground = landscape(key)
+        rates = [1e-3]
+        for air, damp in wind.hours(key, map_size(landscape.size), ground.corner):
+            row = moisture if damp is None else torch.where(damp.isnan(), moisture, damp)
+            rates.append(float(self.spread(ground, air, row.expand(len(air), -1), cell_size).head.max()))
+        return max(rates)
+
+
+def moisture_row(given: Mapping[str, float]) -> Tensor:
+    """Return moistures by name in the order of ``MOISTURES``, float32 [7].
+
+    Raises:
+        ValueError: If a name is not known, or a value not in [0, 400].
+    """
+    for name, value in given.items():
+        if name not in MOISTURES:
+            raise ValueError(f"moisture must name some of {', '.join(MOISTURES)}, got {name}")
+        if not 0.0 <= value <= 400.0:
+            raise ValueError(f"moisture must be in [0, 400], got {name}: {value}")
+    return torch.tensor([float(given.get(name, usual)) for name, usual in MOISTURES.items()])
+
+
+def gradient(elevation: Tensor | None, cover: Tensor, cell_size: float) -> Tensor:
+    """Return how steeply the ground rises to the east and to the north, float32 [B, 2, H, W]; 0 where it is level.
+
+    By Horn's differences over the eight neighbours (Horn 1981), the border's cells repeated beyond it.
+    """
+    if elevation is None:
+        return torch.zeros(len(cover), 2, *cover.shape[1:], device=cover.device)
+    ground = pad(elevation[:, None], (1, 1, 1, 1), mode="replicate")[:, 0]
+    across = ground[:, :, 2:] - ground[:, :, :-2]
+    along = ground[:, :-2] - ground[:, 2:]
+    east = (across[:, :-2] + 2.0 * across[:, 1:-1] + across[:, 2:]) / (8.0 * cell_size)
+    north = (along[:, :, :-2] + 2.0 * along[:, :, 1:-1] + along[:, :, 2:]) / (8.0 * cell_size)
+    return torch.stack((east, north), dim=1)
+
+
+def bearing(east: Tensor, north: Tensor) -> Tensor:
+    """Return where a vector points, degrees clockwise from grid north in [0, 360)."""
+    return torch.rad2deg(torch.atan2(east, north + (north == 0.0) * (east == 0.0))) % 360.0
