@@ -15,6 +15,8 @@ FILES = {
 MODULES = sorted(FILES)
 GROUND = ("nearest", "symmetry", "validation")
 """What knows nothing of ours but each other, and every floor may use."""
+FIRE_SCIENCE = ("rates", "weather")
+"""What the world is built on: equations of fire and weather, which know torch alone."""
 READS_STATE = [
     *(each for each in MODULES if each.split("/")[0] in ("observation", "reward")),
     *("env/metrics", "env/render", "evaluation/behaviour"),
@@ -44,7 +46,14 @@ def ours(module: str) -> set[str]:
 
 @pytest.mark.parametrize("module", [name for name in MODULES if name.startswith("world/")])
 def test_the_world_knows_torch_and_itself(module):
-    assert all(name.split("/")[0] == "world" or name in GROUND for name in ours(module))
+    assert all(name.split("/")[0] in ("world", *FIRE_SCIENCE) or name in GROUND for name in ours(module))
+    foreign = {name.split("/")[0] for name in imports(module)}
+    assert not foreign & {"tensordict", "torchrl", "hydra", "omegaconf", "gymnasium", "pettingzoo", "wandb"}
+
+
+@pytest.mark.parametrize("module", [name for name in MODULES if name.split("/")[0] in FIRE_SCIENCE])
+def test_fire_science_knows_torch_and_itself(module):
+    assert all(name.split("/")[0] in FIRE_SCIENCE or name in GROUND for name in ours(module))
     foreign = {name.split("/")[0] for name in imports(module)}
     assert not foreign & {"tensordict", "torchrl", "hydra", "omegaconf", "gymnasium", "pettingzoo", "wandb"}
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.batch import Batch
 from warp_torchrl.world.automaton import Automaton
+from warp_torchrl.world.batch import Batch
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.state import Landscape, WorldState, is_burning
 from warp_torchrl.world.team import Team

@@ -1,6 +1,5 @@
 """The fuel of landscapes, and the rates at which fire spreads in it."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 

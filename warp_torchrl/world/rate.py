@@ -233,7 +233,7 @@ class RateFire(Automaton):
         return total * self.spreads(state)
 
     def _held(self, before: WorldState, after: WorldState) -> WorldState:
-        """Return the worlds after a tick in which cells at the end of the last stage that spreads wait for neighbours."""
+        """Return the worlds after a tick in which cells that are about to burn out wait for their neighbours."""
         open_cells = self.is_fuel(after) & (after.alpha > 0.0)
         holds = (before.cells == self.last_spreading) & (after.cells != before.cells) & grow(open_cells)
         kept = {
@@ -258,7 +258,7 @@ class RateFire(Automaton):
         ]
 
     def _mean_rate(self, state: WorldState, air: Air) -> Tensor:
-        """Return the sum of the rates from a burning cell to fuel, and from burning cells to fuel, float32 [B, H, W]."""
+        """Return the sum of the rates from each burning cell to fuel, or from burning cells into fuel [B, H, W]."""
         burning = self.spreads(state)
         fuel = (self.is_fuel(state) & (state.alpha > 0.0)).to(torch.float32)
         into, out = torch.zeros_like(fuel), torch.zeros_like(fuel)

@@ -86,7 +86,7 @@ def arrival(times: Tensor, origins: Tensor, metric: Metric, at: Places) -> tuple
 
     Args:
         times: When it reaches each neighbour, float32 [8, ...] [minutes]; ``NEVER`` where it does not.
-        origins: The cell that each neighbour has had it from: its flat index in the map, int32 [8, ...], or ``NOWHERE``.
+        origins: Flat index of the cell that each neighbour has had it from, int32 [8, ...], or ``NOWHERE``.
         metric: Of the cells.
         at: The cells.
 
@@ -109,8 +109,8 @@ def from_edges(times: Tensor, metric: Metric) -> tuple[Tensor, Tensor, Tensor]:
     of the neighbour a beside the cell and b across its corner, at s / sqrt(1 + s^2) = (T_a - T_b) / a.
 
     Returns:
-        The time, float32 [...] [minutes]; the direction of the nearer neighbour, int64 [...]; and whether the fire comes
-        from that one alone, bool [...].
+        The time, float32 [...] [minutes]; the direction of the nearer neighbour, int64 [...]; and whether the fire
+        comes from that one alone, bool [...].
     """
     slowness = metric[0]
     carried = times - _drift(metric, times)

@@ -46,7 +46,7 @@ class Wind(ABC):
         """Return the moisture of dead and live fuel after tick number ``tick``, int [B], or None where it says none.
 
         Returns:
-            float32 [B, 7] [%]: dead fuel of 1, 10 and 100 hours, live herbaceous and woody; FFMC and BUI, which are codes.
+            float32 [B, 7] [%]: dead fuel of 1, 10 and 100 hours, live herbaceous and woody; the codes FFMC and BUI.
         """
         return None
 
