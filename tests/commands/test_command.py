@@ -156,7 +156,7 @@ def test_an_evaluation_draws_maps_of_one_ground(run_here, tmp_path, what):
         "evaluation.json", "episode.gif", "maps.png", *(f"burn_probability_{kind}.tif" for kind in kinds),
     }  # fmt: skip
     numbers = json.loads((tmp_path / "seen" / "evaluation.json").read_text())["maps"]
-    assert numbers["fires"] == 4 and set(numbers["burned_difference"]) >= {"mean", "ci95"}
+    assert numbers["fires"] == 4 and set(numbers["burned_ha"]["difference"]) >= {"mean", "ci95"}
 
 
 def test_maps_say_which_extras_they_need(run_here, tmp_path, monkeypatch):

@@ -33,7 +33,7 @@ def test_a_team_that_does_nothing_changes_nothing():
 
 def test_a_team_protects_the_ground_that_burns_without_it(maps):
     numbers = maps.numbers()
-    assert numbers["burned_difference"]["ci95"][1] < 0.0
+    assert numbers["burned_ha"]["difference"]["ci95"][1] < 0.0
     assert maps.difference.nanmean() < -0.1
     assert numbers["fires"] == 24 and numbers["ground_seed"] == 2_000_000 and numbers["horizon"] == 24
 
@@ -42,7 +42,7 @@ def test_areas_are_the_sums_of_the_maps(maps):
     # Cells of 30 m: the mean area is the sum of the probabilities x 0.09 ha.
     assert maps.area_without.mean() == pytest.approx(0.09 * float(maps.without.nansum()), rel=1e-5)
     assert maps.area_with.mean() == pytest.approx(0.09 * float(maps.with_team.nansum()), rel=1e-5)
-    difference = maps.numbers()["burned_difference"]["mean"]
+    difference = maps.numbers()["burned_ha"]["difference"]["mean"]
     assert difference == pytest.approx(0.09 * float(maps.difference.nansum()), rel=1e-4)
 
 
@@ -86,14 +86,13 @@ def test_maps_of_real_ground_lie_where_the_window_does(tmp_path):
     maps = play_maps(plan, Coordinated, "sampled", 2)
     write_maps(tmp_path, maps, plan.world.landscape.grid, "a title", "coordinated")
     row, column = maps.ground.corner[0].tolist()
-    with (
-        rasterio.open(tmp_path / "burn_probability_with.tif") as file,
-        rasterio.open(LANDFIRE / "LC22_F13_230.tif") as fuel,
-    ):
-        assert file.crs == fuel.crs and file.transform @ (0, 0) == fuel.transform @ (column, row)
-        assert file.shape == (16, 16) and (row, column) != (0, 0)
+    with rasterio.open(LANDFIRE / "LC22_F13_230.tif") as fuel:
+        crs, west, north = fuel.crs, fuel.bounds.left, fuel.bounds.top
+    with rasterio.open(tmp_path / "burn_probability_with.tif") as file:
+        assert file.crs == crs and file.shape == (16, 16) and (row, column) != (0, 0)
+        assert (file.bounds.left, file.bounds.top) == (west + 30.0 * column, north - 30.0 * row)
 
 
 def test_the_line_of_the_maps_has_the_paired_interval(maps):
-    low, high = maps.numbers()["burned_difference"]["ci95"]
+    low, high = maps.numbers()["burned_ha"]["difference"]["ci95"]
     assert f"({low:+.2f} .. {high:+.2f})" in described(maps.numbers())

@@ -56,6 +56,8 @@ def evaluate_policy(
     content = report(
         plan.scenario, name, first, episodes, others, other_modes, left_out, learner, digest, worlds, frames
     )
+    if map_fires is not None:
+        log.info("playing %d fires on one ground for the maps, without the team and with it", map_fires)
     maps = None if map_fires is None else play_maps(plan, lambda env: _actor(found, env, actor), mode, map_fires)
     if maps is not None:
         content["maps"] = maps.numbers()

@@ -48,7 +48,7 @@ class PolicyMaps:
         horizon: Agent steps to an episode.
         without: Share of the fires in which each cell burned without the team, float32 [H, W]; NaN without a tree.
         with_team: The same with the team.
-        lit: Where any fire started, bool [H, W].
+        lit: Where any fire burned when the team came, after its head start, bool [H, W].
         area_without: Area burned in each fire without the team, float64 [n] [ha].
         area_with: The same with the team.
         cleared: Area that the team cleared in each fire, float64 [n] [ha].
@@ -71,17 +71,20 @@ class PolicyMaps:
         return self.with_team - self.without
 
     def numbers(self) -> dict[str, Any]:
-        """Return what ``evaluation.json`` keeps: areas [ha] with 95 % intervals, the difference paired by fire."""
+        """Return what ``evaluation.json`` keeps: areas with 95 % intervals over the fires, the difference paired."""
+        burned = {
+            "without": self.area_without,
+            "with": self.area_with,
+            "difference": self.area_with - self.area_without,
+        }
         return {
             "fires": self.seeds[1],
             "first_seed": self.seeds[0],
             "ground_seed": self.seeds[0],
             "horizon": self.horizon,
             "cell_size": self.cell_size,
-            "burned_without": summarise(self.area_without),
-            "burned_with": summarise(self.area_with),
-            "burned_difference": summarise(self.area_with - self.area_without),
-            "cleared": summarise(self.cleared),
+            "burned_ha": {name: summarise(area) for name, area in burned.items()},
+            "cleared_ha": summarise(self.cleared),
         }
 
 
@@ -207,9 +210,9 @@ def _panels(maps: PolicyMaps, policy: str) -> list[Panel]:
 def described(numbers: dict[str, Any]) -> str:
     """Return the numbers of maps as a line for the terminal."""
     areas = []
-    for name in ("burned_without", "burned_with", "burned_difference"):
-        mean, (low, high) = numbers[name]["mean"], numbers[name]["ci95"]
-        sign = "+" if name == "burned_difference" else ""
+    for name, area in numbers["burned_ha"].items():
+        mean, (low, high) = area["mean"], area["ci95"]
+        sign = "+" if name == "difference" else ""
         areas.append(f"{mean:{sign}.2f} ({low:{sign}.2f} .. {high:{sign}.2f})")
     return (
         f"maps: {numbers['fires']} fires on the ground of seed {numbers['ground_seed']}: {areas[0]} ha burn without "
