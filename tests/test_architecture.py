@@ -15,6 +15,8 @@ FILES = {
 MODULES = sorted(FILES)
 GROUND = ("nearest", "symmetry", "validation")
 """What knows nothing of ours but each other, and every floor may use."""
+FLOORS = ("weather",)
+"""Rooms that know nothing of ours but the ground, and of others' numbers alone."""
 READS_STATE = [
     *(each for each in MODULES if each.split("/")[0] in ("observation", "reward")),
     *("env/metrics", "env/render", "evaluation/behaviour"),
@@ -53,6 +55,13 @@ def test_the_world_knows_torch_and_itself(module):
 def test_the_ground_floor_knows_the_standard_library_alone(module):
     assert all(name in GROUND for name in ours(module))
     assert {name.split("/")[0] for name in imports(module)} - set(GROUND) <= sys.stdlib_module_names
+
+
+@pytest.mark.parametrize("module", [name for name in MODULES if name.split("/")[0] in FLOORS])
+def test_weather_knows_numbers_alone(module):
+    assert all(name.split("/")[0] in (module.split("/")[0], *GROUND) for name in ours(module))
+    others = {name.split("/")[0] for name in imports(module)} - set(GROUND) - {module.split("/")[0]}
+    assert others <= sys.stdlib_module_names | {"torch", "numpy", "rasterio"}
 
 
 @pytest.mark.parametrize("module", READS_STATE)
@@ -118,8 +127,8 @@ def test_hydra_appears_only_where_configuration_is_composed(module):
 
 
 @pytest.mark.parametrize("module", MODULES)
-def test_rasterio_is_imported_in_one_place(module):
-    if module != "world/terrain/layer":
+def test_rasterio_is_imported_where_maps_are_read_and_placed(module):
+    if module not in ("world/terrain/layer", "weather/convergence"):
         assert "rasterio" not in {name.split("/")[0] for name in imports(module)}
 
 
