@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from os import PathLike
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from torch import Tensor
@@ -116,8 +116,14 @@ class Raster:
         layers, known = self._read_layers(paths)
         if NO_DATA not in table:
             known["fuel"] = known["fuel"] & (layers["fuel"] != NO_DATA)
-        window = {"size": self.size, "row": self.row, "column": self.column, "min_fuel": self.min_fuel}
-        object.__setattr__(self, "_crop", Crop(**self._make_planes(layers, known, table), **window))
+        crop = Crop(
+            **self._make_planes(layers, known, table),
+            size=self.size,
+            row=self.row,
+            column=self.column,
+            min_fuel=self.min_fuel,
+        )
+        object.__setattr__(self, "_crop", crop)
 
     def __call__(self, key: Tensor) -> Landscape:
         """Return the landscape of each world's window, with its ``corner`` in ``grid``, batch size [B]."""
@@ -159,10 +165,10 @@ class Raster:
 
     def _make_planes(
         self, layers: Mapping[str, np.ndarray], known: Mapping[str, np.ndarray], table: Mapping[int, int]
-    ) -> dict[str, np.ndarray | None]:
+    ) -> dict[str, Any]:
         """Return the planes of the map, and where it is known, by their names in ``Crop``."""
         cover = to_cover(layers["fuel"], known["fuel"], table)
-        planes: dict[str, np.ndarray | None] = {"cover": cover, "fuel": to_fuel(layers["fuel"], known["fuel"])}
+        planes: dict[str, Any] = {"cover": cover, "fuel": to_fuel(layers["fuel"], known["fuel"])}
         if "elevation" in layers:
             metres = to_metres(layers["elevation"], known["elevation"])
             planes["elevation"] = metres if self.nodata == "refuse" else fill(metres, known["elevation"])
