@@ -78,7 +78,7 @@ def _of_names(given: np.ndarray[Any, Any], names: Mapping[str, int], called: str
         if str(name).upper() not in names:
             raise ValueError(f"fuel must be names of {called}, got {name!r}{did_you_mean(name, names)}")
     codes = np.array([names[str(name).upper()] for name in distinct.tolist()], dtype=np.int64)
-    return torch.from_numpy(codes[place].reshape(given.shape))
+    return torch.tensor(codes[place]).view(given.shape)
 
 
 def _own_model(code: object, given: object) -> FuelModel:
