@@ -112,6 +112,22 @@ def test_a_file_that_builds_on_another_keeps_its_values_and_has_its_own_class_s_
     assert (fire.beta, fire.tau, fire.refinement, fire.slope_gain) == (0.5, 3.0, 8, 0.115)
 
 
+@pytest.mark.parametrize(
+    ("overrides", "group", "key"),
+    [
+        (["scenario=landfire", "ignition=file"], "ignition", "count"),
+        (["scenario=hazard", "wind=calm"], "wind", "speed"),
+    ],
+)
+def test_what_a_scenario_says_of_an_option_goes_with_the_option(overrides, group, key):
+    assert key in plain(compose_config("train", overrides[:1]))[group]
+    chosen = plain(compose_config("train", overrides))[group]
+    assert set(chosen) == {"_target_", *defaults(component(chosen["_target_"]))} and key not in chosen
+    kept = plain(compose_config("train", [*overrides, f"{group}.{key}=1"]))[group]  # the user's own mistake stays
+    with pytest.raises(ConfigError, match=rf"{group}\.{key} is not a key of {group}"):
+        build(kept, group)
+
+
 def _derived(component):
     return {each.name for each in fields(component) if each.name.startswith("_")}
 
