@@ -24,6 +24,7 @@ from warp_torchrl.config.construction import ConfigError, build, component
 from warp_torchrl.config.defaults import defaults
 from warp_torchrl.config.run_config import COMPONENTS, RunConfig, run_config
 from warp_torchrl.world.gridded import Gridded
+from warp_torchrl.world.ignition_file import IgnitionFile
 from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.raster import Raster
 from warp_torchrl.world.world import World
@@ -39,7 +40,7 @@ def test_every_option_builds_and_shows_every_field(group, option):
     if (group, option) == ("collector", "ray"):
         pytest.importorskip("ray", reason="Ray is not installed")
     node = plain(compose_config("train", [f"{group}={option}"]))[group]
-    needs_a_file = {"raster": Raster, "array": Array, "gridded": Gridded}
+    needs_a_file = {"raster": Raster, "array": Array, "file": IgnitionFile, "gridded": Gridded}
     if option in needs_a_file:
         with pytest.raises(ConfigError, match=rf"{group}\.path must name"):
             build(node, group)
@@ -109,6 +110,22 @@ def test_a_file_that_builds_on_another_keeps_its_values_and_has_its_own_class_s_
     with initialize_config_dir(str(tmp_path), version_base="1.3"):
         fire = compose("top")
     assert (fire.beta, fire.tau, fire.refinement, fire.slope_gain) == (0.5, 3.0, 8, 0.115)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "group", "key"),
+    [
+        (["scenario=landfire", "ignition=file"], "ignition", "count"),
+        (["scenario=hazard", "wind=calm"], "wind", "speed"),
+    ],
+)
+def test_what_a_scenario_says_of_an_option_goes_with_the_option(overrides, group, key):
+    assert key in plain(compose_config("train", overrides[:1]))[group]
+    chosen = plain(compose_config("train", overrides))[group]
+    assert set(chosen) == {"_target_", *defaults(component(chosen["_target_"]))} and key not in chosen
+    kept = plain(compose_config("train", [*overrides, f"{group}.{key}=1"]))[group]  # the user's own mistake stays
+    with pytest.raises(ConfigError, match=rf"{group}\.{key} is not a key of {group}"):
+        build(kept, group)
 
 
 def _derived(component):

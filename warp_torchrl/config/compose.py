@@ -8,7 +8,7 @@ import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, cast
@@ -16,7 +16,7 @@ from typing import Any, cast
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 from hydra.errors import HydraException
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig, OmegaConf, open_dict
 from omegaconf.errors import OmegaConfBaseException
 
 from warp_torchrl.config.construction import ConfigError, UnknownKeyError, component
@@ -74,11 +74,29 @@ def check_choices(overrides: Sequence[str]) -> None:
 def _compose(name: str, overrides: Sequence[str]) -> DictConfig:
     try:
         folder = conf_folder()
-        return deepcopy(_composed(folder, _last_change(folder), name, tuple(overrides)))
+        config = deepcopy(_composed(folder, _last_change(folder), name, tuple(overrides)))
+        return _without_values_of_others(config, overrides)
     except HYDRA_ERRORS as error:
         raise explain(error, name, overrides) from None
     except ValueError as error:
         raise ConfigError(f"{one_line(error)}, in {' '.join(overrides)}") from None
+
+
+def _without_values_of_others(config: DictConfig, overrides: Sequence[str]) -> DictConfig:
+    """Return a configuration without what its scenario says of options that the overrides replace.
+
+    ``ignition=file`` in a scenario with ``ignition: {count: 3}`` has no count. What is no field of any option stays, to
+    be refused as a mistake.
+    """
+    given = [override.partition("=")[0].lstrip("+~") for override in overrides]
+    for group in (each for each in COMPONENTS if each in given and each in config):
+        kind = component(config[group].get("_target_"))
+        own = {"_target_"} if kind is None else {"_target_", *(each.name for each in fields(kind))}
+        for key in [each for each in config[group] if each not in own and f"{group}.{each}" not in given]:
+            if kind is not None and _options_with(f"{group}.{key}"):
+                with open_dict(config):
+                    del config[group][key]
+    return config
 
 
 def _known_keys(name: str, overrides: Sequence[str]) -> list[str]:
