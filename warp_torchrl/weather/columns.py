@@ -40,7 +40,7 @@ class Quantity:
     highest: float
     unit: str  # ours
     units: dict[str, tuple[float, float]]  # factor and offset by unit
-    usual: tuple[str, str] | None = None  # without a unit: in a Canadian file and in one of RAWS
+    usual: tuple[str, str]  # without a unit: in a Canadian file and in one of RAWS; any file where they are the same
 
 
 def _plain(names: str, lowest: float, highest: float, unit: str = "") -> Quantity:
@@ -131,9 +131,11 @@ def _places(name: str, headers: Sequence[str]) -> list[int]:
 def _column(name: str, header: str, place: int, family: int | None) -> Column:
     quantity = QUANTITIES[name]
     unit = _split(header)[1]
-    if unit is None and quantity.usual:
-        unit = quantity.usual[family or 0] if family is not None or len(set(quantity.usual)) == 1 else None
-    if unit not in quantity.units:
+    if unit is None and len(set(quantity.usual)) == 1:
+        unit = quantity.usual[0]
+    elif unit is None and family is not None:
+        unit = quantity.usual[family]
+    if unit is None or unit not in quantity.units:
         known = ", ".join(filter(None, quantity.units)) or "none"
         raise ValueError(f"{header} must name its unit ({known}), as in {name} [{quantity.unit}], got {unit or 'none'}")
     factor, offset = quantity.units[unit]
