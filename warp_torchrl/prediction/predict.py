@@ -8,13 +8,13 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.prediction.passing import Behaviour
-from warp_torchrl.prediction.spells import lasting, spells
 from warp_torchrl.prediction.tally import Tally
 from warp_torchrl.weather.table import WeatherTable, read_weather
 from warp_torchrl.world.alone import Spell, arrival_minutes, spread_in
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.rate import RateFire
 from warp_torchrl.world.state import Landscape
+from warp_torchrl.world.weather import Weather
 
 _MOST_TIMES = 2**31  # of fires and cells: 4 GiB
 
@@ -85,10 +85,12 @@ def predict(
         ValueError: If a value is out of its range, nothing that is lit can burn, or the fires do not fit in memory.
     """
     law = RateFire() if fire is None else fire
-    _check(ground, ignition, fires, area, cell_size, seed)
+    _check(ground, ignition, cell_size)
+    _check_numbers(ground, fires, area, hours, seed)
     table = weather if isinstance(weather, WeatherTable) else read_weather(weather)
     minutes = lasting(table, start) if hours is None else 60.0 * hours
-    met = spells(table, start, minutes, convergence)
+    air = Weather(table=table, convergence=convergence)
+    met = [Spell(wind, lasts, moisture) for wind, moisture, lasts in air.spells(minutes, start)]
     lit = ignition.cpu() & (law.flammability(ground)[0] > 0.0) & (ground.age[0] >= law.youngest_fuel)
     if not bool(lit.any()):
         raise ValueError(f"ignition must light a cell with fuel, none of its {int(ignition.sum())} cells has any")
@@ -139,23 +141,42 @@ def _prediction(tally: Tally, behaviour: Behaviour, lit: Tensor, ground: Landsca
     )
 
 
-def _check(
-    ground: Landscape, ignition: Tensor, fires: int, area: float | None, cell_size: float, seed: int
-) -> None:
-    """Refuse what does not fit."""
+def lasting(table: WeatherTable, start: float) -> float:
+    """Return the minutes from a start to the end of the last row, which lasts as long as the one before; 1 hour alone.
+
+    Raises:
+        ValueError: If the start is not before that end.
+    """
+    hours = table.hours.double()
+    last = float(hours[-1] - hours[-2]) if len(hours) > 1 else 1.0
+    end = (float(hours[-1]) + last) * 60.0
+    if not start < end:
+        raise ValueError(f"start must be before the weather's end, {end:g} minutes after its first row, got {start:g}")
+    return end - start
+
+
+def _check(ground: Landscape, ignition: Tensor, cell_size: float) -> None:
+    """Refuse maps that do not fit."""
     shape = ground.cover.shape[1:]
     if len(ground.cover) != 1:
         raise ValueError(f"ground must be one map, batch size 1, got {len(ground.cover)}")
     if ignition.dtype != torch.bool or ignition.shape != shape:
         raise ValueError(f"ignition must be bool {list(shape)}, got {ignition.dtype} {list(ignition.shape)}")
-    if not 1 <= fires <= 1_000_000:
-        raise ValueError(f"fires must be in 1..1000000, got {fires}")
-    if fires * shape.numel() > _MOST_TIMES:
-        most = _MOST_TIMES // shape.numel()
-        raise ValueError(f"fires must be at most {most} on {shape[0]} x {shape[1]} cells, for memory, got {fires}")
-    if area is not None and not 0.0 < area < 1e9:
-        raise ValueError(f"area must be over 0 ha, got {area:g}")
     if not 0.0 < cell_size <= 1e5:
         raise ValueError(f"cell_size must be over 0 and at most 1e5 m, got {cell_size:g}")
+
+
+def _check_numbers(ground: Landscape, fires: int, area: float | None, hours: float | None, seed: int) -> None:
+    """Refuse numbers out of their ranges."""
+    rows, columns = ground.cover.shape[1:]
+    if not 1 <= fires <= 1_000_000:
+        raise ValueError(f"fires must be in 1..1000000, got {fires}")
+    if fires * rows * columns > _MOST_TIMES:
+        most = _MOST_TIMES // (rows * columns)
+        raise ValueError(f"fires must be at most {most} on {rows} x {columns} cells, for memory, got {fires}")
+    if area is not None and not 0.0 < area < 1e9:
+        raise ValueError(f"area must be over 0 and under 1e9 ha, got {area:g}")
+    if hours is not None and not 0.0 < hours <= 1e5:
+        raise ValueError(f"hours must be over 0 and at most 1e5, got {hours:g}")
     if seed < 0:
         raise ValueError(f"seed must be 0 or more, got {seed}")
