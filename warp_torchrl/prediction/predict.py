@@ -33,6 +33,7 @@ class Prediction:
     flame_length: Tensor  # the same, float32 [m]
     hours: Tensor  # since the fires' start, float32 [T]: 0, 1, 2 ...
     area: Tensor  # burned by then in each fire, float32 [B, T] [ha]
+    final_area: Tensor  # burned in each fire at its end, float32 [B] [ha]
     progress: Tensor  # the farthest that each fire had come from the middle of its start, float32 [B, T] [m]
     left_map: Tensor  # whether a fire came to the map's edge, bool [B]
     followed: Tensor  # how long each fire was followed, float32 [B] [min]
@@ -130,6 +131,7 @@ def _prediction(tally: Tally, behaviour: Behaviour, lit: Tensor, ground: Landsca
         flame_length=flame_length.masked_fill(lit, torch.nan),
         hours=tally.hours,
         area=tally.joined("area"),
+        final_area=tally.joined("final"),
         progress=tally.joined("progress"),
         left_map=tally.joined("left"),
         followed=tally.joined("followed"),

@@ -42,7 +42,8 @@ class Tally:
         self.hours = torch.arange(math.floor(minutes / 60.0 + 1e-6) + 1, dtype=torch.float32)
         self._came = torch.zeros(lit.shape)
         self._sums = torch.zeros(3, *lit.shape)
-        self._parts: dict[str, list[Tensor]] = {name: [] for name in ("times", "area", "progress", "left", "followed")}
+        names = ("times", "area", "final", "progress", "left", "followed")
+        self._parts: dict[str, list[Tensor]] = {name: [] for name in names}
         self.first: Tensor | None = None
 
     def add(self, arrival: Tensor, pace: Tensor) -> None:
@@ -57,13 +58,14 @@ class Tally:
         self._parts["times"].append(torch.where(came, steps, _LATE).to(torch.int16).flatten(1))
         self._parts["left"].append(edge.any(1))
         self._parts["followed"].append(followed)
+        self._parts["final"].append(came.sum((1, 2)) * (self._cell_size**2 / 10_000.0))
         area, progress = self._by_hour(arrival)
         self._parts["area"].append(area)
         self._parts["progress"].append(progress)
         self.first = arrival[0].clone() if self.first is None else self.first
 
     def joined(self, name: str) -> Tensor:
-        """Return ``area`` [B, T] [ha] or ``progress`` [B, T] [m] by hour, ``left`` the map, or ``followed`` [minutes]."""
+        """Return ``area`` [B, T] and ``final`` area [B] [ha], ``progress`` [B, T] [m], ``left`` or ``followed`` [B]."""
         return torch.cat(self._parts[name])
 
     def burn_probability(self) -> Tensor:
