@@ -129,18 +129,18 @@ class Crop:
         known = np.ones(self.cover.shape, bool) if self.known is None else self.known
         whole = _sum_windows(torch.from_numpy(~known), height, width) == 0
         if self.row is not None or self.column is not None:
-            row, column = self._fixed_corner(whole)
+            row, column = self._fixed_corner(whole, known)
             return torch.tensor([row * columns + column])
         least = max(1, math.ceil(self.min_fuel * height * width - 1e-6))
         fuel = _sum_windows(holds_trees(torch.from_numpy(self.cover)), height, width)
         window = (whole & (fuel >= least)).flatten().nonzero().squeeze(1)
         if not len(window):
             rule = f"window of {height} x {width} cells without nodata and with min_fuel {self.min_fuel:g}"
-            raise ValueError(f"size must leave some place, the map has no {rule}")
+            raise ValueError(f"size must leave some place, the map has no {rule}{whereabouts(~known)}")
         across = whole.shape[1]
         return window // across * columns + window % across
 
-    def _fixed_corner(self, whole: Tensor) -> tuple[int, int]:
+    def _fixed_corner(self, whole: Tensor, known: np.ndarray) -> tuple[int, int]:
         """Return ``row`` and ``column`` if they name a window without nodata."""
         corner = []
         for name, count in zip(("row", "column"), whole.shape):
@@ -150,8 +150,23 @@ class Crop:
             corner.append(value)
         row, column = corner
         if not whole[row, column]:
-            raise ValueError(f"row, column must name a window without nodata, got {row}, {column}")
+            height, width = map_size(self.size)
+            inside = np.zeros_like(known)
+            inside[row : row + height, column : column + width] = True
+            lies = whereabouts(~known, inside)
+            raise ValueError(f"row, column must name a window without nodata, got {row}, {column}{lies}")
         return row, column
+
+
+def whereabouts(unknown: np.ndarray, inside: np.ndarray | None = None) -> str:
+    """Return in words where cells are not known, bool [rows, columns], of those inside; nothing where all are."""
+    lies = unknown if inside is None else unknown & inside
+    if not lies.any():
+        return ""
+    rows, columns = np.flatnonzero(lies.any(1)), np.flatnonzero(lies.any(0))
+    share = lies.sum() / (lies.size if inside is None else inside.sum())
+    place = f"in rows {rows[0]}..{rows[-1]}, columns {columns[0]}..{columns[-1]}"
+    return f"; nodata lies {place} ({lies.sum()} cells, {100 * share:.3g} %); nodata=unburnable makes it no fuel"
 
 
 def _sum_windows(mask: Tensor, height: int, width: int) -> Tensor:
