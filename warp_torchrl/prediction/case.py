@@ -12,7 +12,7 @@ from warp_torchrl.prediction.options import PredictionOptions
 from warp_torchrl.weather.convergence import grid_convergence
 from warp_torchrl.weather.table import WeatherTable, minutes_until, read_weather
 from warp_torchrl.world.fuel_bed import COVER_FUEL
-from warp_torchrl.world.ignition import read_ignition
+from warp_torchrl.prediction.interim import read_ignition
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.rate import RateFire
 from warp_torchrl.world.state import Landscape
