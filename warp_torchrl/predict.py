@@ -1,4 +1,7 @@
-"""Predicts fires alone on real ground: ``python -m warp_torchrl.predict``; the function is in ``prediction.predict``."""
+"""Predicts fires alone on real ground: ``python -m warp_torchrl.predict``.
+
+The function of that name, ``from warp_torchrl import predict``, is in ``warp_torchrl.prediction.predict``.
+"""
 
 import sys
 

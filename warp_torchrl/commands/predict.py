@@ -136,7 +136,7 @@ def _report(prediction: Prediction, case: Case, values: Mapping[str, Any], secon
     found = numbers(prediction)
     known = [each.name for each in fields(case.weather) if getattr(case.weather, each.name) is not None]
     inputs = {
-        "landscape": values["landscape"]["path"] if "path" in values["landscape"] else None,
+        "landscape": values["landscape"].get("path"),
         "map": f"{case.ignition.shape[0]} x {case.ignition.shape[1]} cells of {case.cell_size:g} m",
         "crs": str(case.place.grid.crs) if case.place.grid.crs else None,
         "weather": values["weather"],

@@ -41,7 +41,7 @@ class FileConfigSource(file_config_source.FileConfigSource):
     """Hydra's source of yaml files, which fills in the fields that a file leaves out."""
 
     def load_config(self, config_path: str) -> ConfigResult:
-        """Return the content of a yaml file, ``train``, ``predict`` or an option of a group, with every field of its class."""
+        """Return the content of a yaml file, a command's or an option of a group, with every field of its class."""
         result = super().load_config(config_path)
         if isinstance(result.config, DictConfig):
             result.config = OmegaConf.merge(_left_out(config_path, result.config), result.config)

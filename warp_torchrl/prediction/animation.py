@@ -38,13 +38,22 @@ def write_animation(
     light = None if ground.elevation is None else hillshade(ground.elevation[0].cpu(), cell_size)
     paled = (0.6 * cover_image(ground.cover[0].cpu(), light) + 0.4).clamp(max=1.0) * 255.0
     step = minutes / _FRAMES
-    frames = [
-        _frame(paled, arrival, step * number, max(step, residence)).quantize(64, dither=Image.Dither.NONE)
-        for number in range(_FRAMES + 1)
-    ]
+    pictures = [_frame(paled, arrival, step * number, max(step, residence)) for number in range(_FRAMES + 1)]
+    palette = _palette(pictures[0])
+    frames = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     drawn, durations = io.BytesIO(), [_FRAME_MS] * _FRAMES + [_LAST_FRAME_MS]
     frames[0].save(drawn, "GIF", save_all=True, append_images=frames[1:], loop=0, duration=durations)
     disk.replace(path, drawn.getvalue())
+
+
+def _palette(first: Image.Image) -> Image.Image:
+    """Return the one palette of all frames: the ground's colours, and those of what burns and has burned."""
+    whole = Image.new("RGB", (first.width, first.height + 2 * _STRIP))
+    whole.paste(first, (0, 0))
+    for place, colour in enumerate((_FLAME, _ASH)):
+        top = first.height + place * _STRIP
+        whole.paste(colour, (0, top, first.width, top + _STRIP))
+    return whole.quantize(96, dither=Image.Dither.NONE)
 
 
 def _frame(ground: Tensor, arrival: Tensor, minute: float, burns_for: float) -> Image.Image:

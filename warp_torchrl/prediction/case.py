@@ -8,11 +8,11 @@ from torch import Tensor
 
 from warp_torchrl.maps.geotiff import local_grid
 from warp_torchrl.prediction.files import Place
+from warp_torchrl.prediction.ignition import read_ignition
 from warp_torchrl.prediction.options import PredictionOptions
 from warp_torchrl.weather.convergence import grid_convergence
 from warp_torchrl.weather.table import WeatherTable, minutes_until, read_weather
 from warp_torchrl.world.fuel_bed import COVER_FUEL
-from warp_torchrl.prediction.interim import read_ignition
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.rate import RateFire
 from warp_torchrl.world.state import Landscape
@@ -44,7 +44,7 @@ def read_case(source: LandscapeSource, fire: RateFire, options: PredictionOption
     if getattr(source, "table", None) == "worldcover":  # its codes are no fuel models
         ground = ground.replace(fuel=None)
     _check_fuel(source, fire)
-    cell_size = options.cell_size or getattr(source, "cell_size", 30.0)
+    cell_size = float(options.cell_size or getattr(source, "cell_size", 30.0))
     height, width = ground.cover.shape[1:]
     grid = getattr(source, "grid", None)
     corner = (0, 0) if grid is None or ground.corner is None else tuple(ground.corner[0].tolist())
@@ -57,9 +57,7 @@ def read_case(source: LandscapeSource, fire: RateFire, options: PredictionOption
         place=place,
         cell_size=cell_size,
         fire=fire,
-        weather=read_weather(
-            weather, wind_height=options.wind_height, start_ffmc=options.start_ffmc, bui=options.bui
-        ),
+        weather=read_weather(weather, wind_height=options.wind_height, start_ffmc=options.start_ffmc, bui=options.bui),
         start=minutes_until(options.start, weather) if isinstance(options.start, str) else options.start,
         convergence=_convergence(place, (height, width)) if options.true_north else 0.0,
         ignition=lit[rows, columns],
