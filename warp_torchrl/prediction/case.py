@@ -74,8 +74,9 @@ def _convergence(place: Place, size: tuple[int, int]) -> float:
     grid: Any = place.grid
     if not grid.is_on_earth:
         return 0.0
-    x, y = grid.transform * (place.corner[1] + size[1] / 2.0, place.corner[0] + size[0] / 2.0)
-    return grid_convergence(grid.crs.to_wkt(), x, y)
+    row, column = place.corner[0] + size[0] / 2.0, place.corner[1] + size[1] / 2.0
+    a, b, left, d, e, top = grid.transform[:6]
+    return grid_convergence(grid.crs.to_wkt(), left + a * column + b * row, top + d * column + e * row)
 
 
 def _check_fuel(source: LandscapeSource, fire: RateFire) -> None:
