@@ -95,8 +95,8 @@ def fire_history(
         weather: See ``simulate``.
 
     Returns:
-        Arrival times, under law ``rate`` in minutes too, burning cells over time and the final codes; ``burn_probability()`` over the worlds,
-        ``burned_area()`` over time.
+        Arrival times, under law ``rate`` in minutes too, burning cells over time and the final codes;
+        ``burn_probability()`` over the worlds, ``burned_area()`` over time.
 
     Raises:
         ValueError: If a shape, type, code or number does not fit.
