@@ -17,10 +17,10 @@ from warp_torchrl.commands.failure import DONE, fail
 from warp_torchrl.config.compose import compose_config, plain, without_targets
 from warp_torchrl.config.construction import ConfigError, build, construct
 from warp_torchrl.config.grammar import check_flags
+from warp_torchrl.config.prediction_options import PredictionOptions
 from warp_torchrl.prediction.animation import write_animation
 from warp_torchrl.prediction.case import Case, read_case, whole_map
 from warp_torchrl.prediction.files import FIGURE, write_figure, write_layers, write_perimeters
-from warp_torchrl.prediction.options import PredictionOptions
 from warp_torchrl.prediction.predict import Prediction, lasting, predict
 from warp_torchrl.prediction.report import numbers, page, warnings
 from warp_torchrl.runs import disk

@@ -6,10 +6,10 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from warp_torchrl.config.prediction_options import PredictionOptions
 from warp_torchrl.maps.geotiff import local_grid
 from warp_torchrl.prediction.files import Place
 from warp_torchrl.prediction.ignition import read_ignition
-from warp_torchrl.prediction.options import PredictionOptions
 from warp_torchrl.weather.convergence import grid_convergence
 from warp_torchrl.weather.table import WeatherTable, minutes_until, read_weather
 from warp_torchrl.world.fuel_bed import COVER_FUEL
@@ -44,7 +44,7 @@ def read_case(source: LandscapeSource, fire: RateFire, options: PredictionOption
     if getattr(source, "table", None) == "worldcover":  # its codes are no fuel models
         ground = ground.replace(fuel=None)
     _check_fuel(source, fire)
-    cell_size = float(options.cell_size or getattr(source, "cell_size", 30.0))
+    cell_size: float = getattr(source, "cell_size", 30.0) if options.cell_size is None else options.cell_size
     height, width = ground.cover.shape[1:]
     grid = getattr(source, "grid", None)
     corner = (0, 0) if grid is None or ground.corner is None else tuple(ground.corner[0].tolist())
