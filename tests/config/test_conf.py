@@ -24,6 +24,7 @@ from warp_torchrl.config.construction import ConfigError, build, component
 from warp_torchrl.config.defaults import defaults
 from warp_torchrl.config.run_config import COMPONENTS, RunConfig, run_config
 from warp_torchrl.world.gridded import Gridded
+from warp_torchrl.world.ignition_file import IgnitionFile
 from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.raster import Raster
 from warp_torchrl.world.world import World
@@ -39,7 +40,7 @@ def test_every_option_builds_and_shows_every_field(group, option):
     if (group, option) == ("collector", "ray"):
         pytest.importorskip("ray", reason="Ray is not installed")
     node = plain(compose_config("train", [f"{group}={option}"]))[group]
-    needs_a_file = {"raster": Raster, "array": Array, "gridded": Gridded}
+    needs_a_file = {"raster": Raster, "array": Array, "file": IgnitionFile, "gridded": Gridded}
     if option in needs_a_file:
         with pytest.raises(ConfigError, match=rf"{group}\.path must name"):
             build(node, group)

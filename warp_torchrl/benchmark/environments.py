@@ -92,7 +92,7 @@ def paper_stack(world: World, radius: int, seed: int | None = None) -> "NumpyFir
         n_agents=world.team.n_agents,
         steps_per_tick=world.steps_per_tick,
         horizon=world.horizon,
-        n_fires=world.ignition.count,
+        n_fires=getattr(world.ignition, "count", 1),
         radius=radius,
         seed=seed,
     )

@@ -18,6 +18,8 @@ _MINERALS = 1.0 - 0.0555
 """Share of dry weight that is not mineral."""
 _MINERAL_DAMPING = 0.174 * 0.01**-0.19
 """For an effective mineral content of 0.01."""
+_USUAL_PACKING, _USUAL_SAV = 0.01, 1500.0
+"""Of ground without fuel, so that what follows from them is finite."""
 _KILOJOULES = 1.055056 / FOOT**2
 """kJ/m2 in a Btu/ft2."""
 
@@ -59,8 +61,8 @@ def bed_response(fuels: Fuels, moisture: Tensor) -> BedResponse:
     )
     dead_share = dead_area / _positive(dead_area + live_area)
     live_share = live_area / _positive(dead_area + live_area)
-    sav = _positive(dead_share * _dead(share * fuels.sav) + live_share * _live(share * fuels.sav), 1.0)
-    packing = _positive(load.sum(-1) / (_DENSITY * _positive(fuels.depth)))
+    sav = _positive(dead_share * _dead(share * fuels.sav) + live_share * _live(share * fuels.sav), _USUAL_SAV)
+    packing = _positive(load.sum(-1) / (_DENSITY * _positive(fuels.depth)), _USUAL_PACKING)
     relative = packing / (3.348 * sav**-0.8189)
 
     reaction = reaction_velocity(sav, relative) * _burnable_heat(fuels, load, share, water)

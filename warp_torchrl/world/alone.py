@@ -12,12 +12,12 @@ from torch import Tensor
 from warp_torchrl.rates.spread import Spread
 from warp_torchrl.world.fast.spreading import Hour, Spreading
 from warp_torchrl.world.fuel_bed import moisture_row
-from warp_torchrl.world.rate import RateFire
+from warp_torchrl.world.rate import TICKS_PER_CELL, RateFire
 from warp_torchrl.world.state import Landscape
 from warp_torchrl.world.travel import travel
 
 _LEAST_TICKS = 4  # of a spell: the fire's edge goes on from the times of the tick before
-_TICKS_PER_CELL = float(__import__("os").environ.get("TPC", "1"))
+_BUT_FASTEST = 0.999  # share of the cells whose rates set the ticks
 _AT_ONCE = 64  # fires, whose planes a CPU's cache holds
 
 
@@ -96,7 +96,7 @@ def _side_by_side(
 def _hour(fire: RateFire, landscape: Landscape, cell_size: float, spell: Spell, fuel: Tensor) -> Hour:
     spread = spread_in(fire, landscape, cell_size, spell)
     rates = spread.head[0][fuel]
-    fastest = float(rates.kthvalue(max(1, math.ceil(0.999 * len(rates)))).values) if len(rates) else 0.0
-    ticks = max(_LEAST_TICKS, math.ceil(_TICKS_PER_CELL * spell.minutes * fastest / cell_size))
+    fastest = float(rates.kthvalue(max(1, math.ceil(_BUT_FASTEST * len(rates)))).values) if len(rates) else 0.0
+    ticks = max(_LEAST_TICKS, math.ceil(TICKS_PER_CELL * spell.minutes * fastest / cell_size))
     made = travel(spread.head, spread.direction, spread.length_to_breadth, cell_size)[0]
     return Hour(made, spell.minutes / ticks, ticks)

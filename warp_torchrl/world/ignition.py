@@ -1,6 +1,8 @@
 """Where the fire starts."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import Self
 
 import torch
 from torch import Tensor
@@ -8,10 +10,42 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.geometry import grow
 from warp_torchrl.world.random import Stream, uniform
+from warp_torchrl.world.terrain.landscape import LandscapeSource, map_size
+
+
+class IgnitionSource(ABC):
+    """What the world needs of an ignition component."""
+
+    @property
+    @abstractmethod
+    def head_start(self) -> int:
+        """Return the fire ticks before the team's first step."""
+
+    @abstractmethod
+    def __call__(self, key: Tensor, fuel: Tensor) -> Tensor:
+        """Return the cells to light, bool [B, H, W], of fuel only.
+
+        Args:
+            key: World keys, int64 [B].
+            fuel: Trees that can ignite, bool [B, H, W].
+        """
+
+    @abstractmethod
+    def over(self, landscape: LandscapeSource) -> Self:
+        """Return the ignition on a landscape's map.
+
+        Raises:
+            ValueError: If it does not fit there.
+        """
+
+    @property
+    def why_dark(self) -> str:
+        """Return what is said where no cell of a world can be lit."""
+        return "landscape: a map has no tree that can burn, so there is no fire to start"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ignition:
+class Ignition(IgnitionSource):
     """Square patches of fire round cells drawn in the middle of the map.
 
     Attributes:
@@ -32,6 +66,18 @@ class Ignition:
 
     def __post_init__(self) -> None:
         check_fields(self, count=(1, 64), radius=(0, 8), region=(1e-6, 1.0), head_start=(0, 1000))
+
+    def over(self, landscape: LandscapeSource) -> "Ignition":
+        """Return this ignition.
+
+        Raises:
+            ValueError: If there are more fires than a quarter of the map's cells.
+        """
+        height, width = map_size(landscape.size)
+        if self.count > height * width // 4:
+            cells = f"a quarter of the map's {height * width} cells"
+            raise ValueError(f"ignition.count must be at most {cells}, got {self.count}")
+        return self
 
     def __call__(self, key: Tensor, fuel: Tensor) -> Tensor:
         """Return the cells to light, bool [B, H, W]: fuel only, and at least one where a map has fuel.

@@ -12,7 +12,7 @@ from warp_torchrl.world.automaton import Automaton
 from warp_torchrl.world.batch import concatenated
 from warp_torchrl.world.fast import road
 from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.ignition import Ignition
+from warp_torchrl.world.ignition import Ignition, IgnitionSource
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.state import (
     EMBER,
@@ -56,7 +56,7 @@ class World:
     wind: Wind = field(default_factory=Uniform)
     fire: Automaton = field(default_factory=Fire)
     team: Team = field(default_factory=Team)
-    ignition: Ignition = field(default_factory=Ignition)
+    ignition: IgnitionSource = field(default_factory=Ignition)
     steps_per_tick: int = 5
     horizon: int = 256
     cell_size: float | None = None
@@ -71,11 +71,7 @@ class World:
             raise ValueError(
                 f"team.n_agents must be at most a quarter of the map's {height * width} cells, got {self.team.n_agents}"
             )
-        if self.ignition.count > height * width // 4:
-            raise ValueError(
-                f"ignition.count must be at most a quarter of the map's {height * width} cells, "
-                f"got {self.ignition.count}"
-            )
+        _ = self.lighting  # refuses an ignition that does not fit the landscape
 
     @property
     def size(self) -> tuple[int, int]:
@@ -91,6 +87,11 @@ class World:
     def air(self) -> Wind:
         """Return the wind on this landscape's map."""
         return self.wind.over(self.landscape).paced(self.fire.minutes)
+
+    @cached_property
+    def lighting(self) -> IgnitionSource:
+        """Return the ignition on this landscape's map."""
+        return self.ignition.over(self.landscape)
 
     def reset(self, seed: Tensor, episode: Tensor) -> WorldState:
         """Start an episode in each world: the ground, the fire after its head start, the team.
@@ -113,9 +114,9 @@ class World:
         key = world_key(seed, episode)
         ground = self.landscape(key)
         fuel = (ground.age >= self.fire.youngest_fuel) & (self.fire.flammability(ground) > 0.0)
-        lit = self.ignition(key, fuel)
+        lit = self.lighting(key, fuel)
         if not lit.flatten(1).any(dim=1).all():
-            raise ValueError("landscape: a map has no tree that can burn, so there is no fire to start")
+            raise ValueError(self.lighting.why_dark)
         vehicles = self.team.place(key, ground.cover, lit)
         index = vehicles.position[..., 0] * self.size[1] + vehicles.position[..., 1]
         if (ground.cover.flatten(1).gather(1, index) == int(Cover.LAKE)).any():

@@ -1,5 +1,6 @@
 """Raster landscapes: what a world gets of the layers of a folder, and every refusal in one line."""
 
+import json
 import pickle
 import sys
 import time
@@ -298,6 +299,37 @@ def test_ground_of_real_fires_is_read_whole(fire, table, cell):
     source = Raster(path=FIRES / fire, **layers, size=codes.shape, ages="oldest")
     assert source.cell_size == cell and source.corner == (0, 0)
     np.testing.assert_array_equal(source(keys(1)).fuel[0].numpy(), codes)
+
+
+# --- Assets of a vector file
+
+
+def houses(path, *places, **properties):
+    """Write points in the map's own coordinates, at the middles of cells of 30 m."""
+    points = [{"type": "Point", "coordinates": [15 + 30 * column, 5e4 - 15 - 30 * row]} for row, column in places]
+    features = [{"type": "Feature", "geometry": each, "properties": properties} for each in points]
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": features, "crs": None}))
+    return path
+
+
+@pytest.mark.parametrize("properties, worth", [({}, 1.0), ({"worth": 2.5}, 2.5), ({"VALUE": "4", "name": "farm"}, 4.0)])
+def test_a_cell_is_worth_the_sum_of_the_shapes_in_it(folder, properties, worth):
+    houses(folder / "houses.geojson", (5, 2), (5, 2), (8, 7), **properties)
+    assets = Raster(path=folder, size=(4, 6), row=5, column=2, assets="houses*")(keys(2)).assets[1]
+    wanted = torch.zeros(4, 6)
+    wanted[0, 0], wanted[3, 5] = 2 * worth, worth
+    assert torch.equal(assets, wanted)
+
+
+@pytest.mark.parametrize("worth", [-1.0, "much", float("inf")])
+def test_a_worth_that_is_none_is_refused_in_one_line(folder, worth):
+    houses(folder / "houses.geojson", (5, 2), worth=worth)
+    refuse("^assets must have a worth of 0 or more, .*houses.geojson has", path=folder, size=4, assets="houses.geojson")
+
+
+def test_shapes_off_the_map_are_no_assets(folder):
+    houses(folder / "houses.geojson", (50, 2))
+    refuse("^assets must hold shapes on the map", path=folder, size=4, assets="houses.geojson")
 
 
 # --- Layers on different grids

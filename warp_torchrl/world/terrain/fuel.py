@@ -1,6 +1,7 @@
 """What the codes of a fuel or land-cover layer are to the world: presets, tables of a user's own, and the covers."""
 
 from collections.abc import Mapping
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -69,7 +70,7 @@ NO_DATA = -9999
 """Code of a fuel layer that says not known, whatever its file declares, where the table has it not."""
 
 
-def code_table(table: str | Mapping[int, int | str]) -> Mapping[int, int]:
+def code_table(table: str | PathLike[str] | Mapping[int, int | str]) -> Mapping[int, int]:
     """Return the cover of each class code.
 
     Args:

@@ -16,6 +16,7 @@ from typing import Any, Literal
 import numpy as np
 
 from warp_torchrl.world.terrain.grid import Grid
+from warp_torchrl.world.terrain.vector import SUFFIXES
 
 Method = Literal["nearest", "mode", "bilinear"]
 """How values are put on another grid."""
@@ -38,7 +39,8 @@ def find_layer(name: str, folder: Path, pattern: str) -> Path:
         matches = sorted(file for file in folder.iterdir() if fnmatchcase(file.name, str(pattern)))
     except OSError as error:  # no permission, a name too long
         raise ValueError(f"{name} must name one file in {folder}, {pattern!r} does not: {error.strerror}") from None
-    matches = [file for file in matches if file.suffix.lower() in _DRIVERS] or matches  # not .tif.aux.xml, .prj
+    kinds = (*_DRIVERS, *SUFFIXES) if name == "assets" else _DRIVERS
+    matches = [file for file in matches if file.suffix.lower() in kinds] or matches  # not .tif.aux.xml, .prj
     if len(matches) != 1:
         got = ", ".join(file.name for file in matches[:4]) or "none"
         raise ValueError(f"{name} must name one file in {folder}, {pattern!r} matches {len(matches)}: {got}")

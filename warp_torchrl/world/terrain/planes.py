@@ -1,11 +1,18 @@
 """What the values of raster layers are to the world: metres, ages, canopies, worth, and where there are none."""
 
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 
 from warp_torchrl.world.state import OLDEST, Cover
 from warp_torchrl.world.terrain.crop import DRAWN
 from warp_torchrl.world.terrain.fuel import NO_FUEL
+from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.landscape import TALLEST
+from warp_torchrl.world.terrain.vector import burn_in, read_shapes
 
 
 def to_metres(heights: np.ndarray, known: np.ndarray) -> np.ndarray:
@@ -28,6 +35,28 @@ def to_worth(values: np.ndarray, known: np.ndarray) -> np.ndarray:
     if broken.any():
         raise ValueError(f"assets must be finite and 0 or more wherever they are known, got {values[broken][0]}")
     return np.where(known, values, 0).astype(np.float32)
+
+
+def read_worth(path: Path, grid: Grid) -> np.ndarray:
+    """Return what each cell of a grid is worth by the shapes of a vector file, float64 [rows, columns].
+
+    Raises:
+        ValueError: If the file cannot be read or placed, or a property is not a number of 0 or more.
+    """
+    shapes = read_shapes("assets", path, grid)
+    return burn_in(shapes, [_worth(path, shape.properties) for shape in shapes], grid)
+
+
+def _worth(path: Path, properties: Mapping[str, Any]) -> float:
+    told = {str(name).lower(): value for name, value in properties.items()}
+    value = next((told[name] for name in ("worth", "value") if told.get(name) is not None), 1.0)
+    try:
+        worth = float(value)
+    except (TypeError, ValueError):
+        worth = math.nan
+    if not 0.0 <= worth < math.inf:
+        raise ValueError(f"assets must have a worth of 0 or more, {path} has {value!r}")
+    return worth
 
 
 def to_age(name: str, values: np.ndarray, known: np.ndarray, top: float) -> np.ndarray:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from os import PathLike
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from torch import Tensor
@@ -19,6 +19,7 @@ from warp_torchrl.world.terrain.grid import Grid, check_grid
 from warp_torchrl.world.terrain.landscape import map_size
 from warp_torchrl.world.terrain.layer import fill, find_layer, read_grid, read_layer, regrid, resample_layer
 from warp_torchrl.world.terrain.planes import (
+    read_worth,
     to_age,
     to_canopy_cover,
     to_canopy_height,
@@ -27,6 +28,7 @@ from warp_torchrl.world.terrain.planes import (
     to_metres,
     to_worth,
 )
+from warp_torchrl.world.terrain.vector import SUFFIXES
 
 _log = logging.getLogger("warp_torchrl")
 
@@ -64,7 +66,8 @@ class Raster:
         canopy_height: The same for a layer of the height of the canopy's top; nodata is 0.
         height_unit: Metres to a unit of that layer, which must be told: 0.1 for LANDFIRE's CH, 1 for metres.
         assets: The same for a layer of what each cell is worth, 0 or more in any unit, for rewards that ask; nodata is
-            0. None leaves all alike.
+            0. Or for GeoJSON or a shapefile, where a cell is worth the sum of what lies in it, each shape's property
+            ``worth`` or ``value``, or 1. None leaves all alike.
         resample: What becomes of layers on another grid: ``refuse`` makes them an error; ``nearest`` and ``mode``
             (the most frequent class) are how class codes are put on the grid, elevation, age and canopy being
             interpolated (bilinear) in both. See ``resample_layer``.
@@ -116,8 +119,14 @@ class Raster:
         layers, known = self._read_layers(paths)
         if NO_DATA not in table:
             known["fuel"] = known["fuel"] & (layers["fuel"] != NO_DATA)
-        window = {"size": self.size, "row": self.row, "column": self.column, "min_fuel": self.min_fuel}
-        object.__setattr__(self, "_crop", Crop(**self._make_planes(layers, known, table), **window))
+        crop = Crop(
+            **self._make_planes(layers, known, table),
+            size=self.size,
+            row=self.row,
+            column=self.column,
+            min_fuel=self.min_fuel,
+        )
+        object.__setattr__(self, "_crop", crop)
 
     def __call__(self, key: Tensor) -> Landscape:
         """Return the landscape of each world's window, with its ``corner`` in ``grid``, batch size [B]."""
@@ -159,10 +168,10 @@ class Raster:
 
     def _make_planes(
         self, layers: Mapping[str, np.ndarray], known: Mapping[str, np.ndarray], table: Mapping[int, int]
-    ) -> dict[str, np.ndarray | None]:
+    ) -> dict[str, Any]:
         """Return the planes of the map, and where it is known, by their names in ``Crop``."""
         cover = to_cover(layers["fuel"], known["fuel"], table)
-        planes: dict[str, np.ndarray | None] = {"cover": cover, "fuel": to_fuel(layers["fuel"], known["fuel"])}
+        planes: dict[str, Any] = {"cover": cover, "fuel": to_fuel(layers["fuel"], known["fuel"])}
         if "elevation" in layers:
             metres = to_metres(layers["elevation"], known["elevation"])
             planes["elevation"] = metres if self.nodata == "refuse" else fill(metres, known["elevation"])
@@ -200,6 +209,9 @@ class Raster:
     def _read_layers(self, paths: Mapping[str, Path]) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
         """Return the values of each layer on the grid, and where they are known; every header is checked first."""
         strict = self.resample == "refuse"
+        vector = "assets" in paths and paths["assets"].suffix.lower() in SUFFIXES
+        shapes = paths["assets"] if vector else None
+        paths = {name: path for name, path in paths.items() if not (vector and name == "assets")}
         grid = read_grid("fuel", paths["fuel"], self.resolution is None, remedy="resolution=30 resample=mode")
         if not grid.crs:
             _tell_once(f"{paths['fuel']} has no CRS: its cells are taken as squares of {grid.cell_size:g} m")
@@ -212,6 +224,8 @@ class Raster:
             if strict:
                 check_grid(name, grids[name], "fuel", grid)
         layers, known = {}, {}
+        if shapes is not None:
+            layers["assets"], known["assets"] = read_worth(shapes, grid), np.ones(grid.shape, bool)
         for name, path in paths.items():
             if grids[name].differs_in(grid) is None:
                 layers[name], known[name] = read_layer(name, path)
