@@ -98,7 +98,7 @@ MISTAKES = {
     "fire.model must be that of landscape.table, fbp, got fbfm40": {"fire.model": "fbfm40"},
     "weather must be a CSV file that can be read": {"weather": "nowhere.csv"},
     "weather must name a CSV file of weather, got null": {"weather": "null"},
-    "ignition must be a file": {"ignition": "nowhere.csv"},
+    "ignition.path must name a file that exists": {"ignition": "nowhere.csv"},
     "start must be a date and time as the first row has it, '2024-07-01 12:00'": {"start": "noon"},
     "landscape.row and landscape.column must be given": {"landscape.size": 20},
     "wind_height must be 10m or 20ft or null": {"wind_height": "2m"},

@@ -159,7 +159,7 @@ def test_history_comes_in_minutes_as_the_prediction_does():
     cells = ground().age.clone()
     cells[0, SIDE // 2, SIDE // 2] = 11
     history = fire_history(
-        cells, ground().cover, fire=EVEN, fuel=ground().fuel, weather=weather(270.0), ticks=12, cell_size=50.0
+        cells, ground().cover, fire=EVEN, fuel=ground().fuel, weather=weather(270.0), ticks=24, cell_size=50.0
     )
     minutes = history.arrival_minutes[0]
     came = ~minutes.isnan()

@@ -9,10 +9,10 @@ from torch import Tensor
 from warp_torchrl.config.prediction_options import PredictionOptions
 from warp_torchrl.maps.geotiff import local_grid
 from warp_torchrl.prediction.files import Place
-from warp_torchrl.prediction.ignition import read_ignition
 from warp_torchrl.weather.convergence import grid_convergence
 from warp_torchrl.weather.table import WeatherTable, minutes_until, read_weather
 from warp_torchrl.world.fuel_bed import COVER_FUEL
+from warp_torchrl.world.ignition_file import read_ignition
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.rate import RateFire
 from warp_torchrl.world.state import Landscape
