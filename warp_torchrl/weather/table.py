@@ -13,7 +13,7 @@ from torch import Tensor
 from warp_torchrl.weather.columns import QUANTITIES, Column, find_columns
 from warp_torchrl.weather.dead_moisture import dead_moisture
 from warp_torchrl.weather.fwi import buildup_index, hourly_ffmc
-from warp_torchrl.weather.times import row_hours
+from warp_torchrl.weather.times import hours_until, row_hours
 
 WindHeight = Literal["10m", "20ft"]
 """At what height over open ground wind was measured: by the Canadian and international custom, or the American."""
@@ -98,6 +98,16 @@ def read_weather(
     height: WindHeight = wind_height or ("20ft" if columns["wind_speed"].unit == "mph" else "10m")
     known = {name: value for name, value in values.items() if value is not None}
     return WeatherTable(hours=hours, wind_height=height, **_complete(known, hours, height, start_ffmc, bui))
+
+
+def minutes_until(moment: str, path: str | Path) -> float:
+    """Return the minutes from the first row of a CSV file to a date and time, written as its rows have them.
+
+    Raises:
+        ValueError: In one line: if the file cannot be read, has no times, or they are written otherwise.
+    """
+    headers, rows = _read_rows(Path(path))
+    return 60.0 * hours_until(moment, headers, rows)
 
 
 def _read_rows(path: Path) -> tuple[list[str], list[list[str]]]:

@@ -1,7 +1,9 @@
 """Fires alone under law ``rate``: many on one map, in weather by the hour, from their ignition to an end."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
 import torch
@@ -61,10 +63,34 @@ def arrival_minutes(
     fuel = (fire.flammability(landscape)[0] > 0.0) & (landscape.age[0] >= fire.youngest_fuel)
     hours = [_hour(fire, landscape, cell_size, spell, fuel) for spell in spells]
     size = (fuel.shape[0], fuel.shape[1])
-    for keys, burning in zip(key.split(_AT_ONCE), lit.expand(len(key), *size).split(_AT_ONCE), strict=True):
-        fires = Spreading(burning, fuel, fire.pace(keys, size))
+
+    def burned(part: tuple[Tensor, Tensor]) -> Tensor:
+        fires = Spreading(part[1], fuel, fire.pace(part[0], size))
         fires.burn(hours)
-        yield fires.arrival().clone()
+        return fires.arrival().clone()
+
+    parts = zip(key.split(_AT_ONCE), lit.expand(len(key), *size).split(_AT_ONCE), strict=True)
+    yield from _side_by_side(burned, parts, 1 if lit.is_cuda else torch.get_num_threads())
+
+
+def _side_by_side(
+    function: Callable[[tuple[Tensor, Tensor]], Tensor], parts: Iterable[tuple[Tensor, Tensor]], workers: int
+) -> Iterator[Tensor]:
+    """Yield a function of each part, in order, computed by so many threads.
+
+    Few operations of a fire are large enough for torch's own threads, so fires take one each.
+    """
+    if workers == 1:
+        yield from map(function, parts)
+        return
+    waiting: deque[Future[Tensor]] = deque()
+    with ThreadPoolExecutor(workers, initializer=torch.set_num_threads, initargs=(1,)) as pool:
+        for part in parts:
+            waiting.append(pool.submit(function, part))
+            if len(waiting) > workers:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
 
 
 def _hour(fire: RateFire, landscape: Landscape, cell_size: float, spell: Spell, fuel: Tensor) -> Hour:
