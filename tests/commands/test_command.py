@@ -14,6 +14,7 @@ from hydra.core.plugins import Plugins
 
 from tests.forgery import forge
 from warp_torchrl import load_policy, make_env
+from warp_torchrl.commands import checks as checks_module
 from warp_torchrl.commands import command as command_module
 from warp_torchrl.commands.command import evaluate, train
 from warp_torchrl.runs import checkpoint
@@ -141,6 +142,30 @@ def test_an_evaluation_never_writes_into_a_run_unless_told_to(trained, run_here,
     assert replaced == {"evaluation.json", "episode.gif", "evaluate.log"}
 
 
+@pytest.mark.parametrize("what", [("policy=coordinated",), ("checkpoint=skirmish", "evaluation.mode=deterministic")])
+def test_an_evaluation_draws_maps_of_one_ground(run_here, tmp_path, what):
+    pytest.importorskip("rasterio", reason="maps need the extra gis")
+    pytest.importorskip("matplotlib", reason="maps need the extra figures")
+    few = ("maps_fires=4", "evaluation.episodes=2", "horizon=8")
+    code, errors, said = run_here("evaluate.py", *what, *few, "maps=true", "hydra.run.dir=seen")
+    assert code == 0, errors
+    assert "maps: 4 fires on the ground of seed 1000000" in said
+    kinds = ("difference", "with", "without")
+    written = {path.name for path in (tmp_path / "seen").iterdir()} - {"evaluate.log"}
+    assert written == {
+        "evaluation.json", "episode.gif", "maps.png", *(f"burn_probability_{kind}.tif" for kind in kinds),
+    }  # fmt: skip
+    numbers = json.loads((tmp_path / "seen" / "evaluation.json").read_text())["maps"]
+    assert numbers["fires"] == 4 and set(numbers["burned_ha"]["difference"]) >= {"mean", "ci95"}
+
+
+def test_maps_say_which_extras_they_need(run_here, tmp_path, monkeypatch):
+    monkeypatch.setattr(checks_module, "find_spec", lambda name: None if name == "rasterio" else name)
+    code, errors, _ = run_here("evaluate.py", *NOOP, "maps=true", "hydra.run.dir=seen")
+    assert code == 2 and 'maps needs rasterio, not installed: pip install "warp_torchrl[figures,gis]"' in errors[-1]
+    assert not (tmp_path / "seen").exists()
+
+
 def test_an_evaluation_never_writes_over_another_nor_a_sweep_over_a_sweep(run_here, tmp_path):
     (tmp_path / "seen").mkdir()
     (tmp_path / "seen" / "evaluate.log").write_text("an earlier mistake\n")
@@ -190,6 +215,10 @@ def test_training_does_not_replace_an_evaluation(run_here, tmp_path):
         ("landscape=raster", 2, "landscape.path must name"),
         ("team.n_agents=70", 2, "team.n_agents must be"),
         ("overwrite=maybe", 2, "overwrite must be true or false"),
+        ("maps=maybe", 2, "maps must be true or false"),
+        ("maps_fires=1", 2, "maps_fires must be a whole number in 2..1000000, got 1"),
+        ("maps_fires=2.5", 2, "maps_fires must be a whole number"),
+        ("maps_fires=20", 2, "maps_fires must come with maps=true, got 20 alone"),
         ("other weights", 4, "is of another architecture"),
         ("cut", 4, "policy.pt is missing or was cut"),
     ],

@@ -52,7 +52,7 @@ def tick_cost(
             contenders["compiled"], cells["compiled"] = _ours(world, state, fuse=True), n_worlds
         except ValueError as error:
             skipped.append({"what": "compiled", "skipped": str(error)})
-    if plays(world.fire, world.air):
+    if isinstance(world.fire, Fire) and plays(world.fire, world.air):
         peers = [
             numpy_copy(state, index, world.fire, world.side_of_cell) for index in range(min(n_worlds, _NUMPY_WORLDS))
         ]

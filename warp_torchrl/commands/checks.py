@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,8 @@ from warp_torchrl.commands.failure import fail
 from warp_torchrl.commands.sweep import jobs
 from warp_torchrl.config.compose import HYDRA_ERRORS, check_choices, explain, plain, restore
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.run_config import run_config
+from warp_torchrl.config.run_config import RunConfig, run_config
+from warp_torchrl.config.seeds import BEYOND_EVALUATION
 from warp_torchrl.evaluation.evaluate import check_policy
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.nearest import did_you_mean
@@ -23,6 +25,8 @@ from warp_torchrl.runs.destination import check_free
 from warp_torchrl.runs.resumption import resumption
 from warp_torchrl.runs.shipped import find_policy
 from warp_torchrl.runs.transfer import check_start
+
+_MOST_FIRES = 1_000_000
 
 
 class CheckFirst(Callback):
@@ -98,16 +102,51 @@ def _check_evaluation(values: Mapping[str, Any], overrides: Sequence[str]) -> No
         raise ConfigError(f"policy must be one of {', '.join(HEURISTICS)}, got {policy}{hint}")
     if not isinstance(values["overwrite"], bool):
         raise ConfigError(f"overwrite must be true or false, got {values['overwrite']!r}")
+    fires = map_fires(values)
+    if fires is None and any(each.startswith("maps_fires=") for each in overrides):
+        raise ConfigError(f"maps_fires must come with maps=true, got {values['maps_fires']} alone")
     if checkpoint is None:
-        check_policy(run_config(without_checkpoint(values)), policy)
-        return
-    found, _ = checkpoints.newest(find_policy(str(checkpoint)))
-    check_policy(run_config(plain(restore(found.record(), of_worlds(overrides)))), found)
+        plan, found = run_config(without_checkpoint(values)), policy
+    else:
+        found, _ = checkpoints.newest(find_policy(str(checkpoint)))
+        plan = run_config(plain(restore(found.record(), of_worlds(overrides))))
+    check_maps(plan, fires)
+    check_policy(plan, found)
+
+
+def map_fires(values: Mapping[str, Any]) -> int | None:
+    """Return how many fires the maps of an evaluation have, None where none are asked for.
+
+    Raises:
+        ConfigError: If ``maps`` is no truth or ``maps_fires`` no such number, or what writes maps is not installed.
+    """
+    maps, fires = values["maps"], values["maps_fires"]
+    if not isinstance(maps, bool):
+        raise ConfigError(f"maps must be true or false, got {maps!r}")
+    if type(fires) is not int or not 2 <= fires <= _MOST_FIRES:
+        raise ConfigError(f"maps_fires must be a whole number in 2..{_MOST_FIRES}, got {fires!r}")
+    missing = [name for name in ("matplotlib", "rasterio") if maps and find_spec(name) is None]
+    if missing:
+        raise ConfigError(f'maps needs {" and ".join(missing)}, not installed: pip install "warp_torchrl[figures,gis]"')
+    return fires if maps else None
+
+
+def check_maps(plan: RunConfig, fires: int | None) -> None:
+    """Check that the fires of the maps have seeds that no training has.
+
+    Raises:
+        ConfigError: If the last one's is beyond those of evaluations.
+    """
+    highest = BEYOND_EVALUATION - (fires or 0)
+    if plan.evaluation.first_seed > highest:
+        first = plan.evaluation.first_seed
+        raise ConfigError(f"evaluation.first_seed must be in 0..{highest} for {fires} fires of the maps, got {first}")
 
 
 def of_worlds(overrides: Sequence[str]) -> list[str]:
     """Return the overrides of an evaluation that are not the command's own."""
-    return [each for each in overrides if not each.startswith(("checkpoint=", "policy=", "overwrite="))]
+    own = ("checkpoint=", "policy=", "overwrite=", "maps=", "maps_fires=")
+    return [each for each in overrides if not each.startswith(own)]
 
 
 def without_checkpoint(values: Mapping[str, Any]) -> dict[str, Any]:

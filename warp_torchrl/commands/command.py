@@ -13,7 +13,7 @@ from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 
 from warp_torchrl.commands.allocation import keep_freed_memory
-from warp_torchrl.commands.checks import new_total, of_worlds, without_checkpoint
+from warp_torchrl.commands.checks import map_fires, new_total, of_worlds, without_checkpoint
 from warp_torchrl.commands.failure import fail
 from warp_torchrl.commands.sweep import SweepSummary, remove_failure, save_failure, summarise_unfinished
 from warp_torchrl.config.compose import (
@@ -125,13 +125,14 @@ def _evaluate_job(config: DictConfig) -> None:
     folder = Path(HydraConfig.get().runtime.output_dir)
     if not config.overwrite:
         check_free(folder, "hydra.run.dir")  # again: two jobs of a sweep may have the same folder
-    given, name = config.checkpoint, config.policy
+    given, name, fires = config.checkpoint, config.policy, map_fires(plain(config))
     if given is None:
-        evaluate_policy(run_config(without_checkpoint(plain(config))), folder, name, world_overrides(plain(config)))
+        values = without_checkpoint(plain(config))
+        evaluate_policy(run_config(values), folder, name, world_overrides(values), fires)
         return
     found = _newest(find_policy(given))
     values = plain(restore(found.record(), of_worlds(HydraConfig.get().overrides.task)))
-    evaluate_policy(run_config(values), folder, found, world_overrides(values))
+    evaluate_policy(run_config(values), folder, found, world_overrides(values), fires)
 
 
 # The saved configuration

@@ -34,7 +34,7 @@ ENVIRONMENT = COMPONENTS[: COMPONENTS.index("reward") + 1]
 """Those that make an environment."""
 WORLD_KEYS = ("scenario", "landscape", "wind", "fire", "team", "ignition", "steps_per_tick", "horizon", "cell_size")
 """What a scenario sets."""
-COMMAND_KEYS = ("resume", "start_from", "debug", "policy", "overwrite")
+COMMAND_KEYS = ("resume", "start_from", "debug", "policy", "overwrite", "maps", "maps_fires")
 """What the commands read themselves."""
 
 

@@ -1,4 +1,4 @@
-"""Evaluation of a policy beside the baselines on the same fires: table, ``evaluation.json`` and ``episode.gif``."""
+"""Evaluation of a policy beside the baselines on the same fires: table, ``evaluation.json``, ``episode.gif``, maps."""
 
 import logging
 from collections.abc import Sequence
@@ -10,6 +10,7 @@ from warp_torchrl.api import policy_of
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.evaluation.maps import described, play_maps, write_maps
 from warp_torchrl.evaluation.method import method
 from warp_torchrl.evaluation.play import BASELINES, Episodes, WithoutAgent, play, play_heuristics, record_episode
 from warp_torchrl.evaluation.report import report, table, write_json
@@ -21,7 +22,13 @@ from warp_torchrl.runs import disk
 log = logging.getLogger("warp_torchrl")
 
 
-def evaluate_policy(plan: RunConfig, folder: Path, found: checkpoints.Checkpoint | str, worlds: Sequence[str]) -> None:
+def evaluate_policy(
+    plan: RunConfig,
+    folder: Path,
+    found: checkpoints.Checkpoint | str,
+    worlds: Sequence[str],
+    map_fires: int | None = None,
+) -> None:
     """Evaluate a checkpoint or a heuristic beside the baselines: table, ``evaluation.json`` and ``episode.gif``.
 
     Args:
@@ -29,6 +36,7 @@ def evaluate_policy(plan: RunConfig, folder: Path, found: checkpoints.Checkpoint
         folder: The output folder.
         found: The checkpoint, or the heuristic's name.
         worlds: Overrides by which the worlds differ from their scenario.
+        map_fires: Fires of the maps; None makes no maps.
     """
     first, folder = plan.evaluation.first_seed, folder.resolve()
     env, one = plan.make_env(plan.evaluation.episodes, first), plan.make_env(1, first)
@@ -48,12 +56,22 @@ def evaluate_policy(plan: RunConfig, folder: Path, found: checkpoints.Checkpoint
     content = report(
         plan.scenario, name, first, episodes, others, other_modes, left_out, learner, digest, worlds, frames
     )
+    if map_fires is not None:
+        log.info("playing %d fires on one ground for the maps, without the team and with it", map_fires)
+    maps = None if map_fires is None else play_maps(plan, lambda env: _actor(found, env, actor), mode, map_fires)
+    if maps is not None:
+        content["maps"] = maps.numbers()
     folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / "evaluation.json", content)
     print(table(content), flush=True)
+    if maps is not None:
+        print(described(content["maps"]), flush=True)
+        title = f"{plan.scenario}: {maps.seeds[1]} fires on one ground, {maps.horizon} steps"
+        write_maps(folder, maps, getattr(plan.world.landscape, "grid", None), title, name)
     with disk.with_path(folder / "episode.gif"):
         record_episode(folder / "episode.gif", one, filmed, f"{plan.scenario}\n{name}", first, mode)
-    log.info("wrote evaluation.json and episode.gif into %s", folder)
+    wrote = "evaluation.json and episode.gif" if maps is None else "evaluation.json, episode.gif and maps"
+    log.info("wrote %s into %s", wrote, folder)
 
 
 def check_policy(plan: RunConfig, found: checkpoints.Checkpoint | str) -> None:
@@ -78,6 +96,13 @@ def _actors(
     except ValueError as error:
         raise ConfigError(f"the policy in {found.path} does not fit here: {error}") from None
     return f"trained, {policy.mode}", policy.mode, policy, policy
+
+
+def _actor(
+    found: checkpoints.Checkpoint | str, env: WildfireEnv, trained: TensorDictModuleBase
+) -> TensorDictModuleBase:
+    """Return the policy for an environment: a heuristic reads one, a trained policy takes any."""
+    return HEURISTICS[found](env) if isinstance(found, str) else trained
 
 
 _PLAYED: dict[str, tuple[RunConfig, dict[str, Episodes]]] = {}

@@ -13,8 +13,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from warp_torchrl.drawing import save, style
 from warp_torchrl.gallery.curves import curve_figures
-from warp_torchrl.gallery.drawing import save, style
 from warp_torchrl.gallery.fires import fire_plain, fire_terrain_wind
 from warp_torchrl.gallery.landscapes import burn_probability
 from warp_torchrl.gallery.laws import ellipses, fire_sizes, isotropy

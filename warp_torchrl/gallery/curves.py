@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from warp_torchrl.gallery.drawing import SOFT, sheet
+from warp_torchrl.drawing import SOFT, sheet
 from warp_torchrl.gallery.runs import FRAMES, MOST_ROWS, SECONDS, Run, read_run, run_folders
 from warp_torchrl.summary import line_style
 

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from warp_torchrl.gallery.drawing import (
+from warp_torchrl.drawing import (
     BLUE,
     CELL,
     INK,

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Literal
 import torch
 from torch import Tensor
 
-from warp_torchrl.gallery.drawing import CELL, contours, cover_image, cover_legend, hillshade, relief, sheet, show_map
+from warp_torchrl.drawing import CELL, contours, cover_image, cover_legend, hillshade, relief, sheet, show_map
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.state import Cover
 from warp_torchrl.world.terrain.landscape import Perlin

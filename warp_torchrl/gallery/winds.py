@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from warp_torchrl.gallery.drawing import BLUE, CELL, GRID, VERMILION, places, ramp, sheet
+from warp_torchrl.drawing import BLUE, CELL, GRID, VERMILION, places, ramp, sheet
 from warp_torchrl.world.burn import burn, start_burning
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.random import world_key

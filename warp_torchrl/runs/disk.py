@@ -18,8 +18,12 @@ def sync(path: Path) -> None:
         os.close(descriptor)
 
 
-def replace(path: Path, text: str) -> None:
+def replace(path: Path, content: str | bytes) -> None:
     """Replace a file atomically: readers find the old or the new content, also after a crash.
+
+    Args:
+        path: The file.
+        content: Its new content; a text is written as UTF-8, line ends as they are.
 
     Raises:
         OSError: If the write fails, with the path; the old file stays.
@@ -27,7 +31,7 @@ def replace(path: Path, text: str) -> None:
     draft = path.with_name(f".{path.name}.tmp")
     try:
         with with_path(path):
-            draft.write_text(text, encoding="utf-8", newline="")
+            draft.write_bytes(content.encode() if isinstance(content, str) else content)
             sync(draft)
             draft.replace(path)
             sync(path.parent)

@@ -47,6 +47,11 @@ class Automaton(ABC):
         return 1
 
     @property
+    def minutes(self) -> float | None:
+        """Return the minutes of a tick; None where it has none."""
+        return None
+
+    @property
     def last_spreading(self) -> int:
         """Return the cell code of the last stage that spreads and can be put out."""
         return FIRST_FIRE + self.burning_stages - 1

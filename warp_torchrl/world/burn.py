@@ -62,13 +62,13 @@ def start_burning(
     ground = Landscape(cover=cover, age=cells, elevation=elevation)
     nobody = Team(n_agents=1).place(key, cover, is_burning(cells))
     air = wind(key, (cells.shape[1], cells.shape[2]))
-    state = initial_state(ground, fire, air, key, nobody, cell_size, wind.moisture(torch.zeros_like(key)))
+    state = initial_state(ground, fire, air, key, nobody, cell_size, wind.moisture(key, torch.zeros_like(key)))
     state = fire.started(state)
     if state.stage_age is not None and stage_age is not None:
         state = state.replace(stage_age=stage_age)
     for tick in range(1, first_tick + 1 if wind.changes else 1):
         state = state.replace(tick=torch.full_like(state.tick, tick))
-        state = in_wind(state, fire, wind.after_tick(state), wind.moisture(state.tick))
+        state = in_wind(state, fire, wind.after_tick(state), wind.moisture(state.key, state.tick))
     return state.replace(tick=torch.full_like(state.tick, first_tick))
 
 

@@ -33,6 +33,7 @@ class Stream(IntEnum):
     GUST = 11
     TERRAIN = 12
     PACE = 13
+    WEATHER = 14
 
 
 def world_key(seed: Tensor, episode: Tensor | int = 0) -> Tensor:

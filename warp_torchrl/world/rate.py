@@ -166,30 +166,42 @@ class RateFire(Automaton):
         burning cell is an origin from now on.
         """
         before, after = self._mean_rate(state, state.air), self._mean_rate(state, air)
-        now = (state.tick * self.minutes)[:, None, None]
-        arrivals = _of(state)
+        arrivals, now = _of(state), self._now(state)
         ratio = torch.where((before > 0.0) & (after > 0.0), before / after, 1.0)
         waits = arrivals.minutes < NEVER / 2
         minutes = torch.where(waits, now + (arrivals.minutes - now) * ratio, arrivals.minutes)
         origin = torch.where(is_burning(state.cells), _own_cell(state.cells), NOWHERE)
         return state.replace(air=air, arrivals=Arrivals(minutes, origin))
 
+    def can_ignite(self, state: WorldState) -> Tensor:
+        """Return which trees can ignite now and burn where they stand, bool [B, H, W]."""
+        return self.is_fuel(state) & (state.alpha > 0.0)
+
+    def sources(self, state: WorldState) -> tuple[Arrivals, Tensor]:
+        """Return what is kept of arrivals, and the times that neighbours go by, float32 [B, H, W].
+
+        They are those of cells that burn, and of trees that the fire has not reached yet.
+        """
+        kept = _of(state)
+        ahead = self.can_ignite(state) & (kept.minutes > self._now(state))
+        return kept, torch.where(self.spreads(state) | ahead, kept.minutes, NEVER)
+
+    def reached(self, state: WorldState) -> Tensor:
+        """Return when the fire reached the cells that burn or have burned, else ``NEVER``, float32 [B, H, W]."""
+        return torch.where(is_tree(state.cells), NEVER, _of(state).minutes)
+
     def next_arrivals(self, state: WorldState) -> Arrivals:
         """Return when the fire reaches each cell that can ignite and is beside it, else ``NEVER``."""
-        kept, fuel, spreads = _of(state), self.is_fuel(state) & (state.alpha > 0.0), self.spreads(state)
-        ahead = fuel & (kept.minutes > (state.tick * self.minutes)[:, None, None])
-        times = torch.where(spreads | ahead, kept.minutes, NEVER)
-        reached = torch.where(is_tree(state.cells), NEVER, kept.minutes).flatten(1)
-        row, column = _rows_and_columns(state.cells)
+        kept, times = self.sources(state)
+        reached, (row, column) = self.reached(state).flatten(1), _rows_and_columns(state.cells)
 
         def time_of(origin: Tensor) -> Tensor:
             return reached.gather(1, origin.flatten(1).to(torch.int64)).view(origin.shape)
 
         places = Places(row, column, state.cells.shape[2], time_of)
-        minutes, origin = arrival(
-            _neighbours(times, NEVER), _neighbours(kept.origin, NOWHERE), self._metric(state, state.air), places
-        )
-        beside = grow(spreads) & fuel & (minutes < NEVER / 2)
+        around = _neighbours(times, NEVER), _neighbours(kept.origin, NOWHERE)
+        minutes, origin = arrival(*around, self._metric(state, state.air), places)
+        beside = grow(self.spreads(state)) & self.can_ignite(state) & (minutes < NEVER / 2)
         return Arrivals(torch.where(beside, minutes, NEVER), torch.where(beside, origin, NOWHERE))
 
     def tick(self, state: WorldState, u: Tensor, ticks_now: Tensor) -> WorldState:
@@ -214,10 +226,14 @@ class RateFire(Automaton):
     def ignition_probability(self, state: WorldState) -> Tensor:
         """Return 1 where the fire arrives in the next tick, else a tick's share of the minutes until it does.
 
-        Joined with p_spont; float32 [B, H, W], 0 where nothing can ignite or the fire is not beside the tree.
+        Or p_spont, where that is more; float32 [B, H, W], 0 where nothing can ignite.
         """
-        wait = self.next_arrivals(state).minutes - (state.tick * self.minutes)[:, None, None]
-        spread = (self.minutes / wait.clamp(min=self.minutes)) * (wait < NEVER / 2)
+        return self.share_of_tick(state, self.next_arrivals(state))
+
+    def share_of_tick(self, state: WorldState, coming: Arrivals) -> Tensor:
+        """Return what ``ignition_probability`` does of these arrivals."""
+        wait = coming.minutes - self._now(state)
+        spread = (self.minutes / wait.clamp(min=self.minutes)) * (coming.minutes < NEVER / 2)
         return spread if self.beta == 0.0 else torch.maximum(spread, self.spontaneous(state))
 
     def expected_ignitions(self, state: WorldState) -> Tensor:
@@ -226,16 +242,20 @@ class RateFire(Automaton):
         A neighbour that takes several ticks counts for its share of them.
         """
         total = torch.zeros_like(state.alpha)
-        fuel = self.is_fuel(state) & (state.alpha > 0.0)
-        for direction, rate in enumerate(self._rates_into(state, state.air)):
+        fuel, metric = self.can_ignite(state), self._metric(state, state.air)
+        for direction in range(8):
+            rate = rate_from(direction, metric)
             share = (rate * self.minutes).clamp(max=1.0) * fuel
             total = total + neighbour_in((direction + 4) % 8, share)
         return total * self.spreads(state)
 
+    def _now(self, state: WorldState) -> Tensor:
+        return (state.tick * self.minutes)[:, None, None]
+
     def _held(self, before: WorldState, after: WorldState) -> WorldState:
         """Return the worlds after a tick in which cells that are about to burn out wait for their neighbours."""
-        open_cells = self.is_fuel(after) & (after.alpha > 0.0)
-        holds = (before.cells == self.last_spreading) & (after.cells != before.cells) & grow(open_cells)
+        ends = (before.cells == self.last_spreading) & (after.cells != before.cells)
+        holds = ends & grow(self.can_ignite(after))
         kept = {
             name: torch.where(holds, getattr(before, name), getattr(after, name))
             for name in ("cells", "age", "stage_age", "burned")
@@ -249,23 +269,23 @@ class RateFire(Automaton):
             raise ValueError("the worlds must be those of a fire with rates of spread")
         return made[:, 0] * pace, made[:, 1] * pace, made[:, 2] * pace
 
-    def _rates_into(self, state: WorldState, air: Air) -> list[Tensor]:
-        """Return 1 / F into each cell from its neighbour in each direction, float32 [B, H, W] each [1/min]."""
-        metric = self._metric(state, air)
-        return [
-            1.0 / duration(metric, torch.full_like(metric[0], -column), torch.full_like(metric[0], row)).clamp(min=1e-9)
-            for row, column in DIRECTIONS
-        ]
-
     def _mean_rate(self, state: WorldState, air: Air) -> Tensor:
         """Return the sum of the rates from each burning cell to fuel, or from burning cells into fuel [B, H, W]."""
         burning = self.spreads(state)
-        fuel = (self.is_fuel(state) & (state.alpha > 0.0)).to(torch.float32)
+        fuel, metric = self.can_ignite(state).to(torch.float32), self._metric(state, air)
         into, out = torch.zeros_like(fuel), torch.zeros_like(fuel)
-        for direction, rate in enumerate(self._rates_into(state, air)):
+        for direction in range(8):
+            rate = rate_from(direction, metric)
             into = into + rate * neighbour_in(direction, burning.to(torch.float32))
             out = out + neighbour_in((direction + 4) % 8, rate * fuel)
         return torch.where(burning, out, into * fuel)
+
+
+def rate_from(direction: int, metric: Metric) -> Tensor:
+    """Return 1 / F into cells from their neighbours in a direction, float32, shape of the metric's [1/min]."""
+    row, column = DIRECTIONS[direction]
+    east, north = torch.full_like(metric[0], -column), torch.full_like(metric[0], row)
+    return 1.0 / duration(metric, east, north).clamp(min=1e-9)
 
 
 def _of(state: WorldState) -> Arrivals:

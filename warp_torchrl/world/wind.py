@@ -42,7 +42,7 @@ class Wind(ABC):
         """Return the field of each world after its tick number ``state.tick``, shape of ``state.wind`` [m/s]."""
         return state.wind
 
-    def moisture(self, tick: Tensor) -> Tensor | None:
+    def moisture(self, key: Tensor, tick: Tensor) -> Tensor | None:
         """Return the moisture of dead and live fuel after tick number ``tick``, int [B], or None where it says none.
 
         Returns:
@@ -54,7 +54,15 @@ class Wind(ABC):
         self, key: Tensor, size: tuple[int, int], corner: Tensor | None = None
     ) -> Iterator[tuple[Tensor, Tensor | None]]:
         """Return the fields that it is known to have, each with its moisture: here that of the start."""
-        yield self(key, size, corner), self.moisture(torch.zeros_like(key))
+        yield self(key, size, corner), self.moisture(key, torch.zeros_like(key))
+
+    def paced(self, minutes: float | None) -> "Wind":
+        """Return the wind for ticks of so many minutes; None where they have none.
+
+        Raises:
+            ValueError: If it asks for minutes and there are none.
+        """
+        return self
 
     def over(self, landscape: LandscapeSource) -> "Wind":
         """Return the wind on a landscape's map.

@@ -64,8 +64,9 @@ class World:
     def __post_init__(self) -> None:
         check_fields(self, steps_per_tick=(1, 1000), horizon=(1, 1_000_000), cell_size=(0.01, 100_000.0))
         height, width = self.size
-        air = self.air  # refuses a wind that does not fit the landscape
-        object.__setattr__(self, "fire", self.fire.over(self.landscape, air, self.side_of_cell))
+        unpaced = self.wind.over(self.landscape)  # refuses a wind that does not fit the landscape
+        object.__setattr__(self, "fire", self.fire.over(self.landscape, unpaced, self.side_of_cell))
+        _ = self.air
         if self.team.n_agents > height * width // 4:
             raise ValueError(
                 f"team.n_agents must be at most a quarter of the map's {height * width} cells, got {self.team.n_agents}"
@@ -89,7 +90,7 @@ class World:
     @cached_property
     def air(self) -> Wind:
         """Return the wind on this landscape's map."""
-        return self.wind.over(self.landscape)
+        return self.wind.over(self.landscape).paced(self.fire.minutes)
 
     def reset(self, seed: Tensor, episode: Tensor) -> WorldState:
         """Start an episode in each world: the ground, the fire after its head start, the team.
@@ -126,7 +127,7 @@ class World:
             key,
             vehicles,
             self.side_of_cell,
-            self.air.moisture(torch.zeros_like(key)),
+            self.air.moisture(key, torch.zeros_like(key)),
         )
         cells = state.cells
         state = state.replace(cells=torch.where(lit, FIRST_FIRE, cells), age=torch.where(lit, cells, state.age))
@@ -244,7 +245,7 @@ def advance(state: WorldState, fire: Automaton, wind: Wind, ticks_now: Tensor) -
     if not wind.changes:
         return after
     now = torch.where(ticks_now[:, None, None, None], wind.after_tick(after), state.wind)
-    return in_wind(after, fire, now, wind.moisture(after.tick))
+    return in_wind(after, fire, now, wind.moisture(after.key, after.tick))
 
 
 def in_wind(state: WorldState, fire: Automaton, wind: Tensor, moisture: Tensor | None = None) -> WorldState:

@@ -12,6 +12,7 @@ from torch import Tensor
 from torch.compiler import is_compiling
 
 from warp_torchrl.world.automaton import Automaton
+from warp_torchrl.world.fast.band import AtBand
 from warp_torchrl.world.fast.bytes import number
 from warp_torchrl.world.fast.edge import AtEdge
 from warp_torchrl.world.fast.planes import Planes
@@ -19,6 +20,7 @@ from warp_torchrl.world.fast.table import pattern_table
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.hazard import HazardFire
 from warp_torchrl.world.random import Stream, uniform
+from warp_torchrl.world.rate import RateFire
 from warp_torchrl.world.state import Air, Forecast, Ground, WorldState, is_tree
 
 COVERED = (Fire, HazardFire)
@@ -64,10 +66,13 @@ def fastest(fire: Automaton, device: torch.device) -> Road:
     A CPU computes a tick at the fire's edge alone where trees neither grow nor ignite by themselves, unless whole maps
     are compiled.
     """
+    on_cpu = device.type == "cpu" and not is_compiling()
+    if type(fire) is RateFire and on_cpu:
+        return AtBand(fire)
     if not isinstance(fire, Fire) or type(fire) not in COVERED:
         return Page(fire)
     spreads_alone = not fire.growth and fire.beta == 0.0 and fire.p_regrow == 0.0
-    return AtEdge(fire) if spreads_alone and device.type == "cpu" and not is_compiling() else Planes(fire)
+    return AtEdge(fire) if spreads_alone and on_cpu else Planes(fire)
 
 
 def forecast(fire: Automaton, state: WorldState) -> Forecast:

@@ -12,7 +12,8 @@ from torch import Tensor
 from torch.nn.functional import pad
 
 from warp_torchrl.world.geometry import DIRECTIONS
-from warp_torchrl.world.travel import NEVER, NOWHERE, Metric, Places, arrival, duration
+from warp_torchrl.world.rate import rate_from
+from warp_torchrl.world.travel import NEVER, NOWHERE, Metric, Places, arrival
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +155,7 @@ class Spreading:
         metric, total = self._metric(travel, cells), torch.zeros(len(cells), device=cells.device)
         for direction in range(8):
             neighbour = self._burned[cells + self._offsets[direction]].to(torch.float32)
-            total = total + _rate(metric, direction) * neighbour
+            total = total + rate_from(direction, metric) * neighbour
         return total
 
     def _rates_out(self, travel: Tensor, cells: Tensor) -> Tensor:
@@ -162,12 +163,5 @@ class Spreading:
         for direction in range(8):
             target = cells - self._offsets[direction]
             fuel = self._fuel[self._place(target).long()] & ~self._burned[target]
-            total = total + _rate(self._metric(travel, target), direction) * fuel.to(torch.float32)
+            total = total + rate_from(direction, self._metric(travel, target)) * fuel.to(torch.float32)
         return total
-
-
-def _rate(metric: Metric, direction: int) -> Tensor:
-    """Return 1 / F into cells from their neighbours in a direction, float32 [n] [1/min]."""
-    row, column = DIRECTIONS[direction]
-    east, north = torch.full_like(metric[0], -column), torch.full_like(metric[0], row)
-    return 1.0 / duration(metric, east, north).clamp(min=1e-9)

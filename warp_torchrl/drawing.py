@@ -97,12 +97,18 @@ def ramp(name: str, low: float, high: float) -> Any:
     return ListedColormap(matplotlib.colormaps[name](np.linspace(low, high, 256)))
 
 
-def save(figure: "Figure", path: Path) -> None:
-    """Write a PNG, the same bytes for the same figure and Matplotlib; one of 256 colours where it would be large."""
+def save(figure: "Figure", path: Path, largest: int | None = _LARGEST) -> None:
+    """Write a PNG, the same bytes for the same figure and Matplotlib.
+
+    Args:
+        figure: The figure.
+        path: The file.
+        largest: It has 256 colours where it would be larger than that [bytes]; None keeps all colours.
+    """
     drawn = BytesIO()
     figure.savefig(drawn, format="png", dpi=_DPI)
     image = Image.open(drawn).convert("RGB")
-    if len(drawn.getvalue()) > _LARGEST:
+    if largest is not None and len(drawn.getvalue()) > largest:
         image = image.quantize(256, kmeans=2, dither=Image.Dither.NONE)
     image.save(path, "PNG", optimize=True, dpi=(_DPI, _DPI))
 

@@ -1,0 +1,1 @@
+"""Maps for a geographic information system and for the eye: GeoTIFF, GeoJSON perimeters, figures."""
