@@ -13,6 +13,7 @@ import pettingzoo
 
 from warp_torchrl.api import load_policy, make_env
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.rates.rate_of_spread import rate_of_spread
 from warp_torchrl.simulation import fire_history, simulate
 
 gymnasium.register(
@@ -25,4 +26,4 @@ if hasattr(pettingzoo, "register"):  # older ones have no registry
     pettingzoo.register("aec", "Wildfire-v0", entry_point="warp_torchrl.adapters.pettingzoo:env")
 
 __version__ = "0.1.0"
-__all__ = ["WildfireEnv", "__version__", "fire_history", "load_policy", "make_env", "simulate"]
+__all__ = ["WildfireEnv", "__version__", "fire_history", "load_policy", "make_env", "rate_of_spread", "simulate"]

@@ -194,7 +194,7 @@ MISTAKES = [
     ("landscape.size=3", r"landscape\.size must be"),
     ("landscape.size=[8]", r"landscape\.size must be"),
     ("landscape.levels=[0.5,0.2,0.1]", r"landscape\.levels must be in order"),
-    ("landscape=raster landscape.table=fbfm", r"landscape\.table must be fbfm13 or .* or a mapping, got 'fbfm'"),
+    ("landscape=raster landscape.table=fbfm", r"landscape\.table must be one of .*, got fbfm: did you mean"),
     ("landscape.thresholds=median", r"landscape\.thresholds must be quantile or minmax or printed"),
     ("wind.speed=-1", r"wind\.speed must be"),
     ("wind.speed=.nan", r"wind\.speed must be"),

@@ -13,6 +13,8 @@ from warp_torchrl.world.random import world_key
 rasterio = pytest.importorskip("rasterio")
 
 LANDFIRE = Path(__file__).parents[3] / "shared" / "landscapes" / "landfire"
+FIRES = Path(__file__).parents[3] / "shared" / "fires"
+needs_fires = pytest.mark.skipif(not FIRES.is_dir(), reason=f"the fires with an outcome are not at {FIRES}")
 needs_landfire = pytest.mark.skipif(not LANDFIRE.is_dir(), reason=f"the LANDFIRE sample is not at {LANDFIRE}")
 NODATA = -9999
 

@@ -75,6 +75,8 @@ NO_SUCH_OPTION = [
     (Fire, "kernel", ["circle"]),
     (Perlin, "frequency_law", ["texts"]),
     (Perlin, "thresholds", ["quantiles"]),
+    (Perlin, "ages", ["old"]),
+    (Array, "ages", ["old"]),
     (Team, "start", ["corners"]),
 ]
 
@@ -137,6 +139,9 @@ def test_every_field_with_a_range_is_in_the_list() -> None:
         (Array, "elevation"),
         (Array, "age"),
         (Array, "assets"),
+        (Array, "fuel"),
+        (Array, "canopy_cover"),
+        (Array, "canopy_height"),
         (Array, "row"),
         (Array, "column"),
         (Team, "allow_stay"),
@@ -161,6 +166,13 @@ def test_every_field_with_a_range_is_in_the_list() -> None:
         ("elevation", [[INF] * 5] * 4),
         ("elevation", [[1.0] * 4] * 4),
         ("elevation", np.zeros((1, 4, 5))),
+        ("fuel", [[1.5] * 5] * 4),
+        ("fuel", [[32768] * 5] * 4),
+        ("fuel", [[101] * 4] * 4),
+        ("canopy_cover", [[100.5] * 5] * 4),
+        ("canopy_cover", [[NAN] * 5] * 4),
+        ("canopy_height", [[-1.0] * 5] * 4),
+        ("canopy_height", [[151.0] * 5] * 4),
     ],
 )
 def test_a_bad_layer_of_an_array_is_an_error_that_names_it(field: str, value: Any) -> None:

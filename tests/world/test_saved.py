@@ -5,6 +5,7 @@ import torch
 
 from warp_torchrl.world.saved import filled
 from warp_torchrl.world.state import count_trees
+from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.world import World
 
@@ -29,6 +30,20 @@ def test_worlds_of_earlier_names_are_read() -> None:
     earlier |= {f"tally.{name}": leaf for name, leaf in count_trees(saved).leaves().items()}
     earlier |= {"alpha": saved.alpha, "slope": saved.ground.slope, "gain": saved.air.wind, "chances": saved.air.wind}
     assert differing(WORLD.restored(filled(start(40), earlier)), saved) == []
+
+
+def test_worlds_that_were_saved_before_landscapes_had_fuel_are_read_without_it() -> None:
+    world = World(landscape=Array(cover=[[3] * 12] * 12, fuel=[[165] * 12] * 12, canopy_cover=[[50] * 12] * 12))
+    saved = world.reset(torch.arange(3), torch.zeros(3, dtype=torch.int64))
+    assert differing(world.restored(filled(saved, saved.what_changes())), saved) == []
+    earlier = saved.what_changes()
+    assert (earlier.pop("ground.landscape.fuel") == 165).all() and (
+        earlier.pop("ground.landscape.canopy_cover") > 0
+    ).all()
+    read = world.restored(filled(saved, earlier))
+    assert read.landscape.fuel is None and read.landscape.canopy_cover is None
+    read[torch.tensor([1])] = saved[1:2]  # the next episode of a world has more than the batch that it joins
+    assert torch.equal(read.cells, saved.cells)
 
 
 @pytest.mark.parametrize(

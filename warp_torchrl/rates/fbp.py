@@ -38,8 +38,8 @@ def fbp_spread(
     """Return what the head of a fire does, in tensors of the shape that all arguments broadcast to.
 
     Everything can be differentiated by weather and moisture; at thresholds of the system the derivative is one-sided.
-    Without wind and slope the head goes where the wind of zero speed would blow to. At a buildup index of 0 nothing
-    spreads: that is the limit of eq. 54 (the package cffdrs takes 0 for "without effect").
+    Without wind and slope the head goes where the wind of zero speed would blow to. At a buildup index of 0
+    nothing but grass spreads: that is the limit of eq. 54 (the package cffdrs takes 0 for "without effect").
 
     Args:
         fuel: Codes of fuel types (see `fbp_fuels`), or what `fbp_fuels` made of them; then the five arguments from

@@ -60,6 +60,8 @@ class Landscape(Batch):
     elevation: Tensor | None  # float32 [B,H,W] [m]; None where every world is flat
     assets: Tensor | None = None  # float32 [B,H,W], what each cell is worth, any unit; None: all alike
     fuel: Tensor | None = None  # int16 [B,H,W], class codes of the fuel layer; None where there is none
+    canopy_cover: Tensor | None = None  # float32 [B,H,W] [%], 0 without trees; None where no source tells it
+    canopy_height: Tensor | None = None  # float32 [B,H,W] [m], 0 without trees; None where no source tells it
     corner: Tensor | None = None  # int64 [B,2], (row, column) of the map's first cell in its source; None: at (0, 0)
 
 

@@ -179,3 +179,37 @@ def test_a_window_has_the_assets_of_its_cells() -> None:
     worth = np.arange(80.0).reshape(8, 10)
     ground = Array(cover=np.full((8, 10), 3), assets=worth, size=4, row=2, column=5)(world_key(torch.arange(2)))
     assert torch.equal(ground.assets[1], torch.from_numpy(worth[2:6, 5:9]).float())
+
+
+def test_a_window_has_the_fuel_and_canopy_of_its_cells() -> None:
+    place = np.arange(80.0).reshape(8, 10)
+    planes = {"fuel": 101 + place, "canopy_cover": place, "canopy_height": place / 4}
+    ground = Array(cover=np.full((8, 10), 3), **planes, size=4, row=2, column=5)(keys(2))
+    types = {"fuel": torch.int16, "canopy_cover": torch.float32, "canopy_height": torch.float32}
+    for name, values in planes.items():
+        plane = getattr(ground, name)
+        assert plane.dtype == types[name] and plane[1].tolist() == values[2:6, 5:9].tolist()
+    assert Array(cover=np.full((8, 10), 3))(keys(1)).fuel is None
+
+
+def test_fuel_tells_arrays_apart_and_comes_from_files_too(tmp_path: Path) -> None:
+    cover = np.full((4, 4), 3)
+    np.savez(tmp_path / "land.npz", cover=cover, fuel=cover + 100)
+    from_file = Array(path=tmp_path / "land.npz")
+    assert from_file == Array(cover=cover, fuel=cover + 100) != Array(cover=cover)
+    assert (from_file(keys(1)).fuel == 103).all()
+
+
+def test_the_oldest_trees_stand_on_every_cell_of_fuel() -> None:
+    cover = [[0, 1, 2, 3]] * 3 + [[4, 4, 3, 3]]
+    ground = Array(cover=cover, ages="oldest")(keys(3))
+    assert ground.age.tolist() == [[[0, 10, 10, 10]] * 3 + [[0, 0, 10, 10]]] * 3 and ground.age.dtype == torch.uint8
+    refuse(
+        "^ages must be drawn where age is given, which tells them, got oldest", cover=cover, age=cover, ages="oldest"
+    )
+
+
+def test_the_corner_is_told_where_every_world_has_the_same_window() -> None:
+    cover = np.full((8, 10), 3)
+    assert Array(cover=cover).corner == (0, 0) and Array(cover=cover, size=4, row=2, column=5).corner == (2, 5)
+    assert Array(cover=cover, size=4).corner is None

@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+import torch
 
+from warp_torchrl.rates.fbp_fuels import fbp_fuels
 from warp_torchrl.world.state import Cover
-from warp_torchrl.world.terrain.fuel import FBFM13, FBFM40, TABLES, WORLDCOVER, code_table, to_cover
+from warp_torchrl.world.terrain.fuel import FBFM13, FBFM40, FBP, NO_FUEL, TABLES, WORLDCOVER, code_table, to_cover
+from warp_torchrl.world.terrain.landscape import holds_trees
 
-from ..rasters import LANDFIRE, needs_landfire, read
+from ..rasters import FIRES, LANDFIRE, needs_fires, needs_landfire, read
 
 LETTERS = {Cover.LAKE: "L", Cover.WETLAND: "W", Cover.GRASSLAND: "G", Cover.FOREST: "F", Cover.BARE: "B"}
 
@@ -36,6 +39,54 @@ def test_worldcover_classes_become_our_covers():
     assert len(WORLDCOVER) == 11
 
 
+def test_fbp_codes_become_our_covers():
+    # C-1 .. C-7, D-1, D-2, S-1 .. S-3, O-1a, O-1b, M-1 .. M-4, the graded ones, no fuel and water.
+    codes = [[1, 2, 5, 7], [11, 12, 13, 21], [31, 32, 23, 40], [60, 90, 405, 995], [0, 101, 105, 102]]
+    assert drawn(codes, "fbp") == ["FFFF", "FFFF", "GGFF", "FFFF", "BBBL"]
+    assert len(FBP) == 7 + 3 + 3 + 2 + 6 + 600 + 9
+
+
+def test_what_burns_in_the_fbp_table_is_what_has_a_rate_of_spread():
+    codes = torch.tensor(sorted(FBP))
+    burns = fbp_fuels(codes).a > 0.0
+    assert torch.equal(burns, holds_trees(torch.tensor([int(FBP[code]) for code in codes.tolist()], dtype=torch.uint8)))
+    assert FBP[NO_FUEL] == Cover.BARE and FBFM13[NO_FUEL] == FBFM40[NO_FUEL] == Cover.BARE
+
+
+@needs_fires
+@pytest.mark.parametrize("fire, table", [("arrowhead", FBP), ("glacier", FBP), ("mica", FBP), ("clinge", FBFM40)])
+def test_every_code_of_the_real_fires_is_in_its_table(fire, table):
+    assert set(np.unique(read(FIRES / fire / "fuel.asc")).tolist()) <= set(table)
+
+
+@pytest.mark.parametrize("text", ["10: forest\n80: lake\n", "{10: 3, 80: 0}", "'10': FOREST\n80: '0'\n"])
+def test_a_table_may_be_a_file(tmp_path, text):
+    path = tmp_path / "my_table.yaml"
+    path.write_text(text)
+    assert code_table(str(path)) == code_table(path) == {10: Cover.FOREST, 80: Cover.LAKE}
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        (None, "^table must name a yaml file that can be read, .*No such file"),
+        ("10: [", "^table must name a yaml file that can be read, .*my_table.yaml cannot: while parsing"),
+        ("", "^table must be one of .*got .*my_table.yaml"),
+        ("forest", "^table must be one of"),
+        ("10: jungle", "^table must be one of"),
+        ("10: [forest]", "^table must be one of"),
+        ("10: forest\n10: lake", "^table must be one of .*each once, got .*my_table.yaml"),
+    ],
+)
+def test_a_file_that_is_no_table_is_refused_in_one_line(tmp_path, text, words):
+    path = tmp_path / "my_table.yaml"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(ValueError, match=words) as caught:
+        code_table(str(path))
+    assert "\n" not in str(caught.value)
+
+
 @needs_landfire
 @pytest.mark.parametrize("layer, table", [("LC22_F13_230", FBFM13), ("LC22_F40_230", FBFM40)])
 def test_every_code_of_a_real_map_is_in_its_table(layer, table):
@@ -60,7 +111,7 @@ def test_a_table_of_ones_own(table):
     ["fbfm12", "", None, 7, {}, {8: "jungle"}, {8: 5}, {8: -1}, {8: None}, {8.5: 3}, {"grass": 2}, {1: 2, "1": 3}],
 )
 def test_a_table_that_is_none_is_refused_in_one_line(table):
-    with pytest.raises(ValueError, match=r"^table must be one of fbfm13, fbfm40, worldcover, or map .*bare") as caught:
+    with pytest.raises(ValueError, match=r"^table must be one of fbfm13, fbfm40, fbp, worldcover, a .*bare") as caught:
         code_table(table)
     assert "\n" not in str(caught.value)
 

@@ -206,3 +206,9 @@ def test_ranges_do_not_depend_on_the_batch(law: str) -> None:
 def test_seven_octaves_as_the_sum_s_upper_limit_prints() -> None:
     six, seven = Perlin(size=64).noise(keys(2)), Perlin(size=64, octaves=7).noise(keys(2))
     assert not torch.allclose(six, seven)
+
+
+def test_the_oldest_trees_stand_wherever_one_can() -> None:
+    drawn, old = Perlin()(keys(8)), Perlin(ages="oldest")(keys(8))
+    assert torch.equal(drawn.cover, old.cover) and old.age.dtype == drawn.age.dtype
+    assert torch.equal(old.age, 10 * holds_trees(old.cover).to(torch.uint8)) and (drawn.age < 2).any()

@@ -17,7 +17,19 @@ from warp_torchrl.world.terrain.landscape import draw_age, holds_trees
 from warp_torchrl.world.terrain.raster import Raster
 
 from .. import rasters
-from ..rasters import LANDFIRE, NODATA, keys, needs_landfire, rasterio, read, write, write_ascii, write_enormous
+from ..rasters import (
+    FIRES,
+    LANDFIRE,
+    NODATA,
+    keys,
+    needs_fires,
+    needs_landfire,
+    rasterio,
+    read,
+    write,
+    write_ascii,
+    write_enormous,
+)
 
 
 def refuse(words, **fields):
@@ -208,6 +220,86 @@ def test_bad_layers_of_trees_are_refused_in_one_line(trees, name, values, fields
     refuse(words, **trees, **{name: f"{name}.tif"}, **fields)
 
 
+def test_the_oldest_trees_stand_on_all_fuel_whatever_the_canopy(trees):
+    write(trees["path"] / "cc.tif", [[0, 15, 25, 95, 100, NODATA]] * 4, "int16")
+    for canopy in (None, "cc.tif"):
+        land = Raster(**trees, canopy=canopy, ages="oldest")(keys(3))
+        assert (land.age == torch.tensor([10, 10, 0, 10], dtype=torch.uint8)[:, None]).all()
+
+
+def test_canopies_are_told_in_percent_and_metres(trees):
+    write(trees["path"] / "cc.tif", [[0, 15, 25, 95, 100, NODATA]] * 4, "int16")
+    write(trees["path"] / "ch.tif", [[0, 25, 75, 175, 375, NODATA]] * 4, "int16")
+    assert Raster(**trees)(keys(1)).canopy_cover is None
+    land = Raster(**trees, canopy="cc.tif", canopy_height="ch.tif", height_unit=0.1)(keys(2))
+    assert land.canopy_cover.tolist() == [[[0, 15, 25, 95, 100, 0]] * 4] * 2
+    wanted = torch.tensor([0, 2.5, 7.5, 17.5, 37.5, 0]).expand(2, 4, 6)  # LANDFIRE's CH is metres x 10
+    torch.testing.assert_close(land.canopy_height, wanted)
+    refuse(
+        r"^canopy_height must be in \[0, 150\] \(150 m in units of 1 m\) wherever it is known, got 175",
+        **trees,
+        canopy_height="ch.tif",
+        height_unit=1.0,
+    )
+
+
+# --- Fuel and nodata
+
+
+def test_the_fuel_of_a_window_is_its_codes(folder):
+    land = Raster(path=folder, size=4, row=5, column=2)(keys(2))
+    assert land.fuel.dtype == torch.int16 and (land.fuel == 8).all()
+
+
+@needs_landfire
+def test_the_fuel_of_a_real_map_is_its_pixels():
+    land = Raster(path=LANDFIRE, fuel="*F40*", table="fbfm40", row=300, column=250)(keys(1))
+    np.testing.assert_array_equal(land.fuel[0].numpy(), read(LANDFIRE / "LC22_F40_230.tif")[300:364, 250:314])
+
+
+def test_nodata_is_no_fuel_where_the_user_says_so(folder):
+    source = Raster(path=folder, size=(12, 16), nodata="unburnable", ages="oldest")
+    assert source.corner == (0, 0)
+    land, unknown = source(keys(2)), torch.zeros(12, 16, dtype=torch.bool)
+    unknown[:3, :3] = True
+    assert torch.equal(land.cover[1] == Cover.BARE, unknown) and torch.equal(land.fuel[1] == 99, unknown)
+    assert torch.equal(land.age[1] == 0, unknown)
+    heights = torch.from_numpy(read(folder / "map_Elev.tif"))
+    known = heights != NODATA
+    assert torch.equal(land.elevation[1][known], heights[known])
+    filled = land.elevation[1][~known]  # of 3 x 3 cells in a corner, on a plane of row + column, 22 at its edge
+    assert (filled >= 18.0).all() and (filled <= 24.0).all()
+
+
+def test_nodata_that_a_fuel_layer_does_not_declare_is_nodata(folder):
+    codes = np.full((12, 16), 8)
+    codes[0, 0] = -9999
+    write(folder / "map_F13.tif", codes, "int16", nodata=None)
+    refuse(r"columns 0\.\.0 \(1 cells, ", path=folder, size=4, row=0, column=0)
+    assert Raster(path=folder, size=4, row=0, column=0, nodata="unburnable")(keys(1)).fuel[0, 0, 0] == 99
+    table = {8: "forest", -9999: "grassland"}
+    assert Raster(path=folder, size=4, row=0, column=0, table=table)(keys(1)).fuel[0, 0, 0] == -9999
+
+
+@needs_landfire
+def test_a_whole_real_map_can_burn_where_it_is_known():
+    source = Raster(path=LANDFIRE, fuel="*F40*", table="fbfm40", size=(613, 549), nodata="unburnable", ages="oldest")
+    land = source(keys(1))
+    assert (land.fuel == 99).float().mean() > 0.3 and torch.isfinite(land.elevation).all()
+    assert land.elevation.min() >= 201.0 and land.elevation.max() <= 1101.0
+    assert torch.equal(land.age > 0, holds_trees(land.cover))
+
+
+@needs_fires
+@pytest.mark.parametrize("fire, table, cell", [("mica", "fbp", 100.0), ("clinge", "fbfm40", 10.0)])
+def test_ground_of_real_fires_is_read_whole(fire, table, cell):
+    codes = read(FIRES / fire / "fuel.asc")
+    layers = {"fuel": "fuel.asc", "elevation": "elevation.asc", "table": table}
+    source = Raster(path=FIRES / fire, **layers, size=codes.shape, ages="oldest")
+    assert source.cell_size == cell and source.corner == (0, 0)
+    np.testing.assert_array_equal(source(keys(1)).fuel[0].numpy(), codes)
+
+
 # --- Layers on different grids
 
 
@@ -321,7 +413,10 @@ def test_configuration_is_what_shows_and_compares(folder):
         ({"path": "x" * 300}, "path must name .*xxx"),
         ({"size": 13}, "size must fit in the map of 12 x 16 cells, got 13 x 13"),
         ({"size": 3}, "size must"),
-        ({"size": 11}, "size must leave .* 11 x 11 cells without nodata"),
+        (
+            {"size": 11},
+            r"size must leave .* 11 x 11 cells without nodata .* rows 0\.\.11, columns 0\.\.15 \(18 cells, 9\.38 %\)",
+        ),
         ({"min_fuel": 1.5}, "min_fuel must be in .*1.5"),
         ({"min_fuel": float("nan")}, "min_fuel must be in .*nan"),
         ({"row": 5}, "column must be whole"),
@@ -329,9 +424,13 @@ def test_configuration_is_what_shows_and_compares(folder):
         ({"row": 5, "column": 11}, r"column must be whole, in 0\.\.10"),
         ({"row": -1, "column": 5}, r"row must be whole, in 0\.\.6 .*got -1"),
         ({"row": 1.5, "column": 5}, "row must be a whole number or null, got 1.5"),
-        ({"row": 2, "column": 2}, "row, column must name a window without nodata, got 2, 2"),
-        ({"row": 6, "column": 9}, "row, column must name a window without nodata, got 6, 9"),
-        ({"table": "fbfm12"}, "table must be fbfm13 or .*got 'fbfm12': did you mean fbfm13"),
+        (
+            {"row": 2, "column": 2},
+            r"row, column must name a window without nodata, got 2, 2; nodata lies in rows 2\.\.2, columns 2\.\.2 "
+            r"\(1 cells, 2\.78 %\); nodata=unburnable makes it no fuel",  # of 6 x 6 cells
+        ),
+        ({"row": 6, "column": 9}, r"without nodata, got 6, 9; nodata lies in rows 9\.\.11, columns 13\.\.14"),
+        ({"table": "fbfm12"}, "table must be one of fbfm13, .*got fbfm12: did you mean fbfm13"),
         ({"table": None}, "table must be"),
         ({"table": {8: "jungle"}}, "table must be .*grassland.*jungle"),
         ({"table": {8: 5}}, "table must be"),
@@ -345,6 +444,12 @@ def test_configuration_is_what_shows_and_compares(folder):
         ({"elevation": ""}, "elevation must name one file"),
         ({"age": "*age*"}, "age must name one file .*matches 0"),
         ({"canopy": "*CC*"}, "canopy must name one file .*matches 0"),
+        ({"canopy_height": "*CH*"}, "height_unit must be given with canopy_height, 0.1 for LANDFIRE or 1 for"),
+        ({"canopy_height": "*CH*", "height_unit": 0.0}, "height_unit must be in"),
+        ({"canopy_height": "*CH*", "height_unit": 0.1}, "canopy_height must name one file .*matches 0"),
+        ({"ages": "old"}, "ages must be drawn or oldest, got 'old'"),
+        ({"ages": "oldest", "age": "*.tif"}, "ages must be drawn where age"),
+        ({"nodata": "lake"}, "nodata must be refuse or unburnable, got 'lake'"),
         ({"resample": "bilinear"}, "resample must be refuse or nearest or mode, got 'bilinear'"),
         ({"resolution": 0.0}, "resolution must be in"),
         ({"resolution": float("nan")}, "resolution must be in"),

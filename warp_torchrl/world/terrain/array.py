@@ -8,7 +8,7 @@ from hashlib import sha256
 from math import prod
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from torch import Tensor
@@ -16,26 +16,48 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.state import OLDEST, Cover, Landscape
 from warp_torchrl.world.terrain.crop import Crop
-from warp_torchrl.world.terrain.landscape import map_size
+from warp_torchrl.world.terrain.landscape import TALLEST, map_size
 from warp_torchrl.world.terrain.layer import LARGEST_MAP
 
-LAYERS = {"cover": np.uint8, "elevation": np.float32, "age": np.uint8, "assets": np.float32}
+LAYERS = {
+    "cover": np.uint8,
+    "elevation": np.float32,
+    "age": np.uint8,
+    "assets": np.float32,
+    "fuel": np.int16,
+    "canopy_cover": np.float32,
+    "canopy_height": np.float32,
+}
 """The arrays of a landscape, and the type that each is kept in."""
+_WHOLE = {"cover": (0, int(max(Cover))), "age": (0, OLDEST), "fuel": (-32768, 32767)}
+"""Those of whole numbers, and their ranges."""
+_REAL = {
+    "elevation": (-math.inf, math.inf, "finite"),
+    "assets": (0.0, math.inf, "finite and 0 or more"),
+    "canopy_cover": (0.0, 100.0, "in [0, 100]"),
+    "canopy_height": (0.0, TALLEST, f"in [0, {TALLEST:g}]"),
+}
+"""The others, and their ranges, in words too."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Array:
-    """A landscape that the user has: cover, and optionally elevation and tree age.
+    """A landscape that the user has: cover, and optionally elevation, tree age, fuel and canopy.
 
     Two are equal where their layers, window and cell size are, wherever the layers come from.
 
     Attributes:
-        path: An ``.npz`` file with ``cover`` [H, W] of codes 0..4, and optionally ``elevation`` [m], ``age`` 0..10 and
-            ``assets``; or None where the arrays are passed.
+        path: An ``.npz`` file with ``cover`` [H, W] of codes 0..4, and optionally the other arrays below by their
+            names; or None where the arrays are passed.
         cover: Land cover codes [H, W], anything ``numpy.asarray`` takes.
         elevation: In metres, [H, W]; None makes a flat world.
-        age: Tree age [H, W]; None draws it for each episode.
+        age: Tree age 0..10 [H, W]; None leaves it to ``ages``.
+        ages: Where ``age`` does not tell them: ``drawn`` draws the trees' ages for each episode, as the paper does;
+            ``oldest`` gives all the oldest, 10, so that every cell of fuel can burn, as on real ground.
         assets: What each cell is worth [H, W], 0 or more in any unit, for rewards that ask; None leaves all alike.
+        fuel: Class codes of a fuel model [H, W], which laws of rates of spread read; None leaves them to the cover.
+        canopy_cover: Canopy cover [%], [H, W], and
+        canopy_height: height of the canopy's top [m], [H, W], by which such laws slow the wind down; None: not told.
         size: Side of the world, or (rows, columns) [cells]: a window of the array. None, or the array's own shape,
             takes the whole array, whatever its fuel.
         row: Top row of the window in the array. None, with ``column``, draws a window for each episode.
@@ -45,14 +67,22 @@ class Array:
 
     Raises:
         ValueError: If there is no cover, arrays and a path are both given, the file is missing, damaged or enormous,
-            shapes differ, a code is not in 0..4, an age not in 0..10, an elevation not finite, or no window fits.
+            shapes differ, a value is out of its range, ``ages`` is ``oldest`` beside ages, or no window fits.
     """
 
     path: str | PathLike[str] | None = field(default=None, compare=False)
     cover: Sequence[Sequence[int]] | np.ndarray | Tensor | None = field(default=None, repr=False, compare=False)
     elevation: Sequence[Sequence[float]] | np.ndarray | Tensor | None = field(default=None, repr=False, compare=False)
     age: Sequence[Sequence[int]] | np.ndarray | Tensor | None = field(default=None, repr=False, compare=False)
+    ages: Literal["drawn", "oldest"] = "drawn"
     assets: Sequence[Sequence[float]] | np.ndarray | Tensor | None = field(default=None, repr=False, compare=False)
+    fuel: Sequence[Sequence[int]] | np.ndarray | Tensor | None = field(default=None, repr=False, compare=False)
+    canopy_cover: Sequence[Sequence[float]] | np.ndarray | Tensor | None = field(
+        default=None, repr=False, compare=False
+    )
+    canopy_height: Sequence[Sequence[float]] | np.ndarray | Tensor | None = field(
+        default=None, repr=False, compare=False
+    )
     size: tuple[int, int] | int | None = None
     row: int | None = None
     column: int | None = None
@@ -76,6 +106,10 @@ class Array:
         for name, layer in layers.items():
             if layer.shape != shape:
                 raise ValueError(f"{name} must have the shape of cover {shape}, got {layer.shape}")
+        if self.ages == "oldest" and "age" in layers:
+            raise ValueError("ages must be drawn where age is given, which tells them, got oldest")
+        if self.ages == "oldest":
+            layers["age"] = np.full(shape, OLDEST, np.uint8)
         size = map_size(shape if self.size is None else self.size)
         row, column = (0 if size == shape and each is None else each for each in (self.row, self.column))
         object.__setattr__(self, "size", size)
@@ -90,6 +124,11 @@ class Array:
     def extent(self) -> tuple[int, int]:
         """Return (rows, columns) of the whole array."""
         return self._crop.extent
+
+    @property
+    def corner(self) -> tuple[int, int] | None:
+        """Return (row, column) of the window that every world has; None where it is drawn."""
+        return self._crop.corner
 
     def reach(self) -> np.ndarray:
         """Return where a world may lie, bool [rows, columns]."""
@@ -134,17 +173,16 @@ def _check_layer(name: str, layer: Any) -> np.ndarray:
     if values.dtype.kind not in "buif" or values.ndim != 2:
         got = f"{values.dtype} of shape {values.shape}"
         raise ValueError(f"{name} must hold numbers in two dimensions, rows and columns, got {got}")
-    if name in ("elevation", "assets"):
-        lowest = 0.0 if name == "assets" else -math.inf
-        broken = ~((np.abs(values) <= np.finfo(np.float32).max) & (values >= lowest))
-        if broken.any():
-            rule = "finite and 0 or more" if name == "assets" else "finite"
-            raise ValueError(f"{name} must be {rule} everywhere, got {values[broken][0]}")
+    if name in _WHOLE:
+        lowest, highest = _WHOLE[name]
+        broken = ~((values >= lowest) & (values <= highest) & (values == np.round(values)))
+        rule = f"hold whole numbers in {lowest}..{highest}"
     else:
-        highest = max(Cover) if name == "cover" else OLDEST
-        broken = ~((values >= 0) & (values <= highest) & (values == np.round(values)))
-        if broken.any():
-            raise ValueError(f"{name} must hold whole numbers in 0..{highest:d}, got {values[broken][0]}")
+        low, high, words = _REAL[name]
+        broken = ~((np.abs(values) <= np.finfo(np.float32).max) & (values >= low) & (values <= high))
+        rule = f"be {words} everywhere"
+    if broken.any():
+        raise ValueError(f"{name} must {rule}, got {values[broken][0]}")
     return values.astype(LAYERS[name])
 
 

@@ -14,6 +14,7 @@ from warp_torchrl.world.terrain.landscape import draw_age, holds_trees, map_size
 
 DRAWN = 255
 """Age code of a cell whose age is drawn for each episode."""
+_LAYERS = ("cover", "age", "elevation", "assets", "fuel", "canopy_cover", "canopy_height")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -25,6 +26,9 @@ class Crop:
         elevation: Elevation [m], float32 [rows, columns]; None makes flat worlds.
         age: Tree age, uint8 [rows, columns], 0..10, or ``DRAWN``; None draws it everywhere.
         assets: What each cell is worth, float32 [rows, columns]; None leaves all alike.
+        fuel: Class codes of the fuel layer, int16 [rows, columns]; None where there is none.
+        canopy_cover: Canopy cover [%], float32 [rows, columns]; None where it is not told.
+        canopy_height: Height of the canopy's top [m], float32 [rows, columns]; None where it is not told.
         known: Where the map is known, bool [rows, columns]; None is everywhere.
         size: Side of a window, or (rows, columns) [cells].
         row: Top row of the only window; None, with ``column``, leaves it to the draw.
@@ -39,13 +43,16 @@ class Crop:
     elevation: np.ndarray | None = field(default=None, repr=False)
     age: np.ndarray | None = field(default=None, repr=False)
     assets: np.ndarray | None = field(default=None, repr=False)
+    fuel: np.ndarray | None = field(default=None, repr=False)
+    canopy_cover: np.ndarray | None = field(default=None, repr=False)
+    canopy_height: np.ndarray | None = field(default=None, repr=False)
     known: np.ndarray | None = field(default=None, repr=False)
     size: tuple[int, int] | int
     row: int | None = None
     column: int | None = None
     min_fuel: float = 0.5
     _draws_age: bool = field(init=False, repr=False)
-    _maps: dict[torch.device, list[Any]] = field(init=False, repr=False)
+    _maps: dict[torch.device, tuple[Tensor, dict[str, Tensor]]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         corners = self._find_corners()
@@ -53,12 +60,10 @@ class Crop:
         if len(corners) == 1:  # the only window, so every world gets the same ground: cut it out once
             (row, column), (height, width) = divmod(int(corners), self.cover.shape[1]), map_size(self.size)
             ground = slice(row, row + height), slice(column, column + width)
-        layers = [
-            None if each is None else each[ground] for each in (self.cover, self.elevation, self.age, self.assets)
-        ]
-        maps = [None if each is None else torch.from_numpy(np.ascontiguousarray(each)) for each in layers]
+        layers = {name: getattr(self, name) for name in _LAYERS if getattr(self, name) is not None}
+        maps = {name: torch.from_numpy(np.ascontiguousarray(layer[ground])) for name, layer in layers.items()}
         object.__setattr__(self, "_draws_age", self.age is None or bool((self.age == DRAWN).any()))
-        object.__setattr__(self, "_maps", {torch.device("cpu"): [corners, *maps]})
+        object.__setattr__(self, "_maps", {torch.device("cpu"): (corners, maps)})
 
     def __call__(self, key: Tensor) -> Landscape:
         """Return the landscape of each world's window, with its ``corner`` in the map, batch size [B].
@@ -67,23 +72,23 @@ class Crop:
             key: World keys, int64 [B].
         """
         if key.device not in self._maps:
-            maps = self._maps[torch.device("cpu")]
-            self._maps[key.device] = [each if each is None else each.to(key.device) for each in maps]
-        corners, cover, elevation, age, assets = self._maps[key.device]
+            corners, maps = self._maps[torch.device("cpu")]
+            there = {name: layer.to(key.device) for name, layer in maps.items()}
+            self._maps[key.device] = corners.to(key.device), there
+        corners, maps = self._maps[key.device]
         draw = uniform(key, 0, Stream.CROP, (1, 1))[:, 0, 0].double()  # float32 cannot count past 2^24 windows
         window, across = corners[(draw * len(corners)).long()], self.cover.shape[1]
         corner = torch.stack((window // across, window % across), dim=1)
-        elevation, age, assets = (
-            layer if layer is None else self._cut(layer, corner) for layer in (elevation, age, assets)
-        )
-        cover = self._cut(cover, corner)
-        return Landscape(
-            cover=cover,
-            age=self._fill_age(key, cover, age),
-            elevation=elevation,
-            assets=assets,
-            corner=corner,
-        )
+        planes: dict[str, Any] = {name: self._cut(layer, corner) for name, layer in maps.items()}
+        age = self._fill_age(key, planes["cover"], planes.get("age"))
+        return Landscape(**{"elevation": None, **planes, "age": age}, corner=corner)
+
+    @property
+    def corner(self) -> tuple[int, int] | None:
+        """Return (row, column) of the window that every world has; None where it is drawn."""
+        corners = self._maps[torch.device("cpu")][0]
+        row, column = divmod(int(corners[0]), self.cover.shape[1])
+        return (row, column) if len(corners) == 1 else None
 
     @property
     def extent(self) -> tuple[int, int]:
@@ -124,18 +129,18 @@ class Crop:
         known = np.ones(self.cover.shape, bool) if self.known is None else self.known
         whole = _sum_windows(torch.from_numpy(~known), height, width) == 0
         if self.row is not None or self.column is not None:
-            row, column = self._fixed_corner(whole)
+            row, column = self._fixed_corner(whole, known)
             return torch.tensor([row * columns + column])
         least = max(1, math.ceil(self.min_fuel * height * width - 1e-6))
         fuel = _sum_windows(holds_trees(torch.from_numpy(self.cover)), height, width)
         window = (whole & (fuel >= least)).flatten().nonzero().squeeze(1)
         if not len(window):
             rule = f"window of {height} x {width} cells without nodata and with min_fuel {self.min_fuel:g}"
-            raise ValueError(f"size must leave some place, the map has no {rule}")
+            raise ValueError(f"size must leave some place, the map has no {rule}{whereabouts(~known)}")
         across = whole.shape[1]
         return window // across * columns + window % across
 
-    def _fixed_corner(self, whole: Tensor) -> tuple[int, int]:
+    def _fixed_corner(self, whole: Tensor, known: np.ndarray) -> tuple[int, int]:
         """Return ``row`` and ``column`` if they name a window without nodata."""
         corner = []
         for name, count in zip(("row", "column"), whole.shape):
@@ -145,8 +150,23 @@ class Crop:
             corner.append(value)
         row, column = corner
         if not whole[row, column]:
-            raise ValueError(f"row, column must name a window without nodata, got {row}, {column}")
+            height, width = map_size(self.size)
+            inside = np.zeros_like(known)
+            inside[row : row + height, column : column + width] = True
+            lies = whereabouts(~known, inside)
+            raise ValueError(f"row, column must name a window without nodata, got {row}, {column}{lies}")
         return row, column
+
+
+def whereabouts(unknown: np.ndarray, inside: np.ndarray | None = None) -> str:
+    """Return in words where cells are not known, bool [rows, columns], of those inside; nothing where all are."""
+    lies = unknown if inside is None else unknown & inside
+    if not lies.any():
+        return ""
+    rows, columns = np.flatnonzero(lies.any(1)), np.flatnonzero(lies.any(0))
+    share = lies.sum() / (lies.size if inside is None else inside.sum())
+    place = f"in rows {rows[0]}..{rows[-1]}, columns {columns[0]}..{columns[-1]}"
+    return f"; nodata lies {place} ({lies.sum()} cells, {100 * share:.3g} %); nodata=unburnable makes it no fuel"
 
 
 def _sum_windows(mask: Tensor, height: int, width: int) -> Tensor:

@@ -1,9 +1,12 @@
 """What the codes of a fuel or land-cover layer are to the world: presets, tables of a user's own, and the covers."""
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
+import yaml
 
+from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.world.state import Cover
 
 _NON_BURNABLE = {91: Cover.BARE, 92: Cover.BARE, 93: Cover.GRASSLAND, 98: Cover.LAKE, 99: Cover.BARE}
@@ -43,29 +46,74 @@ Tree cover 10 is forest; shrubland 20, grassland 30 and cropland 40 grassland, a
 snow and ice 70, and moss and lichen 100, too thin to carry a front, bare. 0 is its nodata, and no class.
 """
 
-TABLES = {"fbfm13": FBFM13, "fbfm40": FBFM40, "worldcover": WORLDCOVER}
+_CONIFER, _DECIDUOUS, _SLASH, _OPEN = range(1, 8), range(11, 14), range(21, 24), (31, 32)
+
+FBP: Mapping[int, int] = (
+    dict.fromkeys((*_CONIFER, *_DECIDUOUS, *_SLASH, *range(40, 100, 10), *range(400, 1000)), Cover.FOREST)
+    | dict.fromkeys(_OPEN, Cover.GRASSLAND)
+    | dict.fromkeys((0, 99, 100, 101, 103, 104, 105, 106), Cover.BARE)
+    | {102: Cover.LAKE}
+)
+"""Cover of each code of Canada's FBP fuel types (Forestry Canada 1992, ST-X-3), as the national fuel grid has them.
+
+Conifers C-1 to C-7 1-7, deciduous D-1 and D-2 11-13, slash S-1 to S-3 21-23 and mixedwood M-1 to M-4 40, 50 .. 90 are
+forest, and so are 400-999, mixedwood whose last two digits are the per cent of conifer or dead fir; grass O-1a 31 and
+O-1b 32 is grassland; water 102 lake; what is no fuel, not known or urban, 0, 99, 100, 101 and 103-106, bare.
+"""
+
+TABLES = {"fbfm13": FBFM13, "fbfm40": FBFM40, "fbp": FBP, "worldcover": WORLDCOVER}
 """The presets by name."""
+NO_FUEL = 99
+"""Fuel code of cells that are not known: no fuel in FBFM13, FBFM40 and FBP alike."""
+NO_DATA = -9999
+"""Code of a fuel layer that says not known, whatever its file declares, where the table has it not."""
 
 
 def code_table(table: str | Mapping[int, int | str]) -> Mapping[int, int]:
     """Return the cover of each class code.
 
     Args:
-        table: A preset of ``TABLES``, or whole codes to ``Cover`` codes or names.
+        table: A preset of ``TABLES``, whole codes to ``Cover`` codes or names, or a yaml file of those.
 
     Raises:
-        ValueError: If it is neither, or a code comes twice.
+        ValueError: If it is none of these, or a code comes twice.
     """
+    pairs = _read_pairs(table) if str(table).endswith((".yaml", ".yml")) else _given_pairs(table)
     try:
-        pairs = TABLES[table].items() if isinstance(table, str) else table.items()
-        covers = {int(str(code)): Cover[to.upper()] if isinstance(to, str) else Cover(to) for code, to in pairs}
+        covers = {int(str(code)): _cover(to) for code, to in pairs}
         if not 0 < len(covers) == len(pairs):
             raise ValueError
-    except (AttributeError, KeyError, TypeError, ValueError):
-        names = ", ".join(cover.name.lower() for cover in Cover)
-        rule = f"one of {', '.join(TABLES)}, or map whole codes to 0..{max(Cover)} ({names})"
-        raise ValueError(f"table must be {rule}, got {table}") from None
+    except (KeyError, TypeError, ValueError):
+        raise ValueError(f"table must {_RULE}, got {table}{did_you_mean(table, TABLES)}") from None
     return covers
+
+
+_RULE = (
+    f"be one of {', '.join(TABLES)}, a .yaml file, or map whole codes to 0..{max(Cover)} "
+    f"({', '.join(cover.name.lower() for cover in Cover)}), each once"
+)
+
+
+def _cover(to: object) -> Cover:
+    text = str(to)
+    return Cover(int(text)) if text.isdigit() else Cover[text.upper()]
+
+
+def _given_pairs(table: object) -> list[tuple[object, object]]:
+    mapping = TABLES.get(table) if isinstance(table, str) else table
+    return list(mapping.items()) if isinstance(mapping, Mapping) else []
+
+
+def _read_pairs(path: object) -> list[tuple[object, object]]:
+    """Return what a yaml file maps to what, in its own words: a code that comes twice is there twice."""
+    try:
+        node = yaml.compose(Path(str(path)).read_text(encoding="utf-8"), yaml.SafeLoader)
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        reason = " ".join(str(error).split())
+        raise ValueError(f"table must name a yaml file that can be read, {path} cannot: {reason}") from None
+    if not isinstance(node, yaml.MappingNode):
+        return []
+    return [(code.value, to.value) for code, to in node.value]
 
 
 def to_cover(codes: np.ndarray, known: np.ndarray, table: Mapping[int, int]) -> np.ndarray:

@@ -20,6 +20,8 @@ from warp_torchrl.world.terrain.perlin import fractal_noise
 
 LARGEST_SIDE = 4096
 """Longest side of a simulated map [cells]."""
+TALLEST = 150.0
+"""Height of a canopy that is believed [m]; the tallest tree known has 116."""
 
 
 @runtime_checkable
@@ -114,6 +116,7 @@ class Perlin:
         levels: (L, W, G); not read by ``printed``.
         relief: Height of n = 1 over n = 0 [m]; 0 makes a flat world.
         independent_elevation: Draw the elevation from a noise of its own, not the one that made the cover.
+        ages: ``drawn`` draws the trees' ages, as the paper does; ``oldest`` gives all the oldest, 10.
 
     Raises:
         ValueError: If a value is out of its range or the levels are out of order (``printed`` excepted).
@@ -129,6 +132,7 @@ class Perlin:
     levels: tuple[float, float, float] = (0.06, 0.16, 0.36)
     relief: float | tuple[float, float] = 0.0
     independent_elevation: bool = False
+    ages: Literal["drawn", "oldest"] = "drawn"
 
     def __post_init__(self) -> None:
         check_fields(
@@ -159,7 +163,8 @@ class Perlin:
         if _ends(self.relief)[1] > 0.0:
             ground = self.noise(key, Stream.ELEVATION) if self.independent_elevation else noise
             elevation = self._draw(key, "relief").to(torch.float32)[:, None, None] * ground
-        return Landscape(cover=cover, age=draw_age(key, cover), elevation=elevation)
+        age = draw_age(key, cover) if self.ages == "drawn" else holds_trees(cover).to(torch.uint8) * OLDEST
+        return Landscape(cover=cover, age=age, elevation=elevation)
 
     def noise(self, key: Tensor, stream: Stream = Stream.NOISE) -> Tensor:
         """Return the noise scaled to [0, 1] on each map, float32 [B, H, W]."""

@@ -151,6 +151,19 @@ def resample(
     return target, known
 
 
+def fill(values: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Return values [H, W] with what is not known interpolated from the known cells around, 100 cells off at most.
+
+    Cells farther off get the mean of all that are known.
+    """
+    from rasterio.fill import fillnodata
+
+    if known.all():
+        return values
+    filled = fillnodata(np.where(known, values, math.nan), mask=known, max_search_distance=100.0)
+    return np.where(np.isnan(filled), values[known].mean(), filled).astype(values.dtype)
+
+
 def regrid(name: str, grid: Grid, resolution: float) -> Grid:
     """Return the grid of square cells, whole ones only, that covers another from its north-west corner on.
 

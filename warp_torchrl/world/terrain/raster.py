@@ -12,12 +12,21 @@ import numpy as np
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.state import OLDEST, Cover, Landscape
-from warp_torchrl.world.terrain.crop import DRAWN, Crop
-from warp_torchrl.world.terrain.fuel import code_table, to_cover
+from warp_torchrl.world.state import OLDEST, Landscape
+from warp_torchrl.world.terrain.crop import Crop
+from warp_torchrl.world.terrain.fuel import NO_DATA, code_table, to_cover
 from warp_torchrl.world.terrain.grid import Grid, check_grid
 from warp_torchrl.world.terrain.landscape import map_size
-from warp_torchrl.world.terrain.layer import find_layer, read_grid, read_layer, regrid, resample_layer
+from warp_torchrl.world.terrain.layer import fill, find_layer, read_grid, read_layer, regrid, resample_layer
+from warp_torchrl.world.terrain.planes import (
+    to_age,
+    to_canopy_cover,
+    to_canopy_height,
+    to_forest_age,
+    to_fuel,
+    to_metres,
+    to_worth,
+)
 
 _log = logging.getLogger("warp_torchrl")
 
@@ -35,16 +44,25 @@ class Raster:
         size: Side of the crop, or (rows, columns) [cells].
         elevation: File name of the elevation layer [m], or a pattern that one raster in the folder matches; None
             makes a flat world.
-        fuel: The same for the layer of class codes; not used where ``path`` is a file.
-        table: Cover of each class code: a preset of ``fuel.TABLES``, or a mapping to ``Cover`` codes or names.
-        age: The same for a layer of tree ages, in any unit; None draws the ages for each episode. A tree's code is
+        fuel: The same for the layer of class codes; not used where ``path`` is a file. Laws of rates of spread read the
+            codes as they stand there.
+        table: Cover of each class code: a preset of ``fuel.TABLES``, or a mapping to ``Cover`` codes or names, or a
+            yaml file of one.
+        nodata: What cells are where the fuel or the elevation is not known: ``refuse`` leaves no world there;
+            ``unburnable`` makes cells without fuel of them, ``fuel.NO_FUEL`` and bare, and gives cells without
+            elevation that of the cells around.
+        ages: ``drawn`` draws the trees' ages for each episode where no layer tells them, as the paper does;
+            ``oldest`` gives all the oldest, 10, so that every cell of fuel can burn.
+        age: The same for a layer of tree ages, in any unit; None leaves them to ``ages``. A tree's code is
             10 x value / ``full_age``, 10 at most, halves up; where it is 0 nothing stands. Where the layer has
             nodata, as age maps have outside of forests, the age is drawn.
         full_age: Value of the age layer from which a tree counts as oldest [its unit].
-        canopy: The same for a layer of canopy cover [%], which then makes the ages of the trees of forest cells:
-            code = canopy / 10, halves up, 1 at least. It tells nothing of grass, shrub or wetland, where LANDFIRE has
-            0 over grass and a mixture over shrub, so there, and under nodata, the age is drawn. A forest cell without
-            canopy keeps a young tree, code 1, since its fuel is timber and code 0 is bare ground or ash.
+        canopy: The same for a layer of canopy cover [%]. Where ages are drawn it makes those of the trees of forest
+            cells: code = canopy / 10, halves up, 1 at least. It tells nothing of grass, shrub or wetland, where
+            LANDFIRE has 0 over grass and a mixture over shrub, so there, and under nodata, the age is drawn. A forest
+            cell without canopy keeps a young tree, code 1, since its fuel is timber and code 0 is bare ground or ash.
+        canopy_height: The same for a layer of the height of the canopy's top; nodata is 0.
+        height_unit: Metres to a unit of that layer, which must be told: 0.1 for LANDFIRE's CH, 1 for metres.
         assets: The same for a layer of what each cell is worth, 0 or more in any unit, for rewards that ask; nodata is
             0. None leaves all alike.
         resample: What becomes of layers on another grid: ``refuse`` makes them an error; ``nearest`` and ``mode``
@@ -58,18 +76,23 @@ class Raster:
         min_fuel: Lowest share of a drawn window where trees can stand, so that there is something to burn.
 
     Raises:
-        ValueError: If a value is out of its range, no window fits, a layer is missing, ambiguous, damaged, enormous,
-            empty or on another grid, a code is not whole or not in the table, or rasterio is not installed.
+        ValueError: If a value is out of its range or contradicts another, no window fits, a layer is missing,
+            ambiguous, damaged, enormous, empty or on another grid, a code is not whole or not in the table, or rasterio
+            is not installed.
     """
 
     path: str | PathLike[str] | None = None
     size: tuple[int, int] | int = 64
     elevation: str | None = "*Elev*"
     fuel: str = "*F13*"
-    table: Literal["fbfm13", "fbfm40", "worldcover"] | Mapping[int, int | str] = "fbfm13"
+    table: str | PathLike[str] | Mapping[int, int | str] = "fbfm13"
+    nodata: Literal["refuse", "unburnable"] = "refuse"
+    ages: Literal["drawn", "oldest"] = "drawn"
     age: str | None = None
     full_age: float = 10.0
     canopy: str | None = None
+    canopy_height: str | None = None
+    height_unit: float | None = None
     assets: str | None = None
     resample: Literal["refuse", "nearest", "mode"] = "refuse"
     resolution: float | None = None
@@ -80,37 +103,21 @@ class Raster:
     _crop: Crop = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        check_fields(self, full_age=(1e-6, 1e6), resolution=(0.1, 100_000.0), min_fuel=(0.0, 1.0))
+        check_fields(
+            self,
+            full_age=(1e-6, 1e6),
+            height_unit=(1e-3, 10.0),
+            resolution=(0.1, 100_000.0),
+            min_fuel=(0.0, 1.0),
+        )
         map_size(self.size)
-        if self.age is not None and self.canopy is not None:
-            raise ValueError(f"canopy must be null where age makes the trees, got {self.canopy} and {self.age}")
-        if self.resolution is not None and self.resample == "refuse":
-            raise ValueError(f"resample must be nearest or mode where resolution is {self.resolution:g}, got refuse")
+        self._check_together()
         table, paths = code_table(self.table), self._find_layers()
         layers, known = self._read_layers(paths)
-        cover, elevation, age = to_cover(layers["fuel"], known["fuel"], table), None, None
-        whole = known["fuel"]
-        if "elevation" in layers:
-            elevation = _to_metres(layers["elevation"], known["elevation"])
-            whole = whole & known["elevation"]
-        if "age" in layers:
-            age = _to_age("age", layers["age"], known["age"], self.full_age)
-        if "canopy" in layers:
-            age = _to_age("canopy", layers["canopy"], known["canopy"], 100.0)
-            age = np.where((cover == int(Cover.FOREST)) & (age != DRAWN), np.maximum(age, 1), np.uint8(DRAWN))
-        assets = _to_worth(layers["assets"], known["assets"]) if "assets" in layers else None
-        crop = Crop(
-            cover=cover,
-            elevation=elevation,
-            age=age,
-            assets=assets,
-            known=whole,
-            size=self.size,
-            row=self.row,
-            column=self.column,
-            min_fuel=self.min_fuel,
-        )
-        object.__setattr__(self, "_crop", crop)
+        if NO_DATA not in table:
+            known["fuel"] = known["fuel"] & (layers["fuel"] != NO_DATA)
+        window = {"size": self.size, "row": self.row, "column": self.column, "min_fuel": self.min_fuel}
+        object.__setattr__(self, "_crop", Crop(**self._make_planes(layers, known, table), **window))
 
     def __call__(self, key: Tensor) -> Landscape:
         """Return the landscape of each world's window, with its ``corner`` in ``grid``, batch size [B]."""
@@ -126,6 +133,11 @@ class Raster:
         """Return (rows, columns) of the grid."""
         return self._crop.extent
 
+    @property
+    def corner(self) -> tuple[int, int] | None:
+        """Return (row, column) of the window that every world has; None where it is drawn."""
+        return self._crop.corner
+
     def reach(self) -> np.ndarray:
         """Return where a world may lie, bool [rows, columns]."""
         return self._crop.reach()
@@ -134,6 +146,41 @@ class Raster:
     def cell_size(self) -> float:
         """Return the side of a cell of the grid [m]; 30 where the fuel layer has no place on Earth."""
         return self._grid.cell_size
+
+    def _check_together(self) -> None:
+        if self.age is not None and self.canopy is not None:
+            raise ValueError(f"canopy must be null where age makes the trees, got {self.canopy} and {self.age}")
+        if self.age is not None and self.ages == "oldest":
+            raise ValueError(f"ages must be drawn where age, {self.age}, tells them, got oldest")
+        if self.canopy_height is not None and self.height_unit is None:
+            raise ValueError("height_unit must be given with canopy_height, 0.1 for LANDFIRE or 1 for metres, got None")
+        if self.resolution is not None and self.resample == "refuse":
+            raise ValueError(f"resample must be nearest or mode where resolution is {self.resolution:g}, got refuse")
+
+    def _make_planes(
+        self, layers: Mapping[str, np.ndarray], known: Mapping[str, np.ndarray], table: Mapping[int, int]
+    ) -> dict[str, np.ndarray | None]:
+        """Return the planes of the map, and where it is known, by their names in ``Crop``."""
+        cover = to_cover(layers["fuel"], known["fuel"], table)
+        planes: dict[str, np.ndarray | None] = {"cover": cover, "fuel": to_fuel(layers["fuel"], known["fuel"])}
+        if "elevation" in layers:
+            metres = to_metres(layers["elevation"], known["elevation"])
+            planes["elevation"] = metres if self.nodata == "refuse" else fill(metres, known["elevation"])
+        if "age" in layers:
+            planes["age"] = to_age("age", layers["age"], known["age"], self.full_age)
+        if "canopy" in layers:
+            planes["age"] = to_forest_age(cover, layers["canopy"], known["canopy"])
+            planes["canopy_cover"] = to_canopy_cover(layers["canopy"], known["canopy"])
+        if self.height_unit is not None and "canopy_height" in layers:
+            planes["canopy_height"] = to_canopy_height(
+                layers["canopy_height"], known["canopy_height"], self.height_unit
+            )
+        if "assets" in layers:
+            planes["assets"] = to_worth(layers["assets"], known["assets"])
+        if self.ages == "oldest":
+            planes["age"] = np.full(cover.shape, OLDEST, np.uint8)
+        whole = known["fuel"] & known.get("elevation", known["fuel"])
+        return {**planes, "known": whole if self.nodata == "refuse" else None}
 
     def _find_layers(self) -> dict[str, Path]:
         try:
@@ -145,7 +192,7 @@ class Raster:
         path = Path(self.path)
         folder = path if path.is_dir() else path.parent
         paths = {"fuel": find_layer("fuel", folder, self.fuel) if path.is_dir() else path}
-        for name in ("elevation", "age", "canopy", "assets"):
+        for name in ("elevation", "age", "canopy", "canopy_height", "assets"):
             if getattr(self, name) is not None:
                 paths[name] = find_layer(name, folder, getattr(self, name))
         return paths
@@ -177,27 +224,3 @@ class Raster:
 @cache
 def _tell_once(line: str) -> None:
     _log.warning(line)
-
-
-def _to_metres(heights: np.ndarray, known: np.ndarray) -> np.ndarray:
-    broken = known & ~((heights >= -1000.0) & (heights <= 10_000.0))  # NaN; or nodata undeclared: -9999, 32767
-    if broken.any():
-        raise ValueError(f"elevation must be in [-1000, 10000] m wherever it is known, got {heights[broken][0]}")
-    return np.where(known, heights, 0).astype(np.float32)
-
-
-def _to_worth(values: np.ndarray, known: np.ndarray) -> np.ndarray:
-    broken = known & ~((values >= 0.0) & (values <= np.finfo(np.float32).max))
-    if broken.any():
-        raise ValueError(f"assets must be finite and 0 or more wherever they are known, got {values[broken][0]}")
-    return np.where(known, values, 0).astype(np.float32)
-
-
-def _to_age(name: str, values: np.ndarray, known: np.ndarray, top: float) -> np.ndarray:
-    """Return the tree's code, 10 from ``top`` on and halves up; ``DRAWN`` where the value is not known."""
-    highest = 100.0 if name == "canopy" else 10_000.0  # above it nodata undeclared: 255, 32767
-    broken = known & ~((values >= 0.0) & (values <= highest))
-    if broken.any():
-        raise ValueError(f"{name} must be in [0, {highest:g}] wherever it is known, got {values[broken][0]}")
-    code = np.floor(OLDEST * np.where(known, values, 0).astype(np.float64) / top + 0.5).clip(max=OLDEST)
-    return np.where(known, code, DRAWN).astype(np.uint8)
