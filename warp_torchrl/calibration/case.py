@@ -15,11 +15,11 @@ from warp_torchrl.calibration.observed import read_perimeters
 from warp_torchrl.weather.table import read_weather
 from warp_torchrl.world.alone import Spell
 from warp_torchrl.world.state import OLDEST, Cover, Landscape
+from warp_torchrl.world.terrain.fuel import NO_FUEL
 from warp_torchrl.world.terrain.grid import Grid, check_grid
 from warp_torchrl.world.terrain.layer import find_layer, read_grid, read_layer
 from warp_torchrl.world.weather import Weather
 
-_NO_FUEL = 99  # in FBFM13, FBFM40 and FBP alike
 _KINDS = (".tif", ".tiff", ".asc")
 _OUTCOMES = "scar (.tif, .asc), arrival (.tif, .asc) or perimeters.geojson"
 
@@ -146,7 +146,7 @@ def _landscape(folder: Path, fuel: Path, grid: Grid) -> Landscape:
     broken = known & ((codes != np.rint(codes)) | (codes < 0) | (codes > 32767))
     if broken.any():
         raise ValueError(f"fuel must hold whole codes of fuels, 0..32767, got {codes[broken][0]:g}")
-    codes = np.where(known, codes, _NO_FUEL).astype(np.int16)
+    codes = np.where(known, codes, NO_FUEL).astype(np.int16)
     cover = torch.full((1, *grid.shape), int(Cover.FOREST), dtype=torch.uint8)
     return Landscape(
         cover=cover,
