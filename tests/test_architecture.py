@@ -134,7 +134,7 @@ def test_hydra_appears_only_where_configuration_is_composed(module):
 
 @pytest.mark.parametrize("module", MODULES)
 def test_rasterio_is_imported_where_maps_are_read_placed_and_written(module):
-    if module not in ("world/terrain/layer", "maps/geotiff", "maps/perimeter", "weather/convergence"):
+    if module not in ("world/terrain/layer", "maps/geotiff", "maps/perimeter", "calibration/observed", "weather/convergence"):
         assert "rasterio" not in {name.split("/")[0] for name in imports(module)}
 
 

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from warp_torchrl.calibration.null_models import mean_wind
 from warp_torchrl.calibration.observed import read_perimeters
-from warp_torchrl.weather.table import read_weather
+from warp_torchrl.weather.table import WeatherTable, read_weather
 from warp_torchrl.world.alone import Spell
 from warp_torchrl.world.state import OLDEST, Cover, Landscape
 from warp_torchrl.world.terrain.fuel import NO_FUEL
@@ -54,7 +54,9 @@ class FireCase:
             raise ValueError(f"{self.name}: ignition must lie on the map, got no cell there")
         if not 0.0 < float(self.minutes[-1]) <= last + 1e-3:
             got = f"{float(self.minutes[-1]) / 60.0:g}"
-            raise ValueError(f"{self.name}: the outcome must be known in hours of the weather, {last / 60.0:g}, got {got}")
+            raise ValueError(
+                f"{self.name}: the outcome must be known in hours of the weather, {last / 60.0:g}, got {got}"
+            )
         if not self.scar.any():
             raise ValueError(f"{self.name}: scar must have a cell that burned, got none")
 
@@ -106,8 +108,9 @@ def _read(folder: Path, hours: float | None) -> FireCase:
     if fuel is None:
         raise ValueError(f"fuel must be fuel.tif or fuel.asc in {folder}, there is none")
     grid = read_grid("fuel", fuel)
-    weather = _weather(folder / "weather.csv", grid)
-    last = hours * 60.0 if hours is not None else _end(folder / "weather.csv")
+    rows = _weather(folder / "weather.csv")
+    weather = Weather(table=rows).over(_Placed(grid))  # type: ignore[arg-type]
+    last = hours * 60.0 if hours is not None else _end(rows)
     minutes, burned, arrival = _outcome(folder, grid, last)
     return FireCase(
         name=folder.name,
@@ -128,17 +131,16 @@ class _Placed:
     grid: Grid
 
 
-def _weather(path: Path, grid: Grid) -> Weather:
+def _weather(path: Path) -> WeatherTable:
     if not path.is_file():
         raise ValueError(f"weather must be {path.name} in {path.parent}, there is none")
-    return Weather(path=path).over(_Placed(grid))  # type: ignore[arg-type]
+    return read_weather(path)
 
 
-def _end(path: Path) -> float:
+def _end(rows: WeatherTable) -> float:
     """Return the minutes to the end of the last row, which lasts as long as the one before, or an hour."""
-    hours = read_weather(path).hours
-    lasts = float(hours[-1] - hours[-2]) if len(hours) > 1 else 1.0
-    return (float(hours[-1]) + lasts) * 60.0
+    lasts = float(rows.hours[-1] - rows.hours[-2]) if len(rows.hours) > 1 else 1.0
+    return (float(rows.hours[-1]) + lasts) * 60.0
 
 
 def _landscape(folder: Path, fuel: Path, grid: Grid) -> Landscape:

@@ -5,10 +5,10 @@ least x*, the logarithm of the least factor at which the fire comes in time:
 
     P(burned by T) = Phi(-x* / sigma)
 
-In weather that stays, x* = ln(t / T), t the time of arrival at factor 1. In weather by the hour a fire that stands still
-at night is not late by minutes but by a share of its rate, which x* measures. A ladder of factors finds it: on the
-lowest rung that comes in time, x* = x_rung - ln(T / t) / k, k = -d ln t / dx, but over the next rung, which does not
-come in time. The gradient is that of a level set,
+In weather that stays, x* = ln(t / T), t the time of arrival at factor 1. In weather by the hour a fire that stands
+still at night is not late by minutes but by a share of its rate, which x* measures. A ladder of factors finds it: on
+the lowest rung that comes in time, x* = x_rung - ln(T / t) / k, k = -d ln t / dx, but over the next rung, which does
+not come in time. The gradient is that of a level set,
 
     dx* / dz = -(dt / dz) / (dt / dx)
 
@@ -67,7 +67,7 @@ def margin(fire: RateFire, parameters: Sequence[Parameter], z: Tensor, case: Fir
     fuel = burnable(law, case)
     hours = [grouped([law], case, spell, fuel) for spell in case.spells]
     tangents = [-hour.travel for hour in hours], *_tangents(fire, parameters, z, case, fuel)
-    minutes, slopes = _differentiated(hours, torch.stack([torch.cat(each) for each in tangents], 1), case, fuel)
+    minutes, slopes = differentiated(hours, torch.stack([torch.cat(each) for each in tangents], 1), case, fuel)
     return _margin(minutes, slopes, case.minutes, fuel)
 
 
@@ -95,7 +95,7 @@ def _tangents(
     return found
 
 
-def _differentiated(hours: Sequence[Hour], tangents: Tensor, case: FireCase, fuel: Tensor) -> tuple[Tensor, Tensor]:
+def differentiated(hours: Sequence[Hour], tangents: Tensor, case: FireCase, fuel: Tensor) -> tuple[Tensor, Tensor]:
     """Return times of arrival on each rung, float32 [R, H, W], and their derivatives [D, R, H, W].
 
     Args:

@@ -8,7 +8,7 @@ from torch import Tensor
 from warp_torchrl.calibration.scores import BURNS, first_cells, jaccard, order_of_burning
 
 Loss = Literal["jaccard", "cross_entropy", "brier"]
-"""``jaccard`` is the mean of 1 - J at the known hours and 1 - J at the scar's area; the others compare probabilities."""
+"""``jaccard`` is the mean of 1 - J at the known hours and at the scar's area; the others compare probabilities."""
 FLOOR = 1e-2
 """Least probability of what happened: no cell costs more than -ln of it."""
 

@@ -27,7 +27,9 @@ def table(rows: Rows) -> str:
     all_scores = [scores for by_model in rows.values() for scores in by_model.values()]
     shown = [name for name in _COLUMNS if any(getattr(scores, name) is not None for scores in all_scores)]
     lines = ["| fire | model | " + " | ".join(_COLUMNS[name] for name in shown) + " |", "|---" * (2 + len(shown)) + "|"]
-    lines += [_line(fire, model, asdict(scores), shown) for fire, each in rows.items() for model, scores in each.items()]
+    lines += [
+        _line(fire, model, asdict(scores), shown) for fire, each in rows.items() for model, scores in each.items()
+    ]
     if len(rows) > 1:
         lines += [_line("mean", model, mean, shown) for model, mean in means(rows).items()]
     return "\n".join(lines)
@@ -37,7 +39,9 @@ def means(rows: Rows) -> dict[str, dict[str, float | None]]:
     """Return the mean of each score over the fires; of errors of the area, of how large they are."""
     models = list(dict.fromkeys(model for by_model in rows.values() for model in by_model))
     return {
-        model: {name: _mean(name, [by_model[model] for by_model in rows.values() if model in by_model]) for name in _COLUMNS}
+        model: {
+            name: _mean(name, [by_model[model] for by_model in rows.values() if model in by_model]) for name in _COLUMNS
+        }
         for model in models
     }
 

@@ -130,4 +130,7 @@ def _write(
         page += "\n\n" + "\n".join(f"{name}: {value:.4g}" for name, value in found.items())
     disk.replace(folder / "calibration.md", page + "\n")
     print(page)
-    print(f"wrote {', '.join(sorted(each.name for each in folder.iterdir()))} into {folder}, in {seconds:.0f} s", flush=True)
+    print(
+        f"wrote {', '.join(sorted(each.name for each in folder.iterdir()))} into {folder}, in {seconds:.0f} s",
+        flush=True,
+    )
