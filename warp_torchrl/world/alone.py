@@ -61,7 +61,7 @@ def arrival_minutes(
         float32 [b, H, W] [minutes], in order; ``travel.NEVER`` where the fire does not come.
     """
     fuel = (fire.flammability(landscape)[0] > 0.0) & (landscape.age[0] >= fire.youngest_fuel)
-    hours = [_hour(fire, landscape, cell_size, spell, fuel) for spell in spells]
+    hours = [hour_of(fire, landscape, cell_size, spell, fuel) for spell in spells]
     size = (fuel.shape[0], fuel.shape[1])
 
     def burned(part: tuple[Tensor, Tensor]) -> Tensor:
@@ -93,7 +93,16 @@ def _side_by_side(
             yield waiting.popleft().result()
 
 
-def _hour(fire: RateFire, landscape: Landscape, cell_size: float, spell: Spell, fuel: Tensor) -> Hour:
+def hour_of(fire: RateFire, landscape: Landscape, cell_size: float, spell: Spell, fuel: Tensor) -> Hour:
+    """Return the times of ways in a spell, and ticks as short as its fastest cells but one in a thousand ask for.
+
+    Args:
+        fire: The automaton.
+        landscape: One landscape, batch size [1].
+        cell_size: Side of a cell [m].
+        spell: The weather.
+        fuel: Cells that can ignite, bool [H, W].
+    """
     spread = spread_in(fire, landscape, cell_size, spell)
     rates = spread.head[0][fuel]
     fastest = float(rates.kthvalue(max(1, math.ceil(_BUT_FASTEST * len(rates)))).values) if len(rates) else 0.0
