@@ -9,7 +9,7 @@ import pytest
 from warp_torchrl import rate_of_spread
 from warp_torchrl.rates.standard_fuels import NOT_BURNABLE, anderson_13, scott_burgan_40
 
-fuel_models = pytest.importorskip("pyretechnics.fuel_models", reason="needs the extra dev, and Python below 3.13")
+fuel_models = pytest.importorskip("pyretechnics.fuel_models", reason="needs the extra witness, and Python below 3.13")
 from pyretechnics import surface_fire, vector_utils  # noqa: E402
 
 MOISTURES = ("dead_1h", "dead_10h", "dead_100h", "live_herbaceous", "live_woody")
