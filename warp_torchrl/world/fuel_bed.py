@@ -108,9 +108,26 @@ class FuelBed:
             flame_length=spread.flame_length * factor.pow(0.46),
         )
 
-    def _canadian(self, fuel: Tensor, moisture: Tensor, **air: Tensor) -> Spread:
+    def _canadian(
+        self,
+        fuel: Tensor,
+        moisture: Tensor,
+        *,
+        wind_speed: Tensor,
+        wind_bearing: Tensor,
+        slope: Tensor,
+        aspect: Tensor,
+    ) -> Spread:
         codes = dict(zip(MOISTURES, moisture[:, :, None, None].unbind(1), strict=True))
-        return fbp_spread(fuel, **air, ffmc=codes["ffmc"], bui=codes["bui"])
+        return fbp_spread(
+            fuel,
+            wind_speed=wind_speed,
+            wind_bearing=wind_bearing,
+            slope=slope,
+            aspect=aspect,
+            ffmc=codes["ffmc"],
+            bui=codes["bui"],
+        )
 
     def _rothermel(self, fuel: Tensor, moisture: Tensor, **air: Tensor) -> Spread:
         table = _on(self.table, fuel.device)
