@@ -71,8 +71,8 @@ def test_a_table_of_nothing_is_refused():
 
 
 def test_classes_of_one_size_share_their_weight():
-    # Dead fuel of 1500 /ft and its cured grass of 1300 /ft are both past 1200 /ft; 109 and 30 /ft stand alone.
-    model = FuelModel(depth=1.0, extinction_moisture=20.0, sav_1h=1500, sav_live_herbaceous=1300, sav_live_woody=750)
+    # Dead fuel of 1200 /ft and its cured grass of 1300 /ft are both 1200 /ft or more; 109 and 30 /ft stand alone.
+    model = FuelModel(depth=1.0, extinction_moisture=20.0, sav_1h=1200, sav_live_herbaceous=1300, sav_live_woody=750)
     same = fuel_table({1: model}).fuels.same_size[0]
     expected = torch.eye(6)
     expected[0, 3] = expected[3, 0] = 1.0

@@ -71,6 +71,12 @@ def test_what_is_no_fuel_does_not_burn_and_fuel_does(table):
     assert (rate[:-1][~still] > 0).all()
 
 
+def test_nothing_at_all_spreads_past_the_moisture_of_extinction():
+    for table in (anderson_13(), scott_burgan_40()):
+        bed = bed_response(table.fuels, torch.tensor([45.0, 45.0, 45.0, 150.0, 150.0]))
+        assert (bed.rate == 0).all() and (bed.heat == 0).all() and (bed.top_wind == 0).all()
+
+
 @pytest.mark.parametrize("column", range(5))
 def test_moister_fuel_spreads_no_faster(column):
     table = scott_burgan_40()

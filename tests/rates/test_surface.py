@@ -1,11 +1,13 @@
 """Heads of fires in wind and on slopes."""
 
 import math
+from dataclasses import fields, replace
 
 import pytest
 import torch
 
 from warp_torchrl import rate_of_spread
+from warp_torchrl.rates.fuel_models import FuelModel, Fuels, fuel_table
 from warp_torchrl.rates.rothermel import bed_response
 from warp_torchrl.rates.standard_fuels import scott_burgan_40
 from warp_torchrl.rates.surface import flame_length, head_of_fire, length_to_breadth, surface_spread
@@ -53,6 +55,11 @@ def test_the_head_goes_with_the_wind_on_level_ground(bearing):
 @pytest.mark.parametrize("aspect", [0.0, 90.0, 200.0])
 def test_the_head_climbs_without_wind(aspect):
     assert float(ask(slope=20.0, aspect=aspect).direction) == pytest.approx((aspect + 180) % 360, abs=1e-3)
+
+
+def test_a_direction_just_below_north_is_no_360():
+    # The sine of -180 degrees is 8.7e-8, so that the head would go to -5e-6, and that plus 360 rounds to 360.
+    assert float(ask(wind=(3.0, -180.0)).direction) == 0.0
 
 
 def test_wind_and_slope_together_beat_each_and_oppose_each_other():
@@ -120,7 +127,7 @@ def test_gradients_are_those_of_differences():
     table = scott_burgan_40().to(dtype=torch.float64)
     row = table.index(torch.tensor([101, 122, 145, 165, 183, 202]))
 
-    def fields(speed, bearing, slope, moisture):
+    def told_fields(speed, bearing, slope, moisture):
         told = surface_spread(
             table,
             row,
@@ -133,15 +140,26 @@ def test_gradients_are_those_of_differences():
         return tuple(getattr(told, name) for name in FIELDS)
 
     given = [torch.tensor(value, dtype=torch.float64) for value in (1.5, 30.0, 12.0, [6.0, 7, 8, 60, 90])]
-    assert torch.autograd.gradcheck(fields, [each.requires_grad_() for each in given])
+    assert torch.autograd.gradcheck(told_fields, [each.requires_grad_() for each in given])
 
 
+def with_twigs(table):
+    """A table with one more row, of twigs so thick that the power of the wind is below 1, with no slope at 0."""
+    twigs = fuel_table({1: FuelModel(depth=1.0, extinction_moisture=40.0, load_1h=5.0, sav_1h=400.0)}).fuels
+    assert bed_response(twigs, torch.tensor([6.0, 7, 8, 60, 90])).wind_power[0] < 1
+    joined = {
+        each.name: torch.cat((getattr(twigs, each.name)[:1], getattr(table.fuels, each.name))) for each in fields(Fuels)
+    }
+    return replace(table, fuels=Fuels(**joined))
+
+
+@pytest.mark.parametrize("dead", [6.0, 60.0])
 @pytest.mark.parametrize("wind", [0.0, 1e-9, 100.0])
 @pytest.mark.parametrize("slope", [0.0, 30.0])
-def test_gradients_are_finite_where_nothing_moves_and_where_much_does(wind, slope):
-    table = scott_burgan_40()
-    given = [torch.tensor(value, requires_grad=True) for value in (wind, 0.0, slope, [60.0, 60, 60, 120, 120])]
-    row = torch.arange(len(table.codes) + 1)
+def test_gradients_are_finite_where_nothing_moves_and_where_much_does(wind, slope, dead):
+    table = with_twigs(scott_burgan_40())
+    given = [torch.tensor(value, requires_grad=True) for value in (wind, 0.0, slope, [dead, dead, dead, 120, 120])]
+    row = torch.arange(len(table.fuels.depth))
     aspect = torch.tensor(180.0)
     names = ("wind_speed", "wind_bearing", "slope", "moisture")
     told = surface_spread(table, row, aspect=aspect, **dict(zip(names, given, strict=True)))

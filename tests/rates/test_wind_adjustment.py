@@ -11,7 +11,7 @@ def factor(depth=1.0, cover=0.0, height=0.0, ratio=1.0):
 
 
 def test_open_fuel_beds_of_the_publication():
-    # Andrews 2012, table 5: 0.36 at 1 ft, 0.55 at 6 ft, 0.42 at 2 ft.
+    # The known factors of models 1, 5 and 4, of 1, 2 and 6 ft, in the open (Andrews 2012).
     told = open_factor(torch.tensor([1.0, 2.0, 6.0, 0.0]))
     assert told.tolist() == pytest.approx([0.36, 0.42, 0.55, 0.0], abs=0.01)
 

@@ -18,8 +18,8 @@ _MINERALS = 1.0 - 0.0555
 """Share of dry weight that is not mineral."""
 _MINERAL_DAMPING = 0.174 * 0.01**-0.19
 """For an effective mineral content of 0.01."""
-_ANY_RATIO = 1500.0
-"""Surface-area-to-volume ratio [1/ft] of ground without fuel: powers of one near 0 overflow."""
+_USUAL_PACKING, _USUAL_SAV = 0.01, 1500.0
+"""Of ground without fuel, so that what follows from them is finite."""
 _KILOJOULES = 1.055056 / FOOT**2
 """kJ/m2 in a Btu/ft2."""
 
@@ -61,8 +61,8 @@ def bed_response(fuels: Fuels, moisture: Tensor) -> BedResponse:
     )
     dead_share = dead_area / _positive(dead_area + live_area)
     live_share = live_area / _positive(dead_area + live_area)
-    sav = _positive(dead_share * _dead(share * fuels.sav) + live_share * _live(share * fuels.sav), _ANY_RATIO)
-    packing = _positive(load.sum(-1) / (_DENSITY * _positive(fuels.depth)))
+    sav = _positive(dead_share * _dead(share * fuels.sav) + live_share * _live(share * fuels.sav), _USUAL_SAV)
+    packing = _positive(load.sum(-1) / (_DENSITY * _positive(fuels.depth)), _USUAL_PACKING)
     relative = packing / (3.348 * sav**-0.8189)
 
     reaction = reaction_velocity(sav, relative) * _burnable_heat(fuels, load, share, water)
@@ -112,7 +112,8 @@ def reaction_velocity(sav: Tensor, relative: Tensor) -> Tensor:
 def moisture_damping(moisture: Tensor, extinction: Tensor) -> Tensor:
     """Return the share of the reaction intensity that moisture leaves, 1 to 0 (Rothermel 1972 eq. 29)."""
     ratio = (moisture / _positive(extinction)).clamp(max=1.0)
-    return (1.0 - 2.59 * ratio + 5.11 * ratio**2 - 3.52 * ratio**3).clamp(min=0.0)
+    share = 1.0 - 2.59 * ratio + 5.11 * ratio**2 - 3.52 * ratio**3
+    return torch.where(ratio < 1.0, share.clamp(min=0.0), 0.0)  # at 1 the rounded sum is not quite 0
 
 
 def live_extinction(fuels: Fuels, load: Tensor, water: Tensor) -> Tensor:

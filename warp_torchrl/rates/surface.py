@@ -115,7 +115,7 @@ def _wind_and_slope(
 
 
 def length_to_breadth(effective_wind: Tensor) -> Tensor:
-    """Return how long the ellipse of a fire is for its breadth, in [1, 8] (Anderson 1983; Finney 1998 eq. 7).
+    """Return how long the ellipse of a fire is for its breadth, in [1, 8] (Anderson 1983; Finney 1998).
 
     Finney's form is 1 without wind, which Anderson's is not.
 
