@@ -25,7 +25,9 @@ def test_a_number_gives_numbers():
 
 
 @pytest.mark.parametrize(
-    "kind", [list, tuple, np.array, torch.tensor, lambda codes: np.array(codes, np.float32)], ids=str
+    "kind",
+    [list, tuple, np.array, torch.tensor, lambda codes: np.array(codes, np.float32)],
+    ids=["list", "tuple", "array", "tensor", "floats"],
 )
 def test_every_kind_of_sequence_tells_the_same(kind):
     told = ask(kind([102, 99, 165]))

@@ -15,14 +15,11 @@ from pyretechnics import surface_fire, vector_utils  # noqa: E402
 MOISTURES = ("dead_1h", "dead_10h", "dead_100h", "live_herbaceous", "live_woody")
 DAMP = [(3, 4, 5, 30, 60), (6, 7, 8, 60, 90), (6, 7, 8, 90, 60), (10, 12, 13, 120, 150), (18, 20, 22, 75, 100)]
 FIELDS = {"head": 0, "length_to_breadth": 2, "intensity": 3, "flame_length": 4}
-WOODY = (4, 5, 7, 10)
-"""Models whose live fuel is woody, as BehavePlus and Andrews (2018) have it; the witness calls it herbaceous."""
 
 
 def witness(code, damp, speed, bearing, slope, aspect):
     """Rate [m/min], direction [degrees], length to breadth, intensity [kW/m] and flame length [m] of the witness."""
     dead_1h, dead_10h, dead_100h, herbs, woody = (value / 100 for value in damp)
-    herbs = woody if code in WOODY else herbs
     model = fuel_models.get_fuel_model(code)
     wet = fuel_models.moisturize(model, (dead_1h, dead_10h, dead_100h, 0.0, herbs, woody))
     still = surface_fire.calc_surface_fire_behavior_no_wind_no_slope(wet)

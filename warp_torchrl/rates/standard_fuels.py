@@ -1,7 +1,8 @@
 """The standard fuel models: the 13 of Anderson (1982) and the 40 of Scott and Burgan (2005).
 
-Codes are those of LANDFIRE's maps. Anderson's table says "live" without a kind; which kind is as in BehavePlus and
-Andrews (2018, RMRS-GTR-371): herbaceous in model 2, woody in 4, 5, 7 and 10. None of the 13 cures.
+Codes are those of LANDFIRE's maps. Anderson's table says "live" without a kind: here it is herbaceous, as in the
+package pyretechnics. BehavePlus takes that of models 4, 5, 7 and 10 for woody; give both moistures alike to burn as it
+does. None of the 13 cures.
 """
 
 from collections.abc import Sequence
@@ -19,13 +20,13 @@ _ANDERSON = {
     1: (0.034, 0.000, 0.000, 0.000, 0.000, 3500, 1500, 1.0, 12),
     2: (0.092, 0.046, 0.023, 0.023, 0.000, 3000, 1500, 1.0, 15),
     3: (0.138, 0.000, 0.000, 0.000, 0.000, 1500, 1500, 2.5, 25),
-    4: (0.230, 0.184, 0.092, 0.000, 0.230, 2000, 1500, 6.0, 20),
-    5: (0.046, 0.023, 0.000, 0.000, 0.092, 2000, 1500, 2.0, 20),
+    4: (0.230, 0.184, 0.092, 0.230, 0.000, 2000, 1500, 6.0, 20),
+    5: (0.046, 0.023, 0.000, 0.092, 0.000, 2000, 1500, 2.0, 20),
     6: (0.069, 0.115, 0.092, 0.000, 0.000, 1750, 1500, 2.5, 25),
-    7: (0.052, 0.086, 0.069, 0.000, 0.017, 1750, 1550, 2.5, 40),
+    7: (0.052, 0.086, 0.069, 0.017, 0.000, 1750, 1550, 2.5, 40),
     8: (0.069, 0.046, 0.115, 0.000, 0.000, 2000, 1500, 0.2, 30),
     9: (0.134, 0.019, 0.007, 0.000, 0.000, 2500, 1500, 0.2, 25),
-    10: (0.138, 0.092, 0.230, 0.000, 0.092, 2000, 1500, 1.0, 25),
+    10: (0.138, 0.092, 0.230, 0.092, 0.000, 2000, 1500, 1.0, 25),
     11: (0.069, 0.207, 0.253, 0.000, 0.000, 1500, 1500, 1.0, 15),
     12: (0.184, 0.644, 0.759, 0.000, 0.000, 1500, 1500, 2.3, 20),
     13: (0.322, 1.058, 1.288, 0.000, 0.000, 1500, 1500, 3.0, 25),
