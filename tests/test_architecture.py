@@ -140,6 +140,7 @@ def test_rasterio_is_imported_where_maps_are_read_placed_and_written(module):
         "maps/geotiff",
         "maps/perimeter",
         "weather/convergence",
+        "calibration/observed",
     ):
         assert "rasterio" not in {name.split("/")[0] for name in imports(module)}
 

@@ -44,6 +44,13 @@ def test_the_example_of_the_fire_alone_runs(capsys):
     assert area.shape == (64, 151) and (area.diff(dim=1) >= 0.0).all() and area[:, -1].mean() > area[:, 0].mean()
 
 
+def test_the_example_of_a_prediction_runs(capsys):
+    names: dict = {}
+    exec(blocks("prediction.md")[0], names)
+    assert re.fullmatch(r"after an hour: \d+ ha, 5 % to 95 %: \d+ to \d+ ha\n", capsys.readouterr().out)
+    assert names["prediction"].burn_probability[40, 10] == 1.0
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_link_and_picture_of_a_page_is_there(page):
     for target in re.findall(r"\]\(([^)#]+)\)", page.read_text()):

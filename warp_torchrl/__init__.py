@@ -8,6 +8,8 @@ import os
 if "OMP_WAIT_POLICY" not in os.environ:
     os.environ.setdefault("GOMP_SPINCOUNT", "1000")
 
+from typing import Any
+
 import gymnasium
 import pettingzoo
 
@@ -27,3 +29,12 @@ if hasattr(pettingzoo, "register"):  # older ones have no registry
 
 __version__ = "0.1.0"
 __all__ = ["WildfireEnv", "__version__", "fire_history", "load_policy", "make_env", "rate_of_spread", "simulate"]
+
+
+def __getattr__(name: str) -> Any:
+    """Return what is imported when it is first asked for."""
+    if name == "predict":
+        from warp_torchrl.prediction.predict import predict
+
+        return predict
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,15 +1,20 @@
 """Fire simulation without vehicles."""
 
 import math
+from dataclasses import dataclass
+from pathlib import Path
 
 import torch
 from torch import Tensor
 
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import build
+from warp_torchrl.weather.table import WeatherTable, read_weather
+from warp_torchrl.world.automaton import Automaton
 from warp_torchrl.world.burn import FireHistory, burn, start_burning, trace
-from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.state import EMBER, Cover, WorldState
+from warp_torchrl.world.rate import RateFire
+from warp_torchrl.world.state import EMBER, Cover, Landscape, WorldState
+from warp_torchrl.world.weather import Weather
 from warp_torchrl.world.wind import Wind, constant_wind
 
 
@@ -18,12 +23,14 @@ def simulate(
     cover: Tensor,
     elevation: Tensor | None = None,
     wind: tuple[float, float] | Wind = (0.0, 0.0),
-    fire: str | Fire = "paper",
+    fire: str | Automaton = "paper",
     ticks: int = 1,
     first_tick: int = 0,
     seed: int = 0,
     cell_size: float = 30.0,
     stage_age: Tensor | None = None,
+    fuel: Tensor | None = None,
+    weather: WeatherTable | str | Path | None = None,
 ) -> Tensor:
     """Simulate the fire without vehicles, with the environment's own code.
 
@@ -32,13 +39,16 @@ def simulate(
         cover: Land cover, uint8 [B, H, W]: 0 lake, 1 wetland, 2 grassland, 3 forest, 4 bare.
         elevation: In metres, float32 [B, H, W]; None is flat.
         wind: (u east, v north) of the air's motion [m/s], or a wind component.
-        fire: One of ``conf/fire``, ``paper`` being the complete automaton, or a ``Fire``.
+        fire: One of ``conf/fire``, ``paper`` being the complete automaton, or a law of one's own numbers.
         ticks: Fire ticks to run.
         first_tick: Ticks already run, to continue a simulation.
         seed: World i has seed ``seed + i``.
         cell_size: Side of a cell [m].
         stage_age: Ticks that each burning cell has spent in its stage, uint8 [B, H, W]; None is 0. Needed to continue a
             simulation under law ``hazard``, where a stage lasts several ticks. ``fire_history`` returns it.
+        fuel: Fuel codes of the law's fuel model, int16 [B, H, W], for law ``rate``; None takes those of the cover.
+        weather: Weather by the hour in place of ``wind``, as a table or its CSV file, for law ``rate``; its bearings
+            are from the map's north.
 
     Returns:
         The codes after the ticks, uint8 [B, H, W].
@@ -46,7 +56,9 @@ def simulate(
     Raises:
         ValueError: If a shape, type, code or number does not fit.
     """
-    state, automaton, air = _start(cells, cover, elevation, wind, fire, ticks, first_tick, seed, cell_size, stage_age)
+    state, automaton, air = _start(
+        cells, cover, elevation, wind, fire, ticks, first_tick, seed, cell_size, stage_age, fuel, weather
+    )
     return burn(state, automaton, air, ticks).cells
 
 
@@ -55,12 +67,14 @@ def fire_history(
     cover: Tensor,
     elevation: Tensor | None = None,
     wind: tuple[float, float] | Wind = (0.0, 0.0),
-    fire: str | Fire = "paper",
+    fire: str | Automaton = "paper",
     ticks: int = 1,
     first_tick: int = 0,
     seed: int = 0,
     cell_size: float = 30.0,
     stage_age: Tensor | None = None,
+    fuel: Tensor | None = None,
+    weather: WeatherTable | str | Path | None = None,
 ) -> FireHistory:
     """Simulate the fire as ``simulate`` does, and record when each cell ignites.
 
@@ -77,15 +91,19 @@ def fire_history(
         seed: See ``simulate``.
         cell_size: See ``simulate``.
         stage_age: See ``simulate``.
+        fuel: See ``simulate``.
+        weather: See ``simulate``.
 
     Returns:
-        Arrival times, burning cells over time and the final codes; ``burn_probability()`` over the worlds,
-        ``burned_area()`` over time.
+        Arrival times, under law ``rate`` in minutes too, burning cells over time and the final codes;
+        ``burn_probability()`` over the worlds, ``burned_area()`` over time.
 
     Raises:
         ValueError: If a shape, type, code or number does not fit.
     """
-    state, automaton, air = _start(cells, cover, elevation, wind, fire, ticks, first_tick, seed, cell_size, stage_age)
+    state, automaton, air = _start(
+        cells, cover, elevation, wind, fire, ticks, first_tick, seed, cell_size, stage_age, fuel, weather
+    )
     return trace(state, automaton, air, ticks, cell_size)
 
 
@@ -94,13 +112,15 @@ def _start(
     cover: Tensor,
     elevation: Tensor | None,
     wind: tuple[float, float] | Wind,
-    fire: str | Fire,
+    fire: str | Automaton,
     ticks: int,
     first_tick: int,
     seed: int,
     cell_size: float,
     stage_age: Tensor | None,
-) -> tuple[WorldState, Fire, Wind]:
+    fuel: Tensor | None,
+    weather: WeatherTable | str | Path | None,
+) -> tuple[WorldState, Automaton, Wind]:
     """Check the arguments; return the initial state, the fire and the wind."""
     for name, plane, top in (("cells", cells, EMBER), ("cover", cover, max(Cover)), ("stage_age", stage_age, 255)):
         if plane is None:
@@ -123,22 +143,64 @@ def _start(
     automaton = _automaton(fire)
     if stage_age is not None and int(stage_age.max()) >= automaton.ticks_per_stage:
         raise ValueError(f"stage_age must be under {automaton.ticks_per_stage} ticks, got {int(stage_age.max())}")
-    air = constant_wind(*wind) if isinstance(wind, tuple | list) else wind
+    elevation = None if elevation is None else elevation.to(torch.float32)
+    _check_rate(automaton, first_tick, fuel, cells)
+    codes = None if fuel is None else fuel.to(torch.int16)
+    air = _air(wind, weather)
+    automaton = automaton.over(_Given(Landscape(cover, cells, elevation, fuel=codes)), air, cell_size)
+    air = air.paced(automaton.minutes)
     state = start_burning(
         cells,
         cover,
-        None if elevation is None else elevation.to(torch.float32),
+        elevation,
         wind=air,
         fire=automaton,
         first_tick=first_tick,
         stage_age=stage_age,
         seed=seed,
         cell_size=cell_size,
+        fuel=codes,
     )
     return state, automaton, air
 
 
-def _automaton(fire: str | Fire) -> Fire:
+@dataclass(frozen=True)
+class _Given:
+    """Landscapes that are there already, as a source."""
+
+    landscape: Landscape
+
+    @property
+    def size(self) -> tuple[int, int]:
+        return self.landscape.cover.shape[1], self.landscape.cover.shape[2]
+
+    def __call__(self, key: Tensor) -> Landscape:
+        device = self.landscape.cover.device
+        return self.landscape[torch.arange(len(key), device=device) % len(self.landscape.cover)]
+
+
+def _air(wind: tuple[float, float] | Wind, weather: WeatherTable | str | Path | None) -> Wind:
+    """Return the wind, from weather where that is given."""
+    if weather is None:
+        return constant_wind(*wind) if isinstance(wind, tuple | list) else wind
+    if isinstance(wind, Wind) or tuple(wind) != (0.0, 0.0):
+        raise ValueError(f"wind must be left out where weather is given, got {wind}")
+    return Weather(table=weather if isinstance(weather, WeatherTable) else read_weather(weather))
+
+
+def _check_rate(automaton: Automaton, first_tick: int, fuel: Tensor | None, cells: Tensor) -> None:
+    """Refuse what law ``rate`` cannot do, and fuel codes that others do not read."""
+    if isinstance(automaton, RateFire) and first_tick > 0:
+        raise ValueError(f"first_tick must be 0 under law rate, whose arrival times are not kept, got {first_tick}")
+    if fuel is None:
+        return
+    if not isinstance(automaton, RateFire):
+        raise ValueError("fuel must be left out under laws that read no fuel codes, all but rate")
+    if fuel.is_floating_point() or fuel.shape != cells.shape or fuel.device != cells.device:
+        raise ValueError(f"fuel must hold whole codes {list(cells.shape)}, got {fuel.dtype} {list(fuel.shape)}")
+
+
+def _automaton(fire: str | Automaton) -> Automaton:
     """Return a fire, built from ``conf/fire`` if given by name."""
     if isinstance(fire, str):
         return build(plain(compose_config("train", [f"fire={fire}"]))["fire"], "fire")

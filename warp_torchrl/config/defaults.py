@@ -14,6 +14,7 @@ from hydra.plugins.config_source import ConfigResult
 from omegaconf import DictConfig, OmegaConf
 
 from warp_torchrl.config.construction import component
+from warp_torchrl.config.prediction_options import PredictionOptions
 from warp_torchrl.config.run_config import COMPONENTS, RunConfig
 from warp_torchrl.world.world import World
 
@@ -40,7 +41,7 @@ class FileConfigSource(file_config_source.FileConfigSource):
     """Hydra's source of yaml files, which fills in the fields that a file leaves out."""
 
     def load_config(self, config_path: str) -> ConfigResult:
-        """Return the content of a yaml file, ``train`` or an option of a group, with every field of its class."""
+        """Return the content of a yaml file, a command's or an option of a group, with every field of its class."""
         result = super().load_config(config_path)
         if isinstance(result.config, DictConfig):
             result.config = OmegaConf.merge(_left_out(config_path, result.config), result.config)
@@ -49,9 +50,12 @@ class FileConfigSource(file_config_source.FileConfigSource):
 
 def _left_out(config_path: str, node: DictConfig) -> dict[str, Any]:
     """Return the default values of what a yaml file configures."""
-    if config_path.removesuffix(".yaml") == "train":
+    name = config_path.removesuffix(".yaml")
+    if name == "predict":
+        return defaults(PredictionOptions)
+    if name == "train":
         run = {**defaults(World), **defaults(RunConfig)}
-        return {name: value for name, value in run.items() if name not in COMPONENTS}
+        return {key: value for key, value in run.items() if key not in COMPONENTS}
     kind = component(node["_target_"]) if "_target_" in node else None
     if kind is None:
         return {}

@@ -20,6 +20,7 @@ FBP_NAMES: Mapping[str, int] = {
 """Codes of the Canadian fuel types by name."""
 FBP_CODES = torch.tensor(sorted({*FBP_NAMES.values(), 0, 13, 60, 90, 99, *range(100, 107), *range(400, 1000)}))
 """Codes of the Canadian fuel types and of what is no fuel there."""
+_SETS = {"fbfm13": anderson_13, "fbfm40": scott_burgan_40}
 _SHOWN = 5  # unknown codes that a message names
 
 
@@ -34,11 +35,12 @@ def read_model(model: str | Mapping[Any, Any]) -> FuelTable | None:
     """
     if isinstance(model, Mapping):
         return fuel_table({_code(code): _own_model(code, given) for code, given in model.items()})
-    known = {"fbfm13": anderson_13, "fbfm40": scott_burgan_40, "fbp": lambda: None}
-    if not isinstance(model, str) or model not in known:
-        hint = did_you_mean(model, known)
+    if model == "fbp":
+        return None
+    if not isinstance(model, str) or model not in _SETS:
+        hint = did_you_mean(model, (*_SETS, "fbp"))
         raise ValueError(f"model must be fbfm13, fbfm40, fbp or fuel models by code, got {model!r}{hint}")
-    return known[model]()
+    return _SETS[model]()
 
 
 def read_fuel(fuel: object, table: FuelTable | None, model: object) -> Tensor:
@@ -76,7 +78,7 @@ def _of_names(given: np.ndarray[Any, Any], names: Mapping[str, int], called: str
         if str(name).upper() not in names:
             raise ValueError(f"fuel must be names of {called}, got {name!r}{did_you_mean(name, names)}")
     codes = np.array([names[str(name).upper()] for name in distinct.tolist()], dtype=np.int64)
-    return torch.from_numpy(codes[place].reshape(given.shape))
+    return torch.tensor(codes[place]).view(given.shape)
 
 
 def _own_model(code: object, given: object) -> FuelModel:

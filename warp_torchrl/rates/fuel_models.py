@@ -90,13 +90,7 @@ class FuelModel:
             raise ValueError(f"{name} must have {' and '.join(missing)}, got {', '.join(values) or 'nothing'}")
         if units not in ("english", "metric"):
             raise ValueError(f"units of {name} must be english or metric, got {units!r}")
-        model = cls(**values)
-        return model._from_metric(values) if units == "metric" else model
-
-    def _from_metric(self, given: Mapping[str, Any]) -> "FuelModel":
-        """Return the model with its given values converted; defaults are in the units of this class already."""
-        factors = {key: _METRIC.get(key.partition("_")[0], 1.0) for key in given if key != "dynamic"}
-        return FuelModel(**{**given, **{key: getattr(self, key) * factor for key, factor in factors.items()}})
+        return cls(**(_from_metric(values) if units == "metric" else values))
 
     @property
     def loads(self) -> tuple[float, ...]:
@@ -150,6 +144,14 @@ class FuelTable:
     def to(self, *, device: torch.device | None = None, dtype: torch.dtype | None = None) -> "FuelTable":
         """Return the table on another device; the precision is that of its fuels."""
         return FuelTable(self.fuels.to(device=device, dtype=dtype), self.codes.to(device), self.names)
+
+
+def _from_metric(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a model's given values in the units of its class; what is no number is left to be refused."""
+    return {
+        key: value * _METRIC.get(key.partition("_")[0], 1.0) if type(value) in (int, float) else value
+        for key, value in given.items()
+    }
 
 
 NO_FUEL = FuelModel(depth=0.0, extinction_moisture=0.0)

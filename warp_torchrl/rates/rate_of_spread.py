@@ -70,6 +70,8 @@ def rate_of_spread(
         raise ValueError(f"wind_height must be {', '.join(get_args(WindHeight))}, got {wind_height!r}")
     if not isinstance(wind, tuple | list) or len(wind) != 2:
         raise ValueError(f"wind must be a speed and a bearing, got {wind!r}")
+    if not isinstance(moisture, Mapping):
+        raise ValueError(f"moisture must be a mapping of per cent by name, got {moisture!r}")
     table = read_model(model)
     codes = read_fuel(fuel, table, model)
     place = _device(codes, *wind, slope, aspect, *moisture.values(), canopy_cover, canopy_height, crown_ratio)
@@ -104,7 +106,7 @@ def _rothermel(
     aspect: Tensor,
     water: dict[str, Tensor],
 ) -> Spread:
-    used = table.fuels.load[row.unique()].amax(0) > 0.0
+    used = table.fuels.load[row.unique()].sum(0) > 0.0
     for column, name in ((3, "live_herbaceous"), (4, "live_woody")):
         if name not in water and bool(used[column]):
             raise ValueError(f"moisture must have {name} where fuels have such a load, got {', '.join(water)}")
@@ -138,7 +140,9 @@ def _canadian(
         raise ValueError(f"moisture must have {' and '.join(missing)} for fbp, got {', '.join(water) or 'nothing'}")
     if wind_height == "20ft":
         speed = speed * TEN_METRES
-    return fbp_spread(codes, wind_speed=speed, wind_bearing=bearing, slope=slope, aspect=aspect, **water)
+    return fbp_spread(
+        codes, wind_speed=speed, wind_bearing=bearing, slope=slope, aspect=aspect, ffmc=water["ffmc"], bui=water["bui"]
+    )
 
 
 def _to_midflame(table: FuelTable, row: Tensor, wind_height: str, canopy: dict[str, Tensor]) -> Tensor:

@@ -18,6 +18,8 @@ _MINERALS = 1.0 - 0.0555
 """Share of dry weight that is not mineral."""
 _MINERAL_DAMPING = 0.174 * 0.01**-0.19
 """For an effective mineral content of 0.01."""
+_ANY_RATIO = 1500.0
+"""Surface-area-to-volume ratio [1/ft] of ground without fuel: powers of one near 0 overflow."""
 _KILOJOULES = 1.055056 / FOOT**2
 """kJ/m2 in a Btu/ft2."""
 
@@ -59,7 +61,7 @@ def bed_response(fuels: Fuels, moisture: Tensor) -> BedResponse:
     )
     dead_share = dead_area / _positive(dead_area + live_area)
     live_share = live_area / _positive(dead_area + live_area)
-    sav = _positive(dead_share * _dead(share * fuels.sav) + live_share * _live(share * fuels.sav), 1.0)
+    sav = _positive(dead_share * _dead(share * fuels.sav) + live_share * _live(share * fuels.sav), _ANY_RATIO)
     packing = _positive(load.sum(-1) / (_DENSITY * _positive(fuels.depth)))
     relative = packing / (3.348 * sav**-0.8189)
 

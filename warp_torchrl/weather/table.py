@@ -13,10 +13,11 @@ from torch import Tensor
 from warp_torchrl.weather.columns import QUANTITIES, Column, find_columns
 from warp_torchrl.weather.dead_moisture import dead_moisture
 from warp_torchrl.weather.fwi import buildup_index, hourly_ffmc
-from warp_torchrl.weather.times import row_hours
+from warp_torchrl.weather.times import hours_until, row_hours
 
 WindHeight = Literal["10m", "20ft"]
 """At what height over open ground wind was measured: by the Canadian and international custom, or the American."""
+_EXAMPLES = Path(__file__).parent / "examples"
 OPEN_10M_OVER_20FT = 1.15
 """Wind at 10 m over that at 20 ft in the open (Turner and Lawson 1978, BC-X-177)."""
 
@@ -72,7 +73,7 @@ def read_weather(
     moistures from temperature and humidity.
 
     Args:
-        path: The file.
+        path: The file; or the name of one that comes with the package: ``august``, three hot dry days, made up.
         wind_height: At what height the wind was measured; None is 20ft for speeds in mph, else 10m.
         start_ffmc: Fine fuel moisture code an hour before the first row, where it is to be computed.
         bui: Buildup index of every row, where the file has none and neither DMC nor DC; None leaves it unknown.
@@ -81,7 +82,7 @@ def read_weather(
         ValueError: In one line, with the file, the column and the row (the first under the header is 1): if the file
             cannot be read, the wind or a unit is missing, a quantity is doubled, a cell is no number or out of range.
     """
-    path = Path(path)
+    path = _EXAMPLES / f"{path}.csv" if str(path) in ("august",) else Path(path)
     if wind_height not in (None, "10m", "20ft"):
         raise ValueError(f"wind_height must be 10m or 20ft or null, got {wind_height!r}")
     for name, value, high in (("start_ffmc", start_ffmc, 101), ("bui", bui, 2000)):
@@ -97,6 +98,16 @@ def read_weather(
     height: WindHeight = wind_height or ("20ft" if columns["wind_speed"].unit == "mph" else "10m")
     known = {name: value for name, value in values.items() if value is not None}
     return WeatherTable(hours=hours, wind_height=height, **_complete(known, hours, height, start_ffmc, bui))
+
+
+def minutes_until(moment: str, path: str | Path) -> float:
+    """Return the minutes from the first row of a CSV file to a date and time, written as its rows have them.
+
+    Raises:
+        ValueError: In one line: if the file cannot be read, has no times, or they are written otherwise.
+    """
+    headers, rows = _read_rows(Path(path))
+    return 60.0 * hours_until(moment, headers, rows)
 
 
 def _read_rows(path: Path) -> tuple[list[str], list[list[str]]]:

@@ -45,6 +45,23 @@ def row_hours(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> list[flo
     return [hour - hours[0] for hour in hours]
 
 
+def hours_until(moment: str, headers: Sequence[str], rows: Sequence[Sequence[str]]) -> float:
+    """Return the hours from the first row to a moment that is written as the rows' times are.
+
+    Raises:
+        ValueError: If the rows tell no times, or the moment is not written as they are.
+    """
+    texts = _texts([re.sub(r"[\s-]", "", header.lower()) for header in headers], rows)
+    if len({*texts}) < min(2, len(texts)) or not any(texts):
+        raise ValueError(f"start must be in minutes where rows tell no dates and times of their own, got {moment!r}")
+    together = [*_plain(texts), *_plain([moment])]
+    fitting = [each for each in _readings(together) if each[:-1] == sorted(each[:-1])]
+    if not fitting:
+        raise ValueError(f"start must be a date and time as the first row has it, {texts[0]!r}, got {moment!r}")
+    best = min(fitting, key=lambda reading: reading[-2] - reading[0])
+    return best[-1] - best[0]
+
+
 def _numbers(texts: Sequence[str]) -> list[float]:
     for row, text in enumerate(texts, 1):
         if not re.fullmatch(r"[-+]?\d+\.?\d*|[-+]?\.\d+", text):
@@ -73,13 +90,23 @@ def _read(texts: Sequence[str]) -> list[float]:
     """Return hours since some moment, in the reading of the texts that suits them best."""
     if not any(texts):
         return [0.0] * len(texts)
-    plain = [re.sub(r"[./]", "-", re.sub(r"(?<=\d)T", " ", text.upper()).removesuffix("Z")) for text in texts]
-    plain = [re.sub(r" (\d{1,3})$", lambda clock: " " + _clock(clock[1]), text) for text in plain]
-    readings = [reading for date in _DATES for time in _TIMES if (reading := _parse(plain, date + time))]
+    plain = _plain(texts)
+    readings = _readings(plain)
     if not readings:
         _refuse(texts, plain)
     forward = [each for each in readings if each == sorted(each)] or readings[:1]
     return min(forward, key=lambda reading: reading[-1] - reading[0])
+
+
+def _plain(texts: Sequence[str]) -> list[str]:
+    """Return the texts with hyphens in their dates and four digits where an hour has no colon."""
+    plain = [re.sub(r"[./]", "-", re.sub(r"(?<=\d)T", " ", text.upper()).removesuffix("Z")) for text in texts]
+    return [re.sub(r" (\d{1,3})$", lambda clock: " " + _clock(clock[1]), text) for text in plain]
+
+
+def _readings(plain: Sequence[str]) -> list[list[float]]:
+    """Return the hours since some moment in each way to read all the texts."""
+    return [reading for date in _DATES for time in _TIMES if (reading := _parse(plain, date + time))]
 
 
 def _clock(digits: str) -> str:

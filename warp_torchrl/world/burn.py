@@ -23,6 +23,7 @@ class FireHistory(Batch):
     arrival: Tensor  # int32 [B,H,W], ticks until the cell first burned: 0 from the start, -1 never
     alight: Tensor  # int32 [B,T+1], cells that burn after each tick; the first is the start
     cell_size: float  # side of a cell [m]
+    arrival_minutes: Tensor | None = None  # float32 [B,H,W] under law ``rate``: when the fire came, NaN never
 
     def burn_probability(self) -> Tensor:
         """Return the share of the worlds in which each cell burned, float32 [H, W]."""
@@ -52,6 +53,7 @@ def start_burning(
     stage_age: Tensor | None,
     seed: int,
     cell_size: float,
+    fuel: Tensor | None = None,
 ) -> WorldState:
     """Return worlds without vehicles that are about to make their tick number ``first_tick`` + 1.
 
@@ -59,7 +61,7 @@ def start_burning(
     """
     seeds = seed + torch.arange(cells.shape[0], device=cells.device)
     key = world_key(seeds, torch.zeros_like(seeds))
-    ground = Landscape(cover=cover, age=cells, elevation=elevation)
+    ground = Landscape(cover=cover, age=cells, elevation=elevation, fuel=fuel)
     nobody = Team(n_agents=1).place(key, cover, is_burning(cells))
     air = wind(key, (cells.shape[1], cells.shape[2]))
     state = initial_state(ground, fire, air, key, nobody, cell_size, wind.moisture(key, torch.zeros_like(key)))
@@ -84,11 +86,15 @@ def trace(state: WorldState, fire: Automaton, wind: Wind, ticks: int, cell_size:
     """Burn for so many ticks and keep when each cell caught fire."""
     burning = is_burning(state.cells)
     arrival = torch.where(burning, 0, -1).to(torch.int32)
+    minutes = None if state.arrivals is None else torch.where(burning, 0.0, torch.nan)
     alight = [burning.sum((1, 2), dtype=torch.int32)]
     for tick in range(1, ticks + 1):
         state = burn(state, fire, wind, 1)
         burning = is_burning(state.cells)
-        arrival.masked_fill_(burning & (arrival < 0), tick)
+        lit = burning & (arrival < 0)
+        arrival.masked_fill_(lit, tick)
+        if minutes is not None and state.arrivals is not None:
+            minutes = torch.where(lit, state.arrivals.minutes, minutes)
         alight.append(burning.sum((1, 2), dtype=torch.int32))
     return FireHistory(
         cells=state.cells,
@@ -96,4 +102,5 @@ def trace(state: WorldState, fire: Automaton, wind: Wind, ticks: int, cell_size:
         arrival=arrival,
         alight=torch.stack(alight, dim=1),
         cell_size=cell_size,
+        arrival_minutes=minutes,
     )

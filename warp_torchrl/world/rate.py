@@ -3,7 +3,8 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal, Self
+from functools import cached_property
+from typing import Any, Literal, Self
 
 import torch
 from torch import Tensor
@@ -28,6 +29,8 @@ from warp_torchrl.world.terrain.landscape import LandscapeSource
 from warp_torchrl.world.travel import NEVER, NOWHERE, Metric, Places, arrival, duration, travel
 from warp_torchrl.world.wind import Wind
 
+TICKS_PER_CELL = 2
+"""Ticks in which the fastest fire crosses a cell: with one the narrowest heads fall back by a tenth more."""
 _STAGES = 5
 _LONGEST_WAIT = 255  # ticks, of a byte
 
@@ -45,7 +48,9 @@ class RateFire(Automaton):
 
     Attributes:
         model: Fuel models: ``fbfm13`` (Anderson 1982), ``fbfm40`` (Scott and Burgan 2005) or ``fbp`` (Canadian).
-        minutes_per_tick: Minutes of a tick; None takes as many as the fastest fire needs for a cell of the landscape.
+        fuel_models: Fuel models of one's own by code, in place of those of ``model``: each a mapping of the fields of
+            ``rates.fuel_models.FuelModel``.
+        minutes_per_tick: Minutes of a tick; None takes half of what the fastest fire needs for a cell of the landscape.
         residence: Minutes that a cell burns at least.
         wet_minutes: Minutes for which a tree that was put out cannot ignite.
         moisture: Percent by name, of those that the wind tells nothing of: see ``fuel_bed.MOISTURES``.
@@ -64,6 +69,7 @@ class RateFire(Automaton):
 
     youngest_fuel: int = 1
     model: Literal["fbfm13", "fbfm40", "fbp"] = "fbfm40"
+    fuel_models: Mapping[int, Any] = field(default_factory=dict)
     minutes_per_tick: float | None = None
     residence: float = 20.0
     wet_minutes: float = 60.0
@@ -106,11 +112,12 @@ class RateFire(Automaton):
         """Return the ticks for which a tree that was put out cannot ignite."""
         return min(_LONGEST_WAIT, math.ceil(self.wet_minutes / self.minutes))
 
-    @property
+    @cached_property
     def bed(self) -> FuelBed:
         """Return the fuels with their factors."""
         return FuelBed(
             model=self.model,
+            fuel_models=self.fuel_models,
             fuel_of_cover=COVER_FUEL[self.model] if self.fuel_of_cover is None else tuple(self.fuel_of_cover),
             fuel_gain=self.fuel_gain,
             rate_gain=self.rate_gain,
@@ -119,11 +126,13 @@ class RateFire(Automaton):
         )
 
     def over(self, landscape: LandscapeSource, wind: Wind, cell_size: float) -> Self:
-        """Return the automaton with the minutes that the fastest fire of some worlds needs for a cell."""
+        """Return the automaton with the minutes of a tick that the fastest fire of some worlds asks for."""
         if self.minutes_per_tick is not None:
             return self
         fastest = self.bed.fastest(landscape, wind, cell_size, moisture_row(self.moisture))
-        return replace(self, minutes_per_tick=min(60.0, max(0.05, float(f"{cell_size / fastest:.2g}"))))
+        return replace(
+            self, minutes_per_tick=min(60.0, max(0.05, float(f"{cell_size / fastest / TICKS_PER_CELL:.2g}")))
+        )
 
     def flammability(self, landscape: Landscape) -> Tensor:
         """Return the square root of the rate on level ground in a wind of 5 m/s, of the fastest fuel's there."""

@@ -28,7 +28,7 @@ class Weather(Wind):
     Speeds are made those at 10 m in the open, bearings those from grid north.
 
     Attributes:
-        path: A CSV file, see ``warp_torchrl.weather.table.read_weather``; None where a table is passed.
+        path: A CSV file, or ``august``, see ``warp_torchrl.weather.table.read_weather``; None where a table is passed.
         table: The table.
         start: Hours into the table at which episodes begin; None draws the row that each episode begins with.
         wind_height: At what height the wind was measured; None goes by the file.

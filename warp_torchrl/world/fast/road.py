@@ -103,7 +103,7 @@ def in_wind(fire: Automaton, state: WorldState, wind: Tensor, moisture: Tensor |
         return fire.in_air(state, air(fire, wind, moisture, state.ground))
     differs = (wind != old.wind).flatten(1).any(dim=1)
     if moisture is not None and old.moisture is not None:
-        differs |= (moisture != old.moisture).any(dim=1)
+        differs |= (moisture.nan_to_num(-1.0) != old.moisture.nan_to_num(-1.0)).any(dim=1)  # NaN differs from itself
     index = differs.nonzero()[:, 0]
     if not len(index):
         return state

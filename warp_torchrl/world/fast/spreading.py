@@ -20,7 +20,7 @@ from warp_torchrl.world.travel import NEVER, NOWHERE, Metric, Places, arrival
 class Hour:
     """A time of one weather."""
 
-    travel: Tensor  # float32 [3, H, W], of every world; see ``travel.travel`` [minutes a cell]
+    travel: Tensor  # float32 [3, H, W], or [G, 3, H, W] of G groups of worlds; see ``travel.travel`` [minutes a cell]
     minutes: float  # of a tick
     ticks: int
 
@@ -64,7 +64,7 @@ class Spreading:
         before: Tensor | None = None
         tick = 0
         for hour in hours:
-            travel = pad(hour.travel, (1, 1, 1, 1), value=NEVER).flatten(1)
+            travel = pad(hour.travel, (1, 1, 1, 1), value=NEVER).view(-1, 3, self._map).transpose(0, 1).flatten(1)
             if before is not None:
                 self._change(before, travel)
             before, began, tick = travel, self._now, 0
@@ -127,7 +127,9 @@ class Spreading:
         return self._times
 
     def _metric(self, travel: Tensor, cells: Tensor) -> Metric:
-        place, pace = self._place(cells).long(), self._pace.index_select(0, cells)
+        pace, place = self._pace.index_select(0, cells), self._place(cells).long()
+        if travel.shape[1] > self._map:
+            place = place + cells // (len(self._pace) * self._map // travel.shape[1]) * self._map
         slowness, east, north = (part.index_select(0, place) * pace for part in travel)
         return slowness, east, north
 

@@ -1,0 +1,106 @@
+"""The command, from files to a law that ``fire=`` takes."""
+
+import json
+
+import pytest
+import torch
+import yaml
+
+from warp_torchrl.calibration.case import read_case
+from warp_torchrl.commands.calibrate import main
+from warp_torchrl.commands.failure import DONE, MISTAKE
+from warp_torchrl.config.construction import build
+
+rasterio = pytest.importorskip("rasterio", reason="rasters need the extra gis")
+
+
+def write(folder, **outcome):
+    """Write a fire as a folder: grass on level ground, three hours of wind from the west."""
+    folder.mkdir()
+    header = "ncols 24\nnrows 20\nxllcorner 0\nyllcorner 0\ncellsize 50\nNODATA_value -9999\n"
+    grids = {"fuel": torch.full((20, 24), 31), **outcome}
+    for name, values in grids.items():
+        lines = [" ".join(f"{value:g}" for value in row) for row in values.tolist()]
+        (folder / f"{name}.asc").write_text(header + "\n".join(lines) + "\n")
+    (folder / "ignition.csv").write_text("row,column\n10,4\n")
+    (folder / "weather.csv").write_text(
+        "datetime,WS,WD,FFMC,BUI\n" + "".join(f"2020-07-01 {h}:00,8,270,84,40\n" for h in (12, 13))
+    )
+    return folder
+
+
+def scar():
+    cells = torch.zeros(20, 24)
+    cells[8:13, 3:14] = 1.0
+    return cells
+
+
+def test_a_fire_is_read_from_a_folder(tmp_path):
+    case = read_case(write(tmp_path / "small", scar=scar()))
+    assert case.name == "small" and case.cell_size == 50.0 and case.last == 120.0 and case.arrival is None
+    assert int(case.scar.sum()) == 55 and case.lit.nonzero().tolist() == [[10, 4]]
+    assert case.wind.tolist() == pytest.approx([8 / 3.6, 0.0], abs=1e-4)
+
+
+def test_times_of_arrival_make_an_outcome_by_the_hour(tmp_path):
+    times = torch.full((20, 24), -9999.0)
+    times[10, 4:8] = torch.tensor([0.0, 30.0, 70.0, 110.0])
+    case = read_case(write(tmp_path / "timed", arrival=times))
+    assert case.minutes.tolist() == [60.0, 120.0] and case.burned.sum((1, 2)).tolist() == [2, 4]
+
+
+def test_perimeters_make_an_outcome_by_their_hours(tmp_path):
+    ring = [[100, 500], [500, 500], [500, 700], [100, 700], [100, 500]]
+    feature = {"type": "Feature", "properties": {"hours": 1}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+    folder = write(tmp_path / "seen")
+    (folder / "perimeters.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
+    case = read_case(folder)
+    assert case.minutes.tolist() == [60.0] and int(case.scar.sum()) == 8 * 4
+
+
+def test_the_law_is_scored_fitted_and_written(tmp_path, capsys):
+    folder = write(tmp_path / "small", scar=scar())
+    given = [f"fires=[{folder}]", "fire.model=fbp", "parameters=[rate_gain]", "draws=4", "steps=2", "hours=1"]
+    assert main([*given, f"out={tmp_path / 'out'}"]) == DONE
+    assert "| small | uncalibrated |" in capsys.readouterr().out
+    found = json.loads((tmp_path / "out" / "calibration.json").read_text())
+    assert set(found["scores"]["small"]) == {"circle", "ellipse", "uncalibrated", "fitted"}
+
+    law = build(yaml.safe_load((tmp_path / "out" / "calibrated.yaml").read_text()), "fire")
+    assert law.model == "fbp" and law.rate_gain == pytest.approx(found["parameters"]["rate_gain"], rel=1e-4) != 1.0
+
+
+@pytest.mark.parametrize(
+    ("given", "line"),
+    [
+        ([], "fires must name folders of fires that happened, got none"),
+        (["fires=[nowhere]"], "fires must name folders that exist, got nowhere"),
+        (["fires=[a]", "parameters=[speed]"], "parameters must be of"),
+        (["fires=[a]", "leave_one_out=true"], "parameters must be given where fires are left out, got none"),
+        (["fires=[a]", "leave_one_out=true", "parameters=[rate_gain]"], "fires must be two at least"),
+        (["fires=[a]", "fire=hazard"], "fire must be a law of metres and minutes, rate, got HazardFire"),
+        (["fires=[a]", "draw=3"], "draw is not a key of the configuration"),
+        (["fires=[a]", "method=gradients", "loss=jaccard"], "loss must be cross_entropy or brier"),
+    ],
+)
+def test_a_refusal_is_one_line(given, line, capsys):
+    assert main(given) == MISTAKE
+    assert line in capsys.readouterr().err.strip().splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [
+        ({"ignition.csv": "row,column\n20,4\n"}, "small: ignition must lie on the map of 20 x 24, got 20, 4"),
+        ({"scar.asc": None}, "small: the outcome must be scar"),
+        ({"weather.csv": None}, "small: weather must be weather.csv"),
+        ({"fuel.asc": None}, "small: fuel must be fuel.tif or fuel.asc"),
+    ],
+)
+def test_a_fire_that_is_not_whole_is_refused_in_one_line(tmp_path, change, line):
+    folder = write(tmp_path / "small", scar=scar())
+    for name, content in change.items():
+        (folder / name).unlink() if content is None else (folder / name).write_text(content)
+    with pytest.raises(ValueError, match=line) as error:
+        read_case(folder)
+    assert "\n" not in str(error.value)

@@ -1,0 +1,141 @@
+"""The command predict: from rasters and a table of weather to maps, a report and refusals in one line."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from PIL import Image
+
+from tests.world.rasters import rasterio, read, write
+from warp_torchrl.commands.predict import composed, main
+from warp_torchrl.world.terrain.layer import read_grid
+
+FIRES = Path(__file__).parents[3] / "shared" / "fires"
+SHAPE = (40, 44)
+MAPS = ("burn_probability.tif", "arrival_hours.tif", "rate.tif", "intensity.tif", "flame_length.tif")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder of even grass in a west wind, with a lake in the north."""
+    fuel = np.full(SHAPE, 31)
+    fuel[:4] = 102
+    write(tmp_path / "fuel.tif", fuel, "int16", cell=50.0, crs="EPSG:32631", west=5e5)
+    write(tmp_path / "elevation.tif", np.full(SHAPE, 100.0), cell=50.0, crs="EPSG:32631", west=5e5)
+    rows = "\n".join(f"2024-07-01 {hour}:00,10.8,270,90" for hour in (12, 13, 14))
+    (tmp_path / "weather.csv").write_text(f"datetime,WS,WD,FFMC\n{rows}\n")
+    (tmp_path / "ignition.csv").write_text("row,column\n20,10\n")
+    return tmp_path
+
+
+def arguments(folder, **changes):
+    given = {
+        "landscape.path": folder,
+        "landscape.fuel": "fuel.tif",
+        "landscape.elevation": "elevation.tif",
+        "landscape.table": "fbp",
+        "fire.model": "fbp",
+        "weather": folder / "weather.csv",
+        "ignition": folder / "ignition.csv",
+        "out": folder / "out",
+        "hours": 1,
+        "fires": 8,
+    }
+    return [f"{key}={value}" for key, value in {**given, **changes}.items()]
+
+
+def test_every_output_is_there_and_lies_where_the_fuel_does(folder, capsys):
+    assert main(arguments(folder, animation="true")) == 0
+    grid = read_grid("fuel", folder / "fuel.tif")
+    for name in MAPS:
+        with rasterio.open(folder / "out" / name) as layer:
+            assert (layer.crs, layer.transform, layer.shape) == (grid.crs, grid.transform, SHAPE), name
+    chance, hours = read(folder / "out" / "burn_probability.tif"), read(folder / "out" / "arrival_hours.tif")
+    assert chance[20, 10] == 1.0 and (chance[:4] == 0.0).all() and chance.max() <= 1.0
+    assert hours[20, 10] == 0.0 and np.nanmax(hours) <= 1.0 and np.array_equal(np.isnan(hours), chance == 0.0)
+    shapes = json.loads((folder / "out" / "perimeters.geojson").read_text())["features"]
+    assert shapes[-1]["properties"]["hours"] == 1.0
+    assert shapes[-1]["properties"]["area_ha"] == pytest.approx((chance >= 0.5).sum() * 0.25)
+    assert Image.open(folder / "out" / "fire.gif").n_frames > 50 and Image.open(folder / "out" / "maps.png").width > 500
+    report = json.loads((folder / "out" / "report.json").read_text())
+    assert report["fires"] == 8 and len(report["by_hour"]) == 2 and report["version"] and report["left_map"] == 0.0
+    assert report["inputs"]["grid convergence [degrees]"] == pytest.approx(0.0, abs=0.05)  # at the zone's middle
+    assert "| 1 |" in capsys.readouterr().out and (folder / "out" / "report.md").exists()
+
+
+def test_a_start_is_a_moment_or_minutes(folder):
+    for number, start in enumerate(("60", "'2024-07-01 13:00'")):
+        assert main(arguments(folder, start=start, out=folder / f"out{number}")) == 0
+    told = [json.loads((folder / f"out{number}" / "report.json").read_text()) for number in range(2)]
+    assert told[0]["by_hour"] == told[1]["by_hour"]
+    assert told[1]["inputs"]["start [minutes after the first row]"] == 60.0
+
+
+def test_a_window_is_predicted_on_its_own(folder):
+    window = {"landscape.size": "[20,24]", "landscape.row": 10, "landscape.column": 2}
+    assert main(arguments(folder, **window)) == 0
+    with rasterio.open(folder / "out" / "rate.tif") as layer:
+        assert layer.shape == (20, 24) and layer.transform.c == 5e5 + 100.0
+    assert read(folder / "out" / "burn_probability.tif")[10, 8] == 1.0
+
+
+def test_an_ignition_may_be_a_raster(folder):
+    cells = np.zeros(SHAPE)
+    cells[20, 10] = 1
+    lit = write(folder / "lit.tif", cells, "uint8", nodata=255, cell=50.0, crs="EPSG:32631", west=5e5)
+    assert main(arguments(folder)) == 0 and main(arguments(folder, ignition=lit, out=folder / "other")) == 0
+    one, other = (read(folder / name / "burn_probability.tif") for name in ("out", "other"))
+    assert np.array_equal(one, other)
+
+
+MISTAKES = {
+    "hous is not a key of the configuration: did you mean hours?": {"hous": 3},
+    "fire.cell_deviaton is not a key": {"fire.cell_deviaton": 0.2},
+    "fires must be a whole number": {"fires": "many"},
+    "fire must be a law of metres and minutes, rate, got Fire": {"fire": "paper", "fire.model": None},
+    "fire.model must be that of landscape.table, fbp, got fbfm40": {"fire.model": "fbfm40"},
+    "weather must be a CSV file that can be read": {"weather": "nowhere.csv"},
+    "weather must name a CSV file of weather, got null": {"weather": "null"},
+    "ignition.path must name a file that exists": {"ignition": "nowhere.csv"},
+    "start must be a date and time as the first row has it, '2024-07-01 12:00'": {"start": "noon"},
+    "landscape.row and landscape.column must be given": {"landscape.size": 20},
+    "wind_height must be 10m or 20ft or null": {"wind_height": "2m"},
+}
+
+
+@pytest.mark.parametrize("line", MISTAKES)
+def test_a_mistake_is_told_in_one_line_before_anything_is_written(line, folder, capsys):
+    changes = arguments(folder, **MISTAKES[line])
+    assert main([each for each in changes if not each.endswith("=None")]) == 2
+    told = capsys.readouterr().err.strip().splitlines()[-1]
+    assert line in told, told
+    assert not (folder / "out").exists()
+
+
+def test_a_folder_that_holds_something_is_left_alone(folder, capsys):
+    assert main(arguments(folder)) == 0
+    assert main(arguments(folder)) == 2
+    assert "overwrite=true" in capsys.readouterr().err
+    assert main(arguments(folder, overwrite="true")) == 0
+
+
+def test_help_names_every_option(capsys):
+    assert main(["--help"]) == 0
+    said = capsys.readouterr().out
+    assert all(f"{name}:" in said for name in composed([]) if name not in ("landscape", "fire"))
+
+
+def test_a_configuration_shows_every_value():
+    assert yaml.safe_dump(composed(["hours=3"])) and composed(["hours=3"])["hours"] == 3
+
+
+@pytest.mark.skipif(not FIRES.is_dir(), reason=f"the shared fires are not at {FIRES}")
+def test_a_real_fire_is_near_its_scar(tmp_path):
+    fire = FIRES / "mica"
+    more = {"hours": 24, "fires": 8, "out": tmp_path, "landscape.nodata": "unburnable"}
+    layers = {"landscape.fuel": "fuel.asc", "landscape.elevation": "elevation.asc"}
+    assert main(arguments(fire, **more, **layers)) == 0
+    chance, scar = read(tmp_path / "burn_probability.tif") >= 0.5, read(fire / "scar.asc") > 0
+    assert (chance & scar).sum() / (chance | scar).sum() > 0.8

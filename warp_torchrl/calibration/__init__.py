@@ -1,0 +1,1 @@
+"""Calibration: how well fires alone agree with fires that happened, and parameters fitted to those."""

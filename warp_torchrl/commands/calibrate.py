@@ -1,0 +1,136 @@
+"""The command calibrate: the law of fires scored on fires that happened, beside null models, and fitted to them."""
+
+import json
+import logging
+import os
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from warp_torchrl.calibration.case import FireCase, read_case
+from warp_torchrl.calibration.fitting import check_told, fitted, folds, null_scores, score
+from warp_torchrl.calibration.options import CalibrationOptions
+from warp_torchrl.calibration.parameters import Parameter, parameters_of
+from warp_torchrl.calibration.report import as_numbers, law_yaml, means, table
+from warp_torchrl.calibration.scores import Scores
+from warp_torchrl.commands.failure import DONE, fail
+from warp_torchrl.config.compose import compose_config, plain, without_targets
+from warp_torchrl.config.construction import ConfigError, build, construct
+from warp_torchrl.config.grammar import check_flags
+from warp_torchrl.runs import disk
+from warp_torchrl.runs.destination import check_free
+from warp_torchrl.world.rate import RateFire
+
+log = logging.getLogger("warp_torchrl")
+
+USAGE = "python -m warp_torchrl.calibrate fires=[FOLDER,...] [parameters=[rate_gain,...]] [KEY=VALUE ...]"
+LAW = "calibrated.yaml"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Score and fit what the command line asks for, and return the exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    if any(each in ("-h", "--help") for each in given):
+        print(f"{USAGE}\n\n{CalibrationOptions.__doc__}\nfire.KEY as for train.py.")
+        return DONE
+    try:
+        _run(given)
+    except Exception as error:
+        return fail(error, "debug=true" in given)[0]
+    return DONE
+
+
+def _run(arguments: Sequence[str]) -> None:
+    began = time.perf_counter()
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    check_flags(arguments)
+    values = plain(compose_config("calibrate", arguments))
+    options: CalibrationOptions = construct(
+        CalibrationOptions, {key: value for key, value in values.items() if key != "fire"}, ""
+    )
+    fire = _law(values["fire"])
+    parameters = parameters_of(options.parameters, fire, options.bounds, options.scales)
+    folder = Path(options.out or datetime.now().strftime(f"outputs/calibrations/%Y-%m-%d/%H-%M-%S-{os.getpid()}"))
+    if not options.overwrite:
+        check_free(folder, "out")
+    cases = [read_case(each, options.hours) for each in options.fires]
+    _check_names(cases)
+    check_told(parameters, cases)
+    rows = {case.name: _before(fire, case, options) for case in cases}
+    law = _fit(fire, parameters, cases, rows, options) if parameters else None
+    _write(folder, rows, values, law, parameters, time.perf_counter() - began)
+
+
+def _law(node: Mapping[str, Any]) -> RateFire:
+    """Return the law, which must be one in metres and minutes."""
+    law = build(node, "fire")
+    if not isinstance(law, RateFire):
+        raise ConfigError(f"fire must be a law of metres and minutes, rate, got {node['_target_'].rpartition('.')[2]}")
+    return law
+
+
+def _check_names(cases: Sequence[FireCase]) -> None:
+    names = [case.name for case in cases]
+    if len(set(names)) < len(names):
+        raise ConfigError(f"fires must have different names, got {', '.join(names)}")
+
+
+def _before(fire: RateFire, case: FireCase, options: CalibrationOptions) -> dict[str, Scores]:
+    return null_scores(fire, case) | {"uncalibrated": score(fire, case, options.draws, options.seed)}
+
+
+def _fit(
+    fire: RateFire,
+    parameters: Sequence[Parameter],
+    cases: Sequence[FireCase],
+    rows: dict[str, dict[str, Scores]],
+    options: CalibrationOptions,
+) -> RateFire:
+    """Fit to all fires but one in turn, and to all; add the scores to the rows; return the law fitted to all."""
+    for left_out, others in folds(cases) if options.leave_one_out else ():
+        law = fitted(options.fit, fire, parameters, others, _told(f"without {left_out.name}"))
+        rows[left_out.name]["left out"] = score(law, left_out, options.draws, options.seed)
+    law = fitted(options.fit, fire, parameters, cases, _told("all fires"))
+    for case in cases:
+        rows[case.name]["fitted"] = score(law, case, options.draws, options.seed)
+    return law
+
+
+def _told(fires: str) -> Callable[[int, float], None]:
+    return lambda step, loss: log.info("%s: step %d, loss %.4f", fires, step, loss)
+
+
+def _write(
+    folder: Path,
+    rows: Mapping[str, Mapping[str, Scores]],
+    values: Mapping[str, Any],
+    law: RateFire | None,
+    parameters: Sequence[Parameter],
+    seconds: float,
+) -> None:
+    from warp_torchrl import __version__
+
+    folder.mkdir(parents=True, exist_ok=True)
+    found = {each.name: each.usual(law) for each in parameters} if law else {}
+    report = {
+        "version": __version__,
+        "parameters": found,
+        "scores": as_numbers(rows),
+        "means": means(rows),
+        "configuration": without_targets(values),
+        "seconds": seconds,
+    }
+    disk.replace(folder / "calibration.json", json.dumps(report, indent=1))
+    page = table(rows)
+    if law is not None:
+        disk.replace(folder / LAW, law_yaml(law, f"Law rate, fitted to {', '.join(rows)}."))
+        page += "\n\n" + "\n".join(f"{name}: {value:.4g}" for name, value in found.items())
+    disk.replace(folder / "calibration.md", page + "\n")
+    print(page)
+    print(
+        f"wrote {', '.join(sorted(each.name for each in folder.iterdir()))} into {folder}, in {seconds:.0f} s",
+        flush=True,
+    )

@@ -1,0 +1,172 @@
+"""The command predict: fires alone on one map, in weather by the hour, as maps and a report."""
+
+import json
+import logging
+import os
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from warp_torchrl.commands.failure import DONE, fail
+from warp_torchrl.config.compose import compose_config, plain, without_targets
+from warp_torchrl.config.construction import ConfigError, build, construct
+from warp_torchrl.config.grammar import check_flags
+from warp_torchrl.config.prediction_options import PredictionOptions
+from warp_torchrl.prediction.animation import write_animation
+from warp_torchrl.prediction.case import Case, read_case, whole_map
+from warp_torchrl.prediction.files import FIGURE, write_figure, write_layers, write_perimeters
+from warp_torchrl.prediction.predict import Prediction, lasting, predict
+from warp_torchrl.prediction.report import numbers, page, warnings
+from warp_torchrl.runs import disk
+from warp_torchrl.runs.destination import check_free
+from warp_torchrl.world.rate import RateFire
+from warp_torchrl.world.terrain.raster import Raster
+
+log = logging.getLogger("warp_torchrl")
+
+_GROUPS = ("landscape", "fire")
+USAGE = (
+    "python -m warp_torchrl.predict landscape.path=FOLDER weather=FILE.csv ignition=FILE [hours=24] [fires=1000] "
+    "[KEY=VALUE ...]"
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Predict what the command line asks for, and return the exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    if any(each in ("-h", "--help") for each in given):
+        print(f"{USAGE}\n\n{PredictionOptions.__doc__}\nlandscape.KEY and fire.KEY as for train.py.")
+        return DONE
+    try:
+        _run(given)
+    except Exception as error:
+        return fail(error, "debug=true" in given)[0]
+    return DONE
+
+
+def composed(overrides: Sequence[str]) -> dict[str, Any]:
+    """Compose ``conf/predict.yaml`` with overrides, as plain values.
+
+    ``ignition`` names a file here, and a group of classes in Hydra's files, so it is read apart.
+
+    Raises:
+        ConfigError: If an override does not fit, in one line.
+    """
+    check_flags(overrides)
+    named = [each.partition("=")[2].strip("'\"") for each in overrides if each.startswith("ignition=")]
+    values = plain(compose_config("predict", [each for each in overrides if not each.startswith("ignition=")]))
+    return values | ({"ignition": named[-1]} if named else {})
+
+
+def _run(arguments: Sequence[str]) -> None:
+    began = time.perf_counter()
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    values = composed(arguments)
+    options: PredictionOptions = construct(
+        PredictionOptions, {key: value for key, value in values.items() if key not in _GROUPS}, ""
+    )
+    folder = Path(options.out or datetime.now().strftime(f"outputs/predictions/%Y-%m-%d/%H-%M-%S-{os.getpid()}"))
+    if not options.overwrite:
+        check_free(folder, "out")
+    case = read_case(_landscape(values["landscape"]), _law(values["fire"]), options)
+    prediction, seconds = _burn(case, options)
+    folder.mkdir(parents=True, exist_ok=True)
+    report = _report(prediction, case, values, {"fires": seconds, "all": time.perf_counter() - began})
+    _write(folder, prediction, case, options, report["title"])
+    report["seconds"]["all"] = time.perf_counter() - began
+    disk.replace(folder / "report.json", json.dumps(report, indent=1))
+    disk.replace(folder / "report.md", page(report))
+    print(page(report))
+    print(f"wrote {', '.join(sorted(each.name for each in folder.iterdir()))} into {folder}", flush=True)
+
+
+def _landscape(node: Mapping[str, Any]) -> Any:
+    """Return the landscape; of rasters the whole map, unless a window is named."""
+    if not node["_target_"].endswith(".Raster"):
+        return build(node, "landscape")
+    if node["size"] is not None:
+        if node["row"] is None or node["column"] is None:
+            raise ConfigError("landscape.row and landscape.column must be given with landscape.size, got null")
+        return build(node, "landscape")
+    smallest: Raster = build({**node, "size": 4, "row": None, "column": None, "min_fuel": 0.0}, "landscape")
+    try:
+        return whole_map(smallest)
+    except ValueError as error:
+        raise ConfigError(f"landscape.{error}") from None
+
+
+def _law(node: Mapping[str, Any]) -> RateFire:
+    """Return the law of the fire, which must be one in metres and minutes."""
+    law = build(node, "fire")
+    if not isinstance(law, RateFire):
+        raise ConfigError(f"fire must be a law of metres and minutes, rate, got {node['_target_'].rpartition('.')[2]}")
+    return law
+
+
+def _burn(case: Case, options: PredictionOptions) -> tuple[Prediction, float]:
+    """Burn the fires behind a progress bar; return what they did and the seconds that they took."""
+    began = time.perf_counter()
+    with tqdm(total=options.fires, unit="fire", disable=None, dynamic_ncols=True) as bar:
+        found = predict(
+            case.ground,
+            case.weather,
+            case.ignition,
+            fire=case.fire,
+            cell_size=case.cell_size,
+            hours=options.hours,
+            area=options.area,
+            fires=options.fires,
+            seed=options.seed,
+            start=case.start,
+            convergence=case.convergence,
+            progress=bar.update,
+        )
+    return found, time.perf_counter() - began
+
+
+def _report(prediction: Prediction, case: Case, values: Mapping[str, Any], seconds: dict[str, float]) -> dict[str, Any]:
+    from warp_torchrl import __version__
+
+    found = numbers(prediction)
+    known = [each.name for each in fields(case.weather) if getattr(case.weather, each.name) is not None]
+    inputs = {
+        "landscape": values["landscape"].get("path"),
+        "map": f"{case.ignition.shape[0]} x {case.ignition.shape[1]} cells of {case.cell_size:g} m",
+        "crs": str(case.place.grid.crs) if case.place.grid.crs else None,
+        "weather": values["weather"],
+        "weather tells": known,
+        "wind height": case.weather.wind_height,
+        "grid convergence [degrees]": round(case.convergence, 3),
+        "start [minutes after the first row]": case.start,
+        "ignition": f"{values['ignition']}, {int(prediction.lit.sum())} cells with fuel of {int(case.ignition.sum())}",
+        "law": without_targets(values["fire"]),
+    }
+    return {
+        "title": f"Prediction from {values['landscape'].get('path') or 'a map'}",
+        "version": __version__,
+        **found,
+        "warnings": warnings(found, lasting(case.weather, case.start)),
+        "inputs": inputs,
+        "configuration": without_targets(values),
+        "seconds": seconds,
+    }
+
+
+def _write(folder: Path, prediction: Prediction, case: Case, options: PredictionOptions, title: str) -> None:
+    """Write the maps; without Matplotlib all but the figure."""
+    write_layers(folder, prediction, case.place)
+    write_perimeters(folder / "perimeters.geojson", prediction, case.place, options.perimeter_hours)
+    try:
+        write_figure(folder / FIGURE, prediction, title)
+    except ImportError:
+        log.warning('no %s: Matplotlib is missing, pip install "warp_torchrl[figures]"', FIGURE)
+    if options.animation:
+        end = float(prediction.followed[0])
+        first = prediction.first_fire
+        write_animation(folder / "fire.gif", first, prediction.ground, case.cell_size, end, case.fire.residence)

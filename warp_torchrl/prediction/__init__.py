@@ -1,0 +1,1 @@
+"""Fires alone in metres and minutes: predicted, mapped and told in numbers."""

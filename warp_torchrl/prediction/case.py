@@ -1,0 +1,86 @@
+"""What is predicted: one map, where and when its fires start, and in which weather."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.config.prediction_options import PredictionOptions
+from warp_torchrl.maps.geotiff import local_grid
+from warp_torchrl.prediction.files import Place
+from warp_torchrl.weather.convergence import grid_convergence
+from warp_torchrl.weather.table import WeatherTable, minutes_until, read_weather
+from warp_torchrl.world.fuel_bed import COVER_FUEL
+from warp_torchrl.world.ignition_file import read_ignition
+from warp_torchrl.world.random import world_key
+from warp_torchrl.world.rate import RateFire
+from warp_torchrl.world.state import Landscape
+from warp_torchrl.world.terrain.landscape import LandscapeSource
+from warp_torchrl.world.terrain.raster import Raster
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Case:
+    """Everything that ``predict`` asks for, read and checked."""
+
+    ground: Landscape  # batch size [1]
+    place: Place
+    cell_size: float  # [m]
+    fire: RateFire
+    weather: WeatherTable
+    start: float  # since the weather's first row began [minutes]
+    convergence: float  # angle from true north to grid north [degrees]
+    ignition: Tensor  # bool [H, W]
+
+
+def read_case(source: LandscapeSource, fire: RateFire, options: PredictionOptions) -> Case:
+    """Read what the options name, for a landscape's one map.
+
+    Raises:
+        ValueError: If a file cannot be read or does not fit.
+    """
+    ground = source(world_key(torch.tensor([options.seed])))
+    if getattr(source, "table", None) == "worldcover":  # its codes are no fuel models
+        ground = ground.replace(fuel=None)
+    _check_fuel(source, fire)
+    cell_size: float = getattr(source, "cell_size", 30.0) if options.cell_size is None else options.cell_size
+    height, width = ground.cover.shape[1:]
+    grid = getattr(source, "grid", None)
+    corner = (0, 0) if grid is None or ground.corner is None else tuple(ground.corner[0].tolist())
+    place = Place(grid or local_grid((height, width), cell_size), (corner[0], corner[1]))
+    lit = torch.as_tensor(read_ignition(str(options.ignition), place.grid))
+    rows, columns = slice(corner[0], corner[0] + height), slice(corner[1], corner[1] + width)
+    weather = str(options.weather)
+    return Case(
+        ground=ground,
+        place=place,
+        cell_size=cell_size,
+        fire=fire,
+        weather=read_weather(weather, wind_height=options.wind_height, start_ffmc=options.start_ffmc, bui=options.bui),
+        start=minutes_until(options.start, weather) if isinstance(options.start, str) else options.start,
+        convergence=_convergence(place, (height, width)) if options.true_north else 0.0,
+        ignition=lit[rows, columns],
+    )
+
+
+def whole_map(source: Raster) -> Raster:
+    """Return a raster whose one window is its whole grid."""
+    return replace(source, size=source.extent, row=0, column=0)
+
+
+def _convergence(place: Place, size: tuple[int, int]) -> float:
+    """Return the angle from true north to grid north at the middle of a map; 0 where it has no place on Earth."""
+    grid: Any = place.grid
+    if not grid.is_on_earth:
+        return 0.0
+    row, column = place.corner[0] + size[0] / 2.0, place.corner[1] + size[1] / 2.0
+    a, b, left, d, e, top = grid.transform[:6]
+    return grid_convergence(grid.crs.to_wkt(), left + a * column + b * row, top + d * column + e * row)
+
+
+def _check_fuel(source: LandscapeSource, fire: RateFire) -> None:
+    """Refuse fuel codes of another model than the law's."""
+    table = getattr(source, "table", None)
+    if isinstance(table, str) and table in COVER_FUEL and table != fire.model:
+        raise ValueError(f"fire.model must be that of landscape.table, {table}, got {fire.model}")

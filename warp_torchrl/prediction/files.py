@@ -1,0 +1,98 @@
+"""The maps of a prediction as files: GeoTIFF, GeoJSON, PNG and GIF."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from warp_torchrl.maps.figure import Panel, save_maps
+from warp_torchrl.maps.geotiff import write_geotiff
+from warp_torchrl.maps.perimeter import perimeters, write_geojson
+from warp_torchrl.prediction.predict import Prediction
+from warp_torchrl.runs import disk
+from warp_torchrl.world.terrain.grid import Grid
+
+FIGURE = "maps.png"
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where a map lies: a window of a grid."""
+
+    grid: Grid
+    corner: tuple[int, int] = (0, 0)  # (row, column) of the first cell in the grid
+
+
+def layers(prediction: Prediction) -> dict[str, dict[str, Tensor]]:
+    """Return the bands of each GeoTIFF by the file's name; times in hours."""
+    return {
+        "burn_probability": {"burn_probability": prediction.burn_probability},
+        "arrival_hours": {
+            "median": prediction.arrival_minutes / 60.0,
+            "early_10": prediction.arrival_early / 60.0,
+            "late_90": prediction.arrival_late / 60.0,
+        },
+        "rate": {"rate_m_min": prediction.rate},
+        "intensity": {"intensity_kw_m": prediction.intensity},
+        "flame_length": {"flame_length_m": prediction.flame_length},
+    }
+
+
+def write_layers(folder: Path, prediction: Prediction, place: Place) -> list[str]:
+    """Write the GeoTIFFs of ``layers`` and return their names.
+
+    Raises:
+        ValueError: If rasterio is not installed.
+        OSError: If a write fails, with the path.
+    """
+    bands = {f"{name}.tif": each for name, each in layers(prediction).items()}
+    for name, each in bands.items():
+        write_geotiff(folder / name, each, place.grid, place.corner)
+    return list(bands)
+
+
+def write_perimeters(path: Path, prediction: Prediction, place: Place, every: float) -> None:
+    """Write the outline of the cells that at least half of the fires had reached, every so many hours, as GeoJSON.
+
+    Raises:
+        ValueError: If rasterio is not installed.
+        OSError: If the write fails, with the path.
+    """
+    longest = float(prediction.followed.max()) / 60.0
+    times = [every * 60.0 * step for step in range(1, int(longest / every + 1e-6) + 1)]
+    if not times or times[-1] < longest * 60.0 - 1e-3:
+        times.append(longest * 60.0)
+    write_geojson(path, perimeters(prediction.half_minutes, place.grid, times, place.corner))
+
+
+def write_figure(path: Path, prediction: Prediction, title: str) -> None:
+    """Draw the maps beside the ground.
+
+    Raises:
+        ImportError: If Matplotlib is not installed.
+        OSError: If the write fails, with the path.
+    """
+    with disk.with_path(path):
+        save_maps(path, prediction.ground, panels(prediction), prediction.cell_size, title, prediction.lit)
+
+
+def panels(prediction: Prediction) -> list[Panel]:
+    """Return the panels of the figure; colours of rates and intensities end at their 99th percentile."""
+    amounts: Mapping[str, tuple[Tensor, str]] = {
+        "arrival, median": (prediction.arrival_minutes / 60.0, "hours since the start"),
+        "rate of spread": (prediction.rate, "m/min"),
+        "fireline intensity": (prediction.intensity, "kW/m"),
+        "flame length": (prediction.flame_length, "m"),
+    }
+    seen = prediction.burn_probability.masked_fill(prediction.burn_probability == 0.0, torch.nan)
+    chance = Panel(title=f"burn probability, {len(prediction.followed)} fires", values=seen, label="share of the fires")
+    return [chance, *(Panel(title=name, values=each, label=label, kind="amount", top=_top(each))
+                      for name, (each, label) in amounts.items())]  # fmt: skip
+
+
+def _top(values: Tensor) -> float | None:
+    known = values[~values.isnan()].numpy()
+    return float(np.percentile(known, 99.0)) or None if len(known) else None
