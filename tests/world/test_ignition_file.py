@@ -111,6 +111,11 @@ def test_shapes_of_geojson_light_the_cells_in_them(tmp_path, document, lit):
     assert cells(written(tmp_path / "fire.geojson", document)) == lit
 
 
+def test_a_perimeter_that_leaves_the_map_lights_what_is_on_it(tmp_path):
+    beyond = feature("Polygon", [degrees(*square(-2, -3, 2, 1))])
+    assert cells(written(tmp_path / "fire.json", beyond)) == [(0, 0), (1, 0)]
+
+
 def test_a_hole_of_a_perimeter_is_not_lit_and_a_small_one_lights_what_it_touches(tmp_path):
     holed = [degrees(*square(2, 3, 5, 8)), degrees(*square(3, 4, 4, 7))]
     lit = cells(written(tmp_path / "holed.geojson", feature("Polygon", holed)))
@@ -148,10 +153,10 @@ def test_a_raster_lights_what_is_neither_0_nor_nodata(tmp_path, suffix):
 
 def test_what_lies_off_the_map_is_left_out_and_counted(tmp_path, caplog):
     with caplog.at_level(logging.WARNING):
-        assert cells(written(tmp_path / "a.csv", "row,column\n2,3\n10,3\n-1,0\n")) == [(2, 3)]
+        assert cells(written(tmp_path / "a.csv", "row,column\n2,3\n10,3\n-1,0\n0,-1\n")) == [(2, 3)]
         far = {"type": "MultiPoint", "coordinates": degrees(middle(2, 3), middle(2, 12))}
         assert cells(written(tmp_path / "b.json", far)) == [(2, 3)]
-    assert "2 of 3 points of" in caplog.text and "1 of 2 shapes of" in caplog.text
+    assert "3 of 4 points of" in caplog.text and "1 of 2 shapes of" in caplog.text
 
 
 @pytest.mark.parametrize(
