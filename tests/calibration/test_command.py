@@ -9,7 +9,8 @@ import yaml
 from warp_torchrl.calibration.case import read_case
 from warp_torchrl.commands.calibrate import main
 from warp_torchrl.commands.failure import DONE, MISTAKE
-from warp_torchrl.config.construction import build
+from warp_torchrl.config.compose import SavedConfig, option_of, plain, restore
+from warp_torchrl.config.construction import ConfigError, build
 
 rasterio = pytest.importorskip("rasterio", reason="rasters need the extra gis")
 
@@ -66,7 +67,7 @@ def test_the_law_is_scored_fitted_and_written(tmp_path, capsys):
     found = json.loads((tmp_path / "out" / "calibration.json").read_text())
     assert set(found["scores"]["small"]) == {"circle", "ellipse", "uncalibrated", "fitted"}
 
-    law = build(yaml.safe_load((tmp_path / "out" / "calibrated.yaml").read_text()), "fire")
+    law = build(yaml.safe_load((tmp_path / "out" / "fire" / "calibrated.yaml").read_text()), "fire")
     assert law.model == "fbp" and law.rate_gain == pytest.approx(found["parameters"]["rate_gain"], rel=1e-4) != 1.0
 
 
@@ -104,3 +105,13 @@ def test_a_fire_that_is_not_whole_is_refused_in_one_line(tmp_path, change, line)
     with pytest.raises(ValueError, match=line) as error:
         read_case(folder)
     assert "\n" not in str(error.value)
+
+
+def test_a_run_keeps_a_law_of_a_user_s_own_file_by_ours_of_its_class_and_every_value():
+    target = "warp_torchrl.world.rate.RateFire"
+    assert option_of("fire", target) == "rate"
+    with pytest.raises(ConfigError, match=r"fire\._target_ must be a class that an option of conf/fire names"):
+        option_of("fire", "warp_torchrl.world.rate.Nothing")
+    kept = SavedConfig(choices={"fire": "rate"}, values={"fire": {"rate_gain": 1.2, "fuel_gain": {"2": 0.9}}})
+    law = build(plain(restore(kept))["fire"], "fire")
+    assert law.rate_gain == 1.2 and law.bed.fuel_gain == {"2": 0.9}

@@ -27,7 +27,8 @@ from warp_torchrl.world.rate import RateFire
 log = logging.getLogger("warp_torchrl")
 
 USAGE = "python -m warp_torchrl.calibrate fires=[FOLDER,...] [parameters=[rate_gain,...]] [KEY=VALUE ...]"
-LAW = "calibrated.yaml"
+LAW = "fire/calibrated.yaml"
+"""In the folder that the command writes, so that ``--config-dir`` takes that folder."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -126,6 +127,7 @@ def _write(
     disk.replace(folder / "calibration.json", json.dumps(report, indent=1))
     page = table(rows)
     if law is not None:
+        (folder / LAW).parent.mkdir(exist_ok=True)
         disk.replace(folder / LAW, law_yaml(law, f"Law rate, fitted to {', '.join(rows)}."))
         page += "\n\n" + "\n".join(f"{name}: {value:.4g}" for name, value in found.items())
     disk.replace(folder / "calibration.md", page + "\n")

@@ -21,6 +21,7 @@ from warp_torchrl.config.compose import (
     SavedConfig,
     conf_folder,
     explain,
+    option_of,
     plain,
     restore,
     without_targets,
@@ -78,7 +79,7 @@ def _start(folder: Path, config: DictConfig) -> None:
     if (folder / "evaluation.json").exists():
         raise ConfigError(f"hydra.run.dir: {folder} holds an evaluation, which training would replace; take another")
     disk.replace(folder / "config.yaml", OmegaConf.to_yaml(config, resolve=True))
-    record = SavedConfig(choices=_choices(), values=_values(config))
+    record = SavedConfig(choices=_choices(config), values=_values(config))
     training = Training(run_config(plain(config)), record, folder)
     if config.start_from is not None:
         training.start_from(_newest(find_policy(config.start_from)))
@@ -138,9 +139,12 @@ def _evaluate_job(config: DictConfig) -> None:
 # The saved configuration
 
 
-def _choices() -> dict[str, str]:
+def _choices(config: DictConfig) -> dict[str, str]:
+    """Return the option of each group; for one of a user's own folder ours of its class, as every value is kept too."""
     chosen = HydraConfig.get().runtime.choices
-    return {group: chosen[group] for group in _RECORDED}
+    options = {group: chosen[group] for group in _RECORDED}
+    own = [group for group in COMPONENTS if not (conf_folder() / group / f"{options[group]}.yaml").is_file()]
+    return options | {group: option_of(group, config[group]["_target_"]) for group in own}
 
 
 def _values(config: DictConfig) -> dict[str, Any]:

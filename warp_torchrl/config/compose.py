@@ -168,6 +168,18 @@ def _class_of(path: Path) -> type:
     return cast("type", component(cast("DictConfig", OmegaConf.load(path))["_target_"]))
 
 
+def option_of(group: str, target: str) -> str:
+    """Return the first of our options of a group whose file names a class.
+
+    Raises:
+        ConfigError: If none does.
+    """
+    for path in sorted((conf_folder() / group).glob("*.yaml")):
+        if cast("DictConfig", OmegaConf.load(path)).get("_target_") == target:
+            return path.stem
+    raise ConfigError(f"{group}._target_ must be a class that an option of conf/{group} names, got {target}")
+
+
 # What is written into a run folder, and read back
 
 _OPTION = re.compile(r"[A-Za-z0-9_]+")
@@ -259,7 +271,7 @@ def restore(record: SavedConfig, overrides: Sequence[str] = ()) -> DictConfig:
         if any(path == key or path.startswith(f"{key}.") for key in touched):
             continue
         try:
-            OmegaConf.update(config, path, value, merge=False, force_add=False)
+            OmegaConf.update(config, path, value, merge=False, force_add=path.count(".") > 1)  # into a field's mapping
         except OmegaConfBaseException:
             raise ConfigError(f"{path} in the run folder is not a key of this version's configuration") from None
     return config
