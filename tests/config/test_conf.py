@@ -27,9 +27,11 @@ from warp_torchrl.world.gridded import Gridded
 from warp_torchrl.world.ignition_file import IgnitionFile
 from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.raster import Raster
+from warp_torchrl.world.weather import Weather
 from warp_torchrl.world.world import World
 
-SCENARIOS = sorted(path.stem for path in (conf_folder() / "scenario").glob("*.yaml") if path.stem != "landfire")
+NEED_A_FOLDER = ("landfire", "wildland")
+SCENARIOS = sorted(path.stem for path in (conf_folder() / "scenario").glob("*.yaml") if path.stem not in NEED_A_FOLDER)
 EXPERIMENTS = sorted(path.stem for path in (conf_folder() / "experiment").glob("*.yaml"))
 OPTIONS = [(path.parent.name, path.stem) for path in sorted(conf_folder().glob("*/*.yaml"))]
 LANDFIRE = Path(__file__).parents[3] / "shared" / "landscapes" / "landfire"
@@ -40,7 +42,7 @@ def test_every_option_builds_and_shows_every_field(group, option):
     if (group, option) == ("collector", "ray"):
         pytest.importorskip("ray", reason="Ray is not installed")
     node = plain(compose_config("train", [f"{group}={option}"]))[group]
-    needs_a_file = {"raster": Raster, "array": Array, "file": IgnitionFile, "gridded": Gridded}
+    needs_a_file = {"raster": Raster, "array": Array, "file": IgnitionFile, "gridded": Gridded, "weather": Weather}
     if option in needs_a_file:
         with pytest.raises(ConfigError, match=rf"{group}\.path must name"):
             build(node, group)
@@ -193,7 +195,7 @@ MISTAKES = [
     ("total_frames=1.5", "total_frames must be a whole number, got 1.5"),
     ("n_worlds=.inf", "n_worlds must be a whole number"),
     ("collector.steps=0.5", r"collector\.steps must be a whole number, got 0\.5"),
-    ("scenario=nowhere", r"scenario must be one of default, .*, water, got nowhere"),
+    ("scenario=nowhere", r"scenario must be one of default, .*, water, wildland, got nowhere"),
     ("algorithm=sarsa", r"algorithm must be one of a2c, ddpg, .*, got sarsa"),
     ("experiment=nowhere", r"experiment must be one of algorithms, .*, got nowhere"),
     ("n_worlds=0", "n_worlds must be in 1..4096, got 0"),

@@ -1,7 +1,7 @@
 """Write down what the package pyretechnics computes for some fires: python -m tests.rates.record_witness.
 
-It holds numpy and scipy back to old versions, so that only the extra ``witness`` installs it; the tests compare with the
-file, and with the package itself where it is.
+It holds numpy and scipy back to old versions, so that only the extra ``witness`` installs it; the tests compare with
+the file, and with the package itself where it is.
 """
 
 import csv
