@@ -220,3 +220,18 @@ def test_only_sure_differences_disagree():
     assert disagreements({"one": np.array([0.9, 0.9, 0.8]), "other": np.zeros(3)}, saved) == ["one and other"]
     assert disagreements({"one": np.array([0.9, -0.9, 0.1]), "other": np.zeros(3)}, saved) == []
     assert disagreements(saved, saved) == []
+
+
+def test_fires_of_every_law_are_timed(capsys):
+    main(["fires", "--fires", "2", "--json"])
+    rows = json.loads(capsys.readouterr().out)["fires"]
+    assert [row["law"] for row in rows] == ["paper", "spread", "hazard", "rate"]
+    assert all(float(row["seconds"]) > 0.0 and 0 < int(row["burned %"]) <= 100 for row in rows)
+
+
+def test_ellipses_are_compared_with_what_is_told(capsys):
+    main(["ellipses", "--reach", "20"])
+    table = [line.split() for line in capsys.readouterr().out.splitlines() if line[:3] in ("1.0", "2.3", "4.6")]
+    assert len(table) == 30
+    assert all(abs(float(row[3])) < 25.0 and abs(float(row[4])) < 25.0 for row in table)
+    assert max(abs(float(row[3])) for row in table if row[0] == "1.0") < 8.0

@@ -1,6 +1,6 @@
-"""Measures speed and calibrates scenarios: ``python -m warp_torchrl.benchmark [tick|env|train|scaling|tasks|rewards]``.
+"""Measures speed, calibrates scenarios and checks fires: ``python -m warp_torchrl.benchmark WHAT``.
 
-Several at once are measured one after the other.
+WHAT is tick, env, train, scaling, tasks, rewards, fires or ellipses; several are measured one after the other.
 """
 
 import argparse
@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from warp_torchrl.benchmark.environments import LARGE, environment_speed, rate_table
+from warp_torchrl.benchmark.fires import ellipse_errors, fire_table, law_times
 from warp_torchrl.benchmark.growth_figure import draw_growth
 from warp_torchrl.benchmark.machine import header, machine, peak_memory
 from warp_torchrl.benchmark.scaling import growth, growth_table
@@ -95,7 +96,24 @@ def _rewards(options: Namespace) -> dict[str, Rows]:
     return {"rewards": [rank_rewards(name, options.device, options.episodes, options.set) for name in names]}
 
 
-_MEASURES = {"tick": _tick, "env": _env, "train": _train, "scaling": _scaling, "tasks": _tasks, "rewards": _rewards}
+def _fires(options: Namespace) -> dict[str, Rows]:
+    return {"fires": law_times(options.fires)}
+
+
+def _ellipses(options: Namespace) -> dict[str, Rows]:
+    return {"ellipses": ellipse_errors(options.reach, (0.0, 0.1))}
+
+
+_MEASURES = {
+    "tick": _tick,
+    "env": _env,
+    "train": _train,
+    "scaling": _scaling,
+    "tasks": _tasks,
+    "rewards": _rewards,
+    "fires": _fires,
+    "ellipses": _ellipses,
+}
 _TABLES = {
     "tick": tick_table,
     "env": rate_table,
@@ -104,6 +122,8 @@ _TABLES = {
     "scaling": growth_table,
     "tasks": task_table,
     "rewards": reward_table,
+    "fires": fire_table,
+    "ellipses": fire_table,
 }
 
 
@@ -123,6 +143,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--no-compile", action="store_true", help="for tick and env: leave what is compiled out")
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="for scaling: draw it too")
     parser.add_argument("--episodes", type=int, default=EPISODES)
+    parser.add_argument("--fires", type=int, default=1000, help="for fires: how many of each law")
+    parser.add_argument("--reach", type=int, default=60, help="for ellipses: cells that the heads go")
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
     return parser

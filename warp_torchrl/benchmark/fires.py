@@ -1,0 +1,116 @@
+"""Fires alone: how long a thousand take under each law, and how true the ellipses of law ``rate`` are."""
+
+import math
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.benchmark.tables import entry, table
+from warp_torchrl.simulation import fire_history
+from warp_torchrl.world.alone import Spell, arrival_minutes, spread_in
+from warp_torchrl.world.fire import Fire
+from warp_torchrl.world.hazard import HazardFire
+from warp_torchrl.world.random import world_key
+from warp_torchrl.world.rate import RateFire
+from warp_torchrl.world.state import Landscape
+from warp_torchrl.world.terrain.landscape import Perlin
+from warp_torchrl.world.weather import Weather
+from warp_torchrl.world.wind import Uniform
+
+_SIZE = (126, 127)
+_TICKS = 256  # of the paper's laws, in which their fires cross the map
+_AT_ONCE = 64
+_C2 = 2
+_CELL = 30.0
+BEARINGS = (0, 11, 22, 33, 45)
+RATIOS = {1.0: 0.0, 2.3: 17.8 / 3.6, 4.6: 36.3 / 3.6}
+"""Wind [m/s] at which the Canadian curve has these ratios of length to breadth."""
+
+
+def law_times(fires: int) -> list[dict[str, Any]]:
+    """Return the seconds that so many fires on one map of 126 x 127 cells take under each law, one row a law.
+
+    Law ``rate`` burns for 24 hours of the weather ``august``, the others for so many ticks as their fires cross the map
+    in, in a wind of 6 m/s.
+    """
+    ground = Perlin(size=_SIZE, relief=200.0, ages="oldest")(world_key(torch.zeros(1, dtype=torch.int64)))
+    lit = torch.zeros(_SIZE, dtype=torch.bool)
+    lit[60:63, 20:23] = True
+    rows = []
+    paper = Fire(growth=True, beta=0.65, p_regrow=0.01)
+    for name, fire in (("paper", paper), ("spread", Fire()), ("hazard", HazardFire())):
+        began = time.perf_counter()
+        burned = _burn_by_ticks(fire, ground, lit, fires, _TICKS * fire.ticks_per_stage)
+        rows.append(_row(name, f"{_TICKS * fire.ticks_per_stage} ticks", fires, began, burned))
+    began = time.perf_counter()
+    spells = [Spell(wind, minutes, damp) for wind, damp, minutes in Weather(path="august").spells(24 * 60.0)]
+    times = arrival_minutes(RateFire(), ground, lit & _fuel(ground), world_key(torch.arange(fires)), spells, _CELL)
+    burned = [(part <= 24 * 60.0).float().mean().item() for part in times]
+    return [*rows, _row("rate", "24 hours", fires, began, burned)]
+
+
+def ellipse_errors(reach: int, deviations: Sequence[float]) -> list[dict[str, Any]]:
+    """Return how fires on uniform ground differ from the told ellipse after their heads should have gone so many cells.
+
+    A row for each ratio of length to breadth, bearing of the wind against the grid, and ``cell_deviation``.
+    """
+    return [
+        {"length to breadth": ratio, "bearing": bearing, "cell deviation": deviation}
+        | _ellipse(reach, ratio, bearing, deviation)
+        for deviation in deviations
+        for ratio in RATIOS
+        for bearing in BEARINGS
+    ]
+
+
+def fire_table(rows: list[dict[str, Any]]) -> str:
+    """Return what ``law_times`` or ``ellipse_errors`` returned as a table."""
+    return table([entry(heading) for heading in rows[0]], rows)
+
+
+def _row(law: str, long: str, fires: int, began: float, burned: list[float]) -> dict[str, Any]:
+    share = f"{100.0 * sum(burned) / len(burned):.0f}"
+    return {"law": law, "fires": fires, "for": long, "seconds": f"{time.perf_counter() - began:.1f}", "burned %": share}
+
+
+def _burn_by_ticks(fire: Fire, ground: Landscape, lit: Tensor, fires: int, ticks: int) -> list[float]:
+    burned = []
+    for first in range(0, fires, _AT_ONCE):
+        count = min(_AT_ONCE, fires - first)
+        cells = torch.where(lit & (ground.age > 0), 11, ground.age).to(torch.uint8).expand(count, -1, -1).contiguous()
+        cover = ground.cover.expand(count, -1, -1).contiguous()
+        height = None if ground.elevation is None else ground.elevation.expand(count, -1, -1).contiguous()
+        history = fire_history(cells, cover, height, wind=Uniform(speed=6.0), fire=fire, ticks=ticks, seed=first)
+        burned.append((history.arrival >= 0).float().mean().item())
+    return burned
+
+
+def _fuel(ground: Landscape) -> Tensor:
+    return ground.age[0] > 0
+
+
+def _ellipse(reach: int, ratio: float, bearing: int, deviation: float) -> dict[str, Any]:
+    size, (row, column) = (reach + 30, (reach + 15, 15)) if ratio > 1.0 else (2 * reach + 11, (reach + 5, reach + 5))
+    whole = torch.ones(1, size, size, dtype=torch.uint8)
+    ground = Landscape(cover=whole * 3, age=whole * 10, elevation=None, fuel=whole.to(torch.int16) * _C2)
+    fire, angle = RateFire(model="fbp", cell_deviation=deviation), math.radians(bearing)
+    wind = torch.tensor([RATIOS[ratio] * math.sin(angle), RATIOS[ratio] * math.cos(angle)])
+    told = spread_in(fire, ground, _CELL, Spell(wind, 1.0)).head[0, 0, 0].item()
+    lit = torch.zeros(size, size, dtype=torch.bool)
+    lit[row, column] = True
+    key, minutes = world_key(torch.arange(8 if deviation else 1)), reach * _CELL / told
+    (arrival,) = arrival_minutes(fire, ground, lit, key, [Spell(wind, minutes)], _CELL)
+    burned = (arrival <= minutes).nonzero()
+    east, north = (burned[:, 2] - column).float(), (row - burned[:, 1]).float()
+    along, across = east * math.sin(angle) + north * math.cos(angle), east * math.cos(angle) - north * math.sin(angle)
+    heads = [along[burned[:, 0] == each].max().item() for each in range(len(key))]
+    lengths, axes = torch.linalg.eigh(torch.cov(torch.stack((along, across))))
+    lean = math.degrees(math.atan2(axes[1, 1].item(), axes[0, 1].item()))
+    return {
+        "head %": f"{100.0 * (sum(heads) / len(heads) / reach - 1.0):+.1f}",
+        "ratio %": f"{100.0 * ((lengths[1] / lengths[0]).sqrt().item() / ratio - 1.0):+.1f}",
+        "lean": "" if ratio == 1.0 else f"{(lean + 90.0) % 180.0 - 90.0:+.1f}",
+    }
