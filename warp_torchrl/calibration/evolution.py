@@ -42,7 +42,7 @@ class Evolution:
     generations: int = 15
     population: int = 8
     loss: Loss = "jaccard"
-    prior_weight: float = 0.01
+    prior_weight: float = 0.1
     seed: int = 1
 
     def __post_init__(self) -> None:

@@ -34,7 +34,7 @@ class Gradients:
     steps: int = 8
     loss: Loss = "cross_entropy"
     softness: float = 0.2
-    prior_weight: float = 0.01
+    prior_weight: float = 0.1
 
     def __post_init__(self) -> None:
         check_fields(self, steps=(1, 1000), softness=(0.02, 1.0), prior_weight=(0.0, 100.0))

@@ -45,7 +45,7 @@ class CalibrationOptions:
     scales: Mapping[str, Any] = field(default_factory=dict)
     method: Literal["gradients", "evolution"] = "gradients"
     loss: Loss | None = None
-    prior_weight: float = 0.01
+    prior_weight: float = 0.1
     steps: int | None = None
     population: int = 8
     softness: float = 0.2
