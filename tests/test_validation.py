@@ -25,7 +25,7 @@ BAD = [
     (Perlin, "scale", (1.0, 2.0, 3.0), "scale must be a number or a list of 2 values, got (1.0, 2.0, 3.0)"),
     (Mlp, "actor_hidden", 64, "actor_hidden must be a list of a whole number, got 64"),
     (Wandb, "mode", "onlin", "mode must be offline or online, got 'onlin': did you mean online?"),
-    (World, "fire", "paper", "fire must be Fire, got 'paper'"),
+    (World, "fire", "paper", "fire must be Automaton, got 'paper'"),
     (Efficiency, "shaping", [], "shaping must be a number, got []"),
 ]
 
