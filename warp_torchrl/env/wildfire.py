@@ -17,6 +17,7 @@ from warp_torchrl.env.specs import make_specs
 from warp_torchrl.observation import Observation, Surroundings, state_names, state_symmetry
 from warp_torchrl.reward import Efficiency, Reward
 from warp_torchrl.world.fast.compile import check_compiler
+from warp_torchrl.world.fast.road import can_fuse
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.saved import filled
 from warp_torchrl.world.state import Transition, TreeCounts, WorldState, count_trees
@@ -71,7 +72,7 @@ class WildfireEnv(EnvBase):
         self.validate = self.device.type == "cpu" if validate is None else validate
         if fuse:
             check_compiler(self.device)
-        self._fuses = fuse
+        self._fuses = fuse and can_fuse(self.world.fire)
         names, roles = self.world.team.agent_names, self.world.team.agent_roles
         self.agent_names, self.action_names = names, self.world.team.action_names
         self.role_names, self.state_names = self.world.team.role_names, state_names(self.world.team)

@@ -4,7 +4,8 @@ import pytest
 import torch
 
 from warp_torchrl.world.fast.band import AtBand
-from warp_torchrl.world.fast.road import Page, fastest
+from warp_torchrl.world.fast.road import Page, can_fuse, fastest
+from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.rate import RateFire
 from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.wind import Uniform, Wandering
@@ -43,3 +44,8 @@ def test_a_cpu_takes_the_band_and_a_subclass_the_page() -> None:
     assert isinstance(fastest(RateFire(), cpu), AtBand)
     assert isinstance(fastest(Own(), cpu), Page)
     assert isinstance(fastest(RateFire(), torch.device("cuda")), Page)
+
+
+def test_compiled_steps_are_left_out_under_law_rate() -> None:
+    assert not can_fuse(RateFire())
+    assert can_fuse(Fire())

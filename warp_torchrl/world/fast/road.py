@@ -75,6 +75,14 @@ def fastest(fire: Automaton, device: torch.device) -> Road:
     return AtEdge(fire) if spreads_alone and on_cpu else Planes(fire)
 
 
+def can_fuse(fire: Automaton) -> bool:
+    """Return whether a step of whole worlds may be compiled.
+
+    Under law ``rate`` it may not: its page took minutes to compile, and a CPU's band is faster without.
+    """
+    return not isinstance(fire, RateFire)
+
+
 def forecast(fire: Automaton, state: WorldState) -> Forecast:
     """Return what the fire is about to do."""
     expected, probability = fastest(fire, state.cells.device).forecast(state)
