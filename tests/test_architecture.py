@@ -84,7 +84,7 @@ def test_tensors_are_compared_with_numbers_and_not_with_members_of_enumerations(
 
 @pytest.mark.parametrize("module", [name for name in MODULES if name.split("/")[0] in ("models", "algorithms")])
 def test_learning_knows_specs_and_not_the_world(module):
-    known = ("models", "algorithms", *GROUND)
+    known = ("models", "algorithms", "parallel", *GROUND)
     assert all(name.split("/")[0] in known for name in ours(module))
 
 

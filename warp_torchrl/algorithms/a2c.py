@@ -4,11 +4,13 @@ Mnih et al., "Asynchronous Methods for Deep Reinforcement Learning", 2016; its s
 """
 
 from dataclasses import dataclass
+from typing import Literal
 
 import torch
 from torchrl.modules import ProbabilisticActor
 from torchrl.objectives import A2CLoss, ValueEstimators
 
+from warp_torchrl import parallel
 from warp_torchrl.algorithms.on_policy import KEYS, OnPolicy
 
 
@@ -42,7 +44,12 @@ class A2c(OnPolicy):
         )
         loss.entropy_coeff.fill_(self.entropy_coeff)
         loss.set_keys(**KEYS)
+        alone = parallel.size() == 1  # else ``standardises`` has it
         loss.make_value_estimator(
-            ValueEstimators.MAGAE, gamma=self.gamma, lmbda=self.lmbda, average_gae=self.normalize_advantage
+            ValueEstimators.MAGAE, gamma=self.gamma, lmbda=self.lmbda, average_gae=self.normalize_advantage and alone
         )
         return loss
+
+    def standardises(self) -> Literal["batch"] | None:
+        """Return that a batch's advantages are standardised, if they are."""
+        return "batch" if self.normalize_advantage else None

@@ -13,6 +13,7 @@ from torchrl.modules import EGreedyModule
 from torchrl.objectives import HardUpdate, LossModule, SoftUpdate
 from torchrl.objectives.utils import TargetNetUpdater
 
+from warp_torchrl import parallel
 from warp_torchrl.algorithms.algorithm import Algorithm, falling
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.algorithms.replay import ReplayMemory, check_prioritised, replay_buffer, weighted
@@ -105,7 +106,7 @@ class OffPolicy(Algorithm):
         Raises:
             ValueError: If a batch does not fit into the memory.
         """
-        self.check_batch(frames_per_batch)
+        self.check_batch(frames_per_batch * parallel.size())
         shape = signature(env)
         policy = self.policy(shape, model).to(env.device)
         loss = self.loss(policy, shape, model, env.device).to(env.device)
@@ -116,7 +117,7 @@ class OffPolicy(Algorithm):
         canonical = model.canonical_batch(shape, state=CANONICAL_STATE in loss.in_keys, restored=True)
 
         def samples() -> Iterator[TensorDictBase]:
-            enough = len(memory) >= max(self.warm_up, self.minibatch_size)
+            enough = len(memory) >= max(self.warm_up, self.minibatch_size) // parallel.size()
             return (weighted(memory.sample()) for _ in range(self.updates if enough else 0))
 
         def after_step(sample: TensorDictBase) -> None:
@@ -144,8 +145,9 @@ class OffPolicy(Algorithm):
         )
 
     def memory(self, device: torch.device) -> ReplayBuffer:
-        """Return TorchRL's replay buffer."""
-        return replay_buffer(self.replay, self.capacity, self.minibatch_size, device)
+        """Return TorchRL's replay buffer; several processes share its capacity and its minibatches equally."""
+        share = parallel.size()
+        return replay_buffer(self.replay, self.capacity // share, max(1, self.minibatch_size // share), device)
 
     def targets(self, loss: LossModule) -> TargetNetUpdater:
         """Return TorchRL's updater of the target networks."""

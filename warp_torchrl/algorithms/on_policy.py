@@ -1,6 +1,8 @@
 """Base of the on-policy algorithms: actors, critics, advantages and schedules."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 import torch
 from tensordict import TensorDictBase
@@ -10,6 +12,7 @@ from torchrl.envs import EnvBase
 from torchrl.modules import ProbabilisticActor
 from torchrl.objectives import LossModule
 
+from warp_torchrl import parallel
 from warp_torchrl.algorithms.algorithm import Algorithm, falling, masked_actor
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.algorithms.storage import RowStorage
@@ -106,13 +109,22 @@ class OnPolicy(Algorithm):
         buffer = TensorDictReplayBuffer(
             storage=RowStorage(frames_per_batch // steps, device=env.device),
             sampler=SamplerWithoutReplacement(),
-            batch_size=max(1, min(self.minibatch_size, frames_per_batch) // steps),
+            batch_size=max(1, min(self.minibatch_size // parallel.size(), frames_per_batch) // steps),
         )
+        standardises = self.standardises() if parallel.size() > 1 else None
 
         def store(batch: TensorDictBase) -> None:
             buffer.empty()
             valued = with_advantages(loss, batch, canonical, whole=bool(memory.actors))
+            if standardises == "batch":
+                valued[ADVANTAGE] = parallel.standardised(valued[ADVANTAGE], dim=-2)
             buffer.extend(narrowed(valued, arithmetic_of(critic, env.device.type)))
+
+        def samples() -> Iterator[TensorDictBase]:
+            for sample in (each for _ in range(self.passes()) for each in buffer):
+                if standardises == "minibatch":
+                    sample[ADVANTAGE] = parallel.standardised(sample[ADVANTAGE], dim=-2)
+                yield sample
 
         return Learner(
             policy=policy,
@@ -124,7 +136,7 @@ class OnPolicy(Algorithm):
             optimizer=optimizer,
             max_grad_norm=self.max_grad_norm,
             store=store,
-            samples=lambda: (sample for _ in range(self.passes()) for sample in buffer),
+            samples=samples,
             after_step=lambda sample: None,
             schedule=schedule,
             keeps={"memory": memory} if memory.actors else {},
@@ -133,6 +145,10 @@ class OnPolicy(Algorithm):
     def loss(self, policy: ProbabilisticActor, critic: torch.nn.Module) -> LossModule:
         """Return TorchRL's loss with its value estimator."""
         raise TypeError(f"{type(self).__name__} does not say what it minimises: define loss()")
+
+    def standardises(self) -> Literal["minibatch", "batch"] | None:
+        """Return of what advantages are standardised: over all processes, if there are several, else by the loss."""
+        return None
 
     def passes(self) -> int:
         """Return the number of passes over each batch."""

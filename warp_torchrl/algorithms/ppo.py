@@ -5,12 +5,24 @@ Policy Optimization Algorithms", 2017.
 """
 
 from dataclasses import dataclass
+from typing import Literal
 
 import torch
+from torch import Tensor
 from torchrl.modules import PopArtValueNorm, ProbabilisticActor
 from torchrl.objectives.multiagent import IPPOLoss, MAPPOLoss
 
+from warp_torchrl import parallel
 from warp_torchrl.algorithms.on_policy import KEYS, OnPolicy
+
+
+class SharedValueNorm(PopArtValueNorm):
+    """TorchRL's running statistics of value targets, over those of all processes."""
+
+    def update(self, value_target: Tensor) -> None:
+        """Add value targets, float32 [..., 1], as many in every process: means of equal parts are those of the whole."""
+        super().update(value_target)
+        parallel.mean_((self.running_mean, self.running_mean_sq))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,11 +54,16 @@ class Ppo(OnPolicy):
             clip_epsilon=self.clip_epsilon,
             entropy_coeff=self.entropy_coeff,
             critic_coeff=self.critic_coeff,
-            value_norm=PopArtValueNorm(shape=1) if self.value_norm else None,
+            value_norm=SharedValueNorm(shape=1) if self.value_norm else None,
+            normalize_advantage=parallel.size() == 1,  # else ``standardises`` has it
         )
         loss.set_keys(**KEYS)
         loss.make_value_estimator(gamma=self.gamma, lmbda=self.lmbda)
         return loss
+
+    def standardises(self) -> Literal["minibatch"]:
+        """Return that each minibatch's advantages are standardised."""
+        return "minibatch"
 
     def passes(self) -> int:
         """Return the epochs."""

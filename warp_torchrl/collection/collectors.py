@@ -11,6 +11,7 @@ from torchrl.collectors import BaseCollector, Collector
 
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.parallel import WorkerDied
 from warp_torchrl.validation import check_fields
 
 MakeEnv = Callable[[int, int], WildfireEnv]
@@ -18,10 +19,6 @@ MakeEnv = Callable[[int, int], WildfireEnv]
 
 
 _UNLIMITED = 10**12  # batches; TorchRL's Ray collector takes no -1
-
-
-class WorkerDied(Exception):  # noqa: N818
-    """A worker process ended unexpectedly."""
 
 
 class Collection(Protocol):
@@ -41,6 +38,10 @@ class Collection(Protocol):
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore what ``state_dict`` returned."""
+        ...
+
+    def start_anew(self, steps: int) -> None:
+        """Let every world start a new episode, with a number that it has not had in so many steps."""
         ...
 
     def close(self) -> None:
@@ -199,6 +200,11 @@ class _InProcessCollection:
         shaped = self._collector._carrier.empty(recurse=True)  # keeps the batch sizes of nested tensordicts
         self._collector._carrier = shaped.update(carrier.to(self.env.device))
 
+    def start_anew(self, steps: int) -> None:
+        """Let every world start a new episode: a world has had at most as many as steps."""
+        self.env.set_seeds(self.env.seeds.tolist(), steps)
+        self._collector.reset()
+
     def close(self) -> None:
         """Shut the collector down."""
         self._collector.shutdown()
@@ -235,6 +241,10 @@ class _MultiProcessCollection:
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore the number of steps; the next episodes are new ones."""
         self._played = int(state["played"])
+
+    def start_anew(self, steps: int) -> None:
+        """Set the number of steps: new workers play new episodes."""
+        self._played = steps
 
     def close(self) -> None:
         """Shut the workers down."""

@@ -12,9 +12,11 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 
+from warp_torchrl import parallel
 from warp_torchrl.commands.allocation import keep_freed_memory
 from warp_torchrl.commands.checks import map_fires, new_total, of_worlds, without_checkpoint
 from warp_torchrl.commands.failure import fail
+from warp_torchrl.commands.following import folder_of_its_own, follow
 from warp_torchrl.commands.sweep import SweepSummary, remove_failure, save_failure, summarise_unfinished
 from warp_torchrl.config.compose import (
     HYDRA_ERRORS,
@@ -61,6 +63,9 @@ def evaluate() -> None:
 
 
 def _train_job(config: DictConfig) -> None:
+    if parallel.torchrun_rank():
+        parallel.follow(follow)
+        return
     resumed = config.resume is not None
     folder = Path(config.resume if resumed else HydraConfig.get().runtime.output_dir)
     lock = checkpoints.RunFolderLock(folder)
@@ -78,12 +83,15 @@ def _start(folder: Path, config: DictConfig) -> None:
         raise ConfigError(f"hydra.run.dir: {folder} holds a run already; go on with resume={folder}, or take another")
     if (folder / "evaluation.json").exists():
         raise ConfigError(f"hydra.run.dir: {folder} holds an evaluation, which training would replace; take another")
+    config.processes = run_config(plain(config)).n_processes()
     disk.replace(folder / "config.yaml", OmegaConf.to_yaml(config, resolve=True))
-    record = SavedConfig(choices=_choices(config), values=_values(config))
-    training = Training(run_config(plain(config)), record, folder)
-    if config.start_from is not None:
-        training.start_from(_newest(find_policy(config.start_from)))
-    _finish(training, world_overrides(plain(config)))
+    record, plan = SavedConfig(choices=_choices(config), values=_values(config)), run_config(plain(config))
+    with parallel.processes(plan.n_processes(), plain(config), follow):
+        training = Training(plan, record, folder)
+        if config.start_from is not None:
+            training.start_from(_newest(find_policy(config.start_from)))
+        _train(training)
+    _evaluate(training, world_overrides(plain(config)))
 
 
 def _resume(folder: Path, total_frames: Any) -> None:
@@ -92,21 +100,26 @@ def _resume(folder: Path, total_frames: Any) -> None:
     if run.is_finished:
         log.info("%s is finished; total_frames=MORE trains it longer", folder)
         return
-    training = Training(run.run_config, run.record, folder)
-    training.load_state_dict(run.found.training())
-    log.info("resumed %s at %d frames", run.found.path, training.frames)
-    if run.run_config.total_frames != run.total_before:
-        # Before the next checkpoint: a run that is killed now must resume with the new total too.
-        disk.replace(folder / "config.yaml", OmegaConf.to_yaml(restore(run.record), resolve=True))
-        training.log_new_total(run.total_before)
-    _finish(training, world_overrides(run.values))
+    with parallel.processes(run.run_config.n_processes(), run.values, follow):
+        training = Training(run.run_config, run.record, folder)
+        training.load_state_dict(run.found.training())
+        log.info("resumed %s at %d frames", run.found.path, training.frames)
+        if run.run_config.total_frames != run.total_before:
+            # Before the next checkpoint: a run that is killed now must resume with the new total too.
+            disk.replace(folder / "config.yaml", OmegaConf.to_yaml(restore(run.record), resolve=True))
+            training.log_new_total(run.total_before)
+        _train(training)
+    _evaluate(training, world_overrides(run.values))
 
 
-def _finish(training: Training, worlds: Sequence[str]) -> None:
+def _train(training: Training) -> None:
     try:
         training.train()
     finally:
         training.close()
+
+
+def _evaluate(training: Training, worlds: Sequence[str]) -> None:
     evaluate_policy(training.run_config, training.run, checkpoints.newest(training.run)[0], worlds)
 
 
@@ -163,7 +176,11 @@ def _run(name: str, job: Callable[[DictConfig], None]) -> None:
     with exit_on_signal():
         try:
             _check_grammar(arguments)
-            _start_hydra(name, job, arguments, debug)
+            if parallel.torchrun_rank():
+                with folder_of_its_own() as quiet:
+                    _start_hydra(name, job, [*_without_folder(arguments), *quiet], debug)
+            else:
+                _start_hydra(name, job, arguments, debug)
         except HYDRA_ERRORS as error:
             overrides = [each for each in arguments if not each.startswith("-")]
             sys.exit(fail(explain(error, name, overrides), debug)[0])
@@ -173,7 +190,7 @@ def _run(name: str, job: Callable[[DictConfig], None]) -> None:
 
 
 def _start_hydra(name: str, job: Callable[[DictConfig], None], arguments: list[str], debug: bool) -> None:
-    if name == "train":
+    if name == "train" and not parallel.torchrun_rank():
         arguments = _with_run_folder(arguments)
     sys.argv[1:] = sorted(arguments, key=lambda each: each not in _MULTIRUN)  # Hydra wants -m before the overrides
 
@@ -197,8 +214,14 @@ def _start_hydra(name: str, job: Callable[[DictConfig], None], arguments: list[s
 def _check_grammar(arguments: Sequence[str]) -> None:
     """Check what can be read before Hydra composes: ``CheckFirst`` checks what it composed."""
     check_flags(arguments)
+    if parallel.is_torchrun() and any(each in _MULTIRUN for each in arguments):
+        raise ConfigError("--multirun must be left out under torchrun: its processes train one run together")
     if all(each in _MULTIRUN for each in arguments if each.startswith("-")):  # others may have arguments of their own
         check_overrides([each for each in arguments if not each.startswith("-")])
+
+
+def _without_folder(arguments: Sequence[str]) -> list[str]:
+    return [each for each in arguments if not each.startswith("hydra.run.dir=")]
 
 
 def _with_run_folder(arguments: Sequence[str]) -> list[str]:

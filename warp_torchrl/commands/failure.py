@@ -5,9 +5,9 @@ import sys
 import traceback
 from pathlib import Path
 
-from warp_torchrl.collection.collectors import WorkerDied
 from warp_torchrl.config.compose import HYDRA_ERRORS, one_line
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.parallel import WorkerDied
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.training.loop import NumericalFailure
 from warp_torchrl.training.signals import Stopped

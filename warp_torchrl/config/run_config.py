@@ -7,6 +7,8 @@ from typing import Any, Literal
 
 import torch
 
+from warp_torchrl import parallel
+from warp_torchrl.collection.collectors import MultiProcess
 from warp_torchrl.collection.kickstarting import Kickstarting
 from warp_torchrl.config.construction import ConfigError, build, construct
 from warp_torchrl.config.seeds import BEYOND_EVALUATION, FIRST_EVALUATED, SEEDS, WORLDS
@@ -116,6 +118,8 @@ class RunConfig:
         total_frames: World steps in all; agent steps are frames x agents.
         seed: 0 to 2^31; no world of one is a world of another, or of an evaluation.
         device: ``cpu``, ``cuda`` or ``cuda:<number>``.
+        processes: Processes that learn together, each from an equal share of the worlds; ``auto`` takes what
+            ``parallel.automatic`` finds.
         compile: Fuse steps and losses of training with ``torch.compile``: faster after a minute or two.
         checkpoint: When training saves.
         evaluation: How policies are evaluated.
@@ -137,6 +141,7 @@ class RunConfig:
     total_frames: int = 2_000_000
     seed: int = 0
     device: str = "cpu"
+    processes: int | Literal["auto"] = "auto"
     compile: bool = False
     checkpoint: CheckpointConfig = field(default_factory=CheckpointConfig)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
@@ -151,13 +156,39 @@ class RunConfig:
         if not 0 <= self.seed <= SEEDS:
             raise ValueError(f"seed must be in 0..{SEEDS}, got {self.seed}")
         _check_device(self.device)
+        if self.processes != "auto":
+            self._check_shares(self.processes)
+
+    def _check_shares(self, count: int) -> None:
+        if not 1 <= count <= self.n_worlds or self.n_worlds % count:
+            raise ValueError(f"processes must divide n_worlds, {self.n_worlds}, got {count}")
+        if count > 1 and isinstance(self.collector, MultiProcess):
+            raise ValueError(f"processes must be 1 where workers collect, got {count}: choose collector=direct")
+
+    def n_processes(self) -> int:
+        """Return how many processes learn together."""
+        if self.processes != "auto":
+            return self.processes
+        if isinstance(self.collector, MultiProcess) and not parallel.is_torchrun():
+            return 1
+        return parallel.automatic(self.n_worlds, torch.device(self.device))
 
     def check_training(self) -> None:
         """Check what training asks of the machine, and playing what was trained does not.
 
         Raises:
-            ConfigError: If ``compile`` is asked for where there is no compiler.
+            ConfigError: If ``compile`` is asked for where there is no compiler, or the processes are not as many as
+                ``torchrun`` has started, or more than there are GPUs.
         """
+        count, started = self.n_processes(), parallel.automatic(self.n_worlds, torch.device(self.device))
+        if parallel.is_torchrun() and count != started:
+            raise ConfigError(f"processes must be auto under torchrun, which has started {started}, got {count}")
+        if torch.device(self.device).type == "cuda" and not parallel.is_torchrun() and count > torch.cuda.device_count():
+            raise ConfigError(f"processes must be at most the {torch.cuda.device_count()} CUDA devices, got {count}")
+        try:
+            self._check_shares(count)
+        except ValueError as error:
+            raise ConfigError(str(error)) from None
         if self.compile:
             try:
                 check_compiler(torch.device(self.device))

@@ -1,4 +1,7 @@
-"""The one training loop for all algorithms; what differs between them is a field of ``Learner``."""
+"""The one training loop for all algorithms; what differs between them is a field of ``Learner``.
+
+Every process of a run goes through it with its share of the worlds; the first one alone logs, saves and decides.
+"""
 
 import logging
 import time
@@ -12,13 +15,14 @@ from tensordict import TensorDictBase
 from torch import Tensor
 from tqdm import tqdm
 
+from warp_torchrl import parallel
 from warp_torchrl.algorithms.learner import Learner
-from warp_torchrl.collection.collectors import WorkerDied
 from warp_torchrl.config.compose import SavedConfig
 from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.config.seeds import WORLDS, first_world_seed
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.models import REWARD, signature
+from warp_torchrl.parallel import WorkerDied
 from warp_torchrl.policy import MODES
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs import disk, former
@@ -44,16 +48,18 @@ class Training:
     Args:
         run_config: What to train.
         record: The configuration that checkpoints keep.
-        run: The run folder.
+        run: The run folder, which the first process alone writes.
     """
 
     def __init__(self, run_config: RunConfig, record: SavedConfig, run: Path) -> None:
-        torch.manual_seed(run_config.seed)
+        torch.manual_seed(run_config.seed)  # the same in every process: all begin with the same networks
         self.run_config, self.record, self.run = run_config, record, run
-        first = first_world_seed(run_config.seed)
-        self.env = run_config.make_training_env(run_config.n_worlds, first)
+        self.is_first = parallel.rank() == 0
+        worlds = run_config.n_worlds // parallel.size()
+        first = first_world_seed(run_config.seed) + worlds * parallel.rank()
+        self.env = run_config.make_training_env(worlds, first)
         self.frames_per_batch = run_config.collector.steps * run_config.n_worlds
-        learner = run_config.algorithm.build(self.env, run_config.model, self.frames_per_batch)
+        learner = run_config.algorithm.build(self.env, run_config.model, run_config.collector.steps * worlds)
         if run_config.compile:
             learner.terms = compile_function(learner.terms)
         self.learner: Learner = run_config.imitation.kickstart(learner, self.env)
@@ -66,6 +72,10 @@ class Training:
         self.mode: str | None = None
         self.metrics = MetricsFile(run / "metrics.csv")
         self._scheduled = self.learner.schedule(0.0)
+        self._others: list[dict[str, Any]] | None = None
+        """What a checkpoint holds of the other processes."""
+        if not self.is_first:
+            torch.manual_seed(_seed_of_process(run_config.seed, parallel.rank()))
 
     def train(self) -> None:
         """Train until ``total_frames``; save checkpoints on the way and at the end.
@@ -73,67 +83,93 @@ class Training:
         Raises:
             Stopped: If a signal asked the run to stop; it has saved.
             NumericalFailure: If a reward, loss or gradient is not finite.
+            WorkerDied: If a worker or another process ended; the run has saved.
         """
         with DeferredSignals() as signals:
-            tracker = self.run_config.logger.open(self.run)
+            tracker = self.run_config.logger.open(self.run) if self.is_first else None
             try:
+                self._join()
                 self._train(signals, tracker)
-                self.mode = self.mode or self._better_mode()
+                if self.is_first:
+                    self.mode = self.mode or self._better_mode()
                 self.save()
-                log.info("saved %d times, in %.2f %% of the time", self.clock.saves, 100.0 * self.clock.share())
+                if self.is_first:
+                    log.info("saved %d times, in %.2f %% of the time", self.clock.saves, 100.0 * self.clock.share())
+            except WorkerDied:
+                self._save_alone()
+                if signals.received:  # a terminal sends its signals to the workers too
+                    raise Stopped(signals.received, self.run) from None
+                raise
             finally:
-                tracker.close()  # after the last save: a slow server may delay it
+                if tracker is not None:
+                    tracker.close()  # after the last save: a slow server may delay it
             if signals.received:
                 raise Stopped(signals.received, self.run)
 
-    def _train(self, signals: DeferredSignals, tracker: Tracker) -> None:
+    def _train(self, signals: DeferredSignals, tracker: Tracker | None) -> None:
         total = self.run_config.total_frames
         notice = batch_size_notice(total, self.run_config.n_worlds, self.run_config.collector.steps)
-        if notice is not None and self.frames < total:
+        if notice is not None and self.frames < total and self.is_first:
             log.log(logging.WARNING if total < self.frames_per_batch else logging.INFO, notice)
-        bar = tqdm(total=total, initial=self.frames, unit="frame", disable=None, dynamic_ncols=True)
-        start, next_line = time.perf_counter() - self.seconds, 0.0
+        disable = None if self.is_first else True  # None: where nobody watches
+        bar = tqdm(total=total, initial=self.frames, unit="frame", disable=disable, dynamic_ncols=True)
+        self._began = time.perf_counter() - self.seconds
         try:
-            for batch in self._batches(signals) if self.frames < total else ():
+            for batch in self.collection if self.frames < total else ():
                 row = self._learn(batch)
-                self.seconds = time.perf_counter() - start
-                rate = batch.numel() / max(self.seconds - self._last_seconds, 1e-9)
-                self._last_seconds = self.seconds
-                row = {"time/frames": self.frames, "time/seconds": self.seconds, "time/fps": rate, **row}
-                self.metrics.add(row)
-                tracker.log(row, self.frames)
-                bar.update(batch.numel())
-                bar.set_postfix(saved=row["world/saved"], refresh=False)
-                if bar.disable and (self.seconds >= next_line or self.frames >= total):
-                    next_line = self.seconds + _SECONDS_BETWEEN_LINES
-                    log.info(line(row, total))
+                if tracker is not None:
+                    self._report(row, tracker, bar)
                 if self.frames >= total:
                     break
-                if signals.received or self._is_regular(self.frames) or self.clock.is_due():
+                due = signals.received or self._is_regular(self.frames) or self.clock.is_due()
+                saves, received = parallel.share((bool(due), signals.received))
+                if saves:
                     self.save()
-                if signals.received:
-                    raise Stopped(signals.received, self.run)
+                if received:
+                    raise Stopped(received, self.run)
         finally:
             bar.close()
 
-    _last_seconds = 0.0
+    _last_seconds = _next_line = 0.0
 
-    def _batches(self, signals: DeferredSignals) -> Iterator[TensorDictBase]:
-        """Yield batches; if a worker dies, save a checkpoint before the error goes on."""
-        try:
-            yield from self.collection
-        except WorkerDied:
-            if self.frames > self.saved_at:
-                self.save()
-            if signals.received:  # a terminal sends its signals to the workers too
-                raise Stopped(signals.received, self.run) from None
-            raise
+    def _report(self, row: dict[str, float | None], tracker: Tracker, bar: tqdm) -> None:
+        """Write a row to ``metrics.csv``, the tracker, and the bar or the log."""
+        total = self.run_config.total_frames
+        self.seconds = time.perf_counter() - self._began
+        rate = self.frames_per_batch / max(self.seconds - self._last_seconds, 1e-9)
+        self._last_seconds = self.seconds
+        row = {"time/frames": self.frames, "time/seconds": self.seconds, "time/fps": rate, **row}
+        self.metrics.add(row)
+        tracker.log(row, self.frames)
+        bar.update(self.frames_per_batch)
+        bar.set_postfix(saved=row["world/saved"], refresh=False)
+        if bar.disable and (self.seconds >= self._next_line or self.frames >= total):
+            self._next_line = self.seconds + _SECONDS_BETWEEN_LINES
+            log.info(line(row, total))
+
+    def _save_alone(self) -> None:
+        """Save without the processes that may have ended: on resume their worlds start new episodes."""
+        if self.is_first and self.frames > self.saved_at:
+            self._write(self.state_dict())
+
+    def _join(self) -> None:
+        """Give the other processes what the first one begins with, or has resumed."""
+        if parallel.size() == 1:
+            return
+        begun = parallel.share({**self.state_dict(), "others": self._others} if self.is_first else None)
+        if self.is_first:
+            return
+        self._restore_shared(begun)
+        if begun["others"] is not None:
+            self._restore_own(begun["others"][parallel.rank() - 1])
+        elif self.frames:  # saved when this process had ended
+            self.collection.start_anew(self.frames // self.run_config.n_worlds)
 
     def _learn(self, batch: TensorDictBase) -> dict[str, float | None]:
         """Learn from one batch [B, T] and return its row of ``metrics.csv``."""
         learner = self.learner
         row = episode_columns(batch)
-        if not batch["next", *REWARD].isfinite().all():
+        if parallel.sum_((~batch["next", *REWARD].isfinite()).sum()):
             raise NumericalFailure(f"after {self.frames} frames a reward is not finite; the last checkpoint stands")
         if self.reward_scale is not None:
             self.reward_scale(batch)
@@ -144,14 +180,16 @@ class Training:
             for name, value in self._update(sample).items():
                 sums[name] = sums.get(name, 0.0) + value
             updates += 1
-        self.frames += batch.numel()
+        self.frames += self.frames_per_batch
+        if updates:
+            parallel.mean_(sums[name] for name in sorted(sums))
         means = {name: float(value) / updates for name, value in sums.items()}
         row["train/loss"] = sum(means[key] for key in learner.loss_keys) if updates else None
         row |= dict.fromkeys(TRAIN_COLUMNS)
         row |= {column: means.get(key) for key, column in learner.columns.items()} | self._scheduled
         self._schedule()
         self.collection.refresh()
-        row["evaluation/saved"] = self._evaluate(batch.numel())
+        row["evaluation/saved"] = self._evaluate() if self.is_first else None
         return row
 
     def _schedule(self) -> None:
@@ -179,10 +217,12 @@ class Training:
         terms = learner.terms(sample)
         loss = sum(terms[key] for key in learner.loss_keys)
         loss.backward()
+        trained = [each.grad for each in learner.loss.parameters() if each.grad is not None]
+        parallel.mean_([*trained, total := loss.detach().clone()])
         norm = torch.nn.utils.clip_grad_norm_(learner.loss.parameters(), learner.max_grad_norm)
-        if not torch.isfinite(norm + loss.detach()):  # one synchronisation for both
+        if not torch.isfinite(norm + total):  # one synchronisation for both
             raise NumericalFailure(
-                f"after {self.frames} frames the loss, {float(loss.detach()):g}, or its gradient, of norm "
+                f"after {self.frames} frames the loss, {float(total):g}, or its gradient, of norm "
                 f"{float(norm):g}, is not finite; the weights were left as they were, and the last checkpoint stands"
             )
         learner.optimizer.step()
@@ -191,9 +231,9 @@ class Training:
         wanted = {*learner.loss_keys, *learner.columns} & set(terms.keys())
         return {name: terms[name].detach().mean() for name in wanted}
 
-    def _evaluate(self, frames: int) -> float | None:
+    def _evaluate(self) -> float | None:
         plan = self.run_config.evaluation
-        if not plan.interval or not passes(plan.interval, self.frames, frames):
+        if not plan.interval or not passes(plan.interval, self.frames, self.frames_per_batch):
             return None
         env = self.run_config.make_env(plan.episodes, plan.first_seed)
         return float(play(env, self.learner.policy, plan.first_seed)["saved"].mean())
@@ -208,8 +248,14 @@ class Training:
         saved = {mode: play(env, self.learner.policy, first, mode)["saved"].mean() for mode in MODES}
         return max(saved, key=saved.__getitem__)
 
-    def save(self) -> Path:
-        """Write a checkpoint and return its folder."""
+    def save(self) -> Path | None:
+        """Write a checkpoint and return its folder; every process must call it at once, and the first one writes."""
+        others = parallel.gather({} if self.is_first else self._own())
+        if not self.is_first:
+            return None
+        return self._write(self.state_dict() | ({"others": others[1:]} if len(others) > 1 else {}))
+
+    def _write(self, training: Mapping[str, Any]) -> Path:
         with self.clock.timed():
             self.metrics.sync()
             path = checkpoints.save(
@@ -220,7 +266,7 @@ class Training:
                 mode=self.mode,
                 record=self.record,
                 policy=self.learner.policy.state_dict(),
-                training=self.state_dict(),
+                training=training,
                 keep=self.run_config.checkpoint.keep,
                 stays=self._is_regular,
             )
@@ -228,8 +274,8 @@ class Training:
         return path
 
     def _size(self) -> int:
-        """Return the size of a checkpoint's tensors [bytes]."""
-        return disk.size(self.state_dict())
+        """Return the size of a checkpoint's tensors [bytes], as if all processes had as much as this one."""
+        return disk.size(self.state_dict()) + (parallel.size() - 1) * disk.size(self._own())
 
     def _is_regular(self, frames: int) -> bool:
         """Return whether ``checkpoint.interval`` asks for a checkpoint at this number of frames."""
@@ -245,18 +291,24 @@ class Training:
         loss.load_state_dict({**loss.state_dict(), **learned_parameters(found, loss)})
 
     def state_dict(self) -> dict[str, Any]:
-        """Return everything that an exact resume needs."""
+        """Return everything that an exact resume needs of this process."""
         return {
             "loss": dict(self.learner.loss.state_dict()),
-            "keeps": {name: each.state_dict() for name, each in self.learner.keeps.items()},
             "optimizer": self.learner.optimizer.state_dict(),
+            **self._own(),
+            "frames": self.frames,
+            "seconds": self.seconds,
+            "rows": self.metrics.rows,
+        }
+
+    def _own(self) -> dict[str, Any]:
+        """Return what differs from process to process."""
+        return {
+            "keeps": {name: each.state_dict() for name, each in self.learner.keeps.items()},
             "random": torch.get_rng_state(),
             "random_cuda": torch.cuda.get_rng_state(self.env.device) if self.env.device.type == "cuda" else None,
             "collection": self.collection.state_dict(),
             "reward_scale": {} if self.reward_scale is None else self.reward_scale.state_dict(),
-            "frames": self.frames,
-            "seconds": self.seconds,
-            "rows": self.metrics.rows,
         }
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
@@ -270,6 +322,7 @@ class Training:
         try:
             self._restore(state)
             self.metrics = MetricsFile(self.run / "metrics.csv", keep_rows=int(state["rows"]))
+            self._others = state.get("others")
         except Exception as error:  # torch and TorchRL raise many types for a state that does not fit
             self._restore(before)
             if isinstance(error, OSError):
@@ -278,6 +331,10 @@ class Training:
             raise checkpoints.CheckpointError(f"the checkpoint does not fit this configuration: {reason}") from None
 
     def _restore(self, state: Mapping[str, Any]) -> None:
+        self._restore_shared(state)
+        self._restore_own(state)
+
+    def _restore_shared(self, state: Mapping[str, Any]) -> None:
         now = self.learner.loss.state_dict()
         loss = former.parameters(state["loss"], now)
         differing = now.keys() ^ loss.keys()
@@ -285,14 +342,16 @@ class Training:
             raise ValueError(f"{min(differing)} is in one of the two alone")
         self.learner.loss.load_state_dict(loss)
         self.learner.optimizer.load_state_dict(state["optimizer"])
+        self.frames, self.seconds = int(state["frames"]), float(state["seconds"])
+        self.saved_at, self._last_seconds = self.frames, self.seconds
+        self._schedule()
+
+    def _restore_own(self, state: Mapping[str, Any]) -> None:
         for name, each in self.learner.keeps.items():
             each.load_state_dict(state["keeps"][name])
         self.collection.load_state_dict(state["collection"])
         if self.reward_scale is not None:
             self.reward_scale.load_state_dict(state["reward_scale"])
-        self.frames, self.seconds = int(state["frames"]), float(state["seconds"])
-        self.saved_at, self._last_seconds = self.frames, self.seconds
-        self._schedule()
         torch.set_rng_state(state["random"])
         if state.get("random_cuda") is not None:
             torch.cuda.set_rng_state(state["random_cuda"], self.env.device)
@@ -300,3 +359,8 @@ class Training:
     def close(self) -> None:
         """Shut the collector down."""
         self.collection.close()
+
+
+def _seed_of_process(seed: int, rank: int) -> int:
+    """Return the seed of a process's draws, of actions and of minibatches."""
+    return (seed + 2**40 * rank) % 2**64

@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping
 
+import torch
 from tensordict import TensorDictBase
 
+from warp_torchrl import parallel
 from warp_torchrl.env.specs import EPISODE_METRICS
 
 TRAIN_COLUMNS = (
@@ -20,11 +22,12 @@ TRAIN_COLUMNS = (
 
 
 def episode_columns(batch: TensorDictBase) -> dict[str, float | None]:
-    """Return the mean metrics of the episodes that ended in a batch [B, T]; None where none ended."""
+    """Return the mean metrics of the episodes that ended in a batch [B, T] of all processes; None where none ended."""
     done = batch["next", "done"][..., 0]
     info = batch["next", "info"]
-    count = int(done.sum())
-    means = {name: float(info[name][..., 0][done].mean()) if count else None for name in EPISODE_METRICS}
+    sums = [done.sum(), *(torch.where(done, info[name][..., 0], 0.0).sum() for name in EPISODE_METRICS)]
+    count, *totals = parallel.sum_(torch.stack([each.double() for each in sums])).tolist()
+    means = {name: total / count if count else None for name, total in zip(EPISODE_METRICS, totals, strict=True)}
     row = {"rollout/ep_rew_mean": means.pop("episode_reward"), "rollout/ep_len_mean": means.pop("episode_length")}
     return row | {f"world/{name}": value for name, value in means.items()}
 

@@ -4,6 +4,7 @@ import torch
 from tensordict import TensorDictBase
 from torch import Tensor
 
+from warp_torchrl import parallel
 from warp_torchrl.models import REWARD
 
 
@@ -42,11 +43,13 @@ class RewardScale:
         return (self._moments[2] / self._moments[0].clamp(min=1.0)).sqrt()
 
     def _add(self, values: Tensor) -> None:
-        """Join the moments of new values (Chan, Golub and LeVeque 1979)."""
+        """Join the moments of new values of all processes (Chan, Golub and LeVeque 1979)."""
         count, mean, squares = self._moments
-        new, new_mean = values.numel(), values.mean()
+        new = values.numel() * parallel.size()
+        new_mean = parallel.sum_(values.sum()) / new if parallel.size() > 1 else values.mean()
         total, gap = count + new, new_mean - mean
-        squares = squares + (values - new_mean).square().sum() + gap * gap * count * new / total
+        departures = parallel.sum_((values - new_mean).square().sum())
+        squares = squares + departures + gap * gap * count * new / total
         self._moments = torch.stack((total, mean + gap * new / total, squares))
 
     def state_dict(self) -> dict[str, Tensor]:

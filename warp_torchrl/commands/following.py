@@ -1,0 +1,48 @@
+"""What the processes of a training do that are not the first one: they learn with it, and leave the files to it."""
+
+import logging
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from warp_torchrl import parallel
+from warp_torchrl.commands.allocation import keep_freed_memory
+from warp_torchrl.config.compose import SavedConfig
+from warp_torchrl.config.run_config import run_config
+from warp_torchrl.training.loop import NumericalFailure, Training
+from warp_torchrl.training.signals import Stopped
+
+
+def follow(values: dict[str, Any]) -> None:
+    """Train as one of the other processes, with the first one's configuration, until it ends.
+
+    What stops the run is told by the first one.
+    """
+    keep_freed_memory()
+    logging.getLogger("warp_torchrl").setLevel(logging.ERROR)
+    if torch.device(values["device"]).type == "cuda":
+        place = int(os.environ.get("LOCAL_RANK", parallel.rank()))
+        values = {**values, "device": f"cuda:{place % torch.cuda.device_count()}"}
+    training = Training(run_config(values), SavedConfig(), Path())
+    try:
+        training.train()
+    except (NumericalFailure, Stopped):
+        pass
+    finally:
+        training.close()
+
+
+@contextmanager
+def folder_of_its_own() -> Iterator[list[str]]:
+    """Yield the overrides by which Hydra, in a process that ``torchrun`` has started, writes and logs nothing."""
+    folder = tempfile.mkdtemp(prefix="warp_torchrl-")
+    try:
+        yield [f"hydra.run.dir={folder}", "hydra/job_logging=disabled", "hydra/hydra_logging=disabled"]
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)

@@ -1,0 +1,20 @@
+"""Processes that learn together: how they start, and what they tell each other."""
+
+from warp_torchrl.parallel.group import WorkerDied, gather, mean_, rank, share, size, standardised, sum_
+from warp_torchrl.parallel.launch import automatic, follow, is_torchrun, processes, torchrun_rank
+
+__all__ = [
+    "WorkerDied",
+    "automatic",
+    "follow",
+    "gather",
+    "is_torchrun",
+    "mean_",
+    "processes",
+    "rank",
+    "share",
+    "size",
+    "standardised",
+    "sum_",
+    "torchrun_rank",
+]

@@ -1,0 +1,101 @@
+"""What the processes of a run tell each other: collective operations of ``torch.distributed``.
+
+A run of one process has no group, and then these functions do nothing. Every process must call them in the same order.
+"""
+
+from collections.abc import Callable, Iterable
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
+
+import torch
+from torch import Tensor
+from torch import distributed as dist
+
+Given = ParamSpec("Given")
+Told = TypeVar("Told")
+
+
+class WorkerDied(Exception):  # noqa: N818
+    """A process that works for this run ended unexpectedly."""
+
+
+def size() -> int:
+    """Return the number of processes that learn together."""
+    return dist.get_world_size() if dist.is_available() and dist.is_initialized() else 1
+
+
+def rank() -> int:
+    """Return this process's number; process 0 writes the run folder."""
+    return dist.get_rank() if size() > 1 else 0
+
+
+def _collective(operation: Callable[Given, Told]) -> Callable[Given, Told]:
+    """Let an operation tell that another process has ended; torch has no type of its own for that."""
+
+    @wraps(operation)
+    def told(*args: Given.args, **kwargs: Given.kwargs) -> Told:
+        try:
+            return operation(*args, **kwargs)
+        except RuntimeError as error:
+            raise WorkerDied(f"a process of the run has ended: {next(iter(str(error).splitlines()), '')}") from error
+
+    return told
+
+
+@_collective
+def sum_(tensor: Tensor) -> Tensor:
+    """Replace a tensor by its sum over the processes, in place, and return it."""
+    if size() > 1:
+        dist.all_reduce(tensor)
+    return tensor
+
+
+@_collective
+def mean_(tensors: Iterable[Tensor]) -> None:
+    """Replace tensors of one type by their means over the processes, in place, with one message for all."""
+    if size() == 1:
+        return
+    several = list(tensors)
+    flat = torch.cat([each.reshape(-1) for each in several])
+    dist.all_reduce(flat)
+    flat /= size()
+    for each, part in zip(several, flat.split([each.numel() for each in several]), strict=True):
+        each.copy_(part.view_as(each))
+
+
+@_collective
+def share(value: Any) -> Any:
+    """Return process 0's value in every process."""
+    if size() == 1:
+        return value
+    held = [value if rank() == 0 else None]
+    dist.broadcast_object_list(held)
+    return held[0]
+
+
+@_collective
+def gather(value: Any) -> list[Any]:
+    """Return the values of all processes in process 0, and nothing in the others."""
+    if size() == 1:
+        return [value]
+    held = [None] * size() if rank() == 0 else None
+    dist.gather_object(value, held)
+    return held or []
+
+
+def standardised(values: Tensor, dim: int) -> Tensor:
+    """Return values less their mean, over their standard deviation, both over all processes.
+
+    As TorchRL standardises advantages: for each index of one dimension by itself, the variance over n - 1.
+
+    Args:
+        values: float32 [..., A, 1], of one shape in every process.
+        dim: The dimension whose indices stay apart.
+    """
+    others = [each for each in range(values.dim()) if each != dim % values.dim()]
+    wide = values.double()
+    count = wide.numel() // wide.shape[dim] * size()
+    mean = sum_(wide.sum(others, keepdim=True)) / count
+    variance = sum_((wide - mean).square().sum(others, keepdim=True)) / max(count - 1, 1)
+    scale = variance.sqrt().clamp(min=torch.finfo(torch.float32).resolution)
+    return ((wide - mean) / scale).to(values.dtype)
