@@ -15,7 +15,8 @@ from torchrl.objectives import LossModule
 from warp_torchrl import parallel
 from warp_torchrl.algorithms.algorithm import Algorithm, falling, masked_actor
 from warp_torchrl.algorithms.learner import Learner
-from warp_torchrl.algorithms.storage import RowStorage
+from warp_torchrl.algorithms.storage import BatchStorage
+from warp_torchrl.device import reads_freely
 from warp_torchrl.models import (
     ACTION,
     CANONICAL,
@@ -107,7 +108,7 @@ class OnPolicy(Algorithm):
         memory = Recollection(policy)
         steps = frames_per_batch // env.batch_size[0] if memory.actors else 1  # in a row of the buffer
         buffer = TensorDictReplayBuffer(
-            storage=RowStorage(frames_per_batch // steps, device=env.device),
+            storage=BatchStorage(frames_per_batch // steps, device=env.device),
             sampler=SamplerWithoutReplacement(),
             batch_size=max(1, min(self.minibatch_size // parallel.size(), frames_per_batch) // steps),
         )
@@ -206,8 +207,11 @@ def _add_values(loss: LossModule, batch: TensorDictBase, canonical: CanonicalBat
     ends[:, -1] = True
     with loss.critic_network_params.to_module(loss.critic_network):
         value = loss.critic_network(batch.select(*keys))[VALUE]
-        last = loss.critic_network(canonical(batch["next"][ends]))[VALUE]
-    following = value.roll(-1, dims=1)
-    following[ends] = last
+        following = value.roll(-1, dims=1)
+        if reads_freely(ends.device):
+            following[ends] = loss.critic_network(canonical(batch["next"][ends]))[VALUE]
+        else:  # of every step, one after the other: how many ends there are would have to be read
+            last = [loss.critic_network(canonical(each))[VALUE] for each in batch["next"].unbind(1)]
+            following = torch.where(ends[..., None, None], torch.stack(last, dim=1), following)
     batch.set(VALUE, value)
     batch.set(("next", *VALUE), following)

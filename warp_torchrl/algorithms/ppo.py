@@ -9,7 +9,7 @@ from typing import Literal
 
 import torch
 from torch import Tensor
-from torchrl.modules import PopArtValueNorm, ProbabilisticActor
+from torchrl.modules import MaskedCategorical, PopArtValueNorm, ProbabilisticActor
 from torchrl.objectives.multiagent import IPPOLoss, MAPPOLoss
 
 from warp_torchrl import parallel
@@ -23,6 +23,21 @@ class SharedValueNorm(PopArtValueNorm):
         """Add value targets, float32 [..., 1], as many in every process: means of equal parts are those of the whole."""
         super().update(value_target)
         parallel.mean_((self.running_mean, self.running_mean_sq))
+
+
+class _MaskedEntropy:
+    """The entropy of masked actions as it is: TorchRL's losses ask at each update whether it is finite, and wait."""
+
+    def _get_entropy(self, dist: MaskedCategorical, adv_shape: torch.Size) -> Tensor:
+        return dist.entropy().unsqueeze(-1)
+
+
+class MaskedMappo(_MaskedEntropy, MAPPOLoss):
+    """TorchRL's MAPPO loss of masked actions."""
+
+
+class MaskedIppo(_MaskedEntropy, IPPOLoss):
+    """TorchRL's IPPO loss of masked actions."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +62,7 @@ class Ppo(OnPolicy):
 
     def loss(self, policy: ProbabilisticActor, critic: torch.nn.Module) -> MAPPOLoss:
         """Return TorchRL's MAPPO or IPPO loss."""
-        loss_class = MAPPOLoss if self.central_critic else IPPOLoss
+        loss_class = MaskedMappo if self.central_critic else MaskedIppo
         loss = loss_class(
             policy,
             critic,

@@ -31,6 +31,15 @@ class RowStorage(LazyTensorStorage):
         return super().get(index)
 
 
+class BatchStorage(RowStorage):
+    """Storage of one batch, which fills it: each ``set`` of so many rows replaces them all, in order, cursor unread."""
+
+    def set(self, cursor: int | Sequence[int] | slice | Tensor, data: Any, *, set_cursor: bool = True) -> None:
+        """Put a batch in the place of the former one; fewer rows at ``cursor``."""
+        whole = isinstance(cursor, Tensor) and len(cursor) == self.max_size
+        super().set(slice(0, self.max_size) if whole else cursor, data, set_cursor=set_cursor)
+
+
 def _rows(data: TensorDictBase, index: Tensor) -> TensorDict:
     """Return the rows [n, ...] of a tensordict [N, ...]."""
     found = {

@@ -31,6 +31,7 @@ _ALWAYS = (
 )
 _MASKS = ("index", "index_put", "index_put_", "_index_put_impl_")
 _READS = (Tensor.tolist, Tensor.numpy, Tensor.__array__)  # of the host's memory: the dispatcher does not see them
+_PICKS = (Tensor.__getitem__, Tensor.__setitem__)  # by a list: a copy too
 _MAKERS = (torch.tensor, torch.as_tensor)  # of the program's numbers: a copy for whose end it waits
 _CHECKED_ON_CPUS = torch.nn.functional.one_hot  # whose codes are looked at on a CPU alone, if it is told their number
 _SYNCHRONISES = "called a synchronizing CUDA operation"
@@ -97,7 +98,7 @@ class _Operations(TorchDispatchMode):
     def __torch_dispatch__(
         self, func: Any, types: Sequence[type], args: tuple[Any, ...] = (), kwargs: Mapping[str, Any] | None = None
     ) -> Any:
-        if not self._found.pauses and would_wait(func, args):
+        if not self._found.pauses and would_wait(func, args, kwargs or {}):
             self._found.add(str(func))
         return func(*args, **(kwargs or {}))
 
@@ -114,8 +115,9 @@ class _ReadsOfMemory(TorchFunctionMode):
         args: tuple[Any, ...] = (),
         kwargs: Mapping[str, Any] | None = None,
     ) -> Any:
+        picks = func in _PICKS and any(isinstance(each, list) for each in _parts(args[1]))
         makes = func in _MAKERS and (kwargs or {}).get("device") is not None and not isinstance(args[0], Tensor)
-        if makes or func in _READS:
+        if makes or picks or func in _READS:
             self._found.add(func.__name__)
         self._found.pauses = func is _CHECKED_ON_CPUS and (len(args) > 1 or "num_classes" in (kwargs or {}))
         try:
@@ -124,20 +126,23 @@ class _ReadsOfMemory(TorchFunctionMode):
             self._found.pauses = False
 
 
-def would_wait(func: Any, args: tuple[Any, ...]) -> bool:
+def would_wait(func: Any, args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> bool:
     """Return whether an operation of the dispatcher waits for a GPU when its tensors live there."""
     name = func.overloadpacket.__name__
     if name == "repeat_interleave":
-        return args[-1] is None or isinstance(args[-1], Tensor)  # the size of the output was not given
+        return kwargs.get("output_size") is None
     if name not in _MASKS:
         return name in _ALWAYS
     by_mask = any(isinstance(each, Tensor) and each.dtype in (torch.bool, torch.uint8) for each in args[1])
     return by_mask and not (name != "index" and args[2].numel() == 1)  # one number is filled in, without a wait
 
 
+def _parts(index: Any) -> tuple[Any, ...]:
+    return index if isinstance(index, tuple) else (index,)
+
+
 def _place() -> str:
     """Return the innermost line of this package that is not of this file, or the innermost of all."""
-    frames = traceback.extract_stack()
-    ours = [each for each in frames if each.filename.startswith(_PACKAGE) and each.filename != __file__]
-    found = (ours or frames)[-1]
+    frames = [each for each in traceback.extract_stack() if each.filename != __file__]
+    found = next((each for each in reversed(frames) if each.filename.startswith(_PACKAGE)), frames[-1])
     return f"{Path(found.filename).name}:{found.lineno}"

@@ -5,7 +5,7 @@ by masks, and the pool is filled once in many steps: one wait for all of them.
 """
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 import torch
@@ -31,7 +31,7 @@ class ResetPool:
 
     Args:
         make: Returns the starts of seeds and episodes, int64 [n] each, and their faults, ``World.start``.
-        check: Raises if faults, bool [2], tell of any; they are of starts of the filling before.
+        check: Raises if faults, two of them, tell of any; they are of starts of the filling before.
         steps: Steps between two fillings.
         ready: Starts of each world after a filling.
     """
@@ -39,7 +39,7 @@ class ResetPool:
     def __init__(
         self,
         make: Callable[[Tensor, Tensor], tuple[Start, Tensor]],
-        check: Callable[[Tensor], None],
+        check: Callable[[Sequence[bool]], None],
         steps: int = STEPS,
         ready: int = READY,
     ) -> None:
@@ -79,14 +79,15 @@ class ResetPool:
         """Make the starts that are missing; it reads from the device once which ones."""
         if self._starts is None:
             self._begin(seeds, episodes)
-        told = torch.cat((self._until - episodes, self._faults.to(torch.int64), self._waited[None])).cpu()
-        self._check(told[-3:-1])
-        if int(told[-1]):
-            log.info("%d times an ended world waited for its next start: its episodes are very short", int(told[-1]))
+        told = torch.cat((self._until - episodes, self._faults.to(torch.int64), self._waited[None])).tolist()
+        *ready, is_dark, is_crowded, waited = told
+        self._check((is_dark, is_crowded))
+        if waited:
+            log.info("%d times an ended world waited for its next start: its episodes are very short", waited)
         for offset in range(self._ready):
-            index = (told[:-3] <= offset).nonzero()[:, 0]
-            if len(index):
-                self._put(index.to(seeds.device, non_blocking=True), offset, seeds, episodes)
+            index = [world for world, count in enumerate(ready) if count <= offset]
+            if index:
+                self._put(torch.tensor(index).to(seeds.device, non_blocking=True), offset, seeds, episodes)
         self._until = episodes + self._ready
         self._since, self._waited = 0, torch.zeros_like(self._waited)
 

@@ -264,7 +264,7 @@ class WildfireEnv(EnvBase):
     def _sound_start(self, seeds: Tensor, episodes: Tensor) -> Start:
         """Return starts of seeds and episodes, and raise if any is faulty."""
         start, faults = self._start(seeds, episodes)
-        self.world.check(faults)
+        self.world.check(faults.tolist())
         return start
 
     def _masked_reset(self, pool: ResetPool, ended: Tensor, seen: TensorDictBase) -> TensorDictBase:

@@ -29,6 +29,7 @@ from warp_torchrl.runs import disk, former
 from warp_torchrl.runs.logging import MetricsFile, Tracker
 from warp_torchrl.runs.saving import SaveClock, passes
 from warp_torchrl.runs.transfer import learned_parameters
+from warp_torchrl.training.finite import FiniteSteps, NumericalFailure
 from warp_torchrl.training.progress import TRAIN_COLUMNS, batch_size_notice, episode_columns, line
 from warp_torchrl.training.reward_scale import RewardScale
 from warp_torchrl.training.signals import DeferredSignals, Stopped
@@ -36,10 +37,6 @@ from warp_torchrl.world.fast.compile import compile_function
 
 log = logging.getLogger("warp_torchrl")
 _SECONDS_BETWEEN_LINES = 15.0
-
-
-class NumericalFailure(Exception):  # noqa: N818
-    """A reward, a loss or a gradient is not finite; the weights were not touched."""
 
 
 class Training:
@@ -63,6 +60,7 @@ class Training:
         if run_config.compile:
             learner.terms = compile_function(learner.terms)
         self.learner: Learner = run_config.imitation.kickstart(learner, self.env)
+        self._steps = FiniteSteps(self.learner.optimizer)
         self.reward_scale = RewardScale(run_config.reward.gamma) if run_config.reward.normalise else None
         self.collection = run_config.collector.open(self.env, self.learner, run_config.make_training_env, first)
         self.frames = 0
@@ -168,8 +166,8 @@ class Training:
     def _learn(self, batch: TensorDictBase) -> dict[str, float | None]:
         """Learn from one batch [B, T] and return its row of ``metrics.csv``."""
         learner = self.learner
-        row = episode_columns(batch)
-        if parallel.sum_((~batch["next", *REWARD].isfinite()).sum()):
+        row, unsound = episode_columns(batch)
+        if unsound:
             raise NumericalFailure(f"after {self.frames} frames a reward is not finite; the last checkpoint stands")
         if self.reward_scale is not None:
             self.reward_scale(batch)
@@ -180,10 +178,10 @@ class Training:
             for name, value in self._update(sample).items():
                 sums[name] = sums.get(name, 0.0) + value
             updates += 1
-        self.frames += self.frames_per_batch
         if updates:
             parallel.mean_(sums[name] for name in sorted(sums))
-        means = {name: float(value) / updates for name, value in sums.items()}
+        means = {name: value / updates for name, value in self._steps.read(sums, self.frames).items()}
+        self.frames += self.frames_per_batch
         row["train/loss"] = sum(means[key] for key in learner.loss_keys) if updates else None
         row |= dict.fromkeys(TRAIN_COLUMNS)
         row |= {column: means.get(key) for key, column in learner.columns.items()} | self._scheduled
@@ -212,7 +210,7 @@ class Training:
         )  # fmt: skip
 
     def _update(self, sample: TensorDictBase) -> dict[str, Tensor]:
-        """Take one optimiser step and return the loss terms; only the check for finite values reads from the device."""
+        """Take one optimiser step and return the loss terms."""
         learner = self.learner
         terms = learner.terms(sample)
         loss = sum(terms[key] for key in learner.loss_keys)
@@ -220,12 +218,7 @@ class Training:
         trained = [each.grad for each in learner.loss.parameters() if each.grad is not None]
         parallel.mean_([*trained, total := loss.detach().clone()])
         norm = torch.nn.utils.clip_grad_norm_(learner.loss.parameters(), learner.max_grad_norm)
-        if not torch.isfinite(norm + total):  # one synchronisation for both
-            raise NumericalFailure(
-                f"after {self.frames} frames the loss, {float(total):g}, or its gradient, of norm "
-                f"{float(norm):g}, is not finite; the weights were left as they were, and the last checkpoint stands"
-            )
-        learner.optimizer.step()
+        self._steps.take(total, norm, self.frames)
         learner.optimizer.zero_grad()
         learner.after_step(sample)
         wanted = {*learner.loss_keys, *learner.columns} & set(terms.keys())

@@ -7,6 +7,7 @@ from tensordict import TensorDictBase
 
 from warp_torchrl import parallel
 from warp_torchrl.env.specs import EPISODE_METRICS
+from warp_torchrl.models import REWARD
 
 TRAIN_COLUMNS = (
     "train/policy_gradient_loss",
@@ -21,15 +22,20 @@ TRAIN_COLUMNS = (
 """Columns of ``metrics.csv`` that every run has; empty where an algorithm has no value for them."""
 
 
-def episode_columns(batch: TensorDictBase) -> dict[str, float | None]:
-    """Return the mean metrics of the episodes that ended in a batch [B, T] of all processes; None where none ended."""
+def episode_columns(batch: TensorDictBase) -> tuple[dict[str, float | None], int]:
+    """Return what a batch [B, T] of all processes holds, read from the device at once.
+
+    Returns:
+        The mean metrics of the episodes that ended, None where none ended; and how many rewards are not finite.
+    """
     done = batch["next", "done"][..., 0]
     info = batch["next", "info"]
-    sums = [done.sum(), *(torch.where(done, info[name][..., 0], 0.0).sum() for name in EPISODE_METRICS)]
-    count, *totals = parallel.sum_(torch.stack([each.double() for each in sums])).tolist()
+    unsound = (~batch["next", *REWARD].isfinite()).sum()
+    sums = [unsound, done.sum(), *(torch.where(done, info[name][..., 0], 0.0).sum() for name in EPISODE_METRICS)]
+    unsound_rewards, count, *totals = parallel.sum_(torch.stack([each.double() for each in sums])).tolist()
     means = {name: total / count if count else None for name, total in zip(EPISODE_METRICS, totals, strict=True)}
     row = {"rollout/ep_rew_mean": means.pop("episode_reward"), "rollout/ep_len_mean": means.pop("episode_length")}
-    return row | {f"world/{name}": value for name, value in means.items()}
+    return row | {f"world/{name}": value for name, value in means.items()}, int(unsound_rewards)
 
 
 def line(row: Mapping[str, float | None], total: int) -> str:

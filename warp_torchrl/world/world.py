@@ -1,6 +1,7 @@
 """The world: assembles landscape, wind, fire and team, and is the only one that draws for them."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -107,7 +108,7 @@ class World:
             ValueError: If a landscape has no tree that can burn, or too little dry ground for the team.
         """
         state, faults = self.start(seed, episode)
-        self.check(faults)
+        self.check(faults.tolist())
         return state
 
     def start(self, seed: Tensor, episode: Tensor) -> tuple[WorldState, Tensor]:
@@ -119,20 +120,20 @@ class World:
 
         Returns:
             The worlds, and whether any has no tree that can burn, or too little dry ground for the team, bool [2]:
-            ``check`` reads it.
+            what ``check`` takes, once it has been read.
         """
         at_once = max(1, _CELLS_AT_ONCE["cuda" if seed.is_cuda else "cpu"] // math.prod(self.size))
         parts = [self._start(*part) for part in zip(seed.split(at_once), episode.split(at_once), strict=True)]
         states, faults = zip(*parts, strict=True)
         return states[0] if len(parts) == 1 else concatenated(list(states)), torch.stack(faults).any(dim=0)
 
-    def check(self, faults: Tensor) -> None:
-        """Check what ``start`` found.
+    def check(self, faults: Sequence[bool]) -> None:
+        """Check the faults that ``start`` found.
 
         Raises:
             ValueError: If a landscape has no tree that can burn, or too little dry ground for the team.
         """
-        is_dark, is_crowded = faults.tolist()
+        is_dark, is_crowded = faults
         if is_dark:
             raise ValueError(self.lighting.why_dark)
         if is_crowded:
