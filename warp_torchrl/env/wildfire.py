@@ -11,10 +11,11 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from warp_torchrl.device import reads_freely
+from warp_torchrl.env.recorded import RecordedStep
 from warp_torchrl.env.render import render
 from warp_torchrl.env.reset_cache import ResetCache, Start
 from warp_torchrl.env.reset_pool import ResetPool
-from warp_torchrl.env.scene import Observations, Scene
+from warp_torchrl.env.scene import Observations, Scene, Step
 from warp_torchrl.env.specs import make_specs
 from warp_torchrl.observation import Observation, Surroundings, state_names, state_symmetry
 from warp_torchrl.reward import Efficiency, Reward
@@ -44,6 +45,7 @@ class WildfireEnv(EnvBase):
         validate: Check on every device that actions are in range, which costs a synchronisation on CUDA; by default
             they are checked on the CPU only.
         fuse: Compile the step with ``torch.compile``; the first steps are then slow.
+        graph: Record the step as one CUDA graph. World and observation must then stay as they are.
 
     Raises:
         ValueError: If ``n_worlds`` is not positive, ``seeds`` are not as many, a seed is out of range, or there is no
@@ -64,6 +66,7 @@ class WildfireEnv(EnvBase):
         device: torch.device | str = "cpu",
         validate: bool | None = None,
         fuse: bool = False,
+        graph: bool = False,
     ) -> None:
         if n_worlds < 1:
             raise ValueError(f"n_worlds must be at least 1, got {n_worlds}")
@@ -75,6 +78,7 @@ class WildfireEnv(EnvBase):
         if fuse:
             check_compiler(self.device)
         self._fuses = fuse and can_fuse(self.world.fire)
+        self._recorded = RecordedStep(self._scene) if graph else None
         names, roles = self.world.team.agent_names, self.world.team.agent_roles
         self.agent_names, self.action_names = names, self.world.team.action_names
         self.role_names, self.state_names = self.world.team.role_names, state_names(self.world.team)
@@ -285,7 +289,7 @@ class WildfireEnv(EnvBase):
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         action = self._checked(tensordict.get(("agents", "action"), None))
-        transition, observed, reward = self._scene.step(self.world_state, self.tree_counts, action)
+        transition, observed, reward = self._advance(self.world_state, self.tree_counts, action)
         self._worlds = transition.after, transition.counts_after
         self._episode_reward = self._episode_reward + reward.mean(1)[:, 0]
         out = self._pack(transition.after, observed, self._episode_reward)
@@ -293,6 +297,13 @@ class WildfireEnv(EnvBase):
             self.watcher(transition)
         out.set(("agents", "reward"), reward)
         return out
+
+    def _advance(self, before: WorldState, counts: TreeCounts, action: Tensor) -> Step:
+        if self._recorded is None:
+            return self._scene.step(before, counts, action)
+        if self._recorded.scene.reward is not self.reward_function:
+            self._recorded = RecordedStep(self._scene)
+        return self._recorded(before, counts, action)
 
     @property
     def _scene(self) -> Scene:

@@ -45,9 +45,11 @@ class FiniteSteps:
         self._optimizer.step()
 
     def _refuse_unless_finite(self, loss: Tensor, norm: Tensor) -> None:
+        if self._first is None:
+            self._first = torch.zeros(3, device=loss.device)
+            self._optimizer.found_inf = self._first[0]  # type: ignore[attr-defined]
         now = torch.stack(((~torch.isfinite(norm + loss)).to(norm.dtype), loss, norm))
-        self._first = now if self._first is None else torch.where(self._first[0] > 0.0, self._first, now)
-        self._optimizer.found_inf = self._first[0].to(torch.float32)  # type: ignore[attr-defined]
+        self._first.copy_(torch.where(self._first[0] > 0.0, self._first, now))  # in its place: it may be recorded
 
     def read(self, sums: Mapping[str, Tensor], frames: int) -> dict[str, float]:
         """Return what the steps of a batch came to, read from the device at once.
@@ -59,10 +61,12 @@ class FiniteSteps:
         Raises:
             NumericalFailure: If a step was refused.
         """
-        first, self._first = self._first, None
-        parts = [each.double() for each in sums.values()] + ([] if first is None else list(first.double()))
+        first = [] if self._first is None else list(self._first.double())
+        parts = [each.double() for each in sums.values()] + first
         told = torch.stack(parts).tolist() if parts else []
-        if first is not None and told[-3]:
+        if self._first is not None:
+            self._first.zero_()
+        if first and told[-3]:
             raise _failure(frames, *told[-2:])
         return dict(zip(sums, told))
 

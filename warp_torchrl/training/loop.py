@@ -31,6 +31,7 @@ from warp_torchrl.runs.saving import SaveClock, passes
 from warp_torchrl.runs.transfer import learned_parameters
 from warp_torchrl.training.finite import FiniteSteps, NumericalFailure
 from warp_torchrl.training.progress import TRAIN_COLUMNS, batch_size_notice, episode_columns, line
+from warp_torchrl.training.recorded import RecordedUpdate
 from warp_torchrl.training.reward_scale import RewardScale
 from warp_torchrl.training.signals import DeferredSignals, Stopped
 from warp_torchrl.world.fast.compile import compile_function
@@ -61,6 +62,8 @@ class Training:
             learner.terms = compile_function(learner.terms)
         self.learner: Learner = run_config.imitation.kickstart(learner, self.env)
         self._steps = FiniteSteps(self.learner.optimizer)
+        if run_config.graph:
+            self._update = RecordedUpdate(self._update, self.learner.optimizer)  # type: ignore[method-assign]
         self.reward_scale = RewardScale(run_config.reward.gamma) if run_config.reward.normalise else None
         self.collection = run_config.collector.open(self.env, self.learner, run_config.make_training_env, first)
         self.frames = 0
