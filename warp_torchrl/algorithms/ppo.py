@@ -20,7 +20,7 @@ class SharedValueNorm(PopArtValueNorm):
     """TorchRL's running statistics of value targets, over those of all processes."""
 
     def update(self, value_target: Tensor) -> None:
-        """Add value targets, float32 [..., 1], as many in every process: means of equal parts are those of the whole."""
+        """Add value targets, float32 [..., 1], as many in every process: the mean of equal parts is that of all."""
         super().update(value_target)
         parallel.mean_((self.running_mean, self.running_mean_sq))
 

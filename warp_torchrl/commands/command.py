@@ -16,7 +16,7 @@ from warp_torchrl import parallel
 from warp_torchrl.commands.allocation import keep_freed_memory
 from warp_torchrl.commands.checks import map_fires, new_total, of_worlds, without_checkpoint
 from warp_torchrl.commands.failure import fail
-from warp_torchrl.commands.following import folder_of_its_own, follow
+from warp_torchrl.commands.following import FOLLOWING, folder_of_its_own, follow
 from warp_torchrl.commands.sweep import SweepSummary, remove_failure, save_failure, summarise_unfinished
 from warp_torchrl.config.compose import (
     HYDRA_ERRORS,
@@ -86,7 +86,7 @@ def _start(folder: Path, config: DictConfig) -> None:
     config.processes = run_config(plain(config)).n_processes()
     disk.replace(folder / "config.yaml", OmegaConf.to_yaml(config, resolve=True))
     record, plan = SavedConfig(choices=_choices(config), values=_values(config)), run_config(plain(config))
-    with parallel.processes(plan.n_processes(), plain(config), follow):
+    with parallel.processes(plan.n_processes(), plain(config), FOLLOWING):
         training = Training(plan, record, folder)
         if config.start_from is not None:
             training.start_from(_newest(find_policy(config.start_from)))
@@ -100,7 +100,7 @@ def _resume(folder: Path, total_frames: Any) -> None:
     if run.is_finished:
         log.info("%s is finished; total_frames=MORE trains it longer", folder)
         return
-    with parallel.processes(run.run_config.n_processes(), run.values, follow):
+    with parallel.processes(run.run_config.n_processes(), run.values, FOLLOWING):
         training = Training(run.run_config, run.record, folder)
         training.load_state_dict(run.found.training())
         log.info("resumed %s at %d frames", run.found.path, training.frames)

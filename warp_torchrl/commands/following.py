@@ -3,6 +3,7 @@
 import logging
 import os
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,6 +18,9 @@ from warp_torchrl.config.compose import SavedConfig
 from warp_torchrl.config.run_config import run_config
 from warp_torchrl.training.loop import NumericalFailure, Training
 from warp_torchrl.training.signals import Stopped
+
+FOLLOWING = "warp_torchrl.commands.following"
+"""The module that another process runs."""
 
 
 def follow(values: dict[str, Any]) -> None:
@@ -46,3 +50,7 @@ def folder_of_its_own() -> Iterator[list[str]]:
         yield [f"hydra.run.dir={folder}", "hydra/job_logging=disabled", "hydra/hydra_logging=disabled"]
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+if __name__ == "__main__":
+    parallel.join(sys.argv[1:], follow)

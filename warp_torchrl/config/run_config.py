@@ -168,6 +168,15 @@ class RunConfig:
         if count > 1 and isinstance(self.collector, MultiProcess):
             raise ValueError(f"processes must be 1 where workers collect, got {count}: choose collector=direct")
 
+    def _check_machine(self, count: int) -> None:
+        device = torch.device(self.device)
+        started = parallel.automatic(self.n_worlds, device)
+        if parallel.is_torchrun() and count != started:
+            raise ValueError(f"processes must be auto under torchrun, which has started {started}, got {count}")
+        gpus = torch.cuda.device_count()
+        if device.type == "cuda" and not parallel.is_torchrun() and count > gpus:
+            raise ValueError(f"processes must be at most the {gpus} CUDA devices of this machine, got {count}")
+
     def n_processes(self) -> int:
         """Return how many processes learn together."""
         if self.processes != "auto":
@@ -183,13 +192,9 @@ class RunConfig:
             ConfigError: If ``compile`` is asked for where there is no compiler, or the processes are not as many as
                 ``torchrun`` has started, or more than there are GPUs; or if ``graph`` is asked for where it cannot be.
         """
-        count, started = self.n_processes(), parallel.automatic(self.n_worlds, torch.device(self.device))
-        if parallel.is_torchrun() and count != started:
-            raise ConfigError(f"processes must be auto under torchrun, which has started {started}, got {count}")
-        if torch.device(self.device).type == "cuda" and not parallel.is_torchrun() and count > torch.cuda.device_count():
-            raise ConfigError(f"processes must be at most the {torch.cuda.device_count()} CUDA devices, got {count}")
         try:
-            self._check_shares(count)
+            self._check_machine(self.n_processes())
+            self._check_shares(self.n_processes())
         except ValueError as error:
             raise ConfigError(str(error)) from None
         if self.graph:

@@ -1,7 +1,7 @@
 """Processes that learn together: how they start, and what they tell each other."""
 
 from warp_torchrl.parallel.group import WorkerDied, gather, mean_, rank, share, size, standardised, sum_
-from warp_torchrl.parallel.launch import automatic, follow, is_torchrun, processes, torchrun_rank
+from warp_torchrl.parallel.launch import automatic, follow, is_torchrun, join, processes, torchrun_rank
 
 __all__ = [
     "WorkerDied",
@@ -9,6 +9,7 @@ __all__ = [
     "follow",
     "gather",
     "is_torchrun",
+    "join",
     "mean_",
     "processes",
     "rank",

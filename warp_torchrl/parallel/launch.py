@@ -1,26 +1,28 @@
 """The start and the end of the processes that learn together, on this machine or under ``torchrun``."""
 
-import multiprocessing
 import os
+import signal
+import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import timedelta
-from multiprocessing.context import SpawnProcess
 from typing import Any
 
 import torch
 from torch import distributed as dist
+from torch.distributed import TCPStore  # type: ignore[attr-defined]  # torch does not say that it exports it
 
 from warp_torchrl.parallel import group
 from warp_torchrl.parallel.group import WorkerDied
 
 Work = Callable[[dict[str, Any]], None]
-"""What processes other than the first do; called with the run's configuration. A function of a module."""
+"""What a process does that is not the first; called with the run's configuration."""
 FEWEST_WORLDS = 32
 """Worlds that ``auto`` gives a process at least: with fewer, a step's operations cost the same as with these."""
 _WAIT = timedelta(days=1)  # a process that has ended is noticed at once; others may wait for an evaluation
 _SECONDS_TO_END = 10.0
+_SECONDS_TO_BREAK = 2.0  # in which a process whose connection has broken off may still be ending
 _HOST = "127.0.0.1"
 
 
@@ -48,13 +50,13 @@ def automatic(n_worlds: int, device: torch.device) -> int:
 
 
 @contextmanager
-def processes(count: int, values: Mapping[str, Any], work: Work) -> Iterator[None]:
+def processes(count: int, values: Mapping[str, Any], module: str) -> Iterator[None]:
     """Run a block as process 0 of so many; the others do their work beside it, and end with it.
 
     Args:
         count: Processes in all.
         values: The configuration that the others are told.
-        work: What they do.
+        module: What they run: it calls ``follow``.
 
     Raises:
         WorkerDied: If one of the others ends before the block does.
@@ -62,7 +64,7 @@ def processes(count: int, values: Mapping[str, Any], work: Work) -> Iterator[Non
     if count == 1:
         yield
         return
-    threads, others = torch.get_num_threads(), _start(count, work)
+    threads, others = torch.get_num_threads(), _start(count, module)
     try:
         group.share(dict(values))
         yield
@@ -74,30 +76,43 @@ def processes(count: int, values: Mapping[str, Any], work: Work) -> Iterator[Non
         _end(others)
 
 
-def _start(count: int, work: Work) -> list[SpawnProcess]:
+def _start(count: int, module: str) -> list[subprocess.Popen[bytes]]:
     """Start the other processes, join the group and share the threads."""
     if is_torchrun():
         dist.init_process_group(_backend(), timeout=_WAIT)
         return []
-    store = dist.TCPStore(_HOST, 0, count, is_master=True, wait_for_workers=False)
+    store = TCPStore(_HOST, 0, count, is_master=True, wait_for_workers=False)
     threads = max(1, torch.get_num_threads() // count)
-    context = multiprocessing.get_context("spawn")
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(path for path in sys.path if path),
+        "PYTHONWARNINGS": "ignore:resource_tracker",  # of what a killed process leaves: the last line is the error's
+    }
     others = [
-        context.Process(target=_other, args=(rank, count, store.port, threads, work), daemon=True)
+        subprocess.Popen([sys.executable, "-m", module, *map(str, (rank, count, store.port, threads))], env=environment)
         for rank in range(1, count)
     ]
-    for each in others:
-        each.start()
     torch.set_num_threads(threads)
     dist.init_process_group(_backend(), store=store, rank=0, world_size=count, timeout=_WAIT)
     return others
 
 
-def _other(rank: int, count: int, port: int, threads: int, work: Work) -> None:
-    """Run in a process that ``_start`` has started."""
+def join(arguments: Sequence[str], work: Work) -> None:
+    """Run in a process that ``processes`` has started.
+
+    Args:
+        arguments: Its number, that of all processes, the first one's port, and the threads that it may use.
+        work: What it does.
+    """
+    for each in (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1):  # a terminal sends them to all: the first one decides
+        signal.signal(each, signal.SIG_IGN)
+    rank, count, port, threads = map(int, arguments)
     torch.set_num_threads(threads)
-    store = dist.TCPStore(_HOST, port, count, is_master=False)
-    dist.init_process_group(_backend(), store=store, rank=rank, world_size=count, timeout=_WAIT)
+    try:
+        store = TCPStore(_HOST, port, count, is_master=False)
+        dist.init_process_group(_backend(), store=store, rank=rank, world_size=count, timeout=_WAIT)
+    except RuntimeError:  # the first process has ended
+        sys.exit(1)
     _follow(work)
 
 
@@ -120,18 +135,27 @@ def _backend() -> str:
     return "cpu:gloo,cuda:nccl" if torch.cuda.is_available() else "gloo"
 
 
-def _ended(others: list[SpawnProcess]) -> str:
+def _ended(others: Sequence[subprocess.Popen[bytes]]) -> str:
     """Return one line that names the processes that have ended, and how; empty if none has."""
-    for each in others:
-        each.join(1.0)  # what has broken off may still be ending
-    codes = {rank: each.exitcode for rank, each in enumerate(others, start=1) if each.exitcode}
-    told = (f"process {rank} by {'signal ' if code < 0 else 'exit code '}{abs(code)}" for rank, code in codes.items())
-    return f"a process of the run has ended: {', '.join(told)}" if codes else ""
+    codes = {rank: _code_of(each, _SECONDS_TO_BREAK) for rank, each in enumerate(others, start=1)}
+    told = [f"process {rank} by {_how(code)}" for rank, code in codes.items() if code]
+    return f"a process of the run has ended: {', '.join(told)}" if told else ""
 
 
-def _end(others: list[SpawnProcess]) -> None:
+def _how(code: int) -> str:
+    return f"signal {-code}" if code < 0 else f"exit code {code}"
+
+
+def _code_of(process: subprocess.Popen[bytes], seconds: float) -> int | None:
+    """Return a process's exit code; None if it has not ended in so many seconds."""
+    try:
+        return process.wait(seconds)
+    except subprocess.TimeoutExpired:
+        return None
+
+
+def _end(others: Sequence[subprocess.Popen[bytes]]) -> None:
     for each in others:
-        each.join(_SECONDS_TO_END)
-        if each.is_alive():
+        if _code_of(each, _SECONDS_TO_END) is None:
             each.kill()
-            each.join()
+            each.wait()

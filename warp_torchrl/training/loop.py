@@ -5,7 +5,8 @@ Every process of a run goes through it with its share of the worlds; the first o
 
 import logging
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -90,7 +91,8 @@ class Training:
             tracker = self.run_config.logger.open(self.run) if self.is_first else None
             try:
                 self._join()
-                self._train(signals, tracker)
+                with self._bar() as bar:
+                    self._train(signals, tracker, bar)
                 if self.is_first:
                     self.mode = self.mode or self._better_mode()
                 self.save()
@@ -107,29 +109,31 @@ class Training:
             if signals.received:
                 raise Stopped(signals.received, self.run)
 
-    def _train(self, signals: DeferredSignals, tracker: Tracker | None) -> None:
+    def _bar(self) -> AbstractContextManager[tqdm | None]:
+        """Return the progress bar of the first process: it has a semaphore, which a killed process would leave."""
+        total = self.run_config.total_frames
+        if not self.is_first:
+            return nullcontext()
+        return tqdm(total=total, initial=self.frames, unit="frame", disable=None, dynamic_ncols=True)
+
+    def _train(self, signals: DeferredSignals, tracker: Tracker | None, bar: tqdm | None) -> None:
         total = self.run_config.total_frames
         notice = batch_size_notice(total, self.run_config.n_worlds, self.run_config.collector.steps)
         if notice is not None and self.frames < total and self.is_first:
             log.log(logging.WARNING if total < self.frames_per_batch else logging.INFO, notice)
-        disable = None if self.is_first else True  # None: where nobody watches
-        bar = tqdm(total=total, initial=self.frames, unit="frame", disable=disable, dynamic_ncols=True)
         self._began = time.perf_counter() - self.seconds
-        try:
-            for batch in self.collection if self.frames < total else ():
-                row = self._learn(batch)
-                if tracker is not None:
-                    self._report(row, tracker, bar)
-                if self.frames >= total:
-                    break
-                due = signals.received or self._is_regular(self.frames) or self.clock.is_due()
-                saves, received = parallel.share((bool(due), signals.received))
-                if saves:
-                    self.save()
-                if received:
-                    raise Stopped(received, self.run)
-        finally:
-            bar.close()
+        for batch in self.collection if self.frames < total else ():
+            row = self._learn(batch)
+            if tracker is not None and bar is not None:
+                self._report(row, tracker, bar)
+            if self.frames >= total:
+                break
+            due = signals.received or self._is_regular(self.frames) or self.clock.is_due()
+            saves, received = parallel.share((bool(due), signals.received))
+            if saves:
+                self.save()
+            if received:
+                raise Stopped(received, self.run)
 
     _last_seconds = _next_line = 0.0
 
