@@ -37,7 +37,8 @@ def test_recorded_worlds_are_those_of_steps(overrides):
         for _ in range(12):
             action = eager.rand_action(one)["agents", "action"]
             one, other = (
-                env.step(shown.set(("agents", "action"), action))["next"] for env, shown in ((eager, one), (recorded, other))
+                env.step(shown.set(("agents", "action"), action))["next"]
+                for env, shown in ((eager, one), (recorded, other))
             )
             assert (one == other).all()
     for name, leaf in eager.world_state.leaves().items():
@@ -55,7 +56,9 @@ def test_no_size_in_a_step_depends_on_a_result(overrides, monkeypatch):
         step = RecordedStep(env._scene)
         step._like = env.world_state, env.tree_counts
         given = [*env.world_state.leaves().values(), *env.tree_counts.leaves().values(), shown["agents", "action"]]
-        traced = make_fx(lambda *tensors: step._flat([*tensors]), tracing_mode="fake", _allow_non_fake_inputs=True)(*given)
+        traced = make_fx(lambda *tensors: step._flat([*tensors]), tracing_mode="fake", _allow_non_fake_inputs=True)(
+            *given
+        )
     assert len(traced.graph.nodes) > 300
 
 

@@ -59,7 +59,8 @@ def counted_waits(device: torch.device | str) -> Iterator[Waits]:
     """Count the waits of what runs inside, for a GPU, or that there would be for one in place of the CPU.
 
     Args:
-        device: Where the worlds live. What a GPU would compute must run inside ``warp_torchrl.device.unread()``, if that is a CPU.
+        device: Where the worlds live. If that is a CPU, what a GPU would compute must run inside
+            ``warp_torchrl.device.unread()``.
     """
     found = Waits()
     if torch.device(device).type != "cpu":

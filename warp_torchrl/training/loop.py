@@ -22,7 +22,7 @@ from warp_torchrl.config.compose import SavedConfig
 from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.config.seeds import WORLDS, first_world_seed
 from warp_torchrl.evaluation.play import play
-from warp_torchrl.models import REWARD, signature
+from warp_torchrl.models import signature
 from warp_torchrl.parallel import WorkerDied
 from warp_torchrl.policy import MODES
 from warp_torchrl.runs import checkpoint as checkpoints
