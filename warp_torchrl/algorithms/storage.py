@@ -32,12 +32,11 @@ class RowStorage(LazyTensorStorage):
 
 
 class BatchStorage(RowStorage):
-    """Storage of one batch, which fills it: each ``set`` of so many rows replaces them all, in order, cursor unread."""
+    """Storage of one batch: each ``set`` puts rows from the first on, in order, and leaves the cursor unread."""
 
     def set(self, cursor: int | Sequence[int] | slice | Tensor, data: Any, *, set_cursor: bool = True) -> None:
-        """Put a batch in the place of the former one; fewer rows at ``cursor``."""
-        whole = isinstance(cursor, Tensor) and len(cursor) == self.max_size
-        super().set(slice(0, self.max_size) if whole else cursor, data, set_cursor=set_cursor)
+        """Put a batch in the place of the former one."""
+        super().set(slice(0, len(data)), data, set_cursor=set_cursor)
 
 
 def _rows(data: TensorDictBase, index: Tensor) -> TensorDict:

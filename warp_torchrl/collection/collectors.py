@@ -88,6 +88,14 @@ class InProcess:
         """Return how many segments a batch has at progress in 0..1."""
         return 1 if progress < self.grows_at else self.steps // self.segment
 
+    def end(self, total: int, n_worlds: int, grows: bool) -> int:
+        """Return the frames after which a training of at least ``total`` frames ends, in whole batches."""
+        small, large = n_worlds * self.segment, n_worlds * self.steps
+        grown = small * -(-int(self.grows_at * total) // small) if grows else 0
+        if grown >= total:
+            return small * -(-total // small)
+        return grown + large * -(-(total - grown) // large)
+
     def check_worlds(self, n_worlds: int) -> None:
         """Accept any number of worlds."""
 

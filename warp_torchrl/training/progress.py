@@ -57,18 +57,20 @@ def line(row: Mapping[str, float | None], total: int) -> str:
     )
 
 
-def batch_size_notice(total: int, n_worlds: int, steps: int) -> str | None:
-    """Return a notice where ``total_frames`` is no multiple of the batch size; None where it is.
+def batch_size_notice(total: int, end: int, n_worlds: int, steps: int, key: str = "steps") -> str | None:
+    """Return a notice where ``total_frames`` is no whole number of batches; None where it is.
 
     Args:
         total: World steps of the whole training.
+        end: Those after which it ends.
         n_worlds: Worlds in a batch.
-        steps: World steps of each world in a batch.
+        steps: Steps of each world in the next batch.
+        key: Of the collector, which says so.
     """
     batch = n_worlds * steps
-    if total % batch == 0:
+    if total == end:
         return None
-    what = f"one batch is {batch} frames, n_worlds={n_worlds} x collector.steps={steps}"
+    what = f"one batch is {batch} frames, n_worlds={n_worlds} x collector.{key}={steps}"
     if total < batch:
         return f"total_frames={total} is less than one batch: {what}, and one is trained on"
-    return f"{what}: training ends at {-(-total // batch) * batch} frames, not at total_frames={total}"
+    return f"{what}: training ends at {end} frames, not at total_frames={total}"
