@@ -17,7 +17,8 @@ from warp_torchrl.config.run_config import run_config
 from warp_torchrl.models import ACTION
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
-from warp_torchrl.training.loop import NumericalFailure, Training
+from warp_torchrl.training.finite import NumericalFailure
+from warp_torchrl.training.loop import Training
 from warp_torchrl.training.signals import Stopped
 
 TINY = [

@@ -9,7 +9,7 @@ from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.run_config import run_config
 from warp_torchrl.device import unread
-from warp_torchrl.training.loop import NumericalFailure
+from warp_torchrl.training.finite import NumericalFailure
 from warp_torchrl.training.recorded import RecordedUpdate
 
 
