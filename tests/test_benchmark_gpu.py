@@ -39,11 +39,10 @@ def test_the_large_one_holds_what_was_asked():
 
 
 def test_worlds_that_differ_are_told(tmp_path, monkeypatch):
-    make = gpu.make_env
+    make, seeds = gpu.make_env, iter((1, 2))
 
-    def other(scenario, n_worlds, device, seed=[0], **options):
-        seed[0] += 1
-        return make(scenario, n_worlds=n_worlds, device=device, seed=seed[0], **options)
+    def other(scenario, **options):
+        return make(scenario, seed=next(seeds), **options)
 
     monkeypatch.setattr(gpu, "make_env", other)
     measure_gpu("cpu", tmp_path / "gpu.json", replace(ONE, worlds=(), ways=()), tell=lambda line: None)

@@ -1,4 +1,4 @@
-"""All that a GPU is asked, in under five minutes, as one JSON: speed, waits, memory, and whether its worlds are the CPU's.
+"""All that a GPU is asked, in under five minutes, as one JSON: speed, waits, memory, and equality with a CPU's worlds.
 
 Each part is written when it is done; what fails is told in its place, so that the others are not lost.
 """

@@ -45,11 +45,13 @@ class ResetPool:
     ) -> None:
         self._make, self._check, self._steps, self._ready = make, check, steps, ready
         self._starts: Start | None = None  # [ready x B]: episode e of world b at (e % ready) x B + b
-        self.clear()
+        self._until = self._waited = torch.zeros(0, dtype=torch.int64)  # episodes with a start; worlds that had none
+        self._faults = torch.zeros(2, dtype=torch.bool)
+        self._since = 0
 
     def clear(self) -> None:
         """Drop all starts: the worlds get other seeds or episodes."""
-        self._starts, self._since = None, 0
+        self._starts = None
 
     def take(self, ended: Tensor, now: Start, seeds: Tensor, episodes: Tensor) -> tuple[Start, Tensor]:
         """Return the worlds with those that have ended in their next episodes.
@@ -64,21 +66,21 @@ class ResetPool:
             The worlds, the counts of their trees and what is observed; entries that no start has are 0 where one
             began. And which worlds have started, bool [B]: all that ended, but those whose starts had run out.
         """
-        if self._starts is None or self._since >= self._steps:
-            self.fill(seeds, episodes)
+        known = self._starts
+        if known is None or self._since >= self._steps:
+            known = self.fill(seeds, episodes)
         self._since += 1
         starts = ended & (self._until > episodes)
         self._waited += (ended & ~starts).sum()
         row = episodes % self._ready * len(seeds) + torch.arange(len(seeds), device=seeds.device)
         worlds, counts, seen = now
-        new_worlds, new_counts, new_seen = self._starts
+        new_worlds, new_counts, new_seen = known
         taken = _chosen(starts, row, new_worlds, worlds), _chosen(starts, row, new_counts, counts)
         return (*taken, _seen(starts, row, new_seen, seen)), starts
 
-    def fill(self, seeds: Tensor, episodes: Tensor) -> None:
-        """Make the starts that are missing; it reads from the device once which ones."""
-        if self._starts is None:
-            self._begin(seeds, episodes)
+    def fill(self, seeds: Tensor, episodes: Tensor) -> Start:
+        """Make the starts that are missing, and return all; it reads from the device once which ones."""
+        known = self._begin(seeds, episodes) if self._starts is None else self._starts
         told = torch.cat((self._until - episodes, self._faults.to(torch.int64), self._waited[None])).tolist()
         *ready, is_dark, is_crowded, waited = told
         self._check((is_dark, is_crowded))
@@ -87,30 +89,36 @@ class ResetPool:
         for offset in range(self._ready):
             index = [world for world, count in enumerate(ready) if count <= offset]
             if index:
-                self._put(torch.tensor(index).to(seeds.device, non_blocking=True), offset, seeds, episodes)
+                some = torch.tensor(index).to(seeds.device, non_blocking=True)
+                self._put(known, some, seeds[some], episodes[some] + offset)
         self._until = episodes + self._ready
         self._since, self._waited = 0, torch.zeros_like(self._waited)
+        self._starts = known
+        return known
 
-    def _begin(self, seeds: Tensor, episodes: Tensor) -> None:
+    def _begin(self, seeds: Tensor, episodes: Tensor) -> Start:
         """Make room, and put one start of each world in all its places."""
         (worlds, counts, seen), self._faults = self._make(seeds, episodes)
         rows = torch.arange(len(seeds), device=seeds.device).repeat(self._ready)
-        self._starts = worlds[rows], counts[rows], seen[rows]
         self._until, self._waited = episodes + 1, torch.zeros((), dtype=torch.int64, device=seeds.device)
+        return worlds[rows], counts[rows], seen[rows]
 
-    def _put(self, index: Tensor, offset: int, seeds: Tensor, episodes: Tensor) -> None:
-        episode = episodes.index_select(0, index) + offset
-        made, faults = self._make(seeds.index_select(0, index), episode)
-        place = episode % self._ready * len(seeds) + index
-        for known, new in zip(self._starts or (), made, strict=True):
-            known[place] = new
+    def _put(self, known: Start, index: Tensor, seeds: Tensor, episodes: Tensor) -> None:
+        """Put the starts of some worlds, int64 [n], of these seeds and episodes in their places."""
+        made, faults = self._make(seeds, episodes)
+        place = episodes % self._ready * len(self._until) + index
+        for all_of_them, new in zip(known, made, strict=True):
+            all_of_them[place] = new
         self._faults = self._faults | faults
 
 
 def _chosen(starts: Tensor, row: Tensor, new: Batched, old: Batched) -> Batched:
     found = new.leaves()
     return old.with_leaves(
-        {name: torch.where(_beside(starts, leaf), found[name][row], leaf) for name, leaf in old.leaves().items()}
+        {
+            name: torch.where(_beside(starts, leaf), found[name].index_select(0, row), leaf)
+            for name, leaf in old.leaves().items()
+        }
     )
 
 

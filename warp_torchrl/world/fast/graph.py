@@ -19,7 +19,7 @@ class Graph:
     """A function of tensors of the same shapes at every call, recorded by a GPU.
 
     It must do the same at every call: no number that it takes from elsewhere may change, except in tensors that keep
-    their place. A CPU calls it each time, on the same tensors as a GPU would, so that all but the recording is tested.
+    their place. A CPU calls it each time, from and to the same tensors as a GPU would, so that all but the recording is tested.
 
     Args:
         function: Takes and returns lists of tensors; it may change tensors that it does not take.
@@ -54,7 +54,14 @@ class Graph:
         elif self._given[0].is_cuda:
             self._aside()
         else:
-            self._made = self._function(self._given)
+            self._again()
+
+    def _again(self) -> None:
+        """Call the function where nothing is recorded, with its results in the places of the last call's."""
+        made = self._function(self._given)
+        self._made = self._made or made
+        for known, new in zip(self._made, made, strict=True):
+            known.copy_(new)
 
     def _aside(self) -> None:
         """Call the function on a stream of its own, as torch asks for before a recording."""
