@@ -8,7 +8,7 @@ import torch
 from pettingzoo.test import parallel_api_test
 
 from warp_torchrl import make_env
-from warp_torchrl.benchmark import scaling, stable_baselines
+from warp_torchrl.benchmark import machine, scaling, stable_baselines
 from warp_torchrl.benchmark.__main__ import main
 from warp_torchrl.benchmark.numpy_env import NumpyFireEnv
 from warp_torchrl.benchmark.numpy_team import NumpyTeam
@@ -235,3 +235,19 @@ def test_ellipses_are_compared_with_what_is_told(capsys):
     assert len(table) == 30
     assert all(abs(float(row[3])) < 25.0 and abs(float(row[4])) < 25.0 for row in table)
     assert max(abs(float(row[3])) for row in table if row[0] == "1.0") < 8.0
+
+
+@pytest.mark.parametrize(
+    ("vectors", "half", "told"), [("AVX2", False, "(AVX2)"), ("AVX512", True, "(AVX512, bfloat16)")]
+)
+def test_the_header_tells_the_kind_of_processor(capsys, monkeypatch, vectors, half, told):
+    monkeypatch.setattr(machine, "vectors", lambda: vectors)
+    monkeypatch.setattr(machine, "computes_in_half", lambda device: half)
+    assert told in output(capsys, "tick", "--no-compile", *TINY).splitlines()[0]
+
+
+def test_what_is_not_compiled_is_told(capsys, monkeypatch):
+    monkeypatch.setattr("warp_torchrl.world.fast.road.vectors", lambda: "AVX2")
+    monkeypatch.setattr("warp_torchrl.world.fast.road.FEW_CELLS", 1)
+    out = output(capsys, "env", *TINY)
+    assert "\ncompiled was skipped: a step of 512 cells is faster eager with AVX2" in out

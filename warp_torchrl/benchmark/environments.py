@@ -45,7 +45,11 @@ def environment_speed(
     ways, skipped = {_EAGER: env}, []
     if compiled:
         try:
-            ways[_COMPILED] = make_env(scenario, n_worlds=n_worlds, device=device, overrides=overrides, compile=True)
+            fused = make_env(scenario, n_worlds=n_worlds, device=device, overrides=overrides, compile=True)
+            if fused.why_eager is None:
+                ways[_COMPILED] = fused
+            else:
+                skipped.append({"what": _COMPILED, "skipped": fused.why_eager})
         except ValueError as error:
             skipped.append({"what": _COMPILED, "skipped": str(error)})
     contenders, worlds = {}, {name: (n_worlds, _STEPS) for name in ways} | {_PEER: (1, _NUMPY_STEPS)}
