@@ -201,10 +201,10 @@ class Perlin:
         lake, wetland, grassland = self._levels_of(noise)
         if self.thresholds != "printed":  # in order, so that the code is the number of levels below
             reached = torch.empty_like(noise)
-            code = torch.ge(noise, lake, out=torch.empty_like(noise))
-            for above_lake in (wetland, grassland):
-                code += torch.ge(noise, above_lake, out=reached)
-            return code.to(torch.int32).to(torch.uint8)  # at once it takes twice the time
+            above = torch.ge(noise, lake, out=torch.empty_like(noise))
+            for higher in (wetland, grassland):
+                above += torch.ge(noise, higher, out=reached)
+            return above.to(torch.int32).to(torch.uint8)  # at once it takes twice the time
         cover = torch.full_like(noise, Cover.FOREST, dtype=torch.uint8)
         for code, level in ((Cover.GRASSLAND, grassland), (Cover.WETLAND, wetland), (Cover.LAKE, lake)):
             cover.masked_fill_(noise < level, code)
