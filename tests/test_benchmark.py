@@ -8,7 +8,7 @@ import torch
 from pettingzoo.test import parallel_api_test
 
 from warp_torchrl import make_env
-from warp_torchrl.benchmark import scaling, stable_baselines
+from warp_torchrl.benchmark import environments, machine, scaling, stable_baselines
 from warp_torchrl.benchmark.__main__ import main
 from warp_torchrl.benchmark.numpy_env import NumpyFireEnv
 from warp_torchrl.benchmark.numpy_team import NumpyTeam
@@ -16,6 +16,7 @@ from warp_torchrl.benchmark.numpy_terrain import new_ground
 from warp_torchrl.benchmark.shares import training_shares
 from warp_torchrl.benchmark.tasks import disagreements
 from warp_torchrl.benchmark.ticks import numpy_copy
+from warp_torchrl.benchmark.timing import mean_rate
 from warp_torchrl.config.compose import SavedConfig, compose_config, plain
 from warp_torchrl.config.run_config import run_config
 from warp_torchrl.training.loop import Training
@@ -235,3 +236,39 @@ def test_ellipses_are_compared_with_what_is_told(capsys):
     assert len(table) == 30
     assert all(abs(float(row[3])) < 25.0 and abs(float(row[4])) < 25.0 for row in table)
     assert max(abs(float(row[3])) for row in table if row[0] == "1.0") < 8.0
+
+
+@pytest.mark.parametrize(
+    ("vectors", "half", "told"), [("AVX2", False, "(AVX2)"), ("AVX512", True, "(AVX512, bfloat16)")]
+)
+def test_the_header_tells_the_kind_of_processor(capsys, monkeypatch, vectors, half, told):
+    monkeypatch.setattr(machine, "vectors", lambda: vectors)
+    monkeypatch.setattr(machine, "computes_in_half", lambda device: half)
+    assert told in output(capsys, "tick", "--no-compile", *TINY).splitlines()[0]
+
+
+def test_what_is_not_compiled_is_told(capsys, monkeypatch):
+    monkeypatch.setattr("warp_torchrl.world.fast.road.vectors", lambda: "AVX2")
+    monkeypatch.setattr("warp_torchrl.world.fast.road.FEW_CELLS", 1)
+    out = output(capsys, "env", *TINY)
+    assert "\ncompiled was skipped: a step of 512 cells is faster eager with AVX2" in out
+
+
+def test_repeats_of_the_environment_hold_whole_episodes():
+    env = make_env("skirmish", n_worlds=3, overrides=["horizon=30", "landscape.size=12"])
+    play = environments.whole_episodes(env)
+    before = env.state_dict()["episodes"]
+    assert (before >= 2).all(), "every world has started again"
+    steps = play()
+    assert (env.state_dict()["episodes"] > before).any()
+    assert steps == 3 * 30, "as many as the longest episode has"
+
+
+def test_the_peer_plays_its_episodes_to_their_end():
+    peer = NumpyFireEnv(size=(12, 12), horizon=7, seed=0)
+    assert environments._random_numpy_play(peer)(3) <= 3 * 7
+    assert not peer.agents
+
+
+def test_rates_are_means_over_all_repeats():
+    assert mean_rate("rate", [100, 100], [1.0, 4.0]) == {"rate": 40.0, "lowest": 25.0, "highest": 100.0}

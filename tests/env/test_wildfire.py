@@ -1,6 +1,7 @@
 """The environment as TorchRL and its users see it."""
 
 import copy
+import logging
 
 import pytest
 import torch
@@ -10,8 +11,10 @@ from torchrl.envs.utils import check_env_specs
 
 from tests.conftest import small_world
 from warp_torchrl import WildfireEnv, make_env
+from warp_torchrl.env import wildfire
 from warp_torchrl.observation import Local, Paper, Surroundings
 from warp_torchrl.reward import Efficiency
+from warp_torchrl.world.fast import road
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.state import Action, count_trees
 from warp_torchrl.world.team import Team
@@ -320,3 +323,15 @@ def test_another_reward_may_be_given_to_an_environment(make_small_env):
     acting = torch.full((2, env.n_agents), int(Action.EXTINGUISH))
     reward = env.step(env.full_done_spec.zero().set(("agents", "action"), acting))["next", "agents", "reward"]
     assert (reward < -900.0).all()
+
+
+def test_steps_that_are_not_compiled_are_told_in_one_line(caplog, monkeypatch):
+    monkeypatch.setattr(road, "vectors", lambda: "AVX2")
+    monkeypatch.setattr(wildfire, "check_compiler", lambda device: None)
+    with caplog.at_level(logging.INFO, logger="warp_torchrl"):
+        few, many = (WildfireEnv(n_worlds=n, fuse=True) for n in (32, 33))
+    assert few.why_eager is None
+    assert [record.getMessage() for record in caplog.records] == [f"compile: {many.why_eager}"]
+    assert "33792 cells is faster eager with AVX2" in many.why_eager
+    monkeypatch.setattr("warp_torchrl.env.scene.compiled", None)  # a compiled step would call it
+    many.rand_step(many.reset())

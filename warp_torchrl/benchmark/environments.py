@@ -5,10 +5,12 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import torch
+from torch import Tensor
 
 from warp_torchrl.api import make_env
 from warp_torchrl.benchmark.tables import entry, spread_of, table
-from warp_torchrl.benchmark.timing import spread, take_turns
+from warp_torchrl.benchmark.timing import mean_rate, take_turns
 from warp_torchrl.world.world import World
 
 if TYPE_CHECKING:
@@ -18,8 +20,8 @@ if TYPE_CHECKING:
 LARGE = ("large", ("team.n_agents=4", "steps_per_tick=1"))
 """The scenario that is measured where none is asked for, and what is changed in it."""
 _EAGER, _COMPILED, _PEER = "environment", "compiled", "numpy, PettingZoo"
-_STEPS, _NUMPY_STEPS = 25, 200  # in a repeat
-_WARM_UP = 128  # steps at most, until worlds end at different times
+_FEWEST_STEPS, _NUMPY_EPISODES = 25, 8  # in a repeat
+_LONGEST = 1024  # steps of the longest episode that is waited for
 
 
 def environment_speed(
@@ -28,6 +30,8 @@ def environment_speed(
     """Measure agent steps a second of the environment alone, and of the paper's stack for the same map and team.
 
     Random actions, observations, rewards and resets; of ours metrics, action masks and the critic's state as well.
+    A repeat holds whole episodes, so that starts count: of the peer some from end to end; of ours as many steps as the
+    longest first episode of a world has, after which worlds end at different times. Rates are means over all repeats.
 
     Args:
         scenario: One of ``conf/scenario``. The paper's stack takes the sizes of its map, team and view and its clock
@@ -45,36 +49,57 @@ def environment_speed(
     ways, skipped = {_EAGER: env}, []
     if compiled:
         try:
-            ways[_COMPILED] = make_env(scenario, n_worlds=n_worlds, device=device, overrides=overrides, compile=True)
+            fused = make_env(scenario, n_worlds=n_worlds, device=device, overrides=overrides, compile=True)
+            if fused.why_eager is None:
+                ways[_COMPILED] = fused
+            else:
+                skipped.append({"what": _COMPILED, "skipped": fused.why_eager})
         except ValueError as error:
             skipped.append({"what": _COMPILED, "skipped": str(error)})
-    contenders, worlds = {}, {name: (n_worlds, _STEPS) for name in ways} | {_PEER: (1, _NUMPY_STEPS)}
-    for name, way in ways.items():
-        play = random_play(way)
-        play(min(env.world.horizon // 2, _WARM_UP))
-        contenders[name] = partial(play, _STEPS)
+    contenders = {name: whole_episodes(way) for name, way in ways.items()}
     theirs = _random_numpy_play(paper_stack(env.world, env.observation.radius, seed=0))
-    contenders[_PEER] = partial(theirs, _NUMPY_STEPS)
+    contenders[_PEER] = partial(theirs, _NUMPY_EPISODES)
+    steps: dict[str, list[int]] = {name: [] for name in contenders}
+
+    def counted(name: str) -> None:
+        steps[name].append(contenders[name]() * env.n_agents)
+
+    seconds = take_turns({name: partial(counted, name) for name in contenders}, repeats, device)
     common = {"scenario": scenario, "agents": env.n_agents, "size": "{} x {}".format(*env.world.size)}
-    rows: list[dict[str, Any]] = []
-    for name, seconds in take_turns(contenders, repeats, device).items():
-        count, steps = worlds[name]
-        rates = [steps * count * env.n_agents / second for second in seconds]
-        rows.append({"what": name, "worlds": count, **common} | spread("agent_steps_per_second", rates))
+    rows: list[dict[str, Any]] = [
+        {"what": name, "worlds": 1 if name == _PEER else n_worlds, **common}
+        | mean_rate("agent_steps_per_second", steps[name][1:], seconds[name])  # the first call does not count
+        for name in contenders
+    ]
     peer = rows[-1]["agent_steps_per_second"]
     return [row | {"ratio": row["agent_steps_per_second"] / peer} for row in rows] + skipped
 
 
-def random_play(env: "WildfireEnv") -> Callable[[int], None]:
-    """Return a function that plays random actions for a number of steps, and resets worlds as they end."""
+def whole_episodes(env: "WildfireEnv") -> Callable[[], int]:
+    """Return a function that plays random actions for as many steps as the longest first episode of a world has.
+
+    Worlds that end start again. It returns the worlds' steps.
+    """
     now = env.reset()
 
-    def play(steps: int) -> None:
+    def play(steps: int) -> Tensor:
         nonlocal now
+        ended = torch.zeros_like(now["done"])
         for _ in range(steps):
-            _, now = env.step_and_maybe_reset(env.rand_action(now))
+            left, now = env.step_and_maybe_reset(env.rand_action(now))
+            ended |= left["next", "done"]
+        return ended
 
-    return play
+    ended, longest = play(1), 1
+    while longest < _LONGEST and not ended.all():
+        ended, longest = ended | play(1), longest + 1
+    longest = max(longest, _FEWEST_STEPS)
+
+    def play_again() -> int:
+        play(longest)
+        return longest * env.batch_size[0]
+
+    return play_again
 
 
 def paper_stack(world: World, radius: int, seed: int | None = None) -> "NumpyFireEnv":
@@ -113,14 +138,18 @@ def rate_table(rows: list[dict[str, Any]]) -> str:
     return table(columns, rows)
 
 
-def _random_numpy_play(env: "NumpyFireEnv") -> Callable[[int], None]:
+def _random_numpy_play(env: "NumpyFireEnv") -> Callable[[int], int]:
+    """Return a function that plays some episodes of random actions from start to end, and returns their steps."""
     rng = np.random.default_rng(0)
     n_actions = env.action_space(env.possible_agents[0]).n
 
-    def play(steps: int) -> None:
-        for _ in range(steps):
-            if not env.agents:
-                env.reset()
-            env.step(dict(zip(env.agents, rng.integers(n_actions, size=len(env.agents)))))
+    def play(episodes: int) -> int:
+        steps = 0
+        for _ in range(episodes):
+            env.reset()
+            while env.agents:
+                env.step(dict(zip(env.agents, rng.integers(n_actions, size=len(env.agents)))))
+                steps += 1
+        return steps
 
     return play

@@ -13,6 +13,8 @@ import torch
 import torchrl
 
 from warp_torchrl.benchmark.timing import is_alone
+from warp_torchrl.models.networks import computes_in_half
+from warp_torchrl.world.fast.compile import vectors
 
 
 def machine(device: str) -> dict[str, Any]:
@@ -20,6 +22,8 @@ def machine(device: str) -> dict[str, Any]:
     return {
         "platform": platform.platform(),
         "processor": _processor(),
+        "vectors": vectors(),
+        "bfloat16": computes_in_half("cpu"),
         "cores": os.cpu_count(),
         "threads": torch.get_num_threads(),
         "device": device if device == "cpu" else torch.cuda.get_device_name(device),
@@ -33,11 +37,13 @@ def machine(device: str) -> dict[str, Any]:
 
 
 def header(found: dict[str, Any]) -> str:
-    """Return the machine in two lines."""
+    """Return the machine in two lines, with the vector instructions in force."""
     libraries = ", ".join(f"{name} {found[name]}" for name in ("torch", "torchrl", "tensordict", "numpy"))
     device = "" if found["device"] == "cpu" else f", {found['device']}"
+    kind = found["vectors"] + (", bfloat16" if found["bfloat16"] else "")
+    units = f"cores: {found['cores']}, threads: {found['threads']}{device}"
     return (
-        f"{found['platform']}, {found['processor']}, cores: {found['cores']}, threads: {found['threads']}{device}\n"
+        f"{found['platform']}, {found['processor']} ({kind}), {units}\n"
         f"Python {found['python']}, {libraries}; times: {found['clock']}"
     )
 

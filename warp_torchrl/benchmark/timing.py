@@ -1,4 +1,4 @@
-"""Timing: medians of repeats, with the contenders in alternation, so that other load slows all of them alike.
+"""Timing: medians of repeats, or means, with the contenders in alternation, so that other load slows all of them alike.
 
 On one thread it measures processor time, which other load does not change; else the wall clock.
 """
@@ -47,3 +47,9 @@ def take_turns(contenders: Mapping[str, Callable[[], object]], repeats: int, dev
 def spread(name: str, values: Sequence[float]) -> dict[str, Any]:
     """Return the median of some values under a name, and the lowest and the highest of them."""
     return {name: statistics.median(values), "lowest": min(values), "highest": max(values)}
+
+
+def mean_rate(name: str, steps: Sequence[int], seconds: Sequence[float]) -> dict[str, Any]:
+    """Return the mean rate over some repeats under a name, and those of the slowest and the fastest of them."""
+    rates = [step / second for step, second in zip(steps, seconds, strict=True)]
+    return {name: sum(steps) / sum(seconds), "lowest": min(rates), "highest": max(rates)}

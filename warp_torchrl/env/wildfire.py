@@ -1,5 +1,7 @@
 """The TorchRL environment: connects world, observation, reward and metrics to ``EnvBase``."""
 
+import logging
+import math
 import secrets
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
@@ -20,11 +22,13 @@ from warp_torchrl.env.specs import make_specs
 from warp_torchrl.observation import Observation, Surroundings, state_names, state_symmetry
 from warp_torchrl.reward import Efficiency, Reward
 from warp_torchrl.world.fast.compile import check_compiler
-from warp_torchrl.world.fast.road import can_fuse
+from warp_torchrl.world.fast.road import why_eager
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.saved import filled
 from warp_torchrl.world.state import Transition, TreeCounts, WorldState, count_trees
 from warp_torchrl.world.world import World
+
+_log = logging.getLogger("warp_torchrl")
 
 
 class WildfireEnv(EnvBase):
@@ -44,7 +48,8 @@ class WildfireEnv(EnvBase):
         device: Where the worlds live.
         validate: Check on every device that actions are in range, which costs a synchronisation on CUDA; by default
             they are checked on the CPU only.
-        fuse: Compile the step with ``torch.compile``; the first steps are then slow.
+        fuse: Compile the step with ``torch.compile`` where that makes it faster, see ``why_eager``; the first steps are
+            then slow.
         graph: Record the step as one CUDA graph. World and observation must then stay as they are.
 
     Raises:
@@ -75,9 +80,9 @@ class WildfireEnv(EnvBase):
         self.observation = Surroundings() if observation is None else observation
         self.reward_function = Efficiency() if reward is None else reward
         self.validate = reads_freely(self.device) if validate is None else validate
-        if fuse:
-            check_compiler(self.device)
-        self._fuses = fuse and can_fuse(self.world.fire)
+        self.why_eager = self._check_compiling() if fuse else None
+        """Why steps are not compiled where that was asked for; None where they are."""
+        self._fuses = fuse and self.why_eager is None
         self._recorded = RecordedStep(self._scene) if graph else None
         names, roles = self.world.team.agent_names, self.world.team.agent_roles
         self.agent_names, self.action_names = names, self.world.team.action_names
@@ -304,6 +309,13 @@ class WildfireEnv(EnvBase):
         if self._recorded.scene.reward is not self.reward_function:
             self._recorded = RecordedStep(self._scene)
         return self._recorded(before, counts, action)
+
+    def _check_compiling(self) -> str | None:
+        check_compiler(self.device)
+        why = why_eager(self.world.fire, self.device, self.batch_size[0] * math.prod(self.world.size))
+        if why is not None:
+            _log.info("compile: %s", why)
+        return why
 
     @property
     def _scene(self) -> Scene:

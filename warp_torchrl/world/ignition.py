@@ -12,6 +12,8 @@ from warp_torchrl.world.geometry import grow
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.terrain.landscape import LandscapeSource, map_size
 
+_FEW = 4  # fires, whose places are found faster one by one than by topk
+
 
 class IgnitionSource(ABC):
     """What the world needs of an ignition component."""
@@ -89,17 +91,13 @@ class Ignition(IgnitionSource):
             fuel: Trees that can ignite, bool [B, H, W].
         """
         worlds, height, width = fuel.shape
-        draw = (uniform(key, 0, Stream.IGNITION, (height, width)) * (1 << 24)).to(torch.int64)
-        score = (
-            draw
-            + (fuel.to(torch.int64) << 26)
-            + ((fuel & self._middle(height, width, fuel.device)).to(torch.int64) << 25)
-        )
+        score = uniform(key, 0, Stream.IGNITION, (height, width)).mul_(1 << 24).to(torch.int64)
+        score.add_(fuel, alpha=1 << 26).add_(fuel & self._middle(height, width, fuel.device), alpha=1 << 25)
         cell = torch.arange(height * width, device=fuel.device)
-        score = score.flatten(1) * (height * width) + cell  # no two alike: topk breaks ties as it likes
-        best = score.topk(self.count, dim=1)
+        score = score.flatten(1).mul_(height * width).add_(cell)  # no two alike: topk breaks ties as it likes
+        best = _largest(score, self.count)
         centres = torch.zeros(worlds, height * width, dtype=torch.bool, device=fuel.device)
-        centres.scatter_(1, best.indices, best.values >= (height * width) << 26)
+        centres.scatter_(1, best % (height * width), best >= (height * width) << 26)
         return grow(centres.view_as(fuel), self.radius) & fuel
 
     def _middle(self, height: int, width: int, device: torch.device) -> Tensor:
@@ -107,3 +105,13 @@ class Ignition(IgnitionSource):
         columns = (torch.arange(width, device=device) + 0.5) / width - 0.5
         half = self.region / 2.0
         return (rows.abs() <= half)[:, None] & (columns.abs() <= half)[None, :]
+
+
+def _largest(scores: Tensor, count: int) -> Tensor:
+    """Return the largest numbers of each row, int64 [B, count], of numbers of which no two are alike, int64 [B, n]."""
+    if count > _FEW:
+        return scores.topk(count, dim=1).values
+    found = [scores.amax(dim=1, keepdim=True)]
+    while len(found) < count:
+        found.append(torch.where(scores < found[-1], scores, -1).amax(dim=1, keepdim=True))
+    return torch.cat(found, dim=1)

@@ -26,17 +26,55 @@ def starting_cells(key: Tensor, cover: Tensor, burning: Tensor, n_agents: int, s
     """
     height, width = cover.shape[1:]
     taken = (cover == int(Cover.LAKE)) | burning
-    rows = torch.arange(height, device=cover.device)
-    columns = torch.arange(width, device=cover.device)
     corner = (uniform(key, 0, Stream.START, (2,)) < 0.5).to(torch.int64)
     base = corner * whole_numbers((height - 1, width - 1), cover.device)
     if start == "corner":
-        row_distance = (rows - base[:, :1]).abs()[:, :, None]
-        column_distance = (columns - base[:, 1:]).abs()[:, None, :]
-        order = torch.maximum(row_distance, column_distance) * (height + width) + row_distance + column_distance
-    else:
-        order = (uniform(key, 1, Stream.START, (height, width)) * (1 << 24)).to(torch.int64)
-    cell = torch.arange(height * width, device=cover.device)
+        return base, nearest_free(taken, base, n_agents)
+    order = (uniform(key, 1, Stream.START, (height, width)) * (1 << 24)).to(torch.int64)
+    return base, first_free(order, taken, n_agents)
+
+
+def nearest_free(taken: Tensor, base: Tensor, n_agents: int) -> Tensor:
+    """Return the free cells nearest to a corner.
+
+    Args:
+        taken: bool [B, H, W].
+        base: The corner's (row, column), int64 [B, 2] [cells].
+        n_agents: A.
+
+    Returns:
+        (row, column), int64 [B, A, 2] [cells].
+    """
+    height, width = taken.shape[1:]
+    side = 2 * n_agents
+    if side < min(height, width) and not taken.is_cuda:  # most find theirs in a small square, in a tenth of the time
+        near = torch.where(base[:, None] == 0, 0, base[:, None] - side + 1)
+        cells = torch.arange(side, device=taken.device)
+        rows, columns = near[..., 0] + cells, near[..., 1] + cells
+        index = (rows[:, :, None] * width + columns[:, None, :]).flatten(1)
+        square = taken.flatten(1).gather(1, index).view(-1, side, side)
+        if ((~square).flatten(1).sum(dim=1) >= n_agents).all():
+            return first_free(_distances(base - near[:, 0], side, side), square, n_agents) + near
+    return first_free(_distances(base, height, width), taken, n_agents)
+
+
+def _distances(base: Tensor, height: int, width: int) -> Tensor:
+    """Return numbers in the order of the cells' distances, int64 [B, H, W]: the longer way first, then the sum."""
+    row = (torch.arange(height, device=base.device) - base[:, :1]).abs()[:, :, None]
+    column = (torch.arange(width, device=base.device) - base[:, 1:]).abs()[:, None, :]
+    return torch.maximum(row, column) * (height + width) + row + column
+
+
+def first_free(order: Tensor, taken: Tensor, n_agents: int) -> Tensor:
+    """Return the free cells of the lowest order, the earlier ones among equals, int64 [B, A, 2] [cells].
+
+    Args:
+        order: int64 [B, H, W], below 2^30.
+        taken: bool [B, H, W].
+        n_agents: A.
+    """
+    height, width = taken.shape[1:]
+    cell = torch.arange(height * width, device=taken.device)
     rank = (order + taken * (1 << 30)).flatten(1) * (height * width) + cell
     best = rank.topk(n_agents, dim=1, largest=False, sorted=True).indices
-    return base, torch.stack((best // width, best % width), dim=-1)
+    return torch.stack((best // width, best % width), dim=-1)

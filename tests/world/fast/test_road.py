@@ -9,7 +9,7 @@ from torch import Tensor
 from warp_torchrl.world.fast.edge import AtEdge
 from warp_torchrl.world.fast.join import in_place
 from warp_torchrl.world.fast.planes import Planes
-from warp_torchrl.world.fast.road import Page, fastest
+from warp_torchrl.world.fast.road import FEW_CELLS, Page, fastest, why_eager
 from warp_torchrl.world.fast.rows import probability_from_rows
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.hazard import HazardFire
@@ -120,3 +120,22 @@ def test_an_automaton_with_rules_of_its_own_takes_the_page() -> None:
     assert torch.equal(world.forecast(state).ignition_probability, beside.to(torch.float32)) and beside.any()
     after = world.step(state, torch.full((4, world.team.n_agents), 10)).after
     assert torch.equal((after.cells == 11), beside | (state.cells == 11) & (after.cells == 11))
+
+
+@pytest.mark.parametrize(
+    ("vectors", "device", "cells", "compiles"),
+    [
+        ("AVX512", "cpu", 1024 * 32 * 32, True),
+        ("AVX2", "cpu", 1024 * 32 * 32, False),
+        ("AVX2", "cpu", FEW_CELLS, True),
+        ("AVX2", "cpu", FEW_CELLS + 1, False),
+        ("AVX2", "cuda", 1024 * 32 * 32, True),
+    ],
+)
+def test_steps_are_compiled_where_that_gains(
+    monkeypatch, vectors: str, device: str, cells: int, compiles: bool
+) -> None:
+    monkeypatch.setattr("warp_torchrl.world.fast.road.vectors", lambda: vectors)
+    why = why_eager(Fire(), torch.device(device), cells)
+    assert (why is None) == compiles
+    assert compiles or f"{cells} cells is faster eager with {vectors}" in str(why)

@@ -92,6 +92,14 @@ def opaque_op(schema: str, like: Callable[..., Any] | None = None) -> Callable[[
     return opaque
 
 
+def vectors() -> str:
+    """Return the vector instructions in force on the CPU, ``AVX512``, ``AVX2`` or what else torch names.
+
+    The environment variable ``ATEN_CPU_CAPABILITY`` sets them, for Inductor too.
+    """
+    return torch.backends.cpu.get_cpu_capability()
+
+
 def check_compiler(device: torch.device) -> None:
     """Check that ``torch.compile`` can work here.
 

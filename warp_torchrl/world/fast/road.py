@@ -15,6 +15,7 @@ from warp_torchrl.device import reads_freely
 from warp_torchrl.world.automaton import Automaton
 from warp_torchrl.world.fast.band import AtBand
 from warp_torchrl.world.fast.bytes import number
+from warp_torchrl.world.fast.compile import vectors
 from warp_torchrl.world.fast.edge import AtEdge
 from warp_torchrl.world.fast.planes import Planes
 from warp_torchrl.world.fast.table import pattern_table
@@ -26,6 +27,8 @@ from warp_torchrl.world.state import Air, Forecast, Ground, WorldState, is_tree
 
 COVERED = (Fire, HazardFire)
 """The automata that the fast roads compute; a subclass may have other rules, and takes the page."""
+FEW_CELLS = 2**15
+"""Of all worlds; a compiled step of so many gains on any CPU."""
 
 
 class Road(Protocol):
@@ -80,12 +83,23 @@ def _may_read(device: torch.device) -> bool:
     return reads_freely(device) and not is_compiling()
 
 
-def can_fuse(fire: Automaton) -> bool:
-    """Return whether a step of whole worlds may be compiled.
+def why_eager(fire: Automaton, device: torch.device, cells: int) -> str | None:
+    """Return why a step of worlds is not compiled, though it was asked for; None where it is.
 
-    Under law ``rate`` it may not: its page took minutes to compile, and a CPU's band is faster without.
+    Under law ``rate`` the page took minutes to compile, and a CPU's band is faster without. On CPUs whose vectors are
+    shorter than those of AVX-512 Inductor reads and writes bytes and whole numbers one by one, so that compiled code
+    gains only where a step has so few cells that most of its time is the calls of its operations.
+
+    Args:
+        fire: The automaton.
+        device: Where the worlds live.
+        cells: B * H * W.
     """
-    return not isinstance(fire, RateFire)
+    if isinstance(fire, RateFire):
+        return "a step under a law with a clock is not compiled"
+    if device.type != "cpu" or vectors() == "AVX512" or cells <= FEW_CELLS:
+        return None
+    return f"a step of {cells} cells is faster eager with {vectors()}, and is not compiled"
 
 
 def forecast(fire: Automaton, state: WorldState) -> Forecast:
