@@ -129,7 +129,9 @@ def divided(counts: np.ndarray) -> np.ndarray:
             continue
         shuffled = np.zeros((SHUFFLES, *table.shape))
         left = np.broadcast_to(sectors, (SHUFFLES, len(sectors))).copy()
-        for agent, acts in enumerate(agents):
+        shuffled[:, 0] = random.multivariate_hypergeometric(sectors, agents[0], size=SHUFFLES)
+        left -= shuffled[:, 0].astype(np.int64)
+        for agent, acts in enumerate(agents[1:], start=1):
             for draw in range(SHUFFLES):
                 taken = random.multivariate_hypergeometric(left[draw], acts)
                 shuffled[draw, agent] = taken
