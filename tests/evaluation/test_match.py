@@ -52,6 +52,16 @@ def test_a_trained_policy_plays_as_step_by_step(mode, observation, lamed, monkey
     assert alike(quick, play(env, policy, 5, mode, watch=True))
 
 
+def test_heuristics_play_side_by_side_as_they_do_alone(make_small_env, monkeypatch):
+    env, names = make_small_env(7), tuple(HEURISTICS)
+    abreast = play_module.play_heuristics(env, 5, names)
+    monkeypatch.setattr(play_module, "_CELLS_ABREAST", 0)
+    monkeypatch.setattr(play_module, "fits", lambda env, policy: False)
+    alone = play_module.play_heuristics(env, 5, names)
+    assert list(abreast) == list(alone) == list(names)
+    assert all(alike(abreast[name], alone[name]) for name in names)
+
+
 def test_a_match_goes_on_with_the_worlds_that_have_not_ended(make_small_env, monkeypatch):
     env, sizes = make_small_env(32), []
     step = Match._step
@@ -67,5 +77,10 @@ def test_what_reads_more_is_played_step_by_step(make_small_env):
     assert not fits(env, HEURISTICS["ring"](env)), "it plans"
     assert not fits(env, WithoutAgent(Greedy(env), 0, env.world.team)), "it reads the environment's worlds"
     assert not fits(env, Mlp().critic(signature(env), central=True)), "it reads the state"
+
+    class Mine(Greedy):
+        pass
+
+    assert not fits(env, Mine(env)), "it may read the environment's worlds"
     env.watcher = lambda transition: None
     assert not fits(env, Greedy(env))

@@ -1,6 +1,6 @@
 """Worlds that are played to their ends: those that have ended, and what nobody reads, are not computed."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import torch
 from tensordict import TensorDict
@@ -26,12 +26,14 @@ class Match:
 
     Args:
         env: Its worlds, at the start of their episodes.
-        policy: Of which ``fits`` is true.
+        policies: Of which ``fits`` is true: one, or heuristics that play equal shares of the worlds, in order.
         watcher: Sees the steps.
     """
 
-    def __init__(self, env: WildfireEnv, policy: TensorDictModuleBase, watcher: Watcher | None = None) -> None:
-        self.env, self.world, self.policy, self.watcher = env, env.world, policy, watcher
+    def __init__(
+        self, env: WildfireEnv, policies: Sequence[TensorDictModuleBase], watcher: Watcher | None = None
+    ) -> None:
+        self.env, self.world, self.policies, self.watcher = env, env.world, policies, watcher
         self.ended, self.state, self.counts = env.world_state.clone(), env.world_state, env.tree_counts
         self.rows = torch.arange(env.batch_size[0], device=env.device)
         self.paid = torch.zeros(env.batch_size[0], device=env.device)
@@ -48,10 +50,9 @@ class Match:
                 break
             self._step(self._actions(shown))
             self._leave_ended()
-            if not isinstance(self.policy, Heuristic):
+            if not isinstance(self.policies[0], Heuristic):
                 self._show(shown)
         self.ended[self.rows] = self.state
-        self.env.set_state(self.ended)
         found = metrics(self.ended, count_trees(self.ended), self.world.horizon)
         return found | {"episode_reward": self.paid, "episode_length": self.ended.step.to(torch.float32)}
 
@@ -60,9 +61,15 @@ class Match:
 
         A trained policy acts in all worlds, so that its draws are those of a loop over all.
         """
-        if isinstance(self.policy, Heuristic):
-            return self.policy.choose(self.state, self.world.action_mask(self.state))
-        return self.policy(shown.copy())[ACTION].index_select(0, self.rows)
+        if not isinstance(self.policies[0], Heuristic):
+            return self.policies[0](shown.copy())[ACTION].index_select(0, self.rows)
+        mask, share = self.world.action_mask(self.state), len(self.paid) // len(self.policies)
+        last = torch.arange(1, len(self.policies) + 1, device=self.rows.device) * share
+        ends = torch.searchsorted(self.rows, last).tolist()
+        own = [slice(*each) for each in zip([0, *ends], ends)]
+        return torch.cat(
+            [each.choose(self.state[at], mask[at]) for each, at in zip(self.policies, own) if len(mask[at])]
+        )
 
     def _step(self, action: Tensor) -> None:
         transition = self.world.step(self.state, action, self.counts)
@@ -94,12 +101,13 @@ class Match:
 def fits(env: WildfireEnv, policy: TensorDictModuleBase) -> bool:
     """Return whether a policy reads what a match shows: a heuristic its worlds, a trained policy each agent's own.
 
-    One that remembers what it did in the worlds before, and an environment that is watched, take a loop over all.
+    One that remembers what it did in the worlds before, a user's own heuristic, which may read the environment, and an
+    environment that is watched take a loop over all.
     """
     if env.watcher is not None:
         return False
     if isinstance(policy, Heuristic):
-        return not policy.is_stateful and type(policy).forward is Heuristic.forward
+        return not policy.is_stateful and type(policy).__module__.startswith("warp_torchrl.")
     heuristics = any(isinstance(each, Heuristic) for each in policy.modules())
     keys = [key if isinstance(key, tuple) else (key,) for key in policy.in_keys]
     own = all(key in (ACTION_MASK, ROLE) or key[: len(OBSERVATION)] == OBSERVATION for key in keys)

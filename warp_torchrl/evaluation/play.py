@@ -24,6 +24,9 @@ from warp_torchrl.world.team import Team
 BASELINES = ("noop", "random", "local", "greedy", "coordinated")
 """Baselines of every table."""
 
+_CELLS_ABREAST = 2**21
+"""Of the worlds of all heuristics that play in one batch; more take much memory, and gain nothing."""
+
 Episodes = dict[str, np.ndarray]
 """Final metrics of n episodes, float64 [n] each."""
 
@@ -70,7 +73,10 @@ def _match(
     recorder: EpisodeRecorder | None,
     behaviour: Behaviour | None,
 ) -> dict[str, Tensor]:
-    return Match(env, policy, behaviour).play(now)
+    match = Match(env, [policy], behaviour)
+    found = match.play(now)
+    env.set_state(match.ended)
+    return found
 
 
 def _steps(
@@ -123,7 +129,30 @@ class WithoutAgent(TensorDictModuleBase):
 
 def play_heuristics(env: WildfireEnv, first_seed: int, names: Sequence[str] = BASELINES) -> dict[str, Episodes]:
     """Return the episodes of heuristics by name."""
-    return {name: play(env, HEURISTICS[name](env), first_seed) for name in names}
+    cells = env.batch_size[0] * env.world.size[0] * env.world.size[1]
+    abreast = [name for name in names if fits(env, HEURISTICS[name](env))]
+    abreast = abreast if cells * len(abreast) <= _CELLS_ABREAST else []
+    found = play_abreast(env, first_seed, abreast) if abreast else {}
+    found |= {name: play(env, HEURISTICS[name](env), first_seed) for name in names if name not in found}
+    return {name: found[name] for name in names}
+
+
+def play_abreast(env: WildfireEnv, first_seed: int, names: Sequence[str]) -> dict[str, Episodes]:
+    """Return the episodes of heuristics by name, all played in one batch: a step of few worlds costs what many do."""
+    count = env.batch_size[0]
+    wide = WildfireEnv(
+        env.world,
+        observation=env.observation,
+        reward=env.reward_function,
+        n_worlds=count * len(names),
+        seeds=[*range(first_seed, first_seed + count)] * len(names),
+        device=env.device,
+    )
+    with torch.random.fork_rng(), torch.no_grad():
+        start = wide.reset()
+        ends = Match(wide, [HEURISTICS[name](wide) for name in names]).play(start)
+    numbers = {metric: ends[metric].double().cpu().numpy().reshape(len(names), count) for metric in EPISODE_METRICS}
+    return {name: {metric: rows[at] for metric, rows in numbers.items()} for at, name in enumerate(names)}
 
 
 def record_episode(
