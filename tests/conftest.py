@@ -75,6 +75,11 @@ def make_small_env():
     return make
 
 
+@pytest.fixture(autouse=True, scope="session")
+def _no_files_at_home(tmp_path_factory):
+    os.environ["XDG_CACHE_HOME"] = str(tmp_path_factory.mktemp("cache"))
+
+
 @pytest.fixture(autouse=True)
 def _same_start():
     torch.manual_seed(0)

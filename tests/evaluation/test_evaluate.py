@@ -5,7 +5,7 @@ from warp_torchrl.config.run_config import run_config
 from warp_torchrl.evaluation import evaluate as evaluation_module
 from warp_torchrl.evaluation.play import play_heuristics
 
-TINY = ["landscape.size=12", "horizon=16"]
+TINY = ["landscape.size=12", "horizon=16", "evaluation.episodes=3", "evaluation.cache=false"]
 
 
 def test_the_jobs_of_a_sweep_play_the_baselines_once(monkeypatch):
@@ -19,7 +19,7 @@ def test_the_jobs_of_a_sweep_play_the_baselines_once(monkeypatch):
     monkeypatch.setattr(evaluation_module, "_PLAYED", {})
 
     def baselines(names, *overrides):
-        plan = run_config(plain(compose_config("train", ["evaluation.episodes=3", *TINY, *overrides])))
+        plan = run_config(plain(compose_config("train", [*TINY, *overrides])))
         return evaluation_module._baselines(plan, plan.make_env(3, plan.evaluation.first_seed), names)
 
     first = baselines(["noop", "local"])

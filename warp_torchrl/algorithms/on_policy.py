@@ -104,7 +104,7 @@ class OnPolicy(Algorithm):
             loss.entropy_coeff.fill_(falling(self.entropy_coeff, self.entropy_coeff_end, progress))
             return {"train/learning_rate": self.rate_at(progress, optimizer), **self.constants()}
 
-        canonical = model.canonical_batch(shape, state=self.central_critic)
+        canonical = model.canonical_batch(shape, state=self.central_critic, packed=True)
         memory = Recollection(policy)
         steps = frames_per_batch // env.batch_size[0] if memory.actors else 1  # in a row of the buffer
         buffer = TensorDictReplayBuffer(

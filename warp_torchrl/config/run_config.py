@@ -78,6 +78,7 @@ class EvaluationConfig:
         first_seed: Seed of the first; training has those below 1 000 000 and from 2^61 on.
         mode: ``sampled``, ``deterministic``, or ``best``: whichever did better on training seeds.
         leave_one_out: Play once more for each agent, without it, to see what it is worth.
+        cache: Keep the baselines' episodes in ``~/.cache/warp_torchrl`` (or ``XDG_CACHE_HOME``), and read those kept.
 
     Raises:
         ValueError: If a value is out of its range.
@@ -88,6 +89,7 @@ class EvaluationConfig:
     first_seed: int = FIRST_EVALUATED
     mode: Literal["sampled", "deterministic", "best"] = "best"
     leave_one_out: bool = False
+    cache: bool = True
 
     def __post_init__(self) -> None:
         check_fields(self)

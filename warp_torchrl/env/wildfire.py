@@ -19,7 +19,7 @@ from warp_torchrl.env.reset_cache import ResetCache, Start
 from warp_torchrl.env.reset_pool import ResetPool
 from warp_torchrl.env.scene import Observations, Scene, Step
 from warp_torchrl.env.specs import make_specs
-from warp_torchrl.observation import Observation, Surroundings, state_names, state_symmetry
+from warp_torchrl.observation import Observation, Surroundings, state_content, state_names, state_symmetry
 from warp_torchrl.reward import Efficiency, Reward
 from warp_torchrl.world.fast.compile import check_compiler
 from warp_torchrl.world.fast.road import why_eager
@@ -91,6 +91,8 @@ class WildfireEnv(EnvBase):
         self.channel_names = {name: space.names for name, space in spaces.items()}
         self.symmetries = {name: space.symmetry for name, space in spaces.items()}
         self.state_symmetry = state_symmetry(self.world.team)
+        self.contents = {name: space.content for name, space in spaces.items()}
+        self.state_content = state_content(self.world)
         self.group_map = {"agents": list(names)}
         self.role_map = {role: [n for n, r in zip(names, roles) if r == role] for role in ROLES if role in roles}
         self._worlds: tuple[WorldState, TreeCounts] | None = None  # and the counts of their trees

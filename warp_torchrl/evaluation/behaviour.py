@@ -31,10 +31,18 @@ class Behaviour:
         self._targets = torch.zeros(worlds, device=device)
         self._cleared_at = torch.full(state.cells.shape, -1, dtype=torch.int32, device=device)
         self._lead = torch.full(state.cells.shape, -1, dtype=torch.int32, device=device)
-        self._state = state
+        self._state = state.clone()
 
-    def __call__(self, transition: Transition) -> None:
-        """Count one step."""
+    def __call__(self, transition: Transition, rows: Tensor | None = None) -> None:
+        """Count one step.
+
+        Args:
+            transition: Of all worlds, or of some.
+            rows: Which they are, int64 [n] in order; None, all.
+        """
+        if rows is not None and len(rows) < len(self._acts):
+            self._count_some(transition, rows)
+            return
         before, after, result = transition.before, transition.after, transition.result
         width = before.cells.shape[2]
         place = torch.stack((result.target // width, result.target % width), dim=-1)
@@ -52,6 +60,17 @@ class Behaviour:
         reached = grow(is_burning(after.cells)) & (self._cleared_at >= 0) & (self._lead < 0)
         self._lead = torch.where(reached, step - self._cleared_at, self._lead)
         self._state = after
+
+    def _count_some(self, transition: Transition, rows: Tensor) -> None:
+        some = Behaviour(transition.before)
+        for name, value in vars(self).items():
+            if isinstance(value, Tensor):
+                setattr(some, name, value.index_select(0, rows))
+        some(transition)
+        for name, value in vars(self).items():
+            if isinstance(value, Tensor):
+                value.index_copy_(0, rows, getattr(some, name))
+        self._state[rows] = some._state
 
     def summary(self) -> dict[str, np.ndarray]:
         """Return the measures of each world's episode, float64 [B]; NaN where an episode has no value.
@@ -110,7 +129,9 @@ def divided(counts: np.ndarray) -> np.ndarray:
             continue
         shuffled = np.zeros((SHUFFLES, *table.shape))
         left = np.broadcast_to(sectors, (SHUFFLES, len(sectors))).copy()
-        for agent, acts in enumerate(agents):
+        shuffled[:, 0] = random.multivariate_hypergeometric(sectors, agents[0], size=SHUFFLES)
+        left -= shuffled[:, 0].astype(np.int64)
+        for agent, acts in enumerate(agents[1:], start=1):
             for draw in range(SHUFFLES):
                 taken = random.multivariate_hypergeometric(left[draw], acts)
                 shuffled[draw, agent] = taken

@@ -10,6 +10,7 @@ from warp_torchrl.api import policy_of
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.evaluation import cache
 from warp_torchrl.evaluation.maps import described, play_maps, write_maps
 from warp_torchrl.evaluation.method import method
 from warp_torchrl.evaluation.play import BASELINES, Episodes, WithoutAgent, play, play_heuristics, record_episode
@@ -109,8 +110,11 @@ _PLAYED: dict[str, tuple[RunConfig, dict[str, Episodes]]] = {}
 
 
 def _baselines(plan: RunConfig, env: WildfireEnv, names: Sequence[str]) -> dict[str, Episodes]:
-    """Return the episodes of heuristics; jobs of a sweep with the same worlds play them once."""
+    """Return the episodes of heuristics; jobs of a sweep with the same worlds play them once, and so do later ones."""
     worlds = repr((plan.world, plan.observation, plan.reward, plan.evaluation, plan.device))
     _, played = _PLAYED.setdefault(worlds, (plan, {}))  # keeps the plan alive: a repr may hold addresses of objects
-    played |= play_heuristics(env, plan.evaluation.first_seed, [name for name in names if name not in played])
+    played |= cache.kept(plan, [name for name in names if name not in played])
+    new = play_heuristics(env, plan.evaluation.first_seed, [name for name in names if name not in played])
+    cache.keep(plan, new)
+    played |= new
     return {name: played[name] for name in names}

@@ -8,12 +8,14 @@ import numpy as np
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
 from torchrl.envs.utils import set_exploration_type
 
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.render import EpisodeRecorder
 from warp_torchrl.env.specs import EPISODE_METRICS
 from warp_torchrl.evaluation.behaviour import Behaviour
+from warp_torchrl.evaluation.match import Match, fits
 from warp_torchrl.heuristics import HEURISTICS, idle_action
 from warp_torchrl.models import ACTION, ACTION_MASK, memory_apart
 from warp_torchrl.policy import MODES
@@ -21,6 +23,9 @@ from warp_torchrl.world.team import Team
 
 BASELINES = ("noop", "random", "local", "greedy", "coordinated")
 """Baselines of every table."""
+
+_CELLS_ABREAST = 2**21
+"""Of the worlds of all heuristics that play in one batch; more take much memory, and gain nothing."""
 
 Episodes = dict[str, np.ndarray]
 """Final metrics of n episodes, float64 [n] each."""
@@ -50,24 +55,50 @@ def play(
     Returns:
         The metrics of each world.
     """
-    behaviour = None
     with torch.random.fork_rng(), torch.no_grad(), set_exploration_type(MODES[mode]), memory_apart(policy):
         torch.manual_seed(first_seed)
         env.set_seed(first_seed, static_seed=True)
         now = env.reset()
-        if watch:
-            behaviour = env.watcher = Behaviour(env.world_state)
-        for _ in range(env.world.horizon):
-            if recorder is not None:
-                recorder.add(env.world_state)
-            now = env.step(policy(now))["next"]
-            if now["done"].all():
-                break
+        behaviour = Behaviour(env.world_state) if watch else None
+        plays = _steps if recorder is not None or not fits(env, policy) else _match
+        found = plays(env, policy, now, recorder, behaviour)
+    episodes = {name: found[name].double().cpu().numpy() for name in EPISODE_METRICS}
+    return episodes if behaviour is None else episodes | behaviour.summary()
+
+
+def _match(
+    env: WildfireEnv,
+    policy: TensorDictModuleBase,
+    now: TensorDictBase,
+    recorder: EpisodeRecorder | None,
+    behaviour: Behaviour | None,
+) -> dict[str, Tensor]:
+    match = Match(env, [policy], behaviour)
+    found = match.play(now)
+    env.set_state(match.ended)
+    return found
+
+
+def _steps(
+    env: WildfireEnv,
+    policy: TensorDictModuleBase,
+    now: TensorDictBase,
+    recorder: EpisodeRecorder | None,
+    behaviour: Behaviour | None,
+) -> dict[str, Tensor]:
+    """Play step by step, for any policy, and return the metrics [B]."""
+    watcher = env.watcher
+    env.watcher = watcher if behaviour is None else behaviour
+    for _ in range(env.world.horizon):
         if recorder is not None:
             recorder.add(env.world_state)
+        now = env.step(policy(now))["next"]
+        if now["done"].all():
+            break
+    if recorder is not None:
+        recorder.add(env.world_state)
     env.watcher = None
-    episodes = {name: now["info", name][:, 0].double().cpu().numpy() for name in EPISODE_METRICS}
-    return episodes if behaviour is None else episodes | behaviour.summary()
+    return {name: now["info", name][:, 0] for name in EPISODE_METRICS}
 
 
 class WithoutAgent(TensorDictModuleBase):
@@ -79,12 +110,12 @@ class WithoutAgent(TensorDictModuleBase):
         team: The team.
     """
 
-    in_keys: ClassVar = [ACTION_MASK]
     out_keys: ClassVar = [ACTION]
 
     def __init__(self, policy: TensorDictModuleBase, agent: int, team: Team) -> None:
         super().__init__()
         self.policy, self.agent, self.team = policy, agent, team
+        self.in_keys = [*policy.in_keys, ACTION_MASK]
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write the team's actions, int64 [B, A]."""
@@ -98,7 +129,30 @@ class WithoutAgent(TensorDictModuleBase):
 
 def play_heuristics(env: WildfireEnv, first_seed: int, names: Sequence[str] = BASELINES) -> dict[str, Episodes]:
     """Return the episodes of heuristics by name."""
-    return {name: play(env, HEURISTICS[name](env), first_seed) for name in names}
+    cells = env.batch_size[0] * env.world.size[0] * env.world.size[1]
+    abreast = [name for name in names if fits(env, HEURISTICS[name](env))]
+    abreast = abreast if cells * len(abreast) <= _CELLS_ABREAST else []
+    found = play_abreast(env, first_seed, abreast) if abreast else {}
+    found |= {name: play(env, HEURISTICS[name](env), first_seed) for name in names if name not in found}
+    return {name: found[name] for name in names}
+
+
+def play_abreast(env: WildfireEnv, first_seed: int, names: Sequence[str]) -> dict[str, Episodes]:
+    """Return the episodes of heuristics by name, all played in one batch: a step of few worlds costs what many do."""
+    count = env.batch_size[0]
+    wide = WildfireEnv(
+        env.world,
+        observation=env.observation,
+        reward=env.reward_function,
+        n_worlds=count * len(names),
+        seeds=[*range(first_seed, first_seed + count)] * len(names),
+        device=env.device,
+    )
+    with torch.random.fork_rng(), torch.no_grad():
+        start = wide.reset()
+        ends = Match(wide, [HEURISTICS[name](wide) for name in names]).play(start)
+    numbers = {metric: ends[metric].double().cpu().numpy().reshape(len(names), count) for metric in EPISODE_METRICS}
+    return {name: {metric: rows[at] for metric, rows in numbers.items()} for at, name in enumerate(names)}
 
 
 def record_episode(

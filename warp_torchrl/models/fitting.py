@@ -58,6 +58,7 @@ def fitted(policy: TensorDictModuleBase, trained: Signature, here: Signature, fa
         ValueError: If the environment lacks an entry, a channel or an action, or has it in another form, or has a role
             that a policy with a network for each does not know; which one.
     """
+    trained, here = trained.bare(), here.bare()
     if (trained.observation, trained.actions, trained.roles) == (here.observation, here.actions, here.roles):
         return policy
     lacking = [name for name in trained.actions if name not in here.actions]

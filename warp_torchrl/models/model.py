@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from tensordict.nn import TensorDictModule, TensorDictModuleBase, TensorDictSequential
 from torch import nn
@@ -23,6 +23,7 @@ from warp_torchrl.models.networks import (
     Network,
     RoleNetworks,
 )
+from warp_torchrl.models.packing import Packings
 from warp_torchrl.models.signature import (
     ACTION_ONE_HOT,
     ACTION_VALUE,
@@ -111,21 +112,31 @@ class Mlp:
         """Return the key of the state as these networks read it."""
         return CANONICAL_STATE if self._is_canonical else STATE
 
-    def canonical_batch(self, signature: Signature, state: bool = True, restored: bool = False) -> CanonicalBatch:
+    def canonical_batch(
+        self, signature: Signature, state: bool = True, restored: bool = False, packed: bool = False
+    ) -> CanonicalBatch:
         """Return what makes the batches from which these networks learn.
 
         Args:
             signature: What they fit.
             state: Whether they read the state.
             restored: Whether they learn from actions as they are on the map.
+            packed: Whether to leave out the planes that the world cannot fill.
         """
+        packings = self._packings(signature) if packed else None
         if not self._is_canonical:
-            return CanonicalBatch(None)
+            return CanonicalBatch(None, packings=packings)
         return CanonicalBatch(
             Canonicalise(signature.observation),
             CanonicaliseState(signature.state) if state else None,
             () if restored else signature.actions,
+            packings,
         )
+
+    def _packings(self, signature: Signature) -> Packings:
+        """Return what packs the entries that these networks read packed or whole."""
+        entries: dict[Any, Entry] = {self._key(name): entry for name, entry in signature.observation.items()}
+        return Packings({**entries, self.state_key: signature.state})
 
     def _of_agents(
         self,
@@ -168,7 +179,7 @@ class Mlp:
             keys += [ORIENTATION] if self._is_canonical else []
             module = RecurrentActor(network, keys, out, memory, self._clock(signature))
         elif central:
-            central_network = Central(network, len(signature.state.shape), action)
+            central_network = Central(network, signature.state, action)
             module = TensorDictModule(central_network, in_keys=[self.state_key, *keys], out_keys=[key])
         else:
             module = TensorDictModule(network, in_keys=keys, out_keys=[key])
@@ -242,6 +253,10 @@ class Cnn(Mlp):
         check_sizes("channels", self.channels)
         if not (1 <= self.kernel_size <= 15 and self.kernel_size % 2):
             raise ValueError(f"kernel_size must be odd and in 1..15, got {self.kernel_size}")
+
+    def _packings(self, signature: Signature) -> Packings:
+        """Return what packs nothing: convolutions read whole planes."""
+        return Packings({})
 
     def _encoder(self, entries: list[Entry], size: int) -> ConvolutionalEncoder:
         return ConvolutionalEncoder(

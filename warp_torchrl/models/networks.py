@@ -8,21 +8,36 @@ import torch
 from torch import Tensor, nn
 from torchrl.modules import MLP, ConvNet
 
+from warp_torchrl.models.packing import own_dims, packing_of
 from warp_torchrl.models.signature import Entry
 
 
 class _Linear(nn.Linear):
+    def __init__(self, entry: Entry, size: int, bias: bool) -> None:
+        super().__init__(count(entry), size, bias=bias)
+        self.dims, self.packing = len(entry.shape), packing_of(entry)
+
     def forward(self, given: Tensor) -> Tensor:
-        if given.dtype != torch.uint8:
-            return super().forward(given)
-        # Scaling the weights is far cheaper than scaling the many bytes.
-        return nn.functional.linear(_cast(given, self.weight), self.weight * (1.0 / 255.0), self.bias)
+        weight: Tensor = self.weight
+        bias: Tensor | None = self.bias
+        unit = 1.0 / 255.0 if given.dtype == torch.uint8 else 1.0
+        if self.packing is not None:
+            given = self.packing.packed(given)
+            weight, added = self.packing.folded(weight)
+            bias = _sum(bias, added, unit)
+        elif self.dims > 1:
+            given = given.flatten(-self.dims)
+        if given.dtype == torch.uint8:
+            # Scaling the weights is far cheaper than scaling the many bytes.
+            given, weight = _cast(given, weight), weight * unit
+        return nn.functional.linear(given, weight, bias)
 
 
 class LinearEncoder(nn.Module):
     """The first layer over several entries: the sum of one linear map each, which equals one of them joined.
 
-    Bytes are read as fractions of 255. Entries may have any number of leading dimensions.
+    Bytes are read as fractions of 255. Entries may have any number of leading dimensions, and be packed: planes that
+    the world cannot fill are left out of the products, and their weights are kept for worlds that can.
 
     Args:
         entries: What is read.
@@ -33,7 +48,7 @@ class LinearEncoder(nn.Module):
         super().__init__()
         self.entries = entries
         counts = [count(entry) for entry in entries]
-        parts = [_Linear(each, size, bias=index == 0) for index, each in enumerate(counts)]
+        parts = [_Linear(each, size, bias=index == 0) for index, each in enumerate(entries)]
         joined = torch.empty(size, sum(counts))
         nn.init.orthogonal_(joined, 2.0**0.5)
         for part, weight in zip(parts, joined.split(counts, dim=1), strict=True):
@@ -43,11 +58,7 @@ class LinearEncoder(nn.Module):
 
     def forward(self, *inputs: Tensor) -> Tensor:
         """Return features, float [..., size]."""
-        features = (
-            part(tensor.flatten(-len(entry.shape)) if len(entry.shape) > 1 else tensor)
-            for part, entry, tensor in zip(self.parts, self.entries, inputs, strict=True)
-        )
-        return reduce(operator.add, features)
+        return reduce(operator.add, (part(given) for part, given in zip(self.parts, inputs, strict=True)))
 
 
 class ConvolutionalEncoder(nn.Module):
@@ -95,6 +106,13 @@ class ConvolutionalEncoder(nn.Module):
 def count(entry: Entry) -> int:
     """Return how many numbers an entry holds."""
     return int(torch.Size(entry.shape).numel())
+
+
+def _sum(bias: Tensor | None, added: Tensor | None, unit: float) -> Tensor | None:
+    """Return a bias with what else is added to it, in its unit."""
+    if added is None:
+        return bias
+    return added * unit if bias is None else bias + added * unit
 
 
 def _cast(tensor: Tensor, like: Tensor) -> Tensor:
@@ -177,17 +195,17 @@ class Central(nn.Module):
 
     Args:
         network: Reads the state, the joint action where there is one, and then each agent's own entries.
-        state_dims: Dimensions of the state without a batch's.
+        state: The state's entry.
         action: Place of the one-hot actions among the agents' entries; None where the critic does not judge actions.
     """
 
-    def __init__(self, network: nn.Module, state_dims: int, action: int | None) -> None:
+    def __init__(self, network: nn.Module, state: Entry, action: int | None) -> None:
         super().__init__()
-        self.network, self.state_dims, self.action = network, state_dims, action
+        self.network, self.state, self.action = network, state, action
 
     def forward(self, state: Tensor, *own: Tensor) -> Tensor:
         """Return float32 [..., A, out] from the state [...] and entries [..., A, ...]."""
-        shared = [state.unsqueeze(-1 - self.state_dims)]
+        shared = [state.unsqueeze(-1 - own_dims(state, self.state))]
         if self.action is not None:
             shared.append(own[self.action].flatten(-2).unsqueeze(-2))
         return self.network(*shared, *own)
@@ -230,7 +248,7 @@ class AgentNetworks(nn.Module):
         """Return float32 [..., A, out] from entries [..., A, ...]; one that all share may be [..., 1, ...]."""
         split = []
         for given, entry in zip(inputs, self._entries, strict=True):
-            each = given.unbind(-1 - len(entry.shape))
+            each = given.unbind(-1 - own_dims(given, entry))
             split.append(each * len(self.networks) if len(each) == 1 else each)
         own = zip(self.networks, *split, strict=True)
         return torch.stack([network(*seen) for network, *seen in own], dim=-2)

@@ -3,8 +3,9 @@
 from typing import NamedTuple
 
 from torchrl.data import TensorSpec
-from torchrl.envs import EnvBase
+from torchrl.envs import EnvBase, TransformedEnv
 
+from warp_torchrl.content import Content
 from warp_torchrl.symmetry import Symmetry
 
 ACTION = ("agents", "action")
@@ -46,13 +47,19 @@ def canonical_key(name: str) -> Key:
 class Entry(NamedTuple):
     """One agent's (or the critic's) entry: shape, name of the type, names along its first dimension, how it turns.
 
-    The names are of a map's channels, or of a vector's numbers; there may be none.
+    The names are of a map's channels, or of a vector's numbers; there may be none. What a map's channels can hold is of
+    the world that is at hand, and no part of what a network must fit: ``bare`` leaves it out.
     """
 
     shape: tuple[int, ...]
     dtype: str
     names: tuple[str, ...] = ()  # none where it has none
     symmetry: Symmetry | None = None  # None where it does not say
+    content: tuple[Content, ...] = ()  # of each channel; () where it does not say
+
+    def bare(self) -> "Entry":
+        """Return the entry without its content."""
+        return self._replace(content=())
 
 
 class Signature(NamedTuple):
@@ -74,6 +81,11 @@ class Signature(NamedTuple):
         """Return the number of roles."""
         return len(self.roles)
 
+    def bare(self) -> "Signature":
+        """Return the signature without what channels can hold."""
+        observation = {name: entry.bare() for name, entry in self.observation.items()}
+        return self._replace(observation=observation, state=self.state.bare())
+
     def observation_keys(self) -> list[tuple[str, ...]]:
         """Return the tensordict keys of the observation's entries."""
         return [observation_key(name) for name in self.observation]
@@ -85,18 +97,23 @@ def signature(env: EnvBase) -> Signature:
     seen = specs[OBSERVATION]
     named = dict(seen.items()) if hasattr(seen, "items") else {"": seen}
 
-    def entry(spec: TensorSpec, skip: int, names: tuple[str, ...], symmetry: Symmetry | None) -> Entry:
+    is_ours = not isinstance(env, TransformedEnv)  # a transform may fill what the world leaves empty
+
+    def entry(
+        spec: TensorSpec, skip: int, names: tuple[str, ...], symmetry: Symmetry | None, content: tuple[Content, ...]
+    ) -> Entry:
         shape = tuple(spec.shape[skip:])  # transforms of TorchRL may stack channels: what does not fit is not told
         return Entry(
             shape,
             str(spec.dtype).removeprefix("torch."),
             names if len(names) == shape[0] else (),
             symmetry if symmetry is not None and symmetry.fits(shape) else None,
+            content if is_ours and len(content) == shape[0] else (),
         )
 
     observation = {
-        name: entry(spec, 1, env.channel_names.get(name, ()), env.symmetries.get(name))
+        name: entry(spec, 1, env.channel_names.get(name, ()), env.symmetries.get(name), env.contents.get(name, ()))
         for name, spec in sorted(named.items())
     }
-    state = entry(specs["state"], 0, env.state_names, env.state_symmetry)
+    state = entry(specs["state"], 0, env.state_names, env.state_symmetry, env.state_content)
     return Signature(observation, state, specs[ACTION_MASK].shape[0], env.action_names, env.role_names)

@@ -9,6 +9,7 @@ from warp_torchrl.observation.coarse import (
     STATE_SYMMETRY,
     central_state,
     picture,
+    state_content,
     state_names,
     state_symmetry,
 )
@@ -39,6 +40,7 @@ __all__ = [
     "former_symmetry",
     "own_vector",
     "picture",
+    "state_content",
     "state_names",
     "state_symmetry",
 ]

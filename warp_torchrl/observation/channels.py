@@ -14,6 +14,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from warp_torchrl.content import Content, Empty, Follows
 from warp_torchrl.world.fast.bytes import at_least, byte, equal, to_codes, to_int32
 from warp_torchrl.world.fast.squares import Window, window
 from warp_torchrl.world.role import PAPER_ROLES
@@ -50,17 +51,41 @@ class Channel(NamedTuple):
     """Returns whole numbers [B, A, V, V] of a look."""
     high: int
     """The largest number that it returns."""
+    content: Callable[[World, Sequence[str]], Content]
+    """Returns what it can hold in a world, in a view of channels by name."""
+
+
+def _anything(world: World, names: Sequence[str]) -> Content:
+    """Return that a channel may hold anything."""
+    return None
+
+
+def _of_ground(world: World, names: Sequence[str]) -> Content:
+    """Return what heights show: on flat ground 128 on the map and 0 beyond, which ``off_map`` tells too."""
+    if world.is_flat and "off_map" in names:
+        return Follows(list(names).index("off_map"), -128.0 / 255.0, 128.0)
+    return None
+
+
+def others_of(role: str, world: World) -> Content:
+    """Return what a plane of other agents of a role can hold: nothing where no agent has another of it."""
+    roles = world.team.agent_roles
+    return None if role in roles and len(roles) > 1 else Empty()
 
 
 CHANNELS: dict[str, Channel] = {}
 """All channels, by name."""
 
 
-def channel(high: int = 255) -> Callable[[Callable[[Look], Tensor]], Callable[[Look], Tensor]]:
+def channel(
+    high: int = 255, content: Callable[[World, Sequence[str]], Content] = _anything
+) -> Callable[[Callable[[Look], Tensor]], Callable[[Look], Tensor]]:
     """Return what adds a function to the table, under the function's name.
 
     Args:
         high: The largest number that it returns, at most 255.
+        content: Returns what it can hold in a world, in a view of channels by name; networks leave out what the rules
+            of the world fix. By default anything.
 
     Raises:
         ValueError: If the number is not in 1..255, or the table has another channel of that name.
@@ -72,7 +97,7 @@ def channel(high: int = 255) -> Callable[[Callable[[Look], Tensor]], Callable[[L
         name, known = show.__name__, CHANNELS.get(show.__name__)
         if known is not None and known.show.__module__ != show.__module__:
             raise ValueError(f"{name} must be a new channel's name, {known.show.__module__} has one")
-        CHANNELS[name] = Channel(show, high)
+        CHANNELS[name] = Channel(show, high, content)
         return show
 
     return add
@@ -120,7 +145,7 @@ def wet(look: Look) -> Tensor:
     return look.wet.clamp(max=10) * 25
 
 
-@channel()
+@channel(content=_of_ground)
 def relative_elevation(look: Look) -> Tensor:
     """Return the height over the agent's own cell, 128 + 127 dz / 100 m."""
     elevation = look.state.landscape.elevation
@@ -138,13 +163,13 @@ def threat(look: Look) -> Tensor:
     return look.fire_risk
 
 
-@channel(high=252)
+@channel(high=252, content=lambda world, names: others_of("ugv", world))
 def other_ugv(look: Look) -> Tensor:
     """Return where other ground vehicles are, 63 each, four at most."""
     return look.others[:, :, PAPER_ROLES.index("ugv")]
 
 
-@channel(high=252)
+@channel(high=252, content=lambda world, names: others_of("uav", world))
 def other_uav(look: Look) -> Tensor:
     """Return where other aircraft are, 63 each, four at most."""
     return look.others[:, :, PAPER_ROLES.index("uav")]

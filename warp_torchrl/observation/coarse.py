@@ -4,6 +4,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import one_hot
 
+from warp_torchrl.content import Content, Empty, Quarters
 from warp_torchrl.observation.channels import ELEVATION_SCALE
 from warp_torchrl.observation.own import WIND_SCALE, steps_to_tick, time_left
 from warp_torchrl.symmetry import Planes, Target, TeamPlanes
@@ -68,6 +69,18 @@ def state_names(team: Team) -> tuple[str, ...]:
 def state_symmetry(team: Team) -> TeamPlanes:
     """Return how the state turns with the map."""
     return TeamPlanes(len(state_names(team)), STATE.index("fire"), (_FIRST_ROLE, len(team.role_names)))
+
+
+def picture_content(team: Team) -> tuple[Content, ...]:
+    """Return what each channel of the picture can hold."""
+    return (None, None, None if team.n_agents > 1 else Empty())
+
+
+def state_content(world: World) -> tuple[Content, ...]:
+    """Return what each channel of the critic's ``state`` can hold."""
+    held: dict[str, Content] = {role: Empty() for role in world.team.role_names if role not in world.team.agent_roles}
+    held |= {"elevation": Empty()} if world.is_flat else {}
+    return (*(held.get(name) for name in state_names(world.team)[:-1]), Quarters())
 
 
 def central_state(state: WorldState, world: World, forecast: Forecast) -> Tensor:

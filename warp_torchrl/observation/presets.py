@@ -10,6 +10,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from warp_torchrl.content import Content
 from warp_torchrl.observation.channels import CHANNELS, DEFAULT, FIRE, ages, check_channels, stages
 from warp_torchrl.observation.coarse import (
     CENTRED_HIGHS,
@@ -17,6 +18,7 @@ from warp_torchrl.observation.coarse import (
     PICTURE_SIDE,
     centred_picture,
     picture,
+    picture_content,
     picture_symmetry,
 )
 from warp_torchrl.observation.own import IDENTITY, SELF, SELF_SIZE, own_entries, own_vector
@@ -37,6 +39,7 @@ class Space(NamedTuple):
     high: float | tuple[float, ...]  # of all numbers, or one for each channel
     names: tuple[str, ...] = ()  # of the channels of a map or the entries of a vector, where they have any
     symmetry: Planes | Vector | None = None  # how it turns with the map; None: networks read it north up alone
+    content: tuple[Content, ...] = ()  # of each channel of a map, what it can hold in this world; (): anything
 
     def bounds(self) -> tuple[Tensor, Tensor]:
         """Return the least and the largest value of each number, both of the entry's shape and type."""
@@ -73,9 +76,10 @@ class Local:
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
         side, highs = 2 * self.radius + 1, tuple(CHANNELS[name].high for name in self.channels)
-        own = own_entries(world.team, self.identity)
+        own, content = own_entries(world.team, self.identity), self._told(view_content(self.channels, world))
+        symmetry = view_symmetry(self.channels)
         return {
-            "view": Space((len(highs), side, side), torch.uint8, 0, highs, self.channels, view_symmetry(self.channels)),
+            "view": Space((len(highs), side, side), torch.uint8, 0, highs, self.channels, symmetry, content),
             "self": Space((len(own.names),), torch.float32, -3.0, 3.0, own.names, own),
         }
 
@@ -83,6 +87,10 @@ class Local:
         """Return ``view`` uint8 [B, A, C, V, V] and ``self`` float32 [B, A, F]."""
         own = own_vector(state, world, self.identity)
         return {"view": egocentric_view(state, world, forecast, self.radius, self.channels), "self": own}
+
+    def _told(self, content: tuple[Content, ...]) -> tuple[Content, ...]:
+        """Return what is told of channels; nothing for a subclass that shows them in a way of its own."""
+        return content if type(self).__call__.__module__ == __name__ else ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +114,8 @@ class Surroundings(Local):
         side = 2 * PICTURE_SIDE - 1 if self.centred else PICTURE_SIDE
         dtype = torch.uint8 if self.centred else torch.float32
         high: float | tuple[float, ...] = CENTRED_HIGHS if self.centred else 1.0
-        space = Space((len(PICTURE), side, side), dtype, 0, high, PICTURE, picture_symmetry(self.centred))
+        shape, symmetry = (len(PICTURE), side, side), picture_symmetry(self.centred)
+        space = Space(shape, dtype, 0, high, PICTURE, symmetry, self._told(picture_content(world.team)))
         return {**super().spaces(world), "picture": space}
 
     def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
@@ -153,6 +162,11 @@ PAPER_SYMMETRY = Planes(3, Target(2), is_flat=True)
 def view_symmetry(channels: Sequence[str]) -> Planes:
     """Return how a view in channels by name turns with the map; agents turn towards ``FIRE`` if it shows it."""
     return Planes(len(channels), Target(list(channels).index(FIRE)) if FIRE in channels else None)
+
+
+def view_content(channels: Sequence[str], world: World) -> tuple[Content, ...]:
+    """Return what each channel of a view in channels by name can hold."""
+    return tuple(CHANNELS[name].content(world, channels) for name in channels)
 
 
 def former_symmetry(name: str, shape: tuple[int, ...], names: tuple[str, ...]) -> Planes | Vector | None:

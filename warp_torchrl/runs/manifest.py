@@ -160,7 +160,8 @@ def first_line(error: Exception) -> str:
 
 def _signature_to_json(signature: Signature) -> dict[str, Any]:
     def entry(each: Entry) -> dict[str, Any]:
-        return each._asdict() | {"symmetry": None if each.symmetry is None else to_plain(each.symmetry)}
+        fields = each._asdict() | {"symmetry": None if each.symmetry is None else to_plain(each.symmetry)}
+        return {name: value for name, value in fields.items() if name != "content"}  # of the world, not of the policy
 
     return signature._asdict() | {
         "observation": {name: entry(each) for name, each in signature.observation.items()},

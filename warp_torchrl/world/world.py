@@ -80,6 +80,11 @@ class World:
         return map_size(self.landscape.size)
 
     @property
+    def is_flat(self) -> bool:
+        """Return whether the ground of every world is flat, as the landscape says; one that does not say may not be."""
+        return bool(getattr(self.landscape, "is_flat", False))
+
+    @property
     def side_of_cell(self) -> float:
         """Return the side of a cell in force [m]."""
         return getattr(self.landscape, "cell_size", 30.0) if self.cell_size is None else self.cell_size

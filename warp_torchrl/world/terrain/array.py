@@ -121,6 +121,11 @@ class Array:
         return self._crop(key)
 
     @property
+    def is_flat(self) -> bool:
+        """Return whether there is no elevation."""
+        return self._crop.elevation is None
+
+    @property
     def extent(self) -> tuple[int, int]:
         """Return (rows, columns) of the whole array."""
         return self._crop.extent

@@ -161,11 +161,16 @@ class Perlin:
         noise = self.noise(key)
         cover = self._cover(noise)
         elevation = None
-        if _ends(self.relief)[1] > 0.0:
+        if not self.is_flat:
             ground = self.noise(key, Stream.ELEVATION) if self.independent_elevation else noise
             elevation = self._draw(key, "relief").to(torch.float32)[:, None, None] * ground
         age = draw_age(key, cover) if self.ages == "drawn" else holds_trees(cover).to(torch.uint8) * OLDEST
         return Landscape(cover=cover, age=age, elevation=elevation)
+
+    @property
+    def is_flat(self) -> bool:
+        """Return whether all ground is flat."""
+        return _ends(self.relief)[1] == 0.0
 
     def noise(self, key: Tensor, stream: Stream = Stream.NOISE) -> Tensor:
         """Return the noise scaled to [0, 1] on each map, float32 [B, H, W]."""

@@ -138,6 +138,11 @@ class Raster:
         return self._grid
 
     @property
+    def is_flat(self) -> bool:
+        """Return whether there is no elevation."""
+        return self._crop.elevation is None
+
+    @property
     def extent(self) -> tuple[int, int]:
         """Return (rows, columns) of the grid."""
         return self._crop.extent
