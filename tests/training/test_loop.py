@@ -136,7 +136,7 @@ def test_a_run_resumed_equals_a_run_not_interrupted(tmp_path, never_stopped, sto
     folder, whole = never_stopped(name)
     (tmp_path / "cut").mkdir()
     first = tiny(tmp_path / "cut", *TINIER, *RUNS[name])
-    batches = first._batches()
+    batches = first.batches()
     for _ in range(stop_after):
         first.metrics.add({"time/frames": 0, "time/seconds": 0.0, "time/fps": 0.0, **first._learn(next(batches))})
     first.save()
@@ -462,7 +462,7 @@ def test_replayed_and_remembered_batches_have_one_size(tmp_path, overrides):
 def test_a_batch_of_segments_is_one_of_all_steps(tmp_path):
     def first(name, *overrides):
         (tmp_path / name).mkdir()
-        return next(tiny(tmp_path / name, *overrides)._batches())
+        return next(tiny(tmp_path / name, *overrides).batches())
 
     one = first("whole", "collector.first_steps=8")
     other = first("parts", "collector.first_steps=4", "collector.grows_at=0")

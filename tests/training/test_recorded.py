@@ -17,7 +17,7 @@ def learned(folder, *overrides):
     """Rows and weights after three batches."""
     with unread():
         run = training(folder, "collector.first_steps=32", *overrides)
-        batches = run._batches()
+        batches = run.batches()
         rows = [run._learn(next(batches)) for _ in range(3)]
         run.close()
     return rows, [each.detach().clone() for each in run.learner.loss.parameters()], run
@@ -44,7 +44,7 @@ def test_the_rate_of_a_recorded_update_falls(tmp_path):
 def test_a_recorded_update_refuses_what_is_not_finite(tmp_path):
     with unread():
         run = training(tmp_path, "graph=true")
-        batch = next(run._batches())
+        batch = next(run.batches())
         run.learner.store(batch)
         for sample in run.learner.samples():
             weights = [each.detach().clone() for each in run.learner.loss.parameters()]
@@ -64,7 +64,7 @@ def test_no_size_in_loss_and_gradients_depends_on_a_result(tmp_path):
     with unread():
         run = training(tmp_path, "model.dtype=float32")
         learner = run.learner
-        learner.store(next(run._batches()))
+        learner.store(next(run.batches()))
         sample = next(iter(learner.samples()))
         run._update(sample)
         names, leaves = zip(*sample.flatten_keys(".").items())

@@ -34,7 +34,7 @@ def training(folder, *overrides):
 def test_an_iteration_waits_three_times_at_most(tmp_path, overrides):
     with unread():
         run = training(tmp_path, *overrides)
-        batches = run._batches()
+        batches = run.batches()
         run._learn(next(batches))
         with counted_waits(DEVICE) as waits:
             row = run._learn(next(batches))
@@ -46,7 +46,7 @@ def test_an_iteration_waits_three_times_at_most(tmp_path, overrides):
 def test_a_step_and_an_update_do_not_wait(tmp_path):
     with unread():
         run = training(tmp_path)
-        batch = next(run._batches())
+        batch = next(run.batches())
         shown, learner = run.env.reset(), run.learner
         learner.store(batch)
         sample = next(iter(learner.samples()))
@@ -65,7 +65,7 @@ def test_the_same_is_learned_without_reading(tmp_path):
 
     def two_iterations():
         run = training(tmp_path)
-        batches = run._batches()
+        batches = run.batches()
         rows = [run._learn(next(batches)) for _ in range(2)]
         run.close()
         return rows, run.env.state_dict()

@@ -75,10 +75,10 @@ def environment_speed(
     return [row | {"ratio": row["agent_steps_per_second"] / peer} for row in rows] + skipped
 
 
-def whole_episodes(env: "WildfireEnv") -> Callable[[], int]:
-    """Return a function that plays random actions for as many steps as the longest first episode of a world has.
+def random_play(env: "WildfireEnv") -> Callable[[int], Tensor]:
+    """Return a function that plays random actions for a number of steps, and returns which worlds ended, bool [B, 1].
 
-    Worlds that end start again. It returns the worlds' steps.
+    Worlds that end start again.
     """
     now = env.reset()
 
@@ -90,6 +90,15 @@ def whole_episodes(env: "WildfireEnv") -> Callable[[], int]:
             ended |= left["next", "done"]
         return ended
 
+    return play
+
+
+def whole_episodes(env: "WildfireEnv") -> Callable[[], int]:
+    """Return a function that plays random actions for as many steps as the longest first episode of a world has.
+
+    Worlds that end start again. It returns the worlds' steps.
+    """
+    play = random_play(env)
     ended, longest = play(1), 1
     while longest < _LONGEST and not ended.all():
         ended, longest = ended | play(1), longest + 1

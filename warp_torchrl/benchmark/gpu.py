@@ -200,7 +200,7 @@ def _trained(device: str, overrides: list[str]) -> Iterator[tuple[Training, Iter
     with tempfile.TemporaryDirectory() as folder:
         training = Training(plan, SavedConfig(), Path(folder))
         try:
-            yield training, iter(training.collection)
+            yield training, training.batches()
         finally:
             training.close()
 

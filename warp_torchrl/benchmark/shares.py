@@ -51,6 +51,7 @@ def training_shares(training: Training, batches: Iterator[TensorDictBase], count
             batch = next(batches)
             watch.lap("collector")
             training._learn(batch)
+            training.go_on()
             watch.lap("other")
     total = sum(watch.seconds.values())
     collecting = sum(watch.seconds[part] for part in _COLLECTING)

@@ -6,9 +6,11 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from warp_torchrl import parallel
 from warp_torchrl.benchmark.shares import training_shares
 from warp_torchrl.benchmark.stable_baselines import NAME, open_stable_baselines, reason_against
 from warp_torchrl.benchmark.timing import spread, take_turns
+from warp_torchrl.commands.following import FOLLOWING
 from warp_torchrl.config.compose import SavedConfig, compose_config, plain
 from warp_torchrl.config.run_config import run_config
 from warp_torchrl.training.loop import Training
@@ -28,16 +30,24 @@ def training_speed(
     Returns:
         A row for each way to train, with ``agent_steps_per_second``; and the shares of our training loop.
     """
-    plan = run_config(plain(compose_config("train", [*overrides, f"device={device}"])))
+    values = plain(compose_config("train", [*overrides, f"device={device}"]))
+    plan = run_config(values)
     agents = plan.world.team.n_agents
     common = {"scenario": plan.scenario, "size": "{} x {}".format(*plan.world.size), "agents": agents}
-    common["worlds"] = plan.n_worlds
+    common |= {"worlds": plan.n_worlds, "processes": plan.n_processes()}
     reason = reason_against(plan) if with_peer else None
     with ExitStack() as stack:
+        stack.enter_context(parallel.processes(plan.n_processes(), values, FOLLOWING))
         training = Training(plan, SavedConfig(), Path(stack.enter_context(tempfile.TemporaryDirectory())))
         stack.callback(training.close)
-        batches = iter(training.collection)
-        contenders: dict[str, Callable[[], object]] = {"training": lambda: training._learn(next(batches))}
+        training.join()
+        batches = training.batches()
+
+        def learn() -> None:
+            training._learn(next(batches))
+            training.go_on()
+
+        contenders: dict[str, Callable[[], object]] = {"training": learn}
         if with_peer and reason is None:
             contenders[NAME], close = open_stable_baselines(plan)
             stack.callback(close)

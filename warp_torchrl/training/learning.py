@@ -179,7 +179,7 @@ class Learning:
         if state.get("random_cuda") is not None:
             torch.cuda.set_rng_state(state["random_cuda"], self.env.device)
 
-    def _join(self) -> None:
+    def join(self) -> None:
         """Give the other processes what the first one begins with, or has resumed."""
         if parallel.size() == 1:
             return

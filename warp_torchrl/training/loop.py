@@ -63,7 +63,7 @@ class Training(Learning):
         with DeferredSignals() as signals:
             tracker = self.run_config.logger.open(self.run) if self.is_first else None
             try:
-                self._join()
+                self.join()
                 with self._bar() as bar:
                     self._train(signals, tracker, bar)
                 if self.is_first:
@@ -98,7 +98,7 @@ class Training(Learning):
         if notice is not None and self.frames < total and self.is_first:
             log.log(logging.WARNING if total < self.frames_per_batch else logging.INFO, notice)
         self._began = time.perf_counter() - self.seconds
-        for batch in self._batches() if self.frames < total else ():
+        for batch in self.batches() if self.frames < total else ():
             row = self._learn(batch)
             row["evaluation/saved"] = self._evaluate() if self.is_first else None
             if tracker is not None and bar is not None:
@@ -106,11 +106,18 @@ class Training(Learning):
             if self.frames >= total:
                 break
             due = signals.received or self._is_regular(self.frames) or self.clock.is_due()
-            saves, received = parallel.share((bool(due), signals.received))
+            saves, received = self.go_on(bool(due), signals.received)
             if saves:
                 self.save()
             if received:
                 raise Stopped(received, self.run)
+
+    def go_on(self, saves: bool = False, received: int = 0) -> tuple[bool, int]:
+        """Return in every process what the first one decides after a batch: whether to save, and a signal to stop at.
+
+        Every process must call it after each batch but the last.
+        """
+        return parallel.share((saves, received))
 
     _last_seconds = _next_line = 0.0
 
