@@ -32,12 +32,15 @@ class RowStorage(LazyTensorStorage):
 
 
 class BatchStorage(RowStorage):
-    """Storage of one batch, which fills it: each ``set`` of so many rows replaces them all, in order, cursor unread."""
+    """Storage of one batch at a time, of its size or smaller: once emptied, it is filled from the first row on.
+
+    So it need not read where rows go.
+    """
 
     def set(self, cursor: int | Sequence[int] | slice | Tensor, data: Any, *, set_cursor: bool = True) -> None:
-        """Put a batch in the place of the former one; fewer rows at ``cursor``."""
-        whole = isinstance(cursor, Tensor) and len(cursor) == self.max_size
-        super().set(slice(0, self.max_size) if whole else cursor, data, set_cursor=set_cursor)
+        """Put a batch in the first rows; where there is one already, further rows at ``cursor``."""
+        first = isinstance(cursor, Tensor) and len(self) == 0
+        super().set(slice(0, len(data)) if first else cursor, data, set_cursor=set_cursor)
 
 
 def _rows(data: TensorDictBase, index: Tensor) -> TensorDict:

@@ -5,7 +5,7 @@ Every process of a run goes through it with its share of the worlds; the first o
 
 import logging
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from copy import deepcopy
 from pathlib import Path
@@ -57,7 +57,6 @@ class Training:
         worlds = run_config.n_worlds // parallel.size()
         first = first_world_seed(run_config.seed) + worlds * parallel.rank()
         self.env = run_config.make_training_env(worlds, first)
-        self.frames_per_batch = run_config.collector.steps * run_config.n_worlds
         learner = run_config.algorithm.build(self.env, run_config.model, run_config.collector.steps * worlds)
         if run_config.compile:
             learner.terms = compile_function(learner.terms)
@@ -74,6 +73,7 @@ class Training:
         self.mode: str | None = None
         self.metrics = MetricsFile(run / "metrics.csv")
         self._scheduled = self.learner.schedule(0.0)
+        self._segments = self._segments_now()
         self._others: list[dict[str, Any]] | None = None
         """What a checkpoint holds of the other processes."""
         if not self.is_first:
@@ -122,7 +122,7 @@ class Training:
         if notice is not None and self.frames < total and self.is_first:
             log.log(logging.WARNING if total < self.frames_per_batch else logging.INFO, notice)
         self._began = time.perf_counter() - self.seconds
-        for batch in self.collection if self.frames < total else ():
+        for batch in self._batches() if self.frames < total else ():
             row = self._learn(batch)
             if tracker is not None and bar is not None:
                 self._report(row, tracker, bar)
@@ -136,17 +136,39 @@ class Training:
                 raise Stopped(received, self.run)
 
     _last_seconds = _next_line = 0.0
+    _last_frames = 0
+
+    @property
+    def frames_per_batch(self) -> int:
+        """Return the frames of the current batch, of all processes."""
+        return self.run_config.n_worlds * self.run_config.collector.segment * self._segments
+
+    def _segments_now(self) -> int:
+        """Return of how many segments the next batch consists."""
+        grows = self.learner.batches_grow and not self.run_config.graph  # a graph has one size
+        progress = min(1.0, self.frames / self.run_config.total_frames) if grows else 1.0
+        return self.run_config.collector.segments(progress)
+
+    def _batches(self) -> Iterator[TensorDictBase]:
+        """Yield batches [B, T] of so many segments as are due."""
+        held: list[TensorDictBase] = []
+        for segment in self.collection:
+            held.append(segment if self._segments == 1 else segment.clone())  # the collector writes over it
+            if len(held) >= self._segments:
+                yield held[0] if len(held) == 1 else torch.cat(held, dim=1)
+                held = []
 
     def _report(self, row: dict[str, float | None], tracker: Tracker, bar: tqdm) -> None:
         """Write a row to ``metrics.csv``, the tracker, and the bar or the log."""
         total = self.run_config.total_frames
         self.seconds = time.perf_counter() - self._began
-        rate = self.frames_per_batch / max(self.seconds - self._last_seconds, 1e-9)
-        self._last_seconds = self.seconds
+        frames = self.frames - self._last_frames
+        rate = frames / max(self.seconds - self._last_seconds, 1e-9)
+        self._last_seconds, self._last_frames = self.seconds, self.frames
         row = {"time/frames": self.frames, "time/seconds": self.seconds, "time/fps": rate, **row}
         self.metrics.add(row)
         tracker.log(row, self.frames)
-        bar.update(self.frames_per_batch)
+        bar.update(frames)
         bar.set_postfix(saved=row["world/saved"], refresh=False)
         if bar.disable and (self.seconds >= self._next_line or self.frames >= total):
             self._next_line = self.seconds + _SECONDS_BETWEEN_LINES
@@ -192,14 +214,15 @@ class Training:
         row["train/loss"] = sum(means[key] for key in learner.loss_keys) if updates else None
         row |= dict.fromkeys(TRAIN_COLUMNS)
         row |= {column: means.get(key) for key, column in learner.columns.items()} | self._scheduled
+        row["evaluation/saved"] = self._evaluate() if self.is_first else None
         self._schedule()
         self.collection.refresh()
-        row["evaluation/saved"] = self._evaluate() if self.is_first else None
         return row
 
     def _schedule(self) -> None:
         """Update the scheduled hyperparameters; their columns belong to the next row."""
         self._scheduled = self.learner.schedule(min(1.0, self.frames / self.run_config.total_frames))
+        self._segments = self._segments_now()
 
     def log_new_total(self, before: int) -> None:
         """Log the scheduled hyperparameters that change because ``total_frames`` was changed.
@@ -343,7 +366,7 @@ class Training:
         self.learner.loss.load_state_dict(loss)
         self.learner.optimizer.load_state_dict(state["optimizer"])
         self.frames, self.seconds = int(state["frames"]), float(state["seconds"])
-        self.saved_at, self._last_seconds = self.frames, self.seconds
+        self.saved_at, self._last_frames, self._last_seconds = self.frames, self.frames, self.seconds
         self._schedule()
 
     def _restore_own(self, state: Mapping[str, Any]) -> None:
