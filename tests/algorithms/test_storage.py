@@ -3,9 +3,11 @@
 import pytest
 import torch
 from tensordict import TensorDict
-from torchrl.data import LazyTensorStorage
+from torchrl.data import LazyTensorStorage, SamplerWithoutReplacement, TensorDictReplayBuffer
 
-from warp_torchrl.algorithms.storage import RowStorage
+from warp_torchrl.algorithms.storage import BatchStorage, RowStorage
+from warp_torchrl.benchmark.waits import counted_waits
+from warp_torchrl.device import unread
 
 TRANSITIONS = TensorDict(
     agents=TensorDict(
@@ -86,3 +88,13 @@ def test_a_sample_is_a_copy():
 def test_nothing_is_taken_of_an_empty_storage():
     with pytest.raises(RuntimeError):
         RowStorage(6).get(torch.tensor([0]))
+
+
+def test_a_batch_lies_in_the_first_rows_though_no_cursor_is_read():
+    buffer = TensorDictReplayBuffer(storage=BatchStorage(6), sampler=SamplerWithoutReplacement())
+    for batch in (TRANSITIONS, TRANSITIONS[2:], TRANSITIONS[:3]):
+        buffer.empty()
+        with counted_waits("cpu") as waits, unread():
+            buffer.extend(batch.clone())
+        assert len(buffer) == len(batch) and (buffer[:].exclude("index") == batch).all()
+    assert not waits.places

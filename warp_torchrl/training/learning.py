@@ -70,7 +70,7 @@ class Learning:
         progress = min(1.0, self.frames / self.run_config.total_frames) if self.batches_grow else 1.0
         return self.run_config.collector.segments(progress)
 
-    def _batches(self) -> Iterator[TensorDictBase]:
+    def batches(self) -> Iterator[TensorDictBase]:
         """Yield batches [B, T] of so many segments as are due."""
         held: list[TensorDictBase] = []
         for segment in self.collection:

@@ -14,8 +14,8 @@ Update = Callable[[TensorDictBase], dict[str, Tensor]]
 class RecordedUpdate:
     """A function that learns from a sample, recorded.
 
-    Numbers that a schedule changes must be tensors: so the learning rate becomes one. A sample of another size, as the
-    last of a pass may be, is learned from without the recording.
+    Numbers that a schedule changes must be tensors: so the learning rate becomes one. Samples of each size, as batches
+    grow or the last of a pass is smaller, have a recording of their own.
 
     Args:
         update: Learns from a sample and returns numbers by name, [] each.
@@ -24,18 +24,17 @@ class RecordedUpdate:
 
     def __init__(self, update: Update, optimizer: torch.optim.Optimizer) -> None:
         self._update, self._optimizer = update, optimizer
-        self._graph = Graph(self._flat)
+        self._graphs: dict[torch.Size, Graph] = {}
         self._like: TensorDictBase | None = None
         self._names: list[str] = []
 
     def __call__(self, sample: TensorDictBase) -> dict[str, Tensor]:
         """Learn from a sample, and return what the update does."""
         if self._like is None:
-            self._like = sample
             _make_capturable(self._optimizer)
-        elif sample.batch_size != self._like.batch_size:
-            return self._update(sample)
-        made = self._graph(_leaves(sample))  # names its results
+        self._like = sample
+        graph = self._graphs.setdefault(sample.batch_size, Graph(self._flat))
+        made = graph(_leaves(sample))  # names its results
         return dict(zip(self._names, made, strict=True))
 
     def _flat(self, given: list[Tensor]) -> list[Tensor]:
