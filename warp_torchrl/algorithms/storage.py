@@ -32,13 +32,6 @@ class RowStorage(LazyTensorStorage):
 
 
 class BatchStorage(RowStorage):
-<<<<<<< HEAD
-    """Storage of one batch: each ``set`` puts rows from the first on, in order, and leaves the cursor unread."""
-
-    def set(self, cursor: int | Sequence[int] | slice | Tensor, data: Any, *, set_cursor: bool = True) -> None:
-        """Put a batch in the place of the former one."""
-        super().set(slice(0, len(data)), data, set_cursor=set_cursor)
-=======
     """Storage of one batch at a time, of its size or smaller: once emptied, it is filled from the first row on.
 
     So it need not read where rows go.
@@ -48,7 +41,6 @@ class BatchStorage(RowStorage):
         """Put a batch in the first rows; where there is one already, further rows at ``cursor``."""
         first = isinstance(cursor, Tensor) and len(self) == 0
         super().set(slice(0, len(data)) if first else cursor, data, set_cursor=set_cursor)
->>>>>>> wt-gpu
 
 
 def _rows(data: TensorDictBase, index: Tensor) -> TensorDict:
