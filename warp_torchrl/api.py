@@ -26,6 +26,7 @@ def make_env(
     overrides: Sequence[str] = (),
     validate: bool | None = None,
     compile: bool = False,
+    graph: bool = False,
 ) -> WildfireEnv:
     """Make the environment of a scenario.
 
@@ -38,6 +39,7 @@ def make_env(
         overrides: In the command line's grammar, ``["fire=paper", "team.n_agents=3"]``.
         validate: Check actions on CUDA too.
         compile: Compile the step with ``torch.compile``.
+        graph: Record the step as one CUDA graph, where the device is cuda.
 
     Returns:
         A TorchRL ``EnvBase`` of batch size [B].
@@ -57,6 +59,7 @@ def make_env(
         device=device,
         validate=validate,
         fuse=compile,
+        graph=graph,
     )
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from hydra import compose, initialize_config_dir
 from omegaconf import OmegaConf
 from torch._inductor.exc import InvalidCxxCompiler
@@ -153,7 +154,12 @@ def test_every_scenario_is_a_run(scenario):
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
 def test_every_experiment_is_a_run(experiment):
-    plan = run_config(plain(compose_config("train", [f"experiment={experiment}"])))
+    values = plain(compose_config("train", [f"experiment={experiment}"]))
+    if values["device"] == "cuda" and not torch.cuda.is_available():
+        with pytest.raises(ConfigError, match="device must be one of this machine's 0 CUDA devices"):
+            run_config(values)
+        values["device"] = "cpu"
+    plan = run_config(values)
     assert plan.total_frames >= plan.n_worlds * plan.collector.steps
 
 

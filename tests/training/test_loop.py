@@ -17,7 +17,8 @@ from warp_torchrl.config.run_config import run_config
 from warp_torchrl.models import ACTION
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
-from warp_torchrl.training.loop import NumericalFailure, Training
+from warp_torchrl.training.finite import NumericalFailure
+from warp_torchrl.training.loop import Training
 from warp_torchrl.training.signals import Stopped
 
 TINY = [
@@ -47,6 +48,10 @@ def tiny(run, *overrides):
     config = compose_config("train", [*TINY, *overrides])
     values = {k: v for k, v in without_targets(plain(config)).items() if k not in ("resume", "debug")}
     return Training(run_config(plain(config)), SavedConfig(choices={}, values=values), run)
+
+
+def frames(run):
+    return [int(row["time/frames"]) for row in rows(run)]
 
 
 def rows(run):
@@ -84,6 +89,7 @@ RUNS = {
                        "wind=wandering", "reward=collaborative", "team.tank=3"],
     "taught": ["imitation.teacher=greedy", "imitation.until=0.7"],
     "remembers": ["model.memory=8"],
+    "grows": ["collector.first_steps=2", "collector.grows_at=0.3", "total_frames=72"],
     "compiled": ["compile=true", "imitation.teacher=greedy", "imitation.until=0.7"],
     **{name: [f"algorithm={name}", *(REPLAY if name in REPLAYS else [])] for name in ALGORITHMS},
 }  # fmt: skip
@@ -111,6 +117,8 @@ FAST = {
     ("all that moves", 1),
     ("taught", 3),
     ("remembers", 3),
+    ("grows", 1),
+    ("grows", 3),
     ("mappo", LAST),
     ("dqn", 1),
     *((name, 3) for name in ("ippo", "a2c", *REPLAYS[1:])),
@@ -128,7 +136,7 @@ def test_a_run_resumed_equals_a_run_not_interrupted(tmp_path, never_stopped, sto
     folder, whole = never_stopped(name)
     (tmp_path / "cut").mkdir()
     first = tiny(tmp_path / "cut", *TINIER, *RUNS[name])
-    batches = iter(first.collection)
+    batches = first._batches()
     for _ in range(stop_after):
         first.metrics.add({"time/frames": 0, "time/seconds": 0.0, "time/fps": 0.0, **first._learn(next(batches))})
     first.save()
@@ -432,3 +440,32 @@ def test_networks_of_another_kind_are_no_start(finished, tmp_path, change):
         training.start_from(newest(finished[0])[0])
     assert all(torch.equal(value, before[name]) for name, value in flattened(training.state_dict()).items()
                if isinstance(value, torch.Tensor))  # fmt: skip
+
+
+def test_batches_and_their_minibatches_grow(tmp_path):
+    training = tiny(tmp_path, "collector.first_steps=4", "collector.grows_at=0.5", "algorithm.epochs=1")
+    sizes = []
+    update = training._update
+    training._update = lambda sample: sizes.append(len(sample)) or update(sample)
+    training.train()
+    assert frames(tmp_path) == [16, 32, 48, 64, 80, 96, 128, 160, 192]
+    assert sizes == [8] * 12 + [16] * 6  # two updates a batch
+
+
+@pytest.mark.parametrize("overrides", [["algorithm=dqn", *REPLAY], ["model.memory=8"]])
+def test_replayed_and_remembered_batches_have_one_size(tmp_path, overrides):
+    training = tiny(tmp_path, "collector.first_steps=4", "total_frames=64", *overrides)
+    training.train()
+    assert frames(tmp_path) == [32, 64]
+
+
+def test_a_batch_of_segments_is_one_of_all_steps(tmp_path):
+    def first(name, *overrides):
+        (tmp_path / name).mkdir()
+        return next(tiny(tmp_path / name, *overrides)._batches())
+
+    one = first("whole", "collector.first_steps=8")
+    other = first("parts", "collector.first_steps=4", "collector.grows_at=0")
+    assert one.shape == other.shape == (4, 8)
+    for key, value in one.items(include_nested=True, leaves_only=True):
+        assert torch.equal(value, other[key]), key

@@ -1,5 +1,8 @@
 """What a training tells of itself."""
 
+import pytest
+
+from warp_torchrl.collection.collectors import InProcess
 from warp_torchrl.training.progress import batch_size_notice, line
 
 ROW = {"time/frames": 104, "time/seconds": 3.2, "time/fps": 40.4, "world/saved": None, "rollout/ep_rew_mean": -1.234,
@@ -15,9 +18,21 @@ def test_whole_batches_end_at_a_hundred_per_cent():
 
 
 def test_it_is_told_where_whole_batches_are_not_what_was_asked_for():
-    assert batch_size_notice(128, 4, 8) is None
-    assert batch_size_notice(20, 4, 8) == (
+    assert batch_size_notice(128, 128, 4, 8) is None
+    assert batch_size_notice(20, 32, 4, 8) == (
         "total_frames=20 is less than one batch: one batch is 32 frames, n_worlds=4 x collector.steps=8, and one is "
         "trained on"
     )
-    assert batch_size_notice(100, 4, 8).endswith(": training ends at 128 frames, not at total_frames=100")
+    assert batch_size_notice(100, 128, 4, 8).endswith(": training ends at 128 frames, not at total_frames=100")
+    assert batch_size_notice(100, 128, 4, 4, "first_steps").startswith(
+        "one batch is 16 frames, n_worlds=4 x collector.f"
+    )
+
+
+@pytest.mark.parametrize(
+    ("total", "grows", "end"),
+    [(192, True, 192), (190, True, 192), (200, True, 208), (192, False, 192), (200, False, 224), (10, True, 16)],
+)
+def test_a_training_ends_with_a_whole_batch(total, grows, end):
+    # Four worlds: batches of 16 frames up to the half, then of 32.
+    assert InProcess(steps=8, first_steps=4, grows_at=0.5).end(total, 4, grows) == end

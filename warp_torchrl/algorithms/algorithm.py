@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import torch
+from torch import Tensor
 from torchrl.modules import MaskedCategorical, ProbabilisticActor
 
 from warp_torchrl.models import ACTION, ACTION_MASK, LOG_PROB, LOGITS, Mlp, Signature
@@ -60,7 +61,10 @@ class Algorithm:
         """Set the optimiser's learning rate to that of progress in 0..1, and return it."""
         rate = self.learning_rate * falling(1.0, self.learning_rate_end, progress)
         for group in optimizer.param_groups:
-            group["lr"] = rate
+            if isinstance(group["lr"], Tensor):  # that of a step which a GPU has recorded
+                group["lr"].fill_(rate)
+            else:
+                group["lr"] = rate
         return rate
 
 

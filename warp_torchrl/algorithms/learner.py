@@ -40,6 +40,7 @@ class Learner:
         after_step: Called with each sample once the optimiser has stepped.
         schedule: Sets the scheduled hyperparameters for progress in 0..1, and returns them as columns.
         keeps: Further objects that an exact resume needs, by name.
+        batches_grow: Whether ``store`` takes smaller batches too, as whole parts of the largest.
     """
 
     policy: TensorDictModuleBase
@@ -55,3 +56,4 @@ class Learner:
     after_step: Callable[[TensorDictBase], None]
     schedule: Callable[[float], dict[str, float]]
     keeps: Mapping[str, Stateful] = field(default_factory=dict)
+    batches_grow: bool = False

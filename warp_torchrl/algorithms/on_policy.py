@@ -15,7 +15,8 @@ from torchrl.objectives import LossModule
 from warp_torchrl import parallel
 from warp_torchrl.algorithms.algorithm import Algorithm, falling, masked_actor
 from warp_torchrl.algorithms.learner import Learner
-from warp_torchrl.algorithms.storage import RowStorage
+from warp_torchrl.algorithms.storage import BatchStorage
+from warp_torchrl.device import reads_freely
 from warp_torchrl.models import (
     ACTION,
     CANONICAL,
@@ -60,8 +61,8 @@ class OnPolicy(Algorithm):
         entropy_coeff: Weight of the entropy bonus at the start.
         entropy_coeff_end: At the end; it falls linearly.
         critic_coeff: Weight of the value loss.
-        minibatch_size: World steps in a minibatch (each has one sample an agent); where actors remember, in as many
-            whole sequences as fit, one at least.
+        minibatch_size: World steps in a minibatch of the largest batch (each has one sample an agent), and in
+            proportion of a smaller one; where actors remember, in as many whole sequences as fit, one at least.
 
     Raises:
         ValueError: If a value is out of its range.
@@ -107,10 +108,9 @@ class OnPolicy(Algorithm):
         memory = Recollection(policy)
         steps = frames_per_batch // env.batch_size[0] if memory.actors else 1  # in a row of the buffer
         buffer = TensorDictReplayBuffer(
-            storage=RowStorage(frames_per_batch // steps, device=env.device),
-            sampler=SamplerWithoutReplacement(),
-            batch_size=max(1, min(self.minibatch_size // parallel.size(), frames_per_batch) // steps),
+            storage=BatchStorage(frames_per_batch // steps, device=env.device), sampler=SamplerWithoutReplacement()
         )
+        largest = min(self.minibatch_size // parallel.size(), frames_per_batch) // steps
         standardises = self.standardises() if parallel.size() > 1 else None
 
         def store(batch: TensorDictBase) -> None:
@@ -121,7 +121,8 @@ class OnPolicy(Algorithm):
             buffer.extend(narrowed(valued, arithmetic_of(critic, env.device.type)))
 
         def samples() -> Iterator[TensorDictBase]:
-            for sample in (each for _ in range(self.passes()) for each in buffer):
+            rows = max(1, largest * len(buffer) * steps // frames_per_batch)
+            for sample in (each for _ in range(self.passes()) for each in minibatches(buffer, rows)):
                 if standardises == "minibatch":
                     sample[ADVANTAGE] = parallel.standardised(sample[ADVANTAGE], dim=-2)
                 yield sample
@@ -140,6 +141,7 @@ class OnPolicy(Algorithm):
             after_step=lambda sample: None,
             schedule=schedule,
             keeps={"memory": memory} if memory.actors else {},
+            batches_grow=not memory.actors,
         )
 
     def loss(self, policy: ProbabilisticActor, critic: torch.nn.Module) -> LossModule:
@@ -165,6 +167,13 @@ class OnPolicy(Algorithm):
     def constants(self) -> dict[str, float]:
         """Return the columns that are constant."""
         return {}
+
+
+def minibatches(buffer: TensorDictReplayBuffer, rows: int) -> Iterator[TensorDictBase]:
+    """Yield minibatches of so many rows of a buffer until each row has been in one; its last ones may be fewer."""
+    buffer.sampler.ran_out = False
+    while not buffer.sampler.ran_out:
+        yield buffer.sample(rows)
 
 
 def with_advantages(
@@ -206,8 +215,11 @@ def _add_values(loss: LossModule, batch: TensorDictBase, canonical: CanonicalBat
     ends[:, -1] = True
     with loss.critic_network_params.to_module(loss.critic_network):
         value = loss.critic_network(batch.select(*keys))[VALUE]
-        last = loss.critic_network(canonical(batch["next"][ends]))[VALUE]
-    following = value.roll(-1, dims=1)
-    following[ends] = last
+        following = value.roll(-1, dims=1)
+        if reads_freely(ends.device):
+            following[ends] = loss.critic_network(canonical(batch["next"][ends]))[VALUE]
+        else:  # of every step, one after the other: how many ends there are would have to be read
+            last = [loss.critic_network(canonical(each))[VALUE] for each in batch["next"].unbind(1)]
+            following = torch.where(ends[..., None, None], torch.stack(last, dim=1), following)
     batch.set(VALUE, value)
     batch.set(("next", *VALUE), following)

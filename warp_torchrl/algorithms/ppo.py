@@ -9,7 +9,7 @@ from typing import Literal
 
 import torch
 from torch import Tensor
-from torchrl.modules import PopArtValueNorm, ProbabilisticActor
+from torchrl.modules import MaskedCategorical, PopArtValueNorm, ProbabilisticActor
 from torchrl.objectives.multiagent import IPPOLoss, MAPPOLoss
 
 from warp_torchrl import parallel
@@ -23,6 +23,21 @@ class SharedValueNorm(PopArtValueNorm):
         """Add value targets, float32 [..., 1], as many in every process: the mean of equal parts is that of all."""
         super().update(value_target)
         parallel.mean_((self.running_mean, self.running_mean_sq))
+
+
+class _MaskedEntropy:
+    """The entropy of masked actions as it is: TorchRL's losses ask at each update whether it is finite, and wait."""
+
+    def _get_entropy(self, dist: MaskedCategorical, adv_shape: torch.Size) -> Tensor:
+        return dist.entropy().unsqueeze(-1)
+
+
+class MaskedMappo(_MaskedEntropy, MAPPOLoss):
+    """TorchRL's MAPPO loss of masked actions."""
+
+
+class MaskedIppo(_MaskedEntropy, IPPOLoss):
+    """TorchRL's IPPO loss of masked actions."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,14 +55,14 @@ class Ppo(OnPolicy):
 
     clip_epsilon: float = 0.2
     value_norm: bool = True
-    epochs: int = 6
+    epochs: int = 3
 
     def __post_init__(self) -> None:
         self.check(clip_epsilon=(1e-4, 1.0), epochs=(1, 1000))
 
     def loss(self, policy: ProbabilisticActor, critic: torch.nn.Module) -> MAPPOLoss:
         """Return TorchRL's MAPPO or IPPO loss."""
-        loss_class = MAPPOLoss if self.central_critic else IPPOLoss
+        loss_class = MaskedMappo if self.central_critic else MaskedIppo
         loss = loss_class(
             policy,
             critic,

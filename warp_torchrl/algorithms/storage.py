@@ -31,6 +31,14 @@ class RowStorage(LazyTensorStorage):
         return super().get(index)
 
 
+class BatchStorage(RowStorage):
+    """Storage of one batch: each ``set`` puts rows from the first on, in order, and leaves the cursor unread."""
+
+    def set(self, cursor: int | Sequence[int] | slice | Tensor, data: Any, *, set_cursor: bool = True) -> None:
+        """Put a batch in the place of the former one."""
+        super().set(slice(0, len(data)), data, set_cursor=set_cursor)
+
+
 def _rows(data: TensorDictBase, index: Tensor) -> TensorDict:
     """Return the rows [n, ...] of a tensordict [N, ...]."""
     found = {

@@ -1,6 +1,7 @@
 """Measures speed, calibrates scenarios and checks fires: ``python -m warp_torchrl.benchmark WHAT``.
 
-WHAT is tick, env, train, scaling, tasks, rewards, fires or ellipses; several are measured one after the other.
+WHAT is tick, env, train, scaling, tasks, rewards, fires or ellipses; several are measured one after the other. Alone,
+gpu measures all that a card is asked, in under five minutes, and writes it to a file.
 """
 
 import argparse
@@ -12,8 +13,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import torch
+
 from warp_torchrl.benchmark.environments import LARGE, environment_speed, rate_table
 from warp_torchrl.benchmark.fires import ellipse_errors, fire_table, law_times
+from warp_torchrl.benchmark.gpu import SMALL, Size, measure_gpu
 from warp_torchrl.benchmark.growth_figure import draw_growth
 from warp_torchrl.benchmark.machine import header, machine, peak_memory
 from warp_torchrl.benchmark.scaling import growth, growth_table
@@ -129,7 +133,7 @@ _TABLES = {
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m warp_torchrl.benchmark", description=__doc__)
-    parser.add_argument("what", nargs="*", choices=[[], *_MEASURES], help="env and train by default")
+    parser.add_argument("what", nargs="*", choices=[[], *_MEASURES, "gpu"], help="env and train by default")
     parser.add_argument(
         "--scenario",
         nargs="+",
@@ -145,9 +149,21 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--episodes", type=int, default=EPISODES)
     parser.add_argument("--fires", type=int, default=1000, help="for fires: how many of each law")
     parser.add_argument("--reach", type=int, default=60, help="for ellipses: cells that the heads go")
-    parser.add_argument("--device", default="cpu")
+    parser.add_argument("--device", help="cpu by default; for gpu cuda, and cpu shows in small that it runs")
+    parser.add_argument("--file", type=Path, default=Path("gpu.json"), metavar="FILE.json", help="for gpu")
     parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
     return parser
+
+
+def _gpu(parser: argparse.ArgumentParser, options: Namespace) -> None:
+    if options.what != ["gpu"]:
+        parser.error("gpu is measured alone")
+    if options.device is None and not torch.cuda.is_available():
+        parser.exit(2, "error: torch finds no CUDA device here; --device cpu shows in small what gpu measures\n")
+    device = options.device or "cuda"
+    logging.getLogger("torchrl").setLevel(logging.WARNING)
+    if not measure_gpu(device, options.file, SMALL if device == "cpu" else Size()):
+        parser.exit(1, f"error: a part was not measured, see {options.file}\n")
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -156,6 +172,10 @@ def main(arguments: list[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     if options.plot is not None and find_spec("matplotlib") is None:
         parser.error("--plot needs matplotlib (extra figures)")
+    if "gpu" in options.what:
+        _gpu(parser, options)
+        return
+    options.device = options.device or "cpu"
     keep_freed_memory()
     logging.getLogger("torchrl").setLevel(logging.WARNING)  # it prints about its buffers to standard output
     described = machine(options.device)

@@ -53,24 +53,55 @@ class Collection(Protocol):
 class InProcess:
     """Collects in this process. A resumed run is exact.
 
+    Batches that grow learn fast at first and well in the end: many small updates from young networks, few precise ones
+    from skilled networks. Off-policy learners and recurrent actors have batches of one size.
+
     Attributes:
         steps: Steps of each world in a batch.
+        first_steps: Steps of each world in the first batches; where ``steps`` is no more, all batches have those.
+        grows_at: Share of the training after which batches have all ``steps``.
 
     Raises:
-        ValueError: If steps is not in 1..100000.
+        ValueError: If a value is out of its range, or first_steps does not divide more steps.
     """
 
     steps: int = 32
+    first_steps: int = 16
+    grows_at: float = 0.5
 
     def __post_init__(self) -> None:
-        check_fields(self, steps=(1, 100_000))
+        self.check()
+
+    def check(self, **ranges: tuple[float, float]) -> None:
+        """Check the numbers against their ranges, and further fields against ``ranges``."""
+        count = (1, 100_000)
+        check_fields(self, steps=count, first_steps=count, grows_at=(0.0, 1.0), **ranges)
+        if self.steps > self.first_steps and self.steps % self.first_steps:
+            raise ValueError(f"first_steps must divide steps, {self.steps}, got {self.first_steps}")
+
+    @property
+    def segment(self) -> int:
+        """Return the steps of each world between two looks at the collector; a batch has one or several segments."""
+        return min(self.steps, self.first_steps)
+
+    def segments(self, progress: float) -> int:
+        """Return how many segments a batch has at progress in 0..1."""
+        return 1 if progress < self.grows_at else self.steps // self.segment
+
+    def end(self, total: int, n_worlds: int, grows: bool) -> int:
+        """Return the frames after which a training of at least ``total`` frames ends, in whole batches."""
+        small, large = n_worlds * self.segment, n_worlds * self.steps
+        grown = small * -(-int(self.grows_at * total) // small) if grows else 0
+        if grown >= total:
+            return small * -(-total // small)
+        return grown + large * -(-(total - grown) // large)
 
     def check_worlds(self, n_worlds: int) -> None:
         """Accept any number of worlds."""
 
     def open(self, env: WildfireEnv, learner: Learner, make_env: MakeEnv, seed: int) -> Collection:
         """Return a collection in ``env`` with the learner's policy; it resets finished worlds at once."""
-        return _InProcessCollection(env, learner, self.steps)
+        return _InProcessCollection(env, learner, self.segment)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +120,7 @@ class MultiProcess(InProcess):
     workers: int = 2
 
     def __post_init__(self) -> None:
-        check_fields(self, steps=(1, 100_000), workers=(1, 1024))
+        self.check(workers=(1, 1024))
 
     def check_worlds(self, n_worlds: int) -> None:
         """Check that the workers can share the worlds equally.
@@ -104,7 +135,7 @@ class MultiProcess(InProcess):
         """Return a collection in workers, with as many worlds as ``env`` and the learner's policy."""
         share = env.batch_size[0] // self.workers
         starts = [seed + worker * share for worker in range(self.workers)]
-        frames = self.steps * env.batch_size[0]
+        frames = self.segment * env.batch_size[0]
 
         def start(first_episode: int) -> BaseCollector:
             makers = [partial(_worlds, make_env, share, each, first_episode) for each in starts]
@@ -118,7 +149,7 @@ class MultiProcess(InProcess):
                 **self.backend(),
             )
 
-        return _MultiProcessCollection(start, self.steps, env.device)
+        return _MultiProcessCollection(start, self.segment, env.device)
 
     def backend(self) -> dict[str, Any]:
         """Return the backend and its options for TorchRL's collector."""
@@ -143,7 +174,7 @@ class Ray(MultiProcess):
     gpus: float = 0.0
 
     def __post_init__(self) -> None:
-        check_fields(self, steps=(1, 100_000), workers=(1, 1024), cpus=(0.0, 1e4), gpus=(0.0, 64.0))
+        self.check(workers=(1, 1024), cpus=(0.0, 1e4), gpus=(0.0, 64.0))
         try:
             import ray  # noqa: F401
         except ImportError:

@@ -16,7 +16,8 @@ from warp_torchrl import parallel
 from warp_torchrl.commands.allocation import keep_freed_memory
 from warp_torchrl.config.compose import SavedConfig
 from warp_torchrl.config.run_config import run_config
-from warp_torchrl.training.loop import NumericalFailure, Training
+from warp_torchrl.training.finite import NumericalFailure
+from warp_torchrl.training.loop import Training
 from warp_torchrl.training.signals import Stopped
 
 FOLLOWING = "warp_torchrl.commands.following"

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import torch
 
 from warp_torchrl import parallel
+from warp_torchrl.algorithms.on_policy import OnPolicy
 from warp_torchrl.collection.collectors import MultiProcess
 from warp_torchrl.collection.kickstarting import Kickstarting
 from warp_torchrl.config.construction import ConfigError, build, construct
@@ -122,6 +123,7 @@ class RunConfig:
         device: ``cpu``, ``cuda`` or ``cuda:<number>``.
         processes: Processes that learn together, each from an equal share of the worlds; ``auto`` takes what
             ``parallel.automatic`` finds.
+        graph: Record each step of the worlds, and each of the optimiser, as one CUDA graph.
         compile: Fuse steps and losses of training with ``torch.compile``: faster after a minute or two.
         checkpoint: When training saves.
         evaluation: How policies are evaluated.
@@ -145,6 +147,7 @@ class RunConfig:
     device: str = "cpu"
     processes: int | Literal["auto"] = "auto"
     compile: bool = False
+    graph: bool = False
     checkpoint: CheckpointConfig = field(default_factory=CheckpointConfig)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
     imitation: Kickstarting = field(default_factory=Kickstarting)
@@ -189,20 +192,31 @@ class RunConfig:
 
         Raises:
             ConfigError: If ``compile`` is asked for where there is no compiler, or the processes are not as many as
-                ``torchrun`` has started, or more than there are GPUs.
+                ``torchrun`` has started, or more than there are GPUs; or if ``graph`` is asked for where it cannot be.
         """
         try:
             self._check_machine(self.n_processes())
             self._check_shares(self.n_processes())
         except ValueError as error:
             raise ConfigError(str(error)) from None
+        if self.graph:
+            self._check_graph()
         if self.compile:
             try:
                 check_compiler(torch.device(self.device))
             except ValueError as error:
                 raise ConfigError(str(error)) from None
 
-    def make_env(self, n_worlds: int, seed: int, fuse: bool = False) -> WildfireEnv:
+    def _check_graph(self) -> None:
+        """Check that what is recorded stays as it is."""
+        if torch.device(self.device).type != "cuda":
+            raise ConfigError(f"graph must be false where device is not cuda, got device={self.device}")
+        if not isinstance(self.algorithm, OnPolicy) or self.imitation.teacher is not None or self.model.memory:
+            raise ConfigError("graph must be false with a teacher, with memory, and where the algorithm replays")
+        if self.n_processes() > 1 or isinstance(self.collector, MultiProcess):
+            raise ConfigError("graph must be false where several processes collect or learn")
+
+    def make_env(self, n_worlds: int, seed: int, fuse: bool = False, graph: bool = False) -> WildfireEnv:
         """Return an environment of the run's scenario, on the run's device."""
         return WildfireEnv(
             self.world,
@@ -212,14 +226,15 @@ class RunConfig:
             seed=seed,
             device=self.device,
             fuse=fuse,
+            graph=graph,
         )
 
     def make_training_env(self, n_worlds: int, seed: int) -> WildfireEnv:
-        """Return an environment to learn from, fused where that is asked for.
+        """Return an environment to learn from, fused or recorded where that is asked for.
 
         The few episodes of an evaluation would take less time than their compilation.
         """
-        return self.make_env(n_worlds, seed, fuse=self.compile)
+        return self.make_env(n_worlds, seed, fuse=self.compile, graph=self.graph)
 
 
 def run_config(config: Mapping[str, Any]) -> RunConfig:

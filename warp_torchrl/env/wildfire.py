@@ -10,9 +10,12 @@ from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
 from torchrl.envs import EnvBase
 
+from warp_torchrl.device import reads_freely
+from warp_torchrl.env.recorded import RecordedStep
 from warp_torchrl.env.render import render
 from warp_torchrl.env.reset_cache import ResetCache, Start
-from warp_torchrl.env.scene import Observations, Scene
+from warp_torchrl.env.reset_pool import ResetPool
+from warp_torchrl.env.scene import Observations, Scene, Step
 from warp_torchrl.env.specs import make_specs
 from warp_torchrl.observation import Observation, Surroundings, state_content, state_names, state_symmetry
 from warp_torchrl.reward import Efficiency, Reward
@@ -42,6 +45,7 @@ class WildfireEnv(EnvBase):
         validate: Check on every device that actions are in range, which costs a synchronisation on CUDA; by default
             they are checked on the CPU only.
         fuse: Compile the step with ``torch.compile``; the first steps are then slow.
+        graph: Record the step as one CUDA graph. World and observation must then stay as they are.
 
     Raises:
         ValueError: If ``n_worlds`` is not positive, ``seeds`` are not as many, a seed is out of range, or there is no
@@ -62,6 +66,7 @@ class WildfireEnv(EnvBase):
         device: torch.device | str = "cpu",
         validate: bool | None = None,
         fuse: bool = False,
+        graph: bool = False,
     ) -> None:
         if n_worlds < 1:
             raise ValueError(f"n_worlds must be at least 1, got {n_worlds}")
@@ -69,10 +74,11 @@ class WildfireEnv(EnvBase):
         self.world = World() if world is None else world
         self.observation = Surroundings() if observation is None else observation
         self.reward_function = Efficiency() if reward is None else reward
-        self.validate = self.device.type == "cpu" if validate is None else validate
+        self.validate = reads_freely(self.device) if validate is None else validate
         if fuse:
             check_compiler(self.device)
         self._fuses = fuse and can_fuse(self.world.fire)
+        self._recorded = RecordedStep(self._scene) if graph else None
         names, roles = self.world.team.agent_names, self.world.team.agent_roles
         self.agent_names, self.action_names = names, self.world.team.action_names
         self.role_names, self.state_names = self.world.team.role_names, state_names(self.world.team)
@@ -85,7 +91,9 @@ class WildfireEnv(EnvBase):
         self.group_map = {"agents": list(names)}
         self.role_map = {role: [n for n, r in zip(names, roles) if r == role] for role in ROLES if role in roles}
         self._worlds: tuple[WorldState, TreeCounts] | None = None  # and the counts of their trees
-        self._resets = ResetCache(self._start)
+        self._resets: ResetCache | ResetPool = ResetCache(self._sound_start)
+        if not reads_freely(self.device):
+            self._resets = ResetPool(self._start, self.world.check)
         self.watcher: Callable[[Transition], None] | None = None
         """Called with the transition of every step, to measure behaviour."""
         self._episode_reward = torch.zeros(n_worlds, device=self.device)
@@ -215,6 +223,9 @@ class WildfireEnv(EnvBase):
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
         mask = None if tensordict is None else tensordict.get("_reset", None)
+        if isinstance(self._resets, ResetPool) and mask is not None and self._worlds is not None:
+            self._resets.fill(self.seeds, self._episodes)
+            return self._masked_reset(self._resets, mask.flatten(), self._observe())
         if mask is None or self._worlds is None or mask.all():
             self._resets.clear()
             self._enter(self.world.reset(self.seeds, self._episodes))
@@ -231,6 +242,8 @@ class WildfireEnv(EnvBase):
     def maybe_reset(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Reset the worlds that have ended; equal to TorchRL's, but it writes their rows only."""
         done = tensordict.get("done", None)
+        if isinstance(self._resets, ResetPool) and done is not None:
+            return self._masked_reset(self._resets, done.flatten(), tensordict)
         if done is None or done.all():
             return super().maybe_reset(tensordict)
         index = done.flatten().nonzero()[:, 0]
@@ -247,20 +260,38 @@ class WildfireEnv(EnvBase):
 
     def _start_again(self, index: Tensor) -> TensorDict:
         """Start the next episode of some worlds, and return their tensordict."""
+        if isinstance(self._resets, ResetPool):
+            raise TypeError("worlds on a device that is not read start by a mask")
         self.world_state[index], self.tree_counts[index], seen = self._resets.pop(index, self.seeds, self._episodes)
         self._episodes = self._episodes.index_add(0, index, torch.ones_like(index))
         self._episode_reward = self._episode_reward.index_fill(0, index, 0.0)
         return seen
 
-    def _start(self, seeds: Tensor, episodes: Tensor) -> Start:
-        worlds = self.world.reset(seeds, episodes)
+    def _sound_start(self, seeds: Tensor, episodes: Tensor) -> Start:
+        """Return starts of seeds and episodes, and raise if any is faulty."""
+        start, faults = self._start(seeds, episodes)
+        self.world.check(faults.tolist())
+        return start
+
+    def _masked_reset(self, pool: ResetPool, ended: Tensor, seen: TensorDictBase) -> TensorDictBase:
+        """Start the next episode of the worlds that ended, bool [B], without asking which; return all worlds' rows."""
+        now = *self._current(), seen
+        (state, counts, out), started = pool.take(ended, now, self.seeds, self._episodes)
+        self._worlds = state, counts
+        self._episodes = self._episodes + started
+        self._episode_reward = self._episode_reward.masked_fill(started, 0.0)
+        return out
+
+    def _start(self, seeds: Tensor, episodes: Tensor) -> tuple[Start, Tensor]:
+        """Return starts of seeds and episodes, and their faults: see ``World.start``."""
+        worlds, faults = self.world.start(seeds, episodes)
         counts = count_trees(worlds)
         observed = self._scene.observe(worlds, counts)
-        return worlds, counts, self._pack(worlds, observed, torch.zeros(len(seeds), device=self.device))
+        return (worlds, counts, self._pack(worlds, observed, torch.zeros(len(seeds), device=self.device))), faults
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         action = self._checked(tensordict.get(("agents", "action"), None))
-        transition, observed, reward = self._scene.step(self.world_state, self.tree_counts, action)
+        transition, observed, reward = self._advance(self.world_state, self.tree_counts, action)
         self._worlds = transition.after, transition.counts_after
         self._episode_reward = self._episode_reward + reward.mean(1)[:, 0]
         out = self._pack(transition.after, observed, self._episode_reward)
@@ -268,6 +299,13 @@ class WildfireEnv(EnvBase):
             self.watcher(transition)
         out.set(("agents", "reward"), reward)
         return out
+
+    def _advance(self, before: WorldState, counts: TreeCounts, action: Tensor) -> Step:
+        if self._recorded is None:
+            return self._scene.step(before, counts, action)
+        if self._recorded.scene.reward is not self.reward_function:
+            self._recorded = RecordedStep(self._scene)
+        return self._recorded(before, counts, action)
 
     @property
     def _scene(self) -> Scene:

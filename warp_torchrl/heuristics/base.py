@@ -8,7 +8,9 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
+from warp_torchrl.device import reads_freely
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.world.fast.constants import whole_numbers
 from warp_torchrl.world.fast.distances import FAR, nearest
 from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.random import Stream, uniform_at
@@ -67,9 +69,11 @@ def list_cells(mask: Tensor) -> tuple[Tensor, Tensor]:
 
     Returns:
         Flat indices, int64 [B, K], with K the largest count of any world, at least 1; and which indices are not
-        padding, bool [B, K].
+        padding, bool [B, K]. On a device that is not read freely, every cell: K = H W, and the mask.
     """
     marked = mask.flatten(1)
+    if not reads_freely(mask.device):
+        return torch.arange(marked.shape[1], device=mask.device).expand_as(marked), marked
     counts = marked.sum(dim=1)
     world, cell = marked.nonzero().unbind(dim=1)
     index = marked.new_zeros(len(marked), max(int(counts.max()), 1), dtype=torch.int64)
@@ -108,7 +112,7 @@ def move_towards(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
     Reversing costs one cell of distance, so that agents follow a lake's shore instead of oscillating.
     """
     vehicles, team = state.vehicles, env.world.team
-    offsets = torch.tensor(DIRECTIONS, device=target.device)
+    offsets = whole_numbers(sum(DIRECTIONS, ()), target.device).view(8, 2)
     reached = vehicles.position[:, :, None] + offsets * team.table(target.device).stride[:, None, None]
     gap = (reached - target[:, :, None]).abs().to(torch.float32)
     way = gap.amax(-1) + 0.01 * gap.sum(-1)

@@ -1,4 +1,4 @@
-"""The one training loop for all algorithms; what differs between them is a field of ``Learner``.
+"""The one training loop for all algorithms: a run's folder, its rows and log, its checkpoints and its end.
 
 Every process of a run goes through it with its share of the worlds; the first one alone logs, saves and decides.
 """
@@ -11,39 +11,29 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
-import torch
-from tensordict import TensorDictBase
-from torch import Tensor
 from tqdm import tqdm
 
 from warp_torchrl import parallel
-from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.config.compose import SavedConfig
 from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.config.seeds import WORLDS, first_world_seed
 from warp_torchrl.evaluation.play import play
-from warp_torchrl.models import REWARD, signature
+from warp_torchrl.models import signature
 from warp_torchrl.parallel import WorkerDied
 from warp_torchrl.policy import MODES
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs import disk, former
+from warp_torchrl.runs import disk
 from warp_torchrl.runs.logging import MetricsFile, Tracker
 from warp_torchrl.runs.saving import SaveClock, passes
-from warp_torchrl.runs.transfer import learned_parameters
-from warp_torchrl.training.progress import TRAIN_COLUMNS, batch_size_notice, episode_columns, line
-from warp_torchrl.training.reward_scale import RewardScale
+from warp_torchrl.training.learning import Learning
+from warp_torchrl.training.progress import batch_size_notice, line
 from warp_torchrl.training.signals import DeferredSignals, Stopped
-from warp_torchrl.world.fast.compile import compile_function
 
 log = logging.getLogger("warp_torchrl")
 _SECONDS_BETWEEN_LINES = 15.0
 
 
-class NumericalFailure(Exception):  # noqa: N818
-    """A reward, a loss or a gradient is not finite; the weights were not touched."""
-
-
-class Training:
+class Training(Learning):
     """A training run: collect, learn, log, save and resume.
 
     Args:
@@ -53,30 +43,14 @@ class Training:
     """
 
     def __init__(self, run_config: RunConfig, record: SavedConfig, run: Path) -> None:
-        torch.manual_seed(run_config.seed)  # the same in every process: all begin with the same networks
-        self.run_config, self.record, self.run = run_config, record, run
+        super().__init__(run_config)
+        self.record, self.run = record, run
         self.is_first = parallel.rank() == 0
-        worlds = run_config.n_worlds // parallel.size()
-        first = first_world_seed(run_config.seed) + worlds * parallel.rank()
-        self.env = run_config.make_training_env(worlds, first)
-        self.frames_per_batch = run_config.collector.steps * run_config.n_worlds
-        learner = run_config.algorithm.build(self.env, run_config.model, run_config.collector.steps * worlds)
-        if run_config.compile:
-            learner.terms = compile_function(learner.terms)
-        self.learner: Learner = run_config.imitation.kickstart(learner, self.env)
-        self.reward_scale = RewardScale(run_config.reward.gamma) if run_config.reward.normalise else None
-        self.collection = run_config.collector.open(self.env, self.learner, run_config.make_training_env, first)
-        self.frames = 0
         self.seconds = 0.0
         self.saved_at = 0
         self.clock = SaveClock(run_config.checkpoint.minutes, self._size)
         self.mode: str | None = None
         self.metrics = MetricsFile(run / "metrics.csv")
-        self._scheduled = self.learner.schedule(0.0)
-        self._others: list[dict[str, Any]] | None = None
-        """What a checkpoint holds of the other processes."""
-        if not self.is_first:
-            torch.manual_seed(_seed_of_process(run_config.seed, parallel.rank()))
 
     def train(self) -> None:
         """Train until ``total_frames``; save checkpoints on the way and at the end.
@@ -117,12 +91,16 @@ class Training:
 
     def _train(self, signals: DeferredSignals, tracker: Tracker | None, bar: tqdm | None) -> None:
         total = self.run_config.total_frames
-        notice = batch_size_notice(total, self.run_config.n_worlds, self.run_config.collector.steps)
+        collector, worlds = self.run_config.collector, self.run_config.n_worlds
+        end = collector.end(total, worlds, self.batches_grow)
+        steps = collector.segment * self._segments
+        notice = batch_size_notice(total, end, worlds, steps, "steps" if steps == collector.steps else "first_steps")
         if notice is not None and self.frames < total and self.is_first:
             log.log(logging.WARNING if total < self.frames_per_batch else logging.INFO, notice)
         self._began = time.perf_counter() - self.seconds
-        for batch in self.collection if self.frames < total else ():
+        for batch in self._batches() if self.frames < total else ():
             row = self._learn(batch)
+            row["evaluation/saved"] = self._evaluate() if self.is_first else None
             if tracker is not None and bar is not None:
                 self._report(row, tracker, bar)
             if self.frames >= total:
@@ -140,12 +118,12 @@ class Training:
         """Write a row to ``metrics.csv``, the tracker, and the bar or the log."""
         total = self.run_config.total_frames
         self.seconds = time.perf_counter() - self._began
-        rate = self.frames_per_batch / max(self.seconds - self._last_seconds, 1e-9)
+        rate = self.last_batch / max(self.seconds - self._last_seconds, 1e-9)
         self._last_seconds = self.seconds
         row = {"time/frames": self.frames, "time/seconds": self.seconds, "time/fps": rate, **row}
         self.metrics.add(row)
         tracker.log(row, self.frames)
-        bar.update(self.frames_per_batch)
+        bar.update(self.last_batch)
         bar.set_postfix(saved=row["world/saved"], refresh=False)
         if bar.disable and (self.seconds >= self._next_line or self.frames >= total):
             self._next_line = self.seconds + _SECONDS_BETWEEN_LINES
@@ -155,50 +133,6 @@ class Training:
         """Save without the processes that may have ended: on resume their worlds start new episodes."""
         if self.is_first and self.frames > self.saved_at:
             self._write(self.state_dict())
-
-    def _join(self) -> None:
-        """Give the other processes what the first one begins with, or has resumed."""
-        if parallel.size() == 1:
-            return
-        begun = parallel.share({**self.state_dict(), "others": self._others} if self.is_first else None)
-        if self.is_first:
-            return
-        self._restore_shared(begun)
-        if begun["others"] is not None:
-            self._restore_own(begun["others"][parallel.rank() - 1])
-        elif self.frames:  # saved when this process had ended
-            self.collection.start_anew(self.frames // self.run_config.n_worlds)
-
-    def _learn(self, batch: TensorDictBase) -> dict[str, float | None]:
-        """Learn from one batch [B, T] and return its row of ``metrics.csv``."""
-        learner = self.learner
-        row = episode_columns(batch)
-        if parallel.sum_((~batch["next", *REWARD].isfinite()).sum()):
-            raise NumericalFailure(f"after {self.frames} frames a reward is not finite; the last checkpoint stands")
-        if self.reward_scale is not None:
-            self.reward_scale(batch)
-        learner.store(batch)
-        sums: dict[str, Tensor] = {}
-        updates = 0
-        for sample in learner.samples():
-            for name, value in self._update(sample).items():
-                sums[name] = sums.get(name, 0.0) + value
-            updates += 1
-        self.frames += self.frames_per_batch
-        if updates:
-            parallel.mean_(sums[name] for name in sorted(sums))
-        means = {name: float(value) / updates for name, value in sums.items()}
-        row["train/loss"] = sum(means[key] for key in learner.loss_keys) if updates else None
-        row |= dict.fromkeys(TRAIN_COLUMNS)
-        row |= {column: means.get(key) for key, column in learner.columns.items()} | self._scheduled
-        self._schedule()
-        self.collection.refresh()
-        row["evaluation/saved"] = self._evaluate() if self.is_first else None
-        return row
-
-    def _schedule(self) -> None:
-        """Update the scheduled hyperparameters; their columns belong to the next row."""
-        self._scheduled = self.learner.schedule(min(1.0, self.frames / self.run_config.total_frames))
 
     def log_new_total(self, before: int) -> None:
         """Log the scheduled hyperparameters that change because ``total_frames`` was changed.
@@ -215,29 +149,9 @@ class Training:
             before, total, 100.0 * self.frames / total, f", {columns}" if columns else "",
         )  # fmt: skip
 
-    def _update(self, sample: TensorDictBase) -> dict[str, Tensor]:
-        """Take one optimiser step and return the loss terms; only the check for finite values reads from the device."""
-        learner = self.learner
-        terms = learner.terms(sample)
-        loss = sum(terms[key] for key in learner.loss_keys)
-        loss.backward()
-        trained = [each.grad for each in learner.loss.parameters() if each.grad is not None]
-        parallel.mean_([*trained, total := loss.detach().clone()])
-        norm = torch.nn.utils.clip_grad_norm_(learner.loss.parameters(), learner.max_grad_norm)
-        if not torch.isfinite(norm + total):  # one synchronisation for both
-            raise NumericalFailure(
-                f"after {self.frames} frames the loss, {float(total):g}, or its gradient, of norm "
-                f"{float(norm):g}, is not finite; the weights were left as they were, and the last checkpoint stands"
-            )
-        learner.optimizer.step()
-        learner.optimizer.zero_grad()
-        learner.after_step(sample)
-        wanted = {*learner.loss_keys, *learner.columns} & set(terms.keys())
-        return {name: terms[name].detach().mean() for name in wanted}
-
     def _evaluate(self) -> float | None:
         plan = self.run_config.evaluation
-        if not plan.interval or not passes(plan.interval, self.frames, self.frames_per_batch):
+        if not plan.interval or not passes(plan.interval, self.frames, self.last_batch):
             return None
         env = self.run_config.make_env(plan.episodes, plan.first_seed)
         return float(play(env, self.learner.policy, plan.first_seed)["saved"].mean())
@@ -283,37 +197,11 @@ class Training:
 
     def _is_regular(self, frames: int) -> bool:
         """Return whether ``checkpoint.interval`` asks for a checkpoint at this number of frames."""
-        return passes(self.run_config.checkpoint.interval, frames, self.frames_per_batch)
-
-    def start_from(self, found: checkpoints.Checkpoint) -> None:
-        """Load another run's networks and value normalisation; everything else starts anew.
-
-        Raises:
-            CheckpointError: If that run had another kind of loss or other networks.
-        """
-        loss = self.learner.loss
-        loss.load_state_dict({**loss.state_dict(), **learned_parameters(found, loss)})
+        return passes(self.run_config.checkpoint.interval, frames, self.last_batch)
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything that an exact resume needs of this process."""
-        return {
-            "loss": dict(self.learner.loss.state_dict()),
-            "optimizer": self.learner.optimizer.state_dict(),
-            **self._own(),
-            "frames": self.frames,
-            "seconds": self.seconds,
-            "rows": self.metrics.rows,
-        }
-
-    def _own(self) -> dict[str, Any]:
-        """Return what differs from process to process."""
-        return {
-            "keeps": {name: each.state_dict() for name, each in self.learner.keeps.items()},
-            "random": torch.get_rng_state(),
-            "random_cuda": torch.cuda.get_rng_state(self.env.device) if self.env.device.type == "cuda" else None,
-            "collection": self.collection.state_dict(),
-            "reward_scale": {} if self.reward_scale is None else self.reward_scale.state_dict(),
-        }
+        return {**super().state_dict(), "seconds": self.seconds, "rows": self.metrics.rows}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore what ``state_dict`` returned, all or nothing.
@@ -334,37 +222,7 @@ class Training:
             reason = " ".join(str(error).split())
             raise checkpoints.CheckpointError(f"the checkpoint does not fit this configuration: {reason}") from None
 
-    def _restore(self, state: Mapping[str, Any]) -> None:
-        self._restore_shared(state)
-        self._restore_own(state)
-
     def _restore_shared(self, state: Mapping[str, Any]) -> None:
-        now = self.learner.loss.state_dict()
-        loss = former.parameters(state["loss"], now)
-        differing = now.keys() ^ loss.keys()
-        if differing:  # tensordict does not report missing or unexpected names
-            raise ValueError(f"{min(differing)} is in one of the two alone")
-        self.learner.loss.load_state_dict(loss)
-        self.learner.optimizer.load_state_dict(state["optimizer"])
-        self.frames, self.seconds = int(state["frames"]), float(state["seconds"])
+        super()._restore_shared(state)
+        self.seconds = float(state["seconds"])
         self.saved_at, self._last_seconds = self.frames, self.seconds
-        self._schedule()
-
-    def _restore_own(self, state: Mapping[str, Any]) -> None:
-        for name, each in self.learner.keeps.items():
-            each.load_state_dict(state["keeps"][name])
-        self.collection.load_state_dict(state["collection"])
-        if self.reward_scale is not None:
-            self.reward_scale.load_state_dict(state["reward_scale"])
-        torch.set_rng_state(state["random"])
-        if state.get("random_cuda") is not None:
-            torch.cuda.set_rng_state(state["random_cuda"], self.env.device)
-
-    def close(self) -> None:
-        """Shut the collector down."""
-        self.collection.close()
-
-
-def _seed_of_process(seed: int, rank: int) -> int:
-    """Return the seed of a process's draws, of actions and of minibatches."""
-    return (seed + 2**40 * rank) % 2**64

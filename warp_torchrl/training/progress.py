@@ -7,6 +7,7 @@ from tensordict import TensorDictBase
 
 from warp_torchrl import parallel
 from warp_torchrl.env.specs import EPISODE_METRICS
+from warp_torchrl.models import REWARD
 
 TRAIN_COLUMNS = (
     "train/policy_gradient_loss",
@@ -21,15 +22,20 @@ TRAIN_COLUMNS = (
 """Columns of ``metrics.csv`` that every run has; empty where an algorithm has no value for them."""
 
 
-def episode_columns(batch: TensorDictBase) -> dict[str, float | None]:
-    """Return the mean metrics of the episodes that ended in a batch [B, T] of all processes; None where none ended."""
+def episode_columns(batch: TensorDictBase) -> tuple[dict[str, float | None], int]:
+    """Return what a batch [B, T] of all processes holds, read from the device at once.
+
+    Returns:
+        The mean metrics of the episodes that ended, None where none ended; and how many rewards are not finite.
+    """
     done = batch["next", "done"][..., 0]
     info = batch["next", "info"]
-    sums = [done.sum(), *(torch.where(done, info[name][..., 0], 0.0).sum() for name in EPISODE_METRICS)]
-    count, *totals = parallel.sum_(torch.stack([each.double() for each in sums])).tolist()
+    unsound = (~batch["next", *REWARD].isfinite()).sum()
+    sums = [unsound, done.sum(), *(torch.where(done, info[name][..., 0], 0.0).sum() for name in EPISODE_METRICS)]
+    unsound_rewards, count, *totals = parallel.sum_(torch.stack([each.double() for each in sums])).tolist()
     means = {name: total / count if count else None for name, total in zip(EPISODE_METRICS, totals, strict=True)}
     row = {"rollout/ep_rew_mean": means.pop("episode_reward"), "rollout/ep_len_mean": means.pop("episode_length")}
-    return row | {f"world/{name}": value for name, value in means.items()}
+    return row | {f"world/{name}": value for name, value in means.items()}, int(unsound_rewards)
 
 
 def line(row: Mapping[str, float | None], total: int) -> str:
@@ -51,18 +57,20 @@ def line(row: Mapping[str, float | None], total: int) -> str:
     )
 
 
-def batch_size_notice(total: int, n_worlds: int, steps: int) -> str | None:
-    """Return a notice where ``total_frames`` is no multiple of the batch size; None where it is.
+def batch_size_notice(total: int, end: int, n_worlds: int, steps: int, key: str = "steps") -> str | None:
+    """Return a notice where ``total_frames`` is no whole number of batches; None where it is.
 
     Args:
         total: World steps of the whole training.
+        end: Those after which it ends.
         n_worlds: Worlds in a batch.
-        steps: World steps of each world in a batch.
+        steps: Steps of each world in the next batch.
+        key: Of the collector, which says so.
     """
     batch = n_worlds * steps
-    if total % batch == 0:
+    if total == end:
         return None
-    what = f"one batch is {batch} frames, n_worlds={n_worlds} x collector.steps={steps}"
+    what = f"one batch is {batch} frames, n_worlds={n_worlds} x collector.{key}={steps}"
     if total < batch:
         return f"total_frames={total} is less than one batch: {what}, and one is trained on"
-    return f"{what}: training ends at {-(-total // batch) * batch} frames, not at total_frames={total}"
+    return f"{what}: training ends at {end} frames, not at total_frames={total}"

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world import law
+from warp_torchrl.world.fast.constants import numbers
 from warp_torchrl.world.state import EMBER, FIRST_FIRE, OLDEST, Air, Ground, Landscape, WorldState
 from warp_torchrl.world.terrain.landscape import LandscapeSource, holds_trees
 from warp_torchrl.world.wind import Wind
@@ -163,5 +164,5 @@ class Automaton(ABC):
 
 def of_codes(table: tuple[float, ...], codes: Tensor) -> Tensor:
     """Return what a table holds for each code, float32, shape of the codes."""
-    values = torch.tensor(table, device=codes.device)
+    values = numbers(table, codes.device)
     return values.index_select(0, codes.flatten().to(torch.int32)).view(codes.shape)

@@ -3,6 +3,7 @@
 import torch
 from torch import Tensor
 
+from warp_torchrl.world.fast.constants import whole_numbers
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import Cover
 
@@ -28,7 +29,7 @@ def starting_cells(key: Tensor, cover: Tensor, burning: Tensor, n_agents: int, s
     rows = torch.arange(height, device=cover.device)
     columns = torch.arange(width, device=cover.device)
     corner = (uniform(key, 0, Stream.START, (2,)) < 0.5).to(torch.int64)
-    base = corner * torch.tensor([height - 1, width - 1], device=cover.device)
+    base = corner * whole_numbers((height - 1, width - 1), cover.device)
     if start == "corner":
         row_distance = (rows - base[:, :1]).abs()[:, :, None]
         column_distance = (columns - base[:, 1:]).abs()[:, None, :]

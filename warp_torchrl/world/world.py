@@ -1,6 +1,7 @@
 """The world: assembles landscape, wind, fire and team, and is the only one that draws for them."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -111,21 +112,47 @@ class World:
         Raises:
             ValueError: If a landscape has no tree that can burn, or too little dry ground for the team.
         """
+        state, faults = self.start(seed, episode)
+        self.check(faults.tolist())
+        return state
+
+    def start(self, seed: Tensor, episode: Tensor) -> tuple[WorldState, Tensor]:
+        """Start an episode in each world, as ``reset`` does, and tell what is wrong with them in place of raising.
+
+        Args:
+            seed: int64 [B].
+            episode: int64 [B], 0 for a seed's first.
+
+        Returns:
+            The worlds, and whether any has no tree that can burn, or too little dry ground for the team, bool [2]:
+            what ``check`` takes, once it has been read.
+        """
         at_once = max(1, _CELLS_AT_ONCE["cuda" if seed.is_cuda else "cpu"] // math.prod(self.size))
         parts = [self._start(*part) for part in zip(seed.split(at_once), episode.split(at_once), strict=True)]
-        return parts[0] if len(parts) == 1 else concatenated(parts)
+        states, faults = zip(*parts, strict=True)
+        return states[0] if len(parts) == 1 else concatenated(list(states)), torch.stack(faults).any(dim=0)
 
-    def _start(self, seed: Tensor, episode: Tensor) -> WorldState:
+    def check(self, faults: Sequence[bool]) -> None:
+        """Check the faults that ``start`` found.
+
+        Raises:
+            ValueError: If a landscape has no tree that can burn, or too little dry ground for the team.
+        """
+        is_dark, is_crowded = faults
+        if is_dark:
+            raise ValueError(self.lighting.why_dark)
+        if is_crowded:
+            raise ValueError(f"team.n_agents must fit on a map's dry ground, got {self.team.n_agents}")
+
+    def _start(self, seed: Tensor, episode: Tensor) -> tuple[WorldState, Tensor]:
         key = world_key(seed, episode)
         ground = self.landscape(key)
         fuel = (ground.age >= self.fire.youngest_fuel) & (self.fire.flammability(ground) > 0.0)
         lit = self.lighting(key, fuel)
-        if not lit.flatten(1).any(dim=1).all():
-            raise ValueError(self.lighting.why_dark)
         vehicles = self.team.place(key, ground.cover, lit)
         index = vehicles.position[..., 0] * self.size[1] + vehicles.position[..., 1]
-        if (ground.cover.flatten(1).gather(1, index) == int(Cover.LAKE)).any():
-            raise ValueError(f"team.n_agents must fit on a map's dry ground, got {self.team.n_agents}")
+        is_dark = ~lit.flatten(1).any(dim=1).all()
+        is_crowded = (ground.cover.flatten(1).gather(1, index) == int(Cover.LAKE)).any()
         state = initial_state(
             ground,
             self.fire,
@@ -141,7 +168,7 @@ class World:
         for _ in range(self.ignition.head_start):
             spreads = (state.cells >= FIRST_FIRE) & (state.cells < EMBER)
             state = self._tick(state, spreads.flatten(1).any(dim=1))
-        return state
+        return state, torch.stack((is_dark, is_crowded))
 
     def step(self, state: WorldState, action: Tensor, counts: TreeCounts | None = None) -> Transition:
         """Advance every world that has not ended by one agent step.

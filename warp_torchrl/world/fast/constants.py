@@ -14,6 +14,12 @@ def numbers(values: tuple[float, ...], device: torch.device) -> Tensor:
     return torch.tensor(values, dtype=torch.float32, device=device)
 
 
+@lru_cache(maxsize=64)
+def whole_numbers(values: tuple[int, ...], device: torch.device) -> Tensor:
+    """Return some whole numbers as a tensor, int64 [n], kept for the next time."""
+    return torch.tensor(values, dtype=torch.int64, device=device)
+
+
 # A compiler would make the numbers of each vector one by one, which on CPUs takes as long as to mix them for a draw.
 @opaque_op("(int length, Tensor beside) -> Tensor")
 def counting(length: int, beside: Tensor) -> Tensor:

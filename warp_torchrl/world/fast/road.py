@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 from torch.compiler import is_compiling
 
+from warp_torchrl.device import reads_freely
 from warp_torchrl.world.automaton import Automaton
 from warp_torchrl.world.fast.band import AtBand
 from warp_torchrl.world.fast.bytes import number
@@ -66,13 +67,17 @@ def fastest(fire: Automaton, device: torch.device) -> Road:
     A CPU computes a tick at the fire's edge alone where trees neither grow nor ignite by themselves, unless whole maps
     are compiled.
     """
-    on_cpu = device.type == "cpu" and not is_compiling()
+    on_cpu = _may_read(device)
     if type(fire) is RateFire and on_cpu:
         return AtBand(fire)
     if not isinstance(fire, Fire) or type(fire) not in COVERED:
         return Page(fire)
     spreads_alone = not fire.growth and fire.beta == 0.0 and fire.p_regrow == 0.0
     return AtEdge(fire) if spreads_alone and on_cpu else Planes(fire)
+
+
+def _may_read(device: torch.device) -> bool:
+    return reads_freely(device) and not is_compiling()
 
 
 def can_fuse(fire: Automaton) -> bool:
@@ -107,7 +112,7 @@ def in_wind(fire: Automaton, state: WorldState, wind: Tensor, moisture: Tensor |
     Under law ``rate``, whose air is dear, a CPU makes that of the worlds alone where it differs.
     """
     old = state.air
-    if old.travel is None or wind.is_cuda or is_compiling():
+    if old.travel is None or not _may_read(wind.device):
         return fire.in_air(state, air(fire, wind, moisture, state.ground))
     differs = (wind != old.wind).flatten(1).any(dim=1)
     if moisture is not None and old.moisture is not None:
@@ -134,7 +139,7 @@ def advance_rows(
 
     Which ones they are is read back from the device.
     """
-    if ticks_now.is_cuda or is_compiling():
+    if not _may_read(ticks_now.device):
         return advance(state, ticks_now)
     index = ticks_now.nonzero()[:, 0]
     if len(index) == len(ticks_now):

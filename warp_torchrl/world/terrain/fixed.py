@@ -36,7 +36,7 @@ class Fixed:
 
     def __call__(self, key: Tensor) -> Landscape:
         """Return the one landscape for each of the keys, int64 [B], batch size [B]."""
-        ground = self.source(world_key(torch.tensor([self.seed], device=key.device)))
+        ground = self.source(world_key(torch.full((1,), self.seed, device=key.device)))
         return ground[torch.zeros_like(key)]
 
     @property

@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from warp_torchrl.device import reads_freely
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.fast.bytes import equal
 from warp_torchrl.world.random import Stream, uniform
@@ -189,7 +190,7 @@ class Perlin:
         """Return each world's value of a parameter, float64 [B], or [1] where it is fixed."""
         low, high = _ends(getattr(self, name))
         if low == high:
-            return torch.tensor([low], dtype=torch.float64, device=key.device)
+            return torch.full((1,), low, dtype=torch.float64, device=key.device)
         draw = uniform(key, _RANGES.index(name), Stream.TERRAIN, (1,))[:, 0].double()
         if name == "octaves":
             return low + (draw * (high - low + 1)).floor()
@@ -221,6 +222,6 @@ class Perlin:
 
 def _in_order_at(values: Tensor, ranks: list[int]) -> Tensor:
     """Return rows of numbers, float32 [B, n], in order as far as these ranks hold what a sort would put there."""
-    if values.device.type != "cpu":
+    if not reads_freely(values.device):
         return values.sort(dim=1).values
     return torch.from_numpy(np.partition(values.numpy(), ranks, axis=1))  # a quarter of the time of torch's sort

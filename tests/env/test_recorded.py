@@ -1,0 +1,80 @@
+"""A recorded step is the step, and a GPU can record it: no size and no choice in it depends on a result."""
+
+import pytest
+import torch
+from torch.fx.experimental.proxy_tensor import make_fx
+
+from warp_torchrl.config.compose import compose_config, plain
+from warp_torchrl.config.run_config import run_config
+from warp_torchrl.device import unread
+from warp_torchrl.env import WildfireEnv
+from warp_torchrl.env.recorded import RecordedStep
+from warp_torchrl.reward import Time
+
+SCENARIOS = [
+    ["scenario=skirmish"],
+    ["scenario=lightning", "wind=wandering"],
+    ["scenario=default", "observation=paper", "landscape.relief=200", "fire=paper"],
+    ["scenario=hazard", "reward=adaptive"],
+    ["scenario=hetero", "reward=collaborative"],
+]
+
+
+def one_hot(codes, count):
+    return (codes[..., None] == torch.arange(count)).long()
+
+
+def env_of(overrides, **options):
+    plan = run_config(plain(compose_config("train", [*overrides, "landscape.size=16", "horizon=20"])))
+    return WildfireEnv(plan.world, observation=plan.observation, reward=plan.reward, n_worlds=3, seed=2, **options)
+
+
+@pytest.mark.parametrize("overrides", SCENARIOS, ids=" ".join)
+def test_recorded_worlds_are_those_of_steps(overrides):
+    with unread():
+        eager, recorded = env_of(overrides), env_of(overrides, graph=True)
+        one, other = eager.reset(), recorded.reset()
+        for _ in range(12):
+            action = eager.rand_action(one)["agents", "action"]
+            one, other = (
+                env.step(shown.set(("agents", "action"), action))["next"]
+                for env, shown in ((eager, one), (recorded, other))
+            )
+            assert (one == other).all()
+    for name, leaf in eager.world_state.leaves().items():
+        assert torch.equal(recorded.world_state.leaves()[name], leaf), name
+
+
+@pytest.mark.parametrize("overrides", SCENARIOS, ids=" ".join)
+def test_no_size_in_a_step_depends_on_a_result(overrides, monkeypatch):
+    for module in ("own", "coarse"):  # a CPU alone looks at the codes, and refuses those out of range
+        monkeypatch.setattr(f"warp_torchrl.observation.{module}.one_hot", one_hot)
+    with unread():
+        env = env_of(overrides)
+        shown = env.rand_action(env.reset())
+        env.step(shown)  # makes the constants
+        step = RecordedStep(env._scene)
+        step._like = env.world_state, env.tree_counts
+        given = [*env.world_state.leaves().values(), *env.tree_counts.leaves().values(), shown["agents", "action"]]
+        traced = make_fx(lambda *tensors: step._flat([*tensors]), tracing_mode="fake", _allow_non_fake_inputs=True)(
+            *given
+        )
+    assert len(traced.graph.nodes) > 300
+
+
+def test_a_recording_keeps_nothing_of_what_it_returned():
+    with unread():
+        env = env_of(["scenario=skirmish"], graph=True)
+        shown = env.step(env.rand_action(env.reset()))["next"]
+        kept, before = shown["agents", "observation"].clone(), shown["agents", "observation"]
+        env.step(env.rand_action(shown))
+        assert (kept == before).all()
+
+
+def test_another_reward_is_recorded_anew():
+    with unread():
+        env = env_of(["scenario=skirmish"], graph=True)
+        shown = env.step(env.rand_action(env.reset()))["next"]
+        first, env.reward_function = env._recorded, Time()
+        env.step(env.rand_action(shown))
+    assert env._recorded is not first and env._recorded.scene.reward == Time()

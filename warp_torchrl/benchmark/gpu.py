@@ -1,0 +1,216 @@
+"""All that a GPU is asked, in under five minutes, as one JSON: speed, waits, memory, and whether its worlds are the CPU's.
+
+Each part is written when it is done; what fails is told in its place, so that the others are not lost.
+"""
+
+import json
+import tempfile
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from warp_torchrl.api import make_env
+from warp_torchrl.benchmark.environments import random_play
+from warp_torchrl.benchmark.machine import machine, peak_memory
+from warp_torchrl.benchmark.timing import clock, spread, take_turns
+from warp_torchrl.benchmark.waits import counted_waits
+from warp_torchrl.config.compose import SavedConfig, compose_config, plain
+from warp_torchrl.config.run_config import run_config
+from warp_torchrl.device import unread
+from warp_torchrl.training.loop import Training
+from warp_torchrl.world.world import advance
+
+_SCENARIO = "skirmish"
+_WAYS: dict[str, dict[str, Any]] = {"eager": {}, "graph": {"graph": True}, "compiled": {"compile": True}}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Size:
+    """How much is measured.
+
+    Attributes:
+        worlds: Numbers of worlds whose ticks and steps are timed.
+        steps: Steps in a repeat.
+        repeats: Times that each speed is measured.
+        compared: Worlds that are compared with the CPU's, and for how many steps.
+        training: Overrides of the recipe.
+        ways: Of ``_WAYS``.
+        seconds: After so many no further part begins.
+    """
+
+    worlds: tuple[int, ...] = (256, 1024, 4096, 8192, 16384)
+    steps: int = 32
+    repeats: int = 3
+    compared: tuple[int, int] = (256, 128)
+    training: tuple[str, ...] = ("experiment=gpu",)
+    ways: tuple[str, ...] = ("eager", "graph", "compiled")
+    seconds: float = 240.0
+
+
+SMALL = Size(
+    worlds=(2, 4),
+    steps=2,
+    repeats=1,
+    compared=(2, 8),
+    training=("n_worlds=4", "collector.steps=8", "horizon=8", "model.actor_hidden=[8]", "model.critic_hidden=[8]"),
+    ways=("eager", "graph"),
+)
+"""What a CPU measures in its place, without compiling, to show that all of it runs."""
+
+
+def measure_gpu(device: str, path: Path, size: Size, tell: Callable[[str], object] = print) -> bool:
+    """Measure everything, write it to a file as JSON, and return whether every part was measured.
+
+    Args:
+        device: ``cuda``, or ``cpu``, which takes a GPU's roads.
+        path: The file.
+        size: How much is measured.
+        tell: Called with a line about each part.
+    """
+    begin = time.perf_counter()
+    found: dict[str, Any] = {"machine": _machine(device), "scenario": _SCENARIO}
+    parts: dict[str, Callable[[], Any]] = {
+        "equality": partial(_equality, device, *size.compared),
+        "waits": partial(_waits, device, size.training),
+        **{f"steps {n}": partial(_steps, device, n, size) for n in size.worlds},
+        **{f"training {way}": partial(_training, device, way, size) for way in size.ways},
+    }
+    sound = True
+    for name, part in parts.items():
+        if time.perf_counter() - begin > size.seconds:
+            found[name] = {"skipped": f"{size.seconds:g} s had passed"}
+        else:
+            found[name] = _told(part, device)
+        sound = sound and "error" not in found[name]
+        found["seconds"] = round(time.perf_counter() - begin, 1)
+        path.write_text(json.dumps(found, indent=1) + "\n")
+        tell(f"{found['seconds']:6.1f} s  {name}: {_line(found[name])}")
+    return sound
+
+
+def _told(part: Callable[[], Any], device: str) -> dict[str, Any]:
+    """Return what a part found, or why it failed: on a borrowed card the other parts are worth their figures."""
+    try:
+        with unread() if device == "cpu" else nullcontext():
+            return part()
+    except Exception as error:
+        return {"error": f"{type(error).__name__}: {error}", "traceback": traceback.format_exc()}
+
+
+def _line(found: dict[str, Any]) -> str:
+    return str(found.get("error") or found.get("skipped") or found).replace("\n", " ")[:400]
+
+
+def _machine(device: str) -> dict[str, Any]:
+    found = machine(device)
+    if device == "cpu":
+        return found
+    card = torch.cuda.get_device_properties(device)
+    return found | {
+        "cuda": torch.version.cuda,
+        "capability": f"{card.major}.{card.minor}",
+        "processors": card.multi_processor_count,
+        "memory_gib": card.total_memory / 2**30,
+    }
+
+
+def _equality(device: str, n_worlds: int, steps: int) -> dict[str, Any]:
+    """Play the same actions on the device and on the CPU, and return where the worlds and what is seen differ."""
+    here = make_env(_SCENARIO, n_worlds=n_worlds, device="cpu")
+    there = make_env(_SCENARIO, n_worlds=n_worlds, device=device)
+    one, other, seen = here.reset(), there.reset(), {"reward": 0.0, "observation": 0.0}
+    for _ in range(steps):
+        action = here.rand_action(one)["agents", "action"]
+        first, one = here.step_and_maybe_reset(one.set(("agents", "action"), action))
+        second, other = there.step_and_maybe_reset(other.set(("agents", "action"), action.to(there.device)))
+        for name in seen:
+            mine, its = first["next", "agents", name], second["next", "agents", name].to("cpu")
+            seen[name] = max(seen[name], _furthest(mine - its if name == "reward" else (mine.double() - its.double())))
+    mine, its = here.world_state.what_changes(), there.world_state.to("cpu").what_changes()
+    differing = {name: int((leaf != its[name]).sum()) for name, leaf in mine.items() if (leaf != its[name]).any()}
+    return {"worlds": n_worlds, "steps": steps, "differing": differing, "furthest": seen}
+
+
+def _furthest(gaps: Any) -> float:
+    leaves = gaps.values(True, True) if hasattr(gaps, "batch_size") else [gaps]
+    return max(float(leaf.double().abs().max()) for leaf in leaves)
+
+
+def _waits(device: str, overrides: tuple[str, ...]) -> dict[str, Any]:
+    """Return how often steps, and an iteration of training, wait for the device, and where."""
+    with _trained(device, [*overrides]) as (training, batches):
+        training._learn(next(batches))
+        shown, policy = training.env.reset(), training.learner.explore
+        shown = training.env.step_and_maybe_reset(policy(shown))[1]
+        with counted_waits(device) as step:
+            training.env.step_and_maybe_reset(policy(shown))
+        with counted_waits(device) as iteration:
+            training._learn(next(batches))
+    return {"step": step.count, "iteration": iteration.count, "places": dict(iteration.places + step.places)}
+
+
+def _steps(device: str, n_worlds: int, size: Size) -> dict[str, Any]:
+    """Return the rates of ticks and, each way, of steps with observations, rewards, metrics and resets."""
+    _forget_peak(device)
+    found: dict[str, Any] = {}
+    for way in size.ways:
+        env = make_env(_SCENARIO, n_worlds=n_worlds, device=device, **_WAYS[way])
+        play = random_play(env)
+        play(size.steps)
+        seconds = take_turns({way: partial(play, size.steps)}, size.repeats, device)[way]
+        rates = [n_worlds * env.n_agents * size.steps / each for each in seconds]
+        found[way] = spread("agent_steps_per_second", rates)
+    state, world = env.world_state, env.world
+    due = torch.ones(n_worlds, dtype=torch.bool, device=device)
+    seconds = take_turns({"tick": lambda: advance(state, world.fire, world.air, due)}, size.repeats, device)["tick"]
+    cells = state.cells.numel()
+    found["tick"] = spread("cells_per_second", [cells / each for each in seconds])
+    return found | {"peak_gib": _peak(device)}
+
+
+def _training(device: str, way: str, size: Size) -> dict[str, Any]:
+    """Return the rate at which the recipe collects and learns."""
+    _forget_peak(device)
+    extra = [f"{name}=true" for name in _WAYS[way]]
+    with _trained(device, [*size.training, *extra]) as (training, batches):
+        now = clock(device)
+        agents = training.env.n_agents * training.frames_per_batch
+
+        def batch() -> None:
+            training._learn(next(batches))
+
+        start = now()
+        batch()
+        first = now() - start
+        seconds = take_turns({way: batch}, size.repeats, device)[way]
+    rates = spread("agent_steps_per_second", [agents / each for each in seconds])
+    return {**rates, "first_batch_seconds": first, "peak_gib": _peak(device)}
+
+
+@contextmanager
+def _trained(device: str, overrides: list[str]) -> Iterator[tuple[Training, Iterator[Any]]]:
+    plan = run_config(plain(compose_config("train", [*overrides, "processes=1", f"device={device}"])))
+    with tempfile.TemporaryDirectory() as folder:
+        training = Training(plan, SavedConfig(), Path(folder))
+        try:
+            yield training, iter(training.collection)
+        finally:
+            training.close()
+
+
+def _forget_peak(device: str) -> None:
+    if device != "cpu":
+        torch.cuda.empty_cache()
+        torch.cuda.reset_peak_memory_stats(device)
+
+
+def _peak(device: str) -> float:
+    """Return the most memory that was held [GiB]: of the device, or of the process on a CPU."""
+    return peak_memory() if device == "cpu" else torch.cuda.max_memory_allocated(device) / 2**30

@@ -1,0 +1,78 @@
+"""Optimiser steps that are taken with finite numbers alone, and what a batch's steps came to."""
+
+from collections.abc import Mapping
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.device import reads_freely
+
+
+class NumericalFailure(Exception):  # noqa: N818
+    """A reward, a loss or a gradient is not finite; the weights were not touched."""
+
+
+class FiniteSteps:
+    """Takes optimiser steps, but none from the first loss or gradient on that is not finite.
+
+    A CPU is asked before each step. On a GPU that would be a wait at each: there a flag stays on the device, by which
+    a fused optimiser leaves the weights as they are, and it is read once a batch.
+
+    Args:
+        optimizer: A fused one: it reads ``found_inf``, as torch's ``GradScaler`` has it.
+    """
+
+    def __init__(self, optimizer: torch.optim.Optimizer) -> None:
+        self._optimizer = optimizer
+        self._first: Tensor | None = None  # [refused, loss, norm] of the first step that was refused, else the last
+
+    def take(self, loss: Tensor, norm: Tensor, frames: int) -> None:
+        """Take a step.
+
+        Args:
+            loss: The loss that the gradients are of, [].
+            norm: Their norm, [].
+            frames: World steps so far, for the message.
+
+        Raises:
+            NumericalFailure: If the loss or the norm is not finite, and the device is read freely.
+        """
+        if reads_freely(loss.device):
+            if not torch.isfinite(norm + loss):
+                raise _failure(frames, float(loss), float(norm))
+        else:
+            self._refuse_unless_finite(loss, norm)
+        self._optimizer.step()
+
+    def _refuse_unless_finite(self, loss: Tensor, norm: Tensor) -> None:
+        if self._first is None:
+            self._first = torch.zeros(3, device=loss.device)
+            self._optimizer.found_inf = self._first[0]  # type: ignore[attr-defined]
+        now = torch.stack(((~torch.isfinite(norm + loss)).to(norm.dtype), loss, norm))
+        self._first.copy_(torch.where(self._first[0] > 0.0, self._first, now))  # in its place: it may be recorded
+
+    def read(self, sums: Mapping[str, Tensor], frames: int) -> dict[str, float]:
+        """Return what the steps of a batch came to, read from the device at once.
+
+        Args:
+            sums: Numbers by name, [] each.
+            frames: World steps so far, for the message.
+
+        Raises:
+            NumericalFailure: If a step was refused.
+        """
+        first = [] if self._first is None else list(self._first.double())
+        parts = [each.double() for each in sums.values()] + first
+        told = torch.stack(parts).tolist() if parts else []
+        if self._first is not None:
+            self._first.zero_()
+        if first and told[-3]:
+            raise _failure(frames, *told[-2:])
+        return dict(zip(sums, told))
+
+
+def _failure(frames: int, loss: float, norm: float) -> NumericalFailure:
+    return NumericalFailure(
+        f"after {frames} frames the loss, {loss:g}, or its gradient, of norm {norm:g}, is not finite; the weights were "
+        "left as they were, and the last checkpoint stands"
+    )

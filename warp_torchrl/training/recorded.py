@@ -1,0 +1,62 @@
+"""An optimiser step as one recording of a GPU."""
+
+from collections.abc import Callable
+
+import torch
+from tensordict import TensorDictBase
+from torch import Tensor
+
+from warp_torchrl.world.fast.graph import Graph
+
+Update = Callable[[TensorDictBase], dict[str, Tensor]]
+
+
+class RecordedUpdate:
+    """A function that learns from a sample, recorded.
+
+    Numbers that a schedule changes must be tensors: so the learning rate becomes one. A sample of another size, as the
+    last of a pass may be, is learned from without the recording.
+
+    Args:
+        update: Learns from a sample and returns numbers by name, [] each.
+        optimizer: With which it learns.
+    """
+
+    def __init__(self, update: Update, optimizer: torch.optim.Optimizer) -> None:
+        self._update, self._optimizer = update, optimizer
+        self._graph = Graph(self._flat)
+        self._like: TensorDictBase | None = None
+        self._names: list[str] = []
+
+    def __call__(self, sample: TensorDictBase) -> dict[str, Tensor]:
+        """Learn from a sample, and return what the update does."""
+        if self._like is None:
+            self._like = sample
+            _make_capturable(self._optimizer)
+        elif sample.batch_size != self._like.batch_size:
+            return self._update(sample)
+        made = self._graph(_leaves(sample))  # names its results
+        return dict(zip(self._names, made, strict=True))
+
+    def _flat(self, given: list[Tensor]) -> list[Tensor]:
+        if self._like is None:
+            raise RuntimeError("a recording is called with no sample")
+        leaves = iter(given)
+        found = self._update(self._like.apply(lambda _: next(leaves)))
+        self._names = sorted(found)
+        return [found[name] for name in self._names]
+
+
+def _leaves(sample: TensorDictBase) -> list[Tensor]:
+    found: list[Tensor] = []
+    sample.apply(lambda leaf: found.append(leaf), filter_empty=True)
+    return found
+
+
+def _make_capturable(optimizer: torch.optim.Optimizer) -> None:
+    """Let an optimiser's steps be recorded, with a learning rate that may change after."""
+    for group in optimizer.param_groups:
+        device = group["params"][0].device
+        rate = group["lr"]
+        group["lr"] = rate if isinstance(rate, Tensor) else torch.tensor(rate, device=device)
+        group["capturable"] = device.type == "cuda"
