@@ -19,7 +19,7 @@ class Graph:
     """A function of tensors of the same shapes at every call, recorded by a GPU.
 
     It must do the same at every call: no number that it takes from elsewhere may change, except in tensors that keep
-    their place. A CPU calls it each time, from and to the same tensors as a GPU would, so that all but the recording is tested.
+    their place. A CPU calls it each time, from and to the same tensors as a GPU would: all but the recording is tested.
 
     Args:
         function: Takes and returns lists of tensors; it may change tensors that it does not take.
