@@ -11,6 +11,7 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
+from tensordict import TensorDictBase
 from tqdm import tqdm
 
 from warp_torchrl import parallel
@@ -100,7 +101,6 @@ class Training(Learning):
         self._began = time.perf_counter() - self.seconds
         for batch in self.batches() if self.frames < total else ():
             row = self._learn(batch)
-            row["evaluation/saved"] = self._evaluate() if self.is_first else None
             if tracker is not None and bar is not None:
                 self._report(row, tracker, bar)
             if self.frames >= total:
@@ -135,6 +135,10 @@ class Training(Learning):
         if bar.disable and (self.seconds >= self._next_line or self.frames >= total):
             self._next_line = self.seconds + _SECONDS_BETWEEN_LINES
             log.info(line(row, total))
+
+    def _learn(self, batch: TensorDictBase) -> dict[str, float | None]:
+        row = super()._learn(batch)
+        return row | {"evaluation/saved": self._evaluate() if self.is_first else None}
 
     def _save_alone(self) -> None:
         """Save without the processes that may have ended: on resume their worlds start new episodes."""
