@@ -201,14 +201,17 @@ def test_checkpoints_are_written_on_the_way_and_at_the_end(finished):
     assert found.manifest.mode == training.mode
 
 
-def test_a_loaded_policy_acts_as_the_trained_one(finished):
-    run, training = finished
+def test_a_loaded_policy_acts_as_the_trained_one(tmp_path):
+    training = tiny(tmp_path, "model.dtype=float32", "total_frames=64")
+    training.train()
     env = training.run_config.make_env(5, 77)
     now = env.reset()
-    loaded = policy_of(newest(run)[0], "deterministic")
+    loaded = policy_of(newest(tmp_path)[0], "deterministic")
     with torch.no_grad():
         logits = training.learner.policy[0](now.clone())["agents", "logits"]
-        assert torch.equal(loaded.module[0](now.clone())["agents", "logits"], logits)
+        acts = loaded.module[0](now.clone())["agents", "logits"]
+    # In training the first layer leaves out what this world cannot fill: the same sums, in another order.
+    torch.testing.assert_close(acts, logits, rtol=0, atol=1e-6)
     assert loaded(now)[ACTION].shape == (5, 2)
 
 
