@@ -109,7 +109,8 @@ def test_one_process_talks_to_nobody():
 
 
 @pytest.mark.parametrize(
-    ("threads", "worlds", "count"), [(1, 256, 1), (2, 256, 2), (4, 256, 4), (3, 256, 2), (8, 64, 2), (4, 63, 1)]
+    ("threads", "worlds", "count"),
+    [(1, 256, 1), (2, 256, 2), (4, 256, 4), (3, 256, 2), (8, 256, 4), (8, 64, 1), (4, 255, 3)],
 )
 def test_auto_takes_what_shares_the_worlds_and_leaves_enough(monkeypatch, threads, worlds, count):
     monkeypatch.setattr(torch, "get_num_threads", lambda: threads)
