@@ -19,7 +19,7 @@ from warp_torchrl.parallel.group import WorkerDied
 Work = Callable[[dict[str, Any]], None]
 """What a process does that is not the first; called with the run's configuration."""
 FEWEST_WORLDS = 64
-"""Worlds that ``auto`` gives a process at least: with fewer a step costs hardly less, and each process has some 0.6 GiB."""
+"""Worlds that ``auto`` gives a process at least: with fewer a step costs hardly less, and each has some 0.6 GiB."""
 _WAIT = timedelta(days=1)  # a process that has ended is noticed at once; others may wait for an evaluation
 _SECONDS_TO_END = 10.0
 _SECONDS_TO_BREAK = 2.0  # in which a process whose connection has broken off may still be ending
