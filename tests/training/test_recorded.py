@@ -16,7 +16,7 @@ from warp_torchrl.training.recorded import RecordedUpdate
 def learned(folder, *overrides):
     """Rows and weights after three batches."""
     with unread():
-        run = training(folder, "collector.first_steps=32", *overrides)
+        run = training(folder, *overrides)
         batches = run.batches()
         rows = [run._learn(next(batches)) for _ in range(3)]
         run.close()

@@ -55,7 +55,7 @@ class Ppo(OnPolicy):
 
     clip_epsilon: float = 0.2
     value_norm: bool = True
-    epochs: int = 3
+    epochs: int = 6
 
     def __post_init__(self) -> None:
         self.check(clip_epsilon=(1e-4, 1.0), epochs=(1, 1000))

@@ -58,8 +58,8 @@ class InProcess:
 
     Attributes:
         steps: Steps of each world in a batch.
-        first_steps: Steps of each world in the first batches; where ``steps`` is no more, all batches have those.
-        grows_at: Share of the training after which batches have all ``steps``.
+        first_steps: Steps of each world in the first batches, if they grow; no more than ``steps``.
+        grows_at: Share of the training after which batches have all ``steps``; 0 gives them those from the start.
 
     Raises:
         ValueError: If a value is out of its range, or first_steps does not divide more steps.
@@ -67,7 +67,7 @@ class InProcess:
 
     steps: int = 32
     first_steps: int = 16
-    grows_at: float = 0.5
+    grows_at: float = 0.0
 
     def __post_init__(self) -> None:
         self.check()
@@ -76,13 +76,13 @@ class InProcess:
         """Check the numbers against their ranges, and further fields against ``ranges``."""
         count = (1, 100_000)
         check_fields(self, steps=count, first_steps=count, grows_at=(0.0, 1.0), **ranges)
-        if self.steps > self.first_steps and self.steps % self.first_steps:
+        if self.steps % self.segment:
             raise ValueError(f"first_steps must divide steps, {self.steps}, got {self.first_steps}")
 
     @property
     def segment(self) -> int:
         """Return the steps of each world between two looks at the collector; a batch has one or several segments."""
-        return min(self.steps, self.first_steps)
+        return min(self.steps, self.first_steps) if self.grows_at else self.steps
 
     def segments(self, progress: float) -> int:
         """Return how many segments a batch has at progress in 0..1."""
