@@ -3,6 +3,7 @@
 import torch
 from torch import Tensor
 
+from warp_torchrl.device import reads_freely
 from warp_torchrl.world.fast.constants import whole_numbers
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import Cover
@@ -47,7 +48,7 @@ def nearest_free(taken: Tensor, base: Tensor, n_agents: int) -> Tensor:
     """
     height, width = taken.shape[1:]
     side = 2 * n_agents
-    if side < min(height, width) and not taken.is_cuda:  # most find theirs in a small square, in a tenth of the time
+    if side < min(height, width) and reads_freely(taken.device):  # most find theirs in a small square, ten times faster
         near = torch.where(base[:, None] == 0, 0, base[:, None] - side + 1)
         cells = torch.arange(side, device=taken.device)
         rows, columns = near[..., 0] + cells, near[..., 1] + cells
