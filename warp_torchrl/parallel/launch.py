@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import timedelta
@@ -23,6 +24,7 @@ FEWEST_WORLDS = 64
 _WAIT = timedelta(days=1)  # a process that has ended is noticed at once; others may wait for an evaluation
 _SECONDS_TO_END = 10.0
 _SECONDS_TO_BREAK = 2.0  # in which a process whose connection has broken off may still be ending
+_SECONDS_BETWEEN_LOOKS = 0.05
 _HOST = "127.0.0.1"
 
 
@@ -92,9 +94,31 @@ def _start(count: int, module: str) -> list[subprocess.Popen[bytes]]:
         subprocess.Popen([sys.executable, "-m", module, *map(str, (rank, count, store.port, threads))], env=environment)
         for rank in range(1, count)
     ]
+    try:
+        _wait_for(others, store)
+    except BaseException:
+        _end(others, seconds=0.0)
+        raise
     torch.set_num_threads(threads)
     dist.init_process_group(_backend(), store=store, rank=0, world_size=count, timeout=_WAIT)
     return others
+
+
+def _wait_for(others: Sequence[subprocess.Popen[bytes]], store: TCPStore) -> None:
+    """Wait until the other processes are there.
+
+    Raises:
+        WorkerDied: If one ends before.
+    """
+    while not store.check([_there(rank) for rank in range(1, len(others) + 1)]):
+        if any(each.poll() is not None for each in others):
+            raise WorkerDied(_ended(others))
+        time.sleep(_SECONDS_BETWEEN_LOOKS)
+
+
+def _there(rank: int) -> str:
+    """Return the key of the store by which a process says that it is there."""
+    return f"there/{rank}"
 
 
 def join(arguments: Sequence[str], work: Work) -> None:
@@ -110,6 +134,7 @@ def join(arguments: Sequence[str], work: Work) -> None:
     torch.set_num_threads(threads)
     try:
         store = TCPStore(_HOST, port, count, is_master=False)
+        store.set(_there(rank), "")
         dist.init_process_group(_backend(), store=store, rank=rank, world_size=count, timeout=_WAIT)
     except RuntimeError:  # the first process has ended
         sys.exit(1)
@@ -154,8 +179,8 @@ def _code_of(process: subprocess.Popen[bytes], seconds: float) -> int | None:
         return None
 
 
-def _end(others: Sequence[subprocess.Popen[bytes]]) -> None:
+def _end(others: Sequence[subprocess.Popen[bytes]], seconds: float = _SECONDS_TO_END) -> None:
     for each in others:
-        if _code_of(each, _SECONDS_TO_END) is None:
+        if _code_of(each, seconds) is None:
             each.kill()
             each.wait()
