@@ -95,7 +95,8 @@ def standardised(values: Tensor, dim: int) -> Tensor:
     others = [each for each in range(values.dim()) if each != dim % values.dim()]
     wide = values.double()
     count = wide.numel() // wide.shape[dim] * size()
-    mean = sum_(wide.sum(others, keepdim=True)) / count
-    variance = sum_((wide - mean).square().sum(others, keepdim=True)) / max(count - 1, 1)
-    scale = variance.sqrt().clamp(min=torch.finfo(torch.float32).resolution)
+    total, squares = sum_(torch.stack([each.sum(others, keepdim=True) for each in (wide, wide.square())]))
+    mean = total / count
+    variance = (squares - total * mean) / max(count - 1, 1)  # one message; float64 keeps its digits
+    scale = variance.clamp(min=0.0).sqrt().clamp(min=torch.finfo(torch.float32).resolution)
     return ((wide - mean) / scale).to(values.dtype)
