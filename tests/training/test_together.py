@@ -14,6 +14,7 @@ import pytest
 import torch
 
 from tests.stress.processes import ROOT, TINY, alive, finish, rows, start, wait_for
+from tests.training.test_loop import flattened
 from warp_torchrl.config.compose import SavedConfig, compose_config, plain, restore
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.run_config import run_config
@@ -39,16 +40,6 @@ def gone(session, seconds=10.0):
     while alive(session) and time.monotonic() < deadline:
         time.sleep(0.05)
     return not alive(session)
-
-
-def flattened(state, prefix=""):
-    if isinstance(state, dict):
-        items = state.items()
-    elif isinstance(state, (list, tuple)):
-        items = enumerate(state)
-    else:
-        return {prefix: state}
-    return {key: leaf for name, value in items for key, leaf in flattened(value, f"{prefix}/{name}").items()}
 
 
 def told(run):
