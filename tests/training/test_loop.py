@@ -465,10 +465,12 @@ def test_replayed_and_remembered_batches_have_one_size(tmp_path, overrides):
 def test_a_batch_of_segments_is_one_of_all_steps(tmp_path):
     def first(name, *overrides):
         (tmp_path / name).mkdir()
-        return next(tiny(tmp_path / name, *overrides).batches())
+        training = tiny(tmp_path / name, *overrides)
+        training._segments = training.run_config.collector.segments(1.0)
+        return next(training.batches())
 
     one = first("whole")
-    other = first("parts", "collector.first_steps=4", "collector.grows_at=1e-9")
+    other = first("parts", "collector.first_steps=4", "collector.grows_at=0.5")
     assert one.shape == other.shape == (4, 8)
     for key, value in one.items(include_nested=True, leaves_only=True):
         assert torch.equal(value, other[key]), key

@@ -109,13 +109,14 @@ class Training(Learning):
             saves, received = self.go_on(bool(due), signals.received)
             if saves:
                 self.save()
+                _, received = self.go_on(received=signals.received)  # one may have come while it saved
             if received:
                 raise Stopped(received, self.run)
 
     def go_on(self, saves: bool = False, received: int = 0) -> tuple[bool, int]:
         """Return in every process what the first one decides after a batch: whether to save, and a signal to stop at.
 
-        Every process must call it after each batch but the last.
+        Every process must call it after each batch but the last, and after a save.
         """
         return parallel.share((saves, received))
 
