@@ -141,7 +141,8 @@ def _name_of(kind: type) -> str:
 @lru_cache(maxsize=1)
 def _code() -> str:
     """Return a digest of the sources of what plays the episodes."""
-    paths = sorted(path for room in _SOURCES for path in (_PACKAGE / room).rglob("*.py"))
+    rooms = (path for room in _SOURCES for path in (_PACKAGE / room).rglob("*.py"))
+    paths = sorted({*rooms, *_PACKAGE.glob("*.py")})
     return digest([[path.relative_to(_PACKAGE).as_posix(), sha256(path.read_bytes()).hexdigest()] for path in paths])
 
 
