@@ -6,6 +6,7 @@ from queue import Empty
 import pytest
 import torch
 from torch import distributed as dist
+from torchrl.modules import PopArtValueNorm
 
 from warp_torchrl import parallel
 from warp_torchrl.algorithms.ppo import SharedValueNorm
@@ -22,7 +23,7 @@ def talk(rank):
     """Everything that a process says and hears, as plain values."""
     own = part_of(BATCH, rank)
     norm, scale = SharedValueNorm(shape=1), RewardScale(gamma=0.9)
-    norm.update(own)
+    norm.learn(norm.moments([own])[0])
     scale._add(own.double())
     several = [torch.full((2, 2), float(rank)), torch.tensor(10.0 * rank)]
     parallel.mean_(several)
@@ -33,8 +34,8 @@ def talk(rank):
         "means": [each.tolist() for each in several],
         "shared": parallel.share({"from": rank}),
         "gathered": parallel.gather(rank),
-        "standardised": parallel.standardised(own, dim=-2).tolist(),
-        "norm": [norm.running_mean.item(), norm.running_mean_sq.item()],
+        "standardised": [each.tolist() for each in parallel.standardised([own, 2.0 * own[:1]], dim=-2)],
+        "norm": [each.item() for each in norm.buffers()],
         "moments": scale._moments.tolist(),
     }
 
@@ -86,19 +87,19 @@ def test_the_first_shares_and_gathers(said):
 
 
 def test_parts_are_standardised_by_the_moments_of_the_whole(said):
-    whole = torch.cat([torch.tensor(each["standardised"]) for each in said])
-    mean = BATCH.mean((0, 1), keepdim=True)
-    deviation = BATCH.std((0, 1), keepdim=True)
-    torch.testing.assert_close(whole, (BATCH - mean) / deviation, atol=1e-6, rtol=0)
-    torch.testing.assert_close(parallel.standardised(BATCH, dim=-2), whole, atol=1e-6, rtol=0)
+    for index, given in enumerate((BATCH, 2.0 * BATCH[::3])):  # each process has told of the first world of its own
+        whole = torch.cat([torch.tensor(each["standardised"][index]) for each in said])
+        mean, deviation = given.mean((0, 1), keepdim=True), given.std((0, 1), keepdim=True)
+        torch.testing.assert_close(whole, (given - mean) / deviation, atol=1e-6, rtol=0)
+        torch.testing.assert_close(parallel.standardised([given], dim=-2)[0], whole, atol=1e-6, rtol=0)
 
 
 def test_norms_of_values_and_rewards_are_those_of_the_whole(said):
-    norm, scale = SharedValueNorm(shape=1), RewardScale(gamma=0.9)
+    norm, scale = PopArtValueNorm(shape=1), RewardScale(gamma=0.9)
     norm.update(BATCH)
     scale._add(BATCH.double())
     for each in said:
-        assert each["norm"] == pytest.approx([norm.running_mean.item(), norm.running_mean_sq.item()], rel=1e-5)
+        assert each["norm"] == pytest.approx([each.item() for each in norm.buffers()], rel=1e-5)
         assert each["moments"] == pytest.approx(scale._moments.tolist(), rel=1e-9)
 
 

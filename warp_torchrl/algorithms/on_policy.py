@@ -112,20 +112,28 @@ class OnPolicy(Algorithm):
         )
         largest = min(self.minibatch_size // parallel.size(), frames_per_batch) // steps
         standardises = self.standardises() if parallel.size() > 1 else None
+        norm = getattr(loss, "value_norm", None)
 
         def store(batch: TensorDictBase) -> None:
             buffer.empty()
             valued = with_advantages(loss, batch, canonical, whole=bool(memory.actors))
             if standardises == "batch":
-                valued[ADVANTAGE] = parallel.standardised(valued[ADVANTAGE], dim=-2)
+                (valued[ADVANTAGE],) = parallel.standardised([valued[ADVANTAGE]], dim=-2)
             buffer.extend(narrowed(valued, arithmetic_of(critic, env.device.type)))
 
         def samples() -> Iterator[TensorDictBase]:
             rows = max(1, largest * len(buffer) * steps // frames_per_batch)
-            for sample in (each for _ in range(self.passes()) for each in minibatches(buffer, rows)):
-                if standardises == "minibatch":
-                    sample[ADVANTAGE] = parallel.standardised(sample[ADVANTAGE], dim=-2)
-                yield sample
+            for places in (list(minibatches(buffer, rows)) for _ in range(self.passes())):
+                if standardises != "minibatch":
+                    yield from (buffer[each] for each in places)
+                    continue
+                kept = buffer[: len(buffer)].select(ADVANTAGE, VALUE_TARGET)
+                advantages = parallel.standardised([kept[ADVANTAGE][each] for each in places], dim=-2)
+                moments = None if norm is None else norm.moments([kept[VALUE_TARGET][each] for each in places])
+                for index, place in enumerate(places):
+                    if norm is not None:
+                        norm.learn(moments[index])
+                    yield buffer[place].set(ADVANTAGE, advantages[index])
 
         return Learner(
             policy=policy,
@@ -169,11 +177,11 @@ class OnPolicy(Algorithm):
         return {}
 
 
-def minibatches(buffer: TensorDictReplayBuffer, rows: int) -> Iterator[TensorDictBase]:
-    """Yield minibatches of so many rows of a buffer until each row has been in one; its last ones may be fewer."""
+def minibatches(buffer: TensorDictReplayBuffer, rows: int) -> Iterator[Tensor]:
+    """Yield which rows of a buffer are a minibatch, int64 [n], until each has been in one; the last may have fewer."""
     buffer.sampler.ran_out = False
     while not buffer.sampler.ran_out:
-        yield buffer.sample(rows)
+        yield buffer.sampler.sample(buffer.storage, rows)[0]
 
 
 def with_advantages(

@@ -4,6 +4,7 @@ Yu et al., "The Surprising Effectiveness of PPO in Cooperative Multi-Agent Games
 Policy Optimization Algorithms", 2017.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -17,12 +18,26 @@ from warp_torchrl.algorithms.on_policy import KEYS, OnPolicy
 
 
 class SharedValueNorm(PopArtValueNorm):
-    """TorchRL's running statistics of value targets, over those of all processes."""
+    """TorchRL's running statistics of value targets, over those of all processes.
+
+    The loss asks for an update in each of its passes, when all processes would have to wait for each other. So that does
+    nothing, and ``learn`` is told the moments, which ``moments`` finds for many minibatches with one message.
+    """
 
     def update(self, value_target: Tensor) -> None:
-        """Add value targets, float32 [..., 1], as many in every process: the mean of equal parts is that of all."""
-        super().update(value_target)
-        parallel.mean_((self.running_mean, self.running_mean_sq))
+        """Do nothing: ``learn`` has it."""
+
+    def moments(self, targets: Sequence[Tensor]) -> Tensor:
+        """Return the mean and the mean square of value targets, float32 [..., 1], over all processes, [n, 2, 1]."""
+        found = torch.stack([torch.stack((each.mean(), each.square().mean())) for each in targets])[..., None]
+        parallel.mean_([found])  # as many targets in every process
+        return found
+
+    def learn(self, moments: Tensor) -> None:
+        """Update the statistics by the mean and the mean square of value targets, [2, 1]."""
+        for running, now in zip((self.running_mean, self.running_mean_sq), moments, strict=True):
+            running.mul_(self.beta).add_(now, alpha=1.0 - self.beta)
+        self.debiasing_term.mul_(self.beta).add_(1.0 - self.beta)
 
 
 class _MaskedEntropy:
@@ -55,7 +70,7 @@ class Ppo(OnPolicy):
 
     clip_epsilon: float = 0.2
     value_norm: bool = True
-    epochs: int = 6
+    epochs: int = 3
 
     def __post_init__(self) -> None:
         self.check(clip_epsilon=(1e-4, 1.0), epochs=(1, 1000))
@@ -63,14 +78,16 @@ class Ppo(OnPolicy):
     def loss(self, policy: ProbabilisticActor, critic: torch.nn.Module) -> MAPPOLoss:
         """Return TorchRL's MAPPO or IPPO loss."""
         loss_class = MaskedMappo if self.central_critic else MaskedIppo
+        alone = parallel.size() == 1
+        norm = PopArtValueNorm if alone else SharedValueNorm
         loss = loss_class(
             policy,
             critic,
             clip_epsilon=self.clip_epsilon,
             entropy_coeff=self.entropy_coeff,
             critic_coeff=self.critic_coeff,
-            value_norm=SharedValueNorm(shape=1) if self.value_norm else None,
-            normalize_advantage=parallel.size() == 1,  # else ``standardises`` has it
+            value_norm=norm(shape=1) if self.value_norm else None,
+            normalize_advantage=alone,  # else ``standardises`` has it
         )
         loss.set_keys(**KEYS)
         loss.make_value_estimator(gamma=self.gamma, lmbda=self.lmbda)

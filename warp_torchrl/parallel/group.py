@@ -3,7 +3,7 @@
 A run of one process has no group, and then these functions do nothing. Every process must call them in the same order.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar
 
@@ -83,20 +83,23 @@ def gather(value: Any) -> list[Any]:
     return held or []
 
 
-def standardised(values: Tensor, dim: int) -> Tensor:
-    """Return values less their mean, over their standard deviation, both over all processes.
+def standardised(parts: Sequence[Tensor], dim: int) -> list[Tensor]:
+    """Return values less their mean, over their standard deviation, both over all processes, with one message.
 
     As TorchRL standardises advantages: for each index of one dimension by itself, the variance over n - 1.
 
     Args:
-        values: float32 [..., A, 1], of one shape in every process.
+        parts: Each is standardised by itself; float32 [..., A, 1], of one shape in every process.
         dim: The dimension whose indices stay apart.
     """
-    others = [each for each in range(values.dim()) if each != dim % values.dim()]
-    wide = values.double()
-    count = wide.numel() // wide.shape[dim] * size()
-    total, squares = sum_(torch.stack([each.sum(others, keepdim=True) for each in (wide, wide.square())]))
-    mean = total / count
-    variance = (squares - total * mean) / max(count - 1, 1)  # one message; float64 keeps its digits
-    scale = variance.clamp(min=0.0).sqrt().clamp(min=torch.finfo(torch.float32).resolution)
-    return ((wide - mean) / scale).to(values.dtype)
+    others = [each for each in range(parts[0].dim()) if each != dim % parts[0].dim()]
+    wide = [each.double() for each in parts]  # so that a difference of sums keeps its digits
+    sums = [torch.stack([each.sum(others, keepdim=True), each.square().sum(others, keepdim=True)]) for each in wide]
+    found = []
+    for each, (total, squares), given in zip(wide, sum_(torch.stack(sums)), parts, strict=True):
+        count = each.numel() // each.shape[dim] * size()
+        mean = total / count
+        variance = (squares - total * mean) / max(count - 1, 1)
+        scale = variance.clamp(min=0.0).sqrt().clamp(min=torch.finfo(torch.float32).resolution)
+        found.append(((each - mean) / scale).to(given.dtype))
+    return found
