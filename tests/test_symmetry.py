@@ -8,7 +8,7 @@ from tests.conftest import small_world
 from warp_torchrl.observation import STATE, STATE_SIDE, STATE_SYMMETRY, Local, Paper, Surroundings, former_symmetry
 from warp_torchrl.symmetry import Part, Planes, Target, TeamPlanes, Vector, from_plain, to_plain
 
-PRESETS = [Surroundings(), Surroundings(centred=True, identity=True), Local(channels=("age", "threat")), Paper()]
+PRESETS = [Surroundings(), Surroundings(centred=False, identity=False), Local(channels=("age", "threat")), Paper()]
 SPACES = [(name, space) for preset in PRESETS for name, space in preset.spaces(small_world()).items()]
 
 

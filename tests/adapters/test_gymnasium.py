@@ -83,7 +83,7 @@ def test_an_unknown_keyword_is_a_type_error_as_of_any_function():
 
 
 def test_what_is_seen_lies_within_its_space_through_episodes():
-    env = gym_env("single", overrides=["observation.centred=true"], **BURNS_OUT)
+    env = gym_env("single", **BURNS_OUT)
     env.action_space.seed(0)
     for _ in range(3):
         seen, _ = env.reset()

@@ -108,13 +108,13 @@ def test_mistakes_are_told_in_one_line():
         (lambda: policy.numpy_policy()({"view": one["view"]}), "must have action_mask, picture, self, got view"),
         (
             lambda: policy.numpy_policy()({**one, "self": one["self"][:5]}),
-            r"self must be float32 of shape \[22\], got .* \[5\]",
+            r"self must be float32 of shape \[26\], got .* \[5\]",
         ),
         (lambda: policy.numpy_policy()({**one, "view": one["view"] / 255}), "view must be uint8 of shape .* float64"),
         (lambda: policy.numpy_policy()(flat["uav_0"]), "observation must be a dict of picture, self, view"),
         (
             lambda: policy.numpy_policy()({"uav_0": {**vector, "observation": vector["observation"][1:]}}),
-            r"observation of uav_0 must be float32 of shape \[..., 1545\], got float32 \[1544\]",
+            r"observation of uav_0 must be float32 of shape \[..., 2032\], got float32 \[2031\]",
         ),
         (
             lambda: policy.numpy_policy()({"observation": vector["observation"]}),

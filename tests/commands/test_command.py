@@ -26,6 +26,7 @@ TINY = [
     "horizon=16",
     "n_worlds=4",
     "collector.steps=8",
+    "collector.grows_at=0",
     "total_frames=128",
     "checkpoint.interval=32",
     "checkpoint.minutes=0",

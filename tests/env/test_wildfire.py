@@ -46,7 +46,7 @@ def test_keys_are_those_of_the_contract(make_small_env):
     env = make_small_env(2)
     rollout = env.rollout(5, break_when_any_done=False)
     assert rollout["agents", "observation", "view"].shape == (2, 5, 2, 11, 11, 11)
-    assert rollout["agents", "observation", "picture"].shape == (2, 5, 2, 3, 8, 8)
+    assert rollout["agents", "observation", "picture"].shape == (2, 5, 2, 3, 15, 15)
     assert rollout["agents", "action_mask"].shape == (2, 5, 2, 11)
     assert rollout["agents", "action"].dtype == torch.int64
     assert rollout["next", "agents", "reward"].shape == (2, 5, 2, 1)

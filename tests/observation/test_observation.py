@@ -39,7 +39,7 @@ def channel(view, name):
     return view[0, 0, DEFAULT.index(name)]
 
 
-@pytest.mark.parametrize("observation", [Surroundings(), Surroundings(centred=True, identity=True), Paper()])
+@pytest.mark.parametrize("observation", [Surroundings(), Surroundings(centred=False, identity=False), Paper()])
 def test_what_is_seen_stays_within_its_space_and_reaches_its_bounds(observation):
     steep = Perlin(size=12, relief=900.0)
     world = small_world(landscape=steep, team=Team(n_agents=6, roles=("ugv", "uav")), horizon=60)
@@ -174,7 +174,7 @@ def test_a_centred_picture_is_the_picture_seen_from_the_agent(size):
     cells[1, size - 1], cells[size // 2, 3] = 11, 12
     places = [[0, 0], [size - 1, 2], [size // 2, size // 2], [size // 2, size // 2]]
     state, world = drawn(cells.tolist(), places)
-    plain, centred = Surroundings(radius=1), Surroundings(radius=1, centred=True)
+    plain, centred = Surroundings(radius=1, centred=False), Surroundings(radius=1)
     assert centred.spaces(world)["picture"].shape == (3, 15, 15)
     flat, seen = (
         plain(state, world, world.forecast(state))["picture"][0],

@@ -42,7 +42,9 @@ def test_shaping_adds_minus_the_first_potential_to_the_return(make_small_env, re
     quick = small_world(fire=Fire(alpha=(0.0, 0.0, 0.0, 1e-6, 0.0)), horizon=400)
     returns = []
     for weight in (0.0, 1.0):
-        env = make_small_env(3, quick, reward=reward(scale=1.0, shaping=weight, gamma=gamma, potential=potential))
+        env = make_small_env(
+            3, quick, reward=reward(scale=1.0, shaping=weight, gamma=gamma, potential=potential, team_share=1.0)
+        )
         env.reset()
         if weight:
             potential = env.reward_function.phi(env.world_state, env.tree_counts).mean(1)

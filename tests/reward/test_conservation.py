@@ -26,14 +26,15 @@ CONSERVATION = [Efficiency, Time, Coverage, Collaborative, Adaptive]
 
 def test_efficiency_pays_a_put_out_tree_and_charges_the_act():
     state, world = drawn(FIELD, [[0, 0], [3, 3]])
-    # Q rises by w_e / N0 = 0.9 / 16; one act costs the team's mean 5e-4
-    assert earned(Efficiency(), state, world, EXTINGUISH, STAY) == pytest.approx([0.9 / 16 - 5e-4] * 2)
+    # Q rises by w_e / N0 = 0.9 / 16; one act costs the team's mean 5e-4, and all of that is the actor's
+    assert earned(Efficiency(), state, world, EXTINGUISH, STAY) == pytest.approx([0.9 / 16 - 1e-3, 0.9 / 16])
+    assert earned(Efficiency(team_share=1.0), state, world, EXTINGUISH, STAY) == pytest.approx([0.9 / 16 - 5e-4] * 2)
 
 
 def test_efficiency_charges_a_cleared_tree():
     state, world = drawn(FIELD, [[0, 0], [3, 3]])
     # a preserved tree (1) becomes a cleared one (-0.5)
-    assert earned(Efficiency(), state, world, STAY, CLEAR) == pytest.approx([-1.5 / 16 - 5e-4] * 2)
+    assert earned(Efficiency(), state, world, STAY, CLEAR) == pytest.approx([-1.5 / 16, -1.5 / 16 - 1e-3])
 
 
 def test_efficiency_charges_the_tick_that_ignites():

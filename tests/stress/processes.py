@@ -12,6 +12,7 @@ TINY = (
     "horizon=16",
     "n_worlds=4",
     "collector.steps=8",
+    "collector.grows_at=0",
     "evaluation.episodes=4",
     "checkpoint.minutes=0",
     "evaluation.mode=sampled",

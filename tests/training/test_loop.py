@@ -26,6 +26,7 @@ TINY = [
     "horizon=20",
     "n_worlds=4",
     "collector.steps=8",
+    "collector.grows_at=0",
     "total_frames=192",
     "checkpoint.interval=64",
     "checkpoint.minutes=0",
@@ -466,7 +467,7 @@ def test_a_batch_of_segments_is_one_of_all_steps(tmp_path):
     def first(name, *overrides):
         (tmp_path / name).mkdir()
         training = tiny(tmp_path / name, *overrides)
-        training._segments = training.run_config.collector.segments(1.0)
+        training._segments = training.collector.segments(1.0)
         return next(training.batches())
 
     one = first("whole")

@@ -30,9 +30,15 @@ def test_it_is_told_where_whole_batches_are_not_what_was_asked_for():
 
 
 @pytest.mark.parametrize(
-    ("total", "grows", "end"),
-    [(192, True, 192), (190, True, 192), (200, True, 208), (192, False, 192), (200, False, 224), (10, True, 16)],
+    ("total", "grows_at", "end"),
+    [(192, 0.5, 192), (190, 0.5, 192), (200, 0.5, 208), (192, 0.0, 192), (200, 0.0, 224), (10, 0.5, 16)],
 )
-def test_a_training_ends_with_a_whole_batch(total, grows, end):
+def test_a_training_ends_with_a_whole_batch(total, grows_at, end):
     # Four worlds: batches of 16 frames up to the half, then of 32.
-    assert InProcess(steps=8, first_steps=4, grows_at=0.5).end(total, 4, grows) == end
+    assert InProcess(steps=8, grows_at=grows_at).end(total, 4) == end
+
+
+def test_first_batches_have_half_of_the_steps_unless_told():
+    assert [InProcess(steps=steps).segment for steps in (32, 7, 1)] == [16, 7, 1]
+    assert InProcess(steps=32, first_steps=8).segment == 8
+    assert InProcess(steps=32, first_steps=8, grows_at=0.0).segment == 32

@@ -25,7 +25,7 @@ def learned(folder, *overrides):
 
 @pytest.mark.parametrize("overrides", [[], ["algorithm=a2c"], ["algorithm.minibatch_size=100"]], ids=" ".join)
 def test_recorded_updates_learn_the_same(tmp_path, overrides):
-    rows, weights, _ = learned(tmp_path, *overrides)
+    rows, weights, _ = learned(tmp_path, "collector.grows_at=0", *overrides)
     recorded_rows, recorded, run = learned(tmp_path, "graph=true", *overrides)
     assert isinstance(run._update, RecordedUpdate) and run.env._recorded is not None
     for one, other in zip(rows, recorded_rows, strict=True):

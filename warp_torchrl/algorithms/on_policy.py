@@ -107,9 +107,8 @@ class OnPolicy(Algorithm):
         canonical = model.canonical_batch(shape, state=self.central_critic, packed=True)
         memory = Recollection(policy)
         steps = frames_per_batch // env.batch_size[0] if memory.actors else 1  # in a row of the buffer
-        buffer = TensorDictReplayBuffer(
-            storage=BatchStorage(frames_per_batch // steps, device=env.device), sampler=SamplerWithoutReplacement()
-        )
+        rows = BatchStorage(frames_per_batch // steps, device=env.device)
+        buffer = TensorDictReplayBuffer(storage=rows, sampler=SamplerWithoutReplacement())
         largest = min(self.minibatch_size // parallel.size(), frames_per_batch) // steps
         standardises = self.standardises() if parallel.size() > 1 else None
         norm = getattr(loss, "value_norm", None)
@@ -122,18 +121,18 @@ class OnPolicy(Algorithm):
             buffer.extend(narrowed(valued, arithmetic_of(critic, env.device.type)))
 
         def samples() -> Iterator[TensorDictBase]:
-            rows = max(1, largest * len(buffer) * steps // frames_per_batch)
-            for places in (list(minibatches(buffer, rows)) for _ in range(self.passes())):
+            size = max(1, largest * len(buffer) * steps // frames_per_batch)
+            for places in (list(minibatches(buffer, size)) for _ in range(self.passes())):
                 if standardises != "minibatch":
-                    yield from (buffer[each] for each in places)
+                    yield from map(rows.get, places)
                     continue
-                kept = buffer[: len(buffer)].select(ADVANTAGE, VALUE_TARGET)
+                kept = rows.get(slice(0, len(rows))).select(ADVANTAGE, VALUE_TARGET)
                 advantages = parallel.standardised([kept[ADVANTAGE][each] for each in places], dim=-2)
                 moments = None if norm is None else norm.moments([kept[VALUE_TARGET][each] for each in places])
                 for index, place in enumerate(places):
                     if norm is not None:
                         norm.learn(moments[index])
-                    yield buffer[place].set(ADVANTAGE, advantages[index])
+                    yield rows.get(place).set(ADVANTAGE, advantages[index])
 
         return Learner(
             policy=policy,
@@ -177,11 +176,11 @@ class OnPolicy(Algorithm):
         return {}
 
 
-def minibatches(buffer: TensorDictReplayBuffer, rows: int) -> Iterator[Tensor]:
-    """Yield which rows of a buffer are a minibatch, int64 [n], until each has been in one; the last may have fewer."""
+def minibatches(buffer: TensorDictReplayBuffer, size: int) -> Iterator[Tensor]:
+    """Yield which rows of a buffer are a minibatch, int64 [size], until each has been in one; the last may be smaller."""
     buffer.sampler.ran_out = False
     while not buffer.sampler.ran_out:
-        yield buffer.sampler.sample(buffer.storage, rows)[0]
+        yield buffer.sampler.sample(buffer.storage, size)[0]
 
 
 def with_advantages(

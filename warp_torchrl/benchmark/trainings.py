@@ -24,13 +24,13 @@ def training_speed(
     Args:
         overrides: Of ``train.py``, in the command line's grammar.
         device: Where all of it happens.
-        repeats: Batches that are measured.
+        repeats: Batches that are measured, of all ``collector.steps``.
         with_peer: Whether to train with Stable-Baselines3 on the NumPy environment as well.
 
     Returns:
         A row for each way to train, with ``agent_steps_per_second``; and the shares of our training loop.
     """
-    values = plain(compose_config("train", [*overrides, f"device={device}"]))
+    values = plain(compose_config("train", [*overrides, "collector.grows_at=0", f"device={device}"]))
     plan = run_config(values)
     agents = plan.world.team.n_agents
     common = {"scenario": plan.scenario, "size": "{} x {}".format(*plan.world.size), "agents": agents}

@@ -58,7 +58,7 @@ class InProcess:
 
     Attributes:
         steps: Steps of each world in a batch.
-        first_steps: Steps of each world in the first batches, if they grow; no more than ``steps``.
+        first_steps: Steps of each world in the first batches, if they grow; None: half of ``steps`` if that is whole.
         grows_at: Share of the training after which batches have all ``steps``; 0 gives them those from the start.
 
     Raises:
@@ -66,8 +66,8 @@ class InProcess:
     """
 
     steps: int = 32
-    first_steps: int = 16
-    grows_at: float = 0.0
+    first_steps: int | None = None
+    grows_at: float = 0.25
 
     def __post_init__(self) -> None:
         self.check()
@@ -82,16 +82,19 @@ class InProcess:
     @property
     def segment(self) -> int:
         """Return the steps of each world between two looks at the collector; a batch has one or several segments."""
-        return min(self.steps, self.first_steps) if self.grows_at else self.steps
+        if not self.grows_at:
+            return self.steps
+        half = self.steps if self.steps % 2 else self.steps // 2
+        return half if self.first_steps is None else min(self.steps, self.first_steps)
 
     def segments(self, progress: float) -> int:
         """Return how many segments a batch has at progress in 0..1."""
         return 1 if progress < self.grows_at else self.steps // self.segment
 
-    def end(self, total: int, n_worlds: int, grows: bool) -> int:
+    def end(self, total: int, n_worlds: int) -> int:
         """Return the frames after which a training of at least ``total`` frames ends, in whole batches."""
         small, large = n_worlds * self.segment, n_worlds * self.steps
-        grown = small * -(-int(self.grows_at * total) // small) if grows else 0
+        grown = small * -(-int(self.grows_at * total) // small)
         if grown >= total:
             return small * -(-total // small)
         return grown + large * -(-(total - grown) // large)

@@ -183,7 +183,7 @@ def option_of(group: str, target: str) -> str:
 # What is written into a run folder, and read back
 
 _OPTION = re.compile(r"[A-Za-z0-9_]+")
-_BEFORE = {"model.symmetry": "none", "processes": 1}
+_BEFORE = {"model.symmetry": "none", "processes": 1, "collector.grows_at": 0.0}
 """What runs did whose record has none of a key yet."""
 
 

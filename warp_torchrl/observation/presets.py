@@ -66,7 +66,7 @@ class Local:
     """
 
     radius: int = 5
-    identity: bool = False
+    identity: bool = True
     channels: tuple[str, ...] = DEFAULT
 
     def __post_init__(self) -> None:
@@ -101,13 +101,14 @@ class Surroundings(Local):
     each block that burns), fuel and team-mates in 8 x 8 blocks.
 
     Attributes:
-        centred: Whether the agent's own block is the middle of the picture, which then has 15 x 15 blocks, uint8.
+        centred: Whether the agent's own block is the middle of the picture, which then has 15 x 15 blocks, uint8; else
+            it is of the map, 8 x 8 blocks, float32.
 
     Raises:
         ValueError: If the radius is not in 1..32.
     """
 
-    centred: bool = False
+    centred: bool = True
 
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
@@ -119,7 +120,7 @@ class Surroundings(Local):
         return {**super().spaces(world), "picture": space}
 
     def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
-        """Return ``view``, ``self``, and ``picture`` float32 [B, A, 3, 8, 8]."""
+        """Return ``view``, ``self``, and ``picture``, uint8 [B, A, 3, 15, 15], or float32 [B, A, 3, 8, 8] of the map."""
         shown = centred_picture(state, forecast) if self.centred else picture(state, forecast)
         return {**super().__call__(state, world, forecast), "picture": shown}
 

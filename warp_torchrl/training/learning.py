@@ -4,6 +4,7 @@ What differs between algorithms is a field of ``Learner``. Every process of a ru
 """
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import torch
@@ -45,7 +46,9 @@ class Learning:
         if run_config.graph:
             self._update = RecordedUpdate(self._update, self.learner.optimizer)  # type: ignore[method-assign]
         self.reward_scale = RewardScale(run_config.reward.gamma) if run_config.reward.normalise else None
-        self.collection = run_config.collector.open(self.env, self.learner, run_config.make_training_env, first)
+        grows = self.learner.batches_grow and not run_config.graph  # a recorded update has one size
+        self.collector = run_config.collector if grows else replace(run_config.collector, grows_at=0.0)
+        self.collection = self.collector.open(self.env, self.learner, run_config.make_training_env, first)
         self.frames = 0
         self._schedule()
         self.last_batch = self.frames_per_batch
@@ -58,26 +61,17 @@ class Learning:
     @property
     def frames_per_batch(self) -> int:
         """Return the frames of the current batch, of all processes."""
-        return self.run_config.n_worlds * self.run_config.collector.segment * self._segments
-
-    @property
-    def batches_grow(self) -> bool:
-        """Return whether batches are smaller at first; a recorded update has one size."""
-        return self.learner.batches_grow and not self.run_config.graph
-
-    def _segments_now(self) -> int:
-        """Return of how many segments the next batch consists."""
-        progress = min(1.0, self.frames / self.run_config.total_frames) if self.batches_grow else 1.0
-        return self.run_config.collector.segments(progress)
+        return self.run_config.n_worlds * self.collector.segment * self._segments
 
     def batches(self) -> Iterator[TensorDictBase]:
         """Yield batches [B, T] of so many segments as are due."""
         held: list[TensorDictBase] = []
         for segment in self.collection:
-            held.append(segment if self._segments == 1 else segment.clone())  # the collector writes over it
-            if len(held) >= self._segments:
-                yield held[0] if len(held) == 1 else torch.cat(held, dim=1)
-                held = []
+            if len(held) + 1 < self._segments:
+                held.append(segment.clone())  # the collector writes over it
+                continue
+            yield torch.cat([*held, segment], dim=1) if held else segment
+            held = []
 
     def _learn(self, batch: TensorDictBase) -> dict[str, float | None]:
         """Learn from one batch [B, T] and return its row of ``metrics.csv``."""
@@ -108,8 +102,10 @@ class Learning:
 
     def _schedule(self) -> None:
         """Update the scheduled hyperparameters; their columns belong to the next row."""
-        self._scheduled = self.learner.schedule(min(1.0, self.frames / self.run_config.total_frames))
-        self._segments = self._segments_now()
+        progress = min(1.0, self.frames / self.run_config.total_frames)
+        self._scheduled = self.learner.schedule(progress)
+        self._segments = self.collector.segments(progress)
+        """Segments of the next batch."""
 
     def _update(self, sample: TensorDictBase) -> dict[str, Tensor]:
         """Take one optimiser step and return the loss terms."""

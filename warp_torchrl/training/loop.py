@@ -92,8 +92,8 @@ class Training(Learning):
 
     def _train(self, signals: DeferredSignals, tracker: Tracker | None, bar: tqdm | None) -> None:
         total = self.run_config.total_frames
-        collector, worlds = self.run_config.collector, self.run_config.n_worlds
-        end = collector.end(total, worlds, self.batches_grow)
+        collector, worlds = self.collector, self.run_config.n_worlds
+        end = collector.end(total, worlds)
         steps = collector.segment * self._segments
         notice = batch_size_notice(total, end, worlds, steps, "steps" if steps == collector.steps else "first_steps")
         if notice is not None and self.frames < total and self.is_first:

@@ -57,9 +57,9 @@ from warp_torchrl.world.world import in_wind
 TURNS = list(itertools.product((1, -1), (1, -1), (False, True)))
 """Whether rows, then columns, are mirrored, and whether they change places after that."""
 PRESETS = {
-    "whole map": Surroundings(),
-    "centred": Surroundings(centred=True, identity=True),
-    "local": Local(identity=True),
+    "whole map": Surroundings(centred=False, identity=False),
+    "centred": Surroundings(),
+    "local": Local(),
     "paper": Paper(),
 }
 SIZE = 16
@@ -364,7 +364,7 @@ def test_every_entry_of_a_preset_says_how_it_turns(name):
     ids=["view", "self", "no target", "no place"],
 )
 def test_observations_that_do_not_say_how_they_turn_are_read_as_they_are(make_small_env, changed, rule):
-    shape = signature(make_small_env(2))
+    shape = signature(make_small_env(2, observation=PRESETS["whole map"]))  # whose places are of the map
     entries = {
         name: entry._replace(symmetry=changed.get(name, entry.symmetry)) for name, entry in shape.observation.items()
     }
@@ -479,7 +479,7 @@ def test_a_tie_is_a_tie_in_any_batch():
     """Fires at the corners of a diamond pull nowhere: north stays up, in one world and in a thousand."""
     picture = torch.zeros(1000, 1, 3, 8, 8)
     picture[:, :, 0, [1, 5, 3, 3], [3, 3, 1, 5]] = 0.3
-    declared = symmetries(Surroundings())
+    declared = symmetries(PRESETS["whole map"])
     entries = {
         "picture": picture,
         "self": torch.full((1000, 1, SELF_SIZE), 3.5 / 8),
