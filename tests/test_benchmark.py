@@ -165,7 +165,8 @@ def test_the_numpy_world_plays_the_same_law(overrides):
 
 
 def test_the_numpy_team_plays_and_earns_the_same():
-    env = make_env("large", n_worlds=1, seed=3, overrides=["landscape.size=14", "team.n_agents=6", "observation=paper"])
+    overrides = ["landscape.size=14", "team.n_agents=6", "observation=paper", "reward.team_share=1"]
+    env = make_env("large", n_worlds=1, seed=3, overrides=overrides)
     now, state = env.reset(), env.world_state
     peer = numpy_copy(state, 0, env.world.fire, env.world.side_of_cell)
     team = NumpyTeam(peer, state.cover[0].numpy(), state.vehicles.position[0].numpy(), 3, env.reward_function)

@@ -67,6 +67,8 @@ def test_a_golden_run_is_small(release):
 
 
 def test_golden_policies_play_in_make_env():
-    env = make_env("skirmish", n_worlds=2, overrides=["landscape.size=8", "observation=local", "observation.radius=1"])
-    rollout = env.rollout(3, load_policy(GOLDEN / RELEASES[-1]), break_when_any_done=False)
+    policy = load_policy(GOLDEN / RELEASES[-1])
+    assert "observation.identity=false" in policy.overrides, "which no record of then names"
+    env = make_env("skirmish", n_worlds=2, overrides=["landscape.size=8", *policy.overrides])
+    rollout = env.rollout(3, policy, break_when_any_done=False)
     assert rollout[ACTION].shape == (2, 3, 2) and rollout[ACTION].dtype == torch.int64

@@ -23,6 +23,7 @@ TINY = [
     "n_worlds=4",
     "horizon=12",
     "collector.steps=6",
+    "collector.grows_at=0",
     "model.actor_hidden=[8]",
     "model.critic_hidden=[8]",
     "algorithm.minibatch_size=24",

@@ -18,7 +18,8 @@ _REWARD = Efficiency()
 
 
 class NumpyFireEnv(ParallelEnv[str, np.ndarray, int]):
-    """Bulldozers against a fire as in the scenario ``large``: its landscape, wind, law ``spread``, actions and reward.
+    """Bulldozers against a fire as in the scenario ``large``: its landscape, wind, law ``spread`` and actions, and
+    the team's mean of its reward.
 
     Args:
         size: (H, W) [cells].

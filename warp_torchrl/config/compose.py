@@ -183,7 +183,13 @@ def option_of(group: str, target: str) -> str:
 # What is written into a run folder, and read back
 
 _OPTION = re.compile(r"[A-Za-z0-9_]+")
-_BEFORE = {"model.symmetry": "none", "processes": 1, "collector.grows_at": 0.0}
+_BEFORE = {
+    "model.symmetry": "none",
+    "processes": 1,
+    "collector.grows_at": 0.0,
+    "observation.identity": False,
+    "observation.centred": False,
+}
 """What runs did whose record has none of a key yet."""
 
 
@@ -264,7 +270,12 @@ def restore(record: SavedConfig, overrides: Sequence[str] = ()) -> DictConfig:
     choices = [f"{group}={option}" for group, option in record.choices.items() if group not in touched]
     config = compose_config("train", [*choices, *overrides])
     recorded = dict(_leaves(record.values))
-    before = {key: value for key, value in _BEFORE.items() if key.split(".")[0] in {*record.values, "processes"}}
+    groups = {*record.values, "processes"}
+    before = {
+        key: value
+        for key, value in _BEFORE.items()
+        if key.split(".")[0] in groups and OmegaConf.select(config, key) is not None
+    }
     for path, value in {**before, **recorded}.items():
         if "${" in str(value):  # what is recorded was resolved: this one was put there to read what is ours
             raise ConfigError(f"{path} in the run folder must be a plain value, got {value!r}")
