@@ -1,8 +1,9 @@
 """Base of the on-policy algorithms: actors, critics, advantages and schedules."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from itertools import zip_longest
+from typing import Any, Literal
 
 import torch
 from tensordict import TensorDictBase
@@ -122,17 +123,9 @@ class OnPolicy(Algorithm):
 
         def samples() -> Iterator[TensorDictBase]:
             size = max(1, largest * len(buffer) * steps // frames_per_batch)
-            for places in (list(minibatches(buffer, size)) for _ in range(self.passes())):
-                if standardises != "minibatch":
-                    yield from map(rows.get, places)
-                    continue
-                kept = rows.get(slice(0, len(rows))).select(ADVANTAGE, VALUE_TARGET)
-                advantages = parallel.standardised([kept[ADVANTAGE][each] for each in places], dim=-2)
-                moments = None if norm is None else norm.moments([kept[VALUE_TARGET][each] for each in places])
-                for index, place in enumerate(places):
-                    if norm is not None:
-                        norm.learn(moments[index])
-                    yield rows.get(place).set(ADVANTAGE, advantages[index])
+            for _ in range(self.passes()):
+                places = list(minibatches(buffer, size))
+                yield from map(rows.get, places) if standardises != "minibatch" else _shared(rows, places, norm)
 
         return Learner(
             policy=policy,
@@ -177,10 +170,27 @@ class OnPolicy(Algorithm):
 
 
 def minibatches(buffer: TensorDictReplayBuffer, size: int) -> Iterator[Tensor]:
-    """Yield which rows of a buffer are a minibatch, int64 [size], until each has been in one; the last may be smaller."""
+    """Yield which rows of a buffer are a minibatch, int64 [size], until all have been; the last may be smaller."""
     buffer.sampler.ran_out = False
     while not buffer.sampler.ran_out:
         yield buffer.sampler.sample(buffer.storage, size)[0]
+
+
+def _shared(rows: BatchStorage, places: Sequence[Tensor], norm: Any) -> Iterator[TensorDictBase]:
+    """Yield minibatches with advantages standardised over all processes, with two messages for all of them.
+
+    Args:
+        rows: Of the batch.
+        places: Which of them are in each minibatch, int64 [n].
+        norm: Of value targets, which learns each minibatch's before that is yielded; None where there is none.
+    """
+    kept = rows.get(slice(0, len(rows))).select(ADVANTAGE, VALUE_TARGET)
+    advantages = parallel.standardised([kept[ADVANTAGE][each] for each in places], dim=-2)
+    moments = [] if norm is None else norm.moments([kept[VALUE_TARGET][each] for each in places])
+    for place, advantage, of_targets in zip_longest(places, advantages, moments):
+        if norm is not None:
+            norm.learn(of_targets)
+        yield rows.get(place).set(ADVANTAGE, advantage)
 
 
 def with_advantages(

@@ -20,7 +20,7 @@ from warp_torchrl.algorithms.on_policy import KEYS, OnPolicy
 class SharedValueNorm(PopArtValueNorm):
     """TorchRL's running statistics of value targets, over those of all processes.
 
-    The loss asks for an update in each of its passes, when all processes would have to wait for each other. So that does
+    The loss asks for an update at each minibatch, when all processes would have to wait for each other. So that does
     nothing, and ``learn`` is told the moments, which ``moments`` finds for many minibatches with one message.
     """
 

@@ -120,7 +120,7 @@ class Surroundings(Local):
         return {**super().spaces(world), "picture": space}
 
     def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
-        """Return ``view``, ``self``, and ``picture``, uint8 [B, A, 3, 15, 15], or float32 [B, A, 3, 8, 8] of the map."""
+        """Return ``view``, ``self`` and ``picture``: uint8 [B, A, 3, 15, 15]; of the map, float32 [B, A, 3, 8, 8]."""
         shown = centred_picture(state, forecast) if self.centred else picture(state, forecast)
         return {**super().__call__(state, world, forecast), "picture": shown}
 
