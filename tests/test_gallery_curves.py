@@ -144,6 +144,18 @@ def test_other_values_under_the_same_names_are_told_apart(tmp_path):
     assert all(len(label) == len("mappo 012345") for label in (first.label, second.label))
 
 
+def test_runs_may_be_called_something(tmp_path, matplotlib):
+    for seed in (0, 1):
+        write_run(tmp_path / "sweep" / str(seed), seed, steps=64)
+    write_run(tmp_path / "a=b", steps=128)
+    write_run(tmp_path / "one")
+    given = [f"before={tmp_path / 'one'}", f"now={tmp_path / 'sweep'}", str(tmp_path / "a=b")]
+    assert main(["curves", *given, "--out", str(tmp_path)]) == 0 and (tmp_path / "curves_saved.png").exists()
+    drawn = [("before", tmp_path / "one"), ("now", tmp_path / "sweep"), tmp_path / "a=b"]
+    legend = curve_figures(drawn)["curves_saved"]().legends[0]
+    assert [each.get_text() for each in legend.get_texts()] == ["before", "now (2 seeds)", "mappo"]
+
+
 def test_a_learner_keeps_its_colour_and_a_scenario_its_width(tmp_path, matplotlib):
     runs = [("ppo", "single"), ("mappo", "single"), ("mappo", "skirmish"), ("dqn", "skirmish")]
     drawn = lines(*(write_run(tmp_path / f"{a}-{s}", algorithm=a, scenario=s) for a, s in runs))
@@ -244,7 +256,7 @@ def test_it_writes_into_the_current_folder_by_default(tmp_path, monkeypatch, mat
 
 def test_the_list_mentions_it(capsys):
     assert main(["--list"]) == 0
-    assert "curves RUN" in capsys.readouterr().out
+    assert "curves [NAME=]RUN" in capsys.readouterr().out
 
 
 def the_one_line(capsys, *arguments):

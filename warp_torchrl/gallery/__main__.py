@@ -39,7 +39,7 @@ WORLD: dict[str, Callable[..., "Figure"]] = {
 REAL_GROUND: dict[str, Callable[..., "Figure"]] = {"burn_probability": burn_probability}
 """Figures that need a folder of rasters."""
 DONE, MISTAKE = 0, 2
-_CURVES = "curves RUN [RUN ...] [--out FOLDER]"
+_CURVES = "curves [NAME=]RUN [[NAME=]RUN ...] [--out FOLDER]"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -71,8 +71,14 @@ def _curves(arguments: Sequence[str]) -> None:
     if not options.runs:
         raise ValueError(f"give the folder of at least one run: {_CURVES}")
     _check_matplotlib()
-    for name, draw in curve_figures(options.runs).items():
+    for name, draw in curve_figures([_named(given) for given in options.runs]).items():
         _draw_one(name, draw, options.out)
+
+
+def _named(given: str) -> tuple[str, Path]:
+    """Return what runs are called, and their folder; a folder may have the sign in its own name."""
+    name, sign, folder = given.partition("=")
+    return (name, Path(folder)) if sign and not Path(given).exists() else ("", Path(given))
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -91,7 +97,7 @@ def _curves_parser() -> argparse.ArgumentParser:
     )
     parser = argparse.ArgumentParser(prog="python -m warp_torchrl.gallery curves", description=about)
     parser.add_argument(
-        "runs", nargs="*", type=Path, metavar="RUN", help="folder of a run, or of a sweep: all its runs"
+        "runs", nargs="*", metavar="[NAME=]RUN", help="folder of a run, or of a sweep, and what to call its runs"
     )
     parser.add_argument(
         "--out", type=Path, default=Path(), metavar="FOLDER", help="where to write, the current folder by default"

@@ -7,6 +7,7 @@ smoothed; files of many rows are averaged over bins, and the figure says so.
 import math
 from collections import Counter
 from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -58,17 +59,20 @@ class Line(NamedTuple):
     runs: list[Run]
 
 
-def curve_figures(paths: Sequence[Path]) -> dict[str, Callable[[], "Figure"]]:
+def curve_figures(paths: Sequence[Path | tuple[str, Path]]) -> dict[str, Callable[[], "Figure"]]:
     """Return a function for each figure of the runs, by name.
 
     Args:
-        paths: Run folders, and folders of a sweep, whose every run is taken.
+        paths: Run folders, and folders of a sweep, whose every run is taken; some with what to call their runs.
 
     Raises:
         ValueError: If a folder is missing or without runs, or a file is not what a run writes.
         OSError: If a file cannot be read.
     """
-    lines = gather([read_run(folder) for folder in run_folders(paths)])
+    named = [each if isinstance(each, tuple) else ("", each) for each in paths]
+    called = {folder.resolve(): name for name, path in reversed(named) for folder in run_folders([path])}
+    folders = run_folders([path for _, path in named])
+    lines = gather([replace(read_run(folder), called=called[folder.resolve()]) for folder in folders])
     single = [line for line in lines if line.runs[0].n_agents == 1]
     multi = [line for line in lines if line.runs[0].n_agents != 1]
     drawn = {"curves_saved": partial(saved_curves, lines)}
@@ -106,13 +110,16 @@ def band(runs: Sequence[Run], x: str, y: str) -> tuple[np.ndarray, np.ndarray, n
 
 
 def gather(runs: Sequence[Run]) -> list[Line]:
-    """Return the lines to draw: runs that differ in their seed alone together, named by what differs among all."""
-    found: dict[str, list[Run]] = {}
+    """Return the lines to draw: runs that differ in their seed alone together, named by what differs among all.
+
+    Runs that are called something have that name.
+    """
+    found: dict[tuple[str, str], list[Run]] = {}
     for run in runs:
-        found.setdefault(run.alike, []).append(run)
+        found.setdefault((run.called, run.alike), []).append(run)
     recorded = [run.names for run in runs if len(run.names) > 1]
     shown = [place for place, names in enumerate(zip(*recorded)) if place == 0 or len(set(names)) > 1]
-    names = [_name(alike[0].names, shown) for alike in found.values()]
+    names = [alike[0].called or _name(alike[0].names, shown) for alike in found.values()]
     count = Counter(names)
     seen: Counter[tuple[str, ...]] = Counter()
     lines, looks, scenarios = [], _Places(), _Places()

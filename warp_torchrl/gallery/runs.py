@@ -34,6 +34,7 @@ class Run:
         scenario: Its name.
         n_agents: A; None where it is not recorded.
         seed: None where it is not recorded.
+        called: What the figure calls it, if it was told.
     """
 
     columns: Mapping[str, np.ndarray]
@@ -44,6 +45,7 @@ class Run:
     scenario: str
     n_agents: int | None
     seed: str | None
+    called: str = ""
 
 
 def run_folders(paths: Sequence[Path]) -> list[Path]:
