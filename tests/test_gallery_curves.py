@@ -16,6 +16,7 @@ from warp_torchrl.gallery.curves import (
     curve_figures,
     gather,
     learning_curves,
+    lines_of,
 )
 from warp_torchrl.gallery.runs import bin_means, read_metrics, read_run, run_folders
 from warp_torchrl.models import Entry, Signature
@@ -152,7 +153,7 @@ def test_runs_may_be_called_something(tmp_path, matplotlib):
     given = [f"before={tmp_path / 'one'}", f"now={tmp_path / 'sweep'}", str(tmp_path / "a=b")]
     assert main(["curves", *given, "--out", str(tmp_path)]) == 0 and (tmp_path / "curves_saved.png").exists()
     drawn = [("before", tmp_path / "one"), ("now", tmp_path / "sweep"), tmp_path / "a=b"]
-    legend = curve_figures(drawn)["curves_saved"]().legends[0]
+    legend = curve_figures(lines_of(drawn))["curves_saved"]().legends[0]
     assert [each.get_text() for each in legend.get_texts()] == ["before", "now (2 seeds)", "mappo"]
 
 
@@ -192,9 +193,13 @@ def test_a_sweep_gives_all_its_runs_once_and_in_order(tmp_path):
 def test_which_figures_there_are_follows_the_runs(tmp_path):
     alone, team = write_run(tmp_path / "a", n_agents=1), write_run(tmp_path / "b", n_agents=3)
     unknown = write_metrics(tmp_path / "c")
-    assert list(curve_figures([alone])) == ["curves_saved", "curves_single"]
-    assert list(curve_figures([team])) == list(curve_figures([unknown])) == ["curves_multi", "curves_saved"]
-    assert list(curve_figures([alone, team])) == ["curves_multi", "curves_saved", "curves_single"]
+    assert list(curve_figures(lines_of([alone]))) == ["curves_saved", "curves_single"]
+    assert (
+        list(curve_figures(lines_of([team])))
+        == list(curve_figures(lines_of([unknown])))
+        == ["curves_multi", "curves_saved"]
+    )
+    assert list(curve_figures(lines_of([alone, team]))) == ["curves_multi", "curves_saved", "curves_single"]
 
 
 def test_the_paper_s_panels_are_drawn(tmp_path, matplotlib):
@@ -217,7 +222,7 @@ def test_a_panel_without_values_says_so(tmp_path, matplotlib):
 
 def test_forest_saved_has_a_row_for_each_scenario_and_its_own_minutes(tmp_path, matplotlib):
     first, second = write_run(tmp_path / "a"), write_run(tmp_path / "b", scenario="village", frames=(600, 1200))
-    figure = curve_figures([first, second])["curves_saved"]()
+    figure = curve_figures(lines_of([first, second]))["curves_saved"]()
     titles = [axes.get_title() for axes in figure.axes]
     assert titles == ["scenario skirmish"] * 2 + ["scenario village"] * 2
     steps, minutes = (axes.lines[0].get_xydata() for axes in figure.axes[2:])
@@ -230,7 +235,7 @@ def test_means_over_bins_are_said(tmp_path, matplotlib):
     run = write_run(tmp_path, frames=frames, columns={"train__loss": frames})
     assert (
         "more than 400 rows as means over bins, of up to 3 rows"
-        in curve_figures([run])["curves_multi"]().get_suptitle()
+        in curve_figures(lines_of([run]))["curves_multi"]().get_suptitle()
     )
 
 

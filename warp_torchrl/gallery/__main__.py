@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warp_torchrl.drawing import save, style
-from warp_torchrl.gallery.curves import curve_figures
+from warp_torchrl.gallery import reached
+from warp_torchrl.gallery.curves import curve_figures, lines_of
 from warp_torchrl.gallery.fires import fire_plain, fire_terrain_wind
 from warp_torchrl.gallery.landscapes import burn_probability
 from warp_torchrl.gallery.laws import ellipses, fire_sizes, isotropy
@@ -71,8 +72,18 @@ def _curves(arguments: Sequence[str]) -> None:
     if not options.runs:
         raise ValueError(f"give the folder of at least one run: {_CURVES}")
     _check_matplotlib()
-    for name, draw in curve_figures([_named(given) for given in options.runs]).items():
+    lines = lines_of([_named(given) for given in options.runs])
+    for name, draw in curve_figures(lines).items():
         _draw_one(name, draw, options.out)
+    if options.reach:
+        print(reached.table(lines, options.reach))
+
+
+def _levels(given: str) -> list[float]:
+    levels = [float(each) for each in given.split(",")]
+    if not all(0.0 <= level <= 100.0 for level in levels):
+        raise argparse.ArgumentTypeError(f"must be percentages in 0..100, got {given}")
+    return levels
 
 
 def _named(given: str) -> tuple[str, Path]:
@@ -101,6 +112,9 @@ def _curves_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--out", type=Path, default=Path(), metavar="FOLDER", help="where to write, the current folder by default"
+    )
+    parser.add_argument(
+        "--reach", type=_levels, default=(), metavar="PERCENT,...", help="print when runs first save so much forest"
     )
     return parser
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from warp_torchrl.drawing import SOFT, sheet
-from warp_torchrl.gallery.runs import FRAMES, MOST_ROWS, SECONDS, Run, read_run, run_folders
+from warp_torchrl.gallery.runs import FRAMES, MOST_ROWS, SAVED, SECONDS, Run, read_run, run_folders
 from warp_torchrl.summary import line_style
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _KL, _CLIP_FRACTION, _ENTROPY = "train/approx_kl", "train/clip_fraction", "train/entropy_loss"
 _EXPLAINED, _POLICY, _VALUE = "train/explained_variance", "train/policy_gradient_loss", "train/value_loss"
-_LENGTH, _REWARD, _SAVED = "rollout/ep_len_mean", "rollout/ep_rew_mean", "world/saved"
+_LENGTH, _REWARD = "rollout/ep_len_mean", "rollout/ep_rew_mean"
 _LABELS = {
     "time/fps": "frames per second [1/s]",
     "train/loss": "loss",
@@ -59,8 +59,8 @@ class Line(NamedTuple):
     runs: list[Run]
 
 
-def curve_figures(paths: Sequence[Path | tuple[str, Path]]) -> dict[str, Callable[[], "Figure"]]:
-    """Return a function for each figure of the runs, by name.
+def lines_of(paths: Sequence[Path | tuple[str, Path]]) -> list[Line]:
+    """Return the lines of runs.
 
     Args:
         paths: Run folders, and folders of a sweep, whose every run is taken; some with what to call their runs.
@@ -72,7 +72,11 @@ def curve_figures(paths: Sequence[Path | tuple[str, Path]]) -> dict[str, Callabl
     named = [each if isinstance(each, tuple) else ("", each) for each in paths]
     called = {folder.resolve(): name for name, path in reversed(named) for folder in run_folders([path])}
     folders = run_folders([path for _, path in named])
-    lines = gather([replace(read_run(folder), called=called[folder.resolve()]) for folder in folders])
+    return gather([replace(read_run(folder), called=called[folder.resolve()]) for folder in folders])
+
+
+def curve_figures(lines: Sequence[Line]) -> dict[str, Callable[[], "Figure"]]:
+    """Return a function for each figure of the runs, by name."""
     single = [line for line in lines if line.runs[0].n_agents == 1]
     multi = [line for line in lines if line.runs[0].n_agents != 1]
     drawn = {"curves_saved": partial(saved_curves, lines)}
@@ -190,8 +194,8 @@ def saved_curves(lines: Sequence[Line]) -> "Figure":
     for scenario, (left, right) in zip(scenarios, panels):
         there = [line for line in lines if line.runs[0].scenario == scenario]
         factor, unit = _steps(there)
-        _draw_panel(axes[left], there, (FRAMES, factor), (_SAVED, 100.0))
-        _draw_panel(axes[right], there, (SECONDS, 1.0 / 60.0), (_SAVED, 100.0))
+        _draw_panel(axes[left], there, (FRAMES, factor), (SAVED, 100.0))
+        _draw_panel(axes[right], there, (SECONDS, 1.0 / 60.0), (SAVED, 100.0))
         axes[left].set(ylabel="forest saved [%]", title=f"scenario {_plain(scenario)}", xlabel=unit)
         axes[right].set(ylabel="forest saved [%]", title=f"scenario {_plain(scenario)}", xlabel="time [min]")
     return figure

@@ -15,7 +15,7 @@ from warp_torchrl.config.compose import SavedConfig
 from warp_torchrl.evaluation.method import method, teacher_label, unusual
 from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError, newest
 
-FRAMES, SECONDS = "time/frames", "time/seconds"
+FRAMES, SECONDS, SAVED = "time/frames", "time/seconds", "world/saved"
 MOST_ROWS = 400
 """Files of more rows are averaged over bins."""
 _LARGEST, _LARGEST_CONFIG = 100_000_000, 1_000_000  # bytes
