@@ -27,6 +27,9 @@ def test_the_terms_are_those_of_the_textbook(make_small_env, central):
     torch.testing.assert_close(terms["loss_objective"], -(log_prob * data[ADVANTAGE][..., 0]).mean())
     torch.testing.assert_close(terms["loss_entropy"], -0.02 * entropy.mean())
     torch.testing.assert_close(terms["loss_critic"], 0.5 * (value - data[VALUE_TARGET]).square().mean())
+    target = data[VALUE_TARGET]
+    explained = 1.0 - (target - value).var(0, correction=0) / target.var(0, correction=0)
+    torch.testing.assert_close(terms["explained_variance"], explained, rtol=1e-3, atol=1e-4)
 
 
 def test_the_advantages_of_each_agent_are_standardised_where_asked(make_small_env):

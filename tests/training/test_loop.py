@@ -194,6 +194,24 @@ def test_metrics_have_the_columns_of_the_contract(finished):
     assert found[0]["rollout/ep_len_mean"] == "", "no episode ends in the first eight steps"
 
 
+NO_BONUS = ["algorithm.entropy_coeff=0", "algorithm.entropy_coeff_end=0"]
+
+
+@pytest.mark.parametrize(
+    ("overrides", "explains"),
+    [(["algorithm=a2c", *NO_BONUS], True), (NO_BONUS, True), (["algorithm=sac", *REPLAY], False)],
+    ids=["a2c", "mappo", "sac"],
+)
+def test_the_entropy_loss_is_minus_the_entropy_whatever_it_weighs(tmp_path, overrides, explains):
+    training = tiny(tmp_path, "total_frames=64", *overrides)
+    training.train()
+    last = rows(tmp_path)[-1]
+    # Eleven actions at most: a young policy chooses among those that are open nearly uniformly.
+    entropy = float(last["train/entropy"])
+    assert 0.5 < entropy < 2.4 and float(last["train/entropy_loss"]) == -entropy
+    assert (last["train/explained_variance"] != "") == explains
+
+
 def test_checkpoints_are_written_on_the_way_and_at_the_end(finished):
     run, training = finished
     names = sorted(int(each.name) for each in (run / "checkpoints").iterdir())

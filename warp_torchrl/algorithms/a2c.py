@@ -4,14 +4,36 @@ Mnih et al., "Asynchronous Methods for Deep Reinforcement Learning", 2016; its s
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import torch
+from tensordict import TensorDictBase
 from torchrl.modules import ProbabilisticActor
 from torchrl.objectives import A2CLoss, ValueEstimators
 
 from warp_torchrl import parallel
 from warp_torchrl.algorithms.on_policy import KEYS, OnPolicy
+
+
+class ExplainedA2c(A2CLoss):
+    """TorchRL's A2C loss, which tells how much of the targets' variance the critic explains, as its PPO loss does.
+
+    explained_variance = 1 - Var(target - value) / Var(target),     float32 [A, 1], over the sample
+    """
+
+    def __init__(self, actor: ProbabilisticActor, critic: torch.nn.Module, **options: Any) -> None:
+        super().__init__(actor, critic, **options)
+        self.critic_network.register_forward_hook(self._keep_value)
+
+    def _keep_value(self, critic: torch.nn.Module, given: object, said: TensorDictBase) -> None:
+        self._value = said.get(self.tensor_keys.value).detach()
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Return the terms of the loss, and the explained variance."""
+        terms = super().forward(tensordict)
+        target = tensordict.get(self.tensor_keys.value_target)
+        rest, all_of_it = (each.var(dim=0, correction=0) for each in (target - self._value, target))
+        return terms.set("explained_variance", 1.0 - rest / (all_of_it + torch.finfo(target.dtype).eps))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +57,7 @@ class A2c(OnPolicy):
 
     def loss(self, policy: ProbabilisticActor, critic: torch.nn.Module) -> A2CLoss:
         """Return TorchRL's loss, with the estimator that gives a team's end to each agent."""
-        loss = A2CLoss(
+        loss = ExplainedA2c(
             policy,
             critic,
             entropy_coeff=self.entropy_coeff or 1.0,  # at 0 TorchRL would leave the term out for good

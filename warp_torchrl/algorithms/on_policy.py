@@ -161,7 +161,8 @@ class OnPolicy(Algorithm):
         return {
             "loss_objective": "train/policy_gradient_loss",
             "loss_critic": "train/value_loss",
-            "loss_entropy": "train/entropy_loss",
+            "entropy": "train/entropy",
+            "explained_variance": "train/explained_variance",
         }
 
     def constants(self) -> dict[str, float]:

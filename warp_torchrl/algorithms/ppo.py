@@ -106,7 +106,6 @@ class Ppo(OnPolicy):
         return super().columns() | {
             "kl_approx": "train/approx_kl",
             "clip_fraction": "train/clip_fraction",
-            "explained_variance": "train/explained_variance",
         }
 
     def constants(self) -> dict[str, float]:

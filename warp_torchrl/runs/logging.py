@@ -21,7 +21,8 @@ log = logging.getLogger("warp_torchrl")
 class MetricsFile:
     """``metrics.csv``: one row for each iteration, complete after a crash, truncated on resume.
 
-    The first row sets the columns. A missing value is an empty cell.
+    The first row sets the columns; a resumed run of a former version goes on with those that it has. A missing value is
+    an empty cell.
 
     Args:
         path: The file.
@@ -35,6 +36,7 @@ class MetricsFile:
         self.path = path
         self.rows = keep_rows
         self._columns: list[str] | None = None
+        self._is_resumed = keep_rows > 0
         if keep_rows:
             self._columns = self._cut(keep_rows)
 
@@ -42,7 +44,7 @@ class MetricsFile:
         """Append a row. ``sync`` flushes it to the disk.
 
         Raises:
-            ValueError: If a column is new.
+            ValueError: If a column is new to the file that this run has begun.
             OSError: If the write fails.
         """
         lines = []
@@ -50,7 +52,7 @@ class MetricsFile:
             self._columns = list(row)
             lines.append(self._columns)
         unknown = set(row) - set(self._columns)
-        if unknown:
+        if unknown and not self._is_resumed:
             raise ValueError(f"metrics.csv has no columns {sorted(unknown)}")
         values = [row.get(column) for column in self._columns]
         lines.append(["" if value is None else repr(value) for value in values])

@@ -96,6 +96,8 @@ class Learning:
         row["train/loss"] = sum(means[key] for key in learner.loss_keys) if updates else None
         row |= dict.fromkeys(TRAIN_COLUMNS)
         row |= {column: means.get(key) for key, column in learner.columns.items()} | self._scheduled
+        entropy = row["train/entropy"]
+        row["train/entropy_loss"] = None if entropy is None else -entropy  # whatever its weight, as others have it
         self._schedule()
         self.collection.refresh()
         return row

@@ -12,6 +12,7 @@ from warp_torchrl.models import REWARD
 TRAIN_COLUMNS = (
     "train/policy_gradient_loss",
     "train/value_loss",
+    "train/entropy",
     "train/entropy_loss",
     "train/approx_kl",
     "train/clip_fraction",
