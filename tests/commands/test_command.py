@@ -518,13 +518,9 @@ def test_the_experiment_of_all_algorithms_is_a_sweep(tmp_path, run_here):
     assert "a2c" in (tmp_path / "sweep" / "summary.md").read_text() and (tmp_path / "sweep" / "1").is_dir()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("program", "launcher"),
-    [
-        ("evaluate.py", "joblib"),
-        pytest.param("train.py", "joblib", marks=pytest.mark.slow),
-        pytest.param("train.py", "submitit", marks=pytest.mark.slow),
-    ],
+    ("program", "launcher"), [("evaluate.py", "joblib"), ("train.py", "joblib"), ("train.py", "submitit")]
 )
 def test_jobs_in_processes_of_their_own_end_in_one_folder_and_the_one_that_failed_is_named(tmp_path, program, launcher):
     pytest.importorskip(f"hydra_plugins.hydra_{launcher}_launcher")
