@@ -23,9 +23,10 @@ from warp_torchrl.world.state import Transition, TreeCounts, WorldState, is_burn
 class Conservation(Reward):
     """Base class of the five conservation rewards.
 
-    By default each agent pays for its own acts and earns its own shaping, at a tenth of the weight: a team learns sooner
-    by it. The sum over the team is what it is with ``team_share`` 1, and an agent's own potential leaves the equilibria
-    as they are (Devlin and Kudenko 2011); but an agent feels each of its acts A times as much as the team's mean does.
+    By default each agent pays for its own acts and earns its own shaping, at a tenth of the weight, by which a team
+    learns sooner. The sum over the team is what it is with ``team_share`` 1, and an agent's own potential leaves the
+    equilibria as they are (Devlin and Kudenko 2011); but an agent feels each of its acts A times as much as the team's
+    mean does.
 
     Attributes:
         preserved: w_p, weight of each tree untouched by fire or agents [1 / initial tree].
