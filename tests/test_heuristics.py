@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 import torch
 
+from tests.conftest import small_world
 from warp_torchrl import make_env
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.evaluation.play import play
+from warp_torchrl.evaluation.play import play, play_heuristics
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.heuristics.base import can_be_put_out, claim_cells, list_cells, nearest_fire
 from warp_torchrl.world.fast.distances import FAR, chebyshev_distance
@@ -39,12 +40,22 @@ def test_heuristics_repeat_themselves(make_small_env, name):
 
 
 def test_no_op_without_stay_changes_nothing(make_small_env):
-    from tests.conftest import small_world
-    from warp_torchrl.world.team import Team
-
     env = make_small_env(6, small_world(team=Team(n_agents=2, allow_stay=False)))
     episodes = play(env, HEURISTICS["noop"](env), 0)
     assert (episodes["extinguished"] == 0).all() and (episodes["cleared"] == 0).all()
+
+
+@pytest.mark.parametrize("name", HEURISTICS)
+def test_heuristics_do_the_same_where_masks_are_off(make_small_env, name):
+    shown, hidden = (
+        make_small_env(4, small_world(team=Team(n_agents=2, allow_stay=False), action_masking=each))
+        for each in (True, False)
+    )
+    assert hidden.reset()["agents", "action_mask"].all() and not shown.reset()["agents", "action_mask"].all()
+    with_masks, without = (play(env, HEURISTICS[name](env), 3) for env in (shown, hidden))
+    assert all((with_masks[metric] == without[metric]).all() for metric in with_masks)
+    side_by_side = play_heuristics(hidden, 3, [name])[name]
+    assert (side_by_side["saved"] == without["saved"]).all()
 
 
 def test_fighters_put_out_a_fire_beside_them(make_small_env):

@@ -33,16 +33,18 @@ def values(learner, params, data):
         return network(data.select(*network.in_keys).clone())[ACTION_VALUE]
 
 
-def test_the_loss_of_double_q_learning_by_hand(make_small_env):
+@pytest.mark.parametrize("double_q", [True, False])
+def test_the_loss_of_q_learning_by_hand(make_small_env, double_q):
     env = make_small_env(1)
-    learner = Dqn(gamma=0.9, warm_up=1, capacity=3, minibatch_size=3, tau=0.5).build(env, SMALL, 3)
+    learner = Dqn(gamma=0.9, warm_up=1, capacity=3, minibatch_size=3, tau=0.5, double_q=double_q).build(env, SMALL, 3)
     online = learner.loss.value_network_params
     target = learner.loss.target_value_network_params
     target.apply_(lambda weight: weight.data.mul_(0.5))  # so that it matters who chooses and who judges
     data = three_transitions(env, learner)
     with torch.no_grad():
         following = data["next"]
-        choice = values(learner, online, following).masked_fill(~following[ACTION_MASK], -torch.inf).argmax(-1)
+        chooses = online if double_q else target
+        choice = values(learner, chooses, following).masked_fill(~following[ACTION_MASK], -torch.inf).argmax(-1)
         judged = values(learner, target, following).gather(-1, choice[..., None])[..., 0]
         reward = torch.tensor([[0.5, 1.0], [-1.0, 0.0], [2.0, 3.0]])
         goes_on = torch.tensor([[1.0], [1.0], [0.0]])  # cut by the horizon, the future still counts
@@ -50,6 +52,11 @@ def test_the_loss_of_double_q_learning_by_hand(make_small_env):
         said = values(learner, online, data).gather(-1, data[ACTION][..., None])[..., 0]
     terms = learner.loss(data)
     torch.testing.assert_close(terms["loss"].detach(), smooth_l1_loss(said, wanted))
+
+
+def test_double_q_is_of_values_that_are_not_mixed():
+    with pytest.raises(ValueError, match="double_q must be true where values are mixed"):
+        Dqn(mixer="qmix", double_q=False)
 
 
 @pytest.mark.parametrize("mixer", ["vdn", "qmix"])

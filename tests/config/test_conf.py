@@ -272,6 +272,16 @@ def test_a_recorded_configuration_comes_back():
     assert config.observation._target_.endswith("Local")
 
 
+@pytest.mark.parametrize("override", ["reward.terms={front:0.2}", "reward.terms.front=0.2", "+reward.terms.front=0.2"])
+def test_a_mapping_takes_keys_of_its_own(override):
+    config = compose_config("train", ["reward=adaptive", override])
+    assert config.reward.terms == {"front": 0.2}
+    record = SavedConfig(choices={"reward": "adaptive"}, values=without_targets(plain(config)))
+    assert run_config(plain(restore(record))).reward.terms == {"front": 0.2}
+    with pytest.raises(ConfigError, match=r"reward\.trms\.front is not a key"):
+        compose_config("train", ["reward=adaptive", "reward.trms.front=0.2"])
+
+
 def test_overrides_come_before_what_is_recorded():
     record = recorded("scenario=single", "observation=local", "wind.speed=9")
     config = restore(record, ["team.n_agents=2", "fire=paper"])
@@ -318,6 +328,7 @@ def test_a_yaml_file_that_was_edited_is_read_anew(tmp_path, monkeypatch):
             ["landscape=raster", "landscape.table={11:3,98:0}"],
             ["landscape=raster", "landscape.table.11=3", "landscape.table.98=0"],
         ),
+        (["action_masking=false"], ["action_masking=False"]),
         (["wind=calm", "fire=paper"], ["wind=calm", "fire.growth=True", "fire.beta=0.65", "fire.p_regrow=0.01"]),
     ],
 )

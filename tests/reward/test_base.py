@@ -10,7 +10,7 @@ from warp_torchrl.reward import Adaptive, Collaborative, Coverage, Efficiency, P
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.state import Action, count_trees
 
-from .drawing import EAST, EXTINGUISH, FIELD, drawn, earned
+from .drawing import EAST, EXTINGUISH, FIELD, STAY, drawn, earned
 
 
 def test_shaping_pays_the_way_to_the_fire():
@@ -57,6 +57,16 @@ def test_shaping_adds_minus_the_first_potential_to_the_return(make_small_env, re
         assert now["terminated"].all()
         returns.append(total)
     assert torch.allclose(returns[1] - returns[0], -potential, atol=1e-5)
+
+
+@pytest.mark.parametrize(("share", "wanted"), [(0.0, [1.0, 0.0]), (0.5, [1.0, 0.5]), (1.0, [1.0, 1.0])])
+def test_the_team_s_reward_can_be_the_sum_of_its_agents_own(share, wanted):
+    # One of two agents puts a fire out, for 10; the other stays.
+    state, world = drawn(FIELD, [[0, 0], [3, 3]])
+    options = {"shaping": 0.0, "divisor": 10.0, "team_share": share}
+    assert earned(Paper(**options, team_reward="sum"), state, world, EXTINGUISH, STAY) == pytest.approx(wanted)
+    mean = [1.0 - share + 0.5 * share, 0.5 * share]
+    assert earned(Paper(**options), state, world, EXTINGUISH, STAY) == pytest.approx(mean)
 
 
 @pytest.mark.parametrize("reward", [Efficiency, Time, Coverage, Collaborative, Adaptive, Paper])

@@ -24,6 +24,7 @@ class LiteralFire:
     beta: float = 0.0
     p_regrow: float = 0.0
     burning_stages: int = 4
+    oldest: int = 10
     divide_by_distance: bool = True
     law: str = "paper"
     refinement: int = 1
@@ -106,7 +107,9 @@ class LiteralFire:
             return 0.0
         height, width = self.size
         age = self.cells[row][column]
-        spontaneous = min(1.0, self.beta * math.exp(10.0 * age / 10.0) / math.exp(10.0) / (height * width))
+        if age > self.oldest:
+            return self.chance_from_neighbours(row, column)
+        spontaneous = min(1.0, self.beta * math.exp(10.0 * age / self.oldest) / math.exp(10.0) / (height * width))
         spontaneous = self.in_a_tick(spontaneous)
         return spontaneous + (1.0 - spontaneous) * self.chance_from_neighbours(row, column)
 
@@ -124,7 +127,7 @@ class LiteralFire:
             regrows = self.in_a_tick(self.p_regrow) if fertile else 0.0
             return {0: 1.0 - regrows, 1: regrows}
         ignites = self.chance_to_ignite(row, column)
-        if not self.growth or code == 10:
+        if not self.growth or code >= self.oldest:
             return {11: ignites, code: 1.0 - ignites}
-        grows = (1.0 - ignites) * self.in_a_tick(math.exp(-code / 10.0 * 5.0))
+        grows = (1.0 - ignites) * self.in_a_tick(math.exp(-code / self.oldest * 5.0))
         return {11: ignites, code + 1: grows, code: 1.0 - ignites - grows}

@@ -24,7 +24,8 @@ OUT_OF_RANGE = [
     (Fire, "beta", [-0.1, 1.1e6, INF, NAN]),
     (Fire, "p_regrow", [-0.1, 1.1, NAN]),
     (Fire, "youngest_fuel", [0, 11, NAN]),
-    (Fire, "burning_stages", [3, 6, NAN]),
+    (Fire, "oldest", [0, 1, 11, NAN]),  # 1 is younger than the youngest fuel
+    (Fire, "burning_stages", [0, 6, NAN]),
     (Fire, "head_gain", [-0.1, 1.1, NAN]),
     (Fire, "neighbours", [0, 5, 9, NAN]),
     (Fire, "wind_gain", [-0.1, 1.1, NAN]),
@@ -82,6 +83,7 @@ NO_SUCH_OPTION = [
 
 NOT_WHOLE = [
     (Fire, "youngest_fuel", [2.5]),
+    (Fire, "oldest", [9.5]),
     (Fire, "burning_stages", [4.5]),
     (Fire, "wet_ticks", [2.5]),
     (HazardFire, "refinement", [2.5]),
@@ -146,7 +148,7 @@ def test_every_field_with_a_range_is_in_the_list() -> None:
         (Array, "column"),
         (Team, "allow_stay"),
         (Paper, "rotate"),
-        *((World, part) for part in ("landscape", "wind", "fire", "team", "ignition")),
+        *((World, part) for part in ("landscape", "wind", "fire", "team", "ignition", "action_masking")),
     }
     for component in (Fire, Ignition, Perlin, Array, Team, Uniform, Paper, Wandering, World):
         for name in (field.name for field in fields(component) if field.init):
@@ -202,6 +204,7 @@ def test_a_team_or_fires_too_many_for_the_map_are_an_error() -> None:
 
 
 def test_the_ends_of_every_range_are_allowed() -> None:
+    Fire(oldest=1, youngest_fuel=1, burning_stages=1)
     Fire(tau=0.0, beta=1e6, p_regrow=1.0, youngest_fuel=10, burning_stages=5, wet_ticks=255, alpha=(1.0,) * 5)
     Ignition(count=64, radius=8, region=1.0, head_start=1000)
     Perlin(

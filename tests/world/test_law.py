@@ -22,6 +22,8 @@ def test_the_oldest_do_not_grow_and_the_youngest_grow_most():
     assert growth_probability(1, 5.0) == pytest.approx(math.exp(-0.5))
     assert growth_probability(9, 5.0) == pytest.approx(math.exp(-4.5))
     assert [growth_probability(code, 5.0) for code in (0, 10, 11, 15)] == [0.0] * 4
+    assert growth_probability(3, 5.0, oldest=4) == pytest.approx(math.exp(-15 / 4))
+    assert growth_probability(4, 5.0, oldest=4) == 0.0
 
 
 def test_lightning_lights_the_oldest_most_and_no_fire():
@@ -29,3 +31,5 @@ def test_lightning_lights_the_oldest_most_and_no_fire():
     assert lightning_probability(9, 2.0, 100) == pytest.approx(0.02 / math.e)
     assert [lightning_probability(code, 2.0, 100) for code in (0, 11, 15)] == [0.0] * 3
     assert lightning_probability(10, 1e6, 4) == 1.0
+    assert lightning_probability(4, 2.0, 100, oldest=4) == pytest.approx(0.02)
+    assert lightning_probability(3, 2.0, 100, oldest=4) == pytest.approx(0.02 * math.exp(-2.5))

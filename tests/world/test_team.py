@@ -502,6 +502,17 @@ def test_an_action_does_something_exactly_where_the_mask_allows_it(team: Team) -
     assert (seen[:STAY] > 0).all()
 
 
+def test_without_masks_all_is_open_and_what_is_not_possible_does_nothing() -> None:
+    team = Team(n_agents=2, allow_stay=False)
+    world, open_world = (World(landscape=Perlin(size=12), team=team, action_masking=each) for each in (True, False))
+    state = world.reset(torch.arange(16), torch.zeros(16, dtype=torch.int64))
+    possible = world.action_mask(state)
+    assert torch.equal(open_world.possible_actions(state), possible) and not possible.all()
+    assert open_world.action_mask(state).shape == possible.shape and open_world.action_mask(state).all()
+    blocked = possible.to(torch.uint8).argmin(dim=-1)
+    assert not open_world.team.act(state, blocked, ~state.done, LAST_SPREADING, WET_TICKS)[1].credited.any()
+
+
 def test_stay_changes_nothing() -> None:
     state = draw("TaT TTT", at=[(1, 1)])
     assert not changed_worlds(state, act(UGV, state, STAY)[0]).any()

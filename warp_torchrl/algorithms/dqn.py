@@ -35,18 +35,24 @@ class Dqn(EpsilonGreedy):
         mixer: ``none``, each agent learns its own values from its own reward (double DQN); ``vdn``, their sum is
             learned from the team's mean reward; ``qmix``, a monotonic network that reads the whole state mixes them.
         mixer_hidden: Width of QMIX's mixing layer.
+        double_q: Whether the network that learns chooses the next action, which the target network judges (van
+            Hasselt et al. 2016); else the target network does both. Of ``mixer`` none.
 
     Raises:
-        ValueError: If a value is out of its range, or prioritised replay does not work here.
+        ValueError: If a value is out of its range, prioritised replay does not work here, or ``double_q`` is false
+            beside a mixer.
     """
 
     updates: int = 128
     mixer: Literal["none", "vdn", "qmix"] = "none"
     mixer_hidden: int = 32
+    double_q: bool = True
 
     def check(self, **ranges: tuple[float, float]) -> None:
         """Check the numbers against their ranges, and further fields against ``ranges``."""
         super().check(mixer_hidden=(1, 8192), **ranges)
+        if self.mixer != "none" and not self.double_q:
+            raise ValueError(f"double_q must be true where values are mixed, got false with mixer={self.mixer}")
 
     def policy(self, shape: Signature, model: Mlp) -> TensorDictSequential:
         """Return the team's decentralised epsilon-greedy policy."""
@@ -70,7 +76,11 @@ class Dqn(EpsilonGreedy):
         values = over_canonical(TensorDictSequential(*policy.module[:-1]), restored=True)
         if self.mixer == "none":
             loss = DQNLoss(
-                values, action_space="categorical", delay_value=True, double_dqn=True, loss_function="smooth_l1"
+                values,
+                action_space="categorical",
+                delay_value=True,
+                double_dqn=self.double_q,
+                loss_function="smooth_l1",
             )
             loss.set_keys(action=ACTION, action_value=ACTION_VALUE, value=CHOSEN_ACTION_VALUE, **AGENT_KEYS)
         else:

@@ -60,9 +60,10 @@ class NumpyWorld:
         self._minus_chance = [np.pad(-chances[each], 1).ravel() for each in directions]
         self._make_buffers([row * self.stride + column for row, column in (DIRECTIONS[each] for each in directions)])
         ages = np.arange(EMBER + 1)
-        is_age = (ages >= 1) & (ages <= OLDEST)
-        self._grows = np.where(is_age & (ages < OLDEST), np.exp(-ages / OLDEST * fire.tau), 0.0).astype(np.float32)
-        lightning = np.minimum(1.0, fire.beta * np.exp(10.0 * (ages / OLDEST - 1.0)) / cover.size)
+        is_age = (ages >= 1) & (ages <= fire.oldest)
+        grows = np.where(is_age & (ages < fire.oldest), np.exp(-ages / fire.oldest * fire.tau), 0.0)
+        self._grows = grows.astype(np.float32)
+        lightning = np.minimum(1.0, fire.beta * np.exp(10.0 * (ages / fire.oldest - 1.0)) / cover.size)
         self._spontaneous = np.where(is_age, lightning, 0.0).astype(np.float32)
 
     @property

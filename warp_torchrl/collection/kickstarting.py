@@ -122,8 +122,8 @@ class _Student(TensorDictModuleBase):
         out = self.policy(tensordict)
         if not self._cloning.weight:
             return out.set(TEACHER_ACTION, out.get(ACTION))
-        state = self._teacher.env.world_state
-        return out.set(TEACHER_ACTION, self._teacher.choose(state, tensordict.get(ACTION_MASK)))
+        labelled = self._teacher(tensordict.select(ACTION_MASK))
+        return out.set(TEACHER_ACTION, labelled.get(ACTION))
 
 
 def _log_loss(logits: Tensor, action: Tensor) -> Tensor:

@@ -6,7 +6,7 @@ filled in. So ``--cfg job`` shows every value, every field can be overridden, an
 
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass
-from typing import Any
+from typing import Any, cast
 
 from hydra._internal.core_plugins import file_config_source
 from hydra._internal.sources_registry import SourcesRegistry
@@ -44,8 +44,19 @@ class FileConfigSource(file_config_source.FileConfigSource):
         """Return the content of a yaml file, a command's or an option of a group, with every field of its class."""
         result = super().load_config(config_path)
         if isinstance(result.config, DictConfig):
-            result.config = OmegaConf.merge(_left_out(config_path, result.config), result.config)
+            filled = OmegaConf.merge(_left_out(config_path, result.config), result.config)
+            result.config = cast("DictConfig", filled)
+            _open_mappings(result.config)
         return result
+
+
+def _open_mappings(node: DictConfig) -> None:
+    """Let an override put keys of its own into fields that are empty mappings: ``reward.terms.front=0.1``."""
+    keys = [key for key in node if isinstance(key, str) and not OmegaConf.is_missing(node, key)]
+    for part in (node[key] for key in keys if not OmegaConf.is_interpolation(node, key)):
+        if isinstance(part, DictConfig):
+            OmegaConf.set_struct(part, None if part else False)
+            _open_mappings(part)
 
 
 def _left_out(config_path: str, node: DictConfig) -> dict[str, Any]:

@@ -35,7 +35,18 @@ COMPONENTS = (
 """Groups whose options are classes."""
 ENVIRONMENT = COMPONENTS[: COMPONENTS.index("reward") + 1]
 """Those that make an environment."""
-WORLD_KEYS = ("scenario", "landscape", "wind", "fire", "team", "ignition", "steps_per_tick", "horizon", "cell_size")
+WORLD_KEYS = (
+    "scenario",
+    "landscape",
+    "wind",
+    "fire",
+    "team",
+    "ignition",
+    "steps_per_tick",
+    "horizon",
+    "cell_size",
+    "action_masking",
+)
 """What a scenario sets."""
 COMMAND_KEYS = ("resume", "start_from", "debug", "policy", "overwrite", "maps", "maps_fires")
 """What the commands read themselves."""

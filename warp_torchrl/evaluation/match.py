@@ -63,7 +63,7 @@ class Match:
         """
         if not isinstance(self.policies[0], Heuristic):
             return self.policies[0](shown.copy())[ACTION].index_select(0, self.rows)
-        mask, share = self.world.action_mask(self.state), len(self.paid) // len(self.policies)
+        mask, share = self.world.possible_actions(self.state), len(self.paid) // len(self.policies)
         last = torch.arange(1, len(self.policies) + 1, device=self.rows.device) * share
         ends = torch.searchsorted(self.rows, last).tolist()
         own = [slice(*each) for each in zip([0, *ends], ends)]

@@ -41,16 +41,21 @@ class Heuristic(TensorDictModuleBase):
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write the team's actions, int64 [B, A]."""
-        action = self.choose(self.env.world_state, tensordict.get(("agents", "action_mask")))
+        state, world = self.env.world_state, self.env.world
+        shown = tensordict.get(("agents", "action_mask"))
+        action = self.choose(state, shown if world.action_masking else world.possible_actions(state))
         return tensordict.set(("agents", "action"), action)
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
-        """Return the actions, int64 [B, A], for worlds and action masks, bool [B, A, actions]."""
+        """Return the actions, int64 [B, A], for worlds and the actions that do something, bool [B, A, actions]."""
         raise TypeError(f"{type(self).__name__} does not say what to do: define choose()")
 
 
 def idle_action(mask: Tensor, team: Team) -> Tensor:
-    """Return an action without effect, int64 [...]: stay, or else one that the mask [..., actions] forbids."""
+    """Return an action without effect, int64 [...]: stay, or else one that the mask [..., actions] forbids.
+
+    Where it forbids none it is a move, which leaves fire and forest alone.
+    """
     if team.allow_stay:
         return torch.full(mask.shape[:-1], int(Action.STAY), device=mask.device)
     return mask.to(torch.uint8).argmin(dim=-1)

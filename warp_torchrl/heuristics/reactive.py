@@ -26,7 +26,7 @@ class NoOp(Heuristic):
 
 
 class Random(Heuristic):
-    """Draws uniformly among the actions that the mask allows; the same seed gives the same draws."""
+    """Draws uniformly among the actions that would do something; the same seed gives the same draws."""
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""

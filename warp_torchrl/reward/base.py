@@ -15,13 +15,14 @@ from warp_torchrl.world.state import Transition, TreeCounts, WorldState, is_burn
 class Reward:
     """A reward, called with a transition.
 
-        r_i = scale ((1 - share) own_i + share mean_j own_j)
+        r_i = scale ((1 - share) own_i + share team),   team = mean_j own_j, or sum_j own_j
         own_i += shaping (gamma Phi_i(s') - Phi_i(s)),  Phi(terminal) = 0
 
     Such shaping leaves optimal policies unchanged (Ng, Harada and Russell 1999).
 
     Attributes:
-        team_share: 1 gives every agent the team's mean, 0 each its own.
+        team_share: 1 gives every agent the team's reward, 0 each its own.
+        team_reward: The team's reward: the ``mean`` of its agents' own, or their ``sum``, A times as much.
         scale: Factor on everything.
         shaping: Weight of the potential; 0 switches it off.
         potential: ``distance``, Phi_i = -0.5 x agent i's distance to the nearest fire / H; or ``exposure``, Phi = -0.5
@@ -34,6 +35,7 @@ class Reward:
     """
 
     team_share: float = 1.0
+    team_reward: Literal["mean", "sum"] = "mean"
     scale: float = 1.0
     shaping: float = 1.0
     potential: Literal["distance", "exposure"] = "distance"
@@ -50,8 +52,8 @@ class Reward:
         own = self.own(transition)
         if self.shaping > 0.0:
             own = own + self.shaping * self._shaping(transition)
-        mean = own.mean(dim=1, keepdim=True)
-        reward = self.scale * ((1.0 - self.team_share) * own + self.team_share * mean)
+        team = own.mean(dim=1, keepdim=True) if self.team_reward == "mean" else own.sum(dim=1, keepdim=True)
+        reward = self.scale * ((1.0 - self.team_share) * own + self.team_share * team)
         return (reward * ~transition.before.done[:, None])[..., None]
 
     def own(self, transition: Transition) -> Tensor:

@@ -7,14 +7,18 @@ R(t) - R(t-1), so that the return of an episode is R(end) - R(start). All agents
 agent pays A times for its own acts, so that the team's mean is R.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from numbers import Real
 from typing import Literal
 
 import torch
 from torch import Tensor
 from torch.nn.functional import avg_pool2d
 
+from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.reward.base import Reward
+from warp_torchrl.reward.terms import TERMS
 from warp_torchrl.world.front import alignment, block_shares, centre, containment, exposure
 from warp_torchrl.world.state import Transition, TreeCounts, WorldState, is_burning
 
@@ -174,7 +178,7 @@ class Collaborative(Conservation):
 class Adaptive(Conservation):
     """Conservation reward 5: also act where the fire spreads.
 
-        R = Q + theta_1 r_1 + theta_2 r_2 + theta_3 r_3 - w_a A_total
+        R = Q + theta_1 r_1 + theta_2 r_2 + theta_3 r_3 + sum of further theta_i r_i - w_a A_total
 
     r_1: trees put out for the first time on the downwind half of the fire, a share of N0. r_2: drop since the start
     in the trees within ``reach`` cells of fire, a share of N0. r_3: share of rays from the fire's centre to the border
@@ -185,6 +189,11 @@ class Adaptive(Conservation):
         exposed: theta_2.
         contained: theta_3.
         reach: Cells about fire.
+        terms: theta_i of further terms by their name in ``TERMS``: ``front``, ``surrounded``, ``head``, or one of your
+            own.
+
+    Raises:
+        ValueError: If a value is out of its range, or a term is unknown.
     """
 
     act: float = 0.0
@@ -192,6 +201,15 @@ class Adaptive(Conservation):
     exposed: float = 0.1
     contained: float = 0.1
     reach: int = 3
+    terms: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name, theta in self.terms.items():
+            if name not in TERMS:
+                raise ValueError(f"terms must be of {', '.join(TERMS)}, got {name}{did_you_mean(name, TERMS)}")
+            if isinstance(theta, bool) or not isinstance(theta, Real) or not -1e9 <= float(theta) <= 1e9:
+                raise ValueError(f"terms.{name} must be a number in [-1e+09, 1e+09], got {theta!r}")
 
     def value(self, state: WorldState, counts: TreeCounts) -> Tensor:
         """Return R without r_1 and the cost of acts, float32 [B]."""
@@ -202,11 +220,17 @@ class Adaptive(Conservation):
         return self.worth(counts) + shape
 
     def bonus(self, transition: Transition) -> Tensor:
-        """Return theta_1 times the trees put out downwind in this step, a share of N0, float32 [B]."""
+        """Return theta_1 times the trees put out downwind in this step, a share of N0, and the further terms' sum.
+
+        float32 [B].
+        """
         before, result = transition.before, transition.result
         width = before.cells.shape[2]
         place = torch.stack((result.target // width, result.target % width), dim=-1)
         downwind = alignment(place, centre(is_burning(before.cells)), before.wind) >= 0.0
         new = ~before.extinguished.flatten(1).gather(1, result.target)
         count = (result.extinguished & downwind & new).sum(dim=1)
-        return self.downwind * count / transition.counts_before.initial
+        bonus = self.downwind * count / transition.counts_before.initial
+        for name, theta in self.terms.items():
+            bonus = bonus + theta * TERMS[name](transition)
+        return bonus

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import Self
 
 import torch
 from torch import Tensor
@@ -11,6 +11,7 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world import law
 from warp_torchrl.world.fast.constants import numbers
+from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import EMBER, FIRST_FIRE, OLDEST, Air, Ground, Landscape, WorldState
 from warp_torchrl.world.terrain.landscape import LandscapeSource, holds_trees
 from warp_torchrl.world.wind import Wind
@@ -21,12 +22,14 @@ class Automaton(ABC):
     """An automaton: trees that ignite, grow and regrow, and fires that burn out.
 
     Attributes:
-        growth: Whether trees age, age + 1 with p = exp(-age / S_max tau); S_max is 10.
+        growth: Whether trees age, age + 1 with p = exp(-age / S_max tau).
         tau: Growth constant.
         beta: Spontaneous ignition, p = beta exp(10 age / S_max) / exp(10) / (H W) for each tree.
         p_regrow: Chance a tick that empty ground grows a tree of age 1.
         youngest_fuel: A_min, the age from which a tree can ignite.
-        burning_stages: Stages that spread: 4, the last stage being an ember that is seen and does not spread; or 5.
+        oldest: S_max, the age of the oldest trees, at most the 10 that cell codes hold. Landscapes tell ages in tenths
+            of it; where it is not 10, a tree's age is drawn within its tenth.
+        burning_stages: Stages that spread, of five. The others are embers: seen, burning, and without spread.
 
     Raises:
         ValueError: If a value is out of its range.
@@ -37,10 +40,21 @@ class Automaton(ABC):
     beta: float = 0.0
     p_regrow: float = 0.0
     youngest_fuel: int = 2
-    burning_stages: Literal[4, 5] = 4
+    oldest: int = OLDEST
+    burning_stages: int = 4
 
     def __post_init__(self) -> None:
-        check_fields(self, tau=(0.0, 100.0), beta=(0.0, 1e6), p_regrow=(0.0, 1.0), youngest_fuel=(1, OLDEST))
+        check_fields(
+            self,
+            tau=(0.0, 100.0),
+            beta=(0.0, 1e6),
+            p_regrow=(0.0, 1.0),
+            youngest_fuel=(1, OLDEST),
+            oldest=(1, OLDEST),
+            burning_stages=(1, EMBER - FIRST_FIRE + 1),
+        )
+        if self.youngest_fuel > self.oldest:
+            raise ValueError(f"youngest_fuel must be at most oldest, {self.oldest}, got {self.youngest_fuel}")
 
     @property
     def ticks_per_stage(self) -> int:
@@ -70,6 +84,24 @@ class Automaton(ABC):
     def started(self, state: WorldState) -> WorldState:
         """Return worlds at their start, whose cells are lit, with what the automaton keeps of its own."""
         return state
+
+    def aged(self, landscape: Landscape, key: Tensor) -> Landscape:
+        """Return landscapes whose trees have the ages of this automaton, in 0..S_max.
+
+        A tree of tenth a is round(S_max x) old, x drawn from where round(10 x) = a; so drawn forests are
+        round(S_max U(0, 1)), and those that come to 0 hold no tree.
+
+        Args:
+            landscape: The landscapes, with ages in tenths.
+            key: World keys, int64 [B].
+        """
+        if self.oldest == OLDEST:
+            return landscape
+        tenth = landscape.age.to(torch.float32)
+        u = uniform(key, 0, Stream.AGE_IN_TENTH, tuple(landscape.age.shape[1:]))
+        low, high = (tenth - 0.5).clamp(min=0.0), (tenth + 0.5).clamp(max=float(OLDEST))
+        age = (low + u * (high - low)).mul_(self.oldest / OLDEST).round_().to(torch.int32).to(torch.uint8)
+        return landscape.replace(age=age * holds_trees(landscape.cover))
 
     def over(self, landscape: LandscapeSource, wind: Wind, cell_size: float) -> Self:
         """Return the automaton on a landscape's map in some wind; a cell's side is in metres."""
@@ -152,11 +184,11 @@ class Automaton(ABC):
 
     def growing(self) -> tuple[float, ...]:
         """Return p_grow in one tick of each cell code, 0..15."""
-        return self._by_code(lambda age: law.growth_probability(age, self.tau) if self.growth else 0.0)
+        return self._by_code(lambda age: law.growth_probability(age, self.tau, self.oldest) if self.growth else 0.0)
 
     def lightning(self, cells: int) -> tuple[float, ...]:
         """Return p_spont in one tick of each cell code, 0..15, on a map of so many cells."""
-        return self._by_code(lambda age: law.lightning_probability(age, self.beta, cells))
+        return self._by_code(lambda age: law.lightning_probability(age, self.beta, cells, self.oldest))
 
     def _by_code(self, rule: Callable[[int], float]) -> tuple[float, ...]:
         return tuple(law.in_finer_time(rule(code), self.ticks_per_stage) for code in range(EMBER + 1))

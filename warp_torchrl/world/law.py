@@ -99,14 +99,14 @@ def expected_ignitions(
     return total
 
 
-def growth_probability(age: int, tau: float) -> float:
-    """Return p_grow = exp(-age / S_max tau) of a tree of age 1..9; S_max is 10. The oldest grow no more."""
-    return math.exp(-age / OLDEST * tau) if 1 <= age < OLDEST else 0.0
+def growth_probability(age: int, tau: float, oldest: int = OLDEST) -> float:
+    """Return p_grow = exp(-age / S_max tau) of a tree of age 1 and more; the oldest, S_max, grow no more."""
+    return math.exp(-age / oldest * tau) if 1 <= age < oldest else 0.0
 
 
-def lightning_probability(age: int, beta: float, cells: int) -> float:
+def lightning_probability(age: int, beta: float, cells: int, oldest: int = OLDEST) -> float:
     """Return p_spont = beta exp(10 age / S_max - 10) / (H W) of a tree on a map of H W cells."""
-    return min(1.0, beta * math.exp(10.0 * age / OLDEST - 10.0) / cells) if 1 <= age <= OLDEST else 0.0
+    return min(1.0, beta * math.exp(10.0 * age / oldest - 10.0) / cells) if 1 <= age <= oldest else 0.0
 
 
 def in_finer_time(probability: float, ticks: int) -> float:

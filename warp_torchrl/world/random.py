@@ -34,6 +34,7 @@ class Stream(IntEnum):
     TERRAIN = 12
     PACE = 13
     WEATHER = 14
+    AGE_IN_TENTH = 15
 
 
 def world_key(seed: Tensor, episode: Tensor | int = 0) -> Tensor:

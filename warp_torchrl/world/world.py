@@ -48,6 +48,8 @@ class World:
         steps_per_tick: Agent steps to a fire tick.
         horizon: Agent steps to an episode.
         cell_size: Side of a cell [m]; None takes the landscape's own, 30 m where it has none.
+        action_masking: Whether agents are shown which actions would do something. Without it every mask is open, as
+            the paper has it: what would do nothing can be chosen, and does nothing.
 
     Raises:
         ValueError: If a value is out of its range or the team does not fit on the map.
@@ -61,6 +63,7 @@ class World:
     steps_per_tick: int = 5
     horizon: int = 256
     cell_size: float | None = None
+    action_masking: bool = True
 
     def __post_init__(self) -> None:
         check_fields(self, steps_per_tick=(1, 1000), horizon=(1, 1_000_000), cell_size=(0.01, 100_000.0))
@@ -146,7 +149,7 @@ class World:
 
     def _start(self, seed: Tensor, episode: Tensor) -> tuple[WorldState, Tensor]:
         key = world_key(seed, episode)
-        ground = self.landscape(key)
+        ground = self.fire.aged(self.landscape(key), key)
         fuel = (ground.age >= self.fire.youngest_fuel) & (self.fire.flammability(ground) > 0.0)
         lit = self.lighting(key, fuel)
         vehicles = self.team.place(key, ground.cover, lit)
@@ -205,9 +208,14 @@ class World:
         """Return what the fire is about to do."""
         return road.forecast(self.fire, state)
 
-    def action_mask(self, state: WorldState) -> Tensor:
+    def possible_actions(self, state: WorldState) -> Tensor:
         """Return which actions would do something, bool [B, A, actions]."""
         return self.team.action_mask(state, self.fire.last_spreading)
+
+    def action_mask(self, state: WorldState) -> Tensor:
+        """Return which actions agents are shown as open, bool [B, A, actions]: those possible, or all."""
+        possible = self.possible_actions(state)
+        return possible if self.action_masking else torch.ones_like(possible)
 
     def _tick(self, state: WorldState, ticks_now: Tensor) -> WorldState:
         if self.steps_per_tick == 1:

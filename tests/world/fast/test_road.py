@@ -29,6 +29,7 @@ ALONE = {
 }
 WHOLE = {
     "growth": Fire(growth=True, tau=1.0),
+    "few ages and stages": Fire(growth=True, tau=1.0, beta=60.0, oldest=4, burning_stages=2),
     "lightning": Fire(beta=60.0),
     "regrowth": Fire(p_regrow=0.2),
     "all": HazardFire(growth=True, beta=90.0, p_regrow=0.3, refinement=2, youngest_fuel=1),

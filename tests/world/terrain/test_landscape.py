@@ -5,10 +5,12 @@ import torch
 from scipy.stats import chi2
 from torch import Tensor
 
+from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.random import Stream, world_key
 from warp_torchrl.world.state import Cover
 from warp_torchrl.world.terrain.landscape import Perlin, draw_age, holds_trees, map_size
 from warp_torchrl.world.terrain.perlin import fractal_noise
+from warp_torchrl.world.world import World
 
 
 def keys(worlds: int, first: int = 0) -> Tensor:
@@ -126,6 +128,26 @@ def test_the_first_forest_is_round_of_ten_uniforms() -> None:
     expected = torch.tensor([0.05] + [0.10] * 9 + [0.05], dtype=torch.float64) * 1e6
     assert len(counts) == 11
     assert 1e-6 < chi2.sf(((counts - expected) ** 2 / expected).sum().item(), df=10) < 1 - 1e-6
+
+
+@pytest.mark.parametrize("oldest", [4, 7])
+def test_a_forest_of_other_ages_is_round_of_so_many_uniforms(oldest: int) -> None:
+    # S_max U(0, 1), rounded: half as many of age 0 and S_max as of each other; sqrt(n p (1 - p)), 5 of them each.
+    key = world_key(torch.arange(64))
+    ground = Perlin(levels=(0.0, 0.0, 0.0))(key)
+    age = Fire(oldest=oldest).aged(ground, key).age
+    share = torch.bincount(age.flatten().long(), minlength=oldest + 1) / age.numel()
+    wanted = torch.full((oldest + 1,), 1.0 / oldest)
+    wanted[[0, -1]] /= 2.0
+    assert len(share) == oldest + 1 and ((share - wanted).abs() < 5.0 * (wanted / age.numel()).sqrt()).all()
+    assert Fire().aged(ground, key) is ground
+    tenths = ground.age.float() * oldest / 10.0
+    assert ((age - tenths).abs() <= 0.5 + 0.05 * oldest).all(), "each within its tenth"
+
+
+def test_younger_oldest_trees_are_in_every_world() -> None:
+    ages = World(landscape=Perlin(ages="oldest"), fire=Fire(oldest=3)).reset(torch.arange(2), torch.zeros(2).long())
+    assert set(ages.landscape.age.unique().tolist()) == {0, 3}
 
 
 def test_no_tree_stands_on_a_lake_or_on_bare_ground() -> None:
