@@ -111,6 +111,13 @@ def test_the_penalty_is_the_mean_square_of_the_open_actions_logits():
     assert all(weight.grad is None for weight in loss.value_network_params.values(True, True))
 
 
+def test_a_sample_s_penalty_weighs_what_its_loss_weighs():
+    # As above, where the first step of the two has three quarters of the weight: (3 x 14/3 + 13/2) / 4 x 0.12 = 0.615.
+    loss = loss_of([1.0, -2.0, 3.0, 70.0], [0.0, 0.0, 5.0, 0.0], logit_penalty=0.12)
+    data = sample([1, 1, 1, 0], [0, 1, 1, 0]).set("priority_weight", torch.tensor([[3.0], [1.0]]))
+    assert loss(data)["loss_actor"].item() == pytest.approx(-5.0 + 0.615)
+
+
 def test_the_entropy_is_that_of_what_gumbel_noise_draws_from():
     # Two open actions with logits 0 and ln 3: shares 1/4 and 3/4. One open action alone: certain.
     loss = loss_of([0.0, math.log(3.0), 9.0], [0.0] * 3, logit_penalty=0.0)
@@ -136,7 +143,7 @@ def test_a_certain_actor_comes_back_with_the_penalty_alone():
         (logits,) = loss.actor_network_params.values(True, True)
         optimizer = torch.optim.Adam([logits], lr=1.0)
         for _ in range(150):
-            loss(data.clone())["loss_actor"].backward()
+            loss.loss_actor(data)[0].backward()
             optimizer.step()
             optimizer.zero_grad()
         found[penalty] = logits.argmax().item(), logits.abs().max().item()
