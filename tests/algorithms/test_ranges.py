@@ -32,7 +32,7 @@ RANGES = {
     Ppo: ON_POLICY | {"clip_epsilon": (1e-4, 1.0), "epochs": (1, 1000)},
     A2c: ON_POLICY,
     Dqn: OFF_POLICY | EPSILON | {"mixer_hidden": (1, 8192)},
-    Ddpg: OFF_POLICY | EPSILON | {"temperature": (1e-3, 100.0)},
+    Ddpg: OFF_POLICY | EPSILON | {"temperature": (1e-3, 100.0), "logit_penalty": (0.0, 1000.0)},
     Sac: OFF_POLICY | {"temperature": (1e-6, 100.0), "target_entropy": SHARE},
 }
 TOGETHER = {

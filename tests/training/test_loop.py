@@ -199,8 +199,13 @@ NO_BONUS = ["algorithm.entropy_coeff=0", "algorithm.entropy_coeff_end=0"]
 
 @pytest.mark.parametrize(
     ("overrides", "explains"),
-    [(["algorithm=a2c", *NO_BONUS], True), (NO_BONUS, True), (["algorithm=sac", *REPLAY], False)],
-    ids=["a2c", "mappo", "sac"],
+    [
+        (["algorithm=a2c", *NO_BONUS], True),
+        (NO_BONUS, True),
+        (["algorithm=sac", *REPLAY], False),
+        (["algorithm=ddpg", *REPLAY], False),
+    ],
+    ids=["a2c", "mappo", "sac", "ddpg"],
 )
 def test_the_entropy_loss_is_minus_the_entropy_whatever_it_weighs(tmp_path, overrides, explains):
     training = tiny(tmp_path, "total_frames=64", *overrides)

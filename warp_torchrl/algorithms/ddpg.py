@@ -6,8 +6,10 @@ Gumbel-Softmax", 2017.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import torch
+from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModule, TensorDictModuleBase, TensorDictSequential
 from torch import Tensor, nn
 from torchrl.envs.utils import ExplorationType, exploration_type
@@ -61,6 +63,45 @@ class _OneHot(nn.Module):
         return nn.functional.one_hot(action, self.n_actions).to(torch.float32)
 
 
+class PenalisedDdpg(DDPGLoss):
+    """TorchRL's DDPG loss with a penalty on the actor's logits, which tells the actor's entropy too.
+
+        loss_actor = -mean Q + penalty * mean (logit^2 of the open actions)
+
+    The mean is over an agent's open actions, then over agents and samples. Without the penalty logits grow until one
+    action is certain, where no gradient comes through the softmax. Lowe et al. penalise logits so in their code of
+    MADDPG (openai/maddpg, ``p_reg``).
+
+    Args:
+        actor: Writes logits float32 [..., actions], and reads masks bool of their shape and order.
+        critic: Writes the value of what the actor chose.
+        logit_penalty: Weight of the penalty.
+        options: Of TorchRL's loss.
+    """
+
+    def __init__(
+        self, actor: TensorDictModuleBase, critic: TensorDictModuleBase, *, logit_penalty: float, **options: Any
+    ) -> None:
+        super().__init__(actor, critic, **options)
+        self.logit_penalty = logit_penalty
+        self.actor_network.register_forward_hook(self._keep_logits)
+
+    def _keep_logits(self, actor: TensorDictModuleBase, given: object, said: TensorDictBase) -> None:
+        self._logits, self._mask = said.get(LOGITS), said.get(ACTION_MASK)
+
+    def loss_actor(self, tensordict: TensorDictBase) -> tuple[Tensor, dict[str, Tensor]]:
+        """Return the actor's loss, and the mean entropy [nat] of the softmax of the open actions' logits."""
+        loss, told = super().loss_actor(tensordict)
+        logits, mask = self._logits, self._mask  # of the actor's last call, which was this loss's
+        self._logits = self._mask = None  # else they would keep the graph
+        size = logits.masked_fill(~mask, 0.0).square().sum(dim=-1) / mask.sum(dim=-1)
+        weights = self._maybe_get_priority_weight(tensordict)
+        penalty = self._reduce_loss(size, tensordict=tensordict, weights=weights)
+        shares = torch.softmax(logits.detach().masked_fill(~mask, -1e4), dim=-1)
+        entropy = torch.special.entr(shares).sum(dim=-1).mean()
+        return loss + self.logit_penalty * penalty, {**told, "entropy": entropy}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Ddpg(EpsilonGreedy):
     """DDPG with one-hot actions: the critic judges the action that the actor chose, and its gradient moves the actor.
@@ -69,6 +110,8 @@ class Ddpg(EpsilonGreedy):
         central_critic: The critic reads the whole state and the team's joint action (MADDPG), or each agent's own
             observation and action.
         temperature: Of the softmax that the gradient goes through.
+        logit_penalty: Weight of the mean square of the open actions' logits in the actor's loss (Lowe et al., 2017, in
+            their code).
 
     Raises:
         ValueError: If a value is out of its range, or prioritised replay does not work here.
@@ -76,10 +119,11 @@ class Ddpg(EpsilonGreedy):
 
     central_critic: bool = False
     temperature: float = 1.0
+    logit_penalty: float = 1e-3
 
     def check(self, **ranges: tuple[float, float]) -> None:
         """Check the numbers against their ranges, and further fields against ``ranges``."""
-        super().check(temperature=(1e-3, 100.0), **ranges)
+        super().check(temperature=(1e-3, 100.0), logit_penalty=(0.0, 1000.0), **ranges)
 
     def policy(self, shape: Signature, model: Mlp) -> TensorDictSequential:
         """Return the team's decentralised policy: each agent's action from its own observation and mask."""
@@ -93,11 +137,16 @@ class Ddpg(EpsilonGreedy):
         told = TensorDictModule(_OneHot(shape.n_actions), in_keys=[ACTION], out_keys=[ACTION_ONE_HOT])
         return TensorDictSequential(policy, self.epsilon_greedy(shape, self.epsilon), told)
 
-    def loss(self, policy: TensorDictModuleBase, shape: Signature, model: Mlp, device: torch.device) -> DDPGLoss:
-        """Return TorchRL's loss with its value estimator."""
+    def loss(self, policy: TensorDictModuleBase, shape: Signature, model: Mlp, device: torch.device) -> PenalisedDdpg:
+        """Return TorchRL's loss with the penalty and its value estimator."""
         critic = over_canonical(model.action_critic(shape, self.central_critic), restored=True).to(device)
-        loss = DDPGLoss(
-            over_canonical(policy, restored=True), critic, delay_actor=True, delay_value=True, loss_function="smooth_l1"
+        loss = PenalisedDdpg(
+            over_canonical(policy, restored=True),
+            critic,
+            logit_penalty=self.logit_penalty,
+            delay_actor=True,
+            delay_value=True,
+            loss_function="smooth_l1",
         )
         loss.set_keys(state_action_value=STATE_ACTION_VALUE, **AGENT_KEYS)
         loss.make_value_estimator(ValueEstimators.TD0, gamma=self.gamma)
@@ -109,4 +158,8 @@ class Ddpg(EpsilonGreedy):
 
     def columns(self) -> dict[str, str]:
         """Return the names of ``metrics.csv`` by entry of the loss's output."""
-        return {"loss_actor": "train/policy_gradient_loss", "loss_value": "train/value_loss"}
+        return {
+            "loss_actor": "train/policy_gradient_loss",
+            "loss_value": "train/value_loss",
+            "entropy": "train/entropy",
+        }

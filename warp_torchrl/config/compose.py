@@ -189,6 +189,7 @@ _BEFORE = {
     "collector.grows_at": 0.0,
     "observation.identity": False,
     "observation.centred": False,
+    "algorithm.logit_penalty": 0.0,
 }
 """What runs did whose record has none of a key yet."""
 
