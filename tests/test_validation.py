@@ -5,10 +5,11 @@ import pytest
 
 from warp_torchrl.config.construction import ConfigError, construct
 from warp_torchrl.models import Mlp
-from warp_torchrl.reward import Efficiency
+from warp_torchrl.reward import Adaptive, Efficiency
 from warp_torchrl.runs.logging import Wandb
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.ignition import Ignition
+from warp_torchrl.world.rate import RateFire
 from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.wind import Uniform
 from warp_torchrl.world.world import World
@@ -26,6 +27,8 @@ BAD = [
     (Mlp, "actor_hidden", 64, "actor_hidden must be a list of a whole number, got 64"),
     (Wandb, "mode", "onlin", "mode must be offline or online, got 'onlin': did you mean online?"),
     (World, "fire", "paper", "fire must be Automaton, got 'paper'"),
+    (RateFire, "moisture", {"dead_1h": "x"}, "moisture.dead_1h must be a number, got 'x'"),
+    (Adaptive, "terms", {"front": 2e9}, "terms.front must be in [-1e+09, 1e+09], got 2000000000.0"),
     (Efficiency, "shaping", [], "shaping must be a number, got []"),
 ]
 
@@ -43,3 +46,4 @@ def test_a_value_takes_the_form_of_its_hint():
     made = [Uniform(speed=4).speed, Uniform(speed=np.float32(4.0)).speed, Ignition(count=3.0).count]
     assert made == [4.0, 4.0, 3] and [type(each) for each in made] == [float, float, int]
     assert Mlp(actor_hidden=[16.0]).actor_hidden == (16,) and Perlin(scale=[10, 20]).scale == (10.0, 20.0)
+    assert repr(Adaptive(terms={"front": 1}).terms) == "{'front': 1.0}"

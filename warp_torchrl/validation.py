@@ -17,7 +17,7 @@ def check_fields(component: Any, **ranges: tuple[float, float]) -> None:
     Args:
         component: A dataclass instance; it may be frozen.
         ranges: Lowest and highest value by field; a field that may be None is checked where it is not. Where a field
-            may be a pair, from low to high, both ends are checked, and their order.
+            may be a pair, from low to high, both ends are checked, and their order; of a mapping every value.
 
     Raises:
         ValueError: With the field, the rule and the value; NaN is in no range.
@@ -33,6 +33,10 @@ def check_fields(component: Any, **ranges: tuple[float, float]) -> None:
 
 
 def _check_range(name: str, value: Any, low: float, high: float) -> None:
+    if isinstance(value, Mapping):
+        for key, each in value.items():
+            _check_range(f"{name}.{key}", each, low, high)
+        return
     ends = value if isinstance(value, tuple) else (value,)
     if not all(low <= end <= high for end in ends):
         raise ValueError(f"{name} must be in [{low:g}, {high:g}], got {value}")
@@ -41,11 +45,13 @@ def _check_range(name: str, value: Any, low: float, high: float) -> None:
 
 
 def fit(value: object, hint: object, name: str) -> object:
-    """Return a value in the form of a type hint.
+    """Return a value in the form of a type hint; of a mapping each value, in that of its own.
 
     Raises:
         ValueError: With the name, what the hint asks for and the value.
     """
+    if get_origin(hint) is Mapping and isinstance(value, Mapping):
+        return _fit_mapping(value, get_args(hint)[1], name)
     choices = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
     for choice in choices:
         fits, fitted = _try_fit(value, choice)
@@ -54,6 +60,11 @@ def fit(value: object, hint: object, name: str) -> object:
     kinds = " or ".join(_describe(choice) for choice in choices)
     words = [str(word) for choice in choices if get_origin(choice) is Literal for word in get_args(choice)]
     raise ValueError(f"{name} must be {kinds}, got {value!r}{did_you_mean(value, words)}")
+
+
+def _fit_mapping(value: Mapping[Any, object], hint: object, name: str) -> Mapping[Any, object]:
+    fitted = {key: fit(each, hint, f"{name}.{key}") for key, each in value.items()}
+    return value if all(fitted[key] is each for key, each in value.items()) else fitted
 
 
 def _try_fit(value: object, hint: object) -> tuple[bool, object]:

@@ -72,9 +72,9 @@ def test_a_term_of_ones_own_is_chosen_by_name():
     ("terms", "message"),
     [
         ({"frnt": 0.1}, "terms must be of front, surrounded, head, got frnt: did you mean front?"),
-        ({"front": float("nan")}, "terms.front must be a number in"),
-        ({"front": True}, "terms.front must be a number in"),
-        ({"front": "much"}, "terms.front must be a number in"),
+        ({"front": float("nan")}, "terms.front must be in"),
+        ({"front": True}, "terms.front must be a number, got True"),
+        ({"front": "much"}, "terms.front must be a number, got 'much'"),
         (["front"], "terms must be a mapping"),
     ],
 )

@@ -9,7 +9,6 @@ agent pays A times for its own acts, so that the team's mean is R.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from numbers import Real
 from typing import Literal
 
 import torch
@@ -19,6 +18,7 @@ from torch.nn.functional import avg_pool2d
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.reward.base import Reward
 from warp_torchrl.reward.terms import TERMS
+from warp_torchrl.validation import check_fields
 from warp_torchrl.world.front import alignment, block_shares, centre, containment, exposure
 from warp_torchrl.world.state import Transition, TreeCounts, WorldState, is_burning
 
@@ -205,11 +205,10 @@ class Adaptive(Conservation):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name, theta in self.terms.items():
+        check_fields(self, terms=(-1e9, 1e9))
+        for name in self.terms:
             if name not in TERMS:
                 raise ValueError(f"terms must be of {', '.join(TERMS)}, got {name}{did_you_mean(name, TERMS)}")
-            if isinstance(theta, bool) or not isinstance(theta, Real) or not -1e9 <= float(theta) <= 1e9:
-                raise ValueError(f"terms.{name} must be a number in [-1e+09, 1e+09], got {theta!r}")
 
     def value(self, state: WorldState, counts: TreeCounts) -> Tensor:
         """Return R without r_1 and the cost of acts, float32 [B]."""
