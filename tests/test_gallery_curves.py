@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from warp_torchrl.config.compose import SavedConfig
+from warp_torchrl.gallery import curves
 from warp_torchrl.gallery.__main__ import main
 from warp_torchrl.gallery.curves import (
     MULTI,
@@ -185,6 +186,16 @@ def test_a_sweep_gives_all_its_runs_once_and_in_order(tmp_path):
     (tmp_path / "sweep" / "empty").mkdir()
     found = run_folders([tmp_path / "sweep", tmp_path / "sweep" / "2"])
     assert [folder.name for folder in found] == ["0", "2", "10"]
+
+
+def test_each_path_is_listed_once_and_the_first_name_of_a_run_is_its_own(tmp_path, monkeypatch):
+    for job in (0, 1):
+        write_run(tmp_path / "sweep" / f"{job}", steps=32 + job)
+    listed = []
+    monkeypatch.setattr(curves, "run_folders", lambda paths: listed.extend(paths) or run_folders(paths))
+    given = [("one", tmp_path / "sweep" / "1"), ("all", tmp_path / "sweep")]
+    assert [line.label for line in lines_of(given)] == ["one", "all"]
+    assert listed == [path for _, path in given]
 
 
 # What is drawn

@@ -6,6 +6,7 @@ RUN [RUN ...]`` draws the learning curves of runs instead. It needs the extra ``
 
 import argparse
 import importlib.util
+import math
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -14,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warp_torchrl.drawing import save, style
-from warp_torchrl.gallery import reached
+from warp_torchrl.gallery import reached, saved_at
 from warp_torchrl.gallery.curves import curve_figures, lines_of
 from warp_torchrl.gallery.fires import fire_plain, fire_terrain_wind
 from warp_torchrl.gallery.landscapes import burn_probability
@@ -73,17 +74,34 @@ def _curves(arguments: Sequence[str]) -> None:
         raise ValueError(f"give the folder of at least one run: {_CURVES}")
     _check_matplotlib()
     lines = lines_of([_named(given) for given in options.runs])
+    tables = [reached.table(lines, options.reach)] if options.reach else []
+    tables += [saved_at.table(lines, options.at)] if options.at else []  # refuses steps that a run has not made
     for name, draw in curve_figures(lines).items():
         _draw_one(name, draw, options.out)
-    if options.reach:
-        print(reached.table(lines, options.reach))
+    print(*tables, sep="\n\n", end="\n" if tables else "")
 
 
 def _levels(given: str) -> list[float]:
-    levels = [float(each) for each in given.split(",")]
-    if not all(0.0 <= level <= 100.0 for level in levels):
-        raise argparse.ArgumentTypeError(f"must be percentages in 0..100, got {given}")
-    return levels
+    return _numbers(given, lambda level: 0.0 <= level <= 100.0, "percentages in 0..100")
+
+
+def _steps(given: str) -> list[float]:
+    return _numbers(given, lambda step: step >= 1.0 and step.is_integer(), "world steps, whole numbers from 1 on")
+
+
+def _numbers(given: str, fits: Callable[[float], bool], what: str) -> list[float]:
+    """Return numbers that stand between commas.
+
+    Raises:
+        argparse.ArgumentTypeError: If they are none, or do not fit.
+    """
+    try:
+        numbers = [float(each) for each in given.split(",")]
+    except ValueError:
+        numbers = [math.nan]
+    if not all(fits(number) for number in numbers):
+        raise argparse.ArgumentTypeError(f"must be {what}, got {given}")
+    return numbers
 
 
 def _named(given: str) -> tuple[str, Path]:
@@ -115,6 +133,14 @@ def _curves_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--reach", type=_levels, default=(), metavar="PERCENT,...", help="print when runs first save so much forest"
+    )
+    parser.add_argument(
+        "--at",
+        type=_steps,
+        default=(),
+        metavar="STEPS,...",
+        help="print the forest saved in training by these world steps, each the mean over the twentieth of the run "
+        "before it, and the median of world steps a second",
     )
     return parser
 

@@ -70,9 +70,11 @@ def lines_of(paths: Sequence[Path | tuple[str, Path]]) -> list[Line]:
         OSError: If a file cannot be read.
     """
     named = [each if isinstance(each, tuple) else ("", each) for each in paths]
-    called = {folder.resolve(): name for name, path in reversed(named) for folder in run_folders([path])}
-    folders = run_folders([path for _, path in named])
-    return gather([replace(read_run(folder), called=called[folder.resolve()]) for folder in folders])
+    found: dict[Path, tuple[str, Path]] = {}
+    for name, path in named:
+        for folder in run_folders([path]):
+            found.setdefault(folder.resolve(), (name, folder))
+    return gather([replace(read_run(folder), called=name) for name, folder in found.values()])
 
 
 def curve_figures(lines: Sequence[Line]) -> dict[str, Callable[[], "Figure"]]:

@@ -15,7 +15,7 @@ from warp_torchrl.config.compose import SavedConfig
 from warp_torchrl.evaluation.method import method, teacher_label, unusual
 from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError, newest
 
-FRAMES, SECONDS, SAVED = "time/frames", "time/seconds", "world/saved"
+FRAMES, SECONDS, FPS, SAVED = "time/frames", "time/seconds", "time/fps", "world/saved"
 MOST_ROWS = 400
 """Files of more rows are averaged over bins."""
 _LARGEST, _LARGEST_CONFIG = 100_000_000, 1_000_000  # bytes
@@ -26,8 +26,10 @@ class Run:
     """Configuration and metrics of a run folder.
 
     Attributes:
-        columns: Columns of ``metrics.csv``, [rows] each, NaN where a value is missing.
-        rows_per_bin: Rows that one of these stands for.
+        folder: Where it is.
+        rows: Columns of ``metrics.csv``, [rows] each, NaN where a value is missing.
+        columns: The same as means over bins, [bins] each, of at most ``MOST_ROWS``.
+        rows_per_bin: Rows that a bin stands for.
         names: Algorithm and teacher, reward, observation and scenario; the folder's own name where nothing is recorded.
         alike: Equal for runs that differ in their seed only.
         mark: Distinguishes runs of the same names.
@@ -37,6 +39,8 @@ class Run:
         called: What the figure calls it, if it was told.
     """
 
+    folder: Path
+    rows: Mapping[str, np.ndarray]
     columns: Mapping[str, np.ndarray]
     rows_per_bin: int
     names: tuple[str, ...]
@@ -64,15 +68,15 @@ def run_folders(paths: Sequence[Path]) -> list[Path]:
 
 def read_run(folder: Path) -> Run:
     """Return what a run folder holds, without instantiating anything."""
-    columns = read_metrics(folder / "metrics.csv")
-    rows_per_bin = math.ceil(len(columns[FRAMES]) / MOST_ROWS)
-    columns = {name: bin_means(values, rows_per_bin) for name, values in columns.items()}
+    rows = read_metrics(folder / "metrics.csv")
+    rows_per_bin = math.ceil(len(rows[FRAMES]) / MOST_ROWS)
+    columns = {name: bin_means(values, rows_per_bin) for name, values in rows.items()}
     try:
         found, _ = newest(folder)
         trained = _recorded(found, found.record())
     except CheckpointError:  # none was saved yet
         trained = _not_recorded(folder.resolve())
-    return Run(columns=columns, rows_per_bin=rows_per_bin, **trained)
+    return Run(folder=folder, rows=rows, columns=columns, rows_per_bin=rows_per_bin, **trained)
 
 
 def read_metrics(path: Path) -> dict[str, np.ndarray]:
