@@ -206,7 +206,7 @@ def _start_hydra(name: str, job: Callable[[DictConfig], None], arguments: list[s
 
     try:
         hydra.main(version_base="1.3", config_path=str(conf_folder()), config_name=name)(guarded)()
-    except Exception:  # a launcher gives up with what its library raises (joblib's, submitit's, a plugin's): it goes on up
+    except Exception:  # a launcher's library raises what it likes; it is raised again
         summarise_unfinished()
         raise
 
