@@ -65,6 +65,7 @@ def searched(tmp_path, monkeypatch, capsys):
             ["algorithm=ppo,dqn", "algorithm.epochs=range(1, 4)"],
             "algorithm.epochs is not a key of the configuration, but",
         ),
+        (["processes=1,3", "n_worlds=3,4", "algorithm.minibatch_size=16"], "processes must divide n_worlds, 4, got 3"),
         (["algorithm.gamma=interval(0.9"], "algorithm.gamma=interval(0.9 cannot be read"),
         ([], "nothing is searched: name a ready search, search=NAME of a2c, ddpg, dqn, ppo, sac, or give"),
         (["search=pp"], "search must be one of a2c, ddpg, dqn, ppo, sac, got pp: did you mean ppo?"),
@@ -113,6 +114,7 @@ def test_the_first_trial_is_the_configuration_as_it_is_and_all_are_runs_of_their
     plain(compose_config("train", [each for each in overrides if not each.startswith("hydra")]))
     best = yaml.safe_load((tmp_path / "it's" / "experiment" / "best.yaml").read_text())
     assert best["total_frames"] == TOTAL and best["defaults"] == [{"override /scenario": "single"}, "_self_"]
+    assert best["algorithm"]["learning_rate"] == pytest.approx(0.001), "written though it is the default"
 
 
 def test_the_same_command_goes_on_and_another_one_is_refused(searched, tmp_path):

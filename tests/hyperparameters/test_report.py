@@ -8,26 +8,27 @@ optuna = pytest.importorskip("optuna", reason="needs the extra search")
 
 from optuna.trial import TrialState, create_trial
 
-from tests.hyperparameters.test_search import SPACE
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.search_options import SearchOptions
 from warp_torchrl.config.space import dimension
 from warp_torchrl.hyperparameters.figure import FIGURE, draw
 from warp_torchrl.hyperparameters.report import BEST, CSV, TABLE, experiment, table, write
 
+GAMMA, EPOCHS, ACTIVATION = "algorithm.gamma", "algorithm.epochs", "model.activation"
+SPACE = [dimension(f"{GAMMA}=interval(0, 1)"), dimension(f"{EPOCHS}=range(1, 9)"), dimension(f"{ACTIVATION}=relu,tanh")]
 DISTRIBUTIONS = {
-    "x": optuna.distributions.FloatDistribution(0.0, 1.0),
-    "n": optuna.distributions.IntDistribution(1, 9),
-    "kind": optuna.distributions.CategoricalDistribution(("good", "bad")),
+    GAMMA: optuna.distributions.FloatDistribution(0.0, 1.0),
+    EPOCHS: optuna.distributions.IntDistribution(1, 8),
+    ACTIVATION: optuna.distributions.CategoricalDistribution(("relu", "tanh")),
 }
 
 
-def add(study, x, saved=None, state="COMPLETE", path=(), **attributes):
+def add(study, gamma, saved=None, state="COMPLETE", path=(), **attributes):
     study.add_trial(
         create_trial(
             state=TrialState[state],
             value=saved,
-            params={"x": x, "n": 3, "kind": "good" if x > 0.5 else "bad"},
+            params={GAMMA: gamma, EPOCHS: 3, ACTIVATION: "relu" if gamma > 0.5 else "tanh"},
             distributions=DISTRIBUTIONS,
             intermediate_values=dict(path),
             user_attrs=attributes,
@@ -49,12 +50,12 @@ def study():
 
 def test_the_table_has_the_best_first_and_those_that_came_furthest_next(study):
     assert table(study, SPACE).splitlines()[2:] == [
-        "| 2 | trained | 62.5 | - | 0.75 | 3 | good |",
-        "| 0, as it is | trained | 50.0 | - | 0.25 | 3 | bad |",
-        "| 4 | pruned at 60 % | 10.0 | - | 0.2 | 3 | bad |",
-        "| 1 | pruned at 30 % | 20.0 | - | 0.1 | 3 | bad |",
-        "| 5 | pruned at 0 % | - | - | 0.9 | 3 | good |",
-        "| 3 | failed | - | - | 0.3 | 3 | bad |",
+        "| 2 | trained | 62.5 | - | 0.75 | 3 | relu |",
+        "| 0, as it is | trained | 50.0 | - | 0.25 | 3 | tanh |",
+        "| 4 | pruned at 60 % | 10.0 | - | 0.2 | 3 | tanh |",
+        "| 1 | pruned at 30 % | 20.0 | - | 0.1 | 3 | tanh |",
+        "| 5 | pruned at 0 % | - | - | 0.9 | 3 | relu |",
+        "| 3 | failed | - | - | 0.3 | 3 | tanh |",
     ]
 
 
@@ -63,20 +64,20 @@ def test_what_ten_trials_hang_on_is_told(study):
     for place in range(12):
         add(study, 0.08 * place, 0.08 * place, values=[0.08 * place])
     row = table(study, SPACE).splitlines()[-1]
-    name, *_, x, n, kind = (cell.strip(" %") for cell in row.strip("|").split("|"))
-    assert name == "importance" and float(x) > 50.0 > float(n) > 0.0, row  # saved is x, and n always 3
-    assert float(x) + float(n) + float(kind) == pytest.approx(100.0, abs=1.0)
+    name, *_, gamma, epochs, activation = (cell.strip(" %") for cell in row.strip("|").split("|"))
+    assert name == "importance" and float(gamma) > 50.0 > float(epochs), row  # saved is gamma, epochs always 3
+    assert float(gamma) + float(epochs) + float(activation) == pytest.approx(100.0, abs=1.0)
 
 
 def test_the_files_say_the_same(study, tmp_path):
-    page = write(study, SPACE, ["algorithm=a2c"], SearchOptions(), tmp_path)
+    page = write(study, SPACE, ["scenario=single"], SearchOptions(), tmp_path)
     assert (tmp_path / TABLE).read_text() == page + "\n"
     assert "The best is trial 2: 62.5 % saved in its evaluation. Each trial is one seed" in page
-    assert "python train.py algorithm=a2c x=0.75 n=3 kind=good\n" in page
+    assert "python train.py scenario=single algorithm.gamma=0.75 algorithm.epochs=3 model.activation=relu\n" in page
     with (tmp_path / CSV).open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row["trial"] for row in rows] == ["2", "0", "4", "1", "5", "3"]
-    assert rows[0]["saved"] == "0.625" and rows[0]["x"] == "0.75" and rows[2]["percent"] == "60"
+    assert rows[0]["saved"] == "0.625" and rows[0][GAMMA] == "0.75" and rows[2]["percent"] == "60"
     assert rows[-1]["reason"] == "it fell over" and rows[-1]["saved"] == ""
 
 
@@ -85,7 +86,7 @@ def test_the_seeds_of_trials_say_how_much_is_noise(tmp_path):
     add(study, 0.5, 0.5, values=[0.4, 0.6])  # variances 0.02 and 0.08, together 0.05, deviation 0.2236
     add(study, 0.6, 0.6, values=[0.4, 0.8])
     page = write(study, SPACE, [], SearchOptions(seeds=2), tmp_path)
-    assert "| 1 | trained | 60.0 | 40.0 .. 80.0 | 0.6 | 3 | good |" in page
+    assert "| 1 | trained | 60.0 | 40.0 .. 80.0 | 0.6 | 3 | relu |" in page
     assert "differ by 22.4 % (standard deviation), means of 2 by 15.8 %" in page
 
 
@@ -104,6 +105,7 @@ def test_a_search_without_a_trained_trial_has_a_table_and_no_best(tmp_path):
         ["algorithm=a2c", "scenario=single", "algorithm.learning_rate=3e-05", "n_worlds=64"],
         ["experiment=skirmish", "model.actor_hidden=[64,32]", "imitation.teacher=null", "model.activation=relu"],
         ["total_frames=1_000", "experiment=quick", "algorithm.value_norm=False"],
+        ["algorithm=a2c", "experiment=short", "algorithm.minibatch_size=64"],
         ["model=cnn"],
         ["horizon=64"],
     ],

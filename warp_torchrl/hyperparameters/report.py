@@ -13,7 +13,7 @@ import optuna
 import yaml
 from optuna.trial import FrozenTrial, TrialState
 
-from warp_torchrl.config.compose import GROUPS
+from warp_torchrl.config.compose import GROUPS, choices, compose_config, plain
 from warp_torchrl.config.run_config import COMPONENTS
 from warp_torchrl.config.search_options import SearchOptions
 from warp_torchrl.config.space import Dimension, value_of
@@ -28,6 +28,7 @@ _STATES = {
     TrialState.WAITING: "waiting",
     TrialState.FAIL: "failed",
 }
+_MISSING = object()
 _FEWEST_FOR_IMPORTANCE = 10
 
 
@@ -181,25 +182,41 @@ def _best_overrides(best: FrozenTrial, space: Sequence[Dimension], fixed: Sequen
 
 
 def experiment(overrides: Sequence[str], says: str) -> str:
-    """Return overrides as the yaml of an experiment.
+    """Return a training's overrides as the yaml of an experiment.
+
+    An experiment among them is resolved: its options and values are written out, without those that the overrides
+    replace.
 
     Args:
         overrides: In Hydra's grammar, each with one value.
         says: What it is, for the file's comment.
     """
-    defaults: list[Any] = []
-    values: dict[str, Any] = {}
+    chosen = choices(overrides)
+    scenario = f"scenario={chosen['scenario']}"
+    usual = choices([scenario])
+    options = {group: chosen[group] for group in COMPONENTS if chosen[group] != usual[group]}
+    base = compose_config("train", [scenario, *(f"{group}={option}" for group, option in options.items())])
+    values = _differing(plain(compose_config("train", overrides)), plain(base))
     for override in overrides:
-        key, value = override.partition("=")[0], value_of(override)
-        if key == "experiment":
-            defaults[:0] = [] if value is None else [value]
-        elif key in (*COMPONENTS, *GROUPS):
-            defaults.append({f"override /{key}": value})
-        else:
-            _put(values, key.split("."), value)
-    parts = ({"defaults": [*defaults, "_self_"]} if defaults else {}) | values
-    text = yaml.safe_dump(parts, sort_keys=False, default_flow_style=False) if parts else ""
+        key = override.partition("=")[0]
+        if key not in (*COMPONENTS, *GROUPS):
+            _put(values, key.split("."), value_of(override))  # also where it is today's default
+    defaults = [{f"override /{group}": option} for group, option in {"scenario": chosen["scenario"], **options}.items()]
+    text = yaml.safe_dump({"defaults": [*defaults, "_self_"], **values}, sort_keys=False, default_flow_style=False)
     return f"# @package _global_\n# Found by python -m warp_torchrl.search. {says}\n{text}"
+
+
+def _differing(values: Mapping[str, Any], others: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what of nested values is another value than in others, or not there."""
+    found: dict[str, Any] = {}
+    for key, value in values.items():
+        other = others.get(key, _MISSING)
+        if isinstance(value, Mapping) and isinstance(other, Mapping):
+            inner = _differing(value, other)
+            found |= {key: inner} if inner else {}
+        elif value != other:
+            found[key] = value
+    return found
 
 
 def _put(values: dict[str, Any], path: Sequence[str], value: Any) -> None:
