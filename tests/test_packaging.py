@@ -76,7 +76,9 @@ def test_a_program_s_function_is_there(name):
     assert callable(getattr(importlib.import_module(module), function))
 
 
-@pytest.mark.parametrize("extra", ["gis", "calibration", "tensorboard", "figures", "interop", "docs", "sweep"])
+@pytest.mark.parametrize(
+    "extra", ["gis", "calibration", "tensorboard", "figures", "interop", "docs", "search", "sweep"]
+)
 def test_development_has_what_each_extra_has(extra):
     extras = PROJECT["optional-dependencies"]
     assert set(extras[extra]) <= set(extras["dev"])

@@ -274,3 +274,30 @@ def test_a_run_folder_has_one_writer(tmp_path):
         RunFolderLock(run)
     lock.release()
     RunFolderLock(run).release()
+
+
+def test_a_run_that_leaves_its_policy_has_nothing_to_go_on_from(tmp_path):
+    for frames in (100, 200, 300):
+        saved(tmp_path, frames)
+    torn = tmp_path / "checkpoints" / "300" / "policy.pt"
+    torn.write_bytes(torn.read_bytes()[:-1])
+    for _ in range(2):  # once more changes nothing
+        checkpoints.leave_policy(tmp_path)
+        assert [each.name for each in (tmp_path / "checkpoints").iterdir()] == ["200"]
+        found, _ = newest(tmp_path)
+        assert found.policy()["weight"].tolist() == [0, 1, 2, 3] and found.manifest.mode == "sampled"
+        with pytest.raises(CheckpointError, match="holds a policy alone"):
+            found.training()
+
+
+def test_a_disk_that_refuses_the_policy_leaves_the_whole_run(tmp_path, monkeypatch):
+    for frames in (100, 200):
+        saved(tmp_path, frames)
+
+    def refuse(*paths):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(shutil, "copyfile", refuse)
+    with pytest.raises(OSError, match="No space left"):
+        checkpoints.leave_policy(tmp_path)
+    assert newest(tmp_path)[0].training()["frames"] == 200

@@ -66,10 +66,16 @@ def _check(name: str | None, config: DictConfig) -> None:
     overrides = list(config.hydra.overrides.task)
     check_choices(overrides)
     values = plain(OmegaConf.masked_copy(config, [str(key) for key in config if key != "hydra"]))
-    (_check_evaluation if name == "evaluate" else _check_training)(values, overrides)
+    (_check_evaluation if name == "evaluate" else check_training)(values, overrides)
 
 
-def _check_training(values: Mapping[str, Any], overrides: Sequence[str]) -> None:
+def check_training(values: Mapping[str, Any], overrides: Sequence[str]) -> None:
+    """Check a training as it is composed: all of its values, and what it begins with or resumes.
+
+    Raises:
+        ConfigError: With key, value and rule.
+        CheckpointError: If what it begins with or resumes is not sound.
+    """
     if values["resume"] is None:
         plan = run_config(values)
         plan.check_training()

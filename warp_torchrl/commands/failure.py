@@ -9,10 +9,11 @@ from warp_torchrl.config.compose import HYDRA_ERRORS, one_line
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.parallel import WorkerDied
 from warp_torchrl.runs import checkpoint as checkpoints
+from warp_torchrl.runs.exit_codes import DISK, DONE, IN_USE, MISTAKE, NUMERICAL, UNSOUND
 from warp_torchrl.training.finite import NumericalFailure
 from warp_torchrl.training.signals import Stopped
 
-DONE, MISTAKE, IN_USE, UNSOUND, NUMERICAL, DISK = 0, 2, 3, 4, 5, 6
+__all__ = ["DISK", "DONE", "IN_USE", "MISTAKE", "NUMERICAL", "UNSOUND", "fail"]
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 
 

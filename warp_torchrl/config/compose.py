@@ -56,6 +56,14 @@ def compose_config(name: str, overrides: Sequence[str] = ()) -> DictConfig:
     return config
 
 
+def choices(overrides: Sequence[str]) -> dict[str, str]:
+    """Return the option of each group of ``conf/train.yaml`` with overrides that ``compose_config`` takes."""
+    GlobalHydra.instance().clear()
+    with initialize_config_dir(str(conf_folder()), version_base="1.3"):
+        composed = compose("train", overrides=renamed_overrides(overrides), return_hydra_config=True)
+    return dict(composed.hydra.runtime.choices)
+
+
 def check_choices(overrides: Sequence[str]) -> None:
     """Check that each group has one option, by its name.
 

@@ -16,6 +16,7 @@ from omegaconf import DictConfig, OmegaConf
 from warp_torchrl.config.construction import component
 from warp_torchrl.config.prediction_options import PredictionOptions
 from warp_torchrl.config.run_config import COMPONENTS, RunConfig
+from warp_torchrl.config.search_options import SearchOptions
 from warp_torchrl.world.world import World
 
 
@@ -64,6 +65,8 @@ def _left_out(config_path: str, node: DictConfig) -> dict[str, Any]:
     name = config_path.removesuffix(".yaml")
     if name == "predict":
         return defaults(PredictionOptions)
+    if name == "search":
+        return {"search": defaults(SearchOptions)}
     if name == "train":
         run = {**defaults(World), **defaults(RunConfig)}
         return {key: value for key, value in run.items() if key not in COMPONENTS}

@@ -37,6 +37,7 @@ __all__ = [
     "RunFolderLock",
     "export",
     "holds_any",
+    "leave_policy",
     "newest",
     "save",
 ]
@@ -166,6 +167,25 @@ def export(found: Checkpoint, folder: Path) -> None:
                 shutil.copyfile(found.path / name, draft / name)
         write_manifest(draft, manifest.frames, manifest.scenario, manifest.signature, manifest.mode)
         _publish(draft, folder)
+
+
+def leave_policy(run: Path) -> None:
+    """Leave of a run's checkpoints the newest one's policy alone, from which nothing goes on.
+
+    Raises:
+        CheckpointError: If no checkpoint is sound.
+        OSError: If a write fails; all checkpoints stay.
+    """
+    found, _ = newest(run)
+    apart, whole = found.path.with_name(".policy.tmp"), found.path.with_name(".whole.tmp")
+    for left in (apart, whole):
+        shutil.rmtree(left, ignore_errors=True)
+    export(found, apart)
+    found.path.rename(whole)
+    apart.rename(found.path)
+    disk.sync(found.path.parent)
+    for folder in (whole, *(each for each in _listed(run) if each != found.path)):
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def holds_any(run: Path) -> bool:
