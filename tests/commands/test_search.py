@@ -89,6 +89,11 @@ def test_a_mistake_is_told_in_one_line_before_any_trial(searched, tmp_path, argu
     assert not searched.started and not list(tmp_path.iterdir())
 
 
+def test_an_unknown_key_is_told_without_the_values_of_others(searched):
+    _, errors, _ = searched(RATE, "algorithm.gama=interval(0.9, 1.0)")
+    assert errors[-1].endswith("did you mean algorithm.gamma?")
+
+
 def test_without_optuna_it_says_what_to_install(searched, tmp_path, monkeypatch):
     find = search_module.find_spec
     monkeypatch.setattr(search_module, "find_spec", lambda name: None if name == "optuna" else find(name))

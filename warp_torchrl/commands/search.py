@@ -17,7 +17,7 @@ import torch
 from warp_torchrl.commands.checks import check_training
 from warp_torchrl.commands.failure import DONE, fail
 from warp_torchrl.config.compose import GROUPS, compose_config, conf_folder, plain, without_targets
-from warp_torchrl.config.construction import ConfigError, construct
+from warp_torchrl.config.construction import ConfigError, UnknownKeyError, construct
 from warp_torchrl.config.grammar import check_flags, check_overrides
 from warp_torchrl.config.renamed import renamed_overrides
 from warp_torchrl.config.run_config import COMPONENTS
@@ -134,6 +134,8 @@ def check_points(space: Sequence[Dimension], fixed: Sequence[str]) -> dict[str, 
     for point in sorted(points):
         try:
             check_training(plain(compose_config("train", [*fixed, *point])), [*fixed, *point])
+        except UnknownKeyError:
+            raise  # whatever the other values are
         except ConfigError as error:
             raise ConfigError(f"{error}, in {' '.join(point)}") from None
     return base
