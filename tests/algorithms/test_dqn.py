@@ -83,6 +83,48 @@ def test_the_team_s_value_is_learnt_from_the_mean_reward(make_small_env, mixer):
     torch.testing.assert_close(loss(data)["loss"].detach(), smooth_l1_loss(said, wanted))
 
 
+@pytest.mark.parametrize("mixer", ["none", "vdn"])
+def test_returns_over_two_steps_by_hand(make_small_env, mixer):
+    """Of three steps the first sums two rewards and leads to the third; the others end with an episode, by the horizon
+    and for good.
+    """
+    env = make_small_env(1)
+    learner = Dqn(mixer=mixer, gamma=0.9, warm_up=1, capacity=3, minibatch_size=3, n_step=2).build(env, SMALL, 3)
+    data = three_transitions(env, learner)
+    rewards = {
+        "none": [[0.5 - 0.9 * 1.0, 1.0 + 0.9 * 0.0], [-1.0, 0.0], [2.0, 3.0]],
+        "vdn": [0.75 - 0.9 * 0.5, -0.5, 2.5],
+    }[mixer]
+    key = REWARD if mixer == "none" else "team_reward"
+    reward = torch.tensor(rewards)
+    torch.testing.assert_close(data["next"].get(key)[..., 0], reward)
+    steps = torch.tensor([2.0, 1.0, 1.0])
+    assert torch.equal(data["steps_to_next_obs"].reshape(3, -1), steps[:, None].expand(3, reward[0].numel()))
+    ends = data["next", "agents"] if mixer == "none" else data["next"]
+    assert ends["terminated"].reshape(3, -1)[:, 0].tolist() == [False, False, True]
+    assert ends["done"].reshape(3, -1)[:, 0].tolist() == [True, True, True]  # the first leads to the horizon's end
+
+    loss = learner.loss
+    with torch.no_grad():  # the target networks are still copies
+        params = loss.value_network_params if mixer == "none" else loss.local_value_network_params
+        best = values(learner, params, data["next"]).masked_fill(~data["next"][ACTION_MASK], -torch.inf).amax(-1)
+        said = values(learner, params, data).gather(-1, data[ACTION][..., None])[..., 0]
+        if mixer == "vdn":
+            best, said = best.sum(-1), said.sum(-1)
+        discount = torch.tensor([0.81, 0.9, 0.0]).reshape(3, *[1] * (best.ndim - 1))
+        wanted = reward + discount * best
+    torch.testing.assert_close(loss(data)["loss"].detach(), smooth_l1_loss(said, wanted))
+
+
+def test_what_follows_several_steps_is_seen_later(make_small_env):
+    env = make_small_env(1)
+    learner = Dqn(warm_up=1, capacity=3, minibatch_size=3, n_step=2).build(env, SMALL, 3)
+    data = three_transitions(env, learner)
+    for name, now in data["next", "agents"].items():
+        if name not in ("reward", "done", "terminated"):
+            assert torch.equal(now[0], now[1]), name
+
+
 def test_qmix_never_falls_when_an_agent_s_value_rises(make_small_env):
     env = make_small_env(8)
     mixer = Dqn(mixer="qmix").build(env, SMALL, 8).loss.mixer_network

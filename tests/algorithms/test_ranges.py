@@ -26,6 +26,7 @@ OFF_POLICY = ALL | {
     "warm_up": (0, 10**9),
     "target_interval": (0, 10**9),
     "tau": (1e-6, 1.0),
+    "n_step": (1, 1024),
 }
 EPSILON = {"epsilon": SHARE, "epsilon_end": (0.0, 0.5), "epsilon_until": (1e-6, 1.0)}
 RANGES = {

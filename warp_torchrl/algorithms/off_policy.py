@@ -7,7 +7,9 @@ from typing import Literal
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
+from tensordict.utils import expand_right
 from torchrl.data import Categorical, ReplayBuffer
+from torchrl.data.postprocs import MultiStep
 from torchrl.envs import EnvBase
 from torchrl.modules import EGreedyModule
 from torchrl.objectives import HardUpdate, LossModule, SoftUpdate
@@ -30,6 +32,8 @@ from warp_torchrl.models import (
 
 AGENT_KEYS = {"reward": REWARD, "done": ("agents", "done"), "terminated": ("agents", "terminated")}
 """Keys of TorchRL's losses for values of each agent; the team's end is each agent's end."""
+STEPS = "steps_to_next_obs"
+"""Key of the number of steps whose rewards a transition sums, where it is not 1."""
 TEAM_REWARD = "team_reward"
 """Key of the team's mean reward, for a value of the whole team."""
 
@@ -46,6 +50,8 @@ class OffPolicy(Algorithm):
         replay: ``uniform``, or ``prioritised`` by the temporal-difference error (Schaul et al., 2016).
         target_interval: Optimiser steps between copies into the target networks; 0 lets them follow at ``tau``.
         tau: How far the target networks move towards the others in an optimiser step.
+        n_step: World steps whose rewards a target sums before it takes the value of what they led to (Sutton 1988);
+            fewer where an episode or a batch of the collector ends.
 
     Raises:
         ValueError: If a value is out of its range, or prioritised replay does not work here.
@@ -61,11 +67,12 @@ class OffPolicy(Algorithm):
     replay: Literal["uniform", "prioritised"] = "uniform"
     target_interval: int = 0
     tau: float = 0.01
+    n_step: int = 1
 
     def check(self, **ranges: tuple[float, float]) -> None:
         """Check the numbers against their ranges, and further fields against ``ranges``."""
         large = (1, 10**9)
-        own = {"capacity": large, "minibatch_size": large, "updates": large, "warm_up": (0, 10**9)}
+        own = {"capacity": large, "minibatch_size": large, "updates": large, "warm_up": (0, 10**9), "n_step": (1, 1024)}
         super().check(**own, target_interval=(0, 10**9), tau=(1e-6, 1.0), **ranges)
         if self.warm_up > self.capacity:
             raise ValueError(f"warm_up must be at most capacity, {self.capacity}, got {self.warm_up}")
@@ -137,7 +144,7 @@ class OffPolicy(Algorithm):
             columns=self.columns(),
             optimizer=optimizer,
             max_grad_norm=self.max_grad_norm,
-            store=lambda batch: memory.extend(transitions(loss, batch, canonical)),
+            store=lambda batch: memory.extend(transitions(loss, batch, canonical, self.n_step, self.gamma)),
             samples=samples,
             after_step=after_step,
             schedule=schedule,
@@ -222,11 +229,31 @@ class EpsilonGreedy(OffPolicy):
         return {"rollout/exploration_rate": epsilon}
 
 
-def transitions(loss: LossModule, batch: TensorDictBase, canonical: CanonicalBatch) -> TensorDictBase:
-    """Return a loss's inputs from a batch, with the team's end for each agent; [B, T] -> [B T]."""
+def transitions(
+    loss: LossModule, batch: TensorDictBase, canonical: CanonicalBatch, n_step: int, gamma: float
+) -> TensorDictBase:
+    """Return a loss's inputs from a batch, with the team's end for each agent; [B, T] -> [B T].
+
+    With ``n_step`` above 1 what follows a step is what its next n steps led to: their discounted rewards, the
+    observation and the ends after them, and their number under ``steps_to_next_obs``, by which the losses' estimators
+    discount.
+    """
     batch = canonical(batch).set("next", canonical(batch["next"]))
     reward = batch["next", *REWARD]
     batch["next", TEAM_REWARD] = reward.mean(dim=-2)
     for name in ("done", "terminated"):
         batch["next", "agents", name] = batch["next", name].unsqueeze(-2).expand(reward.shape)
-    return batch.select(*loss.in_keys, strict=False).reshape(-1)
+    if n_step > 1:
+        batch = _several_steps(batch.select(*loss.in_keys, ("next", "done"), strict=False), loss, n_step, gamma)
+    return batch.select(*loss.in_keys, STEPS, strict=False).reshape(-1)
+
+
+def _several_steps(batch: TensorDictBase, loss: LossModule, n_step: int, gamma: float) -> TensorDictBase:
+    """Return a batch [B, T] whose next entries are those of n steps later, or of the episode's or the batch's end."""
+    key = loss.tensor_keys.reward
+    several = MultiStep(gamma, n_step)
+    several.reward_keys, several.done_keys = (key,), ()  # the ends too are those of n steps later
+    batch = several(batch)
+    steps = batch[STEPS].to(torch.float32)  # [B, T]; the estimators read it in the reward's shape
+    batch[STEPS] = expand_right(steps, batch["next"].get(key).shape).contiguous()
+    return batch
