@@ -7,7 +7,7 @@ import pytest
 from tests.test_gallery_curves import the_one_line, write_metrics, write_run
 from warp_torchrl.gallery.__main__ import main
 from warp_torchrl.gallery.runs import read_run
-from warp_torchrl.gallery.saved_at import saved_at, speed
+from warp_torchrl.gallery.saved_at import minutes, saved_at, speed
 
 FRAMES = range(100, 6100, 100)  # a twentieth: 300 world steps, three batches
 SAVED = [*[0.1] * 10, 0.2, 0.4, *[0.6] * 47, 0.9]  # of 100 .. 1000, 1100, 1200, 1300 .. 5900, 6000
@@ -53,6 +53,13 @@ def test_speed_is_a_median(tmp_path):
     assert math.isnan(speed(read_run(write_run(tmp_path / "none"))))
 
 
+def test_minutes_are_those_of_the_last_batch(tmp_path):
+    run = write_run(tmp_path / "run", frames=(100, 200, 300), columns={"time__seconds": [9, 60, 150]})
+    assert minutes(read_run(run)) == 2.5
+    (run / "metrics.csv").write_text("time/frames,world/saved\n100,0.5\n")
+    assert math.isnan(minutes(read_run(run)))
+
+
 def test_seeds_are_one_row_with_the_lowest_and_the_highest(run, tmp_path, capsys):
     pytest.importorskip("matplotlib")
     columns = {"world__saved": [*[0.2] * 58, 0.6, 0.6], "time__fps": [2000] * 60}
@@ -64,10 +71,11 @@ def test_seeds_are_one_row_with_the_lowest_and_the_highest(run, tmp_path, capsys
     assert main(["curves", *given]) == 0
     # At 6000: (0.6 + 0.6 + 0.9) / 3 = 70.0 % and (0.2 + 0.6 + 0.6) / 3 = 46.7 %, 58.3 % in the mean. One has no fps.
     assert capsys.readouterr().out.splitlines()[-4:] == [
-        "| saved in training, % | 0.1 k | 1 k | 6 k | steps/s |",
-        "| --- | --- | --- | --- | --- |",
-        "| now (2 seeds) | 15.0 (10.0 .. 20.0) | 15.0 (10.0 .. 20.0) | 58.3 (46.7 .. 70.0) | 2000 (2000 .. 2000) |",
-        "| then | - | 100.0 | 100.0 | 2000 |",
+        "| saved in training, % | 0.1 k | 1 k | 6 k | steps/s | minutes |",
+        "| --- | --- | --- | --- | --- | --- |",
+        "| now (2 seeds) | 15.0 (10.0 .. 20.0) | 15.0 (10.0 .. 20.0) | 58.3 (46.7 .. 70.0) | 2000 (2000 .. 2000) | "
+        "10.0 (10.0 .. 10.0) |",
+        "| then | - | 100.0 | 100.0 | 2000 | 10.0 |",
     ]
 
 
@@ -75,7 +83,7 @@ def test_both_tables_may_be_asked_for(run, tmp_path, capsys):
     pytest.importorskip("matplotlib")
     assert main(["curves", str(run), "--out", str(tmp_path), "--reach", "50", "--at", "6000"]) == 0
     *_, reached, between, _, _, saved = capsys.readouterr().out.splitlines()
-    assert reached.startswith("| mappo | 1 k, ") and between == "" and saved == "| mappo | 70.0 | - |"
+    assert reached.startswith("| mappo | 1 k, ") and between == "" and saved == "| mappo | 70.0 | - | 10.0 |"
 
 
 @pytest.mark.parametrize("given", ["soon", "100,", "0", "-5", "10.5", "nan", "inf"])

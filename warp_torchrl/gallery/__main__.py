@@ -140,7 +140,7 @@ def _curves_parser() -> argparse.ArgumentParser:
         default=(),
         metavar="STEPS,...",
         help="print the forest saved in training by these world steps, each the mean over the twentieth of the run "
-        "before it, and the median of world steps a second",
+        "before it, the median of world steps a second, and minutes",
     )
     return parser
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from warp_torchrl.gallery.curves import Line
-from warp_torchrl.gallery.runs import FPS, FRAMES, SAVED, Run
+from warp_torchrl.gallery.runs import FPS, FRAMES, SAVED, SECONDS, Run
 
 WINDOW = 0.05
 """Share of a run's world steps over which batches are averaged, all of it before the step that is asked for."""
@@ -40,20 +40,27 @@ def speed(run: Run) -> float:
     return float(np.median(found)) if found.size else np.nan
 
 
+def minutes(run: Run) -> float:
+    """Return the minutes from the start of training to its last batch; NaN where they are not recorded."""
+    found = run.rows.get(SECONDS, np.empty(0))
+    return float(found[-1]) / 60.0 if found.size else np.nan
+
+
 def table(lines: Sequence[Line], steps: Sequence[float]) -> str:
-    """Return a Markdown table, a row for each line: its forest saved [%] by world steps, and its world steps a second.
+    """Return a Markdown table, a row for each line: its forest saved [%] by world steps, its world steps a second, and
+    the minutes that it took.
 
     Runs that differ in their seed alone have their mean, and the lowest and the highest.
 
     Raises:
         ValueError: If a run has no ``world/saved``, or ends before one of the steps.
     """
-    rows = [["saved in training, %", *(f"{step / 1000:g} k" for step in steps), "steps/s"]]
+    rows = [["saved in training, %", *(f"{step / 1000:g} k" for step in steps), "steps/s", "minutes"]]
     rows.append(["---"] * len(rows[0]))
     for line in lines:
         shares = [[100.0 * saved_at(run, step) for run in line.runs] for step in steps]
-        speeds = [speed(run) for run in line.runs]
-        rows.append([line.label, *(_cell(each, 1) for each in shares), _cell(speeds, 0)])
+        speeds, took = [speed(run) for run in line.runs], [minutes(run) for run in line.runs]
+        rows.append([line.label, *(_cell(each, 1) for each in shares), _cell(speeds, 0), _cell(took, 1)])
     return "\n".join(f"| {' | '.join(row)} |" for row in rows)
 
 
