@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from warp_torchrl.algorithms.a2c import A2c
-from warp_torchrl.algorithms.on_policy import ADVANTAGE, VALUE_TARGET, with_advantages
+from warp_torchrl.algorithms.held_batch import ADVANTAGE, VALUE_TARGET, with_advantages
 from warp_torchrl.models import ACTION, VALUE, Mlp, over_canonical, signature
 
 SMALL = Mlp(actor_hidden=(16,), critic_hidden=(16,))

@@ -5,7 +5,7 @@ import torch
 from torch import nn
 
 from tests.conftest import small_world
-from warp_torchrl.algorithms.on_policy import with_advantages
+from warp_torchrl.algorithms.held_batch import with_advantages
 from warp_torchrl.algorithms.ppo import Ppo
 from warp_torchrl.models import (
     ACTION,

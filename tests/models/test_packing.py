@@ -6,7 +6,7 @@ from torch import nn
 from torchrl.envs import TransformedEnv
 
 from tests.conftest import small_world
-from warp_torchrl.algorithms.on_policy import with_advantages
+from warp_torchrl.algorithms.held_batch import with_advantages
 from warp_torchrl.algorithms.ppo import Ppo
 from warp_torchrl.content import Empty, Follows, Quarters
 from warp_torchrl.env import WildfireEnv

@@ -117,6 +117,8 @@ class Ddpg(EpsilonGreedy):
         ValueError: If a value is out of its range, or prioritised replay does not work here.
     """
 
+    updates: int = 128
+    tau: float = 0.05
     central_critic: bool = False
     temperature: float = 1.0
     logit_penalty: float = 1e-3

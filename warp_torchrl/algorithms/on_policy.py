@@ -1,34 +1,22 @@
 """Base of the on-policy algorithms: actors, critics, advantages and schedules."""
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import zip_longest
-from typing import Any, Literal
+from typing import Literal
 
 import torch
-from tensordict import TensorDictBase
-from torch import Tensor
-from torchrl.data import SamplerWithoutReplacement, TensorDictReplayBuffer
 from torchrl.envs import EnvBase
 from torchrl.modules import ProbabilisticActor
 from torchrl.objectives import LossModule
 
 from warp_torchrl import parallel
 from warp_torchrl.algorithms.algorithm import Algorithm, falling, masked_actor
+from warp_torchrl.algorithms.held_batch import ADVANTAGE, VALUE_TARGET, HeldBatch
 from warp_torchrl.algorithms.learner import Learner
-from warp_torchrl.algorithms.storage import BatchStorage
-from warp_torchrl.device import reads_freely
 from warp_torchrl.models import (
     ACTION,
-    CANONICAL,
-    CANONICAL_STATE,
     LOG_PROB,
-    LOGITS,
-    OBSERVATION,
     REWARD,
-    STATE,
     VALUE,
-    CanonicalBatch,
     Mlp,
     Recollection,
     Signature,
@@ -37,8 +25,6 @@ from warp_torchrl.models import (
     signature,
 )
 
-ADVANTAGE = ("agents", "advantage")
-VALUE_TARGET = ("agents", "value_target")
 KEYS = {
     "action": ACTION,
     "sample_log_prob": LOG_PROB,
@@ -105,28 +91,18 @@ class OnPolicy(Algorithm):
             loss.entropy_coeff.fill_(falling(self.entropy_coeff, self.entropy_coeff_end, progress))
             return {"train/learning_rate": self.rate_at(progress, optimizer), **self.constants()}
 
-        canonical = model.canonical_batch(shape, state=self.central_critic, packed=True)
         memory = Recollection(policy)
-        steps = frames_per_batch // env.batch_size[0] if memory.actors else 1  # in a row of the buffer
-        rows = BatchStorage(frames_per_batch // steps, device=env.device)
-        buffer = TensorDictReplayBuffer(storage=rows, sampler=SamplerWithoutReplacement())
-        largest = min(self.minibatch_size // parallel.size(), frames_per_batch) // steps
-        standardises = self.standardises() if parallel.size() > 1 else None
-        norm = getattr(loss, "value_norm", None)
-
-        def store(batch: TensorDictBase) -> None:
-            buffer.empty()
-            valued = with_advantages(loss, batch, canonical, whole=bool(memory.actors))
-            if standardises == "batch":
-                (valued[ADVANTAGE],) = parallel.standardised([valued[ADVANTAGE]], dim=-2)
-            buffer.extend(narrowed(valued, arithmetic_of(critic, env.device.type)))
-
-        def samples() -> Iterator[TensorDictBase]:
-            size = max(1, largest * len(buffer) * steps // frames_per_batch)
-            for _ in range(self.passes()):
-                places = list(minibatches(buffer, size))
-                yield from map(rows.get, places) if standardises != "minibatch" else _shared(rows, places, norm)
-
+        batch = HeldBatch(
+            loss,
+            model.canonical_batch(shape, state=self.central_critic, packed=True),
+            arithmetic_of(critic, env.device.type),
+            frames=frames_per_batch,
+            steps=frames_per_batch // env.batch_size[0] if memory.actors else None,
+            minibatch_size=self.minibatch_size // parallel.size(),
+            passes=self.passes(),
+            standardises=self.standardises() if parallel.size() > 1 else None,
+            device=env.device,
+        )
         return Learner(
             policy=policy,
             explore=policy,
@@ -136,8 +112,8 @@ class OnPolicy(Algorithm):
             columns=self.columns(),
             optimizer=optimizer,
             max_grad_norm=self.max_grad_norm,
-            store=store,
-            samples=samples,
+            store=batch.store,
+            samples=batch.samples,
             after_step=lambda sample: None,
             schedule=schedule,
             keeps={"memory": memory} if memory.actors else {},
@@ -168,76 +144,3 @@ class OnPolicy(Algorithm):
     def constants(self) -> dict[str, float]:
         """Return the columns that are constant."""
         return {}
-
-
-def minibatches(buffer: TensorDictReplayBuffer, size: int) -> Iterator[Tensor]:
-    """Yield which rows of a buffer are a minibatch, int64 [size], until all have been; the last may be smaller."""
-    buffer.sampler.ran_out = False
-    while not buffer.sampler.ran_out:
-        yield buffer.sampler.sample(buffer.storage, size)[0]
-
-
-def _shared(rows: BatchStorage, places: Sequence[Tensor], norm: Any) -> Iterator[TensorDictBase]:
-    """Yield minibatches with advantages standardised over all processes, with two messages for all of them.
-
-    Args:
-        rows: Of the batch.
-        places: Which of them are in each minibatch, int64 [n].
-        norm: Of value targets, which learns each minibatch's before that is yielded; None where there is none.
-    """
-    kept = rows.get(slice(0, len(rows))).select(ADVANTAGE, VALUE_TARGET)
-    advantages = parallel.standardised([kept[ADVANTAGE][each] for each in places], dim=-2)
-    moments = [] if norm is None else norm.moments([kept[VALUE_TARGET][each] for each in places])
-    for place, advantage, of_targets in zip_longest(places, advantages, moments):
-        if norm is not None:
-            norm.learn(of_targets)
-        yield rows.get(place).set(ADVANTAGE, advantage)
-
-
-def with_advantages(
-    loss: LossModule, batch: TensorDictBase, canonical: CanonicalBatch, whole: bool = False
-) -> TensorDictBase:
-    """Add advantages and value targets over time, then drop what the loss does not read.
-
-    Args:
-        loss: Whose values and estimator they are of.
-        batch: The collected batch, [B, T].
-        canonical: Makes what the loss's networks read.
-        whole: Whether to return sequences [B, T], and not steps [B T].
-    """
-    with torch.no_grad():
-        batch = canonical(batch)
-        _add_values(loss, batch, canonical)
-        loss.value_estimator(batch)
-    batch = batch.exclude("next", "info", LOGITS, VALUE)
-    return batch if whole else batch.reshape(-1)
-
-
-def narrowed(batch: TensorDictBase, dtype: torch.dtype) -> TensorDictBase:
-    """Return a batch whose state, and observation where it is one vector, have the type that networks compute in.
-
-    They would be made so at every pass, and most of what a minibatch copies is the state.
-    """
-    wide = {key: batch.get(key, None) for key in (STATE, OBSERVATION, CANONICAL_STATE, CANONICAL)}
-    found = {key: value for key, value in wide.items() if isinstance(value, Tensor) and value.dtype == torch.float32}
-    return batch.copy().update({key: value.to(dtype) for key, value in found.items()}) if found else batch
-
-
-def _add_values(loss: LossModule, batch: TensorDictBase, canonical: CanonicalBatch) -> None:
-    """Add the values of each step's state and next state, with little more than one pass of the critic.
-
-    The next state is the following step's state, except at the end of an episode or of the batch.
-    """
-    keys = loss.critic_network.in_keys
-    ends = batch["next", "done"][..., 0].clone()
-    ends[:, -1] = True
-    with loss.critic_network_params.to_module(loss.critic_network):
-        value = loss.critic_network(batch.select(*keys))[VALUE]
-        following = value.roll(-1, dims=1)
-        if reads_freely(ends.device):
-            following[ends] = loss.critic_network(canonical(batch["next"][ends]))[VALUE]
-        else:  # of every step, one after the other: how many ends there are would have to be read
-            last = [loss.critic_network(canonical(each))[VALUE] for each in batch["next"].unbind(1)]
-            following = torch.where(ends[..., None, None], torch.stack(last, dim=1), following)
-    batch.set(VALUE, value)
-    batch.set(("next", *VALUE), following)

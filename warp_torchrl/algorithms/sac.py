@@ -26,7 +26,8 @@ class Sac(OffPolicy):
         ValueError: If a value is out of its range, or prioritised replay does not work here.
     """
 
-    temperature: float = 0.003
+    updates: int = 128
+    temperature: float = 0.01
     target_entropy: float = 0.2
 
     def check(self, **ranges: tuple[float, float]) -> None:
