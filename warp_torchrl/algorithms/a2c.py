@@ -49,10 +49,10 @@ class A2c(OnPolicy):
         ValueError: If a value is out of its range.
     """
 
-    entropy_coeff: float = 0.02
-    entropy_coeff_end: float = 0.002
+    entropy_coeff: float = 0.1
+    entropy_coeff_end: float = 0.005
     critic_coeff: float = 0.5
-    minibatch_size: int = 512
+    minibatch_size: int = 256
     normalize_advantage: bool = True
 
     def loss(self, policy: ProbabilisticActor, critic: torch.nn.Module) -> A2CLoss:
