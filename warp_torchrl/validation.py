@@ -32,6 +32,22 @@ def check_fields(component: Any, **ranges: tuple[float, float]) -> None:
             _check_range(name, fitted, *ranges[name])
 
 
+def check_new_name(what: str, name: str, made: Any, known: Any) -> None:
+    """Check that what a module adds to a table under a name is not another module's; its own may be defined again.
+
+    Args:
+        what: What the table holds, for the message.
+        name: The name.
+        made: What is added.
+        known: What the table has under the name; None if nothing.
+
+    Raises:
+        ValueError: If another module has the name.
+    """
+    if known is not None and known.__module__ != made.__module__:
+        raise ValueError(f"{name} must be a new {what}'s name, {known.__module__} has one")
+
+
 def _check_range(name: str, value: Any, low: float, high: float) -> None:
     if isinstance(value, Mapping):
         for key, each in value.items():

@@ -62,7 +62,7 @@ def test_a_term_of_ones_own_is_chosen_by_name():
         old = state.replace(cells=torch.where(state.cells == 11, 15, state.cells).to(torch.uint8))
         assert of("burnt_out", old, world, STAY, STAY) == pytest.approx(-1 / 16)
         term("burnt_out")(burnt_out)  # read again, as in a notebook
-        with pytest.raises(ValueError, match="front must be a new term"):
+        with pytest.raises(ValueError, match="front must be a new term's name, warp_torchrl"):
             term("front")(burnt_out)
     finally:
         del TERMS["burnt_out"]

@@ -197,9 +197,15 @@ def test_what_cannot_be_is_refused() -> None:
         add_role("ugv", Role("truck", ("move",)))
     with pytest.raises(ValueError, match="truck must be a new role with a new name, got uav"):
         add_role("truck", Role("uav", ("move",)))
-    for name, actions in (("clear", ("fell",)), ("fell", ("clear",)), ("fell", ("stay",)), ("fell", ())):
+    taken, new = r"clear must be a new ability's name, warp_torchrl\.world\.abilities has one", "with new actions, got"
+    for name, actions, line in (
+        ("clear", ("fell",), taken),
+        ("fell", ("clear",), f"fell must be an ability {new} clear"),
+        ("fell", ("stay",), f"fell must be an ability {new} stay"),
+        ("fell", (), f"fell must be an ability {new} none"),
+    ):
         kind = type("Fell", (Ability,), {"actions": actions, "__module__": "elsewhere"})
-        with pytest.raises(ValueError, match=f"{name} must be a new ability with new actions"):
+        with pytest.raises(ValueError, match=line):
             ability(name)(kind)
     ROLES["boat"] = Role("boat", ("move", "sail"))
     try:

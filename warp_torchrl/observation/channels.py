@@ -15,6 +15,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.content import Content, Empty, Follows
+from warp_torchrl.validation import check_new_name
 from warp_torchrl.world.fast.bytes import at_least, byte, equal, to_codes, to_int32
 from warp_torchrl.world.fast.squares import Window, window
 from warp_torchrl.world.role import PAPER_ROLES
@@ -95,8 +96,7 @@ def channel(
 
     def add(show: Callable[[Look], Tensor]) -> Callable[[Look], Tensor]:
         name, known = show.__name__, CHANNELS.get(show.__name__)
-        if known is not None and known.show.__module__ != show.__module__:
-            raise ValueError(f"{name} must be a new channel's name, {known.show.__module__} has one")
+        check_new_name("channel", name, show, known.show if known else None)
         CHANNELS[name] = Channel(show, high, content)
         return show
 

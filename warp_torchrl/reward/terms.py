@@ -10,6 +10,7 @@ from collections.abc import Callable
 import torch
 from torch import Tensor
 
+from warp_torchrl.validation import check_new_name
 from warp_torchrl.world.front import alignment, centre, sector
 from warp_torchrl.world.geometry import grow
 from warp_torchrl.world.state import Transition, TreeCounts, WorldState, is_burning, is_tree
@@ -29,8 +30,7 @@ def term(name: str) -> Callable[[Term], Term]:
     """
 
     def add(made: Term) -> Term:
-        if name in TERMS and TERMS[name].__module__ != made.__module__:
-            raise ValueError(f"{name} must be a new term, of {TERMS[name].__module__} there is one already")
+        check_new_name("term", name, made, TERMS.get(name))
         TERMS[name] = made
         return made
 

@@ -16,6 +16,7 @@ from typing import ClassVar, NamedTuple
 import torch
 from torch import Tensor
 
+from warp_torchrl.validation import check_new_name
 from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.role import RoleTable
@@ -93,10 +94,11 @@ def ability(name: str) -> Callable[[type[Ability]], type[Ability]]:
     """
 
     def add(kind: type[Ability]) -> type[Ability]:
-        others = {known: each for known, each in ABILITIES.items() if type(each).__module__ != kind.__module__}
-        taken = {action for each in others.values() for action in each.actions} | {"stay"}
-        if name in others or not kind.actions or taken & set(kind.actions):
-            raise ValueError(f"{name} must be a new ability with new actions, got {', '.join(kind.actions) or 'none'}")
+        check_new_name("ability", name, kind, ABILITIES.get(name))
+        others = [each for each in ABILITIES.values() if each.__module__ != kind.__module__]
+        taken = {"stay"}.union(*(each.actions for each in others))
+        if not kind.actions or taken & set(kind.actions):
+            raise ValueError(f"{name} must be an ability with new actions, got {', '.join(kind.actions) or 'none'}")
         ABILITIES[name] = kind()
         return kind
 
