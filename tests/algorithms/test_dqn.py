@@ -5,7 +5,9 @@ import torch
 from tensordict import TensorDict
 from torch.nn.functional import smooth_l1_loss
 
+from warp_torchrl.algorithms.ddpg import Ddpg
 from warp_torchrl.algorithms.dqn import Dqn
+from warp_torchrl.algorithms.sac import Sac
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.run_config import run_config
@@ -114,6 +116,22 @@ def test_returns_over_two_steps_by_hand(make_small_env, mixer):
         discount = torch.tensor([0.81, 0.9, 0.0]).reshape(3, *[1] * (best.ndim - 1))
         wanted = reward + discount * best
     torch.testing.assert_close(loss(data)["loss"].detach(), smooth_l1_loss(said, wanted))
+
+
+def test_several_steps_need_a_discount():
+    with pytest.raises(ValueError, match="n_step must be 1 where gamma is 0, got 3"):
+        Dqn(gamma=0.0, n_step=3)
+
+
+@pytest.mark.parametrize("algorithm", [Sac, Ddpg])
+def test_targets_of_actors_and_critics_discount_by_the_steps_too(make_small_env, algorithm):
+    env = make_small_env(1)
+    learner = algorithm(gamma=0.9, warm_up=1, capacity=3, minibatch_size=3, n_step=2).build(env, SMALL, 3)
+    data = three_transitions(env, learner)
+    value = torch.ones(3, 2, 1)
+    target = learner.loss.value_estimator.value_estimate(data, next_value=value)
+    wanted = data["next", *REWARD] + torch.tensor([0.81, 0.9, 0.0]).view(3, 1, 1)
+    torch.testing.assert_close(target, wanted)
 
 
 def test_what_follows_several_steps_is_seen_later(make_small_env):

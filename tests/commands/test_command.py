@@ -573,6 +573,8 @@ MISTAKES = [
     (("train.py", "resume=nowhere"), 4, "nowhere is not a run folder"),
     (("evaluate.py",), 2, "give either checkpoint=PATH or policy=NAME"),
     (("evaluate.py", "policy=genius"), 2, "policy must be one of"),
+    (("train.py", "algorithm.epochz=3", "--cfg", "job"), 2, "did you mean algorithm.epochs?"),
+    (("train.py", "seeed=3", "--cfg", "job", "-p", "algorithm"), 2, "did you mean seed?"),
     (("evaluate.py", "policy=gredy"), 2, "did you mean greedy?"),
     (("train.py", "--total_frames", "1000"), 2, "keys are given as total_frames=1000"),
     (("train.py", "total_frames", "1000"), 2, "keys are given as total_frames=1000"),

@@ -54,7 +54,8 @@ class OffPolicy(Algorithm):
             fewer where an episode or a batch of the collector ends.
 
     Raises:
-        ValueError: If a value is out of its range, or prioritised replay does not work here.
+        ValueError: If a value is out of its range, ``n_step`` is above 1 where ``gamma`` is 0, or prioritised replay
+            does not work here.
     """
 
     learning_rate: float = 5e-4
@@ -76,6 +77,8 @@ class OffPolicy(Algorithm):
         super().check(**own, target_interval=(0, 10**9), tau=(1e-6, 1.0), **ranges)
         if self.warm_up > self.capacity:
             raise ValueError(f"warm_up must be at most capacity, {self.capacity}, got {self.warm_up}")
+        if self.n_step > 1 and self.gamma == 0.0:
+            raise ValueError(f"n_step must be 1 where gamma is 0, got {self.n_step}")
         if self.replay == "prioritised":
             check_prioritised()
 

@@ -182,8 +182,7 @@ def _run(name: str, job: Callable[[DictConfig], None]) -> None:
             else:
                 _start_hydra(name, job, arguments, debug)
         except HYDRA_ERRORS as error:
-            overrides = [each for each in arguments if not each.startswith("-")]
-            sys.exit(fail(explain(error, name, overrides), debug)[0])
+            sys.exit(fail(explain(error, name, _overrides(arguments)), debug)[0])
         except Exception as error:
             sys.exit(fail(error, debug)[0])
         sys.exit(SweepSummary.exit_code)
@@ -218,6 +217,11 @@ def _check_grammar(arguments: Sequence[str]) -> None:
         raise ConfigError("--multirun must be left out under torchrun: its processes train one run together")
     if all(each in _MULTIRUN for each in arguments if each.startswith("-")):  # others may have arguments of their own
         check_overrides([each for each in arguments if not each.startswith("-")])
+
+
+def _overrides(arguments: Sequence[str]) -> list[str]:
+    """Return what changes the configuration: neither flags nor what they are told, as ``job`` in ``--cfg job``."""
+    return [each for each in arguments if not each.startswith("-") and ("=" in each or each.startswith("~"))]
 
 
 def _without_folder(arguments: Sequence[str]) -> list[str]:
