@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from warp_torchrl.config.compose import SavedConfig
+from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.gallery import curves
 from warp_torchrl.gallery.__main__ import main
 from warp_torchrl.gallery.curves import (

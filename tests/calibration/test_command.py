@@ -9,8 +9,9 @@ import yaml
 from warp_torchrl.calibration.case import read_case
 from warp_torchrl.commands.calibrate import main
 from warp_torchrl.commands.failure import DONE, MISTAKE
-from warp_torchrl.config.compose import SavedConfig, option_of, plain, restore
+from warp_torchrl.config.compose import option_of, plain
 from warp_torchrl.config.construction import ConfigError, build
+from warp_torchrl.config.saved_config import SavedConfig, restore
 
 rasterio = pytest.importorskip("rasterio", reason="rasters need the extra gis")
 

@@ -9,9 +9,10 @@ from torch.nn.functional import cross_entropy
 from torchrl.objectives import BCLoss
 
 from warp_torchrl.collection.kickstarting import TEACHERS, Kickstarting
-from warp_torchrl.config.compose import SavedConfig, compose_config, plain
+from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.run_config import run_config
+from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.evaluation.method import method
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, TEACHER_ACTION, over_canonical

@@ -2,7 +2,8 @@
 
 import pytest
 
-from warp_torchrl.config.compose import SavedConfig, compose_config, plain
+from warp_torchrl.config.compose import compose_config, plain
+from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.evaluation.method import method
 
 

@@ -12,18 +12,11 @@ from omegaconf import OmegaConf
 from torch._inductor.exc import InvalidCxxCompiler
 
 from warp_torchrl.api import make_env
-from warp_torchrl.config.compose import (
-    SavedConfig,
-    compose_config,
-    conf_folder,
-    plain,
-    restore,
-    without_targets,
-    world_overrides,
-)
+from warp_torchrl.config.compose import compose_config, conf_folder, plain, without_targets
 from warp_torchrl.config.construction import ConfigError, build, component
 from warp_torchrl.config.defaults import defaults
 from warp_torchrl.config.run_config import COMPONENTS, RunConfig, run_config
+from warp_torchrl.config.saved_config import SavedConfig, restore, world_overrides
 from warp_torchrl.world.gridded import Gridded
 from warp_torchrl.world.ignition_file import IgnitionFile
 from warp_torchrl.world.terrain.array import Array

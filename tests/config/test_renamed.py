@@ -7,8 +7,9 @@ import shutil
 import pytest
 
 from tests.test_golden import GOLDEN
-from warp_torchrl.config.compose import compose_config, plain, restore
+from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.renamed import RENAMED, renamed_overrides, renamed_values
+from warp_torchrl.config.saved_config import restore
 from warp_torchrl.runs.checkpoint import newest
 from warp_torchrl.runs.resumption import read_config
 from warp_torchrl.runs.shipped import find_policy

@@ -12,8 +12,9 @@ import pytest
 import torch
 
 from warp_torchrl.api import policy_of
-from warp_torchrl.config.compose import SavedConfig, compose_config, conf_folder, plain, without_targets
+from warp_torchrl.config.compose import compose_config, conf_folder, plain, without_targets
 from warp_torchrl.config.run_config import run_config
+from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.models import ACTION
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.checkpoint import CheckpointError, newest

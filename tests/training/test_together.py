@@ -15,9 +15,10 @@ import torch
 
 from tests.stress.processes import ROOT, TINY, alive, finish, rows, start, wait_for
 from tests.training.test_loop import flattened
-from warp_torchrl.config.compose import SavedConfig, compose_config, plain, restore
+from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.run_config import run_config
+from warp_torchrl.config.saved_config import SavedConfig, restore
 from warp_torchrl.runs.checkpoint import newest
 
 LENGTH = ("processes=2", "total_frames=256", "checkpoint.interval=64", "checkpoint.keep=9")

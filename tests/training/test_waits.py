@@ -4,8 +4,9 @@ import pytest
 import torch
 
 from warp_torchrl.benchmark.waits import counted_waits
-from warp_torchrl.config.compose import SavedConfig, compose_config, plain
+from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.run_config import run_config
+from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.device import unread
 from warp_torchrl.training.loop import Training
 

@@ -13,9 +13,10 @@ from omegaconf import DictConfig, OmegaConf
 
 from warp_torchrl.commands.failure import fail
 from warp_torchrl.commands.sweep import jobs
-from warp_torchrl.config.compose import HYDRA_ERRORS, check_choices, explain, plain, restore
+from warp_torchrl.config.compose import HYDRA_ERRORS, check_choices, explain, plain
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.run_config import RunConfig, run_config
+from warp_torchrl.config.saved_config import restore
 from warp_torchrl.config.seeds import BEYOND_EVALUATION
 from warp_torchrl.evaluation.evaluate import check_policy
 from warp_torchrl.heuristics import HEURISTICS

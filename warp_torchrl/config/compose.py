@@ -1,4 +1,4 @@
-"""Configuration: composes the yaml files of ``conf/``, and lays out what run folders keep of it.
+"""Configuration: composes the yaml files of ``conf/``.
 
 A component's types, defaults and rules stand in its dataclass and nowhere else. The yaml files name the class, always
 one of this package's own; nothing that is read from a run folder is ever instantiated by name.
@@ -8,7 +8,7 @@ import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, field, fields
+from dataclasses import fields
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, cast
@@ -23,7 +23,7 @@ from warp_torchrl.config.construction import ConfigError, UnknownKeyError, compo
 from warp_torchrl.config.defaults import defaults
 from warp_torchrl.config.grammar import check_overrides, several_values
 from warp_torchrl.config.renamed import renamed_overrides
-from warp_torchrl.config.run_config import COMPONENTS, WORLD_KEYS
+from warp_torchrl.config.run_config import COMPONENTS
 from warp_torchrl.nearest import did_you_mean
 
 OmegaConf.register_new_resolver("pid", os.getpid, replace=True, use_cache=True)  # a sweep's jobs get its own process's
@@ -31,6 +31,8 @@ HYDRA_ERRORS = (HydraException, OmegaConfBaseException)
 """What Hydra raises where a configuration has a mistake."""
 GROUPS = ("scenario", "experiment")
 """Groups whose options are no classes."""
+OPTION = re.compile(r"[A-Za-z0-9_]+")
+"""What an option may be called."""
 
 
 def conf_folder() -> Path:
@@ -74,7 +76,7 @@ def check_choices(overrides: Sequence[str]) -> None:
     """
     for override in overrides:
         group, _, option = override.partition("=")
-        if group in (*COMPONENTS, "scenario") and not _OPTION.fullmatch(option.strip("'\"")):
+        if group in (*COMPONENTS, "scenario") and not OPTION.fullmatch(option.strip("'\"")):
             several = "; -m sweeps over several" if "," in option else ""
             raise ConfigError(f"{group} must be one of the files of conf/{group}, got {option}{several}")
 
@@ -188,33 +190,6 @@ def option_of(group: str, target: str) -> str:
     raise ConfigError(f"{group}._target_ must be a class that an option of conf/{group} names, got {target}")
 
 
-# What is written into a run folder, and read back
-
-_OPTION = re.compile(r"[A-Za-z0-9_]+")
-_BEFORE = {
-    "model.symmetry": "none",
-    "processes": 1,
-    "collector.grows_at": 0.0,
-    "observation.identity": False,
-    "observation.centred": False,
-    "algorithm.logit_penalty": 0.0,
-}
-"""What runs did whose record has none of a key yet."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class SavedConfig:
-    """A configuration as a run folder keeps it: which option each group had, and every value.
-
-    Attributes:
-        choices: Option by group.
-        values: Resolved values, without the names of classes.
-    """
-
-    choices: dict[str, str] = field(default_factory=dict)
-    values: dict[str, Any] = field(default_factory=dict)
-
-
 def plain(config: DictConfig) -> dict[str, Any]:
     """Return a configuration as plain, resolved values."""
     return cast("dict[str, Any]", OmegaConf.to_container(config, resolve=True))
@@ -227,76 +202,6 @@ def without_targets(node: Any) -> Any:
     return list(node) if isinstance(node, list) else node
 
 
-def world_overrides(values: Mapping[str, Any]) -> list[str]:
-    """Return how a configuration's worlds differ from those of its scenario, as overrides; files are not named.
-
-    Args:
-        values: Plain, with ``_target_``.
-    """
-    choices = [f"scenario={values['scenario']}"]
-    usual = _composed_worlds(choices)
-    for group, parts in values.items():
-        if group in usual and isinstance(parts, Mapping) and parts.get("_target_") != usual[group].get("_target_"):
-            options = (f"{group}={path.stem}" for path in sorted((conf_folder() / group).glob("*.yaml")))
-            of_its_class = (
-                each for each in options if _composed_worlds([*choices, each])[group]["_target_"] == parts["_target_"]
-            )
-            choices.append(next(of_its_class))
-            usual = _composed_worlds(choices)
-    usual = dict(_leaves(usual))
-    changed = [
-        f"{path}={value}".replace(" ", "")
-        for path, value in _leaves({key: values[key] for key in WORLD_KEYS if key in values})
-        if (path not in usual or usual[path] != value) and not path.endswith(".path")
-    ]
-    return choices[1:] + changed
-
-
-def _composed_worlds(choices: Sequence[str]) -> dict[str, Any]:
-    composed = plain(_compose("train", choices))
-    return {key: composed[key] for key in WORLD_KEYS}
-
-
-def restore(record: SavedConfig, overrides: Sequence[str] = ()) -> DictConfig:
-    """Compose the configuration of a record anew from this package's own files, and lay its values over it.
-
-    Classes come from our yaml files alone. Values that an override touches are the override's; an override of
-    ``scenario`` takes the whole world from that scenario.
-
-    Args:
-        record: From a run folder: not trusted.
-        overrides: In Hydra's grammar.
-
-    Raises:
-        ConfigError: If a choice or a value does not fit.
-    """
-    for group, option in record.choices.items():
-        if group not in (*COMPONENTS, "scenario") or not _OPTION.fullmatch(str(option)):
-            raise ConfigError(f"{group}={option!r} in the run folder is not one of our options")
-    touched = [override.split("=", 1)[0].lstrip("+~") for override in overrides]
-    if "scenario" in touched:
-        touched += WORLD_KEYS
-    choices = [f"{group}={option}" for group, option in record.choices.items() if group not in touched]
-    config = compose_config("train", [*choices, *overrides])
-    recorded = dict(_leaves(record.values))
-    groups = {*record.values, "processes"}
-    before = {
-        key: value
-        for key, value in _BEFORE.items()
-        if key.split(".")[0] in groups and OmegaConf.select(config, key) is not None
-    }
-    for path, value in {**before, **recorded}.items():
-        if "${" in str(value):  # what is recorded was resolved: this one was put there to read what is ours
-            raise ConfigError(f"{path} in the run folder must be a plain value, got {value!r}")
-        if any(path == key or path.startswith(f"{key}.") for key in touched):
-            continue
-        try:
-            OmegaConf.update(config, path, value, merge=False, force_add=path.count(".") > 1)  # into a field's mapping
-        except OmegaConfBaseException:
-            raise ConfigError(f"{path} in the run folder is not a key of this version's configuration") from None
-    return config
-
-
 def _keys(node: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
     """Yield the keys of a configuration, those of groups included."""
     for key, value in node.items():
@@ -304,11 +209,3 @@ def _keys(node: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
             yield f"{prefix}{key}"
         if isinstance(value, Mapping):
             yield from _keys(value, f"{prefix}{key}.")
-
-
-def _leaves(node: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
-    found = []
-    for key, value in node.items():
-        path = f"{prefix}{key}"
-        found += _leaves(value, f"{path}.") if isinstance(value, Mapping) else [(path, value)]
-    return found

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from warp_torchrl.config.compose import SavedConfig
+from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.evaluation.method import method, teacher_label, unusual
 from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError, newest
 

@@ -14,8 +14,8 @@ from typing import Any
 
 import torch
 
-from warp_torchrl.config.compose import SavedConfig
 from warp_torchrl.config.renamed import renamed_values
+from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.models import Signature
 from warp_torchrl.runs import disk
 from warp_torchrl.runs.manifest import (

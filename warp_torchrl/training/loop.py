@@ -15,8 +15,8 @@ from tensordict import TensorDictBase
 from tqdm import tqdm
 
 from warp_torchrl import parallel
-from warp_torchrl.config.compose import SavedConfig
 from warp_torchrl.config.run_config import RunConfig
+from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.config.seeds import WORLDS, first_world_seed
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.models import signature

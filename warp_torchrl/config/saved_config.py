@@ -1,0 +1,116 @@
+"""What run folders keep of a configuration, and how it is composed anew from that.
+
+What is read from a run folder is plain values: classes come from this package's own files alone.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from warp_torchrl.config.compose import OPTION, compose_config, conf_folder, plain
+from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.config.run_config import COMPONENTS, WORLD_KEYS
+
+_BEFORE = {
+    "model.symmetry": "none",
+    "processes": 1,
+    "collector.grows_at": 0.0,
+    "observation.identity": False,
+    "observation.centred": False,
+    "algorithm.logit_penalty": 0.0,
+}
+"""What runs did whose record has none of a key yet."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SavedConfig:
+    """A configuration as a run folder keeps it: which option each group had, and every value.
+
+    Attributes:
+        choices: Option by group.
+        values: Resolved values, without the names of classes.
+    """
+
+    choices: dict[str, str] = field(default_factory=dict)
+    values: dict[str, Any] = field(default_factory=dict)
+
+
+def restore(record: SavedConfig, overrides: Sequence[str] = ()) -> DictConfig:
+    """Compose the configuration of a record anew from this package's own files, and lay its values over it.
+
+    Classes come from our yaml files alone. Values that an override touches are the override's; an override of
+    ``scenario`` takes the whole world from that scenario.
+
+    Args:
+        record: From a run folder: not trusted.
+        overrides: In Hydra's grammar.
+
+    Raises:
+        ConfigError: If a choice or a value does not fit.
+    """
+    for group, option in record.choices.items():
+        if group not in (*COMPONENTS, "scenario") or not OPTION.fullmatch(str(option)):
+            raise ConfigError(f"{group}={option!r} in the run folder is not one of our options")
+    touched = [override.split("=", 1)[0].lstrip("+~") for override in overrides]
+    if "scenario" in touched:
+        touched += WORLD_KEYS
+    choices = [f"{group}={option}" for group, option in record.choices.items() if group not in touched]
+    config = compose_config("train", [*choices, *overrides])
+    recorded = dict(_leaves(record.values))
+    groups = {*record.values, "processes"}
+    before = {
+        key: value
+        for key, value in _BEFORE.items()
+        if key.split(".")[0] in groups and OmegaConf.select(config, key) is not None
+    }
+    for path, value in {**before, **recorded}.items():
+        if "${" in str(value):  # what is recorded was resolved: this one was put there to read what is ours
+            raise ConfigError(f"{path} in the run folder must be a plain value, got {value!r}")
+        if any(path == key or path.startswith(f"{key}.") for key in touched):
+            continue
+        try:
+            OmegaConf.update(config, path, value, merge=False, force_add=path.count(".") > 1)  # into a field's mapping
+        except OmegaConfBaseException:
+            raise ConfigError(f"{path} in the run folder is not a key of this version's configuration") from None
+    return config
+
+
+def world_overrides(values: Mapping[str, Any]) -> list[str]:
+    """Return how a configuration's worlds differ from those of its scenario, as overrides; files are not named.
+
+    Args:
+        values: Plain, with ``_target_``.
+    """
+    choices = [f"scenario={values['scenario']}"]
+    usual = _composed_worlds(choices)
+    for group, parts in values.items():
+        if group in usual and isinstance(parts, Mapping) and parts.get("_target_") != usual[group].get("_target_"):
+            options = (f"{group}={path.stem}" for path in sorted((conf_folder() / group).glob("*.yaml")))
+            of_its_class = (
+                each for each in options if _composed_worlds([*choices, each])[group]["_target_"] == parts["_target_"]
+            )
+            choices.append(next(of_its_class))
+            usual = _composed_worlds(choices)
+    usual = dict(_leaves(usual))
+    changed = [
+        f"{path}={value}".replace(" ", "")
+        for path, value in _leaves({key: values[key] for key in WORLD_KEYS if key in values})
+        if (path not in usual or usual[path] != value) and not path.endswith(".path")
+    ]
+    return choices[1:] + changed
+
+
+def _composed_worlds(choices: Sequence[str]) -> dict[str, Any]:
+    composed = plain(compose_config("train", choices))
+    return {key: composed[key] for key in WORLD_KEYS}
+
+
+def _leaves(node: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
+    found = []
+    for key, value in node.items():
+        path = f"{prefix}{key}"
+        found += _leaves(value, f"{path}.") if isinstance(value, Mapping) else [(path, value)]
+    return found
