@@ -85,6 +85,10 @@ class Automaton(ABC):
         """Return worlds at their start, whose cells are lit, with what the automaton keeps of its own."""
         return state
 
+    def lit(self, state: WorldState, where: Tensor) -> WorldState:
+        """Return worlds in which cells, bool [B, H, W], were set alight now, with what the automaton keeps of them."""
+        return state
+
     def aged(self, landscape: Landscape, key: Tensor) -> Landscape:
         """Return landscapes whose trees have the ages of this automaton, in 0..S_max.
 

@@ -168,6 +168,12 @@ class RateFire(Automaton):
         minutes = torch.where(burning, 0.0, NEVER)
         return state.replace(arrivals=Arrivals(minutes, torch.where(burning, _own_cell(state.cells), NOWHERE)))
 
+    def lit(self, state: WorldState, where: Tensor) -> WorldState:
+        """Return worlds whose fires have reached these cells, bool [B, H, W], now, each from itself."""
+        kept = _of(state)
+        minutes = torch.where(where, self._now(state), kept.minutes)
+        return state.replace(arrivals=Arrivals(minutes, torch.where(where, _own_cell(state.cells), kept.origin)))
+
     def in_air(self, state: WorldState, air: Air) -> WorldState:
         """Return worlds in another air: the fire has gone as far as it has, and goes on at the new rates.
 

@@ -1,0 +1,187 @@
+"""A match: one fire, played step by step by one policy or two, and beside them the same fire without a team.
+
+All sides have the same seed. Every draw of a world is a function of seed, episode, tick and cell, so the fires differ
+by what the teams do, and by nothing else.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.config.run_config import ENVIRONMENT, build_components
+from warp_torchrl.env import WildfireEnv
+from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.live.crew import Question, Refused
+from warp_torchrl.live.player import Found, Player
+from warp_torchrl.live.side import Side
+from warp_torchrl.validation import check_fields
+from warp_torchrl.world.intervention import can_be_lit, cleared, ignited
+from warp_torchrl.world.state import WorldState, is_tree
+from warp_torchrl.world.wind import constant_wind
+from warp_torchrl.world.world import World, in_wind
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """What a match is of.
+
+    Attributes:
+        policy: A baseline, a shipped policy, a run folder or a checkpoint folder.
+        beside: Another one that plays the same fire; None plays one side.
+        seed: Of the fire.
+        overrides: Of the scenario, in the command line's grammar; a trained policy plays without any in the scenario of
+            its training.
+
+    Raises:
+        ValueError: If a value is out of its range.
+    """
+
+    policy: str = "default"
+    beside: str | None = None
+    seed: int = 0
+    overrides: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_fields(self, seed=(0, 2**62 - 1))
+
+
+class Match:
+    """A fire and those who fight it.
+
+    Args:
+        setting: What it is of.
+
+    Raises:
+        ConfigError: If a policy is unknown or does not fit, or an override is wrong.
+        CheckpointError: If a run folder holds no sound checkpoint.
+    """
+
+    def __init__(self, setting: Setting) -> None:
+        self.setting = setting
+        found = [Found(name) for name in (setting.policy, setting.beside) if name is not None]
+        config = found[0].config(setting.overrides)
+        self.scenario: str = config["scenario"]
+        parts = build_components(config, ENVIRONMENT)
+        self.world: World = parts["world"]
+        self.sides: list[Side] = []
+        for each in found:
+            # Each sees what it was trained to see, in the first one's world.
+            seen = parts if each is found[0] else build_components(each.config(setting.overrides), ENVIRONMENT)
+            env = WildfireEnv(self.world, observation=seen["observation"], reward=parts["reward"], seed=setting.seed)
+            env.reset()
+            self.sides.append(Side(env, each.player(env, setting.seed)))
+        alone = WildfireEnv(self.world, observation=parts["observation"], reward=parts["reward"], seed=setting.seed)
+        self.alone = Side(alone, Player("without a team", HEURISTICS["noop"](alone), "sampled", setting.seed))
+        self.restart()
+
+    @property
+    def everywhere(self) -> Sequence[Side]:
+        """Return the sides, and the fire without a team."""
+        return [*self.sides, self.alone]
+
+    @property
+    def ended(self) -> bool:
+        """Return whether the episode is over on all sides; the fire without a team goes on as long as one does."""
+        return all(side.ended for side in self.sides)
+
+    def restart(self, seed: int | None = None) -> None:
+        """Start the episode anew, or that of another seed.
+
+        Raises:
+            ValueError: If the seed is out of range.
+        """
+        if seed is not None:
+            self.setting = replace(self.setting, seed=seed)
+        for side in self.everywhere:
+            side.restart(self.setting.seed)
+
+    def questions(self) -> list[Question]:
+        """Return the acts of the first side that wait for a person's word before the next step."""
+        return self.sides[0].questions()
+
+    def step(self) -> list[str]:
+        """Advance all sides by one step, unless a question is open.
+
+        Returns:
+            A line for each act of a person that was refused.
+        """
+        if self.questions() or self.ended:
+            return []
+        told = []
+        for side in self.everywhere:
+            side.questions()
+            told += side.step()
+        return told
+
+    def follow(self) -> list[str]:
+        """Let policies of runs that go on training have their newest weights; return what there is to tell."""
+        told = (side.player.follow(side.env) for side in self.sides)
+        return [line for line in told if line is not None]
+
+    # What people do to the world
+
+    def blow(self, speed: float, direction: float) -> None:
+        """Hold one wind over the whole map, on all sides, until the next start.
+
+        Args:
+            speed: In 0..60 [m/s].
+            direction: Where the air goes, degrees from east, counter-clockwise.
+
+        Raises:
+            ValueError: If the speed is out of its range.
+        """
+        turn = math.radians(direction)
+        u, v = speed * math.cos(turn), speed * math.sin(turn)
+        world = replace(self.world, wind=constant_wind(u, v))
+        field = torch.tensor([u, v]).view(1, 2, 1, 1)
+        for side in self.everywhere:
+            side.env.world = world
+            side.enter(in_wind(side.state, world.fire, field))
+
+    def ignite(self, row: int, column: int) -> None:
+        """Light a cell, on every side where it can burn.
+
+        Raises:
+            Refused: If it can burn on none, or the time is up.
+        """
+        self._check_time()
+        here = self._cell(row, column)
+        where = [bool((can_be_lit(side.state, self.world.fire) & here).any()) for side in self.everywhere]
+        if not any(where):
+            raise Refused(f"cell {row}, {column} holds no dry tree that can burn")
+        for side in self.everywhere:
+            side.enter(ignited(side.state, self.world.fire, here))
+
+    def clear(self, row: int, column: int) -> None:
+        """Cut a firebreak into a cell, on every side where it holds a tree that does not burn.
+
+        Raises:
+            Refused: If none holds one, or the time is up.
+        """
+        self._check_time()
+        here = self._cell(row, column)
+        if not any(bool((is_tree(side.state.cells) & here).any()) for side in self.everywhere):
+            raise Refused(f"cell {row}, {column} holds no tree to clear")
+        for side in self.everywhere:
+            side.enter(cleared(side.state, here))
+
+    def _check_time(self) -> None:
+        if bool(self.sides[0].state.truncated[0]):
+            raise Refused("the episode is over: start it anew")
+
+    def _cell(self, row: int, column: int) -> Tensor:
+        """Return where a cell is, bool [1, H, W].
+
+        Raises:
+            Refused: If it is not on the map.
+        """
+        state: WorldState = self.alone.state
+        height, width = state.cells.shape[1:]
+        if not (0 <= row < height and 0 <= column < width):
+            raise Refused(f"cell {row}, {column} is not on the map of {height} x {width} cells")
+        here = torch.zeros_like(state.cells, dtype=torch.bool)
+        here[:, row, column] = True
+        return here

@@ -1,0 +1,117 @@
+"""One team on a fire, or the fire without a team: an environment of one world, who acts in it, and its curves."""
+
+from dataclasses import dataclass, field
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.env import WildfireEnv
+from warp_torchrl.live.crew import Crew, Question
+from warp_torchrl.live.player import Player
+from warp_torchrl.models import ACTION, ACTION_MASK
+from warp_torchrl.world.state import Transition, WorldState
+
+
+@dataclass
+class Curves:
+    """What became of an episode, a number for its start and one for each step since.
+
+    Attributes:
+        saved: Share of the initial trees that stand, in 0..1.
+        burning: Share that burns, in 0..1.
+        extinguished: Fires put out by each vehicle so far, int64 [A].
+        cleared: Cells cleared by each vehicle so far, int64 [A].
+    """
+
+    saved: list[float] = field(default_factory=list)
+    burning: list[float] = field(default_factory=list)
+    extinguished: Tensor = field(default_factory=lambda: torch.zeros(0, dtype=torch.int64))
+    cleared: Tensor = field(default_factory=lambda: torch.zeros(0, dtype=torch.int64))
+
+
+class Side:
+    """A team on a fire.
+
+    A step has two parts: ``questions`` lets the policy propose its actions, once, and ``step`` does them.
+
+    Args:
+        env: Of one world.
+        player: Its policy.
+    """
+
+    def __init__(self, env: WildfireEnv, player: Player) -> None:
+        self.env, self.player, self.crew = env, player, Crew(env.world.team)
+        self.world = env.world
+        env.watcher = self._count
+        self.chances: Tensor | None = None
+        """Probability of each action at the last proposal, float32 [A, actions]; None of a policy that has none."""
+
+    @property
+    def state(self) -> WorldState:
+        """Return the world as it is, batch size [1]."""
+        return self.env.world_state
+
+    @property
+    def ended(self) -> bool:
+        """Return whether the episode is over."""
+        return bool(self.state.done[0])
+
+    @property
+    def possible(self) -> Tensor:
+        """Return which actions would do something, bool [A, actions]."""
+        return self.env.world.possible_actions(self.state)[0]
+
+    @property
+    def mask(self) -> Tensor:
+        """Return the mask under which the policy chooses, orders included, bool [A, actions]."""
+        return self.crew.mask(self.shown[ACTION_MASK][0], self.state.vehicles.position[0])
+
+    def restart(self, seed: int) -> None:
+        """Start the episode of a seed, in the scenario's own wind."""
+        self.env.world = self.world
+        self.env.set_seeds([seed])
+        self.shown = self.env.reset()
+        agents = self.env.n_agents
+        self.curves = Curves(
+            extinguished=torch.zeros(agents, dtype=torch.int64), cleared=torch.zeros(agents, dtype=torch.int64)
+        )
+        self.crew.restart()
+        self.player.restart(seed)
+        self._proposed: Tensor | None = None
+        self._note()
+
+    def questions(self) -> list[Question]:
+        """Return the acts of the next step that wait for a person's word; none where the episode is over."""
+        if self.ended:
+            return []
+        if self._proposed is None:
+            self._proposed, self.chances = self.player.act(self.shown.copy().set(ACTION_MASK, self.mask[None]))
+        return self.crew.questions(self._proposed)
+
+    def step(self) -> list[str]:
+        """Do the step that ``questions`` proposed; return a line for each act of a person that was refused."""
+        if self.ended or self._proposed is None:
+            return []
+        position = self.state.vehicles.position[0]
+        action, told = self.crew.decide(self._proposed, self.mask, self.possible, position)
+        self._proposed = None
+        self.shown = self.env.step(self.shown.set(ACTION, action[None]))["next"]
+        self._note()
+        return told
+
+    def enter(self, state: WorldState) -> None:
+        """Go on from another state of the world: what people did to it."""
+        self.shown = self.env.set_state(state)
+        self._proposed = None
+        self.curves.saved.pop()
+        self.curves.burning.pop()
+        self._note()
+
+    def _note(self) -> None:
+        counts = self.env.tree_counts
+        self.curves.saved.append(float(counts.saved()[0]))
+        self.curves.burning.append(float(counts.burning[0] / counts.initial[0]))
+
+    def _count(self, transition: Transition) -> None:
+        self.curves.extinguished += transition.result.extinguished[0]
+        self.curves.cleared += transition.result.cleared[0]
