@@ -55,6 +55,17 @@ def render(state: WorldState, flies: Tensor | None, scale: int = 12) -> Tensor:
     return _stamp(image, state.vehicles.position * scale + scale // 2, flies.to(torch.int64), scale)
 
 
+def fire_colours() -> Tensor:
+    """Return the colours of the burning stages, the first one first, uint8 [5, 3]."""
+    return torch.tensor(_FIRE, dtype=torch.uint8)
+
+
+def legend_colours() -> dict[str, tuple[int, int, int]]:
+    """Return a colour of each thing that is drawn on a map, by its name."""
+    covers = {cover.name.lower(): _GROUND[cover][-1] for cover in Cover}
+    return {**covers, "fire": _FIRE[2], "ember": _FIRE[4], "ash": _ASH, "firebreak": _FIREBREAK, "wet": _WATER}
+
+
 class EpisodeRecorder:
     """Collects an episode frame by frame: the map, and beside it the numbers, the wind and a legend.
 

@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.config.run_config import ENVIRONMENT, build_components
+from warp_torchrl.config.seeds import FIRST_EVALUATED
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.live.crew import Question, Refused
@@ -19,7 +20,7 @@ from warp_torchrl.live.player import Found, Player
 from warp_torchrl.live.side import Side
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.intervention import can_be_lit, cleared, ignited
-from warp_torchrl.world.state import WorldState, is_tree
+from warp_torchrl.world.state import is_tree
 from warp_torchrl.world.wind import constant_wind
 from warp_torchrl.world.world import World, in_wind
 
@@ -31,7 +32,7 @@ class Setting:
     Attributes:
         policy: A baseline, a shipped policy, a run folder or a checkpoint folder.
         beside: Another one that plays the same fire; None plays one side.
-        seed: Of the fire.
+        seed: Of the fire; the default is the first that evaluations have.
         overrides: Of the scenario, in the command line's grammar; a trained policy plays without any in the scenario of
             its training.
 
@@ -41,7 +42,7 @@ class Setting:
 
     policy: str = "default"
     beside: str | None = None
-    seed: int = 0
+    seed: int = FIRST_EVALUATED
     overrides: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -84,8 +85,8 @@ class Match:
 
     @property
     def ended(self) -> bool:
-        """Return whether the episode is over on all sides; the fire without a team goes on as long as one does."""
-        return all(side.ended for side in self.sides)
+        """Return whether the episode is over on all sides, and without a team."""
+        return all(side.ended for side in self.everywhere)
 
     def restart(self, seed: int | None = None) -> None:
         """Start the episode anew, or that of another seed.
@@ -172,16 +173,23 @@ class Match:
         if bool(self.sides[0].state.truncated[0]):
             raise Refused("the episode is over: start it anew")
 
+    def check_cell(self, row: int, column: int) -> None:
+        """Check that a cell is on the map.
+
+        Raises:
+            Refused: If it is not.
+        """
+        height, width = self.world.size
+        if not (0 <= row < height and 0 <= column < width):
+            raise Refused(f"cell {row}, {column} is not on the map of {height} x {width} cells")
+
     def _cell(self, row: int, column: int) -> Tensor:
         """Return where a cell is, bool [1, H, W].
 
         Raises:
             Refused: If it is not on the map.
         """
-        state: WorldState = self.alone.state
-        height, width = state.cells.shape[1:]
-        if not (0 <= row < height and 0 <= column < width):
-            raise Refused(f"cell {row}, {column} is not on the map of {height} x {width} cells")
-        here = torch.zeros_like(state.cells, dtype=torch.bool)
+        self.check_cell(row, column)
+        here = torch.zeros_like(self.alone.state.cells, dtype=torch.bool)
         here[:, row, column] = True
         return here

@@ -7,8 +7,10 @@ from torch import Tensor
 
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.live.crew import Crew, Question
+from warp_torchrl.live.order import Order
 from warp_torchrl.live.player import Player
 from warp_torchrl.models import ACTION, ACTION_MASK
+from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.state import Transition, WorldState
 
 
@@ -72,6 +74,8 @@ class Side:
         self.env.set_seeds([seed])
         self.shown = self.env.reset()
         agents = self.env.n_agents
+        self.facing = torch.full((agents,), -1)
+        """Direction of each vehicle's last move, 0..7 clockwise from north; -1 before the first, int64 [A]."""
         self.curves = Curves(
             extinguished=torch.zeros(agents, dtype=torch.int64), cleared=torch.zeros(agents, dtype=torch.int64)
         )
@@ -99,6 +103,15 @@ class Side:
         self._note()
         return told
 
+    def order(self, agent: int, order: Order | None) -> None:
+        """Send a vehicle to a sector, or set it free: what the policy had proposed under the former order is forgotten.
+
+        Raises:
+            Refused: If a person drives it.
+        """
+        self.crew.order(agent, order)
+        self._proposed = None
+
     def enter(self, state: WorldState) -> None:
         """Go on from another state of the world: what people did to it."""
         self.shown = self.env.set_state(state)
@@ -113,5 +126,7 @@ class Side:
         self.curves.burning.append(float(counts.burning[0] / counts.initial[0]))
 
     def _count(self, transition: Transition) -> None:
+        moves = transition.result.moved[0] & (transition.result.action[0] < len(DIRECTIONS))
+        self.facing = torch.where(moves, transition.result.action[0], self.facing)
         self.curves.extinguished += transition.result.extinguished[0]
         self.curves.cleared += transition.result.cleared[0]

@@ -1,0 +1,308 @@
+"""A world as the arrays of a picture in three dimensions; no loop over cells, and nothing of a browser.
+
+One cell is one unit: x is east, y is north, z is up, and the middle of the map is at the origin. Heights are drawn twice
+as large as they are.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn.functional import avg_pool2d, pad
+
+from warp_torchrl.env.render import fire_colours, render
+from warp_torchrl.live.shapes import Shape
+from warp_torchrl.world.geometry import unit_vectors
+from warp_torchrl.world.state import FIRST_FIRE, Cover, WorldState, is_burning, is_tree
+
+EXAGGERATION = 2.0
+"""Of heights."""
+MOST_TREES = 128 * 128
+"""Cells of a map beyond which trees are colours of the ground, and no trees of their own."""
+VEHICLE_COLOURS = np.array(  # Okabe and Ito 2008, on the dark sides of a vehicle; then again from the first
+    [(255, 255, 255), (230, 159, 0), (86, 180, 233), (240, 228, 66), (204, 121, 167), (0, 158, 115), (213, 94, 0),
+     (0, 114, 178)],
+    dtype=np.uint8,
+)  # fmt: skip
+"""Of the vehicles, by their index, uint8 [8, 3]."""
+_FLIGHT = 3.0  # height of aircraft over the ground [cells]
+_WIND_ARROWS = 5  # along each side of the map
+_SHADE = 0.82  # of the ground under trees
+
+
+@dataclass(frozen=True)
+class Instances:
+    """Copies of one shape.
+
+    Attributes:
+        position: Of each, float32 [n, 3] [cells].
+        turn: Of each, unit quaternion w, x, y, z, float32 [n, 4].
+        scale: Of each, along x, y and z, float32 [n, 3].
+        colour: Of each, uint8 [n, 3].
+    """
+
+    position: np.ndarray
+    turn: np.ndarray
+    scale: np.ndarray
+    colour: np.ndarray
+
+
+@dataclass(frozen=True)
+class Ground:
+    """What stays as it is for an episode.
+
+    Attributes:
+        height: Of each cell's middle, float32 [H, W] [cells].
+        block: The ground as one closed body, under the tiles.
+        position: Of the tiles, float32 [H W, 3] [cells], row by row.
+        turn: Of the tiles, unit quaternion w, x, y, z, float32 [H W, 4].
+        trees: Flat index of the cells that have trees of their own, int64 [T]; none on large maps.
+    """
+
+    height: np.ndarray
+    block: Shape
+    position: np.ndarray
+    turn: np.ndarray
+    trees: np.ndarray
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Return (H, W) [cells]."""
+        return self.height.shape[0], self.height.shape[1]
+
+
+def ground_of(state: WorldState) -> Ground:
+    """Return the ground of world 0."""
+    elevation, (rows, columns) = state.landscape.elevation, state.cells.shape[1:]
+    height = torch.zeros(rows, columns)
+    if elevation is not None:
+        height = (elevation[0] - elevation[0].mean()).float() * (EXAGGERATION / state.ground.cell_size)
+    corners = avg_pool2d(pad(height[None], (1, 1, 1, 1), mode="replicate"), 2, stride=1)[0]
+    middle = corners.unfold(0, 2, 1).unfold(1, 2, 1).mean((-2, -1))
+    east = (corners[:, 1:] - corners[:, :-1]).unfold(0, 2, 1).mean(-1)
+    south = (corners[1:] - corners[:-1]).unfold(1, 2, 1).mean(-1)
+    x, y = _east_and_north(rows, columns)
+    holds_trees = (state.cover[0] != int(Cover.LAKE)) & (state.cover[0] != int(Cover.BARE))
+    trees = holds_trees.flatten().nonzero()[:, 0].numpy() if rows * columns <= MOST_TREES else np.zeros(0, np.int64)
+    return Ground(
+        height=middle.numpy(),
+        block=_block(corners.numpy()),
+        position=torch.stack((x.expand(rows, -1), y.expand(-1, columns), middle), dim=-1).flatten(0, 1).numpy(),
+        turn=_tilt(east.flatten(), -south.flatten()).numpy(),
+        trees=trees,
+    )
+
+
+def tiles(state: WorldState, ground: Ground) -> np.ndarray:
+    """Return the colours of the tiles of world 0: of the pictures of ``env.render``, darker under trees; uint8 [H W, 3].
+
+    They tell cover, tree age, fire by stage, ash, firebreaks and wet cells.
+    """
+    colours = render(state[:1], None, scale=1)[0].flatten(0, 1)
+    if not len(ground.trees):
+        return colours.numpy()
+    under = is_tree(state.cells[0]).flatten()[:, None]
+    return torch.where(under, (colours.float() * _SHADE).byte(), colours).numpy()
+
+
+def trees(state: WorldState, ground: Ground) -> Instances:
+    """Return the trees of world 0, one for each of the cells that ``ground`` names; a cell without has one of size 0.
+
+    A tree's height tells its age, and its colour cover, age, fire and wetness, as the ground's does.
+    """
+    cells = state.cells[0].flatten()[ground.trees]
+    age = torch.where(is_burning(cells), state.age[0].flatten()[ground.trees], cells).float()
+    jitter = _jitter(ground.size)[ground.trees]
+    tall = torch.where(age > 0, 0.45 + 0.1 * age, 0.0) * (0.85 + 0.3 * torch.from_numpy(jitter[:, 2]))
+    wide = tall.clamp(max=1.0) * 0.95
+    colour = render(state[:1], None, scale=1)[0].flatten(0, 1)[ground.trees].float()
+    light = 0.88 + 0.24 * torch.from_numpy(jitter[:, 3:])
+    position = ground.position[ground.trees] + np.pad(0.3 * (jitter[:, :2] - 0.5), ((0, 0), (0, 1)))
+    return Instances(
+        position=position.astype(np.float32),
+        turn=_upright(len(cells)),
+        scale=torch.stack((wide, wide, tall), dim=1).numpy(),
+        colour=(colour * light).clamp(max=255.0).byte().numpy(),
+    )
+
+
+def flames(state: WorldState, ground: Ground) -> Instances:
+    """Return a flame for each burning cell of world 0, its colour by stage; they flicker from step to step."""
+    cells = state.cells[0].flatten()
+    index = is_burning(cells).nonzero()[:, 0].numpy()
+    stage = cells[index].long() - FIRST_FIRE
+    jitter = np.roll(_jitter(ground.size), int(state.step[0]) * 7, axis=0)[index]
+    tall = np.array([1.1, 1.9, 2.3, 1.7, 0.7], dtype=np.float32)[stage.numpy()] * (0.75 + 0.5 * jitter[:, 2])
+    wide = np.minimum(tall, 1.4) * 0.9
+    return Instances(
+        position=ground.position[index],
+        turn=_upright(len(index)),
+        scale=np.stack((wide, wide, tall), axis=1).astype(np.float32),
+        colour=fire_colours()[stage].numpy(),
+    )
+
+
+def smoke(state: WorldState, ground: Ground) -> Instances:
+    """Return puffs over the burning cells of world 0, carried by the wind; a third of them at a time."""
+    index = is_burning(state.cells[0]).flatten().nonzero()[:, 0].numpy()
+    jitter = np.roll(_jitter(ground.size), int(state.step[0]) * 3, axis=0)[index]
+    some = jitter[:, 0] < 0.34
+    index, jitter = index[some], jitter[some]
+    rise = 2.0 + 5.0 * jitter[:, 1:2]
+    drift = _wind_at(state, index) * rise * 0.12
+    size = (0.6 + 0.2 * rise) * (0.8 + 0.4 * jitter[:, 2:3])
+    grey = (150.0 + 60.0 * jitter[:, 3:]).astype(np.uint8)
+    return Instances(
+        position=(ground.position[index] + np.concatenate((drift, rise), axis=1)).astype(np.float32),
+        turn=_upright(len(index)),
+        scale=np.repeat(size, 3, axis=1).astype(np.float32),
+        colour=np.repeat(grey, 3, axis=1),
+    )
+
+
+def glow(state: WorldState, ground: Ground) -> tuple[tuple[float, float, float], float]:
+    """Return where the light of the fires of world 0 comes from, over their middle [cells], and how strong it is."""
+    index = is_burning(state.cells[0]).flatten().nonzero()[:, 0].numpy()
+    if not len(index):
+        return (0.0, 0.0, 0.0), 0.0
+    x, y, z = ground.position[index].mean(axis=0).tolist()
+    return (x, y, z + 5.0), 6.0 * math.sqrt(len(index))
+
+
+def vehicles(state: WorldState, ground: Ground, flies: Tensor, facing: Tensor) -> Instances:
+    """Return the vehicles of world 0.
+
+    Args:
+        state: The worlds.
+        ground: Of world 0.
+        flies: Which of them are aircraft, bool [A].
+        facing: Direction of each, int64 [A]: 0..7 clockwise from north; -1 is east.
+    """
+    place = state.vehicles.position[0]
+    index = (place[:, 0] * ground.size[1] + place[:, 1]).numpy()
+    position = ground.position[index] + np.array([0.0, 0.0, 1.0]) * (flies.numpy()[:, None] * _FLIGHT + 0.05)
+    size = max(1.25, max(ground.size) / 42.0)
+    half = _angles(facing) / 2.0
+    zero = torch.zeros_like(half)
+    return Instances(
+        position=position.astype(np.float32),
+        turn=torch.stack((half.cos(), zero, zero, half.sin()), dim=1).numpy(),
+        scale=np.full((len(index), 3), size, dtype=np.float32),
+        colour=VEHICLE_COLOURS[np.arange(len(index)) % len(VEHICLE_COLOURS)],
+    )
+
+
+def headings(shown: Instances, goals: dict[int, tuple[int, int]], ground: Ground) -> np.ndarray:
+    """Return where vehicles are heading as lines from each to its end, float32 [A, 2, 3] [cells].
+
+    Args:
+        shown: Of ``vehicles``.
+        goals: (row, column) of the place that a vehicle was sent to, by its index; others point where they face.
+        ground: Of world 0.
+    """
+    size, turn = shown.scale[:, :1], 2.0 * np.arctan2(shown.turn[:, 3], shown.turn[:, 0])
+    ahead = np.stack((np.cos(turn), np.sin(turn), np.zeros_like(turn)), axis=1)
+    start = shown.position + np.array([0.0, 0.0, 0.55]) * size
+    end = start + ahead * 2.4 * size
+    for agent, (row, column) in goals.items():
+        end[agent] = ground.position[row * ground.size[1] + column] + (0.0, 0.0, 0.6)
+    return np.stack((start + ahead * 0.9 * size, end), axis=1).astype(np.float32)
+
+
+def wind_arrows(state: WorldState, ground: Ground) -> np.ndarray:
+    """Return the wind of world 0 as arrows over the map where the air goes, float32 [25, 2, 3] [cells].
+
+    An arrow of a wind of 12 m/s is as long as their distance. In a calm all are points.
+    """
+    rows, columns = ground.size
+    row = ((torch.arange(_WIND_ARROWS) + 0.5) * rows / _WIND_ARROWS).long()
+    column = ((torch.arange(_WIND_ARROWS) + 0.5) * columns / _WIND_ARROWS).long()
+    index = (row[:, None] * columns + column).flatten().numpy()
+    middle = ground.position[index].copy()
+    middle[:, 2] = ground.height.max() + max(rows, columns) / 8.0
+    reach = _wind_at(state, index) * (min(rows, columns) / _WIND_ARROWS / 12.0)
+    half = np.pad(reach, ((0, 0), (0, 1))) / 2.0
+    return np.stack((middle - half, middle + half), axis=1).astype(np.float32)
+
+
+def cell_at(origin: tuple[float, float, float], direction: tuple[float, float, float], ground: Ground) -> tuple | None:
+    """Return the (row, column) of the cell that a ray first meets from above; None if it meets none.
+
+    Args:
+        origin: Where it starts [cells].
+        direction: Unit vector of where it goes.
+        ground: The ground.
+    """
+    rows, columns = ground.size
+    reach = math.dist(origin, (0.0, 0.0, 0.0)) + rows + columns
+    along = np.arange(0.0, reach, 0.05)[:, None]
+    x, y, z = (np.asarray(origin) + along * np.asarray(direction)).T
+    row = np.floor((rows - 1) / 2.0 - y + 0.5).astype(int)
+    column = np.floor(x + (columns - 1) / 2.0 + 0.5).astype(int)
+    inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+    below = z <= ground.height[row.clip(0, rows - 1), column.clip(0, columns - 1)]
+    met = np.flatnonzero(inside & below)
+    return (int(row[met[0]]), int(column[met[0]])) if len(met) else None
+
+
+# Parts
+
+
+def _east_and_north(rows: int, columns: int) -> tuple[Tensor, Tensor]:
+    """Return x of the columns [1, W] and y of the rows [H, 1] [cells]."""
+    east = torch.arange(columns, dtype=torch.float32) - (columns - 1) / 2.0
+    north = (rows - 1) / 2.0 - torch.arange(rows, dtype=torch.float32)
+    return east[None], north[:, None]
+
+
+def _tilt(east: Tensor, north: Tensor) -> Tensor:
+    """Return the quaternions that tilt level tiles to slopes [n] of the ground, float32 [n, 4]."""
+    up = torch.rsqrt(1.0 + east.square() + north.square())
+    w = ((1.0 + up) / 2.0).sqrt()
+    return torch.stack((w, north * up / (2.0 * w), -east * up / (2.0 * w), torch.zeros_like(w)), dim=1)
+
+
+def _upright(count: int) -> np.ndarray:
+    turn = np.zeros((count, 4), dtype=np.float32)
+    turn[:, 0] = 1.0
+    return turn
+
+
+def _block(corners: np.ndarray) -> Shape:
+    """Return a closed body under a surface of corner heights [H + 1, W + 1], with its floor three cells below."""
+    rows, columns = corners.shape
+    floor = corners.min() - 3.0
+    y, x = np.meshgrid((rows - 1) / 2.0 - np.arange(rows), np.arange(columns) - (columns - 1) / 2.0, indexing="ij")
+    top = np.stack((x, y, corners - 0.06), axis=-1).reshape(-1, 3)
+    number = np.arange(rows * columns).reshape(rows, columns)
+    quads = np.stack((number[1:, :-1], number[1:, 1:], number[:-1, 1:], number[:-1, :-1]), axis=-1).reshape(-1, 4)
+    rim = np.concatenate((number[0, :-1], number[:-1, -1], number[-1, :0:-1], number[:0:-1, 0]))
+    below = top[rim].copy()
+    below[:, 2] = floor
+    low = len(top) + np.arange(len(rim))
+    walls = np.stack((rim, np.roll(rim, -1), np.roll(low, -1), low), axis=-1)
+    first, last = low[0], len(rim)
+    bottom = np.stack((np.full(last - 2, first), low[1:-1], low[2:]), axis=-1)
+    faces = np.concatenate((quads[:, [0, 1, 2]], quads[:, [0, 2, 3]], walls[:, [0, 1, 2]], walls[:, [0, 2, 3]], bottom))
+    return Shape(np.concatenate((top, below)).astype(np.float32), faces.astype(np.uint32))
+
+
+@lru_cache(maxsize=4)
+def _jitter(size: tuple[int, int]) -> np.ndarray:
+    """Return numbers of each cell that make trees look grown and not set, float32 [H W, 4] in 0..1, always the same."""
+    return np.random.default_rng(0).random((size[0] * size[1], 4), dtype=np.float32)
+
+
+def _angles(direction: Tensor) -> Tensor:
+    """Return the angle from east, counter-clockwise, of directions, float32 [A] [radians]; 0 of those below 0."""
+    units = unit_vectors()[direction.clamp(min=0)]
+    return torch.where(direction >= 0, torch.atan2(units[:, 1], units[:, 0]), 0.0)
+
+
+def _wind_at(state: WorldState, index: np.ndarray) -> np.ndarray:
+    """Return the wind of world 0 at flat indices [n], float32 [n, 2], (u east, v north) [m/s]."""
+    field = state.wind[0].expand(-1, *state.cells.shape[1:]).flatten(1)
+    return field[:, index].T.numpy()

@@ -1,0 +1,216 @@
+"""The page: a local server that shows a match, plays it at a pace, and lets people take part."""
+
+import contextlib
+import io
+import socket
+import threading
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import viser
+
+from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.live import words
+from warp_torchrl.live.match import Match, Setting
+from warp_torchrl.live.panel import Panel
+from warp_torchrl.live.stage import Stage
+from warp_torchrl.validation import check_fields
+
+_FOLLOWED_EVERY = 5.0  # seconds between two looks for newer weights
+
+
+@dataclass(frozen=True, kw_only=True)
+class Address:
+    """Where a page is served.
+
+    Attributes:
+        host: Network interface; the default is reachable from this machine alone.
+        port: 0 takes any that is free.
+
+    Raises:
+        ValueError: If the port is out of its range.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = 8080
+
+    def __post_init__(self) -> None:
+        check_fields(self, port=(0, 65535))
+
+    def free(self) -> "Address":
+        """Return the address with a port that is free.
+
+        Raises:
+            ConfigError: If the port is taken, or the host is none of this machine's.
+        """
+        with socket.socket(socket.AF_INET6 if ":" in self.host else socket.AF_INET) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind((self.host, self.port))
+            except OSError as error:
+                raise ConfigError(
+                    f"port {self.port} cannot be used on {self.host} ({error.strerror}): choose another, port=NUMBER"
+                ) from None
+            return Address(host=self.host, port=probe.getsockname()[1])
+
+
+class _Server(viser.ViserServer):
+    """A server that stays local: viser's own would open a public tunnel when a browser asks for one."""
+
+    def request_share_url(self, verbose: bool = True) -> str | None:
+        """Return None: nothing is shared."""
+        return None
+
+
+class Page:
+    """A match on a page. ``with`` serves it; ``play`` runs it until it is interrupted.
+
+    All that changes the match holds ``lock``.
+
+    Args:
+        setting: What is played first.
+        address: Where it is served.
+
+    Raises:
+        ConfigError: If the setting or the address does not fit.
+        CheckpointError: If a run folder holds no sound checkpoint.
+    """
+
+    def __init__(self, setting: Setting, address: Address) -> None:
+        self.given, self.match = setting, Match(setting)
+        self.address = address.free()
+        self.lock = threading.RLock()
+        self.playing, self.pace = False, 8.0
+        self._panels: dict[int, Panel] = {}
+        self._stages: list[Stage] = []
+        self._stopped = threading.Event()
+        self._followed = time.monotonic()
+        warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")  # of a browser that just left
+        with contextlib.redirect_stdout(io.StringIO()):  # viser prints addresses of its own
+            self.server = _Server(host=self.address.host, port=self.address.port, verbose=False)
+        self._furnish()
+        self.open(self.match)
+        self.server.on_client_connect(self._welcome)
+        self.server.on_client_disconnect(self._part)
+
+    def __enter__(self) -> "Page":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._stopped.set()
+        self.server.stop()
+
+    @property
+    def url(self) -> str:
+        """Return the address for a browser."""
+        return f"http://{self.address.host}:{self.address.port}"
+
+    def play(self) -> None:
+        """Play the match at its pace until ``stop``, or a signal."""
+        while not self._stopped.is_set():
+            began = time.monotonic()
+            with self.lock:
+                self._follow()
+                if self.playing:
+                    self.step()
+            self._stopped.wait(max(0.002, 1.0 / self.pace - (time.monotonic() - began)))
+
+    def stop(self) -> None:
+        """Let ``play`` return."""
+        self._stopped.set()
+
+    # What panels ask for, under the lock
+
+    def open(self, match: Match) -> None:
+        """Show another match from its start."""
+        for stage in self._stages:
+            stage.remove()
+        self.match, self.playing = match, False
+        rows, columns = match.world.size
+        apart = columns * 1.14
+        first = -apart * (len(match.sides) - 1) / 2.0
+        self._stages = [
+            Stage(self.server, index, side, first + index * apart) for index, side in enumerate(match.sides)
+        ]
+        for index, stage in enumerate(self._stages):
+            stage.tiles.on_click(self._clicked(index))
+        away = max(1.22 * (apart * (len(match.sides) - 1) + columns), 1.4 * rows)
+        aside = 0.15 * away  # the panel stands on the right
+        self.server.initial_camera.position = (aside, -0.8 * away, 0.66 * away)
+        self.server.initial_camera.look_at = (aside, -0.02 * away, 0.0)
+        self.server.initial_camera.fov = 0.8
+        for panel in self._panels.values():
+            panel.fill()
+        self.show()
+
+    def step(self) -> None:
+        """Advance the match by one step, and show it; the clock stops with the episode."""
+        for line in self.match.step():
+            self.tell(line)
+        self.playing &= not self.match.ended
+        self.show()
+
+    def restart(self, seed: int | None = None) -> None:
+        """Start the episode anew; of another seed on its own ground.
+
+        Raises:
+            ValueError: If the seed is out of range.
+        """
+        self.match.restart(seed)
+        self.open(self.match)
+
+    def show(self) -> None:
+        """Draw the match as it is, here and on every panel."""
+        for stage, side in zip(self._stages, self.match.sides):
+            stage.show(f"{words.title(side)}: {side.curves.saved[-1]:.0%} saved")
+        for panel in list(self._panels.values()):
+            panel.show()
+
+    def tell(self, line: str) -> None:
+        """Tell everybody something."""
+        for panel in list(self._panels.values()):
+            panel.tell(line)
+
+    # Parts
+
+    def _furnish(self) -> None:
+        self.server.gui.configure_theme(control_width="large", dark_mode=True, show_logo=False, show_share_button=False)
+        self.server.gui.set_panel_label("warp_torchrl")
+        scene = self.server.scene
+        scene.world_axes.visible = False
+        scene.set_background_image(np.full((2, 2, 3), (24, 30, 38), dtype=np.uint8))
+        scene.configure_default_lights(enabled=False)
+        scene.configure_environment_map(None)
+        scene.add_light_hemisphere("/sky", sky_color=(210, 224, 255), ground_color=(70, 60, 52), intensity=2.0)
+        scene.add_light_directional("/sun", color=(255, 240, 214), intensity=3.4, position=(-34.0, -26.0, 50.0))
+
+    def _welcome(self, client: viser.ClientHandle) -> None:
+        with self.lock:
+            self._panels[client.client_id] = Panel(self, client)
+            self._panels[client.client_id].show()
+
+    def _part(self, client: viser.ClientHandle) -> None:
+        with self.lock:
+            self._panels.pop(client.client_id, None)
+            for name in self.match.sides[0].crew.leave(client.client_id):
+                self.tell(f"{name} is the policy's again: who drove it has left")
+            self.show()
+
+    def _clicked(self, index: int) -> Callable[[viser.SceneNodePointerEvent], None]:
+        def click(event: viser.SceneNodePointerEvent) -> None:
+            with self.lock:
+                panel = self._panels.get(event.client_id)
+                if panel is not None:
+                    panel.click(self._stages[index], event.ray_origin, event.ray_direction)
+
+        return click
+
+    def _follow(self) -> None:
+        if time.monotonic() - self._followed < _FOLLOWED_EVERY:
+            return
+        for line in self.match.follow():
+            self.tell(line)
+        self._followed = time.monotonic()

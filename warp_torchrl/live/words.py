@@ -1,0 +1,97 @@
+"""What the page says: tables and short lines as Markdown, and bars and the legend as HTML."""
+
+from collections.abc import Mapping, Sequence
+from html import escape
+
+from warp_torchrl.env.render import legend_colours
+from warp_torchrl.live.drawing import VEHICLE_COLOURS
+from warp_torchrl.live.match import Match
+from warp_torchrl.live.side import Side
+
+_STYLE = "font-family:inherit;font-size:12px;line-height:1.35"
+
+
+def headline(match: Match) -> str:
+    """Return what is played, and where it is."""
+    step, horizon = int(match.alone.state.step[0]), match.world.horizon
+    step = max(step, *(int(side.state.step[0]) for side in match.sides))
+    end = ", over" if match.ended else ""
+    return f"**{match.scenario}**, seed {match.setting.seed}: step {step} of {horizon}{end}"
+
+
+def numbers(match: Match) -> str:
+    """Return the table of all sides: forest saved and burning, acts."""
+    rows = ["| | saved | burning | put out | cleared |", "|---|---:|---:|---:|---:|"]
+    for side in match.everywhere:
+        curves = side.curves
+        acts = f"{int(curves.extinguished.sum())} | {int(curves.cleared.sum())}" if side is not match.alone else " | "
+        rows.append(f"| {title(side)} | **{curves.saved[-1]:.1%}** | {curves.burning[-1]:.1%} | {acts} |")
+    return "\n".join(rows)
+
+
+def title(side: Side) -> str:
+    """Return what a side's policy is called, short; of a run with how far it is trained."""
+    name, frames = side.player.name, side.player.frames
+    short = name if len(name) <= 26 else f"...{name[-23:]}"
+    return short if frames is None else f"{short} ({frames / 1e6:.1f} M)"
+
+
+def acts(side: Side) -> str:
+    """Return the table of a team's vehicles: who moves each, its water, and its acts."""
+    curves, tank = side.curves, side.state.vehicles.tank[0].tolist()
+    full = side.env.world.team.tank
+    rows = ["| vehicle | moved by | put out | cleared | water |", "|---|---|---:|---:|---:|"]
+    for agent, name in enumerate(side.env.agent_names):
+        water = "" if full is None else f"{tank[agent]} of {full}"
+        done = f"{int(curves.extinguished[agent])} | {int(curves.cleared[agent])}"
+        rows.append(f"| {name} | {moved_by(side, agent)} | {done} | {water} |")
+    return "\n".join(rows)
+
+
+def moved_by(side: Side, agent: int, person: int | None = None) -> str:
+    """Return who moves a vehicle, as a person reads it; None reads as nobody in particular."""
+    seat = side.crew.seats[agent]
+    if seat.person is not None:
+        return "you" if seat.person == person else "a person"
+    if seat.order is None:
+        return "policy"
+    return f"policy, sent to {seat.order.row}, {seat.order.column} (within {seat.order.radius})"
+
+
+def actions(side: Side, agent: int) -> str:
+    """Return bars of an agent's action probabilities, with what its mask closes, as HTML."""
+    mask = side.mask[agent].tolist()
+    shares: Sequence[float] = [] if side.chances is None else side.chances[agent].tolist()
+    last = int(side.state.vehicles.last_action[0, agent])
+    rows = []
+    for code, name in enumerate(side.env.action_names):
+        share = shares[code] if shares else 0.0
+        ink = "inherit" if mask[code] else "rgba(130,130,130,.55)"
+        bar = f"<div style='background:#e8862e;height:9px;border-radius:2px;width:{100 * share:.1f}%'></div>"
+        told = (f"{share:.0%}" if shares else "") if mask[code] else "closed"
+        mark = " ◂ last" if code == last else ""
+        rows.append(
+            f"<tr style='color:{ink}'><td style='padding-right:8px'>{escape(name)}{mark}</td>"
+            f"<td style='width:45%'>{bar}</td><td style='text-align:right;padding-left:6px'>{told}</td></tr>"
+        )
+    note = "" if shares else "<div>This policy has no action probabilities.</div>"
+    return f"<div style='{_STYLE};padding:0 12px'>{note}<table style='width:100%'>{''.join(rows)}</table></div>"
+
+
+def told(numbers: Mapping[str, float]) -> str:
+    """Return the numbers that an agent is told, those that are not 0, as HTML."""
+    rows = [f"{escape(name)} <b>{value:.2f}</b>" for name, value in numbers.items() if abs(value) >= 0.005]
+    return f"<div style='{_STYLE};padding:0 12px'>{', '.join(rows) or 'nothing else'}</div>"
+
+
+def legend(side: Side) -> str:
+    """Return what the colours mean, and whose each vehicle's is, as HTML."""
+    chips = {name: colour for name, colour in legend_colours().items()}
+    chips |= {name: tuple(VEHICLE_COLOURS[at % len(VEHICLE_COLOURS)]) for at, name in enumerate(side.env.agent_names)}
+    spans = [
+        f"<span style='white-space:nowrap;margin-right:10px'><span style='display:inline-block;width:11px;height:11px;"
+        f"border:1px solid #888;border-radius:2px;vertical-align:-1px;margin-right:4px;"
+        f"background:rgb({red},{green},{blue})'></span>{escape(name)}</span> "
+        for name, (red, green, blue) in chips.items()
+    ]
+    return f"<div style='{_STYLE};padding:2px 12px'>{''.join(spans)}</div>"
