@@ -161,6 +161,14 @@ def test_nothing_reads_pickles(module):
     assert source.count("torch.load(") == source.count("weights_only=True, map_location")
 
 
+@pytest.mark.parametrize("module", MODULES)
+def test_viser_is_imported_where_the_live_page_is_put_together(module):
+    if module not in ("live/page", "live/panel", "live/stage"):
+        assert "viser" not in {name.split("/")[0] for name in imports(module)}
+        if module.split("/")[0] == "live" and module != "live/__main__":
+            assert not ours(module) & {"live/page", "live/panel", "live/stage"}
+
+
 FENCE = "world/fast"
 """Where alone words of compilers stand."""
 

@@ -1,7 +1,7 @@
 """A world as the arrays of a picture in three dimensions; no loop over cells, and nothing of a browser.
 
-One cell is one unit: x is east, y is north, z is up, and the middle of the map is at the origin. Heights are drawn twice
-as large as they are.
+One cell is one unit: x is east, y is north, z is up, and the middle of the map is at the origin. Heights are drawn
+twice as large as they are.
 """
 
 import math
@@ -97,9 +97,10 @@ def ground_of(state: WorldState) -> Ground:
 
 
 def tiles(state: WorldState, ground: Ground) -> np.ndarray:
-    """Return the colours of the tiles of world 0: of the pictures of ``env.render``, darker under trees; uint8 [H W, 3].
+    """Return the colours of the tiles of world 0, uint8 [H W, 3].
 
-    They tell cover, tree age, fire by stage, ash, firebreaks and wet cells.
+    They are those of the pictures of ``env.render``, darker under trees: they tell cover, tree age, fire by stage, ash,
+    firebreaks and wet cells.
     """
     colours = render(state[:1], None, scale=1)[0].flatten(0, 1)
     if not len(ground.trees):
@@ -228,7 +229,9 @@ def wind_arrows(state: WorldState, ground: Ground) -> np.ndarray:
     return np.stack((middle - half, middle + half), axis=1).astype(np.float32)
 
 
-def cell_at(origin: tuple[float, float, float], direction: tuple[float, float, float], ground: Ground) -> tuple | None:
+def cell_at(
+    origin: tuple[float, float, float], direction: tuple[float, float, float], ground: Ground
+) -> tuple[int, int] | None:
     """Return the (row, column) of the cell that a ray first meets from above; None if it meets none.
 
     Args:

@@ -57,6 +57,11 @@ class Address:
             return Address(host=self.host, port=probe.getsockname()[1])
 
 
+def _quiet() -> contextlib.AbstractContextManager[object]:
+    """Return a context in which viser's own lines are not printed."""
+    return contextlib.redirect_stdout(io.StringIO())
+
+
 class _Server(viser.ViserServer):
     """A server that stays local: viser's own would open a public tunnel when a browser asks for one."""
 
@@ -89,7 +94,7 @@ class Page:
         self._stopped = threading.Event()
         self._followed = time.monotonic()
         warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")  # of a browser that just left
-        with contextlib.redirect_stdout(io.StringIO()):  # viser prints addresses of its own
+        with _quiet():
             self.server = _Server(host=self.address.host, port=self.address.port, verbose=False)
         self._furnish()
         self.open(self.match)
@@ -101,7 +106,8 @@ class Page:
 
     def __exit__(self, *error: object) -> None:
         self._stopped.set()
-        self.server.stop()
+        with _quiet():
+            self.server.stop()
 
     @property
     def url(self) -> str:

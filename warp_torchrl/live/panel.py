@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -130,10 +131,10 @@ class Panel:
         take.on_click(self._guarded(lambda event: self._seat(event.target.value == "Take over")))
         for row in _PADS:
             pad = gui.add_button_group("", row)
-            pad.on_click(self._guarded(lambda event: self._press(_MOVES[event.target.value])))
+            pad.on_click(self._guarded(lambda event: self._press(_MOVES[event.target.value], event)))
         acts = tuple(name for name in self._side.env.action_names if name not in _MOVES.values())
         deeds = gui.add_button_group("", acts)
-        deeds.on_click(self._guarded(lambda event: self._press(event.target.value)))
+        deeds.on_click(self._guarded(lambda event: self._press(event.target.value, event)))
         gui.add_markdown("Keys: **Q W E A D Z X C** move, **S** stays, **F** extinguishes, **R** clears, **P** plays.")
         with gui.add_folder("Send it"):
             self._radius = gui.add_slider("Within cells", min=0, max=16, step=1, initial_value=3)
@@ -143,7 +144,7 @@ class Panel:
         with gui.add_folder("Ask me before the policy"):
             for name in acts:
                 box = gui.add_checkbox(name, initial_value=name in self._side.crew.asks)
-                box.on_update(self._guarded(lambda event, name=name: self._ask(name, event.target.value)))
+                box.on_update(self._guarded(partial(self._ask, name)))
         self._vehicle.on_update(self._guarded(lambda event: self.show()))
 
     def _add_agent(self) -> None:
@@ -182,7 +183,7 @@ class Panel:
     def _add_keys(self) -> None:
         for key, action in KEYS.items():
             command = self._gui.add_command(f"Drive: {action}", hotkey=key)
-            command.on_trigger(self._guarded(lambda event, action=action: self._press(action)))
+            command.on_trigger(self._guarded(partial(self._press, action)))
         play = self._gui.add_command("Play or pause", hotkey="P")
         play.on_trigger(self._guarded(lambda event: self._play("Pause" if self._page.playing else "Play")))
 
@@ -279,7 +280,7 @@ class Panel:
         (crew.take if take else crew.hand_back)(self._agent, person)
         self._page.show()
 
-    def _press(self, action: str) -> None:
+    def _press(self, action: str, event: Any) -> None:
         """Do an act with the chosen vehicle; where the clock stands still the act is a step."""
         names = self._side.env.action_names
         if action not in names:
@@ -295,9 +296,9 @@ class Panel:
         self._side.order(self._agent, order)
         self._page.show()
 
-    def _ask(self, name: str, asks: bool) -> None:
+    def _ask(self, name: str, event: Any) -> None:
         crew = self._side.crew
-        crew.ask_before(crew.asks | {name} if asks else crew.asks - {name})
+        crew.ask_before(crew.asks | {name} if event.target.value else crew.asks - {name})
         self._page.show()
 
     def _answer(self, allow: bool) -> None:
@@ -322,9 +323,7 @@ class Panel:
             overrides = (f"scenario={self._scenario.value}",)
         beside = None if self._beside.value == _ALONE else self._beside.value
         self._page.open(
-            Match(
-                Setting(policy=self._policy.value, beside=beside, seed=int(self._seed.value), overrides=overrides)
-            )
+            Match(Setting(policy=self._policy.value, beside=beside, seed=int(self._seed.value), overrides=overrides))
         )
 
     # What there is to choose

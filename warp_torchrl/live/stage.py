@@ -90,7 +90,7 @@ class Stage:
 
     def show(self, title: str) -> None:
         """Draw the side as it is now, with what stands above it."""
-        side, ground, state = self._side, self.ground, self._side.state
+        ground, state = self.ground, self._side.state
         with self._server.atomic():
             change(self.tiles, batched_colors=_light(drawing.tiles(state, ground)))
             if len(ground.trees):
@@ -119,9 +119,10 @@ class Stage:
         for role in dict.fromkeys(self._side.env.world.team.agent_roles):
             own = np.array([each == role for each in self._side.env.world.team.agent_roles])
             for part, shape in (drone() if ROLES[role].flies else bulldozer()).items():
+                colour = shown.colour[own] if part == "body" else np.array(_IRON)
                 handle = scene.add_batched_meshes_simple(
                     self._node(f"{role}_{part}"), *shape, shown.turn[own], shown.position[own],
-                    batched_scales=shown.scale[own], batched_colors=_light(shown.colour[own] if part == "body" else np.array(_IRON)),
+                    batched_scales=shown.scale[own], batched_colors=_light(colour),
                     flat_shading=True, lod="off", cast_shadow=False, receive_shadow=False,
                 )  # fmt: skip
                 self._bodies.append((own, handle))

@@ -1,0 +1,75 @@
+"""The command: what it is told, and mistakes in one line."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from urllib.request import urlopen
+
+import pytest
+
+from warp_torchrl.commands.failure import MISTAKE, UNSOUND
+from warp_torchrl.live.__main__ import _read, main
+
+
+def test_the_command_s_own_keys_are_apart_from_those_of_the_scenario():
+    setting, where = _read(["policy=outputs/run", "scenario=large", "seed=7", "port=0", "team.n_agents=3"])
+    assert (setting.policy, setting.seed, setting.beside) == ("outputs/run", 7, None)
+    assert setting.overrides == ("scenario=large", "team.n_agents=3") and where == {"port": 0}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["policy=gredy"], "got gredy: did you mean greedy?"),
+        (["policy=nowhere/run"], "nowhere/run is not a run folder"),
+        (["seed=x"], "seed must be a whole number, got 'x'"),
+        (["seed=-1"], "seed must be in"),
+        (["port=70000"], "port must be in [0, 65535], got 70000"),
+        (["--port", "8080"], "keys are given as port=8080"),
+        (["scenario=larg"], "scenario must be one of"),
+        (["team.n_agents=0"], "team.n_agents must be in"),
+        (["landscape"], "landscape has no value"),
+        (["policy=default", "observation.radius=4"], "the policy default does not fit here"),
+        (["scenario=landfire", "policy=local", "landscape.path=nowhere"], "nowhere"),
+    ],
+)
+def test_a_mistake_is_one_line_and_the_exit_code_of_a_mistake(arguments, says, capsys):
+    pytest.importorskip("viser", reason="needs the extra live")
+    assert main(arguments) in (MISTAKE, UNSOUND)
+    out, err = capsys.readouterr()
+    assert out == "" and err.startswith("error: ") and len(err.splitlines()) == 1 and says in err
+
+
+def test_a_port_that_is_taken_is_one_line(capsys):
+    pytest.importorskip("viser", reason="needs the extra live")
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        assert main(["policy=noop", f"port={port}"]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith(f"error: port {port} cannot be used on 127.0.0.1") and len(err.splitlines()) == 1
+
+
+def test_help_names_the_keys(capsys):
+    assert main(["--help"]) == 0
+    assert "beside=NAME" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_it_prints_its_address_serves_and_ends_cleanly(number):
+    pytest.importorskip("viser", reason="needs the extra live")
+    command = [sys.executable, "-m", "warp_torchrl.live", "policy=noop", "port=0", "landscape.size=12"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ) as live:
+        line = live.stdout.readline()
+        url = line.split()[0]
+        assert url.startswith("http://127.0.0.1:") and line.endswith("shows noop; Ctrl-C ends it\n")
+        with urlopen(url, timeout=20) as page:
+            assert page.status == 200 and b"<html" in page.read().lower()
+        time.sleep(0.2)
+        live.send_signal(number)
+        out, err = live.communicate(timeout=30)
+    assert live.returncode == 0 and out.strip() == "stopped" and err == ""

@@ -1,0 +1,181 @@
+"""The page: a server of this machine alone, and in a real browser what people do on it."""
+
+import os
+import re
+import shutil
+import socket
+import threading
+import time
+from http.client import HTTPConnection
+
+import pytest
+
+pytest.importorskip("viser", reason="needs the extra live")
+
+from tests.live.conftest import SMALL
+from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.live.match import Setting
+from warp_torchrl.live.page import Address, Page
+from warp_torchrl.world.state import Action, is_tree
+
+BROWSER = next((path for name in ("chromium", "google-chrome") if (path := shutil.which(name))), None)
+FLAGS = ["--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+
+
+@pytest.fixture
+def page():
+    overrides = (*SMALL, "observation.radius=4")  # which no shipped policy was trained to see
+    with Page(Setting(policy="noop", overrides=overrides), Address(port=0)) as made:
+        yield made
+
+
+def test_it_listens_to_this_machine_alone(page):
+    host, port = page.address.host, page.address.port
+    assert host == "127.0.0.1"
+    with pytest.raises(ConnectionRefusedError), socket.socket() as other:
+        other.connect(("127.0.0.2", port))  # another address of this machine, as a network's would be
+
+
+@pytest.mark.parametrize("path", ["/../../../../../../etc/passwd", "/%2e%2e/%2e%2e/%2e%2e/__init__.py", "//etc/passwd"])
+def test_no_file_outside_of_the_browser_s_program_is_served(page, path):
+    link = HTTPConnection(page.address.host, page.address.port, timeout=10)
+    link.request("GET", path)
+    answer = link.getresponse()
+    body = answer.read()
+    assert answer.status == 404 or (b"root:" not in body and b"import" not in body)
+    link.close()
+
+
+def test_nothing_is_shared_when_a_browser_asks(page):
+    assert page.server.request_share_url() is None
+
+
+def test_a_port_that_another_program_has_is_refused(page):
+    with pytest.raises(ConfigError, match=f"port {page.address.port} cannot be used on 127.0.0.1"):
+        Page(Setting(policy="noop", overrides=SMALL), page.address)
+
+
+def test_the_clock_plays_at_its_pace_and_stops_with_the_episode(page):
+    page.playing, page.pace = True, 500.0
+    clock = threading.Thread(target=page.play)
+    clock.start()
+    _until(lambda: page.match.ended)
+    _until(lambda: not page.playing)
+    page.stop()
+    clock.join(timeout=10)
+    assert not clock.is_alive() and int(page.match.alone.state.step[0]) > 5
+
+
+def _until(holds, seconds=60.0):
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "it took too long"
+        time.sleep(0.05)
+
+
+def test_what_is_drawn_follows_the_match(page):
+    stage, state = page._stages[0], page.match.sides[0].state
+    row, column = (is_tree(state.cells[0]) & (state.cells[0] > 3)).nonzero()[-1].tolist()
+    before = stage.tiles.batched_colors.copy()
+    page.match.ignite(row, column)
+    page.show()
+    changed = (stage.tiles.batched_colors != before).any(axis=1).nonzero()[0].tolist()
+    assert changed == [row * 16 + column]
+
+
+# In a browser
+
+
+@pytest.fixture
+def browser(page):
+    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    if BROWSER is None:
+        pytest.skip("there is no Chromium here")
+    clock = threading.Thread(target=page.play)
+    clock.start()
+    with sync_api.sync_playwright() as driver:
+        made = driver.chromium.launch(executable_path=BROWSER, args=FLAGS)
+        yield made
+        made.close()
+    page.stop()
+    clock.join(timeout=10)
+
+
+def _open(browser, page):
+    tab = browser.new_page(viewport={"width": 1200, "height": 800})
+    tab.goto(page.url)
+    tab.get_by_role("tab", name="Drive").wait_for(timeout=60_000)
+    return tab
+
+
+@pytest.mark.slow
+def test_a_person_watches_a_fire_grow_drives_a_vehicle_puts_out_a_cell_and_leaves(page, browser):
+    tab, side = _open(browser, page), page.match.sides[0]
+    tab.get_by_role("button", name="Step", exact=True).click()
+    tab.get_by_text(re.compile("step 1 of 30")).wait_for(timeout=30_000)
+
+    tab.get_by_role("tab", name="Drive").click()
+    tab.keyboard.press("f")
+    tab.get_by_text("take it over first").first.wait_for(timeout=30_000)
+    assert int(side.state.step[0]) == 1, "what is refused is no step"
+
+    tab.get_by_role("button", name="Take over", exact=True).click()
+    _until(lambda: side.crew.seats[0].person is not None)
+    with page.lock:
+        row, column = side.state.vehicles.position[0, 0].tolist()
+        while not is_tree(side.state.cells)[0, row, column]:
+            page.restart(page.match.setting.seed + 1)
+            row, column = side.state.vehicles.position[0, 0].tolist()
+        before = side.curves.burning[-1]
+        page.match.ignite(row, column)
+        page.show()
+    assert side.curves.burning[-1] > before
+    tab.get_by_role("tab", name="Drive").click()
+    tab.keyboard.press("f")
+    _until(lambda: int(side.curves.extinguished[0]) == 1)
+    assert bool(side.state.extinguished[0, row, column])
+
+    tab.get_by_role("button", name="Play", exact=True).click()
+    _until(lambda: int(side.state.step[0]) > 8)
+    assert page.match.alone.curves.saved[-1] < page.match.alone.curves.saved[0], "the fire grows"
+    if folder := os.environ.get("WARP_TORCHRL_SCREENSHOTS"):
+        tab.screenshot(path=f"{folder}/live_test.png")
+    tab.close()
+    _until(lambda: side.crew.seats[0].person is None)
+
+
+@pytest.mark.slow
+def test_two_people_on_one_vehicle_the_second_is_told(page, browser):
+    first, second = _open(browser, page), _open(browser, page)
+    for tab in (first, second):
+        tab.get_by_role("tab", name="Drive").click()
+    first.get_by_role("button", name="Take over", exact=True).click()
+    first.locator("strong", has_text="you").wait_for(timeout=30_000)
+    second.get_by_role("button", name="Take over", exact=True).click()
+    second.get_by_text("bulldozer_0 is driven by another person").first.wait_for(timeout=30_000)
+    second.locator("strong", has_text="a person").wait_for(timeout=30_000)
+
+
+@pytest.mark.slow
+def test_the_match_waits_for_a_word_and_a_policy_that_does_not_fit_leaves_it(page, browser):
+    tab = _open(browser, page)
+    with page.lock:
+        page.match.sides[0].crew.ask_before(["stay"])
+        page.show()
+    tab.get_by_text("is about to").first.wait_for(timeout=30_000)
+    tab.get_by_role("button", name="Play", exact=True).click()
+    time.sleep(1.0)
+    assert int(page.match.alone.state.step[0]) == 0
+    tab.get_by_role("button", name="Pause", exact=True).click()
+    _until(lambda: not page.playing)
+    tab.get_by_role("button", name="Don't", exact=True).click()
+    _until(lambda: int(page.match.alone.state.step[0]) == 1)
+    assert (page.match.sides[0].state.vehicles.last_action == int(Action.STAY)).all()
+
+    match = page.match
+    tab.get_by_role("tab", name="Match").click()
+    tab.get_by_label("Policy").click()
+    tab.get_by_role("option", name="default", exact=True).click()
+    tab.get_by_role("button", name="Load", exact=True).click()
+    tab.get_by_text("the policy default does not fit here").first.wait_for(timeout=30_000)
+    assert page.match is match

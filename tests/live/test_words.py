@@ -1,0 +1,66 @@
+"""What the page says."""
+
+import re
+
+import pytest
+
+from warp_torchrl.live import words
+from warp_torchrl.live.order import Order
+
+
+@pytest.fixture
+def match(make_match):
+    return make_match("default", ("team.tank=8",), beside="local")
+
+
+def test_the_headline_tells_the_step_of_the_side_that_is_farthest(match):
+    match.step()
+    assert words.headline(match) == "**default**, seed 1000000: step 1 of 30"
+    while not match.ended:
+        match.step()
+    assert words.headline(match).endswith("of 30, over")
+
+
+def test_the_table_has_a_row_for_each_side_with_its_numbers(match):
+    rows = words.numbers(match).splitlines()
+    assert [row.split(" | ")[0].strip("| ") for row in rows[2:]] == ["default (4.0 M)", "local", "without a team"]
+    assert f"**{match.alone.curves.saved[-1]:.1%}**" in rows[-1]
+
+
+def test_a_long_path_is_cut_at_its_front(match):
+    match.sides[1].player.name = "outputs/2026-01-01/10-00-00-12345"
+    assert words.title(match.sides[1]) == "...26-01-01/10-00-00-12345"
+
+
+def test_the_table_of_vehicles_tells_who_moves_each_and_its_water(match):
+    side = match.sides[0]
+    side.crew.take(1, person=5)
+    side.crew.order(2, Order(row=3, column=4, radius=2))
+    rows = words.acts(side).splitlines()[2:]
+    assert [row.split(" | ")[1] for row in rows] == ["policy", "a person", "policy, sent to 3, 4 (within 2)"]
+    assert all("8 of 8" in row for row in rows)
+    assert words.moved_by(side, 1, person=5) == "you" and words.moved_by(side, 1, person=6) == "a person"
+
+
+def test_bars_are_as_long_as_the_probabilities_and_closed_actions_say_so(match):
+    match.step()
+    side = match.sides[0]
+    bars = [float(each) for each in re.findall(r"width:([\d.]+)%'></div>", words.actions(side, 0))]
+    assert bars == pytest.approx([100 * share for share in side.chances[0].tolist()], abs=0.06)
+    assert words.actions(side, 0).count("closed") == int((~side.mask[0]).sum())
+
+
+def test_a_policy_without_probabilities_says_so(match):
+    match.step()
+    assert "no action probabilities" in words.actions(match.sides[1], 0)
+
+
+def test_what_an_agent_is_told_leaves_out_noughts():
+    assert words.told({"time_left": 0.5, "tank": 0.0}).count("<b>") == 1
+    assert "nothing else" in words.told({"tank": 0.0})
+
+
+def test_the_legend_names_every_kind_of_cell_and_every_vehicle(match):
+    text = words.legend(match.sides[0])
+    for name in ("lake", "forest", "fire", "ash", "firebreak", "wet", "bulldozer_2"):
+        assert f"</span>{name}</span>" in text
