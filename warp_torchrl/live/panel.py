@@ -1,5 +1,6 @@
 """One person's controls on the page; each browser has its own."""
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -38,6 +39,7 @@ _LOOK, _LIGHT, _CUT, _SEND = "nothing", "lights it", "cuts a firebreak", "sends 
 _NEED_A_FOLDER = ("landfire", "wildland")
 _ALONE = "nobody"
 _LINES = ("#f2a33a", "#6bb7ea", "#9a9a9a")
+_PAINTED_EVERY = 0.25  # seconds between two pictures of what takes long to make, while the match plays
 _MAP_SIDE = 360  # of the two-dimensional map [pixels]
 
 
@@ -52,6 +54,7 @@ class Panel:
     def __init__(self, page: "Page", client: viser.ClientHandle) -> None:
         self._page, self._client, self._gui = page, client, client.gui
         self._own: list[Any] = []
+        self._painted = 0.0
         self._add_keys()
         self.fill()
 
@@ -190,24 +193,30 @@ class Panel:
     # What is shown
 
     def show(self) -> None:
-        """Show the match as it is."""
-        match, side, agent = self._match, self._side, self._agent
+        """Show the match as it is; while it plays pictures and curves follow a few times a second."""
         with self._client.atomic():
-            change(self._headline, content=words.headline(match))
-            change(self._numbers, content=words.numbers(match))
-            self._plot(self._saved, [each.curves.saved for each in match.everywhere])
-            self._plot(self._burning, [each.curves.burning for each in match.everywhere])
-            change(self._map, image=self._picture())
-            change(self._acts, content=words.acts(side))
-            mover = words.moved_by(side, agent, self._client.client_id)
-            change(self._mover, content=f"Moved by: **{mover}**")
-            change(self._who, content=f"What **{side.env.agent_names[agent]}** sees, and how likely it acts:")
-            change(self._chances, content=words.actions(side, agent))
-            change(self._told, content=words.told(sight.numbers(side, agent)))
-            pictures = sight.pictures(side, agent)
-            for name, handle in self._sights.items():
-                change(handle, image=pictures[name])
+            change(self._headline, content=words.headline(self._match))
+            change(self._numbers, content=words.numbers(self._match))
             self._show_question()
+            if not self._page.playing or time.monotonic() - self._painted > _PAINTED_EVERY:
+                self._paint()
+
+    def _paint(self) -> None:
+        """Show what takes long to make and to send."""
+        match, side, agent = self._match, self._side, self._agent
+        self._painted = time.monotonic()
+        self._plot(self._saved, [each.curves.saved for each in match.everywhere])
+        self._plot(self._burning, [each.curves.burning for each in match.everywhere])
+        change(self._map, image=self._picture())
+        change(self._acts, content=words.acts(side))
+        mover = words.moved_by(side, agent, self._client.client_id)
+        change(self._mover, content=f"Moved by: **{mover}**")
+        change(self._who, content=f"What **{side.env.agent_names[agent]}** sees, and how likely it acts:")
+        change(self._chances, content=words.actions(side, agent))
+        change(self._told, content=words.told(sight.numbers(side, agent)))
+        pictures = sight.pictures(side, agent)
+        for name, handle in self._sights.items():
+            change(handle, image=pictures[name])
 
     def tell(self, line: str, mistake: bool = False) -> None:
         """Tell the person something."""
@@ -272,8 +281,7 @@ class Panel:
             page.restart()
             return
         page.playing = button == "Play" and not self._match.ended
-        if button == "Step":
-            page.step()
+        (page.step if button == "Step" else page.show)()
 
     def _seat(self, take: bool) -> None:
         crew, person = self._side.crew, self._client.client_id

@@ -95,12 +95,8 @@ def bulldozer() -> dict[str, Shape]:
 @lru_cache(maxsize=1)
 def drone() -> dict[str, Shape]:
     """Return the parts of an aircraft that faces east: ``body`` in its own colour, ``iron`` in that of all."""
-    rotors = [(x, y, 0.12) for x in (-0.5, 0.5) for y in (-0.5, 0.5)]
-    discs = [spindle((0.32, 0.32), (0.12, 0.17), 10) for _ in rotors]
-    placed = [
-        Shape(disc.vertices + np.array([x, y, 0.0], dtype=np.float32), disc.faces)
-        for disc, (x, y, _) in zip(discs, rotors)
-    ]
+    disc, rotors = spindle((0.32, 0.32), (0.12, 0.17), 10), [(x, y) for x in (-0.5, 0.5) for y in (-0.5, 0.5)]
+    placed = [Shape(disc.vertices + np.array([x, y, 0.0], dtype=np.float32), disc.faces) for x, y in rotors]
     body = joined(box((0.7, 0.34, 0.26), (0.0, 0.0, 0.0)), box((0.2, 0.2, 0.12), (0.42, 0.0, 0.02)))
     struts = [box((1.1, 0.1, 0.08), (0.0, side, 0.08)) for side in (-0.5, 0.5)]
     return {"body": body, "iron": joined(*placed, *struts, box((0.1, 1.1, 0.08), (0.0, 0.0, 0.08)))}
