@@ -51,6 +51,11 @@ def test_the_example_of_a_prediction_runs(capsys):
     assert names["prediction"].burn_probability[40, 10] == 1.0
 
 
+def test_the_example_of_a_live_match_runs(capsys):
+    exec(blocks("live.md")[0], {})
+    assert re.fullmatch(r"\d+% saved, \d+% without a team\n", capsys.readouterr().out)
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_link_and_picture_of_a_page_is_there(page):
     for target in re.findall(r"\]\(([^)#]+)\)", page.read_text()):

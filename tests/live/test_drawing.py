@@ -82,6 +82,14 @@ def test_without_fire_there_is_neither_flame_nor_smoke_nor_glow():
     assert drawing.glow(state, ground)[1] == 0.0
 
 
+def test_the_glow_stands_over_the_densest_fire_and_grows_with_it():
+    ground = drawing.ground_of(draw("TTTTTTTTTTTTTTTTTTTT"))
+    few, more = draw("aTTTTTTTTTTTTTTTTabT"), draw("aTTTTTTTTTTTTTTTabcT")
+    (x, y, z), strength = drawing.glow(few, ground)
+    assert x == ground.position[17, 0] and (y, z) == (0.0, 4.0), "two cells burn there, and one at the other end"
+    assert strength > 0.0 and drawing.glow(more, ground)[1] > strength
+
+
 def test_smoke_goes_up_and_with_the_wind():
     state = draw("cccc cccc cccc", wind=(10.0, 0.0))
     ground = drawing.ground_of(state)

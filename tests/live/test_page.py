@@ -1,6 +1,7 @@
 """The page: a server of this machine alone, and in a real browser what people do on it."""
 
-import os
+import contextlib
+import io
 import re
 import shutil
 import socket
@@ -8,7 +9,9 @@ import threading
 import time
 from http.client import HTTPConnection
 
+import numpy as np
 import pytest
+from PIL import Image
 
 pytest.importorskip("viser", reason="needs the extra live")
 
@@ -138,10 +141,32 @@ def test_a_person_watches_a_fire_grow_drives_a_vehicle_puts_out_a_cell_and_leave
     tab.get_by_role("button", name="Play", exact=True).click()
     _until(lambda: int(side.state.step[0]) > 8)
     assert page.match.alone.curves.saved[-1] < page.match.alone.curves.saved[0], "the fire grows"
-    if folder := os.environ.get("WARP_TORCHRL_SCREENSHOTS"):
-        tab.screenshot(path=f"{folder}/live_test.png")
     tab.close()
     _until(lambda: side.crew.seats[0].person is None)
+
+
+@pytest.mark.slow
+def test_the_picture_shows_forest_and_fire(page, browser):
+    tab = _open(browser, page)
+    _until(lambda: _share(tab, FOREST) > 0.05)
+    before = _share(tab, BURNING)
+    with page.lock:
+        for index in page._stages[0].ground.trees[::3].tolist():
+            with contextlib.suppress(ValueError):  # a tree that cannot be lit
+                page.match.ignite(index // 16, index % 16)
+        page.show()
+    _until(lambda: _share(tab, BURNING) > before + 0.02)
+
+
+FOREST, BURNING = "forest", "burning"
+
+
+def _share(tab, what):
+    """The share of the picture's pixels, left of the panel, that are green or are orange."""
+    picture = np.asarray(Image.open(io.BytesIO(tab.screenshot())).convert("RGB").crop((0, 0, 840, 800))).astype(int)
+    red, green, blue = picture[..., 0], picture[..., 1], picture[..., 2]
+    found = (green > red + 8) & (green > blue + 8) if what == FOREST else (red > 190) & (red > blue + 70)
+    return found.mean()
 
 
 @pytest.mark.slow

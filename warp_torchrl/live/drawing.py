@@ -29,6 +29,7 @@ VEHICLE_COLOURS = np.array(  # Okabe and Ito 2008, on the dark sides of a vehicl
 )  # fmt: skip
 """Of the vehicles, by their index, uint8 [8, 3]."""
 _FLIGHT = 3.0  # height of aircraft over the ground [cells]
+_GLOW_SIDE = 9  # of the square in which fires shine together [cells]
 _WIND_ARROWS = 5  # along each side of the map
 _SHADE = 0.82  # of the ground under trees
 
@@ -165,12 +166,12 @@ def smoke(state: WorldState, ground: Ground) -> Instances:
 
 
 def glow(state: WorldState, ground: Ground) -> tuple[tuple[float, float, float], float]:
-    """Return where the light of the fires of world 0 comes from, over their middle [cells], and how strong it is."""
-    index = is_burning(state.cells[0]).flatten().nonzero()[:, 0].numpy()
-    if not len(index):
-        return (0.0, 0.0, 0.0), 0.0
-    x, y, z = ground.position[index].mean(axis=0).tolist()
-    return (x, y, z + 5.0), 6.0 * math.sqrt(len(index))
+    """Return where the light of the fires of world 0 comes from, over the densest of them [cells], and its strength."""
+    burning = is_burning(state.cells[:1]).float()
+    around = avg_pool2d(burning, _GLOW_SIDE, stride=1, padding=_GLOW_SIDE // 2)[0] * burning[0]
+    place = int(around.argmax())
+    x, y, z = ground.position[place].tolist()
+    return (x, y, z + 4.0), 40.0 * float(around.flatten()[place].sqrt())
 
 
 def vehicles(state: WorldState, ground: Ground, flies: Tensor, facing: Tensor) -> Instances:

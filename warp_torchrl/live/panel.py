@@ -110,7 +110,7 @@ class Panel:
 
     def _add_watch(self) -> None:
         gui = self._gui
-        self._saved = self._curve("Saved [%]", uplot.Scale(auto=False, range=(0.0, 100.0)))
+        self._saved = self._curve("Saved [%]", uplot.Scale(auto=False, range=(0.0, 104.0)))
         self._burning = self._curve("Burning [%]", uplot.Scale(auto=True))
         self._map = gui.add_image(self._picture(), label="Map", format="png")
         self._acts = gui.add_markdown("")
@@ -326,13 +326,15 @@ class Panel:
         self._page.show()
 
     def _load(self) -> None:
-        overrides = self._page.given.overrides
-        if self._scenario.value != self._scenario_of(self._page.given):
-            overrides = (f"scenario={self._scenario.value}",)
-        beside = None if self._beside.value == _ALONE else self._beside.value
-        self._page.open(
-            Match(Setting(policy=self._policy.value, beside=beside, seed=int(self._seed.value), overrides=overrides))
+        scenario, policy, beside = (_chosen(each) for each in (self._scenario, self._policy, self._beside))
+        is_given = scenario == self._scenario_of(self._page.given)
+        setting = Setting(
+            policy=policy,
+            beside=None if beside == _ALONE else beside,
+            seed=int(self._seed.value),
+            overrides=self._page.given.overrides if is_given else (f"scenario={scenario}",),
         )
+        self._page.open(Match(setting))
 
     # What there is to choose
 
@@ -354,3 +356,14 @@ class Panel:
         if setting.overrides == self._page.given.overrides:
             return " ".join(("as started:", *setting.overrides)) if setting.overrides else "the policy's own"
         return self._match.scenario
+
+
+def _chosen(dropdown: Any) -> str:
+    """Return what is chosen, which a browser may not make up: it could name a file of this machine.
+
+    Raises:
+        ValueError: If it is none of the options.
+    """
+    if dropdown.value not in dropdown.options:
+        raise ValueError(f"{dropdown.label} must be one of {', '.join(dropdown.options)}, got {dropdown.value}")
+    return str(dropdown.value)
