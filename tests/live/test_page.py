@@ -8,6 +8,7 @@ import socket
 import threading
 import time
 from http.client import HTTPConnection
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from tests.live.conftest import SMALL
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.live.match import Setting
 from warp_torchrl.live.page import Address, Page
+from warp_torchrl.live.panel import _chosen
 from warp_torchrl.world.state import Action, is_tree
 
 BROWSER = next((path for name in ("chromium", "google-chrome") if (path := shutil.which(name))), None)
@@ -74,6 +76,39 @@ def _until(holds, seconds=60.0):
     while not holds():
         assert time.monotonic() < end, "it took too long"
         time.sleep(0.05)
+
+
+def test_a_match_that_fails_stands_still_and_the_page_stays(page, monkeypatch):
+    def fail():
+        raise RuntimeError("an ability of one's own\nhas a mistake")
+
+    told = []
+    monkeypatch.setattr(page.match, "step", fail)
+    monkeypatch.setattr(page, "tell", lambda line, mistake=False: told.append((line, mistake)))
+    page.playing, page.pace = True, 100.0
+    clock = threading.Thread(target=page.play)
+    clock.start()
+    _until(lambda: told)
+    assert told == [("RuntimeError: an ability of one's own has a mistake", True)] and not page.playing
+    assert clock.is_alive()
+    page.stop()
+    clock.join(timeout=10)
+
+
+def test_a_new_start_shows_the_ground_of_its_seed(page):
+    before = page._stages[0].tiles.batched_colors.copy()
+    page.restart(page.match.setting.seed + 1)
+    assert (page._stages[0].tiles.batched_colors != before).any()
+    page.restart(page.match.setting.seed - 1)
+    assert (page._stages[0].tiles.batched_colors == before).all()
+
+
+def test_a_browser_cannot_name_what_it_was_not_offered():
+    offered = SimpleNamespace(value="/etc", options=("default", "local"), label="Policy")
+    with pytest.raises(ValueError, match="Policy must be one of default, local, got /etc"):
+        _chosen(offered)
+    offered.value = "local"
+    assert _chosen(offered) == "local"
 
 
 def test_what_is_drawn_follows_the_match(page):
@@ -133,7 +168,6 @@ def test_a_person_watches_a_fire_grow_drives_a_vehicle_puts_out_a_cell_and_leave
         page.match.ignite(row, column)
         page.show()
     assert side.curves.burning[-1] > before
-    tab.get_by_role("tab", name="Drive").click()
     tab.keyboard.press("f")
     _until(lambda: int(side.curves.extinguished[0]) == 1)
     assert bool(side.state.extinguished[0, row, column])
@@ -156,6 +190,27 @@ def test_the_picture_shows_forest_and_fire(page, browser):
                 page.match.ignite(index // 16, index % 16)
         page.show()
     _until(lambda: _share(tab, BURNING) > before + 0.02)
+
+
+@pytest.mark.slow
+def test_a_click_on_the_ground_lights_the_cell_that_was_clicked_and_one_in_the_sky_none(page, browser):
+    tab, before = _open(browser, page), page.match.alone.state.cells.clone()
+    tab.get_by_role("tab", name="World").click()
+    tab.get_by_label("A click on a cell").click()
+    tab.get_by_role("option", name="lights it", exact=True).click()
+    _until(lambda: _share(tab, FOREST) > 0.05)
+
+    def lit():
+        return ((page.match.alone.state.cells > 10) & (before <= 10))[0].nonzero().tolist()
+
+    tab.mouse.click(60, 60)
+    for x, y in ((420, 420), (360, 440), (300, 460), (480, 420)):  # one of them may be bare
+        tab.mouse.click(x, y)
+        time.sleep(1.0)
+        if lit():
+            break
+    panel = next(iter(page._panels.values()))
+    assert lit() == [[int(each) for each in panel._cell.value]]
 
 
 FOREST, BURNING = "forest", "burning"

@@ -119,9 +119,7 @@ class Page:
         while not self._stopped.is_set():
             began = time.monotonic()
             with self.lock:
-                self._follow()
-                if self.playing:
-                    self.step()
+                self._go_on()
             self._stopped.wait(max(0.002, 1.0 / self.pace - (time.monotonic() - began)))
 
     def stop(self) -> None:
@@ -132,22 +130,8 @@ class Page:
 
     def open(self, match: Match) -> None:
         """Show another match from its start."""
-        for stage in self._stages:
-            stage.remove()
         self.match, self.playing = match, False
-        rows, columns = match.world.size
-        apart = columns * 1.14
-        first = -apart * (len(match.sides) - 1) / 2.0
-        self._stages = [
-            Stage(self.server, index, side, first + index * apart) for index, side in enumerate(match.sides)
-        ]
-        for index, stage in enumerate(self._stages):
-            stage.tiles.on_click(self._clicked(index))
-        away = max(1.22 * (apart * (len(match.sides) - 1) + columns), 1.4 * rows)
-        aside = 0.15 * away  # the panel stands on the right
-        self.server.initial_camera.position = (aside, -0.8 * away, 0.66 * away)
-        self.server.initial_camera.look_at = (aside, -0.02 * away, 0.0)
-        self.server.initial_camera.fov = 0.8
+        self._set_stages()
         for panel in self._panels.values():
             panel.fill()
         self.show()
@@ -166,7 +150,9 @@ class Page:
             ValueError: If the seed is out of range.
         """
         self.match.restart(seed)
-        self.open(self.match)
+        self.playing = False
+        self._set_stages()
+        self.show()
 
     def show(self) -> None:
         """Draw the match as it is, here and on every panel."""
@@ -175,12 +161,39 @@ class Page:
         for panel in list(self._panels.values()):
             panel.show()
 
-    def tell(self, line: str) -> None:
+    def tell(self, line: str, mistake: bool = False) -> None:
         """Tell everybody something."""
         for panel in list(self._panels.values()):
-            panel.tell(line)
+            panel.tell(line, mistake)
 
     # Parts
+
+    def _set_stages(self) -> None:
+        match = self.match
+        for stage in self._stages:
+            stage.remove()
+        rows, columns = match.world.size
+        apart = columns * 1.14
+        first = -apart * (len(match.sides) - 1) / 2.0
+        self._stages = [
+            Stage(self.server, index, side, first + index * apart) for index, side in enumerate(match.sides)
+        ]
+        for index, stage in enumerate(self._stages):
+            stage.tiles.on_click(self._clicked(index))
+        away = max(1.22 * (apart * (len(match.sides) - 1) + columns), 1.4 * rows)
+        aside = 0.15 * away  # the panel stands on the right
+        self.server.initial_camera.position = (aside, -0.8 * away, 0.66 * away)
+        self.server.initial_camera.look_at = (aside, -0.02 * away, 0.0)
+        self.server.initial_camera.fov = 0.8
+
+    def _go_on(self) -> None:
+        try:
+            self._follow()
+            if self.playing:
+                self.step()
+        except Exception as error:  # the page stays, to show what the match had come to, and to load another
+            self.playing = False
+            self.tell(f"{type(error).__name__}: {' '.join(str(error).split())}", mistake=True)
 
     def _furnish(self) -> None:
         self.server.gui.configure_theme(control_width="large", dark_mode=True, show_logo=False, show_share_button=False)

@@ -230,7 +230,7 @@ class Panel:
         handle.data = (np.arange(count, dtype=np.float64), *rows)
 
     def _show_question(self) -> None:
-        self._asked = self._match.questions() if self._side.crew.asks else []
+        self._asked = self._match.questions()  # the policy proposes: its probabilities are of what it sees now
         names, actions = self._side.env.agent_names, self._side.env.action_names
         lines = [f"**{names[each.agent]}** is about to **{actions[each.action]}**." for each in self._asked]
         change(self._asking, content="\n\n".join(lines))
