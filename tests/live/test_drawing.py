@@ -42,6 +42,13 @@ def test_tiles_lie_on_the_slope():
     assert np.allclose(normal, [-2 / math.sqrt(5), 0.0, 1 / math.sqrt(5)], atol=1e-6)
 
 
+def test_tiles_lie_on_a_slope_that_rises_to_the_south():
+    south = [[30.0 * row] * WIDTH for row in range(HEIGHT)]
+    w, x, y, z = drawing.ground_of(draw(MAP, elevation=south)).turn[5]
+    normal = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]
+    assert np.allclose(normal, [0.0, 2 / math.sqrt(5), 1 / math.sqrt(5)], atol=1e-6), "it looks to the north"
+
+
 def test_the_block_is_closed():
     faces = drawing.ground_of(draw(MAP, elevation=SLOPE)).block.faces
     edges = {tuple(edge) for edge in faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).tolist()}

@@ -75,6 +75,10 @@ def test_who_is_on_a_vehicle_is_obeyed_and_the_others_go_on(make_match):
     assert match.step() == []
     assert int(side.state.vehicles.last_action[0, 0]) == open_move
     assert not side.state.vehicles.position[0, 0].equal(before[0])
+    assert int(side.facing[0]) == open_move
+    side.crew.press(0, 1, int(Action.STAY))
+    match.step()
+    assert int(side.facing[0]) == open_move, "it faces where it last moved"
 
 
 def test_a_driven_vehicle_puts_out_a_cell(make_match):

@@ -51,7 +51,11 @@ def test_no_file_outside_of_the_browser_s_program_is_served(page, path):
     link.close()
 
 
-def test_nothing_is_shared_when_a_browser_asks(page):
+def test_nothing_is_shared_when_a_browser_asks(page, monkeypatch):
+    def tunnel(*given):
+        raise AssertionError("a tunnel to the public network")
+
+    monkeypatch.setattr("viser._viser.ViserTunnel", tunnel)
     assert page.server.request_share_url() is None
 
 

@@ -24,9 +24,12 @@ def test_a_channel_is_dark_where_it_shows_its_least_and_bright_where_it_shows_it
     at = names.index("off_map")
     view[at] = 0
     view[at, 0, 0] = 255
+    view[at, 0, -1] = 51
     picture = sight.pictures(side, 0, tile=70)["view"]
     row, column = at // 4 * (74 + 13) + 13, at % 4 * 74
     assert picture[row + 3, column + 3].sum() > 700 and picture[row + 66, column + 66].sum() < 120
+    # A fifth of the way from the darkest colour: four fifths towards the second of five, (92, 44, 110).
+    assert picture[row + 3, column + 66].tolist() == [77, 39, 95]
 
 
 def test_numbers_have_their_names(side):

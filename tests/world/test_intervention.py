@@ -1,5 +1,6 @@
 """What people do to a world: cells that they light or clear, counted as those of the rules."""
 
+import pytest
 import torch
 
 from tests.world.drawing import draw
@@ -62,9 +63,15 @@ def test_under_a_law_with_a_clock_the_fire_goes_on_from_a_lit_cell():
     world = World(landscape=_Forest(), wind=Calm(), fire=RateFire(), team=Team(n_agents=1))
     state = world.reset(torch.tensor([0]), torch.tensor([0]))
     assert state.cover[0].equal(cover.to(torch.uint8))
+    for _ in range(5):
+        state = advance(state, world.fire, world.air, torch.ones(1, dtype=torch.bool))
     far = torch.zeros(1, 9, 9, dtype=torch.bool)
     far[0, 0, 0] = True
-    state = ignited(state, world.fire, far & can_be_lit(state, world.fire))
+    before, state = state, ignited(state, world.fire, far & can_be_lit(state, world.fire))
+    # The fire has reached the corner after five ticks, from itself; elsewhere nothing has changed.
+    assert float(state.arrivals.minutes[0, 0, 0]) == pytest.approx(5 * world.fire.minutes)
+    assert int(state.arrivals.origin[0, 0, 0]) == 0 and int(state.cells[0, 0, 0]) == 11
+    assert state.arrivals.minutes[0, 1:].equal(before.arrivals.minutes[0, 1:])
     for _ in range(60):
         state = advance(state, world.fire, world.air, torch.ones(1, dtype=torch.bool))
     assert (state.cells[0, :2, :2] != 10).sum() > 1, "its neighbours caught fire"
