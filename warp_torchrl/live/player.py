@@ -11,8 +11,9 @@ from torch import Tensor
 from torchrl.envs.utils import set_exploration_type
 
 from warp_torchrl.api import policy_of
-from warp_torchrl.config.compose import compose_config, plain, restore
+from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.config.saved_config import restore
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS
