@@ -21,7 +21,7 @@ def crew():
 
 
 def acts(crew, possible=OPEN, proposed=POLICY):
-    action, told = crew.decide(proposed, crew.mask(possible, PLACE), possible, PLACE)
+    action, _, told = crew.decide(proposed, crew.mask(possible, PLACE), possible, PLACE)
     return action.tolist(), told
 
 

@@ -194,7 +194,8 @@ def test_when_the_time_is_up_nothing_can_be_lit(make_match):
 
 def test_the_fire_goes_on_after_a_team_is_done(make_match):
     match = make_match("noop", ("horizon=40",))
-    match.sides[0].enter(match.sides[0].state.replace(terminated=torch.tensor([True])))
+    side = match.sides[0]
+    side.shown = side.env.set_state(side.state.replace(terminated=torch.tensor([True])))
     run(match, 3)
     assert int(match.alone.state.step[0]) == 3 and int(match.sides[0].state.step[0]) == 0 and not match.ended
 

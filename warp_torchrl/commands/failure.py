@@ -10,6 +10,7 @@ from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.parallel import WorkerDied
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.exit_codes import DISK, DONE, IN_USE, MISTAKE, NUMERICAL, UNSOUND
+from warp_torchrl.runs.sealed import Unsound
 from warp_torchrl.training.finite import NumericalFailure
 from warp_torchrl.training.signals import Stopped
 
@@ -33,7 +34,7 @@ def _diagnose(error: Exception) -> tuple[int, str]:
         return 128 + error.number, line
     if isinstance(error, checkpoints.RunFolderInUse):
         return IN_USE, line
-    if isinstance(error, checkpoints.CheckpointError):
+    if isinstance(error, Unsound):
         return UNSOUND, line
     if isinstance(error, NumericalFailure):
         return NUMERICAL, line

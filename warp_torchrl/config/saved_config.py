@@ -10,9 +10,9 @@ from typing import Any
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from warp_torchrl.config.compose import OPTION, compose_config, conf_folder, plain
+from warp_torchrl.config.compose import OPTION, compose_config, conf_folder, option_of, plain, without_targets
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.run_config import COMPONENTS, WORLD_KEYS
+from warp_torchrl.config.run_config import COMPONENTS, ENVIRONMENT, WORLD_KEYS
 
 _BEFORE = {
     "model.symmetry": "none",
@@ -36,6 +36,17 @@ class SavedConfig:
 
     choices: dict[str, str] = field(default_factory=dict)
     values: dict[str, Any] = field(default_factory=dict)
+
+
+def environment_record(values: Mapping[str, Any]) -> SavedConfig:
+    """Return what a composed configuration, as plain values, says of its environment.
+
+    Raises:
+        ConfigError: If a class is none that an option of ours names.
+    """
+    choices = {group: option_of(group, values[group]["_target_"]) for group in ENVIRONMENT}
+    kept = {key: values[key] for key in dict.fromkeys((*WORLD_KEYS, *ENVIRONMENT)) if key in values}
+    return SavedConfig(choices={"scenario": values["scenario"], **choices}, values=without_targets(kept))
 
 
 def restore(record: SavedConfig, overrides: Sequence[str] = ()) -> DictConfig:

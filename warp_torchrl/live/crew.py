@@ -8,6 +8,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from warp_torchrl.demonstrations.recording import Mover
 from warp_torchrl.heuristics import idle_action
 from warp_torchrl.live.order import Order
 from warp_torchrl.nearest import did_you_mean
@@ -169,7 +170,9 @@ class Crew:
             and each not in self._answers
         ]
 
-    def decide(self, proposed: Tensor, mask: Tensor, possible: Tensor, position: Tensor) -> tuple[Tensor, list[str]]:
+    def decide(
+        self, proposed: Tensor, mask: Tensor, possible: Tensor, position: Tensor
+    ) -> tuple[Tensor, list[Mover], list[str]]:
         """Return what each vehicle does in a step that has no open question, and forget what was asked for it.
 
         Args:
@@ -179,29 +182,31 @@ class Crew:
             position: (row, column) of each vehicle, int64 [A, 2] [cells].
 
         Returns:
-            Actions, int64 [A], and a line for each act of a person that was refused.
+            Actions, int64 [A], whose each is, and a line for each act of a person that was refused.
         """
         action, idle, told = proposed.clone(), idle_action(possible, self.team), []
+        movers = [Mover.POLICY] * self.team.n_agents
         for agent, seat in enumerate(self.seats):
             if seat.person is not None:
-                action[agent], refusal = self._driven(agent, seat, possible[agent], int(idle[agent]))
+                action[agent], movers[agent], refusal = self._driven(agent, seat, possible[agent], int(idle[agent]))
                 told += refusal
             elif self._answers.get(Question(agent, int(proposed[agent]))) is False:
-                action[agent] = idle[agent]
-            elif seat.order is not None and not mask[agent, proposed[agent]]:
-                # A baseline reads the world and not the mask.
-                move = seat.order.nearest_move(mask[agent], position[agent], self._strides()[agent])
-                action[agent] = idle[agent] if move is None else move
+                action[agent], movers[agent] = idle[agent], Mover.FORBIDDEN
+            elif seat.order is not None:
+                movers[agent] = Mover.ORDER
+                if not mask[agent, proposed[agent]]:  # a baseline reads the world and not the mask
+                    move = seat.order.nearest_move(mask[agent], position[agent], self._strides()[agent])
+                    action[agent] = idle[agent] if move is None else move
         self._answers.clear()
-        return action, told
+        return action, movers, told
 
-    def _driven(self, agent: int, seat: Seat, possible: Tensor, idle: int) -> tuple[int, list[str]]:
+    def _driven(self, agent: int, seat: Seat, possible: Tensor, idle: int) -> tuple[int, Mover, list[str]]:
         if not seat.keys:
-            return idle, []
+            return idle, Mover.WAITING, []
         wanted = seat.keys.popleft()
         if possible[wanted] or wanted == idle:
-            return wanted, []
-        return idle, [f"{self.name(agent)}: {self.team.action_names[wanted]} would do nothing here"]
+            return wanted, Mover.PERSON, []
+        return idle, Mover.WAITING, [f"{self.name(agent)}: {self.team.action_names[wanted]} would do nothing here"]
 
     def _check_drives(self, agent: int, person: int) -> None:
         if self.seats[agent].person != person:

@@ -4,25 +4,24 @@ All sides have the same seed. Every draw of a world is a function of seed, episo
 by what the teams do, and by nothing else.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import torch
 from torch import Tensor
 
 from warp_torchrl.config.run_config import ENVIRONMENT, build_components
+from warp_torchrl.config.saved_config import environment_record
 from warp_torchrl.config.seeds import FIRST_EVALUATED
+from warp_torchrl.demonstrations.events import at_cell
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.live.crew import Question, Refused
 from warp_torchrl.live.player import Found, Player
 from warp_torchrl.live.side import Side
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.intervention import can_be_lit, cleared, ignited
+from warp_torchrl.world.intervention import can_be_lit
 from warp_torchrl.world.state import is_tree
-from warp_torchrl.world.wind import constant_wind
-from warp_torchrl.world.world import World, in_wind
+from warp_torchrl.world.world import World
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,12 +69,14 @@ class Match:
         self.sides: list[Side] = []
         for each in found:
             # Each sees what it was trained to see, in the first one's world.
-            seen = parts if each is found[0] else build_components(each.config(setting.overrides), ENVIRONMENT)
+            values = {**config, "observation": each.config(setting.overrides)["observation"]}
+            seen = build_components(values, ENVIRONMENT)
             env = WildfireEnv(self.world, observation=seen["observation"], reward=parts["reward"], seed=setting.seed)
             env.reset()
-            self.sides.append(Side(env, each.player(env, setting.seed)))
+            self.sides.append(Side(env, each.player(env, setting.seed), environment_record(values)))
         alone = WildfireEnv(self.world, observation=parts["observation"], reward=parts["reward"], seed=setting.seed)
-        self.alone = Side(alone, Player("without a team", HEURISTICS["noop"](alone), "sampled", setting.seed))
+        nobody = Player("without a team", HEURISTICS["noop"](alone), "sampled", setting.seed)
+        self.alone = Side(alone, nobody, environment_record(config))
         self.restart()
 
     @property
@@ -134,13 +135,8 @@ class Match:
         Raises:
             ValueError: If the speed is out of its range.
         """
-        turn = math.radians(direction)
-        u, v = speed * math.cos(turn), speed * math.sin(turn)
-        world = replace(self.world, wind=constant_wind(u, v))
-        field = torch.tensor([u, v]).view(1, 2, 1, 1)
         for side in self.everywhere:
-            side.env.world = world
-            side.enter(in_wind(side.state, world.fire, field))
+            side.intervene("blow", speed, direction)
 
     def ignite(self, row: int, column: int) -> None:
         """Light a cell, on every side where it can burn.
@@ -154,7 +150,7 @@ class Match:
         if not any(where):
             raise Refused(f"cell {row}, {column} holds no dry tree that can burn")
         for side in self.everywhere:
-            side.enter(ignited(side.state, self.world.fire, here))
+            side.intervene("ignite", row, column)
 
     def clear(self, row: int, column: int) -> None:
         """Cut a firebreak into a cell, on every side where it holds a tree that does not burn.
@@ -167,7 +163,7 @@ class Match:
         if not any(bool((is_tree(side.state.cells) & here).any()) for side in self.everywhere):
             raise Refused(f"cell {row}, {column} holds no tree to clear")
         for side in self.everywhere:
-            side.enter(cleared(side.state, here))
+            side.intervene("clear", row, column)
 
     def _check_time(self) -> None:
         if bool(self.sides[0].state.truncated[0]):
@@ -190,6 +186,4 @@ class Match:
             Refused: If it is not on the map.
         """
         self.check_cell(row, column)
-        here = torch.zeros_like(self.alone.state.cells, dtype=torch.bool)
-        here[:, row, column] = True
-        return here
+        return at_cell(self.alone.env, row, column)

@@ -5,8 +5,11 @@ from dataclasses import dataclass, field
 import torch
 from torch import Tensor
 
+from warp_torchrl.config.saved_config import SavedConfig
+from warp_torchrl.demonstrations.events import Event, carry_out
+from warp_torchrl.demonstrations.recording import Recording, Tape
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.live.crew import Crew, Question
+from warp_torchrl.live.crew import Crew, Question, Refused
 from warp_torchrl.live.order import Order
 from warp_torchrl.live.player import Player
 from warp_torchrl.models import ACTION, ACTION_MASK
@@ -39,10 +42,11 @@ class Side:
     Args:
         env: Of one world.
         player: Its policy.
+        environment: The environment's configuration.
     """
 
-    def __init__(self, env: WildfireEnv, player: Player) -> None:
-        self.env, self.player, self.crew = env, player, Crew(env.world.team)
+    def __init__(self, env: WildfireEnv, player: Player, environment: SavedConfig) -> None:
+        self.env, self.player, self.crew, self.environment = env, player, Crew(env.world.team), environment
         self.world = env.world
         env.watcher = self._count
         self.chances: Tensor | None = None
@@ -79,6 +83,7 @@ class Side:
         self.curves = Curves(
             extinguished=torch.zeros(agents, dtype=torch.int64), cleared=torch.zeros(agents, dtype=torch.int64)
         )
+        self.tape, self.seed = Tape(), seed
         self.crew.restart()
         self.player.restart(seed)
         self._proposed: Tensor | None = None
@@ -97,9 +102,10 @@ class Side:
         if self.ended or self._proposed is None:
             return []
         position = self.state.vehicles.position[0]
-        action, told = self.crew.decide(self._proposed, self.mask, self.possible, position)
+        action, movers, told = self.crew.decide(self._proposed, self.mask, self.possible, position)
+        before, self.shown = self.shown, self.env.step(self.shown.set(ACTION, action[None]))["next"]
+        self.tape.add(before, self._proposed, movers, self.shown)
         self._proposed = None
-        self.shown = self.env.step(self.shown.set(ACTION, action[None]))["next"]
         self._note()
         return told
 
@@ -112,9 +118,35 @@ class Side:
         self.crew.order(agent, order)
         self._proposed = None
 
-    def enter(self, state: WorldState) -> None:
-        """Go on from another state of the world: what people did to it."""
-        self.shown = self.env.set_state(state)
+    def record(self) -> Recording:
+        """Return the episode as it was played so far.
+
+        Raises:
+            Refused: If nothing was played.
+        """
+        if not self.tape.rows:
+            raise Refused("nothing was played yet: there is no step to keep")
+        return Recording(
+            steps=self.tape.steps(),
+            environment=self.environment,
+            seed=self.seed,
+            events=tuple(self.tape.events),
+            policy=self.player.name,
+            frames=self.player.frames,
+            agents=tuple(self.env.agent_names),
+            actions=tuple(self.env.action_names),
+        )
+
+    def intervene(self, kind: str, *numbers: float) -> None:
+        """Let an event happen, one of ``KINDS``: what people do to the world.
+
+        Raises:
+            ValueError: If a number is out of its range.
+        """
+        row, column = numbers
+        event = Event(step=len(self.tape.rows), kind=kind, numbers=(float(row), float(column)))
+        self.shown = carry_out(self.env, event)
+        self.tape.events.append(event)
         self._proposed = None
         self.curves.saved.pop()
         self.curves.burning.pop()

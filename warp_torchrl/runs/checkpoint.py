@@ -23,11 +23,11 @@ from warp_torchrl.runs.manifest import (
     TRAINING,
     CheckpointError,
     Manifest,
-    first_line,
-    read_json,
+    of_a_checkpoint,
     read_manifest,
     write_manifest,
 )
+from warp_torchrl.runs.sealed import first_line, read_json
 
 __all__ = [
     "MANIFEST",
@@ -61,7 +61,8 @@ class Checkpoint:
 
     def record(self) -> SavedConfig:
         """Return the training's configuration."""
-        content = read_json(self.path / "config.json")
+        with of_a_checkpoint():
+            content = read_json(self.path / "config.json")
         choices, values = content.get("choices"), content.get("values")
         if not (isinstance(choices, dict) and isinstance(values, dict)):
             raise CheckpointError(f"{self.path / 'config.json'} must hold choices and values")

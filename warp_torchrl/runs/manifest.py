@@ -1,8 +1,7 @@
 """``manifest.json`` of a checkpoint, with the size and sha256 of every file and a sha256 of its own content."""
 
-import hashlib
-import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -15,6 +14,7 @@ import torchrl
 from warp_torchrl.models import Entry, Signature
 from warp_torchrl.observation import DEFAULT, PICTURE, STATE, STATE_SYMMETRY, former_symmetry
 from warp_torchrl.observation.own import IDENTITY, SELF
+from warp_torchrl.runs.sealed import Files, Unsound, check_files, check_seal, described, read_json, sealed
 from warp_torchrl.symmetry import Symmetry, from_plain, to_plain
 from warp_torchrl.world.role import PAPER_ROLES
 from warp_torchrl.world.state import Action
@@ -26,7 +26,6 @@ MANIFEST = "manifest.json"
 TRAINING = "training.pt"
 _POLICY = ("policy.pt", "config.json")  # of an exported policy
 _FILES = ("policy.pt", TRAINING, "config.json")
-_LARGEST_JSON = 1_000_000
 _FORMER_NAMES = {
     "view": (DEFAULT,),
     "picture": (PICTURE,),
@@ -37,8 +36,17 @@ _FORMER_ACTIONS = tuple(action.name.lower() for action in Action)
 """Channels and actions of manifests without names; one entry had two lengths."""
 
 
-class CheckpointError(Exception):
+class CheckpointError(Unsound):
     """There is no sound checkpoint; the message is one line."""
+
+
+@contextmanager
+def of_a_checkpoint() -> Iterator[None]:
+    """Raise what is unsound as a ``CheckpointError``."""
+    try:
+        yield
+    except Unsound as error:
+        raise CheckpointError(str(error)) from None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +69,7 @@ class Manifest:
     signature: Signature
     mode: str | None
     versions: dict[str, str]
-    files: dict[str, dict[str, Any]]
+    files: Files
 
     def __post_init__(self) -> None:
         if type(self.frames) is not int or self.mode not in (None, "sampled", "deterministic"):
@@ -74,13 +82,9 @@ def read_manifest(folder: Path) -> Manifest:
     Raises:
         CheckpointError: If a file is missing, altered, or not of a known format.
     """
-    manifest = _parse_manifest(folder)
-    for name, entry in manifest.files.items():
-        path, size = folder / name, entry["size"]
-        if not path.is_file() or path.stat().st_size != size:
-            raise CheckpointError(f"{path} is missing or was cut: {size} bytes are expected")
-        if _sha256(path) != entry["sha256"]:
-            raise CheckpointError(f"{path} was altered: its sha256 is not the manifest's")
+    with of_a_checkpoint():
+        manifest = _parse_manifest(folder)
+        check_files(folder, manifest.files)
     return manifest
 
 
@@ -92,9 +96,7 @@ def _parse_manifest(folder: Path) -> Manifest:
             f"{folder} has format {content.get('format')!r}, this version reads {', '.join(map(str, _READ))}"
         )
     if content["format"] == FORMAT:
-        content.pop("sha256", None)
-        if path.read_bytes() != _sealed(content):
-            raise CheckpointError(f"{path} was altered: its sha256 is not its own")
+        check_seal(path, content)
     try:
         signature = _signature_from_json(content.pop("signature"))
         manifest = Manifest(signature=signature, **content)
@@ -104,29 +106,6 @@ def _parse_manifest(folder: Path) -> Manifest:
     if set(files) not in (set(_FILES), set(_POLICY)):
         raise CheckpointError(f"{path} must list {', '.join(_FILES)}; a policy alone lists no {TRAINING}")
     return manifest
-
-
-def _sealed(content: Mapping[str, Any]) -> bytes:
-    """Return the exact bytes of a manifest with this content and its sha256."""
-    digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()
-    return json.dumps({**content, "sha256": digest}, indent=1).encode()
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """Return the mapping in a JSON file.
-
-    Raises:
-        CheckpointError: If the file cannot be read or holds no mapping.
-    """
-    try:
-        if path.stat().st_size > _LARGEST_JSON:
-            raise CheckpointError(f"{path} is too large to be one of ours")
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise CheckpointError(f"{path} cannot be read: {first_line(error)}") from None
-    if not isinstance(content, dict):
-        raise CheckpointError(f"{path} must hold a mapping")
-    return content
 
 
 def write_manifest(folder: Path, frames: int, scenario: str, signature: Signature, mode: str | None) -> None:
@@ -139,23 +118,9 @@ def write_manifest(folder: Path, frames: int, scenario: str, signature: Signatur
         signature=signature,
         mode=mode,
         versions={name: library.__version__ for name, library in libraries.items()},
-        files={name: _describe(folder / name) for name in _FILES if (folder / name).exists()},
+        files=described(folder, (name for name in _FILES if (folder / name).exists())),
     )
-    (folder / MANIFEST).write_bytes(_sealed(asdict(manifest) | {"signature": _signature_to_json(signature)}))
-
-
-def _describe(path: Path) -> dict[str, Any]:
-    return {"size": path.stat().st_size, "sha256": _sha256(path)}
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def first_line(error: Exception) -> str:
-    """Return the first line of an error's message."""
-    return (str(error).splitlines() or [type(error).__name__])[0]
+    (folder / MANIFEST).write_bytes(sealed(asdict(manifest) | {"signature": _signature_to_json(signature)}))
 
 
 def _signature_to_json(signature: Signature) -> dict[str, Any]:

@@ -1,0 +1,39 @@
+"""A recording plays again, exactly."""
+
+import pytest
+import torch
+
+from warp_torchrl.demonstrations.files import read, save
+from warp_torchrl.demonstrations.replay import Replay
+from warp_torchrl.runs.sealed import Unsound
+
+
+def test_the_worlds_are_those_that_were_played(match, recording, tmp_path):
+    last = Replay(read(save(recording, tmp_path))).check()
+    for name, value in match.sides[0].state.what_changes().items():
+        assert torch.equal(last.what_changes()[name], value), name
+
+
+def test_it_yields_the_start_and_every_step(recording):
+    states = list(Replay(recording).states())
+    assert [int(each.step[0]) for each in states] == list(range(13))
+
+
+@pytest.mark.parametrize("left_out", [0, 1, 2])
+def test_without_one_of_the_events_another_episode_is_played(recording, left_out):
+    events = tuple(each for at, each in enumerate(recording.events) if at != left_out)
+    object.__setattr__(recording, "events", events)
+    with pytest.raises(Unsound, match=r"step \d+ of the recording is not what this version plays"):
+        Replay(recording).check()
+
+
+def test_another_action_is_told(recording):
+    recording.steps["agents", "action"][5, 2] = (recording.steps["agents", "action"][5, 2] + 4) % 8
+    with pytest.raises(Unsound, match="is not what this version plays"):
+        Replay(recording).check()
+
+
+def test_a_configuration_of_another_version_is_told(recording):
+    recording.environment.values["nothing"] = {"such": 1}
+    with pytest.raises(ValueError, match="nothing"):
+        Replay(recording)

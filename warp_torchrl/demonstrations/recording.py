@@ -1,0 +1,108 @@
+"""A recording: the steps of one episode as TorchRL data, and where they were."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import torch
+from tensordict import TensorDict, TensorDictBase
+from torch import Tensor
+
+from warp_torchrl.config.saved_config import SavedConfig
+from warp_torchrl.demonstrations.events import Event
+from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, REWARD
+
+PROPOSED, MOVER = ("agents", "proposed"), ("agents", "mover")
+ROLE = ("agents", "role")
+_SHOWN = (OBSERVATION, ACTION_MASK, ROLE)
+_ENDS = (REWARD, "done", "terminated", "truncated")
+
+
+class Mover(IntEnum):
+    """Whose an agent's action was."""
+
+    POLICY = 0
+    ORDER = 1
+    """The policy's, under an order of a person."""
+    PERSON = 2
+    WAITING = 3
+    """None: the person who drives the vehicle asked for nothing in this step, or for what would do nothing."""
+    FORBIDDEN = 4
+    """None: a person forbade what the policy proposed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recording:
+    """An episode, from its start to wherever it was left.
+
+    Attributes:
+        steps: Batch size [T], as TorchRL's collectors have it: what each agent saw, ``("agents", "observation")`` and
+            ``("agents", "action_mask")``; what it did, ``("agents", "action")`` int64 [T, A]; what the policy proposed,
+            ``("agents", "proposed")`` int64 [T, A]; whose the action was, ``("agents", "mover")`` uint8 [T, A], see
+            ``Mover``; ``("next", "agents", "reward")`` float32 [T, A, 1]; and ``("next", "done")``,
+            ``("next", "terminated")``, ``("next", "truncated")``, bool [T, 1].
+        environment: Its configuration.
+        seed: Of the episode, which is the seed's first.
+        events: What people did to the world, in their order.
+        policy: What it is called.
+        frames: World steps that the policy was trained for; None for a baseline.
+        agents: Names of the agents.
+        actions: Names of the actions.
+    """
+
+    steps: TensorDictBase
+    environment: SavedConfig
+    seed: int
+    events: tuple[Event, ...]
+    policy: str
+    frames: int | None
+    agents: tuple[str, ...]
+    actions: tuple[str, ...]
+
+    @property
+    def scenario(self) -> str:
+        """Return the name of its scenario."""
+        return self.environment.choices["scenario"]
+
+    def by(self, mover: Mover) -> Tensor:
+        """Return which actions were whose, bool [T, A]."""
+        return self.steps[MOVER] == mover
+
+    def corrected(self) -> Tensor:
+        """Return where a person did other than the policy proposed, bool [T, A]."""
+        return self.by(Mover.PERSON) & (self.steps[ACTION] != self.steps[PROPOSED])
+
+
+@dataclass
+class Tape:
+    """The steps of an episode that is being played.
+
+    Attributes:
+        rows: A TensorDict of batch size [] for each step.
+        events: What people have done to the world.
+    """
+
+    rows: list[TensorDictBase] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+
+    def add(self, shown: TensorDictBase, proposed: Tensor, movers: Sequence[Mover], after: TensorDictBase) -> None:
+        """Add a step.
+
+        Args:
+            shown: Of an environment of one world, with the actions done.
+            proposed: The policy's actions, int64 [A].
+            movers: Of each agent.
+            after: What the step led to.
+        """
+        row = shown.select(*_SHOWN, ACTION, strict=False)[0].clone()
+        row[PROPOSED] = proposed.clone()
+        row[MOVER] = torch.tensor(movers, dtype=torch.uint8)
+        row["next"] = after.select(*_ENDS)[0].clone()
+        self.rows.append(row)
+
+    def steps(self) -> TensorDictBase:
+        """Return the steps, of which there is one at least, batch size [T]."""
+        steps = torch.stack(self.rows)
+        if not isinstance(steps, TensorDict):
+            raise TypeError(f"the steps of a recording must be of one kind, got {type(steps).__name__}")
+        return steps
