@@ -91,7 +91,7 @@ def test_the_site_builds_without_warnings(tmp_path):
 
 
 def test_what_the_table_says_is_torchrls_is_used_from_there():
-    section = (DOCS / "learners.md").read_text().partition("## What is TorchRL's")[2].partition("\n## ")[0]
+    section = (DOCS / "interop.md").read_text().partition("## What is TorchRL's")[2].partition("\n## ")[0]
     theirs = [row.split(" | ")[1] for row in section.splitlines() if row.startswith("| ")][1:]
     said = {name for cell in theirs for name in re.findall(r"`(\w+)`", cell)} - {"state_dict"}
     code = "\n".join(path.read_text() for path in (ROOT / "warp_torchrl").rglob("*.py"))
