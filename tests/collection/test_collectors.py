@@ -8,12 +8,13 @@ from pathlib import Path
 import pytest
 import torch
 
-from warp_torchrl.collection.collectors import MultiProcess, WorkerDied
+from warp_torchrl.collection.collectors import MultiProcess
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.config.seeds import first_world_seed
+from warp_torchrl.parallel import WorkerDied
 from warp_torchrl.runs.checkpoint import newest
 from warp_torchrl.training.loop import Training
 
