@@ -1,15 +1,19 @@
 """Draws a side of a match in viser's scene, and changes what has changed."""
 
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
+import torch
 import viser
+from torch import Tensor
 
+from warp_torchrl.env import WildfireEnv
 from warp_torchrl.live import drawing
+from warp_torchrl.live.crew import Crew
 from warp_torchrl.live.drawing import Ground, Instances
 from warp_torchrl.live.shapes import TILE, Shape, bulldozer, drone, flame, puff, tree
-from warp_torchrl.live.side import Side
 from warp_torchrl.world.role import ROLES
+from warp_torchrl.world.state import WorldState
 
 _EARTH, _IRON, _WIND, _GLOW = (84, 66, 52), (38, 40, 44), (206, 226, 255), (255, 128, 40)
 
@@ -49,6 +53,28 @@ class Flock:
         change(self._handle, batched_positions=position, batched_scales=scale, batched_colors=colour)
 
 
+class Shown(Protocol):
+    """What a stage reads of a side; its tensors are on the CPU."""
+
+    @property
+    def env(self) -> WildfireEnv:
+        """Return whose team and names it has."""
+        ...
+
+    @property
+    def crew(self) -> Crew:
+        """Return who moves the vehicles."""
+        ...
+
+    @property
+    def state(self) -> WorldState:
+        """Return the world as it is, batch size [1]."""
+        ...
+
+    facing: Tensor
+    """Direction of each vehicle, int64 [A]: 0..7 clockwise from north; -1 before its first move."""
+
+
 class Stage:
     """One side's part of the scene.
 
@@ -59,7 +85,7 @@ class Stage:
         east: By how much its middle is east of the scene's [cells].
     """
 
-    def __init__(self, server: viser.ViserServer, index: int, side: Side, east: float) -> None:
+    def __init__(self, server: viser.ViserServer, index: int, side: Shown, east: float) -> None:
         self._server, self._side, self._root = server, side, f"/side_{index}"
         self.east = east
         self.ground: Ground = drawing.ground_of(side.state)
@@ -76,7 +102,7 @@ class Stage:
         self._trees = Flock(server, self._node("trees"), tree())
         self._flames = Flock(server, self._node("flames"), flame())
         self._smoke = Flock(server, self._node("smoke"), puff(), 0.24)
-        self._flies = side.env.world.team.table(side.env.device).flies
+        self._flies = side.env.world.team.table(torch.device("cpu")).flies
         self._add_vehicles()
         self._wind = scene.add_arrows(
             self._node("wind"), drawing.wind_arrows(side.state, ground), _WIND, **_arrow(max(ground.size) / 320.0)
