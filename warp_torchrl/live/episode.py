@@ -25,10 +25,10 @@ from warp_torchrl.world.state import Cover, WorldState, count_trees
 STEP_SECONDS, END_SECONDS = 0.12, 2.0
 """How long a picture stands, and the last one."""
 _STYLE = """<style>
-#episode{position:fixed;left:0;right:0;top:0;z-index:1;pointer-events:none;padding:14px 18px 26px;color:#f0f1f3;
-font:15px/1.45 system-ui,sans-serif;background:linear-gradient(#181e26 55%,#181e2600)}
+#episode{position:fixed;left:0;top:0;z-index:1;pointer-events:none;padding:14px 18px;color:#f0f1f3;
+font:15px/1.45 system-ui,sans-serif;text-shadow:0 0 4px #0d1321}
 #episode h1{font-size:19px;font-weight:600;margin:0}#episode p{margin:0;color:#b9bdc4}
-#episode footer{font-size:13px;line-height:1.7;margin-top:4px}
+#episode footer{display:flex;flex-direction:column;font-size:13px;line-height:1.6;margin-top:8px}
 </style>"""
 
 
@@ -46,7 +46,7 @@ class Film:
         with quiet():
             self._server = LocalServer(host="127.0.0.1", port=0, verbose=False)
         furnish(self._server)
-        aim(self._server, size, len(sides))
+        aim(self._server, size, len(sides), up=0.02)  # the heading stands above
         self._stages = [
             Stage(self._server, index, side, east)
             for index, (side, east) in enumerate(zip(sides, places(size[1], len(sides))))

@@ -15,7 +15,7 @@ from warp_torchrl.live.shapes import TILE, Shape, bulldozer, drone, flame, puff,
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.state import WorldState
 
-_EARTH, _IRON, _WIND, _GLOW = (84, 66, 52), (38, 40, 44), (206, 226, 255), (255, 128, 40)
+_EARTH, _IRON, _WIND, _GLOW = (84, 66, 52), (38, 40, 44), (196, 214, 240), (255, 128, 40)
 
 
 class Flock:
@@ -95,7 +95,7 @@ class Stage:
             self._node("block"), *ground.block, color=_EARTH, flat_shading=True, side="double", cast_shadow=False
         )
         self.tiles = scene.add_batched_meshes_simple(
-            self._node("tiles"), *TILE, ground.turn, ground.position, batched_scales=np.full(len(ground.turn), 1.02),
+            self._node("tiles"), *TILE, ground.turn, ground.position, batched_scales=ground.side,
             batched_colors=_light(drawing.tiles(side.state, ground)), side="double", lod="off", cast_shadow=False,
             receive_shadow=False,
         )  # fmt: skip
@@ -105,7 +105,7 @@ class Stage:
         self._flies = side.env.world.team.table(torch.device("cpu")).flies
         self._add_vehicles()
         self._wind = scene.add_arrows(
-            self._node("wind"), drawing.wind_arrows(side.state, ground), _WIND, **_arrow(max(ground.size) / 320.0)
+            self._node("wind"), drawing.wind_arrows(side.state, ground), _WIND, **_arrow(max(ground.size) / 520.0)
         )
         self._glow = scene.add_light_point(self._node("glow"), color=_GLOW, intensity=0.0, distance=26.0, decay=1.4)
         self._title = scene.add_label(
@@ -123,6 +123,7 @@ class Stage:
                 self._trees.show(drawing.trees(state, ground))
             self._flames.show(drawing.flames(state, ground))
             self._smoke.show(drawing.smoke(state, ground))
+            self._show_sparks()
             self._show_vehicles()
             place, strength = drawing.glow(state, ground)
             change(self._glow, position=place, intensity=strength)
@@ -132,6 +133,12 @@ class Stage:
     def remove(self) -> None:
         """Take the side away."""
         self._server.scene.remove_by_name(self._root)
+
+    def _show_sparks(self) -> None:
+        place, colour = drawing.sparks(self._side.state, self.ground)
+        self._server.scene.add_point_cloud(  # anew: places and colours change together
+            self._node("sparks"), place, colour, point_size=0.09, point_shape="circle", point_shading="flat"
+        )
 
     def _node(self, name: str) -> str:
         return f"{self._root}/{name}"
