@@ -29,16 +29,18 @@ def photograph(setting: Setting, first: int, last: int, every: int, path: Path, 
         last: Step of the last one; where the episode is over before, its end is the last.
         every: Steps from one picture to the next.
         path: The file, without its ending.
-        sharpness: Pixels of the picture for one of the page of 900 x 620.
+        sharpness: Pixels of the picture for one of the page of 900 x 620, in 0.2..4.
 
     Returns:
         The file.
 
     Raises:
-        ValueError: If Playwright or viser is not installed.
+        ValueError: If Playwright, viser or a browser is not installed, or the sharpness is out of its range.
         ConfigError: If the setting does not fit.
     """
     check_installed()
+    if not 0.2 <= sharpness <= 4.0:
+        raise ValueError(f"sharpness must be in 0.2..4, got {sharpness}")
     document, seconds = _film(setting, first, last, every)
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / "episode.html"
@@ -51,7 +53,7 @@ def photograph(setting: Setting, first: int, last: int, every: int, path: Path, 
         return path
     path = path.with_suffix(".webp")
     times = [_FRAME_MS] * (len(pictures) - 1) + [_LAST_FRAME_MS]
-    pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=times, loop=0, quality=62, method=6)
+    pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=times, loop=0, quality=75, method=6)
     return path
 
 
@@ -74,8 +76,8 @@ def _film(setting: Setting, first: int, last: int, every: int) -> tuple[str, lis
     match = Match(setting)
     for _ in range(first):
         match.step()
-    below = f"{', '.join(title(side) for side in match.sides)}, seed {setting.seed}"
-    film, count = Film(match.sides, [f"Wildfire: {match.scenario}", below]), 1
+    below = f"policy {' and '.join(title(side) for side in match.sides)}, seed {setting.seed}"
+    film, count = Film(match.sides, [" ".join((match.scenario, *setting.overrides)), below]), 1
     film.add()
     for step in range(first, last):
         if all(side.ended for side in match.sides):
@@ -112,11 +114,18 @@ def _picture(tab: Any, clock: Any, second: float) -> Image.Image:
 
 @contextmanager
 def _browser() -> Iterator[Any]:
-    """Yield a Chromium: that of the system, else Playwright's own."""
-    from playwright.sync_api import sync_playwright
+    """Yield a Chromium: that of the system, else Playwright's own.
+
+    Raises:
+        ValueError: If there is none.
+    """
+    from playwright.sync_api import Error, sync_playwright
 
     found = next((path for name in ("chromium", "google-chrome") if (path := shutil.which(name))), None)
     with sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=found, args=["--headless=new", "--no-sandbox", *_FLAGS])
+        try:
+            browser = driver.chromium.launch(executable_path=found, args=["--headless=new", "--no-sandbox", *_FLAGS])
+        except Error as error:
+            raise ValueError(f"Chromium does not start: {error.message.splitlines()[0]}") from None
         yield browser
         browser.close()

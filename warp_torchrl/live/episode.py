@@ -46,9 +46,9 @@ class Film:
         with quiet():
             self._server = LocalServer(host="127.0.0.1", port=0, verbose=False)
         furnish(self._server)
-        aim(self._server, size, len(sides), up=0.02)  # the heading stands above
+        aim(self._server, size, len(sides), aside=-0.04, up=0.02)  # heading and legend stand left
         self._stages = [
-            Stage(self._server, index, side, east)
+            Stage(self._server, index, side, east, list(short_names(side.env.agent_names).values()))
             for index, (side, east) in enumerate(zip(sides, places(size[1], len(sides))))
         ]
         self._film = self._server.get_scene_serializer()
@@ -91,7 +91,16 @@ def legend(side: Shown) -> dict[str, Sequence[int]]:
     colours: Mapping[str, Sequence[int]] = {
         name: colour for name, colour in legend_colours().items() if name not in absent
     }
-    return {**colours, **vehicle_colours(side.env.agent_names)}
+    short = short_names(side.env.agent_names)
+    vehicles = vehicle_colours(side.env.agent_names).items()
+    return {**colours, **{f"{short[name]}  {name}" if name != short[name] else name: each for name, each in vehicles}}
+
+
+def short_names(names: Sequence[str]) -> dict[str, str]:
+    """Return what stands at each vehicle, by its name: its kind's first letter and its number, where that tells all."""
+    parts = {name: name.rpartition("_") for name in names}
+    short = {name: f"{kind[:1].upper()}{number}" for name, (kind, _, number) in parts.items()}
+    return short if len(set(short.values())) == len(names) else {name: name for name in names}
 
 
 def _framed(page: str, lines: Sequence[str], colours: Mapping[str, Sequence[int]]) -> str:

@@ -1,5 +1,6 @@
 """Draws a side of a match in viser's scene, and changes what has changed."""
 
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -83,10 +84,14 @@ class Stage:
         index: Of the side; its nodes stand under ``/side_<index>``.
         side: The side, at the start of an episode.
         east: By how much its middle is east of the scene's [cells].
+        names: What stands at the vehicles; by default their own.
     """
 
-    def __init__(self, server: viser.ViserServer, index: int, side: Shown, east: float) -> None:
+    def __init__(
+        self, server: viser.ViserServer, index: int, side: Shown, east: float, names: Sequence[str] | None = None
+    ) -> None:
         self._server, self._side, self._root = server, side, f"/side_{index}"
+        self._called = side.env.agent_names if names is None else names
         self.east = east
         self.ground: Ground = drawing.ground_of(side.state)
         scene, ground = server.scene, self.ground
@@ -164,8 +169,8 @@ class Stage:
             self._node("headings"), drawing.headings(shown, {}, self.ground), shown.colour, **_arrow(size / 9.0)
         )
         self._names = [
-            scene.add_label(self._node(f"name_{name}"), name, anchor="bottom-center", font_screen_scale=0.72)
-            for name in self._side.env.agent_names
+            scene.add_label(self._node(f"name_{name}"), called, anchor="bottom-center", font_screen_scale=0.72)
+            for name, called in zip(self._side.env.agent_names, self._called)
         ]
         self._lift = np.array([0.0, 0.0, 1.3 * size])
 
@@ -178,7 +183,7 @@ class Stage:
         goals = {agent: (order.row, order.column) for agent, order in orders.items()}
         change(self._headings, points=drawing.headings(shown, goals, self.ground))
         tank, full = side.state.vehicles.tank[0].tolist(), side.env.world.team.tank
-        for agent, (label, name) in enumerate(zip(self._names, side.env.agent_names)):
+        for agent, (label, name) in enumerate(zip(self._names, self._called)):
             water = "" if full is None else f" {tank[agent]}/{full}"
             driven = " (driven)" if side.crew.seats[agent].person is not None else ""
             change(label, text=f"{name}{water}{driven}", position=shown.position[agent] + self._lift)
