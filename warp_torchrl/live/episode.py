@@ -107,9 +107,9 @@ def _framed(page: str, lines: Sequence[str], colours: Mapping[str, Sequence[int]
     """Return viser's document with a title, a heading and a legend; the scene's own texts are data, not HTML."""
     heading, *below = (escape(line) for line in lines)
     top = f"<h1>{heading}</h1>" + "".join(f"<p>{line}</p>" for line in below)
-    page = page.replace("<title>Viser</title>", f"<title>{' - '.join((heading, *below))}</title>{_STYLE}", 1)
+    page = page.replace("<title>Viser</title>", f"<title>{' - '.join((heading, *below))}</title>", 1)
     before, end, after = page.rpartition("</body>")
-    return f"{before}<div id='episode'>{top}<footer>{chips(colours)}</footer></div>{end}{after}"
+    return f"{before}{_STYLE}<div id='episode'>{top}<footer>{chips(colours)}</footer></div>{end}{after}"
 
 
 @dataclass
