@@ -1,4 +1,4 @@
-"""An episode as a file: what it shows, what it holds of names, and in a real browser that it plays without a network."""
+"""An episode as a file: what it shows and holds, and that a real browser plays it without a network."""
 
 import io
 import re

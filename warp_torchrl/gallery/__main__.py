@@ -15,9 +15,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from warp_torchrl.drawing import save, style
 from warp_torchrl.config.grammar import check_overrides
 from warp_torchrl.config.seeds import FIRST_EVALUATED
+from warp_torchrl.drawing import save, style
 from warp_torchrl.gallery import reached, saved_at
 from warp_torchrl.gallery.curves import curve_figures, lines_of
 from warp_torchrl.gallery.episode import photograph
@@ -61,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             _episode(given[1:])
         else:
             _world(given)
-    except (ValueError, OSError, CheckpointError) as error:  # of the command line, of a folder to read, or of the one to write to
+    except (ValueError, OSError, CheckpointError) as error:  # of the command line, or of a folder to read or write
         print(f"gallery: {' '.join(str(error).split())}", file=sys.stderr)
         return MISTAKE
     return DONE
@@ -96,7 +96,8 @@ def _episode(arguments: Sequence[str]) -> None:
     check_overrides(options.overrides)
     setting = Setting(policy=options.policy, seed=options.seed, overrides=tuple(options.overrides))
     start = time.perf_counter()
-    path = photograph(setting, *options.steps, options.out / "episode", options.sharpness)
+    first, last, every = options.steps
+    path = photograph(setting, first, last, every, options.out / "episode", options.sharpness)
     print(f"{'episode':<20}{time.perf_counter() - start:6.1f} s  {path}", flush=True)
 
 
@@ -109,9 +110,11 @@ def _three_steps(given: str) -> tuple[int, int, int]:
     words = given.split(":")
     if not (1 <= len(words) <= 3 and all(word.isdecimal() for word in words)):
         raise argparse.ArgumentTypeError(f"must be FIRST, FIRST:LAST or FIRST:LAST:EVERY, whole numbers, got {given}")
-    first, last, every = (*map(int, words), *(int(words[0]), 1)[len(words) - 1 :])
+    first = int(words[0])
+    last = int(words[1]) if len(words) > 1 else first
+    every = int(words[2]) if len(words) > 2 else 1
     if last < first or every < 1:
-        raise argparse.ArgumentTypeError(f"must go from a first step to a later one, one or more at a time, got {given}")
+        raise argparse.ArgumentTypeError(f"must go on from the first step, by at least one at a time, got {given}")
     return first, last, every
 
 
@@ -192,7 +195,9 @@ def _episode_parser() -> argparse.ArgumentParser:
         "--steps", type=_three_steps, default=(0, 512, 2), metavar="FIRST:LAST:EVERY", help="by default all, 0:512:2"
     )
     parser.add_argument("--out", type=Path, default=Path("docs/figures"), metavar="FOLDER", help="%(default)s")
-    parser.add_argument("--sharpness", type=float, default=1.0, help="pixels for one of 900 x 580, in 0.2..4, %(default)s")
+    parser.add_argument(
+        "--sharpness", type=float, default=1.0, help="pixels for one of 900 x 580, in 0.2..4, %(default)s by default"
+    )
     return parser
 
 
