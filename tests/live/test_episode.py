@@ -167,8 +167,8 @@ def test_a_browser_without_a_network_shows_forest_and_a_fire_that_changes(make_m
         browser = driver.chromium.launch(executable_path=BROWSER, args=FLAGS)
         tab = browser.new_context(viewport={"width": 800, "height": 600}, offline=True).new_page()
         tab.on("request", lambda request: asked.append(request.url))
-        tab.on("pageerror", wrong.append)
-        tab.on("dialog", lambda dialog: wrong.append(dialog.message))
+        tab.on("pageerror", lambda error: wrong.append(str(error)))
+        tab.on("dialog", lambda dialog: (wrong.append(dialog.message), dialog.dismiss()))
         tab.goto((tmp_path / "episode.html").as_uri())
         tab.locator("h1", has_text=HOSTILE).wait_for(timeout=60_000)
         clock = tab.locator("input").first
