@@ -52,8 +52,15 @@ def test_the_example_of_a_prediction_runs(capsys):
 
 
 def test_the_example_of_a_live_match_runs(capsys):
-    exec(blocks("live.md")[0], {})
+    exec(blocks("live.md")[1], {})
     assert re.fullmatch(r"\d+% saved, \d+% without a team\n", capsys.readouterr().out)
+
+
+def test_the_example_of_a_match_as_a_file_runs(tmp_path, monkeypatch):
+    pytest.importorskip("viser", reason="needs the extra live")
+    monkeypatch.chdir(tmp_path)
+    exec(blocks("live.md")[0], {})
+    assert "<h1>default and local</h1>" in (tmp_path / "match.html").read_text()
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

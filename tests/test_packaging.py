@@ -77,7 +77,7 @@ def test_a_program_s_function_is_there(name):
 
 
 @pytest.mark.parametrize(
-    "extra", ["gis", "calibration", "tensorboard", "figures", "interop", "docs", "search", "sweep", "live"]
+    "extra", ["gis", "calibration", "tensorboard", "figures", "interop", "docs", "search", "sweep", "live", "video"]
 )
 def test_development_has_what_each_extra_has(extra):
     extras = PROJECT["optional-dependencies"]

@@ -11,7 +11,9 @@ from gymnasium.utils.env_checker import check_env
 from pettingzoo.test import render_test
 
 from warp_torchrl.adapters import FireExtinguishingVectorEnv, gym_env, parallel_env, pettingzoo
+from warp_torchrl.adapters.gymnasium import KEYS
 from warp_torchrl.adapters.screen import Terminal, Window, as_text
+from warp_torchrl.world.state import is_burning
 
 
 @pytest.fixture(params=["without pygame", "without a display", "with a display"])
@@ -66,18 +68,35 @@ def test_gymnasium_s_window_shows_one_agent(monkeypatch):
     env.close()
 
 
-def test_people_may_play(monkeypatch):
+def test_people_drive_to_the_fire_and_put_it_out_with_keys(monkeypatch):
     pygame = pytest.importorskip("pygame")
     from gymnasium.utils.play import play
 
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    taken = []
-    space, end = pygame.event.Event(pygame.KEYDOWN, key=ord(" ")), pygame.event.Event(pygame.QUIT)
-    events = iter([[space], [], [end]])
-    monkeypatch.setattr(pygame.event, "get", lambda: next(events))
-    env = gymnasium.make("Wildfire-v0", horizon=5, render_mode="rgb_array")
-    play(env, fps=1000, noop=10, callback=lambda before, after, action, *rest: taken.append(action))
-    assert taken == [8, 8]
+    env = gymnasium.make("Wildfire-v0", render_mode="rgb_array")
+    world, held, places = env.unwrapped._worlds.env, [], []
+
+    def press(key):
+        """Hold one key alone, or none."""
+        for each in held:
+            pygame.event.post(pygame.event.Event(pygame.KEYUP, key=ord(each)))
+        held[:] = [key] if key else []
+        for each in held:
+            pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=ord(each)))
+
+    def look(before, after, action, reward, terminated, truncated, info):
+        state = world.world_state
+        place = state.vehicles.position[0, 0]
+        places.append(tuple(place.tolist()))
+        if state.extinguished.any() or len(places) > 200:
+            pygame.event.post(pygame.event.Event(pygame.QUIT))
+            return
+        fires = is_burning(state.cells[0]).nonzero()
+        row, column = (fires[(fires - place).abs().amax(dim=1).argmin()] - place).sign().tolist()
+        press({-1: "qwe", 0: "a d", 1: "zxc"}[row][column + 1])
+
+    play(env, fps=1000, noop=KEYS["s"], callback=look, seed=0)
+    assert world.world_state.extinguished.any() and len(set(places)) > 2
 
 
 def test_keys_are_those_of_the_actions_that_there_are():

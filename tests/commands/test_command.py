@@ -160,6 +160,38 @@ def test_an_evaluation_draws_maps_of_one_ground(run_here, tmp_path, what):
     assert numbers["fires"] == 4 and set(numbers["burned_ha"]["difference"]) >= {"mean", "ci95"}
 
 
+@pytest.mark.parametrize(("kind", "module"), [("gif", None), ("html", "viser"), ("mp4", "av"), ("null", None)])
+def test_an_evaluation_writes_its_first_fire_as_it_is_told(run_here, tmp_path, kind, module):
+    if module is not None:
+        pytest.importorskip(module, reason="needs the extra live or video")
+    code, errors, _ = run_here("evaluate.py", *NOOP, f"picture={kind}", "hydra.run.dir=seen")
+    assert code == 0, errors
+    written = {path.name for path in (tmp_path / "seen").iterdir()} - {"evaluate.log"}
+    assert written == {"evaluation.json"} | ({f"episode.{kind}"} if kind != "null" else set())
+    if kind == "html":
+        assert "<h1>skirmish</h1><p>noop</p>" in (tmp_path / "seen" / "episode.html").read_text()
+
+
+@pytest.mark.parametrize("what", [NOOP, ("checkpoint=skirmish",)])
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        ("htlm", "picture must be gif or html or mp4 or null, got 'htlm': did you mean html?"),
+        ("true", "picture must be gif or html or mp4 or null, got True"),
+        ("html", 'picture=html needs viser, not installed: pip install "warp_torchrl[live]"'),
+        ("mp4", 'picture=mp4 needs av, not installed: pip install "warp_torchrl[video]"'),
+    ],
+)
+def test_a_picture_that_cannot_be_written_is_told_before_anything_is_played(
+    run_here, tmp_path, monkeypatch, what, kind, said
+):
+    monkeypatch.setattr(checks_module, "find_spec", lambda name: None)
+    monkeypatch.setattr("warp_torchrl.evaluation.evaluate.play", None)
+    code, errors, _ = run_here("evaluate.py", *what, f"picture={kind}", "hydra.run.dir=seen")
+    assert code == 2 and said in errors[-1]
+    assert not (tmp_path / "seen").exists()
+
+
 def test_maps_say_which_extras_they_need(run_here, tmp_path, monkeypatch):
     monkeypatch.setattr(checks_module, "find_spec", lambda name: None if name == "rasterio" else name)
     code, errors, _ = run_here("evaluate.py", *NOOP, "maps=true", "hydra.run.dir=seen")

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from hydra.core.global_hydra import GlobalHydra
 from hydra.experimental.callback import Callback
@@ -19,6 +19,7 @@ from warp_torchrl.config.run_config import RunConfig, run_config
 from warp_torchrl.config.saved_config import restore
 from warp_torchrl.config.seeds import BEYOND_EVALUATION
 from warp_torchrl.evaluation.evaluate import check_policy
+from warp_torchrl.evaluation.picture import Kind
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.runs import checkpoint as checkpoints
@@ -26,8 +27,10 @@ from warp_torchrl.runs.destination import check_free
 from warp_torchrl.runs.resumption import resumption
 from warp_torchrl.runs.shipped import find_policy
 from warp_torchrl.runs.transfer import check_start
+from warp_torchrl.validation import fit
 
 _MOST_FIRES = 1_000_000
+_PICTURE_NEEDS = {"html": ("viser", "live"), "mp4": ("av", "video")}  # module, and the extra that has it
 
 
 class CheckFirst(Callback):
@@ -109,6 +112,7 @@ def _check_evaluation(values: Mapping[str, Any], overrides: Sequence[str]) -> No
         raise ConfigError(f"policy must be one of {', '.join(HEURISTICS)}, got {policy}{hint}")
     if not isinstance(values["overwrite"], bool):
         raise ConfigError(f"overwrite must be true or false, got {values['overwrite']!r}")
+    picture(values)
     fires = map_fires(values)
     if fires is None and any(each.startswith("maps_fires=") for each in overrides):
         raise ConfigError(f"maps_fires must come with maps=true, got {values['maps_fires']} alone")
@@ -138,6 +142,22 @@ def map_fires(values: Mapping[str, Any]) -> int | None:
     return fires if maps else None
 
 
+def picture(values: Mapping[str, Any]) -> Kind | None:
+    """Return as what an evaluation writes its first fire, None where it writes no picture.
+
+    Raises:
+        ConfigError: If ``picture`` is nothing of the kind, or what writes it is not installed.
+    """
+    try:
+        kind = cast(Kind | None, fit(values["picture"], Kind | None, "picture"))
+    except ValueError as error:
+        raise ConfigError(str(error)) from None
+    module, extra = _PICTURE_NEEDS.get(str(kind), ("", ""))
+    if module and find_spec(module) is None:
+        raise ConfigError(f'picture={kind} needs {module}, not installed: pip install "warp_torchrl[{extra}]"')
+    return kind
+
+
 def check_maps(plan: RunConfig, fires: int | None) -> None:
     """Check that the fires of the maps have seeds that no training has.
 
@@ -152,7 +172,7 @@ def check_maps(plan: RunConfig, fires: int | None) -> None:
 
 def of_worlds(overrides: Sequence[str]) -> list[str]:
     """Return the overrides of an evaluation that are not the command's own."""
-    own = ("checkpoint=", "policy=", "overwrite=", "maps=", "maps_fires=")
+    own = ("checkpoint=", "policy=", "overwrite=", "maps=", "maps_fires=", "picture=")
     return [each for each in overrides if not each.startswith(own)]
 
 

@@ -14,7 +14,7 @@ from omegaconf import DictConfig, OmegaConf
 
 from warp_torchrl import parallel
 from warp_torchrl.commands.allocation import keep_freed_memory
-from warp_torchrl.commands.checks import map_fires, new_total, of_worlds, without_checkpoint
+from warp_torchrl.commands.checks import map_fires, new_total, of_worlds, picture, without_checkpoint
 from warp_torchrl.commands.failure import fail
 from warp_torchrl.commands.following import FOLLOWING, folder_of_its_own, follow
 from warp_torchrl.commands.sweep import SweepSummary, remove_failure, save_failure, summarise_unfinished
@@ -130,14 +130,15 @@ def _evaluate_job(config: DictConfig) -> None:
     folder = Path(HydraConfig.get().runtime.output_dir)
     if not config.overwrite:
         check_free(folder, "hydra.run.dir")  # again: two jobs of a sweep may have the same folder
-    given, name, fires = config.checkpoint, config.policy, map_fires(plain(config))
+    given, name = config.checkpoint, config.policy
+    fires, kind = map_fires(plain(config)), picture(plain(config))
     if given is None:
         values = without_checkpoint(plain(config))
-        evaluate_policy(run_config(values), folder, name, world_overrides(values), fires)
+        evaluate_policy(run_config(values), folder, name, world_overrides(values), fires, kind)
         return
     found = _newest(find_policy(given))
     values = plain(restore(found.record(), of_worlds(HydraConfig.get().overrides.task)))
-    evaluate_policy(run_config(values), folder, found, world_overrides(values), fires)
+    evaluate_policy(run_config(values), folder, found, world_overrides(values), fires, kind)
 
 
 # The saved configuration

@@ -48,7 +48,7 @@ WORLD_KEYS = (
     "action_masking",
 )
 """What a scenario sets."""
-COMMAND_KEYS = ("resume", "start_from", "debug", "policy", "overwrite", "maps", "maps_fires")
+COMMAND_KEYS = ("resume", "start_from", "debug", "policy", "overwrite", "maps", "maps_fires", "picture")
 """What the commands read themselves."""
 
 

@@ -102,19 +102,26 @@ class EpisodeRecorder:
         canvas.paste(panel, (picture.width + 2 * _MARGIN, _MARGIN + (height - panel.height) // 2))
         return canvas
 
-    def save(self, path: str | Path) -> None:
-        """Write a looping GIF of at most 130 frames; the file appears whole or not at all.
+    def frames(self) -> list[tuple[Image.Image, int]]:
+        """Return each frame, with a palette, and for how long it stands [ms]; at most 130.
 
         Raises:
             ValueError: If no frame was added.
         """
         if not self._frames:
             raise ValueError("an episode needs at least one frame, got none")
-        first, *rest = self._frames
-        durations = [_FRAME_MS] * len(rest) + [_LAST_FRAME_MS]
+        return [(frame, _FRAME_MS) for frame in self._frames[:-1]] + [(self._frames[-1], _LAST_FRAME_MS)]
+
+    def save(self, path: str | Path) -> None:
+        """Write a looping GIF of at most 130 frames; the file appears whole or not at all.
+
+        Raises:
+            ValueError: If no frame was added.
+        """
+        (first, *rest), durations = zip(*self.frames())
         partial = Path(path).with_name(f".{Path(path).name}.{os.getpid()}.partial")
         try:
-            first.save(partial, "GIF", save_all=True, append_images=rest, loop=0, duration=durations)
+            first.save(partial, "GIF", save_all=True, append_images=rest, loop=0, duration=list(durations))
             partial.replace(path)
         finally:
             partial.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Evaluation of a policy beside the baselines on the same fires: table, ``evaluation.json``, ``episode.gif``, maps."""
+"""Evaluation of a policy beside the baselines on the same fires: table, ``evaluation.json``, a picture, maps."""
 
 import logging
 from collections.abc import Sequence
@@ -13,7 +13,8 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation import cache
 from warp_torchrl.evaluation.maps import described, play_maps, write_maps
 from warp_torchrl.evaluation.method import method
-from warp_torchrl.evaluation.play import BASELINES, Episodes, WithoutAgent, play, play_heuristics, record_episode
+from warp_torchrl.evaluation.picture import Kind, record_episode
+from warp_torchrl.evaluation.play import BASELINES, Episodes, WithoutAgent, play, play_heuristics
 from warp_torchrl.evaluation.report import report, table, write_json
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.policy import MODES
@@ -29,8 +30,9 @@ def evaluate_policy(
     found: checkpoints.Checkpoint | str,
     worlds: Sequence[str],
     map_fires: int | None = None,
+    picture: Kind | None = "gif",
 ) -> None:
-    """Evaluate a checkpoint or a heuristic beside the baselines: table, ``evaluation.json`` and ``episode.gif``.
+    """Evaluate a checkpoint or a heuristic beside the baselines: table, ``evaluation.json``, ``episode.gif``.
 
     Args:
         plan: RunConfig of the worlds and the evaluation.
@@ -38,6 +40,7 @@ def evaluate_policy(
         found: The checkpoint, or the heuristic's name.
         worlds: Overrides by which the worlds differ from their scenario.
         map_fires: Fires of the maps; None makes no maps.
+        picture: As what the first fire is written, ``episode.<picture>``; None writes none.
     """
     first, folder = plan.evaluation.first_seed, folder.resolve()
     env, one = plan.make_env(plan.evaluation.episodes, first), plan.make_env(1, first)
@@ -69,10 +72,13 @@ def evaluate_policy(
         print(described(content["maps"]), flush=True)
         title = f"{plan.scenario}: {maps.seeds[1]} fires on one ground, {maps.horizon} steps"
         write_maps(folder, maps, getattr(plan.world.landscape, "grid", None), title, name)
-    with disk.with_path(folder / "episode.gif"):
-        record_episode(folder / "episode.gif", one, filmed, f"{plan.scenario}\n{name}", first, mode)
-    wrote = "evaluation.json and episode.gif" if maps is None else "evaluation.json, episode.gif and maps"
-    log.info("wrote %s into %s", wrote, folder)
+    wrote = ["evaluation.json"]
+    if picture is not None:
+        wrote += [f"episode.{picture}"]
+        with disk.with_path(folder / wrote[-1]):
+            record_episode(folder / wrote[-1], picture, one, filmed, f"{plan.scenario}\n{name}", first, mode)
+    wrote += [] if maps is None else ["maps"]
+    log.info("wrote %s into %s", " and ".join(filter(None, (", ".join(wrote[:-1]), wrote[-1]))), folder)
 
 
 def check_policy(plan: RunConfig, found: checkpoints.Checkpoint | str) -> None:

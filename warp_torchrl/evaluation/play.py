@@ -1,8 +1,7 @@
 """Paired evaluation: every policy plays the same worlds, on seeds outside of training."""
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Protocol
 
 import numpy as np
 import torch
@@ -12,13 +11,13 @@ from torch import Tensor
 from torchrl.envs.utils import set_exploration_type
 
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.env.render import EpisodeRecorder
 from warp_torchrl.env.specs import EPISODE_METRICS
 from warp_torchrl.evaluation.behaviour import Behaviour
 from warp_torchrl.evaluation.match import Match, fits
 from warp_torchrl.heuristics import HEURISTICS, idle_action
 from warp_torchrl.models import ACTION, ACTION_MASK, memory_apart
 from warp_torchrl.policy import MODES
+from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.team import Team
 
 BASELINES = ("noop", "random", "local", "greedy", "coordinated")
@@ -31,12 +30,20 @@ Episodes = dict[str, np.ndarray]
 """Final metrics of n episodes, float64 [n] each."""
 
 
+class Recorder(Protocol):
+    """What looks at an episode while it is played."""
+
+    def add(self, state: WorldState) -> None:
+        """Append world 0 of a batch."""
+        ...
+
+
 def play(
     env: WildfireEnv,
     policy: TensorDictModuleBase,
     first_seed: int,
     mode: str = "sampled",
-    recorder: EpisodeRecorder | None = None,
+    recorder: Recorder | None = None,
     watch: bool = False,
 ) -> Episodes:
     """Play one episode in each world of an environment until all have ended.
@@ -70,7 +77,7 @@ def _match(
     env: WildfireEnv,
     policy: TensorDictModuleBase,
     now: TensorDictBase,
-    recorder: EpisodeRecorder | None,
+    recorder: Recorder | None,
     behaviour: Behaviour | None,
 ) -> dict[str, Tensor]:
     match = Match(env, [policy], behaviour)
@@ -83,7 +90,7 @@ def _steps(
     env: WildfireEnv,
     policy: TensorDictModuleBase,
     now: TensorDictBase,
-    recorder: EpisodeRecorder | None,
+    recorder: Recorder | None,
     behaviour: Behaviour | None,
 ) -> dict[str, Tensor]:
     """Play step by step, for any policy, and return the metrics [B]."""
@@ -153,12 +160,3 @@ def play_abreast(env: WildfireEnv, first_seed: int, names: Sequence[str]) -> dic
         ends = Match(wide, [HEURISTICS[name](wide) for name in names]).play(start)
     numbers = {metric: ends[metric].double().cpu().numpy().reshape(len(names), count) for metric in EPISODE_METRICS}
     return {name: {metric: rows[at] for metric, rows in numbers.items()} for at, name in enumerate(names)}
-
-
-def record_episode(
-    path: Path, env: WildfireEnv, policy: TensorDictModuleBase, title: str, seed: int, mode: str
-) -> None:
-    """Play one episode in an environment of one world, and write it as a GIF."""
-    recorder = EpisodeRecorder(title=title, roles=env.world.team.agent_roles)
-    play(env, policy, seed, mode, recorder)
-    recorder.save(path)

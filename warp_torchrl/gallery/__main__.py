@@ -1,7 +1,8 @@
 """Draws the figures of the world: ``python -m warp_torchrl.gallery [FIGURE ...]``.
 
 All of them by default, as PNG; those of the paper and those that show our laws. ``python -m warp_torchrl.gallery curves
-RUN [RUN ...]`` draws the learning curves of runs instead. It needs the extra ``figures``.
+RUN [RUN ...]`` draws the learning curves of runs instead. Both need the extra ``figures``. ``python -m
+warp_torchrl.gallery episode`` photographs a team at work; it needs the extra ``live``, Playwright and Chromium.
 """
 
 import argparse
@@ -14,14 +15,19 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from warp_torchrl.config.grammar import check_overrides
+from warp_torchrl.config.seeds import FIRST_EVALUATED
 from warp_torchrl.drawing import save, style
 from warp_torchrl.gallery import reached, saved_at
 from warp_torchrl.gallery.curves import curve_figures, lines_of
+from warp_torchrl.gallery.episode import photograph
 from warp_torchrl.gallery.fires import fire_plain, fire_terrain_wind
 from warp_torchrl.gallery.landscapes import burn_probability
 from warp_torchrl.gallery.laws import ellipses, fire_sizes, isotropy
 from warp_torchrl.gallery.terrain import cover, noise, noise_scales
 from warp_torchrl.gallery.winds import wind
+from warp_torchrl.live.match import Setting
+from warp_torchrl.runs.checkpoint import CheckpointError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,6 +47,7 @@ WORLD: dict[str, Callable[..., "Figure"]] = {
 REAL_GROUND: dict[str, Callable[..., "Figure"]] = {"burn_probability": burn_probability}
 """Figures that need a folder of rasters."""
 DONE, MISTAKE = 0, 2
+_EPISODE = "episode [--policy NAME] [--seed SEED] [--steps FIRST:LAST:EVERY] [--out FOLDER] [KEY=VALUE ...]"
 _CURVES = "curves [NAME=]RUN [[NAME=]RUN ...] [--out FOLDER]"
 
 
@@ -50,9 +57,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if given[:1] == ["curves"]:
             _curves(given[1:])
+        elif given[:1] == ["episode"]:
+            _episode(given[1:])
         else:
             _world(given)
-    except (ValueError, OSError) as error:  # of the command line, of a folder to read, or of the one to write to
+    except (ValueError, OSError, CheckpointError) as error:  # of the command line, or of a folder to read or write
         print(f"gallery: {' '.join(str(error).split())}", file=sys.stderr)
         return MISTAKE
     return DONE
@@ -63,6 +72,7 @@ def _world(arguments: Sequence[str]) -> None:
     if options.list:
         print("\n".join(f"{name:<20}{_first_line(draw)}" for name, draw in (WORLD | REAL_GROUND).items()))
         print(f"{_CURVES} draws the learning curves of runs")
+        print(f"{_EPISODE} photographs a team at work")
         return
     _check(options)
     _draw_all(options)
@@ -79,6 +89,33 @@ def _curves(arguments: Sequence[str]) -> None:
     for name, draw in curve_figures(lines).items():
         _draw_one(name, draw, options.out)
     print(*tables, sep="\n\n", end="\n" if tables else "")
+
+
+def _episode(arguments: Sequence[str]) -> None:
+    options = _episode_parser().parse_intermixed_args(arguments)
+    check_overrides(options.overrides)
+    setting = Setting(policy=options.policy, seed=options.seed, overrides=tuple(options.overrides))
+    start = time.perf_counter()
+    first, last, every = options.steps
+    path = photograph(setting, first, last, every, options.out / "episode", options.sharpness)
+    print(f"{'episode':<20}{time.perf_counter() - start:6.1f} s  {path}", flush=True)
+
+
+def _three_steps(given: str) -> tuple[int, int, int]:
+    """Return the first and the last step, and the distance between pictures.
+
+    Raises:
+        argparse.ArgumentTypeError: If they are none.
+    """
+    words = given.split(":")
+    if not (1 <= len(words) <= 3 and all(word.isdecimal() for word in words)):
+        raise argparse.ArgumentTypeError(f"must be FIRST, FIRST:LAST or FIRST:LAST:EVERY, whole numbers, got {given}")
+    first = int(words[0])
+    last = int(words[1]) if len(words) > 1 else first
+    every = int(words[2]) if len(words) > 2 else 1
+    if last < first or every < 1:
+        raise argparse.ArgumentTypeError(f"must go on from the first step, by at least one at a time, got {given}")
+    return first, last, every
 
 
 def _levels(given: str) -> list[float]:
@@ -141,6 +178,25 @@ def _curves_parser() -> argparse.ArgumentParser:
         metavar="STEPS,...",
         help="print the forest saved in training by these world steps, each the mean over the twentieth of the run "
         "before it, the median of world steps a second, and minutes",
+    )
+    return parser
+
+
+def _episode_parser() -> argparse.ArgumentParser:
+    about = (
+        "Plays an episode and photographs it in Chromium: of one step episode.png, of several episode.webp. Overrides "
+        "are those of train.py."
+    )
+    parser = argparse.ArgumentParser(prog="python -m warp_torchrl.gallery episode", description=about)
+    parser.add_argument("overrides", nargs="*", metavar="KEY=VALUE", help="of the scenario, landscape.relief=120")
+    parser.add_argument("--policy", default="default", metavar="NAME", help="baseline, shipped policy or run folder")
+    parser.add_argument("--seed", type=int, default=FIRST_EVALUATED, help="of the fire, %(default)s by default")
+    parser.add_argument(
+        "--steps", type=_three_steps, default=(0, 512, 2), metavar="FIRST:LAST:EVERY", help="by default all, 0:512:2"
+    )
+    parser.add_argument("--out", type=Path, default=Path("docs/figures"), metavar="FOLDER", help="%(default)s")
+    parser.add_argument(
+        "--sharpness", type=float, default=1.0, help="pixels for one of 900 x 580, in 0.2..4, %(default)s by default"
     )
     return parser
 

@@ -31,6 +31,7 @@ VEHICLE_COLOURS = np.array(  # Okabe and Ito 2008, on the dark sides of a vehicl
 _FLIGHT = 3.0  # height of aircraft over the ground [cells]
 _GLOW_SIDE = 9  # of the square in which fires shine together [cells]
 _WIND_ARROWS = 5  # along each side of the map
+_SPARKS = 3  # over a burning cell
 _SHADE = 0.82  # of the ground under trees
 
 
@@ -60,6 +61,7 @@ class Ground:
         block: The ground as one closed body, under the tiles.
         position: Of the tiles, float32 [H W, 3] [cells], row by row.
         turn: Of the tiles, unit quaternion w, x, y, z, float32 [H W, 4].
+        side: Of the tiles, float32 [H W]: longer on slopes, where they lie tilted over cells of side 1.
         trees: Flat index of the cells that have trees of their own, int64 [T]; none on large maps.
     """
 
@@ -67,6 +69,7 @@ class Ground:
     block: Shape
     position: np.ndarray
     turn: np.ndarray
+    side: np.ndarray
     trees: np.ndarray
 
     @property
@@ -93,6 +96,7 @@ def ground_of(state: WorldState) -> Ground:
         block=_block(corners.numpy()),
         position=torch.stack((x.expand(rows, -1), y.expand(-1, columns), middle), dim=-1).flatten(0, 1).numpy(),
         turn=_tilt(east.flatten(), -south.flatten()).numpy(),
+        side=(1.02 * (1.0 + east.square() + south.square()).sqrt()).flatten().numpy(),
         trees=trees,
     )
 
@@ -165,13 +169,33 @@ def smoke(state: WorldState, ground: Ground) -> Instances:
     )
 
 
+def sparks(state: WorldState, ground: Ground) -> tuple[np.ndarray, np.ndarray]:
+    """Return sparks that rise with the wind from the burning cells of world 0.
+
+    Returns:
+        Their places, float32 [n, 3] [cells], and colours, uint8 [n, 3]: those of fire, darker higher up.
+    """
+    index = is_burning(state.cells[0]).flatten().nonzero()[:, 0].numpy().repeat(_SPARKS)
+    draws = np.random.default_rng(int(state.step[0]))
+    x, y, height = draws.random((3, len(index)), dtype=np.float32)
+    rise = 0.6 + 4.4 * height[:, None] ** 2
+    drift = _wind_at(state, index) * rise * 0.12
+    spread = np.stack((x, y), axis=1) - 0.5
+    colours = fire_colours().float().numpy()
+    share = np.sqrt(height)[:, None]
+    return (
+        (ground.position[index] + np.concatenate((spread + drift, rise), axis=1)).astype(np.float32),
+        (colours[0] * (1.0 - share) + colours[2] * share).astype(np.uint8),
+    )
+
+
 def glow(state: WorldState, ground: Ground) -> tuple[tuple[float, float, float], float]:
     """Return where the light of the fires of world 0 comes from, over the densest of them [cells], and its strength."""
     burning = is_burning(state.cells[:1]).float()
     around = avg_pool2d(burning, _GLOW_SIDE, stride=1, padding=_GLOW_SIDE // 2)[0] * burning[0]
     place = int(around.argmax())
     x, y, z = ground.position[place].tolist()
-    return (x, y, z + 4.0), 40.0 * float(around.flatten()[place].sqrt())
+    return (x, y, z + 4.0), 90.0 * float(around.flatten()[place].sqrt())
 
 
 def vehicles(state: WorldState, ground: Ground, flies: Tensor, facing: Tensor) -> Instances:

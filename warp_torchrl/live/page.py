@@ -1,7 +1,5 @@
 """The page: a local server that shows a match, plays it at a pace, and lets people take part."""
 
-import contextlib
-import io
 import socket
 import threading
 import time
@@ -9,13 +7,13 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
 import viser
 
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.live import words
 from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.live.panel import Panel
+from warp_torchrl.live.scene import LocalServer, aim, furnish, places, quiet
 from warp_torchrl.live.stage import Stage
 from warp_torchrl.validation import check_fields
 
@@ -57,19 +55,6 @@ class Address:
             return Address(host=self.host, port=probe.getsockname()[1])
 
 
-def _quiet() -> contextlib.AbstractContextManager[object]:
-    """Return a context in which viser's own lines are not printed."""
-    return contextlib.redirect_stdout(io.StringIO())
-
-
-class _Server(viser.ViserServer):
-    """A server that stays local: viser's own would open a public tunnel when a browser asks for one."""
-
-    def request_share_url(self, verbose: bool = True) -> str | None:
-        """Return None: nothing is shared."""
-        return None
-
-
 class Page:
     """A match on a page. ``with`` serves it; ``play`` runs it until it is interrupted.
 
@@ -94,8 +79,8 @@ class Page:
         self._stopped = threading.Event()
         self._followed = time.monotonic()
         warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")  # of a browser that just left
-        with _quiet():
-            self.server = _Server(host=self.address.host, port=self.address.port, verbose=False)
+        with quiet():
+            self.server = LocalServer(host=self.address.host, port=self.address.port, verbose=False)
         self._furnish()
         self.open(self.match)
         self.server.on_client_connect(self._welcome)
@@ -106,7 +91,7 @@ class Page:
 
     def __exit__(self, *error: object) -> None:
         self._stopped.set()
-        with _quiet():
+        with quiet():
             self.server.stop()
 
     @property
@@ -172,19 +157,14 @@ class Page:
         match = self.match
         for stage in self._stages:
             stage.remove()
-        rows, columns = match.world.size
-        apart = columns * 1.14
-        first = -apart * (len(match.sides) - 1) / 2.0
+        size, count = match.world.size, len(match.sides)
         self._stages = [
-            Stage(self.server, index, side, first + index * apart) for index, side in enumerate(match.sides)
+            Stage(self.server, index, side, east)
+            for index, (side, east) in enumerate(zip(match.sides, places(size[1], count)))
         ]
         for index, stage in enumerate(self._stages):
             stage.tiles.on_click(self._clicked(index))
-        away = max(1.22 * (apart * (len(match.sides) - 1) + columns), 1.4 * rows)
-        aside = 0.15 * away  # the panel stands on the right
-        self.server.initial_camera.position = (aside, -0.8 * away, 0.66 * away)
-        self.server.initial_camera.look_at = (aside, -0.02 * away, 0.0)
-        self.server.initial_camera.fov = 0.8
+        aim(self.server, size, count, aside=0.15)  # the panel stands on the right
 
     def _go_on(self) -> None:
         try:
@@ -196,15 +176,8 @@ class Page:
             self.tell(f"{type(error).__name__}: {' '.join(str(error).split())}", mistake=True)
 
     def _furnish(self) -> None:
-        self.server.gui.configure_theme(control_width="large", dark_mode=True, show_logo=False, show_share_button=False)
+        furnish(self.server)
         self.server.gui.set_panel_label("warp_torchrl")
-        scene = self.server.scene
-        scene.world_axes.visible = False
-        scene.set_background_image(np.full((2, 2, 3), (24, 30, 38), dtype=np.uint8))
-        scene.configure_default_lights(enabled=False)
-        scene.configure_environment_map(None)
-        scene.add_light_hemisphere("/sky", sky_color=(210, 224, 255), ground_color=(70, 60, 52), intensity=2.0)
-        scene.add_light_directional("/sun", color=(255, 240, 214), intensity=3.4, position=(-34.0, -26.0, 50.0))
 
     def _welcome(self, client: viser.ClientHandle) -> None:
         with self.lock:

@@ -1,17 +1,22 @@
 """Draws a side of a match in viser's scene, and changes what has changed."""
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, Protocol
 
 import numpy as np
+import torch
 import viser
+from torch import Tensor
 
+from warp_torchrl.env import WildfireEnv
 from warp_torchrl.live import drawing
+from warp_torchrl.live.crew import Crew
 from warp_torchrl.live.drawing import Ground, Instances
 from warp_torchrl.live.shapes import TILE, Shape, bulldozer, drone, flame, puff, tree
-from warp_torchrl.live.side import Side
 from warp_torchrl.world.role import ROLES
+from warp_torchrl.world.state import WorldState
 
-_EARTH, _IRON, _WIND, _GLOW = (84, 66, 52), (38, 40, 44), (206, 226, 255), (255, 128, 40)
+_EARTH, _IRON, _WIND, _GLOW = (84, 66, 52), (38, 40, 44), (196, 214, 240), (255, 128, 40)
 
 
 class Flock:
@@ -49,6 +54,28 @@ class Flock:
         change(self._handle, batched_positions=position, batched_scales=scale, batched_colors=colour)
 
 
+class Shown(Protocol):
+    """What a stage reads of a side; its tensors are on the CPU."""
+
+    @property
+    def env(self) -> WildfireEnv:
+        """Return whose team and names it has."""
+        ...
+
+    @property
+    def crew(self) -> Crew:
+        """Return who moves the vehicles."""
+        ...
+
+    @property
+    def state(self) -> WorldState:
+        """Return the world as it is, batch size [1]."""
+        ...
+
+    facing: Tensor
+    """Direction of each vehicle, int64 [A]: 0..7 clockwise from north; -1 before its first move."""
+
+
 class Stage:
     """One side's part of the scene.
 
@@ -57,10 +84,14 @@ class Stage:
         index: Of the side; its nodes stand under ``/side_<index>``.
         side: The side, at the start of an episode.
         east: By how much its middle is east of the scene's [cells].
+        names: What stands at the vehicles; by default their own.
     """
 
-    def __init__(self, server: viser.ViserServer, index: int, side: Side, east: float) -> None:
+    def __init__(
+        self, server: viser.ViserServer, index: int, side: Shown, east: float, names: Sequence[str] | None = None
+    ) -> None:
         self._server, self._side, self._root = server, side, f"/side_{index}"
+        self._called = side.env.agent_names if names is None else names
         self.east = east
         self.ground: Ground = drawing.ground_of(side.state)
         scene, ground = server.scene, self.ground
@@ -69,17 +100,17 @@ class Stage:
             self._node("block"), *ground.block, color=_EARTH, flat_shading=True, side="double", cast_shadow=False
         )
         self.tiles = scene.add_batched_meshes_simple(
-            self._node("tiles"), *TILE, ground.turn, ground.position, batched_scales=np.full(len(ground.turn), 1.02),
+            self._node("tiles"), *TILE, ground.turn, ground.position, batched_scales=ground.side,
             batched_colors=_light(drawing.tiles(side.state, ground)), side="double", lod="off", cast_shadow=False,
             receive_shadow=False,
         )  # fmt: skip
         self._trees = Flock(server, self._node("trees"), tree())
         self._flames = Flock(server, self._node("flames"), flame())
         self._smoke = Flock(server, self._node("smoke"), puff(), 0.24)
-        self._flies = side.env.world.team.table(side.env.device).flies
+        self._flies = side.env.world.team.table(torch.device("cpu")).flies
         self._add_vehicles()
         self._wind = scene.add_arrows(
-            self._node("wind"), drawing.wind_arrows(side.state, ground), _WIND, **_arrow(max(ground.size) / 320.0)
+            self._node("wind"), drawing.wind_arrows(side.state, ground), _WIND, **_arrow(max(ground.size) / 520.0)
         )
         self._glow = scene.add_light_point(self._node("glow"), color=_GLOW, intensity=0.0, distance=26.0, decay=1.4)
         self._title = scene.add_label(
@@ -97,6 +128,7 @@ class Stage:
                 self._trees.show(drawing.trees(state, ground))
             self._flames.show(drawing.flames(state, ground))
             self._smoke.show(drawing.smoke(state, ground))
+            self._show_sparks()
             self._show_vehicles()
             place, strength = drawing.glow(state, ground)
             change(self._glow, position=place, intensity=strength)
@@ -106,6 +138,12 @@ class Stage:
     def remove(self) -> None:
         """Take the side away."""
         self._server.scene.remove_by_name(self._root)
+
+    def _show_sparks(self) -> None:
+        place, colour = drawing.sparks(self._side.state, self.ground)
+        self._server.scene.add_point_cloud(  # anew: places and colours change together
+            self._node("sparks"), place, colour, point_size=0.09, point_shape="circle", point_shading="flat"
+        )
 
     def _node(self, name: str) -> str:
         return f"{self._root}/{name}"
@@ -131,8 +169,8 @@ class Stage:
             self._node("headings"), drawing.headings(shown, {}, self.ground), shown.colour, **_arrow(size / 9.0)
         )
         self._names = [
-            scene.add_label(self._node(f"name_{name}"), name, anchor="bottom-center", font_screen_scale=0.72)
-            for name in self._side.env.agent_names
+            scene.add_label(self._node(f"name_{name}"), called, anchor="bottom-center", font_screen_scale=0.72)
+            for name, called in zip(self._side.env.agent_names, self._called)
         ]
         self._lift = np.array([0.0, 0.0, 1.3 * size])
 
@@ -145,7 +183,7 @@ class Stage:
         goals = {agent: (order.row, order.column) for agent, order in orders.items()}
         change(self._headings, points=drawing.headings(shown, goals, self.ground))
         tank, full = side.state.vehicles.tank[0].tolist(), side.env.world.team.tank
-        for agent, (label, name) in enumerate(zip(self._names, side.env.agent_names)):
+        for agent, (label, name) in enumerate(zip(self._names, self._called)):
             water = "" if full is None else f" {tank[agent]}/{full}"
             driven = " (driven)" if side.crew.seats[agent].person is not None else ""
             change(label, text=f"{name}{water}{driven}", position=shown.position[agent] + self._lift)

@@ -86,12 +86,20 @@ def told(numbers: Mapping[str, float]) -> str:
 
 def legend(side: Side) -> str:
     """Return what the colours mean, and whose each vehicle's is, as HTML."""
-    chips = {name: colour for name, colour in legend_colours().items()}
-    chips |= {name: tuple(VEHICLE_COLOURS[at % len(VEHICLE_COLOURS)]) for at, name in enumerate(side.env.agent_names)}
-    spans = [
+    spans = chips({**legend_colours(), **vehicle_colours(side.env.agent_names)})
+    return f"<div style='{_STYLE};padding:2px 12px'>{spans}</div>"
+
+
+def vehicle_colours(names: Sequence[str]) -> dict[str, Sequence[int]]:
+    """Return the colour of each vehicle by its name."""
+    return {name: VEHICLE_COLOURS[at % len(VEHICLE_COLOURS)].tolist() for at, name in enumerate(names)}
+
+
+def chips(colours: Mapping[str, Sequence[int]]) -> str:
+    """Return colours and what they are called, as HTML."""
+    return "".join(
         f"<span style='white-space:nowrap;margin-right:10px'><span style='display:inline-block;width:11px;height:11px;"
         f"border:1px solid #888;border-radius:2px;vertical-align:-1px;margin-right:4px;"
         f"background:rgb({red},{green},{blue})'></span>{escape(name)}</span> "
-        for name, (red, green, blue) in chips.items()
-    ]
-    return f"<div style='{_STYLE};padding:2px 12px'>{''.join(spans)}</div>"
+        for name, (red, green, blue) in colours.items()
+    )

@@ -1,0 +1,163 @@
+"""An episode as one file that plays in a browser: scene, picture by picture, and the program that shows it.
+
+The file needs neither Python nor a network. It plays by itself and starts anew at its end; the bar below has pause,
+the time and the speed, and the mouse turns the scene.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.env import WildfireEnv
+from warp_torchrl.env.render import legend_colours
+from warp_torchrl.live.crew import Crew
+from warp_torchrl.live.scene import LocalServer, aim, furnish, places, quiet
+from warp_torchrl.live.stage import Shown, Stage
+from warp_torchrl.live.words import chips, vehicle_colours
+from warp_torchrl.runs import disk
+from warp_torchrl.world.geometry import DIRECTIONS
+from warp_torchrl.world.state import Cover, WorldState, count_trees
+
+STEP_SECONDS, END_SECONDS = 0.12, 2.0
+"""How long a picture stands, and the last one."""
+_STYLE = """<style>
+#episode{position:fixed;left:0;top:0;z-index:1;pointer-events:none;padding:14px 18px;color:#f0f1f3;
+font:15px/1.45 system-ui,sans-serif;text-shadow:0 0 4px #0d1321}
+#episode h1{font-size:19px;font-weight:600;margin:0}#episode p{margin:0;color:#b9bdc4}
+#episode footer{display:flex;flex-direction:column;font-size:13px;line-height:1.6;margin-top:8px}
+</style>"""
+
+
+class Film:
+    """Sides of a match, recorded picture by picture.
+
+    Args:
+        sides: What is shown, side by side; all have one size.
+        lines: Heading of the document, and what stands smaller below it.
+    """
+
+    def __init__(self, sides: Sequence[Shown], lines: Sequence[str]) -> None:
+        self._sides, self._lines = sides, lines
+        size = sides[0].env.world.size
+        with quiet():
+            self._server = LocalServer(host="127.0.0.1", port=0, verbose=False)
+        furnish(self._server)
+        aim(self._server, size, len(sides), aside=-0.04, up=0.02)  # heading and legend stand left
+        self._stages = [
+            Stage(self._server, index, side, east, list(short_names(side.env.agent_names).values()))
+            for index, (side, east) in enumerate(zip(sides, places(size[1], len(sides))))
+        ]
+        self._film = self._server.get_scene_serializer()
+        self._pictures = 0
+
+    def add(self, titles: Sequence[str] | None = None) -> None:
+        """Record the sides as they are.
+
+        Args:
+            titles: What stands above each; by default where its episode is, and what became of the forest.
+        """
+        if self._pictures:
+            self._film.insert_sleep(STEP_SECONDS)
+        for stage, title in zip(self._stages, titles or [progress(side) for side in self._sides]):
+            stage.show(title)
+        self._pictures += 1
+
+    def document(self) -> str:
+        """Return the film as an HTML document, and end it."""
+        self._film.insert_sleep(END_SECONDS)
+        page = self._film.as_html(dark_mode=True)
+        with quiet():
+            self._server.stop()
+        return _framed(page, self._lines, legend(self._sides[0]))
+
+
+def progress(side: Shown) -> str:
+    """Return where an episode is: step, and the forest saved and burning."""
+    counts = count_trees(side.state)
+    burning = float(counts.burning[0] / counts.initial[0])
+    step, horizon = int(side.state.step[0]), side.env.world.horizon
+    return f"step {step} of {horizon}:  {float(counts.saved()[0]):.0%} saved, {burning:.0%} burning"
+
+
+def legend(side: Shown) -> dict[str, Sequence[int]]:
+    """Return the colours of what can be seen on a side's map, by name: its covers, fire and what is left, vehicles."""
+    absent = {cover.name.lower() for cover in Cover} - {
+        Cover(each).name.lower() for each in side.state.cover.unique().tolist()
+    }
+    colours: Mapping[str, Sequence[int]] = {
+        name: colour for name, colour in legend_colours().items() if name not in absent
+    }
+    short = short_names(side.env.agent_names)
+    vehicles = vehicle_colours(side.env.agent_names).items()
+    return {**colours, **{f"{short[name]}  {name}" if name != short[name] else name: each for name, each in vehicles}}
+
+
+def short_names(names: Sequence[str]) -> dict[str, str]:
+    """Return what stands at each vehicle, by its name: its kind's first letter and its number, where that tells all."""
+    parts = {name: name.rpartition("_") for name in names}
+    short = {name: f"{kind[:1].upper()}{number}" for name, (kind, _, number) in parts.items()}
+    return short if len(set(short.values())) == len(names) else {name: name for name in names}
+
+
+def _framed(page: str, lines: Sequence[str], colours: Mapping[str, Sequence[int]]) -> str:
+    """Return viser's document with a title, a heading and a legend; the scene's own texts are data, not HTML."""
+    heading, *below = (escape(line) for line in lines)
+    top = f"<h1>{heading}</h1>" + "".join(f"<p>{line}</p>" for line in below)
+    page = page.replace("<title>Viser</title>", f"<title>{' - '.join((heading, *below))}</title>", 1)
+    before, end, after = page.rpartition("</body>")
+    return f"{before}{_STYLE}<div id='episode'>{top}<footer>{chips(colours)}</footer></div>{end}{after}"
+
+
+@dataclass
+class _Watched:
+    """A team that nobody but its policy moves."""
+
+    env: WildfireEnv
+    crew: Crew
+    state: WorldState
+    facing: Tensor = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.facing = torch.full((self.env.n_agents,), -1)
+
+    def go_on(self, state: WorldState) -> None:
+        """Show the next state; vehicles face where they last moved."""
+        there, action = state.vehicles.position[0], state.vehicles.last_action[0]
+        moved = (there != self.state.vehicles.position[0]).any(dim=1) & (action < len(DIRECTIONS))
+        self.facing, self.state = torch.where(moved, action.long(), self.facing), state
+
+
+class SceneRecorder:
+    """Collects an episode state by state, as ``EpisodeRecorder`` does, and writes it as an HTML document.
+
+    Args:
+        title: Heading of the document; what follows a line break stands smaller below it.
+        env: Whose episode it is.
+    """
+
+    def __init__(self, title: str, env: WildfireEnv) -> None:
+        self._lines, self._env = title.splitlines(), env
+        self._film: Film | None = None
+
+    def add(self, state: WorldState) -> None:
+        """Append world 0 of a batch."""
+        state = state[:1].to("cpu")
+        if self._film is None:
+            self._side = _Watched(self._env, Crew(self._env.world.team), state)
+            self._film = Film([self._side], self._lines)
+        self._side.go_on(state)
+        self._film.add()
+
+    def save(self, path: Path) -> None:
+        """Write the document; the file appears whole or not at all.
+
+        Raises:
+            ValueError: If no state was added.
+        """
+        if self._film is None:
+            raise ValueError("an episode needs at least one state, got none")
+        disk.replace(path, self._film.document())
