@@ -9,12 +9,12 @@ from warp_torchrl.live.match import Match, Setting
 
 
 def seconds(do, times=5):
-    """The least of several times: other programs of the machine only add."""
+    """The least of several times on the processor, which other programs of the machine do not share."""
 
     def once():
-        began = time.perf_counter()
+        began = time.process_time()
         do()
-        return time.perf_counter() - began
+        return time.process_time() - began
 
     do()
     return min(once() for _ in range(times))
