@@ -20,7 +20,7 @@ from tests.live.conftest import SMALL
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.live.match import Setting
 from warp_torchrl.live.page import Address, Page
-from warp_torchrl.live.panel import _chosen
+from warp_torchrl.live.panel.tab import chosen
 from warp_torchrl.world.state import Action, is_tree
 
 BROWSER = next((path for name in ("chromium", "google-chrome") if (path := shutil.which(name))), None)
@@ -110,9 +110,9 @@ def test_a_new_start_shows_the_ground_of_its_seed(page):
 def test_a_browser_cannot_name_what_it_was_not_offered():
     offered = SimpleNamespace(value="/etc", options=("default", "local"), label="Policy")
     with pytest.raises(ValueError, match="Policy must be one of default, local, got /etc"):
-        _chosen(offered)
+        chosen(offered)
     offered.value = "local"
-    assert _chosen(offered) == "local"
+    assert chosen(offered) == "local"
 
 
 def test_what_is_drawn_follows_the_match(page):
@@ -214,7 +214,7 @@ def test_a_click_on_the_ground_lights_the_cell_that_was_clicked_and_one_in_the_s
         if lit():
             break
     panel = next(iter(page._panels.values()))
-    assert lit() == [[int(each) for each in panel._cell.value]]
+    assert lit() == [[int(each) for each in panel.world.cell.value]]
 
 
 FOREST, BURNING = "forest", "burning"

@@ -15,7 +15,7 @@ import viser
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.live import words
 from warp_torchrl.live.match import Match, Setting
-from warp_torchrl.live.panel import Panel
+from warp_torchrl.live.panel.panel import Panel
 from warp_torchrl.live.stage import Stage
 from warp_torchrl.validation import check_fields
 
