@@ -15,6 +15,7 @@ import viser
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.live import words
 from warp_torchrl.live.match import Match, Setting
+from warp_torchrl.live.origin import only_own
 from warp_torchrl.live.panel.panel import Panel
 from warp_torchrl.live.stage import Stage
 from warp_torchrl.validation import check_fields
@@ -94,7 +95,7 @@ class Page:
         self._stopped = threading.Event()
         self._followed = time.monotonic()
         warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")  # of a browser that just left
-        with _quiet():
+        with _quiet(), only_own(self.address.host):
             self.server = _Server(host=self.address.host, port=self.address.port, verbose=False)
         self._furnish()
         self.open(self.match)
