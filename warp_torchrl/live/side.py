@@ -95,7 +95,26 @@ class Side:
             return []
         if self._proposed is None:
             self._proposed, self.chances = self.player.act(self.shown.copy().set(ACTION_MASK, self.mask[None]))
-        return self.crew.questions(self._proposed)
+        return self.crew.questions(self._proposed, self.chances)
+
+    def ask_where_unsure(self, below: float | None) -> None:
+        """Let a person be asked for an action where the policy's most likely one is less likely; None asks nobody.
+
+        Raises:
+            Refused: If it is no probability, or the policy has none.
+        """
+        self.questions()
+        if below is not None and self.chances is None and not self.ended:
+            raise Refused(f"{self.player.name} has no action probabilities: it cannot tell how sure it is")
+        self.crew.ask_where_unsure(below)
+
+    def choose(self, question: Question, action: int) -> None:
+        """Choose the action of a vehicle whose policy is unsure.
+
+        Raises:
+            Refused: If the action would do nothing.
+        """
+        self.crew.choose(question, action, self.possible)
 
     def step(self) -> list[str]:
         """Do the step that ``questions`` proposed; return a line for each act of a person that was refused."""
