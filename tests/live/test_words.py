@@ -5,6 +5,7 @@ import re
 import pytest
 
 from warp_torchrl.live import words
+from warp_torchrl.live.crew import Question
 from warp_torchrl.live.order import Order
 
 
@@ -64,3 +65,12 @@ def test_the_legend_names_every_kind_of_cell_and_every_vehicle(match):
     text = words.legend(match.sides[0])
     for name in ("lake", "forest", "fire", "ash", "firebreak", "wet", "bulldozer_2"):
         assert f"</span>{name}</span>" in text
+
+
+def test_a_question_names_the_vehicle_and_the_act_and_tells_how_unsure_the_policy_is(match):
+    north, extinguish = (match.sides[0].env.action_names.index(name) for name in ("north", "extinguish"))
+    text = words.questions(match.sides[0], [Question(0, extinguish), Question(2, extinguish)])
+    assert text == "**bulldozer_0** is about to **extinguish**.\n\n**bulldozer_2** is about to **extinguish**."
+    unsure = words.questions(match.sides[0], [Question(1, north, 0.312)])
+    assert "What should **bulldozer_1** do?" in unsure and "**north**" in unsure and "31%" in unsure
+    assert words.questions(match.sides[0], []) == ""

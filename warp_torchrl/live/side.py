@@ -154,6 +154,7 @@ class Side:
             frames=self.player.frames,
             agents=tuple(self.env.agent_names),
             actions=tuple(self.env.action_names),
+            saved=self.curves.saved[-1],
         )
 
     def intervene(self, kind: str, *numbers: float) -> None:

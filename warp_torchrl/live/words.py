@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 
 from warp_torchrl.env.render import legend_colours
+from warp_torchrl.live.crew import Question
 from warp_torchrl.live.drawing import VEHICLE_COLOURS
 from warp_torchrl.live.match import Match
 from warp_torchrl.live.side import Side
@@ -56,6 +57,19 @@ def moved_by(side: Side, agent: int, person: int | None = None) -> str:
     if seat.order is None:
         return "policy"
     return f"policy, sent to {seat.order.row}, {seat.order.column} (within {seat.order.radius})"
+
+
+def questions(side: Side, asked: Sequence[Question]) -> str:
+    """Return what a person is asked; of an action that the policy is unsure of with how to answer."""
+    names, actions = side.env.agent_names, side.env.action_names
+    lines = [
+        f"**{names[each.agent]}** is about to **{actions[each.action]}**."
+        if each.chance is None
+        else f"What should **{names[each.agent]}** do? Its policy would **{actions[each.action]}**; its likeliest "
+        f"action has {each.chance:.0%}. Press *Do it* (key G), or another action in Drive or by its key."
+        for each in asked
+    ]
+    return "\n\n".join(lines)
 
 
 def actions(side: Side, agent: int) -> str:

@@ -38,7 +38,10 @@ class DriveTab(Tab):
         acts = tuple(name for name in self.side.env.action_names if name not in _MOVES.values())
         deeds = gui.add_button_group("", acts)
         deeds.on_click(self.guarded(lambda event: self.press(event.target.value)))
-        gui.add_markdown("Keys: **Q W E A D Z X C** move, **S** stays, **F** extinguishes, **R** clears, **P** plays.")
+        gui.add_markdown(
+            "Keys: **Q W E A D Z X C** move, **S** stays, **F** extinguishes, **R** clears, **G** says *Do it*, **P** "
+            "plays."
+        )
         with gui.add_folder("Send it"):
             self._radius = gui.add_slider("Within cells", min=0, max=16, step=1, initial_value=3)
             self._goal = gui.add_vector2("Row, column", initial_value=self.middle(), min=(0, 0), step=1)
@@ -48,6 +51,14 @@ class DriveTab(Tab):
             for name in acts:
                 box = gui.add_checkbox(name, initial_value=name in self.side.crew.asks)
                 box.on_update(self.guarded(partial(self._ask, name)))
+        with gui.add_folder("Ask me where the policy is less sure than"):
+            below = self.side.crew.unsure_below
+            self._below = gui.add_slider(
+                "Likeliest action [%]", min=5, max=100, step=5, initial_value=round(100 * (below or 0.5))
+            )
+            self._unsure = gui.add_checkbox("Ask me for the action", initial_value=below is not None)
+            for control in (self._below, self._unsure):
+                control.on_update(self.guarded(lambda event: self._ask_where_unsure()))
         self._vehicle.on_update(self.guarded(lambda event: self.panel.show()))
 
     def paint(self) -> None:
@@ -61,14 +72,18 @@ class DriveTab(Tab):
         return self.side.env.agent_names.index(self._vehicle.value)
 
     def press(self, action: str) -> None:
-        """Do an act with the chosen vehicle; where the clock stands still the act is a step.
+        """Do an act with the vehicle that is asked about, else with the chosen one.
+
+        Where the clock stands still an act is a step.
 
         Raises:
-            ValueError: If the team has no such action.
+            ValueError: If the team has no such action, or it cannot be done.
         """
         names = self.side.env.action_names
         if action not in names:
             raise ValueError(f"this team has no action {action}")
+        if self.panel.question.choose(names.index(action)):
+            return
         self.side.crew.press(self.agent, self.panel.person, names.index(action))
         if not self.page.playing:
             self.page.step()
@@ -93,4 +108,12 @@ class DriveTab(Tab):
     def _ask(self, name: str, event: Any) -> None:
         crew = self.side.crew
         crew.ask_before(crew.asks | {name} if event.target.value else crew.asks - {name})
+        self.page.show()
+
+    def _ask_where_unsure(self) -> None:
+        try:
+            self.side.ask_where_unsure(self._below.value / 100.0 if self._unsure.value else None)
+        except ValueError:
+            self._unsure.value = False
+            raise
         self.page.show()

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import viser
 
 from warp_torchrl.live import words
-from warp_torchrl.live.crew import Question
 from warp_torchrl.live.drawing import cell_at
 from warp_torchrl.live.panel.agent import AgentTab
 from warp_torchrl.live.panel.drive import KEYS, DriveTab
 from warp_torchrl.live.panel.match import MatchTab
+from warp_torchrl.live.panel.question import QuestionBox
 from warp_torchrl.live.panel.tab import Tab, told_if_refused
 from warp_torchrl.live.panel.watch import WatchTab
 from warp_torchrl.live.panel.world import WorldTab
@@ -55,8 +55,8 @@ class Panel:
         """Make the controls of the present match."""
         for handle in self._own:
             handle.remove()
-        self._asked: list[Question] = []
-        self._own = [self._add_play(), self._add_question(), tabs := self.gui.add_tab_group()]
+        play, self.question = self._add_play(), QuestionBox(self)
+        self._own = [play, self.question.folder, tabs := self.gui.add_tab_group()]
         self._tabs: list[Tab] = []
         for kind in (WatchTab, DriveTab, AgentTab, WorldTab, MatchTab):
             with tabs.add_tab(kind.title):
@@ -75,18 +75,12 @@ class Panel:
         pace.on_update(self.guarded(lambda event: setattr(self.page, "pace", float(event.target.value))))
         return folder
 
-    def _add_question(self) -> Any:
-        self._question = self.gui.add_folder("The match waits for your word", visible=False)
-        with self._question:
-            self._asking = self.gui.add_markdown("")
-            word = self.gui.add_button_group("", ("Do it", "Don't"))
-        word.on_click(self.guarded(lambda event: self._answer(event.target.value == "Do it")))
-        return self._question
-
     def _add_keys(self) -> None:
         for key, action in KEYS.items():
             command = self.gui.add_command(f"Drive: {action}", hotkey=key)
             command.on_trigger(self.guarded(partial(self._press, action)))
+        agree = self.gui.add_command("Do it", hotkey="G")
+        agree.on_trigger(self.guarded(lambda event: self.question.answer(True)))
         play = self.gui.add_command("Play or pause", hotkey="P")
         play.on_trigger(self.guarded(lambda event: self._play("Pause" if self.page.playing else "Play")))
 
@@ -97,7 +91,7 @@ class Panel:
         with self._client.atomic():
             change(self._headline, content=words.headline(self.page.match))
             change(self._numbers, content=words.numbers(self.page.match))
-            self._show_question()
+            self.question.show()
             if not self.page.playing or time.monotonic() - self._painted > _PAINTED_EVERY:
                 self._painted = time.monotonic()
                 for tab in self._tabs:
@@ -108,14 +102,6 @@ class Panel:
         self._client.add_notification(
             "This cannot be done" if mistake else "Told", line, auto_close_seconds=7.0, color="red" if mistake else None
         )
-
-    def _show_question(self) -> None:
-        side = self.page.match.sides[0]
-        self._asked = self.page.match.questions()  # the policy proposes: its probabilities are of what it sees now
-        names, actions = side.env.agent_names, side.env.action_names
-        lines = [f"**{names[each.agent]}** is about to **{actions[each.action]}**." for each in self._asked]
-        change(self._asking, content="\n\n".join(lines))
-        change(self._question, visible=bool(lines))
 
     # What is done; each under the lock, and told in one line where it cannot be
 
@@ -146,10 +132,3 @@ class Panel:
 
     def _press(self, action: str, event: Any) -> None:
         self.drive.press(action)
-
-    def _answer(self, allow: bool) -> None:
-        for question in self._asked:
-            self.page.match.sides[0].crew.answer(question, allow)
-        if not self.page.playing:
-            self.page.step()
-        self.page.show()
