@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 import torch
+from tensordict import TensorDictBase
 from torch import Tensor
 
 from warp_torchrl.config.saved_config import SavedConfig
@@ -74,9 +75,7 @@ class Side:
 
     def restart(self, seed: int) -> None:
         """Start the episode of a seed, in the scenario's own wind."""
-        self.env.world = self.world
-        self.env.set_seeds([seed])
-        self.shown = self.env.reset()
+        self.shown = self._reset(seed)
         agents = self.env.n_agents
         self.facing = torch.full((agents,), -1)
         """Direction of each vehicle's last move, 0..7 clockwise from north; -1 before the first, int64 [A]."""
@@ -171,6 +170,11 @@ class Side:
         self.curves.saved.pop()
         self.curves.burning.pop()
         self._note()
+
+    def _reset(self, seed: int) -> TensorDictBase:
+        self.env.world = self.world
+        self.env.set_seeds([seed])
+        return self.env.reset()
 
     def _note(self) -> None:
         counts = self.env.tree_counts
