@@ -89,7 +89,7 @@ def test_a_full_disk_is_one_line_and_what_was_saved_before_stays(match, keeper, 
 
 def test_a_folder_that_cannot_be_made_is_one_line(match, tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(Refused, match="file.* cannot be written"):
+    with pytest.raises(Refused, match=r"file.* cannot be written"):
         Keeper(tmp_path / "file" / "people").save(drive(match))
 
 

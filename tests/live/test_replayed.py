@@ -75,7 +75,7 @@ def test_it_is_told_whose_it_is(replayed):
     ],
 )
 def test_nobody_takes_part(replayed, act):
-    with pytest.raises(Refused, match="a recording is watched as it was played|a recording already"):
+    with pytest.raises(Refused, match=r"a recording is watched as it was played|a recording already"):
         act(replayed)
 
 

@@ -3,23 +3,30 @@
 import contextlib
 import io
 import socket
+import sys
 import threading
 import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import viser
 
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.demonstrations.recording import Tape
 from warp_torchrl.live import words
+from warp_torchrl.live.keeping import Keeper
+from warp_torchrl.live.learning import Learning
 from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.live.origin import only_own
 from warp_torchrl.live.panel.panel import Panel
+from warp_torchrl.live.panel.tab import told_if_refused
 from warp_torchrl.live.stage import Stage
 from warp_torchrl.validation import check_fields
 
+RECORDINGS = Path("recordings")
 _FOLLOWED_EVERY = 5.0  # seconds between two looks for newer weights
 
 
@@ -79,17 +86,21 @@ class Page:
     Args:
         setting: What is played first.
         address: Where it is served.
+        recordings: Folder of what is saved.
 
     Raises:
         ConfigError: If the setting or the address does not fit.
         CheckpointError: If a run folder holds no sound checkpoint.
     """
 
-    def __init__(self, setting: Setting, address: Address) -> None:
+    def __init__(self, setting: Setting, address: Address, recordings: Path = RECORDINGS) -> None:
         self.given, self.match = setting, Match(setting)
         self.address = address.free()
         self.lock = threading.RLock()
         self.playing, self.pace = False, 8.0
+        self.keeper, self.learning = Keeper(recordings), Learning(recordings)
+        self._ended: Tape | None = None  # of the last episode that was seen to end
+        self._training = ""
         self._panels: dict[int, Panel] = {}
         self._stages: list[Stage] = []
         self._stopped = threading.Event()
@@ -107,6 +118,11 @@ class Page:
 
     def __exit__(self, *error: object) -> None:
         self._stopped.set()
+        with self.lock:
+            self._keep_the_last()
+            if self.learning.goes_on:
+                print(f"{self.learning.folder} saves and ends", flush=True)
+            self.learning.close()
         with _quiet():
             self.server.stop()
 
@@ -130,7 +146,12 @@ class Page:
     # What panels ask for, under the lock
 
     def open(self, match: Match) -> None:
-        """Show another match from its start."""
+        """Show another match from its start.
+
+        Raises:
+            Refused: If the one before is to be kept and cannot be saved; it stays then.
+        """
+        self._keep()
         self.match, self.playing = match, False
         self._set_stages()
         for panel in self._panels.values():
@@ -143,13 +164,20 @@ class Page:
             self.tell(line)
         self.playing &= not self.match.ended
         self.show()
+        side = self.match.sides[0]
+        if side.ended and side.tape is not self._ended:
+            self._ended = side.tape
+            with told_if_refused(self.tell):
+                self._keep()
 
     def restart(self, seed: int | None = None) -> None:
         """Start the episode anew; of another seed on its own ground.
 
         Raises:
             ValueError: If the seed is out of range.
+            Refused: If the episode is to be kept and cannot be saved; it stays then.
         """
+        self._keep()
         self.match.restart(seed)
         self.playing = False
         self._set_stages()
@@ -188,13 +216,30 @@ class Page:
         self.server.initial_camera.fov = 0.8
 
     def _go_on(self) -> None:
-        try:
+        with told_if_refused(self._stand_still):  # the page stays, to show what the match had come to
             self._follow()
             if self.playing:
                 self.step()
-        except Exception as error:  # the page stays, to show what the match had come to, and to load another
-            self.playing = False
-            self.tell(f"{type(error).__name__}: {' '.join(str(error).split())}", mistake=True)
+
+    def _stand_still(self, line: str, mistake: bool) -> None:
+        self.playing = False
+        self.tell(line, mistake)
+
+    def _keep(self) -> None:
+        folder = self.keeper.keep(self.match.sides[0])
+        if folder is not None:
+            self.tell(f"saved {folder}")
+            self.show()
+
+    def _keep_the_last(self) -> None:
+        """Save the episode that is being played when the page ends, and say so where it was started."""
+        try:
+            folder = self.keeper.keep(self.match.sides[0])
+        except ValueError as error:
+            print(f"error: {error}", file=sys.stderr, flush=True)
+        else:
+            if folder is not None:
+                print(f"saved {folder}", flush=True)
 
     def _furnish(self) -> None:
         self.server.gui.configure_theme(control_width="large", dark_mode=True, show_logo=False, show_share_button=False)
@@ -231,6 +276,11 @@ class Page:
     def _follow(self) -> None:
         if time.monotonic() - self._followed < _FOLLOWED_EVERY:
             return
+        self._followed = time.monotonic()
         for line in self.match.follow():
             self.tell(line)
-        self._followed = time.monotonic()
+        if (training := self.learning.told()) != self._training:
+            self._training = training
+            if not self.learning.goes_on:
+                self.tell(training)
+            self.show()

@@ -2,13 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from html import escape
+from pathlib import Path
 
+from warp_torchrl.demonstrations.summary import Summary
 from warp_torchrl.env.render import legend_colours
 from warp_torchrl.live.crew import Question
 from warp_torchrl.live.drawing import VEHICLE_COLOURS
 from warp_torchrl.live.match import Match
 from warp_torchrl.live.side import Side
 
+_LISTED = 15  # recordings on the page
 _STYLE = "font-family:inherit;font-size:12px;line-height:1.35"
 
 
@@ -35,6 +38,35 @@ def title(side: Side) -> str:
     name, frames = side.player.name, side.player.frames
     short = name if len(name) <= 26 else f"...{name[-23:]}"
     return short if frames is None else f"{short} ({frames / 1e6:.1f} M)"
+
+
+def so_far(side: Side) -> str:
+    """Return how much was played, and how much of it by people."""
+    tape = side.tape
+    corrections = f"{tape.corrections} of them corrections" if tape.acts else "no corrections"
+    return f"**{len(tape.rows)}** steps so far, **{tape.acts}** acts of people, {corrections}."
+
+
+def recordings(folder: Path, found: Mapping[str, Summary | str]) -> str:
+    """Return the table of the recordings in a folder, the newest of them last."""
+    if not found:
+        return f"`{folder}` holds no recording."
+    rows = [f"In `{folder}`:", "", "| recording | steps | acts | corrections | saved |", "|---|---:|---:|---:|---:|"]
+    for name, each in list(found.items())[-_LISTED:]:
+        if isinstance(each, str):
+            rows.append(f"| {name} | broken | | | |")
+            continue
+        saved = "" if each.saved is None else f"{each.saved:.0%}"
+        rows.append(f"| {name} | {each.steps} | {each.acts} | {each.corrections} | {saved} |")
+    if len(found) > _LISTED:
+        rows.append(f"\nand {len(found) - _LISTED} before them.")
+    return "\n".join(rows)
+
+
+def training(told: str, newest: int | None) -> str:
+    """Return how far a training is, and whether there is a policy to play."""
+    ready = "" if newest is None else f" A policy of {newest:,} steps can be played."
+    return f"{told}.{ready}" if told else "Only policies that were trained by mappo, ippo, ppo or a2c learn."
 
 
 def acts(side: Side) -> str:

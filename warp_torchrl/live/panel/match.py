@@ -18,7 +18,7 @@ class MatchTab(Tab):
     def make(self) -> None:
         """Make the choices."""
         gui, setting, given = self.gui, self.match.setting, self.page.given
-        policies = tuple(dict.fromkeys((*_named(given), *policy_names(), *HEURISTICS)))
+        policies = tuple(dict.fromkeys((*_named(given), *_named(setting), *policy_names(), *HEURISTICS)))
         self._scenario = gui.add_dropdown("Scenario", self._scenarios(), initial_value=self._scenario_of(setting))
         self._policy = gui.add_dropdown("Policy", policies, initial_value=setting.policy)
         self._beside = gui.add_dropdown("Beside it", (_ALONE, *policies), initial_value=setting.beside or _ALONE)
@@ -46,7 +46,7 @@ class MatchTab(Tab):
         """Return what a setting's scenario is called among ``_scenarios``."""
         if setting.overrides == self.page.given.overrides:
             return " ".join(("as started:", *setting.overrides)) if setting.overrides else "the policy's own"
-        return self.match.scenario
+        return setting.overrides[0].removeprefix("scenario=")
 
 
 def _named(setting: Setting) -> list[str]:

@@ -13,6 +13,7 @@ from warp_torchrl.live.panel.agent import AgentTab
 from warp_torchrl.live.panel.drive import KEYS, DriveTab
 from warp_torchrl.live.panel.match import MatchTab
 from warp_torchrl.live.panel.question import QuestionBox
+from warp_torchrl.live.panel.record import RecordTab
 from warp_torchrl.live.panel.tab import Tab, told_if_refused
 from warp_torchrl.live.panel.watch import WatchTab
 from warp_torchrl.live.panel.world import WorldTab
@@ -58,7 +59,7 @@ class Panel:
         play, self.question = self._add_play(), QuestionBox(self)
         self._own = [play, self.question.folder, tabs := self.gui.add_tab_group()]
         self._tabs: list[Tab] = []
-        for kind in (WatchTab, DriveTab, AgentTab, WorldTab, MatchTab):
+        for kind in (WatchTab, DriveTab, AgentTab, WorldTab, RecordTab, MatchTab):
             with tabs.add_tab(kind.title):
                 self._tabs.append(kind(self))
         self.drive = next(each for each in self._tabs if isinstance(each, DriveTab))

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from warp_torchrl.live.match import Match
 from warp_torchrl.live.side import Side
+from warp_torchrl.runs.sealed import Unsound
 
 if TYPE_CHECKING:
     from warp_torchrl.live.page import Page
@@ -62,7 +63,7 @@ def told_if_refused(tell: Callable[[str, bool], object]) -> Iterator[None]:
     """Tell an error in one line: a page must not fall silent, and the match goes on as it was."""
     try:
         yield
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, Unsound) as error:
         tell(" ".join(str(error).split()), True)
     except Exception as error:
         tell(f"{type(error).__name__}: {' '.join(str(error).split())}", True)
