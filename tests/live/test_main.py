@@ -32,7 +32,7 @@ def test_the_command_s_own_keys_are_apart_from_those_of_the_scenario():
         (["seed=-1"], "seed must be in"),
         (["port=70000"], "port must be in [0, 65535], got 70000"),
         (["--port", "8080"], "keys are given as port=8080"),
-        (["recordings=pyproject.toml"], "recordings must be a folder, got the file pyproject.toml"),
+        ([f"recordings={__file__}"], "recordings must be a folder, got the file "),
         (["scenario=larg"], "scenario must be one of"),
         (["team.n_agents=0"], "team.n_agents must be in"),
         (["landscape"], "landscape has no value"),
