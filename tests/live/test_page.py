@@ -18,9 +18,12 @@ pytest.importorskip("viser", reason="needs the extra live")
 
 from tests.live.conftest import SMALL
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.live.match import Setting
+from warp_torchrl.live.crew import Refused
+from warp_torchrl.live.keeping import Keeper
+from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.live.page import Address, Page
 from warp_torchrl.live.panel.tab import chosen
+from warp_torchrl.live.replayed import ReplayedMatch
 from warp_torchrl.world.state import Action, is_tree
 
 BROWSER = next((path for name in ("chromium", "google-chrome") if (path := shutil.which(name))), None)
@@ -123,6 +126,102 @@ def test_what_is_drawn_follows_the_match(page):
     page.show()
     changed = (stage.tiles.batched_colors != before).any(axis=1).nonzero()[0].tolist()
     assert changed == [row * 16 + column]
+
+
+# What was played
+
+
+@pytest.fixture
+def kept(page, tmp_path):
+    """A page that keeps episodes in an empty folder, and a function that drives a vehicle for a step."""
+    page.keeper = Keeper(tmp_path / "people")
+    page.keeper.every = True
+
+    def drive():
+        crew = page.match.sides[0].crew
+        crew.take(0, person=1)
+        crew.press(0, 1, int(Action.SOUTH))
+        page.step()
+
+    return page, drive
+
+
+def saved(page):
+    return sorted(path.name for path in page.keeper.folder.glob("*"))
+
+
+def test_an_episode_with_people_is_kept_when_it_is_left_and_one_without_is_not(kept):
+    page, drive = kept
+    page.step()
+    page.restart()
+    assert saved(page) == []
+    drive()
+    page.restart()
+    assert saved(page) == ["skirmish-1000000-1"]
+    drive()
+    page.open(Match(page.given))
+    assert len(saved(page)) == 2
+    drive()
+    while not page.match.sides[0].ended:
+        page.step()
+    assert len(saved(page)) == 3 and len(page.keeper.read("skirmish-1000000-3").steps) > 5
+    page.step()
+    page.restart()
+    assert len(saved(page)) == 3, "it is kept once"
+
+
+def test_the_end_of_the_page_keeps_the_episode_and_says_so(kept, capsys):
+    page, drive = kept
+    drive()
+    page.__exit__()
+    assert saved(page) == ["skirmish-1000000-1"]
+    assert capsys.readouterr().out == f"saved {page.keeper.folder / 'skirmish-1000000-1'}\n"
+
+
+def test_an_episode_that_cannot_be_saved_is_not_left_and_its_end_is_told_once(kept, monkeypatch):
+    page, drive = kept
+    told = []
+    monkeypatch.setattr(page, "tell", lambda line, mistake=False: told.append(line))
+    page.keeper.folder.write_text("a file")
+    drive()
+    tape = page.match.sides[0].tape
+    for leave in (page.restart, lambda: page.open(Match(page.given))):
+        with pytest.raises(Refused, match="cannot be written"):
+            leave()
+    assert page.match.sides[0].tape is tape and told == []
+    while not page.match.ended:
+        page.step()
+    assert len(told) == 1 and "this episode is not saved" in told[0]
+    page.keeper.every = False
+    page.restart()
+    assert page.match.sides[0].tape is not tape
+
+
+def test_a_recording_is_watched_and_the_match_is_loaded_again(kept):
+    page, drive = kept
+    drive()
+    page.restart()
+    page.open(ReplayedMatch(page.keeper.read("skirmish-1000000-1"), page.match.setting))
+    page.playing, page.pace = True, 500.0
+    page._go_on()
+    assert page.match.ended and not page.playing and int(page.match.sides[0].state.step[0]) == 1
+    page.open(Match(page.match.setting))
+    assert len(saved(page)) == 1
+
+
+def test_the_page_tells_how_far_a_training_is_and_ends_it(page, monkeypatch):
+    told = []
+    monkeypatch.setattr(page, "tell", lambda line, mistake=False: told.append(line))
+    states = iter(["one trains", "one trains", "one is trained"])
+    monkeypatch.setattr(page.learning, "told", lambda: next(states))
+    for _ in range(3):
+        page._followed = -1e9
+        page._go_on()
+    assert told[-1] == "one is trained" and told.count("one trains") <= 1
+    ended = []
+    monkeypatch.setattr(page.learning, "close", lambda: ended.append(True))
+    page.__exit__()
+    assert ended == [True]
 
 
 # In a browser

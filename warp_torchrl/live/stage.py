@@ -9,6 +9,7 @@ from warp_torchrl.live import drawing
 from warp_torchrl.live.drawing import Ground, Instances
 from warp_torchrl.live.shapes import TILE, Shape, bulldozer, drone, flame, puff, tree
 from warp_torchrl.live.side import Side
+from warp_torchrl.live.words import labels
 from warp_torchrl.world.role import ROLES
 
 _EARTH, _IRON, _WIND, _GLOW = (84, 66, 52), (38, 40, 44), (206, 226, 255), (255, 128, 40)
@@ -132,7 +133,7 @@ class Stage:
         )
         self._names = [
             scene.add_label(self._node(f"name_{name}"), name, anchor="bottom-center", font_screen_scale=0.72)
-            for name in self._side.env.agent_names
+            for name in labels(self._side.env.agent_names)
         ]
         self._lift = np.array([0.0, 0.0, 1.3 * size])
 
@@ -145,9 +146,9 @@ class Stage:
         goals = {agent: (order.row, order.column) for agent, order in orders.items()}
         change(self._headings, points=drawing.headings(shown, goals, self.ground))
         tank, full = side.state.vehicles.tank[0].tolist(), side.env.world.team.tank
-        for agent, (label, name) in enumerate(zip(self._names, side.env.agent_names)):
+        for agent, (label, name) in enumerate(zip(self._names, labels(side.env.agent_names))):
             water = "" if full is None else f" {tank[agent]}/{full}"
-            driven = " (driven)" if side.crew.seats[agent].person is not None else ""
+            driven = " driven" if side.crew.seats[agent].person is not None else ""
             change(label, text=f"{name}{water}{driven}", position=shown.position[agent] + self._lift)
 
 

@@ -40,6 +40,13 @@ def title(side: Side) -> str:
     return short if frames is None else f"{short} ({frames / 1e6:.1f} M)"
 
 
+def labels(names: Sequence[str]) -> list[str]:
+    """Return short names of vehicles, which stand apart where they are close: ``b0`` of ``bulldozer_0``."""
+    stems = {name.rpartition("_")[0] for name in names}
+    letters = next(count for count in range(1, 100) if len({stem[:count] for stem in stems}) == len(stems))
+    return [stem[:letters] + number for stem, _, number in (name.rpartition("_") for name in names)]
+
+
 def so_far(side: Side) -> str:
     """Return how much was played, and how much of it by people."""
     tape = side.tape
