@@ -18,8 +18,9 @@ pytest.importorskip("viser", reason="needs the extra live")
 
 from tests.live.conftest import SMALL
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.demonstrations.files import read
+from warp_torchrl.demonstrations.recording import Mover
 from warp_torchrl.live.crew import Refused
-from warp_torchrl.live.keeping import Keeper
 from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.live.page import Address, Page
 from warp_torchrl.live.panel.tab import chosen
@@ -31,9 +32,12 @@ FLAGS = ["--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swifts
 
 
 @pytest.fixture
-def page():
-    overrides = (*SMALL, "observation.radius=4")  # which no shipped policy was trained to see
-    with Page(Setting(policy="noop", overrides=overrides), Address(port=0)) as made:
+def page(request, tmp_path):
+    """A page of a policy without probabilities; of another one where a test names it."""
+    policy = getattr(request, "param", "noop")
+    # No shipped policy was trained to see so far.
+    overrides = (*SMALL, "observation.radius=4") if policy == "noop" else SMALL
+    with Page(Setting(policy=policy, overrides=overrides), Address(port=0), tmp_path / "people") as made:
         yield made
 
 
@@ -132,9 +136,8 @@ def test_what_is_drawn_follows_the_match(page):
 
 
 @pytest.fixture
-def kept(page, tmp_path):
+def kept(page):
     """A page that keeps episodes in an empty folder, and a function that drives a vehicle for a step."""
-    page.keeper = Keeper(tmp_path / "people")
     page.keeper.every = True
 
     def drive():
@@ -217,7 +220,7 @@ def test_the_page_tells_how_far_a_training_is_and_ends_it(page, monkeypatch):
     for _ in range(3):
         page._followed = -1e9
         page._go_on()
-    assert told[-1] == "one is trained" and told.count("one trains") <= 1
+    assert told == ["one trains", "one is trained"]
     ended = []
     monkeypatch.setattr(page.learning, "close", lambda: ended.append(True))
     page.__exit__()
@@ -362,3 +365,81 @@ def test_the_match_waits_for_a_word_and_a_policy_that_does_not_fit_leaves_it(pag
     tab.get_by_role("button", name="Load", exact=True).click()
     tab.get_by_text("the policy default does not fit here").first.wait_for(timeout=30_000)
     assert page.match is match
+
+
+@pytest.mark.slow
+def test_a_person_drives_by_the_keyboard_saves_what_was_played_and_watches_it(page, browser):
+    tab, side = _open(browser, page), page.match.sides[0]
+    tab.get_by_role("tab", name="Drive").click()
+    tab.get_by_role("button", name="Take over", exact=True).click()
+    _until(lambda: side.crew.seats[0].person is not None)
+    for count, key in enumerate("ss", start=1):
+        tab.keyboard.press(key)
+        _until(lambda steps=count: len(side.tape.rows) == steps)
+    tab.get_by_role("tab", name="Record").click()
+    tab.get_by_role("button", name="Save what was played", exact=True).click()
+    folder = page.keeper.folder / "skirmish-1000000-1"
+    tab.get_by_text(f"saved {folder}").first.wait_for(timeout=30_000)
+    assert read(folder).by(Mover.PERSON)[:, 0].all()
+    tab.get_by_role("cell", name="skirmish-1000000-1").wait_for(timeout=30_000)
+
+    tab.get_by_role("button", name="Watch it", exact=True).click()
+    _until(lambda: isinstance(page.match, ReplayedMatch))
+    tab.get_by_role("tab", name="Drive").click()
+    tab.get_by_role("button", name="Take over", exact=True).click()
+    tab.get_by_text("a recording is watched as it was played").first.wait_for(timeout=30_000)
+    tab.get_by_role("button", name="Play", exact=True).click()
+    _until(lambda: page.match.ended)
+    assert int(page.match.sides[0].state.step[0]) == 2
+
+
+@pytest.mark.slow
+def test_a_full_disk_is_told_and_the_match_goes_on(page, browser):
+    tab = _open(browser, page)
+    page.keeper.folder.write_text("no folder")
+    tab.get_by_role("button", name="Step", exact=True).click()
+    tab.get_by_role("tab", name="Record").click()
+    tab.get_by_role("button", name="Save what was played", exact=True).click()
+    tab.get_by_text("this episode is not saved").first.wait_for(timeout=30_000)
+    tab.get_by_role("button", name="Step", exact=True).click()
+    _until(lambda: int(page.match.alone.state.step[0]) == 2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", ["default"], indirect=True)
+def test_a_person_answers_by_keys_where_the_policy_is_unsure(page, browser):
+    tab, side = _open(browser, page), page.match.sides[0]
+    with page.lock:
+        side.ask_where_unsure(1.0)
+        page.show()
+        questions = page.match.questions()
+        if len(questions) > 1:  # answer all but the last here
+            for question in questions[:-1]:
+                side.crew.answer(question, True)
+            page.show()
+        asked = page.match.questions()[0]
+        stay = side.env.action_names.index("stay")
+    tab.get_by_text(f"What should {side.env.agent_names[asked.agent]} do?").first.wait_for(timeout=30_000)
+    tab.keyboard.press("s")
+    _until(lambda: len(side.tape.rows) == 1)
+    row = side.tape.rows[0]
+    assert int(row["agents", "action"][asked.agent]) == stay
+    assert int(row["agents", "mover"][asked.agent]) == Mover.PERSON
+
+    _until(lambda: page.match.questions())
+    while len(side.tape.rows) == 1:
+        before = len(page.match.questions())
+        tab.keyboard.press("g")
+        _until(lambda left=before: len(side.tape.rows) == 2 or len(page.match.questions()) < left)
+    row = side.tape.rows[1]
+    agreed = row["agents", "mover"] == Mover.PERSON
+    assert agreed.any() and row["agents", "action"].equal(row["agents", "proposed"])
+
+
+@pytest.mark.slow
+def test_a_baseline_that_is_to_be_unsure_is_told(page, browser):
+    tab = _open(browser, page)
+    tab.get_by_role("tab", name="Drive").click()
+    tab.get_by_label("Ask me for the action").click()
+    tab.get_by_text("noop has no action probabilities").first.wait_for(timeout=30_000)
+    assert page.match.sides[0].crew.unsure_below is None
