@@ -99,7 +99,7 @@ def test_teams_of_other_shapes_are_not_exported_together(people, capsys):
     [
         ([], MISTAKE, "one folder of recordings is expected, got none"),
         (["one", "two"], MISTAKE, "got one two"),
-        (["one", "chek=true"], MISTAKE, "did you mean check?"),
+        (["one", "checks=true"], MISTAKE, "did you mean check?"),
         (["one", "check=maybe"], MISTAKE, "check must be true or false, got 'maybe'"),
         (["one", "export=all.csv"], MISTAKE, "export must be a file that ends in .npz, got all.csv"),
         (["one", "--check"], MISTAKE, "keys are given as check="),

@@ -247,6 +247,7 @@ def browser(page):
 
 def _open(browser, page):
     tab = browser.new_page(viewport={"width": 1200, "height": 800})
+    tab.set_default_timeout(120_000)  # without a graphics card a picture takes long
     tab.goto(page.url)
     tab.get_by_role("tab", name="Drive").wait_for(timeout=60_000)
     return tab
