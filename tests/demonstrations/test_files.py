@@ -27,7 +27,7 @@ def reseal(folder, **changes):
 def test_what_is_read_is_what_was_saved(recording, folder):
     found = read(folder)
     assert (found.steps == recording.steps).all() and set(found.steps.keys(True)) == set(recording.steps.keys(True))
-    for name in ("environment", "seed", "events", "policy", "frames", "agents", "actions"):
+    for name in ("environment", "seed", "events", "policy", "frames", "agents", "actions", "saved"):
         assert getattr(found, name) == getattr(recording, name), name
 
 
@@ -57,6 +57,17 @@ def test_a_full_disk_leaves_nothing(recording, tmp_path, monkeypatch):
     assert list((tmp_path / "people").iterdir()) == []
 
 
+def test_a_disk_without_room_is_told_before_memory_is_mapped_onto_it(recording, tmp_path, monkeypatch):
+    def full(*given):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.posix_fallocate", full, raising=False)
+    monkeypatch.setattr(TensorDict, "memmap", lambda *given, **more: pytest.fail("it would kill the process"))
+    with pytest.raises(OSError, match="No space"):
+        save(recording, tmp_path / "people")
+    assert list((tmp_path / "people").iterdir()) == []
+
+
 def test_every_altered_file_is_found(folder):
     for path in sorted(each for each in folder.rglob("*") if each.is_file()):
         kept = path.read_bytes()
@@ -78,6 +89,8 @@ def test_every_altered_file_is_found(folder):
         ({"events": [{"step": 1, "kind": "ignite", "numbers": [1, float("nan")]}]}, "two finite numbers"),
         ({"entries": {"../../etc/passwd": {"dtype": "uint8", "shape": [12]}}}, "has no file of its own"),
         ({"entries": {"agents/action": {"dtype": "object", "shape": [12, 3]}}}, "not a recording"),
+        ({"saved": 1.5}, "a share in 0..1"),
+        ({"saved": "all"}, "a share in 0..1"),
         ({"environment": {"choices": {}, "values": {}}}, "no scenario"),
     ],
 )

@@ -37,3 +37,16 @@ def test_a_configuration_of_another_version_is_told(recording):
     recording.environment.values["nothing"] = {"such": 1}
     with pytest.raises(ValueError, match="nothing"):
         Replay(recording)
+
+
+def test_it_plays_a_second_time(recording):
+    replay = Replay(recording)  # with a held wind, which must not blow at the second start
+    assert torch.equal(replay.check().cells, replay.check().cells)
+
+
+def test_a_wrong_number_of_what_was_saved_is_told(recording):
+    object.__setattr__(recording, "saved", recording.saved - 0.01)
+    with pytest.raises(Unsound, match="the recording says that"):
+        Replay(recording).check()
+    object.__setattr__(recording, "saved", None)
+    Replay(recording).check()

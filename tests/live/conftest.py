@@ -1,6 +1,8 @@
 """Small matches, and a run folder that goes on training."""
 
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -21,6 +23,26 @@ def make_match():
         return Match(Setting(policy=policy, overrides=(*SMALL, *overrides), **options))
 
     return make
+
+
+@pytest.fixture(scope="session")
+def trained(tmp_path_factory):
+    """The folder of a tiny run that was trained here, and goes on."""
+    folder = tmp_path_factory.mktemp("trained") / "run"
+    small = ("n_worlds=4", "collector.steps=8", "algorithm.minibatch_size=16", "model.actor_hidden=[16]")
+    given = (
+        *SMALL,
+        *small,
+        "model.critic_hidden=[16]",
+        "total_frames=32",
+        "evaluation.episodes=2",
+        "evaluation.mode=sampled",
+    )
+    command = [sys.executable, "-m", "warp_torchrl.commands.trial", *given, f"hydra.run.dir={folder}"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL) as process:
+        errors = process.stderr.read()
+    assert process.returncode == 0, errors
+    return folder
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 import pytest
 import torch
 
+from warp_torchrl.demonstrations.recording import Mover
 from warp_torchrl.live.crew import MOST_KEYS, Crew, Question, Refused
 from warp_torchrl.live.order import Order
 from warp_torchrl.world.state import Action
@@ -135,3 +136,82 @@ def test_a_new_start_forgets_keys_and_words_but_no_seats(crew):
     crew.restart()
     assert crew.seats[0].person == ANN and not crew.seats[0].keys
     assert crew.questions(torch.tensor([STAY, CLEAR])) == [Question(1, CLEAR)]
+
+
+# Where the policy is unsure
+
+
+def likely(*tops):
+    """Probabilities of which the likeliest action has these."""
+    chances = torch.zeros(len(tops), 11)
+    chances[:, 0], chances[:, 1] = torch.tensor(tops), 1.0 - torch.tensor(tops)
+    return chances
+
+
+def asked(crew, *tops):
+    return [each.agent for each in crew.questions(POLICY, likely(*tops))]
+
+
+def decided(crew, possible=OPEN):
+    action, movers, told = crew.decide(POLICY, possible, possible, PLACE)
+    return action.tolist(), movers, told
+
+
+def test_the_vehicle_whose_policy_is_least_sure_is_asked_about_first(crew):
+    assert asked(crew, 0.6, 0.55) == [], "nobody wants to be asked"
+    crew.ask_where_unsure(0.7)
+    assert asked(crew, 0.6, 0.55) == [1, 0] and asked(crew, 0.6, 0.75) == [0] and asked(crew, 0.9, 0.8) == []
+    assert crew.questions(POLICY, likely(0.6, 0.9)) == [Question(0, EXTINGUISH, pytest.approx(0.6))]
+    assert crew.questions(POLICY, None) == [], "a baseline has no probabilities"
+
+
+def test_what_a_person_chooses_is_done_and_is_the_person_s(crew):
+    crew.ask_where_unsure(1.0)
+    first, second = crew.questions(POLICY, likely(0.6, 0.7))
+    crew.choose(first, CLEAR, OPEN)
+    assert asked(crew, 0.6, 0.7) == [1]
+    crew.answer(second, True)
+    assert asked(crew, 0.6, 0.7) == []
+    action, movers, _ = decided(crew)
+    assert action == [CLEAR, int(Action.EAST)]
+    assert movers == [Mover.PERSON, Mover.PERSON], "an act that was asked for and approved is the person's too"
+    assert asked(crew, 0.6, 0.7) == [0, 1], "a choice is of one step"
+
+
+def test_an_unsure_policy_may_be_forbidden_what_it_proposes(crew):
+    crew.ask_where_unsure(0.65)
+    crew.answer(crew.questions(POLICY, likely(0.6, 0.9))[0], False)
+    assert asked(crew, 0.6, 0.9) == []
+    action, movers, _ = decided(crew)
+    assert action == [STAY, int(Action.EAST)] and movers == [Mover.FORBIDDEN, Mover.POLICY]
+
+
+def test_a_choice_that_would_do_nothing_is_refused_and_the_question_stays(crew):
+    closed = OPEN.clone()
+    closed[0, CLEAR] = False
+    crew.ask_where_unsure(0.65)
+    question = crew.questions(POLICY, likely(0.6, 0.9))[0]
+    with pytest.raises(Refused, match="bulldozer_0: clear would do nothing here"):
+        crew.choose(question, CLEAR, closed)
+    assert asked(crew, 0.6, 0.9) == [0]
+    crew.choose(question, STAY, closed)
+    crew.choose(question, CLEAR, OPEN)  # and then the world changed
+    assert decided(crew, closed) == (
+        [STAY, int(Action.EAST)], [Mover.WAITING, Mover.POLICY], ["bulldozer_0: clear would do nothing here"]
+    )  # fmt: skip
+
+
+def test_a_vehicle_is_asked_about_once_and_a_driven_one_not_at_all(crew):
+    crew.ask_where_unsure(1.0)
+    crew.ask_before(["extinguish", "east"])
+    assert [each.chance is None for each in crew.questions(POLICY, likely(0.6, 1.0))] == [False, True]
+    crew.take(0, ANN)
+    assert crew.questions(POLICY, likely(0.6, 1.0)) == [Question(1, int(Action.EAST))]
+
+
+def test_what_is_no_probability_is_refused(crew):
+    with pytest.raises(Refused, match="a probability must be in"):
+        crew.ask_where_unsure(1.5)
+    crew.ask_where_unsure(0.5)
+    crew.ask_where_unsure(None)
+    assert crew.unsure_below is None

@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 import time
+from pathlib import Path
 from urllib.request import urlopen
 
 import pytest
@@ -15,7 +16,9 @@ from warp_torchrl.live.__main__ import _read, main
 
 
 def test_the_command_s_own_keys_are_apart_from_those_of_the_scenario():
-    setting, where = _read(["policy=outputs/run", "scenario=large", "seed=7", "port=0", "team.n_agents=3"])
+    given = ["policy=outputs/run", "scenario=large", "seed=7", "port=0", "team.n_agents=3"]
+    setting, where, recordings = _read(given)
+    assert recordings == Path("recordings") and _read([*given, "recordings=people/one"])[2] == Path("people/one")
     assert (setting.policy, setting.seed, setting.beside) == ("outputs/run", 7, None)
     assert setting.overrides == ("scenario=large", "team.n_agents=3") and where == {"port": 0}
 
@@ -29,6 +32,7 @@ def test_the_command_s_own_keys_are_apart_from_those_of_the_scenario():
         (["seed=-1"], "seed must be in"),
         (["port=70000"], "port must be in [0, 65535], got 70000"),
         (["--port", "8080"], "keys are given as port=8080"),
+        ([f"recordings={__file__}"], "recordings must be a folder, got the file "),
         (["scenario=larg"], "scenario must be one of"),
         (["team.n_agents=0"], "team.n_agents must be in"),
         (["landscape"], "landscape has no value"),

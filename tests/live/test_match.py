@@ -4,6 +4,7 @@ import pytest
 import torch
 
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.demonstrations.recording import Mover
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.live.order import Order
@@ -134,6 +135,33 @@ def test_an_order_is_obeyed_at_once_though_a_question_was_open(make_match):
     side.order(0, Order(row=15, column=15, radius=0))
     left = side.mask[0]
     assert all(left[question.action] for question in match.questions() if question.agent == 0)
+
+
+def test_a_match_waits_where_its_policy_is_unsure_and_records_what_a_person_chose(make_match):
+    match = make_match("default")
+    side = match.sides[0]
+    side.ask_where_unsure(1.0)
+    while not (questions := match.questions()):
+        match.step()
+    at = int(side.state.step[0])
+    match.step()
+    assert int(side.state.step[0]) == at, "a question is open"
+    for question in questions:
+        assert question.chance == pytest.approx(float(side.chances[question.agent].max()))
+        side.crew.answer(question, True)
+    match.step()
+    row = side.record().steps[-1]
+    people = (row["agents", "mover"] == Mover.PERSON).nonzero()[:, 0].tolist()
+    assert people == sorted(each.agent for each in questions)
+    assert row["agents", "action"].equal(row["agents", "proposed"])
+
+
+def test_a_baseline_cannot_tell_how_sure_it_is(make_match):
+    match = make_match("local")
+    with pytest.raises(Refused, match="local has no action probabilities"):
+        match.sides[0].ask_where_unsure(0.5)
+    match.sides[0].ask_where_unsure(None)
+    assert match.sides[0].crew.unsure_below is None
 
 
 # The world

@@ -18,9 +18,13 @@ pytest.importorskip("viser", reason="needs the extra live")
 
 from tests.live.conftest import SMALL
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.live.match import Setting
+from warp_torchrl.demonstrations.files import read
+from warp_torchrl.demonstrations.recording import Mover
+from warp_torchrl.live.crew import Refused
+from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.live.page import Address, Page
-from warp_torchrl.live.panel import _chosen
+from warp_torchrl.live.panel.tab import chosen
+from warp_torchrl.live.replayed import ReplayedMatch
 from warp_torchrl.world.state import Action, is_tree
 
 BROWSER = next((path for name in ("chromium", "google-chrome") if (path := shutil.which(name))), None)
@@ -28,9 +32,12 @@ FLAGS = ["--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swifts
 
 
 @pytest.fixture
-def page():
-    overrides = (*SMALL, "observation.radius=4")  # which no shipped policy was trained to see
-    with Page(Setting(policy="noop", overrides=overrides), Address(port=0)) as made:
+def page(request, tmp_path):
+    """A page of a policy without probabilities; of another one where a test names it."""
+    policy = getattr(request, "param", "noop")
+    # No shipped policy was trained to see so far.
+    overrides = (*SMALL, "observation.radius=4") if policy == "noop" else SMALL
+    with Page(Setting(policy=policy, overrides=overrides), Address(port=0), tmp_path / "people") as made:
         yield made
 
 
@@ -110,9 +117,9 @@ def test_a_new_start_shows_the_ground_of_its_seed(page):
 def test_a_browser_cannot_name_what_it_was_not_offered():
     offered = SimpleNamespace(value="/etc", options=("default", "local"), label="Policy")
     with pytest.raises(ValueError, match="Policy must be one of default, local, got /etc"):
-        _chosen(offered)
+        chosen(offered)
     offered.value = "local"
-    assert _chosen(offered) == "local"
+    assert chosen(offered) == "local"
 
 
 def test_what_is_drawn_follows_the_match(page):
@@ -123,6 +130,101 @@ def test_what_is_drawn_follows_the_match(page):
     page.show()
     changed = (stage.tiles.batched_colors != before).any(axis=1).nonzero()[0].tolist()
     assert changed == [row * 16 + column]
+
+
+# What was played
+
+
+@pytest.fixture
+def kept(page):
+    """A page that keeps episodes in an empty folder, and a function that drives a vehicle for a step."""
+    page.keeper.every = True
+
+    def drive():
+        crew = page.match.sides[0].crew
+        crew.take(0, person=1)
+        crew.press(0, 1, int(Action.SOUTH))
+        page.step()
+
+    return page, drive
+
+
+def saved(page):
+    return sorted(path.name for path in page.keeper.folder.glob("*"))
+
+
+def test_an_episode_with_people_is_kept_when_it_is_left_and_one_without_is_not(kept):
+    page, drive = kept
+    page.step()
+    page.restart()
+    assert saved(page) == []
+    drive()
+    page.restart()
+    assert saved(page) == ["skirmish-1000000-1"]
+    drive()
+    page.open(Match(page.given))
+    assert len(saved(page)) == 2
+    drive()
+    while not page.match.sides[0].ended:
+        page.step()
+    assert len(saved(page)) == 3 and len(page.keeper.read("skirmish-1000000-3").steps) > 5
+    page.step()
+    page.restart()
+    assert len(saved(page)) == 3, "it is kept once"
+
+
+def test_the_end_of_the_page_keeps_the_episode_and_says_so(kept, capsys):
+    page, drive = kept
+    drive()
+    page.__exit__()
+    assert saved(page) == ["skirmish-1000000-1"]
+    assert capsys.readouterr().out == f"saved {page.keeper.folder / 'skirmish-1000000-1'}\n"
+
+
+def test_an_episode_that_cannot_be_saved_is_not_left_and_its_end_is_told_once(kept, monkeypatch):
+    page, drive = kept
+    told = []
+    monkeypatch.setattr(page, "tell", lambda line, mistake=False: told.append(line))
+    page.keeper.folder.write_text("a file")
+    drive()
+    tape = page.match.sides[0].tape
+    for leave in (page.restart, lambda: page.open(Match(page.given))):
+        with pytest.raises(Refused, match="cannot be written"):
+            leave()
+    assert page.match.sides[0].tape is tape and told == []
+    while not page.match.ended:
+        page.step()
+    assert len(told) == 1 and "this episode is not saved" in told[0]
+    page.keeper.every = False
+    page.restart()
+    assert page.match.sides[0].tape is not tape
+
+
+def test_a_recording_is_watched_and_the_match_is_loaded_again(kept):
+    page, drive = kept
+    drive()
+    page.restart()
+    page.open(ReplayedMatch(page.keeper.read("skirmish-1000000-1"), page.match.setting))
+    page.playing, page.pace = True, 500.0
+    page._go_on()
+    assert page.match.ended and not page.playing and int(page.match.sides[0].state.step[0]) == 1
+    page.open(Match(page.match.setting))
+    assert len(saved(page)) == 1
+
+
+def test_the_page_tells_how_far_a_training_is_and_ends_it(page, monkeypatch):
+    told = []
+    monkeypatch.setattr(page, "tell", lambda line, mistake=False: told.append(line))
+    states = iter(["one trains", "one trains", "one is trained"])
+    monkeypatch.setattr(page.learning, "told", lambda: next(states))
+    for _ in range(3):
+        page._followed = -1e9
+        page._go_on()
+    assert told == ["one trains", "one is trained"]
+    ended = []
+    monkeypatch.setattr(page.learning, "close", lambda: ended.append(True))
+    page.__exit__()
+    assert ended == [True]
 
 
 # In a browser
@@ -145,8 +247,9 @@ def browser(page):
 
 def _open(browser, page):
     tab = browser.new_page(viewport={"width": 1200, "height": 800})
+    tab.set_default_timeout(120_000)  # without a graphics card a picture takes long
     tab.goto(page.url)
-    tab.get_by_role("tab", name="Drive").wait_for(timeout=60_000)
+    tab.get_by_role("tab", name="Drive").wait_for(timeout=120_000)
     return tab
 
 
@@ -214,7 +317,7 @@ def test_a_click_on_the_ground_lights_the_cell_that_was_clicked_and_one_in_the_s
         if lit():
             break
     panel = next(iter(page._panels.values()))
-    assert lit() == [[int(each) for each in panel._cell.value]]
+    assert lit() == [[int(each) for each in panel.world.cell.value]]
 
 
 FOREST, BURNING = "forest", "burning"
@@ -263,3 +366,72 @@ def test_the_match_waits_for_a_word_and_a_policy_that_does_not_fit_leaves_it(pag
     tab.get_by_role("button", name="Load", exact=True).click()
     tab.get_by_text("the policy default does not fit here").first.wait_for(timeout=30_000)
     assert page.match is match
+
+
+@pytest.mark.slow
+def test_a_person_drives_by_the_keyboard_saves_what_was_played_and_watches_it(page, browser):
+    tab, side = _open(browser, page), page.match.sides[0]
+    tab.get_by_role("tab", name="Drive").click()
+    tab.get_by_role("button", name="Take over", exact=True).click()
+    _until(lambda: side.crew.seats[0].person is not None)
+    for count, key in enumerate("ss", start=1):
+        tab.keyboard.press(key)
+        _until(lambda steps=count: len(side.tape.rows) == steps)
+    tab.get_by_role("tab", name="Record").click()
+    tab.get_by_role("button", name="Save what was played", exact=True).click()
+    folder = page.keeper.folder / "skirmish-1000000-1"
+    tab.get_by_text(f"saved {folder}").first.wait_for(timeout=30_000)
+    assert read(folder).by(Mover.PERSON)[:, 0].all()
+    tab.get_by_role("cell", name="skirmish-1000000-1").wait_for(timeout=30_000)
+
+    tab.get_by_role("button", name="Watch it", exact=True).click()
+    _until(lambda: isinstance(page.match, ReplayedMatch))
+    tab.get_by_role("tab", name="Drive").click()
+    tab.get_by_role("button", name="Take over", exact=True).click()
+    tab.get_by_text("a recording is watched as it was played").first.wait_for(timeout=30_000)
+    tab.get_by_role("button", name="Play", exact=True).click()
+    _until(lambda: page.match.ended)
+    assert int(page.match.sides[0].state.step[0]) == 2
+
+
+@pytest.mark.slow
+def test_a_full_disk_is_told_and_the_match_goes_on(page, browser):
+    tab = _open(browser, page)
+    page.keeper.folder.write_text("no folder")
+    tab.get_by_role("button", name="Step", exact=True).click()
+    tab.get_by_role("tab", name="Record").click()
+    tab.get_by_role("button", name="Save what was played", exact=True).click()
+    tab.get_by_text("this episode is not saved").first.wait_for(timeout=30_000)
+    tab.get_by_role("button", name="Step", exact=True).click()
+    _until(lambda: int(page.match.alone.state.step[0]) == 2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", ["default"], indirect=True)
+def test_a_person_answers_by_keys_where_the_policy_is_unsure(page, browser):
+    tab, side = _open(browser, page), page.match.sides[0]
+    with page.lock:
+        side.ask_where_unsure(1.0)
+        page.show()
+        questions = page.match.questions()
+        if len(questions) > 1:  # answer all but the last here
+            for question in questions[:-1]:
+                side.crew.answer(question, True)
+            page.show()
+        asked = page.match.questions()[0]
+        stay = side.env.action_names.index("stay")
+    tab.get_by_text(f"What should {side.env.agent_names[asked.agent]} do?").first.wait_for(timeout=30_000)
+    tab.keyboard.press("s")
+    _until(lambda: len(side.tape.rows) == 1)
+    row = side.tape.rows[0]
+    assert int(row["agents", "action"][asked.agent]) == stay
+    assert int(row["agents", "mover"][asked.agent]) == Mover.PERSON
+
+    _until(lambda: page.match.questions())
+    while len(side.tape.rows) == 1:
+        before = len(page.match.questions())
+        tab.keyboard.press("g")
+        _until(lambda left=before: len(side.tape.rows) == 2 or len(page.match.questions()) < left)
+    row = side.tape.rows[1]
+    agreed = row["agents", "mover"] == Mover.PERSON
+    assert agreed.any() and row["agents", "action"].equal(row["agents", "proposed"])

@@ -1,10 +1,13 @@
 """What the page says."""
 
 import re
+from pathlib import Path
 
 import pytest
 
+from warp_torchrl.demonstrations.summary import Summary
 from warp_torchrl.live import words
+from warp_torchrl.live.crew import Question
 from warp_torchrl.live.order import Order
 
 
@@ -64,3 +67,51 @@ def test_the_legend_names_every_kind_of_cell_and_every_vehicle(match):
     text = words.legend(match.sides[0])
     for name in ("lake", "forest", "fire", "ash", "firebreak", "wet", "bulldozer_2"):
         assert f"</span>{name}</span>" in text
+
+
+def test_a_question_names_the_vehicle_and_the_act_and_tells_how_unsure_the_policy_is(match):
+    north, extinguish = (match.sides[0].env.action_names.index(name) for name in ("north", "extinguish"))
+    text = words.questions(match.sides[0], [Question(0, extinguish), Question(2, extinguish)])
+    assert text == "**bulldozer_0** is about to **extinguish**.\n\n**bulldozer_2** is about to **extinguish**."
+    unsure = words.questions(match.sides[0], [Question(1, north, 0.312)])
+    assert "What should **bulldozer_1** do?" in unsure and "**north**" in unsure and "31%" in unsure
+    assert words.questions(match.sides[0], []) == ""
+
+
+@pytest.mark.parametrize(
+    ("names", "short"),
+    [
+        (["bulldozer_0", "bulldozer_10"], ["b0", "b10"]),
+        (["bulldozer_0", "drone_0", "drone_1"], ["b0", "d0", "d1"]),
+        (["drone_0", "dozer_0"], ["dr0", "do0"]),
+    ],
+)
+def test_short_names_are_of_one_vehicle_each(names, short):
+    assert words.labels(names) == short
+
+
+def test_what_was_played_so_far_tells_whose_acts_there_were(match):
+    side = match.sides[0]
+    assert words.so_far(side) == "**0** steps so far, **0** acts of people, no corrections."
+    side.crew.take(0, person=1)
+    for name in ("stay", "south"):
+        side.crew.press(0, 1, side.env.action_names.index(name))
+        match.step()
+    assert (
+        words.so_far(side) == f"**2** steps so far, **2** acts of people, {side.tape.corrections} of them corrections."
+    )
+
+
+def test_recordings_are_a_table_in_which_a_broken_one_is_called_so():
+    row = Summary("one", "skirmish", 7, "default", 30, 5, 2, 0.613)
+    text = words.recordings(Path("people"), {"one": row, "two": "its sha256 is not its own"})
+    assert text.splitlines()[-2:] == ["| one | 30 | 5 | 2 | 61% |", "| two | broken | | | |"]
+    many = words.recordings(Path("people"), {f"{at:02}": row for at in range(20)})
+    assert "| 19 |" in many and "| 04 |" not in many and many.endswith("and 5 before them.")
+    assert words.recordings(Path("people"), {}) == "`people` holds no recording."
+
+
+def test_a_training_tells_what_can_be_played():
+    assert words.training("", None).startswith("Only policies")
+    assert words.training("runs/a trains", None) == "runs/a trains."
+    assert words.training("runs/a trains", 2000) == "runs/a trains. A policy of 2,000 steps can be played."

@@ -4,6 +4,7 @@
 in a folder is executed or unpickled.
 """
 
+import os
 import re
 import shutil
 from collections.abc import Iterator
@@ -49,6 +50,7 @@ def save(recording: Recording, parent: Path) -> Path:
         shutil.rmtree(draft, ignore_errors=True)
         try:
             draft.mkdir()
+            _check_room(draft / ".room", recording.steps)
             recording.steps.to_tensordict().memmap(draft / _STEPS, copy_existing=True)
             (draft / MANIFEST).write_bytes(sealed(_content(recording, draft)))
             for path in (*draft.rglob("*"), draft):
@@ -87,6 +89,7 @@ def read(folder: Path) -> Recording:
             frames=None if content["frames"] is None else _whole(content["frames"], 2**62),
             agents=agents,
             actions=tuple(map(str, content["actions"])),
+            saved=_share(content.get("saved")),
         )
         _check(recording)
     except (TypeError, KeyError, ValueError, AttributeError, OverflowError, RuntimeError, OSError) as error:
@@ -104,6 +107,14 @@ def find(folder: Path) -> list[Path]:
     if not found:
         raise Unsound(f"{folder} holds no recording: no {MANIFEST} in it, nor in its folders")
     return found
+
+
+def _check_room(path: Path, steps: TensorDictBase) -> None:
+    """Check that the disk has room for the steps: a full one would kill the process that writes into mapped memory."""
+    if hasattr(os, "posix_fallocate"):
+        with path.open("wb") as file:
+            os.posix_fallocate(file.fileno(), 0, steps.bytes())
+        path.unlink()
 
 
 def _content(recording: Recording, folder: Path) -> dict[str, Any]:
@@ -124,6 +135,7 @@ def _content(recording: Recording, folder: Path) -> dict[str, Any]:
         "frames": recording.frames,
         "agents": list(recording.agents),
         "actions": list(recording.actions),
+        "saved": recording.saved,
         "versions": {name: library.__version__ for name, library in libraries.items()},
         "files": described(folder, names),
     }
@@ -173,3 +185,9 @@ def _whole(value: object, most: int) -> int:
     if type(value) is not int or not 0 <= value <= most:
         raise ValueError(f"a whole number up to {most} is expected, got {value!r}")
     return value
+
+
+def _share(value: object) -> float | None:
+    if value is None or (isinstance(value, float | int) and 0.0 <= value <= 1.0):
+        return value
+    raise ValueError(f"a share in 0..1 is expected, got {value!r}")

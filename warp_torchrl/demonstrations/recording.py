@@ -48,6 +48,7 @@ class Recording:
         frames: World steps that the policy was trained for; None for a baseline.
         agents: Names of the agents.
         actions: Names of the actions.
+        saved: Share of the initial trees that stand where it was left, in 0..1; None if nobody has counted them.
     """
 
     steps: TensorDictBase
@@ -58,6 +59,7 @@ class Recording:
     frames: int | None
     agents: tuple[str, ...]
     actions: tuple[str, ...]
+    saved: float | None = None
 
     @property
     def scenario(self) -> str:
@@ -80,10 +82,21 @@ class Tape:
     Attributes:
         rows: A TensorDict of batch size [] for each step.
         events: What people have done to the world.
+        acts: Actions of people so far.
+        corrections: Those of them that the policy had not proposed.
+        words: Actions under an order, or in place of a forbidden one.
     """
 
     rows: list[TensorDictBase] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
+    acts: int = 0
+    corrections: int = 0
+    words: int = 0
+
+    @property
+    def has_people(self) -> bool:
+        """Return whether a person did anything: drove, chose, ordered, forbade, or changed the world."""
+        return bool(self.acts or self.words or self.events)
 
     def add(self, shown: TensorDictBase, proposed: Tensor, movers: Sequence[Mover], after: TensorDictBase) -> None:
         """Add a step.
@@ -99,6 +112,10 @@ class Tape:
         row[MOVER] = torch.tensor(movers, dtype=torch.uint8)
         row["next"] = after.select(*_ENDS)[0].clone()
         self.rows.append(row)
+        others = (row[ACTION] != proposed).tolist()
+        self.acts += sum(each == Mover.PERSON for each in movers)
+        self.corrections += sum(each == Mover.PERSON and other for each, other in zip(movers, others))
+        self.words += sum(each in (Mover.ORDER, Mover.FORBIDDEN) for each in movers)
 
     def steps(self) -> TensorDictBase:
         """Return the steps, of which there is one at least, batch size [T]."""

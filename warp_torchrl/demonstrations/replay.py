@@ -34,6 +34,7 @@ class Replay:
         self.env = WildfireEnv(
             parts["world"], observation=parts["observation"], reward=parts["reward"], seed=recording.seed
         )
+        self._world = self.env.world
 
     def states(self) -> Iterator[WorldState]:
         """Play, and yield the world at its start and after every step, batch size [1].
@@ -41,18 +42,30 @@ class Replay:
         Raises:
             Unsound: If an agent sees, may do or earns other than was recorded.
         """
+        for _ in self.shown():
+            yield self.env.world_state
+
+    def shown(self) -> Iterator[TensorDictBase]:
+        """Play, and yield what the environment shows at its start and after every step, batch size [1].
+
+        Raises:
+            Unsound: If an agent sees, may do or earns other than was recorded.
+        """
         env, steps = self.env, self.recording.steps
+        env.world = self._world  # a wind that was held may blow there
         env.set_seeds([self.recording.seed])
         shown = env.reset()
-        yield env.world_state
+        yield shown
         for at in range(len(steps)):
             shown = self._after_events(at, shown)
             row = steps[at]
             self._check(at, row, shown, (OBSERVATION, ACTION_MASK))
             shown = env.step(shown.set(ACTION, row[ACTION][None]))["next"]
             self._check(at, row["next"], shown, (REWARD, "done"))
-            yield env.world_state
-        self._after_events(len(steps), shown)
+            if at == len(steps) - 1:
+                shown = self._after_events(len(steps), shown)
+                self._check_saved()
+            yield shown
 
     def check(self) -> WorldState:
         """Play it all, and return the last world.
@@ -68,6 +81,11 @@ class Replay:
             if event.step == step:
                 shown = carry_out(self.env, event)
         return shown
+
+    def _check_saved(self) -> None:
+        recorded, found = self.recording.saved, float(self.env.tree_counts.saved()[0])
+        if recorded is not None and abs(recorded - found) > 1e-6:
+            raise Unsound(f"the recording says that {recorded:.2%} was saved, this version plays {found:.2%}")
 
     def _check(
         self, step: int, recorded: TensorDictBase, shown: TensorDictBase, keys: tuple[str | tuple[str, ...], ...]

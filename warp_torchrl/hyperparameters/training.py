@@ -1,4 +1,4 @@
-"""A training as a process of its own, which ends when the search does."""
+"""A training as a process of its own, which ends when the search does, or the live page that started it."""
 
 import os
 import signal

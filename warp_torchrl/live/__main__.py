@@ -4,6 +4,7 @@ import importlib.util
 import signal
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from types import FrameType
 
 from warp_torchrl.commands.failure import DONE, fail
@@ -13,9 +14,9 @@ from warp_torchrl.live.match import Setting
 
 USAGE = (
     "python -m warp_torchrl.live [policy=NAME or FOLDER] [beside=NAME or FOLDER] [seed=0] [port=8080] "
-    "[host=127.0.0.1] [scenario=NAME] [KEY=VALUE ...]"
+    "[host=127.0.0.1] [recordings=recordings] [scenario=NAME] [KEY=VALUE ...]"
 )
-_OURS, _WHERE = ("policy", "beside", "seed"), ("host", "port")
+_OURS, _WHERE, _RECORDINGS = ("policy", "beside", "seed"), ("host", "port"), "recordings"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -33,14 +34,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _serve(arguments: Sequence[str]) -> None:
-    setting, where = _read(arguments)
+    setting, where, recordings = _read(arguments)
     if importlib.util.find_spec("viser") is None:
         raise ConfigError('the live page needs viser, not installed: pip install "warp_torchrl[live]"')
     from warp_torchrl.live.page import Address, Page
 
     address = construct(Address, where, "")
     signal.signal(signal.SIGTERM, _interrupt)
-    with Page(setting, address) as page:
+    with Page(setting, address, recordings) as page:
         print(f"{page.url} shows {setting.policy}; Ctrl-C ends it", flush=True)
         try:
             page.play()
@@ -48,8 +49,8 @@ def _serve(arguments: Sequence[str]) -> None:
             print("\nstopped", flush=True)
 
 
-def _read(arguments: Sequence[str]) -> tuple[Setting, dict[str, object]]:
-    """Return what the command line asks for: a setting, and the address's values.
+def _read(arguments: Sequence[str]) -> tuple[Setting, dict[str, object], Path]:
+    """Return what the command line asks for: a setting, the address's values, and the folder of recordings.
 
     Raises:
         ConfigError: If a word is no ``key=value``, or a value does not fit.
@@ -57,11 +58,15 @@ def _read(arguments: Sequence[str]) -> tuple[Setting, dict[str, object]]:
     check_flags(arguments)
     check_overrides(arguments)
     pairs = [each.partition("=") for each in arguments]
-    own = {key: _value(key, value) for key, _, value in pairs if key in (*_OURS, *_WHERE)}
-    overrides = tuple("=".join((key, value)) for key, _, value in pairs if key not in (*_OURS, *_WHERE))
+    known = (*_OURS, *_WHERE, _RECORDINGS)
+    own = {key: _value(key, value) for key, _, value in pairs if key in known}
+    overrides = tuple("=".join((key, value)) for key, _, value in pairs if key not in known)
     values = {key: value for key, value in own.items() if key in _OURS}
     setting = construct(Setting, {**values, "overrides": overrides}, "")
-    return setting, {key: value for key, value in own.items() if key in _WHERE}
+    recordings = Path(str(own.get(_RECORDINGS, _RECORDINGS)))
+    if recordings.exists() and not recordings.is_dir():
+        raise ConfigError(f"recordings must be a folder, got the file {recordings}")
+    return setting, {key: value for key, value in own.items() if key in _WHERE}, recordings
 
 
 def _value(key: str, given: str) -> object:

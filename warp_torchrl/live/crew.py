@@ -23,10 +23,18 @@ class Refused(ValueError):  # noqa: N818
 
 
 class Question(NamedTuple):
-    """An act of the policy that waits for a person's word."""
+    """An act of the policy that waits for a person's word.
+
+    Attributes:
+        agent: Index of the vehicle.
+        action: What the policy proposes.
+        chance: Probability of the policy's most likely action, where that is so low that a person is asked for the
+            action; None where the act is of a kind that needs a word.
+    """
 
     agent: int
     action: int
+    chance: float | None = None
 
 
 @dataclass
@@ -49,7 +57,8 @@ class Crew:
 
     A driven vehicle does what its person asked for, one act a step in the order of the keys, and idles without one. All
     others do what the policy proposes, under the mask of their order if they have one. Before an act of a kind in
-    ``asks`` the policy needs a person's word.
+    ``asks`` the policy needs a person's word. Where its most likely action is less likely than ``unsure_below`` a
+    person chooses the action: what the policy proposes, or another.
 
     Args:
         team: The vehicles.
@@ -60,7 +69,10 @@ class Crew:
         self.seats = [Seat() for _ in range(team.n_agents)]
         self.asks: frozenset[str] = frozenset()
         """Names of the actions before which a person is asked."""
-        self._answers: dict[Question, bool] = {}
+        self.unsure_below: float | None = None
+        """Probability of the most likely action below which a person is asked for the action; None asks for none."""
+        self._answers: dict[tuple[int, int], bool] = {}  # by vehicle and proposed action
+        self._chosen: dict[int, int] = {}  # action by vehicle
 
     # What people do
 
@@ -125,13 +137,42 @@ class Crew:
             raise Refused(f"an action must be one of {', '.join(self.team.action_names)}, got {name}{hint}")
         self.asks = names
 
+    def ask_where_unsure(self, below: float | None) -> None:
+        """Choose how likely the policy's most likely action must be for no person to be asked; None asks nobody.
+
+        Raises:
+            Refused: If it is no probability.
+        """
+        if below is not None and not 0.0 <= below <= 1.0:
+            raise Refused(f"a probability must be in [0, 1], got {below:g}")
+        self.unsure_below = below
+
     def answer(self, question: Question, allow: bool) -> None:
-        """Give a person's word on an act."""
-        self._answers[question] = allow
+        """Give a person's word on an act; to allow one of which the policy was unsure is to choose it."""
+        if allow and question.chance is not None:
+            self._chosen[question.agent] = question.action
+        else:
+            self._answers[question.agent, question.action] = allow
+
+    def choose(self, question: Question, action: int, possible: Tensor) -> None:
+        """Choose the action of a vehicle whose policy is unsure; also its own, if that is what a person would do.
+
+        Args:
+            question: Which asked for it.
+            action: What it does instead of, or as, the policy proposes.
+            possible: Which actions would do something, bool [A, actions].
+
+        Raises:
+            Refused: If the action would do nothing.
+        """
+        agent = question.agent
+        if not possible[agent, action] and action != int(idle_action(possible, self.team)[agent]):
+            raise Refused(self._nothing(agent, action))
+        self._chosen[agent] = action
 
     def restart(self) -> None:
         """Forget acts and answers of an episode that is over; who drives what, and the orders, stay."""
-        self._answers.clear()
+        self._forget()
         for seat in self.seats:
             seat.keys.clear()
 
@@ -157,17 +198,26 @@ class Crew:
         ]
         return torch.stack(rows)
 
-    def questions(self, proposed: Tensor) -> list[Question]:
-        """Return the acts of the policy that wait for a person's word; proposed are its actions, int64 [A]."""
-        if not self.asks:
-            return []
-        acts = [Question(agent, action) for agent, action in enumerate(proposed.tolist())]
-        return [
-            each
-            for each in acts
-            if self.seats[each.agent].person is None
-            and self.team.action_names[each.action] in self.asks
-            and each not in self._answers
+    def questions(self, proposed: Tensor, chances: Tensor | None = None) -> list[Question]:
+        """Return the acts of the policy that wait for a person, the one that it is least sure of first.
+
+        Args:
+            proposed: Its actions, int64 [A].
+            chances: Probability of each action, float32 [A, actions]; None of a policy that has none.
+        """
+        free = [
+            (agent, action)
+            for agent, action in enumerate(proposed.tolist())
+            if self.seats[agent].person is None and agent not in self._chosen and (agent, action) not in self._answers
+        ]
+        unsure: list[Question] = []
+        if self.unsure_below is not None and chances is not None:
+            top = chances.amax(dim=-1).tolist()
+            asked = [Question(*each, top[each[0]]) for each in free if top[each[0]] < self.unsure_below]
+            unsure = sorted(asked, key=lambda each: top[each.agent])
+        known = {each.agent for each in unsure}
+        return unsure + [
+            Question(*each) for each in free if each[0] not in known and self.team.action_names[each[1]] in self.asks
         ]
 
     def decide(
@@ -188,25 +238,39 @@ class Crew:
         movers = [Mover.POLICY] * self.team.n_agents
         for agent, seat in enumerate(self.seats):
             if seat.person is not None:
-                action[agent], movers[agent], refusal = self._driven(agent, seat, possible[agent], int(idle[agent]))
+                wanted = seat.keys.popleft() if seat.keys else None
+                action[agent], movers[agent], refusal = self._asked_for(wanted, agent, possible[agent], idle[agent])
                 told += refusal
-            elif self._answers.get(Question(agent, int(proposed[agent]))) is False:
+            elif agent in self._chosen:
+                wanted = self._chosen[agent]
+                action[agent], movers[agent], refusal = self._asked_for(wanted, agent, possible[agent], idle[agent])
+                told += refusal
+            elif self._answers.get((agent, int(proposed[agent]))) is False:
                 action[agent], movers[agent] = idle[agent], Mover.FORBIDDEN
             elif seat.order is not None:
                 movers[agent] = Mover.ORDER
                 if not mask[agent, proposed[agent]]:  # a baseline reads the world and not the mask
                     move = seat.order.nearest_move(mask[agent], position[agent], self._strides()[agent])
                     action[agent] = idle[agent] if move is None else move
-        self._answers.clear()
+        self._forget()
         return action, movers, told
 
-    def _driven(self, agent: int, seat: Seat, possible: Tensor, idle: int) -> tuple[int, Mover, list[str]]:
-        if not seat.keys:
-            return idle, Mover.WAITING, []
-        wanted = seat.keys.popleft()
-        if possible[wanted] or wanted == idle:
+    def _asked_for(
+        self, wanted: int | None, agent: int, possible: Tensor, idle: Tensor
+    ) -> tuple[int, Mover, list[str]]:
+        """Return what a vehicle does for a person who asked for an action or none, whose it is, and what to tell."""
+        if wanted is None:
+            return int(idle), Mover.WAITING, []
+        if possible[wanted] or wanted == int(idle):
             return wanted, Mover.PERSON, []
-        return idle, Mover.WAITING, [f"{self.name(agent)}: {self.team.action_names[wanted]} would do nothing here"]
+        return int(idle), Mover.WAITING, [self._nothing(agent, wanted)]
+
+    def _nothing(self, agent: int, action: int) -> str:
+        return f"{self.name(agent)}: {self.team.action_names[action]} would do nothing here"
+
+    def _forget(self) -> None:
+        self._answers.clear()
+        self._chosen.clear()
 
     def _check_drives(self, agent: int, person: int) -> None:
         if self.seats[agent].person != person:

@@ -4,8 +4,9 @@ All sides have the same seed. Every draw of a world is a function of seed, episo
 by what the teams do, and by nothing else.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from torch import Tensor
 
@@ -60,20 +61,35 @@ class Match:
     """
 
     def __init__(self, setting: Setting) -> None:
-        self.setting = setting
         found = [Found(name) for name in (setting.policy, setting.beside) if name is not None]
         config = found[0].config(setting.overrides)
-        self.scenario: str = config["scenario"]
         parts = build_components(config, ENVIRONMENT)
-        self.world: World = parts["world"]
-        self.sides: list[Side] = []
+        sides = []
         for each in found:
             # Each sees what it was trained to see, in the first one's world.
             values = {**config, "observation": each.config(setting.overrides)["observation"]}
             seen = build_components(values, ENVIRONMENT)
-            env = WildfireEnv(self.world, observation=seen["observation"], reward=parts["reward"], seed=setting.seed)
+            env = WildfireEnv(
+                parts["world"], observation=seen["observation"], reward=parts["reward"], seed=setting.seed
+            )
             env.reset()
-            self.sides.append(Side(env, each.player(env, setting.seed), environment_record(values)))
+            sides.append(Side(env, each.player(env, setting.seed), environment_record(values)))
+        self._set(setting, config, parts, sides)
+
+    def _set(
+        self, setting: Setting, config: Mapping[str, Any], parts: Mapping[str, Any], sides: Sequence[Side]
+    ) -> None:
+        """Set the sides, and the fire without a team beside them, at the start of the episode.
+
+        Args:
+            setting: What the match is of.
+            config: The composed configuration, as plain values.
+            parts: What was built of it.
+            sides: Who fights the fire.
+        """
+        self.setting, self.sides = setting, sides
+        self.scenario: str = config["scenario"]
+        self.world: World = parts["world"]
         alone = WildfireEnv(self.world, observation=parts["observation"], reward=parts["reward"], seed=setting.seed)
         nobody = Player("without a team", HEURISTICS["noop"](alone), "sampled", setting.seed)
         self.alone = Side(alone, nobody, environment_record(config))

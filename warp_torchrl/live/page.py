@@ -1,22 +1,30 @@
 """The page: a local server that shows a match, plays it at a pace, and lets people take part."""
 
 import socket
+import sys
 import threading
 import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import viser
 
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.demonstrations.recording import Tape
 from warp_torchrl.live import words
+from warp_torchrl.live.keeping import Keeper
+from warp_torchrl.live.learning import Learning
 from warp_torchrl.live.match import Match, Setting
-from warp_torchrl.live.panel import Panel
+from warp_torchrl.live.origin import only_own
+from warp_torchrl.live.panel.panel import Panel
+from warp_torchrl.live.panel.tab import told_if_refused
 from warp_torchrl.live.scene import LocalServer, aim, furnish, places, quiet
 from warp_torchrl.live.stage import Stage
 from warp_torchrl.validation import check_fields
 
+RECORDINGS = Path("recordings")
 _FOLLOWED_EVERY = 5.0  # seconds between two looks for newer weights
 
 
@@ -63,23 +71,27 @@ class Page:
     Args:
         setting: What is played first.
         address: Where it is served.
+        recordings: Folder of what is saved.
 
     Raises:
         ConfigError: If the setting or the address does not fit.
         CheckpointError: If a run folder holds no sound checkpoint.
     """
 
-    def __init__(self, setting: Setting, address: Address) -> None:
+    def __init__(self, setting: Setting, address: Address, recordings: Path = RECORDINGS) -> None:
         self.given, self.match = setting, Match(setting)
         self.address = address.free()
         self.lock = threading.RLock()
         self.playing, self.pace = False, 8.0
+        self.keeper, self.learning = Keeper(recordings), Learning(recordings)
+        self._ended: Tape | None = None  # of the last episode that was seen to end
+        self._training = ""
         self._panels: dict[int, Panel] = {}
         self._stages: list[Stage] = []
         self._stopped = threading.Event()
         self._followed = time.monotonic()
         warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")  # of a browser that just left
-        with quiet():
+        with quiet(), only_own(self.address.host):
             self.server = LocalServer(host=self.address.host, port=self.address.port, verbose=False)
         self._furnish()
         self.open(self.match)
@@ -91,6 +103,11 @@ class Page:
 
     def __exit__(self, *error: object) -> None:
         self._stopped.set()
+        with self.lock:
+            self._keep_the_last()
+            if self.learning.goes_on:
+                print(f"{self.learning.folder} saves and ends", flush=True)
+            self.learning.close()
         with quiet():
             self.server.stop()
 
@@ -114,7 +131,12 @@ class Page:
     # What panels ask for, under the lock
 
     def open(self, match: Match) -> None:
-        """Show another match from its start."""
+        """Show another match from its start.
+
+        Raises:
+            Refused: If the one before is to be kept and cannot be saved; it stays then.
+        """
+        self._keep()
         self.match, self.playing = match, False
         self._set_stages()
         for panel in self._panels.values():
@@ -127,13 +149,20 @@ class Page:
             self.tell(line)
         self.playing &= not self.match.ended
         self.show()
+        side = self.match.sides[0]
+        if side.ended and side.tape is not self._ended:
+            self._ended = side.tape
+            with told_if_refused(self.tell):
+                self._keep()
 
     def restart(self, seed: int | None = None) -> None:
         """Start the episode anew; of another seed on its own ground.
 
         Raises:
             ValueError: If the seed is out of range.
+            Refused: If the episode is to be kept and cannot be saved; it stays then.
         """
+        self._keep()
         self.match.restart(seed)
         self.playing = False
         self._set_stages()
@@ -167,13 +196,30 @@ class Page:
         aim(self.server, size, count, aside=0.15)  # the panel stands on the right
 
     def _go_on(self) -> None:
-        try:
+        with told_if_refused(self._stand_still):  # the page stays, to show what the match had come to
             self._follow()
             if self.playing:
                 self.step()
-        except Exception as error:  # the page stays, to show what the match had come to, and to load another
-            self.playing = False
-            self.tell(f"{type(error).__name__}: {' '.join(str(error).split())}", mistake=True)
+
+    def _stand_still(self, line: str, mistake: bool) -> None:
+        self.playing = False
+        self.tell(line, mistake)
+
+    def _keep(self) -> None:
+        folder = self.keeper.keep(self.match.sides[0])
+        if folder is not None:
+            self.tell(f"saved {folder}")
+            self.show()
+
+    def _keep_the_last(self) -> None:
+        """Save the episode that is being played when the page ends, and say so where it was started."""
+        try:
+            folder = self.keeper.keep(self.match.sides[0])
+        except ValueError as error:
+            print(f"error: {error}", file=sys.stderr, flush=True)
+        else:
+            if folder is not None:
+                print(f"saved {folder}", flush=True)
 
     def _furnish(self) -> None:
         furnish(self.server)
@@ -203,6 +249,11 @@ class Page:
     def _follow(self) -> None:
         if time.monotonic() - self._followed < _FOLLOWED_EVERY:
             return
+        self._followed = time.monotonic()
         for line in self.match.follow():
             self.tell(line)
-        self._followed = time.monotonic()
+        if (training := self.learning.told()) != self._training:
+            self._training = training
+            if not self.learning.goes_on:
+                self.tell(training)
+            self.show()

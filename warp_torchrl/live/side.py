@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 import torch
+from tensordict import TensorDictBase
 from torch import Tensor
 
 from warp_torchrl.config.saved_config import SavedConfig
@@ -74,9 +75,7 @@ class Side:
 
     def restart(self, seed: int) -> None:
         """Start the episode of a seed, in the scenario's own wind."""
-        self.env.world = self.world
-        self.env.set_seeds([seed])
-        self.shown = self.env.reset()
+        self.shown = self._reset(seed)
         agents = self.env.n_agents
         self.facing = torch.full((agents,), -1)
         """Direction of each vehicle's last move, 0..7 clockwise from north; -1 before the first, int64 [A]."""
@@ -95,7 +94,26 @@ class Side:
             return []
         if self._proposed is None:
             self._proposed, self.chances = self.player.act(self.shown.copy().set(ACTION_MASK, self.mask[None]))
-        return self.crew.questions(self._proposed)
+        return self.crew.questions(self._proposed, self.chances)
+
+    def ask_where_unsure(self, below: float | None) -> None:
+        """Let a person be asked for an action where the policy's most likely one is less likely; None asks nobody.
+
+        Raises:
+            Refused: If it is no probability, or the policy has none.
+        """
+        self.questions()
+        if below is not None and self.chances is None and not self.ended:
+            raise Refused(f"{self.player.name} has no action probabilities: it cannot tell how sure it is")
+        self.crew.ask_where_unsure(below)
+
+    def choose(self, question: Question, action: int) -> None:
+        """Choose the action of a vehicle whose policy is unsure.
+
+        Raises:
+            Refused: If the action would do nothing.
+        """
+        self.crew.choose(question, action, self.possible)
 
     def step(self) -> list[str]:
         """Do the step that ``questions`` proposed; return a line for each act of a person that was refused."""
@@ -135,6 +153,7 @@ class Side:
             frames=self.player.frames,
             agents=tuple(self.env.agent_names),
             actions=tuple(self.env.action_names),
+            saved=self.curves.saved[-1],
         )
 
     def intervene(self, kind: str, *numbers: float) -> None:
@@ -151,6 +170,11 @@ class Side:
         self.curves.saved.pop()
         self.curves.burning.pop()
         self._note()
+
+    def _reset(self, seed: int) -> TensorDictBase:
+        self.env.world = self.world
+        self.env.set_seeds([seed])
+        return self.env.reset()
 
     def _note(self) -> None:
         counts = self.env.tree_counts

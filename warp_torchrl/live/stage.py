@@ -13,6 +13,7 @@ from warp_torchrl.live import drawing
 from warp_torchrl.live.crew import Crew
 from warp_torchrl.live.drawing import Ground, Instances
 from warp_torchrl.live.shapes import TILE, Shape, bulldozer, drone, flame, puff, tree
+from warp_torchrl.live.words import labels
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.state import WorldState
 
@@ -84,14 +85,14 @@ class Stage:
         index: Of the side; its nodes stand under ``/side_<index>``.
         side: The side, at the start of an episode.
         east: By how much its middle is east of the scene's [cells].
-        names: What stands at the vehicles; by default their own.
+        names: What stands at the vehicles; by default their own, short.
     """
 
     def __init__(
         self, server: viser.ViserServer, index: int, side: Shown, east: float, names: Sequence[str] | None = None
     ) -> None:
         self._server, self._side, self._root = server, side, f"/side_{index}"
-        self._called = side.env.agent_names if names is None else names
+        self._called = labels(side.env.agent_names) if names is None else names
         self.east = east
         self.ground: Ground = drawing.ground_of(side.state)
         scene, ground = server.scene, self.ground
@@ -185,7 +186,7 @@ class Stage:
         tank, full = side.state.vehicles.tank[0].tolist(), side.env.world.team.tank
         for agent, (label, name) in enumerate(zip(self._names, self._called)):
             water = "" if full is None else f" {tank[agent]}/{full}"
-            driven = " (driven)" if side.crew.seats[agent].person is not None else ""
+            driven = " driven" if side.crew.seats[agent].person is not None else ""
             change(label, text=f"{name}{water}{driven}", position=shown.position[agent] + self._lift)
 
 

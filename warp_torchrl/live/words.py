@@ -2,12 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from html import escape
+from pathlib import Path
 
+from warp_torchrl.demonstrations.summary import Summary
 from warp_torchrl.env.render import legend_colours
+from warp_torchrl.live.crew import Question
 from warp_torchrl.live.drawing import VEHICLE_COLOURS
 from warp_torchrl.live.match import Match
 from warp_torchrl.live.side import Side
 
+_LISTED = 15  # recordings on the page
 _STYLE = "font-family:inherit;font-size:12px;line-height:1.35"
 
 
@@ -36,6 +40,42 @@ def title(side: Side) -> str:
     return short if frames is None else f"{short} ({frames / 1e6:.1f} M)"
 
 
+def labels(names: Sequence[str]) -> list[str]:
+    """Return short names of vehicles, which stand apart where they are close: ``b0`` of ``bulldozer_0``."""
+    stems = {name.rpartition("_")[0] for name in names}
+    letters = next(count for count in range(1, 100) if len({stem[:count] for stem in stems}) == len(stems))
+    return [stem[:letters] + number for stem, _, number in (name.rpartition("_") for name in names)]
+
+
+def so_far(side: Side) -> str:
+    """Return how much was played, and how much of it by people."""
+    tape = side.tape
+    corrections = f"{tape.corrections} of them corrections" if tape.acts else "no corrections"
+    return f"**{len(tape.rows)}** steps so far, **{tape.acts}** acts of people, {corrections}."
+
+
+def recordings(folder: Path, found: Mapping[str, Summary | str]) -> str:
+    """Return the table of the recordings in a folder, the newest of them last."""
+    if not found:
+        return f"`{folder}` holds no recording."
+    rows = [f"In `{folder}`:", "", "| recording | steps | acts | corrections | saved |", "|---|---:|---:|---:|---:|"]
+    for name, each in list(found.items())[-_LISTED:]:
+        if isinstance(each, str):
+            rows.append(f"| {name} | broken | | | |")
+            continue
+        saved = "" if each.saved is None else f"{each.saved:.0%}"
+        rows.append(f"| {name} | {each.steps} | {each.acts} | {each.corrections} | {saved} |")
+    if len(found) > _LISTED:
+        rows.append(f"\nand {len(found) - _LISTED} before them.")
+    return "\n".join(rows)
+
+
+def training(told: str, newest: int | None) -> str:
+    """Return how far a training is, and whether there is a policy to play."""
+    ready = "" if newest is None else f" A policy of {newest:,} steps can be played."
+    return f"{told}.{ready}" if told else "Only policies that were trained by mappo, ippo, ppo or a2c learn."
+
+
 def acts(side: Side) -> str:
     """Return the table of a team's vehicles: who moves each, its water, and its acts."""
     curves, tank = side.curves, side.state.vehicles.tank[0].tolist()
@@ -56,6 +96,19 @@ def moved_by(side: Side, agent: int, person: int | None = None) -> str:
     if seat.order is None:
         return "policy"
     return f"policy, sent to {seat.order.row}, {seat.order.column} (within {seat.order.radius})"
+
+
+def questions(side: Side, asked: Sequence[Question]) -> str:
+    """Return what a person is asked; of an action that the policy is unsure of with how to answer."""
+    names, actions = side.env.agent_names, side.env.action_names
+    lines = [
+        f"**{names[each.agent]}** is about to **{actions[each.action]}**."
+        if each.chance is None
+        else f"What should **{names[each.agent]}** do? Its policy would **{actions[each.action]}**; its likeliest "
+        f"action has {each.chance:.0%}. Press *Do it* (key G), or another action in Drive or by its key."
+        for each in asked
+    ]
+    return "\n\n".join(lines)
 
 
 def actions(side: Side, agent: int) -> str:

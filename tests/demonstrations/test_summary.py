@@ -1,0 +1,15 @@
+"""Recordings in numbers."""
+
+from pathlib import Path
+
+from warp_torchrl.demonstrations.recording import Mover
+from warp_torchrl.demonstrations.summary import summary, table
+
+
+def test_a_row_tells_whose_the_actions_were_and_what_was_saved(recording):
+    row = summary(Path("people/one"), recording)
+    assert (row.name, row.scenario, row.policy, row.steps) == ("one", "skirmish", "coordinated", 12)
+    assert row.acts == int(recording.by(Mover.PERSON).sum()) and 0 < row.corrections <= row.acts
+    line = table([row]).splitlines()[-1]
+    assert line.endswith(f"| 12 | {row.acts} | {row.corrections} | {100 * recording.saved:.1f} |")
+    assert table([row._replace(saved=None)]).endswith(f"| {row.corrections} |  |")

@@ -1,0 +1,157 @@
+"""A training that the page starts."""
+
+import time
+from pathlib import Path
+
+import pytest
+
+from warp_torchrl.config.compose import compose_config, plain
+from warp_torchrl.config.run_config import run_config
+from warp_torchrl.config.saved_config import SavedConfig, restore
+from warp_torchrl.live.crew import Refused
+from warp_torchrl.live.learning import Learning, _literal, arguments
+from warp_torchrl.live.player import Found
+from warp_torchrl.runs.checkpoint import newest
+from warp_torchrl.runs.manifest import CheckpointError
+from warp_torchrl.runs.transfer import check_start
+
+PEOPLE, RUN = Path("people"), Path("people/runs/one")
+
+
+def composed(given):
+    """What a training is of; ``imitation.demonstrations`` is looked at apart."""
+    return plain(compose_config("train", [each for each in given if not each.startswith(("imitation", "hydra"))]))
+
+
+@pytest.mark.parametrize("policy", ["default", "single", "skirmish"])
+@pytest.mark.parametrize("overrides", [(), ("scenario=large", "team.n_agents=3", "seed=5")])
+def test_the_policy_s_own_configuration_is_trained_in_the_scenario_that_is_played(policy, overrides):
+    record = Found(policy).checkpoint.record()
+    values = composed(arguments(policy, record, overrides, PEOPLE, RUN, 200_000))
+    wanted = plain(restore(record, overrides))
+    for key in ("scenario", "landscape", "team", "horizon", "observation", "reward", "model", "algorithm", "n_worlds"):
+        assert values[key] == wanted[key], key
+    assert values["seed"] == wanted["seed"]
+    assert (values["start_from"], values["total_frames"], values["checkpoint"]["interval"]) == (policy, 200_000, 20_000)
+
+
+def test_a_training_may_start_from_the_run_of_which_it_is_made(trained):
+    found = newest(trained)[0]
+    values = composed(arguments(str(trained), found.record(), ("scenario=default",), PEOPLE, RUN, 200))
+    assert values["model"]["actor_hidden"] == [16] and values["scenario"] == "default"
+    check_start(run_config(values), found)
+
+
+def test_recordings_and_folder_are_named_in_hydra_s_grammar():
+    record = Found("skirmish").checkpoint.record()
+    given = arguments("out puts/run", record, (), Path("it's, mine"), RUN, 10)
+    assert "imitation.demonstrations='it\\'s, mine'" in given and "start_from='out puts/run'" in given
+    assert f"hydra.run.dir={RUN}" in given
+    assert composed(given)["start_from"] == "out puts/run"
+
+
+def test_what_is_of_another_machine_is_not_asked_for():
+    old = Found("skirmish").checkpoint.record()
+    values = {**old.values, "device": "cuda:7", "processes": 8, "compile": True, "total_frames": 10**12}
+    choices = {**old.choices, "collector": "process", "logger": "wandb"}
+    values["collector"] = {"steps": 16, "workers": 4}
+    made = composed(arguments("skirmish", SavedConfig(choices=choices, values=values), (), PEOPLE, RUN, 10))
+    assert (made["device"], made["compile"], made["total_frames"]) == ("cpu", False, 10)
+    assert "InProcess" in made["collector"]["_target_"] and made["collector"]["steps"] == 16
+    assert "CsvOnly" in made["logger"]["_target_"]
+    assert made["imitation"]["teacher"] is None, "people teach now"
+
+
+@pytest.mark.parametrize(
+    ("value", "literal"),
+    [
+        (None, "null"), (True, "true"), (0.5, "0.5"), (1e-05, "1e-05"), ("text", "text"), ("null", "'null'"),
+        ("3", "'3'"), ([64, 64], "[64,64]"), (["a b", None], "['a b',null]"), ("a'b\\", "'a\\'b\\\\'"),
+    ],
+)  # fmt: skip
+def test_values_are_written_as_hydra_reads_them(value, literal):
+    assert _literal(value) == literal
+    assert plain(compose_config("train", [f"+own={literal}"]))["own"] == value
+
+
+# The process
+
+
+@pytest.fixture
+def learning(tmp_path, monkeypatch):
+    monkeypatch.setattr("warp_torchrl.hyperparameters.training.MODULE", "tests.live.fake_training")
+    made = Learning(tmp_path / "people")
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def match(make_match, trained):
+    return make_match(str(trained))
+
+
+def until(holds):
+    end = time.monotonic() + 60.0
+    while not holds():
+        assert time.monotonic() < end, "it took too long"
+        time.sleep(0.02)
+
+
+def test_a_training_is_started_followed_and_stopped(learning, match):
+    assert learning.told() == "" and learning.newest() is None
+    with pytest.raises(Refused, match="no policy is trained yet"):
+        learning.setting(7)
+    folder = learning.start(match.sides[0], match.setting, 5000)
+    assert folder.parent == learning.recordings / "runs"
+    until(lambda: learning.newest() == 2000)
+    assert learning.told() == f"{folder} trains: 2,000 of 5,000 steps, 75% saved in training"
+    with pytest.raises(Refused, match="trains: stop it first"):
+        learning.start(match.sides[0], match.setting, 5000)
+    setting = learning.setting(7)
+    assert (setting.policy, setting.seed, setting.overrides) == (str(folder), 7, match.setting.overrides)
+    learning.stop()
+    until(lambda: not learning.goes_on)
+    assert learning.told() == (
+        f"{folder} was stopped: 2,000 of 5,000 steps, 75% saved in training; train.py resume={folder} goes on"
+    )
+    with pytest.raises(Refused, match="no training goes on"):
+        learning.stop()
+    given = (folder / "arguments.txt").read_text().splitlines()
+    name, record = match.setting.policy, match.sides[0].player.checkpoint.record()
+    assert given == arguments(name, record, match.setting.overrides, learning.recordings, folder, 5000)
+
+
+def test_a_training_ends_by_itself(learning, match):
+    folder = learning.start(match.sides[0], match.setting, 1)
+    until(lambda: not learning.goes_on)
+    assert learning.told() == f"{folder} is trained: 2,000 of 1 steps, 75% saved in training"
+
+
+def test_why_a_training_fails_is_told(learning, match):
+    folder = learning.start(match.sides[0], match.setting, 2)
+    until(lambda: not learning.goes_on)
+    assert learning.told() == f"{folder} failed: the disk is full" and learning.newest() is None
+
+
+def test_the_page_s_end_is_the_training_s_when_it_has_saved(learning, match):
+    folder = learning.start(match.sides[0], match.setting, 5000)
+    until(lambda: learning.newest() is not None)
+    learning.close()
+    assert not learning.goes_on and (folder / "saved.txt").read_text() == "all of it"
+
+
+def test_what_does_not_learn_is_told(learning, make_match, match, monkeypatch):
+    with pytest.raises(Refused, match="coordinated does not learn"):
+        baseline = make_match("coordinated")
+        learning.start(baseline.sides[0], baseline.setting, 10)
+    with pytest.raises(CheckpointError, match="holds a policy alone: it acts, and nothing goes on from it"):
+        shipped = make_match("default")
+        learning.start(shipped.sides[0], shipped.setting, 10)
+    with pytest.raises(Refused, match="steps must be in"):
+        learning.start(match.sides[0], match.setting, 0)
+    record = match.sides[0].player.checkpoint.record()
+    other = SavedConfig(choices={**record.choices, "algorithm": "qmix"}, values=record.values)
+    monkeypatch.setattr("warp_torchrl.runs.checkpoint.Checkpoint.record", lambda self: other)
+    with pytest.raises(Refused, match="was trained by qmix: from recordings learn mappo"):
+        learning.start(match.sides[0], match.setting, 10)
+    assert not learning.recordings.exists()

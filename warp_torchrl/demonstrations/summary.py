@@ -1,0 +1,58 @@
+"""Recordings in numbers: whose their actions were, and how much forest each saved."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+from warp_torchrl.demonstrations.recording import Mover, Recording
+
+
+class Summary(NamedTuple):
+    """A recording in numbers.
+
+    Attributes:
+        name: Of its folder.
+        scenario: Its scenario.
+        seed: Of the episode.
+        policy: Which played, with people.
+        steps: How many.
+        acts: Actions of people.
+        corrections: Those of them that the policy had not proposed.
+        saved: Share of the initial trees that stand where it was left, in 0..1; None if nobody has counted them.
+    """
+
+    name: str
+    scenario: str
+    seed: int
+    policy: str
+    steps: int
+    acts: int
+    corrections: int
+    saved: float | None
+
+
+def summary(folder: Path, recording: Recording) -> Summary:
+    """Return the numbers of the recording in a folder."""
+    return Summary(
+        name=folder.name,
+        scenario=recording.scenario,
+        seed=recording.seed,
+        policy=recording.policy,
+        steps=len(recording.steps),
+        acts=int(recording.by(Mover.PERSON).sum()),
+        corrections=int(recording.corrected().sum()),
+        saved=recording.saved,
+    )
+
+
+def table(summaries: Iterable[Summary]) -> str:
+    """Return a Markdown table, a row for each recording."""
+    lines = [
+        "| recording | scenario | seed | policy | steps | acts of people | corrections | saved % |",
+        "|---|---|---:|---|---:|---:|---:|---:|",
+    ]
+    for each in summaries:
+        saved = "" if each.saved is None else f"{100 * each.saved:.1f}"
+        cells = (each.name, each.scenario, each.seed, each.policy, each.steps, each.acts, each.corrections, saved)
+        lines.append("| " + " | ".join(map(str, cells)) + " |")
+    return "\n".join(lines)

@@ -1,0 +1,96 @@
+"""The recordings of a page's matches, in one folder."""
+
+import shutil
+from pathlib import Path
+
+from warp_torchrl.demonstrations.files import MANIFEST, find, read, save
+from warp_torchrl.demonstrations.recording import Recording, Tape
+from warp_torchrl.demonstrations.summary import Summary, summary
+from warp_torchrl.live.crew import Refused
+from warp_torchrl.live.side import Side
+from warp_torchrl.runs.sealed import Unsound
+
+
+class Keeper:
+    """Saves episodes, each once: what is saved of an episode later takes the place of what was saved of it before.
+
+    Args:
+        folder: Of the recordings; it is made when the first is saved.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.every = False
+        """Whether ``keep`` saves."""
+        self.changes = 0
+        """How often the list of recordings may have changed."""
+        self._last: tuple[Tape, tuple[int, int], Path] | None = None
+        self._known: dict[tuple[Path, int], Summary | str] = {}
+
+    def save(self, side: Side) -> Path:
+        """Save what a side has played so far, and return its folder.
+
+        Raises:
+            Refused: If nothing was played, or the folder cannot be written; nothing is lost then.
+        """
+        recording = side.record()
+        try:
+            folder = save(recording, self.folder)
+        except OSError as error:
+            raise Refused(
+                f"{error.filename or self.folder} cannot be written ({error.strerror}): this episode is not saved"
+            ) from None
+        if self._last is not None and self._last[0] is side.tape:
+            shutil.rmtree(self._last[2], ignore_errors=True)
+        self._last = (side.tape, _length(side.tape), folder)
+        self.changes += 1
+        return folder
+
+    def keep(self, side: Side) -> Path | None:
+        """Save an episode that ends, or is left, if people did something in it; return its folder.
+
+        Returns:
+            None where nothing is to be saved: ``every`` is off, nobody did anything, or all of it is saved.
+
+        Raises:
+            Refused: As of ``save``.
+        """
+        is_saved = self._last is not None and self._last[0] is side.tape and self._last[1] == _length(side.tape)
+        if not self.every or not side.tape.has_people or not side.tape.rows or is_saved:
+            return None
+        return self.save(side)
+
+    def recordings(self) -> dict[str, Summary | str]:
+        """Return the recordings by the paths of their folders in this one: their numbers, or why one is broken."""
+        found = {}
+        for folder in self._folders():
+            key = (folder, (folder / MANIFEST).stat().st_mtime_ns)
+            if key not in self._known:
+                try:
+                    self._known[key] = summary(folder, read(folder))
+                except Unsound as error:
+                    self._known[key] = str(error)
+            found[str(folder.relative_to(self.folder))] = self._known[key]
+        return found
+
+    def read(self, name: str) -> Recording:
+        """Return a recording of ``recordings``, verified.
+
+        Raises:
+            Refused: If there is none of the name.
+            Unsound: If it is broken.
+        """
+        folders = {str(folder.relative_to(self.folder)): folder for folder in self._folders()}
+        if name not in folders:
+            raise Refused(f"{self.folder} holds no recording {name}")
+        return read(folders[name])
+
+    def _folders(self) -> list[Path]:
+        try:
+            return find(self.folder)
+        except Unsound:
+            return []
+
+
+def _length(tape: Tape) -> tuple[int, int]:
+    return len(tape.rows), len(tape.events)

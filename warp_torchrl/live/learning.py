@@ -1,0 +1,214 @@
+"""A training that learns from a page's recordings, in a process of its own."""
+
+import csv
+import re
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from warp_torchrl.config.compose import compose_config, plain
+from warp_torchrl.config.run_config import WORLD_KEYS
+from warp_torchrl.config.saved_config import SavedConfig, restore
+from warp_torchrl.hyperparameters.training import STOPPED, Training, TrainingProcess
+from warp_torchrl.live.crew import Refused
+from warp_torchrl.live.match import Setting
+from warp_torchrl.live.side import Side
+from warp_torchrl.runs import checkpoint as checkpoints
+
+ON_POLICY = ("mappo", "ippo", "ppo", "a2c")
+"""Algorithms that learn from recordings."""
+MOST_FRAMES = 100_000_000
+_LEFT_TO_THE_PAGE = (
+    *("start_from", "resume", "total_frames", "debug", "experiment", "imitation", "checkpoint", "evaluation"),
+    *("device", "processes", "compile", "graph", "logger"),
+)
+_EPISODES = 64  # of the evaluation at the end
+_PLAIN = re.compile(r"[A-Za-z_./][A-Za-z0-9_./-]*")
+_ENDS_WITHIN = 30.0  # seconds in which a training saves
+
+
+def arguments(
+    policy: str, record: SavedConfig, overrides: Sequence[str], recordings: Path, folder: Path, total_frames: int
+) -> list[str]:
+    """Return the arguments of ``train.py`` that let a policy go on learning, from recordings too.
+
+    Args:
+        policy: A shipped policy or a run folder.
+        record: Of its training: networks, algorithm and all else are its own.
+        overrides: Of the scenario that is played.
+        recordings: Folder of recordings.
+        folder: Run folder of the new training.
+        total_frames: World steps.
+
+    Raises:
+        ConfigError: If an override does not fit.
+    """
+    device = str(record.values.get("device", "cpu"))
+    return [
+        *_configuration(record, overrides),
+        *((f"device={device}",) if device.startswith("cuda") and torch.cuda.is_available() else ()),
+        f"start_from={_literal(policy)}",
+        f"imitation.demonstrations={_literal(str(recordings))}",
+        f"total_frames={total_frames}",
+        f"checkpoint.interval={max(1, total_frames // 10)}",
+        f"evaluation.episodes={_EPISODES}",
+        f"hydra.run.dir={_literal(str(folder))}",
+    ]
+
+
+class Learning:
+    """The training that a page has started; one at a time.
+
+    Args:
+        recordings: Folder of recordings; run folders are made in its folder ``runs``.
+    """
+
+    def __init__(self, recordings: Path) -> None:
+        self.recordings = recordings
+        self.folder: Path | None = None
+        """Run folder of the last training; None before the first."""
+        self.overrides: tuple[str, ...] = ()
+        """Of the scenario that it was started in."""
+        self._process: Training | None = None
+        self._total = 0
+
+    @property
+    def goes_on(self) -> bool:
+        """Return whether a training goes on."""
+        return self._process is not None and self._process.poll() is None
+
+    def start(self, side: Side, setting: Setting, total_frames: int) -> Path:
+        """Train the policy of a side from the recordings, and return the run folder.
+
+        Raises:
+            Refused: If a training goes on, or the policy does not learn from recordings.
+            CheckpointError: If it is a policy alone, such as the shipped ones, whose training was not kept.
+            ConfigError: If an override does not fit.
+        """
+        found = side.player.checkpoint
+        if self.goes_on:
+            raise Refused(f"{self.folder} trains: stop it first")
+        if found is None:
+            raise Refused(f"{side.player.name} does not learn: load a trained policy in the tab Match")
+        found.check_goes_on()
+        record = found.record()
+        algorithm = record.choices.get("algorithm")
+        if algorithm not in ON_POLICY:
+            raise Refused(
+                f"{side.player.name} was trained by {algorithm}: from recordings learn {', '.join(ON_POLICY)}"
+            )
+        if not 1 <= total_frames <= MOST_FRAMES:
+            raise Refused(f"steps must be in 1..{MOST_FRAMES}, got {total_frames}")
+        folder = self.recordings / "runs" / datetime.now().strftime("%Y-%m-%d_%H-%M-%S")
+        given = arguments(side.player.name, record, setting.overrides, self.recordings, folder, total_frames)
+        self._process = TrainingProcess(given, folder, threads=None)
+        self.folder, self.overrides, self._total = folder, setting.overrides, total_frames
+        return folder
+
+    def stop(self) -> None:
+        """Let the training save and end.
+
+        Raises:
+            Refused: If none goes on.
+        """
+        if self._process is None or not self.goes_on:
+            raise Refused("no training goes on")
+        self._process.stop()
+
+    def close(self) -> None:
+        """End the training, if one goes on, when it has saved."""
+        if self._process is None or not self.goes_on:
+            return
+        self._process.stop()
+        end = time.monotonic() + _ENDS_WITHIN
+        while self.goes_on and time.monotonic() < end:
+            time.sleep(0.05)
+
+    def newest(self) -> int | None:
+        """Return the frames of the newest checkpoint of the last training; None where it has none yet."""
+        if self.folder is None:
+            return None
+        saved = [int(each.name) for each in (self.folder / "checkpoints").glob("*") if each.name.isdigit()]
+        return max(saved, default=None)
+
+    def setting(self, seed: int) -> Setting:
+        """Return what shows the newest policy, of which a match follows the training.
+
+        Raises:
+            Refused: If there is none yet.
+        """
+        if self.newest() is None or self.folder is None:
+            raise Refused("no policy is trained yet")
+        return Setting(policy=str(self.folder), seed=seed, overrides=self.overrides)
+
+    def told(self) -> str:
+        """Return how far the training is, in one line; nothing before the first."""
+        if self._process is None or self.folder is None:
+            return ""
+        frames, saved = _reached(self.folder / "metrics.csv")
+        so_far = f"{frames:,} of {self._total:,} steps" + ("" if saved is None else f", {saved:.0%} saved in training")
+        code = self._process.poll()
+        if code is None:
+            return f"{self.folder} trains: {so_far}"
+        if code == 0:
+            return f"{self.folder} is trained: {so_far}"
+        if code == STOPPED:
+            resumed = checkpoints.holds_any(self.folder)
+            return f"{self.folder} was stopped: {so_far}" + (
+                f"; train.py resume={self.folder} goes on" if resumed else ""
+            )
+        return f"{self.folder} failed: {self._process.reason()}"
+
+
+def _configuration(record: SavedConfig, overrides: Sequence[str]) -> list[str]:
+    """Return what composes the configuration of a record under overrides anew, but for what the page sets itself."""
+    touched = {each.partition("=")[0].lstrip("+~") for each in overrides}
+    if "scenario" in touched:
+        touched |= set(WORLD_KEYS)
+    chosen = record.choices | {"collector": "direct", "logger": "csv"}
+    given = [*(f"{group}={option}" for group, option in chosen.items() if group not in touched), *overrides]
+    usual = dict(_leaves(plain(compose_config("train", given))))
+    wanted = _leaves(plain(restore(record, overrides)))
+    return given + [
+        f"{'' if path in usual else '+'}{path}={_literal(value)}"
+        for path, value in wanted
+        if path.partition(".")[0] not in _LEFT_TO_THE_PAGE
+        and not path.endswith("_target_")
+        and (path not in usual or usual[path] != value)
+        and (path in usual or not path.startswith("collector."))
+    ]
+
+
+def _leaves(node: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in node.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def _literal(value: object) -> str:
+    """Return a value in Hydra's grammar."""
+    if value is None or isinstance(value, bool):
+        return {None: "null", True: "true", False: "false"}[value]
+    if isinstance(value, list | tuple):
+        return f"[{','.join(map(_literal, value))}]"
+    text = str(value)
+    if not isinstance(value, str) or (_PLAIN.fullmatch(text) and text.lower() not in ("null", "true", "false")):
+        return text
+    escaped = text.replace("\\", "\\\\").replace("'", "\\'")
+    return f"'{escaped}'"
+
+
+def _reached(path: Path) -> tuple[int, float | None]:
+    """Return the frames of the last row of a ``metrics.csv`` that is written to its end, and the forest saved in it."""
+    try:
+        text = path.read_text(encoding="utf-8", errors="replace")
+        row = list(csv.DictReader(text[: text.rfind("\n") + 1].splitlines()))[-1]
+        return int(float(row["time/frames"])), float(row["world/saved"]) if row["world/saved"] else None
+    except (OSError, LookupError, ValueError):
+        return 0, None

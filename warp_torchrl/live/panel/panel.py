@@ -1,0 +1,135 @@
+"""One person's controls on the page; each browser has its own."""
+
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import viser
+
+from warp_torchrl.live import words
+from warp_torchrl.live.drawing import cell_at
+from warp_torchrl.live.panel.agent import AgentTab
+from warp_torchrl.live.panel.drive import KEYS, DriveTab
+from warp_torchrl.live.panel.match import MatchTab
+from warp_torchrl.live.panel.question import QuestionBox
+from warp_torchrl.live.panel.record import RecordTab
+from warp_torchrl.live.panel.tab import Tab, told_if_refused
+from warp_torchrl.live.panel.watch import WatchTab
+from warp_torchrl.live.panel.world import WorldTab
+from warp_torchrl.live.stage import Stage, change
+
+if TYPE_CHECKING:
+    from warp_torchrl.live.page import Page
+
+_PAINTED_EVERY = 0.25  # seconds between two pictures of what takes long to make, while the match plays
+
+
+class Panel:
+    """The controls of one browser, and what they show.
+
+    Args:
+        page: What they control; its lock is held when they are made or shown.
+        client: The browser.
+    """
+
+    def __init__(self, page: "Page", client: viser.ClientHandle) -> None:
+        self.page, self.gui, self._client = page, client.gui, client
+        self._own: list[Any] = []
+        self._painted = 0.0
+        self._add_keys()
+        self.fill()
+
+    @property
+    def person(self) -> int:
+        """Return the number of the person at the browser."""
+        return self._client.client_id
+
+    @property
+    def agent(self) -> int:
+        """Return the index of the vehicle that is chosen."""
+        return self.drive.agent
+
+    # What is made
+
+    def fill(self) -> None:
+        """Make the controls of the present match."""
+        for handle in self._own:
+            handle.remove()
+        play, self.question = self._add_play(), QuestionBox(self)
+        self._own = [play, self.question.folder, tabs := self.gui.add_tab_group()]
+        self._tabs: list[Tab] = []
+        for kind in (WatchTab, DriveTab, AgentTab, WorldTab, RecordTab, MatchTab):
+            with tabs.add_tab(kind.title):
+                self._tabs.append(kind(self))
+        self.drive = next(each for each in self._tabs if isinstance(each, DriveTab))
+        self.world = next(each for each in self._tabs if isinstance(each, WorldTab))
+
+    def _add_play(self) -> Any:
+        gui, folder = self.gui, self.gui.add_folder("Play")
+        with folder:
+            self._headline = gui.add_markdown("")
+            play = gui.add_button_group("", ("Play", "Pause", "Step", "Restart"))
+            pace = gui.add_slider("Steps a second", min=1, max=30, step=1, initial_value=round(self.page.pace))
+            self._numbers = gui.add_markdown("")
+        play.on_click(self.guarded(lambda event: self._play(event.target.value)))
+        pace.on_update(self.guarded(lambda event: setattr(self.page, "pace", float(event.target.value))))
+        return folder
+
+    def _add_keys(self) -> None:
+        for key, action in KEYS.items():
+            command = self.gui.add_command(f"Drive: {action}", hotkey=key)
+            command.on_trigger(self.guarded(partial(self._press, action)))
+        agree = self.gui.add_command("Do it", hotkey="G")
+        agree.on_trigger(self.guarded(lambda event: self.question.answer(True)))
+        play = self.gui.add_command("Play or pause", hotkey="P")
+        play.on_trigger(self.guarded(lambda event: self._play("Pause" if self.page.playing else "Play")))
+
+    # What is shown
+
+    def show(self) -> None:
+        """Show the match as it is; while it plays pictures and curves follow a few times a second."""
+        with self._client.atomic():
+            change(self._headline, content=words.headline(self.page.match))
+            change(self._numbers, content=words.numbers(self.page.match))
+            self.question.show()
+            if not self.page.playing or time.monotonic() - self._painted > _PAINTED_EVERY:
+                self._painted = time.monotonic()
+                for tab in self._tabs:
+                    tab.paint()
+
+    def tell(self, line: str, mistake: bool = False) -> None:
+        """Tell the person something."""
+        self._client.add_notification(
+            "This cannot be done" if mistake else "Told", line, auto_close_seconds=7.0, color="red" if mistake else None
+        )
+
+    # What is done; each under the lock, and told in one line where it cannot be
+
+    def guarded(self, do: Callable[[Any], object]) -> Callable[[Any], None]:
+        """Return a callback that does something under the page's lock, and tells what is refused."""
+
+        def call(event: Any) -> None:
+            with self.page.lock, told_if_refused(self.tell):
+                do(event)
+
+        return call
+
+    def click(self, stage: Stage, origin: tuple[float, float, float], direction: tuple[float, float, float]) -> None:
+        """Do what a click on a cell is to do; the page's lock is held."""
+        with told_if_refused(self.tell):
+            x, y, z = origin
+            cell = cell_at((x - stage.east, y, z), direction, stage.ground)
+            if cell is not None:
+                self.world.click(cell)
+
+    def _play(self, button: str) -> None:
+        page = self.page
+        if button == "Restart":
+            page.restart()
+            return
+        page.playing = button == "Play" and not page.match.ended
+        (page.step if button == "Step" else page.show)()
+
+    def _press(self, action: str, event: Any) -> None:
+        self.drive.press(action)

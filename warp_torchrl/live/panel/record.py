@@ -1,0 +1,69 @@
+"""The tab Record: what was played is saved, watched again, and learned from."""
+
+from warp_torchrl.live import words
+from warp_torchrl.live.match import Match
+from warp_torchrl.live.panel.tab import Tab, chosen
+from warp_torchrl.live.replayed import ReplayedMatch
+from warp_torchrl.live.stage import change
+
+_NONE = "none yet"
+_FRAMES = 200_000
+_TRAIN, _STOP, _PLAY = "Train", "Stop", "Play the new policy"
+
+
+class RecordTab(Tab):
+    """The recordings of the page's folder, and a training from them."""
+
+    title = "Record"
+
+    def make(self) -> None:
+        """Make the buttons and the list."""
+        gui, keeper = self.gui, self.page.keeper
+        self._listed = -1
+        self._so_far = gui.add_markdown("")
+        save = gui.add_button("Save what was played")
+        save.on_click(self.guarded(lambda event: self._save()))
+        self._every = gui.add_checkbox("Keep every episode", keeper.every, hint="in which a person did something")
+        self._every.on_update(self.guarded(lambda event: setattr(keeper, "every", bool(event.target.value))))
+        with gui.add_folder("Recordings"):
+            self._list = gui.add_markdown("")
+            self._which = gui.add_dropdown("Recording", (_NONE,), initial_value=_NONE)
+            watch = gui.add_button("Watch it")
+            watch.on_click(self.guarded(lambda event: self._watch()))
+        with gui.add_folder("Train from what people did"):
+            self._frames = gui.add_number("Steps", initial_value=_FRAMES, min=1, step=1000)
+            train = gui.add_button_group("", (_TRAIN, _STOP, _PLAY))
+            train.on_click(self.guarded(lambda event: self._train(event.target.value)))
+            self._training = gui.add_markdown("")
+
+    def paint(self) -> None:
+        """Show how much was played, what is in the folder, and how far a training is."""
+        keeper, learning = self.page.keeper, self.page.learning
+        change(self._so_far, content=words.so_far(self.side))
+        change(self._every, value=keeper.every)
+        change(self._training, content=words.training(learning.told(), learning.newest()))
+        if self._listed != keeper.changes:
+            self._listed = keeper.changes
+            found = keeper.recordings()
+            change(self._list, content=words.recordings(keeper.folder, found))
+            self._which.options = tuple(found) or (_NONE,)
+            self._which.value = self._which.options[-1]
+
+    def _save(self) -> None:
+        self.page.tell(f"saved {self.page.keeper.save(self.side)}")
+        self.page.show()
+
+    def _watch(self) -> None:
+        name = chosen(self._which)
+        self.page.open(ReplayedMatch(self.page.keeper.read(name), self.match.setting))
+
+    def _train(self, button: str) -> None:
+        learning = self.page.learning
+        if button == _TRAIN:
+            folder = learning.start(self.side, self.match.setting, int(self._frames.value))
+            self.page.tell(f"a training has started, its log is in {folder}")
+        elif button == _STOP:
+            learning.stop()
+        else:
+            self.page.open(Match(learning.setting(self.match.setting.seed)))
+        self.page.show()

@@ -1,0 +1,55 @@
+"""The tab Watch: curves, a map, the acts of each vehicle, the legend."""
+
+from typing import Any
+
+import numpy as np
+from viser import uplot
+
+from warp_torchrl.env.render import render
+from warp_torchrl.live import words
+from warp_torchrl.live.panel.tab import Tab
+from warp_torchrl.live.stage import change
+
+_LINES = ("#f2a33a", "#6bb7ea", "#9a9a9a")
+_MAP_SIDE = 360  # of the two-dimensional map [pixels]
+
+
+class WatchTab(Tab):
+    """What has become of the fire."""
+
+    title = "Watch"
+
+    def make(self) -> None:
+        """Make the curves, the map and the table."""
+        self._saved = self._curve("Saved [%]", uplot.Scale(auto=False, range=(0.0, 104.0)))
+        self._burning = self._curve("Burning [%]", uplot.Scale(auto=True))
+        self._map = self.gui.add_image(self._picture(), label="Map", format="png")
+        self._acts = self.gui.add_markdown("")
+        self.gui.add_html(words.legend(self.side))
+
+    def paint(self) -> None:
+        """Show the match so far."""
+        self._plot(self._saved, [each.curves.saved for each in self.match.everywhere])
+        self._plot(self._burning, [each.curves.burning for each in self.match.everywhere])
+        change(self._map, image=self._picture())
+        change(self._acts, content=words.acts(self.side))
+
+    def _curve(self, name: str, scale: uplot.Scale) -> Any:
+        names = [words.title(side) for side in self.match.everywhere]
+        inks = [*_LINES[: len(names) - 1], _LINES[2]]
+        lines = [uplot.Series(label=each, stroke=ink, width=2) for each, ink in zip(names, inks)]
+        axis = uplot.Axis(stroke="#c9ced6", grid=uplot.Axis_Grid(stroke="rgba(140,150,165,.22)", width=1))
+        return self.gui.add_uplot(
+            (np.zeros(1), *(np.zeros(1) for _ in names)), (uplot.Series(label="step"), *lines), title=name,
+            scales={"x": uplot.Scale(time=False), "y": scale}, axes=(axis, axis), height=170,
+        )  # fmt: skip
+
+    def _plot(self, handle: Any, curves: list[list[float]]) -> None:
+        count = max(len(curve) for curve in curves)
+        rows = [np.pad(np.array(curve) * 100.0, (0, count - len(curve)), mode="edge") for curve in curves]
+        handle.data = (np.arange(count, dtype=np.float64), *rows)
+
+    def _picture(self) -> np.ndarray:
+        state, team = self.side.state, self.side.env.world.team
+        scale = max(1, _MAP_SIDE // max(self.match.world.size))
+        return render(state, team.table(self.side.env.device).flies, scale)[0].numpy()
