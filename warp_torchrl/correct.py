@@ -1,14 +1,17 @@
 """Records a scripted person who corrects a policy: ``python -m warp_torchrl.correct policy=RUN out=FOLDER``."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
 import torch
 import yaml
-from tensordict import TensorDict
+from tensordict import TensorDictBase
+from torch import Tensor
+from torchrl.envs.utils import set_exploration_type
 
+from warp_torchrl.api import policy_of
 from warp_torchrl.commands.failure import DONE, fail
 from warp_torchrl.config.construction import ConfigError, construct
 from warp_torchrl.config.grammar import check_flags, check_overrides
@@ -16,21 +19,22 @@ from warp_torchrl.config.run_config import ENVIRONMENT, build_components
 from warp_torchrl.config.saved_config import environment_record
 from warp_torchrl.config.seeds import SEEDS, WORLDS, first_world_seed
 from warp_torchrl.demonstrations.files import save
-from warp_torchrl.demonstrations.recording import Mover, Recording
+from warp_torchrl.demonstrations.recording import Mover, Recording, recorded
 from warp_torchrl.demonstrations.scripted import Hands, Person
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.evaluation.play import play
+from warp_torchrl.heuristics import HEURISTICS, idle_action
 from warp_torchrl.live.player import Found
-from warp_torchrl.live.side import Side
-from warp_torchrl.models import ACTION, ACTION_MASK
-from warp_torchrl.runs.destination import check_free
+from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, memory_apart
+from warp_torchrl.policy import MODES
 from warp_torchrl.validation import check_fields
 
 USAGE = (
     "python -m warp_torchrl.correct policy=NAME or FOLDER out=FOLDER [episodes=32] [acts=1000] [seed=0] "
     "[by=coordinated] [delay=1] [error=0.1] [threshold=0.5] [KEY=VALUE ...]"
 )
-_PERSON = 1  # number of the scripted person among those of a match
+_ABREAST = 32
+"""Episodes that are played at once: a step of few worlds costs what many do."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,7 +81,7 @@ class Corrected:
 
 
 class Correction:
-    """A policy on a scenario, and a scripted person who corrects it.
+    """A policy on a scenario, and a scripted person who corrects it, in many worlds at once.
 
     Args:
         session: What is recorded.
@@ -94,53 +98,93 @@ class Correction:
             raise ConfigError(f"policy must be a trained one, which tells how sure it is, got {session.policy}")
         config = found.config(session.overrides)
         parts = build_components(config, ENVIRONMENT)
-        env = WildfireEnv(parts["world"], observation=parts["observation"], reward=parts["reward"])
-        env.reset()
         self.session, self.person, self.scenario = session, person, str(config["scenario"])
-        self.side = Side(env, found.player(env, 0), environment_record(config))
-        self.baseline = HEURISTICS[person.by](env)
+        self.frames, self.environment = found.checkpoint.manifest.frames, environment_record(config)
+        self.env = WildfireEnv(
+            parts["world"],
+            observation=parts["observation"],
+            reward=parts["reward"],
+            n_worlds=min(session.episodes, _ABREAST),
+        )
+        try:
+            self.policy = policy_of(found.checkpoint).fitted(self.env)
+        except ValueError as error:
+            raise ConfigError(f"the policy {session.policy} does not fit here: {error}") from None
+        self.baseline = HEURISTICS[person.by](self.env)
 
-    def play(self, episode: int) -> Corrected:
-        """Play an episode without the person and with them.
+    def episodes(self) -> Iterator[Corrected]:
+        """Play so many episodes as are asked for, and yield them in the order of their seeds."""
+        count, acts = self.env.batch_size[0], 0
+        for start in range(0, self.session.episodes, count):
+            for played in self._play(start)[: self.session.episodes - start]:
+                yield played
+                acts += int(played.recording.by(Mover.PERSON).sum())
+                if self.session.acts is not None and acts >= self.session.acts:
+                    return
 
-        Args:
-            episode: Number of the world among those of the training seed.
-        """
-        side, seed = self.side, first_world_seed(self.session.seed) + episode
-        alone = self._play(seed, None)
-        saved = self._play(seed, Hands(self.person, seed))
-        return Corrected(side.record(), saved, alone)
+    def _play(self, start: int) -> list[Corrected]:
+        """Play an episode in each world without the person and with them; ``start`` is the first one's number."""
+        env, first = self.env, first_world_seed(self.session.seed) + start
+        alone = play(env, self.policy, first, self.policy.mode)["saved"]
+        seeds = range(first, first + env.batch_size[0])
+        hands = [Hands(self.person, seed) for seed in seeds]
+        rows = []
+        with (
+            torch.random.fork_rng(devices=[]),
+            torch.no_grad(),
+            set_exploration_type(MODES[self.policy.mode]),
+            memory_apart(self.policy),
+        ):
+            torch.manual_seed(first)
+            env.set_seeds(seeds)
+            shown = env.reset()
+            while not bool(env.world_state.done.all()):
+                row, shown = self._step(shown, hands)
+                rows.append(row)
+        steps, saved = torch.stack(rows), env.tree_counts.saved()
+        lengths = (~steps["next", "done"][..., 0]).sum(0) + 1  # a world that has ended stays as it is
+        return [
+            Corrected(self._recording(seed, steps[: int(lengths[at]), at]), float(saved[at]), float(alone[at]))
+            for at, seed in enumerate(seeds)
+        ]
 
-    def _play(self, seed: int, hands: Hands | None) -> float:
-        """Return the share of trees that stands in the end."""
-        side = self.side
-        side.crew.leave(_PERSON)
-        side.restart(seed)
-        with torch.no_grad():
-            while not side.ended:
-                side.questions()
-                if hands is not None:
-                    self._correct(hands)
-                side.step()
-        return side.curves.saved[-1]
+    def _step(self, shown: TensorDictBase, hands: Sequence[Hands]) -> tuple[TensorDictBase, TensorDictBase]:
+        """Play a step in every world; return what is recorded of it, and what is shown then."""
+        env = self.env
+        out = self.policy(shown.copy())
+        proposed = out[ACTION]
+        chances, advice = self._chances(out), self.baseline(shown.select(ACTION_MASK))[ACTION]
+        possible = env.world.possible_actions(env.world_state)
+        idle = idle_action(possible, env.world.team)
+        action, mover = proposed.clone(), torch.full_like(proposed, Mover.POLICY, dtype=torch.uint8)
+        for world, person in enumerate(hands):
+            act = person.drive(chances[world], advice[world], possible[world])
+            if person.agent is not None:
+                at = (world, person.agent)
+                does = act is not None and (bool(possible[at][act]) or act == int(idle[at]))
+                action[at] = act if act is not None and does else idle[at]
+                mover[at] = Mover.PERSON if does else Mover.WAITING
+        after = env.step(shown.set(ACTION, action))["next"]
+        return recorded(shown, proposed, mover, after), after
 
-    def _correct(self, hands: Hands) -> None:
-        side, before, chances = self.side, hands.agent, self.side.chances
-        if chances is None:
-            raise ConfigError(f"policy must tell how sure it is, got {self.session.policy}")
-        act = hands.drive(chances, self._advice(), side.possible)
-        if before != hands.agent:
-            if before is not None:
-                side.crew.hand_back(before, _PERSON)
-            if hands.agent is not None:
-                side.crew.take(hands.agent, _PERSON)
-        if act is not None and hands.agent is not None:
-            side.crew.press(hands.agent, _PERSON, act)
+    def _chances(self, out: TensorDictBase) -> Tensor:
+        """Return the policy's probability of each act here, float32 [B, A, actions]."""
+        mask, here = out[ACTION_MASK], self.policy.shown.actions
+        scores = torch.full(mask.shape, -torch.inf)
+        scores[..., [here.index(name) for name in self.policy.trained.actions]] = out[LOGITS].float()
+        return scores.masked_fill(~mask, -torch.inf).softmax(dim=-1).nan_to_num(0.0)
 
-    def _advice(self) -> torch.Tensor:
-        shown = TensorDict({ACTION_MASK: self.side.shown[ACTION_MASK]}, batch_size=[1])
-        advice: torch.Tensor = self.baseline(shown)[ACTION][0]
-        return advice
+    def _recording(self, seed: int, steps: TensorDictBase) -> Recording:
+        return Recording(
+            steps=steps.clone(),
+            environment=self.environment,
+            seed=seed,
+            events=(),
+            policy=self.session.policy,
+            frames=self.frames,
+            agents=tuple(self.env.agent_names),
+            actions=tuple(self.env.action_names),
+        )
 
 
 def table(rows: Sequence[tuple[int, int, int, float, float]], scenario: str) -> str:
@@ -196,18 +240,15 @@ def _value(text: str) -> object:
 
 def _record(session: Session, person: Person) -> None:
     out = Path(session.out)
-    check_free(out, "out")
+    if out.is_dir() and any(out.iterdir()):
+        raise ConfigError(f"out must be a new folder, {out} holds files")
     correction = Correction(session, person)
-    rows: list[tuple[int, int, int, float, float]] = []
-    for episode in range(session.episodes):
-        played = correction.play(episode)
+    rows = []
+    for played in correction.episodes():
         recording = played.recording
         save(recording, out)
-        by_person, corrected = recording.by(Mover.PERSON), recording.corrected()
-        numbers = len(recording.steps), int(by_person.sum()), int(corrected.sum())
+        numbers = len(recording.steps), int(recording.by(Mover.PERSON).sum()), int(recording.corrected().sum())
         rows.append((*numbers, played.saved, played.saved_alone))
-        if session.acts is not None and sum(row[1] for row in rows) >= session.acts:
-            break
     print(table(rows, correction.scenario), flush=True)
 
 

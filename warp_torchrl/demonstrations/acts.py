@@ -94,13 +94,14 @@ def _check_fits(
     if recording.actions != wanted.actions:
         raise ConfigError(_differs(path, "actions", recording.actions, wanted.actions))
     if shown.observation.keys() != wanted.observation.keys():
-        raise ConfigError(_differs(path, "observation entries", tuple(shown.observation), tuple(wanted.observation)))
+        there, here = (tuple(name or "a single tensor" for name in each.observation) for each in (shown, wanted))
+        raise ConfigError(_differs(path, "observation entries", there, here))
     for name, entry in wanted.observation.items():
-        there = shown.observation[name]
         for what in ("shape", "dtype", "names"):
-            if getattr(there, what) != getattr(entry, what):
+            recorded, own = getattr(shown.observation[name], what), getattr(entry, what)
+            if recorded != own:
                 label = f"observation {name}'s {what}" if name else f"observation's {what}"
-                raise ConfigError(_differs(path, label, getattr(there, what), getattr(entry, what)))
+                raise ConfigError(_differs(path, label, recorded, own))
     if sharing == "role" and shown.roles != wanted.roles:
         raise ConfigError(_differs(path, "roles", shown.roles, wanted.roles))
     if agents is not None and recording.agents != tuple(agents):
@@ -108,14 +109,14 @@ def _check_fits(
             _differs(path, "agents", recording.agents, tuple(agents))
             + ", and model.sharing=none has a network for each"
         )
-    count, own = len(recording.steps), len(recording.agents)
-    for key, name in zip(wanted.observation_keys(), wanted.observation):
+    team = (len(recording.steps), len(recording.agents))
+    entries = [
+        (key, entry.shape, entry.dtype) for key, entry in zip(wanted.observation_keys(), shown.observation.values())
+    ]
+    for key, shape, dtype in (*entries, (ROLE, (), "int64")):
         held = recording.steps.get(key, None)
-        shape, dtype = wanted.observation[name].shape, wanted.observation[name].dtype
-        if held is None or held.shape != (count, own, *shape) or str(held.dtype) != f"torch.{dtype}":
-            raise ConfigError(f"{path} does not hold the observation {name} of its own configuration")
-    if recording.steps.get(ROLE, None) is None:
-        raise ConfigError(f"{path} does not hold its agents' roles")
+        if not isinstance(held, Tensor) or held.shape != (*team, *shape) or str(held.dtype) != f"torch.{dtype}":
+            raise ConfigError(f"{path} does not hold the {' '.join(key[1:])} that its own configuration has")
 
 
 def _differs(path: Path, what: str, there: object, here: object) -> str:

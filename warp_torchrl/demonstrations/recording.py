@@ -73,6 +73,21 @@ class Recording:
         return self.by(Mover.PERSON) & (self.steps[ACTION] != self.steps[PROPOSED])
 
 
+def recorded(shown: TensorDictBase, proposed: Tensor, mover: Tensor, after: TensorDictBase) -> TensorDictBase:
+    """Return what is recorded of a step of any number of worlds, batch size [B].
+
+    Args:
+        shown: Of an environment, with the actions done.
+        proposed: The policy's actions, int64 [B, A].
+        mover: Whose each action was, uint8 [B, A].
+        after: What the step led to.
+    """
+    row = shown.select(*_SHOWN, ACTION, strict=False).clone()
+    row[PROPOSED], row[MOVER] = proposed.clone(), mover.clone()
+    row["next"] = after.select(*_ENDS).clone()
+    return row
+
+
 @dataclass
 class Tape:
     """The steps of an episode that is being played.
@@ -94,11 +109,8 @@ class Tape:
             movers: Of each agent.
             after: What the step led to.
         """
-        row = shown.select(*_SHOWN, ACTION, strict=False)[0].clone()
-        row[PROPOSED] = proposed.clone()
-        row[MOVER] = torch.tensor(movers, dtype=torch.uint8)
-        row["next"] = after.select(*_ENDS)[0].clone()
-        self.rows.append(row)
+        whose = torch.tensor(movers, dtype=torch.uint8)
+        self.rows.append(recorded(shown, proposed[None], whose[None], after)[0].clone())
 
     def steps(self) -> TensorDictBase:
         """Return the steps, of which there is one at least, batch size [T]."""
