@@ -33,6 +33,7 @@ USAGE = (
     "python -m warp_torchrl.correct policy=NAME or FOLDER out=FOLDER [episodes=32] [acts=1000] [seed=0] "
     "[by=coordinated] [delay=1] [error=0.1] [threshold=0.5] [KEY=VALUE ...]"
 )
+_TEXTS = ("policy", "out", "by")
 _ABREAST = 32
 """Episodes that are played at once: a step of few worlds costs what many do."""
 
@@ -224,18 +225,20 @@ def read(arguments: Sequence[str]) -> tuple[Session, Person]:
     own = {kind: [each.name for each in fields(kind) if each.name != "overrides"] for kind in (Session, Person)}
     pairs = [each.partition("=")[::2] for each in arguments]
     rest = tuple(f"{key}={value}" for key, value in pairs if not any(key in names for names in own.values()))
-    values = {kind: {key: _value(value) for key, value in pairs if key in names} for kind, names in own.items()}
+    values = {kind: {key: _value(key, value) for key, value in pairs if key in names} for kind, names in own.items()}
     session = construct(Session, {**values[Session], "overrides": rest}, "")
     return session, construct(Person, values[Person], "")
 
 
-def _value(text: str) -> object:
-    """Return a value of the command's own keys, a plain one."""
+def _value(key: str, text: str) -> object:
+    """Return a plain value of one of the command's own keys."""
+    bare = text.strip("'\"")
+    if key in _TEXTS:
+        return bare
     try:
-        found = yaml.safe_load(text)
+        return yaml.safe_load(text)
     except yaml.YAMLError:
-        return text
-    return found if isinstance(found, (int, float)) or found is None else text.strip("'\"")
+        return bare
 
 
 def _record(session: Session, person: Person) -> None:

@@ -108,10 +108,10 @@ def test_a_recording_that_lacks_what_its_configuration_has_is_told(recording, ke
 
 
 def test_folders_that_teach_nothing_are_told(recording, tmp_path):
-    with pytest.raises(ConfigError, match="imitation.demonstrations: .*holds no recording"):
+    with pytest.raises(ConfigError, match=r"imitation.demonstrations: .*holds no recording"):
         found(tmp_path / "nowhere")
     folder = save(played(mover=Mover.WAITING), tmp_path)
-    with pytest.raises(ConfigError, match="imitation.demonstrations: .*holds no act of a person"):
+    with pytest.raises(ConfigError, match=r"imitation.demonstrations: .*holds no act of a person"):
         found(tmp_path)
     (folder / "steps" / "agents" / "action.memmap").write_bytes(b"other")
     with pytest.raises(ConfigError, match=r"imitation.demonstrations: .*action.memmap"):
