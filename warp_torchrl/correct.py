@@ -19,7 +19,7 @@ from warp_torchrl.config.run_config import ENVIRONMENT, build_components
 from warp_torchrl.config.saved_config import environment_record
 from warp_torchrl.config.seeds import SEEDS, WORLDS, first_world_seed
 from warp_torchrl.demonstrations.files import save
-from warp_torchrl.demonstrations.recording import Mover, Recording, recorded
+from warp_torchrl.demonstrations.recording import Mover, Recording, Tape, recorded
 from warp_torchrl.demonstrations.scripted import Hands, Person
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation.play import play
@@ -129,7 +129,7 @@ class Correction:
         alone = play(env, self.policy, first, self.policy.mode)["saved"]
         seeds = range(first, first + env.batch_size[0])
         hands = [Hands(self.person, seed) for seed in seeds]
-        rows = []
+        tape = Tape()
         with (
             torch.random.fork_rng(devices=[]),
             torch.no_grad(),
@@ -141,8 +141,8 @@ class Correction:
             shown = env.reset()
             while not bool(env.world_state.done.all()):
                 row, shown = self._step(shown, hands)
-                rows.append(row)
-        steps, saved = torch.stack(rows), env.tree_counts.saved()
+                tape.rows.append(row)
+        steps, saved = tape.steps(), env.tree_counts.saved()
         lengths = (~steps["next", "done"][..., 0]).sum(0) + 1  # a world that has ended stays as it is
         return [
             Corrected(self._recording(seed, steps[: int(lengths[at]), at]), float(saved[at]), float(alone[at]))

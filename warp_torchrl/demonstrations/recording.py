@@ -90,10 +90,10 @@ def recorded(shown: TensorDictBase, proposed: Tensor, mover: Tensor, after: Tens
 
 @dataclass
 class Tape:
-    """The steps of an episode that is being played.
+    """The steps of an episode that is being played, or of one in each of several worlds.
 
     Attributes:
-        rows: A TensorDict of batch size [] for each step.
+        rows: A TensorDict of batch size [], or [B], for each step.
         events: What people have done to the world.
     """
 
@@ -113,7 +113,7 @@ class Tape:
         self.rows.append(recorded(shown, proposed[None], whose[None], after)[0].clone())
 
     def steps(self) -> TensorDictBase:
-        """Return the steps, of which there is one at least, batch size [T]."""
+        """Return the steps, of which there is one at least, batch size [T] or [T, B]."""
         steps = torch.stack(self.rows)
         if not isinstance(steps, TensorDict):
             raise TypeError(f"the steps of a recording must be of one kind, got {type(steps).__name__}")
