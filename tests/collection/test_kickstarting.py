@@ -8,7 +8,8 @@ from tensordict import TensorDict
 from torch.nn.functional import cross_entropy
 from torchrl.objectives import BCLoss
 
-from warp_torchrl.collection.kickstarting import TEACHERS, Kickstarting
+from warp_torchrl.collection.imitation import TEACHERS, Imitation
+from warp_torchrl.collection.kickstarting import kickstart
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.run_config import run_config
@@ -151,7 +152,7 @@ def test_teachers_do_not_remember():
 
 def test_without_a_teacher_the_learner_is_as_it_was(tmp_path):
     training = Training(configured(), SavedConfig(), tmp_path)
-    assert Kickstarting().kickstart(training.learner, training.env) is training.learner
+    assert kickstart(training.learner, Imitation(), training.env) is training.learner
 
 
 def test_a_policy_with_a_teacher_is_called_so():

@@ -18,6 +18,11 @@ from warp_torchrl.evaluation.method import method
         (["observation=paper", "observation.radius=5"], "mappo efficiency paper radius=5"),
         (["reward=paper", "reward.barrier_rule=printed"], "mappo paper surroundings barrier_rule=printed"),
         (["observation=paper", "imitation.teacher=local"], "mappo efficiency paper taught by local"),
+        (["imitation.demonstrations=people"], "mappo efficiency surroundings taught by people"),
+        (
+            ["imitation.teacher=local", "imitation.demonstrations=people"],
+            "mappo efficiency surroundings taught by local and people",
+        ),
     ],
 )
 def test_a_policy_is_called_by_what_is_unusual(overrides, named):

@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,12 +14,14 @@ from pathlib import Path
 import pytest
 import torch
 
+from tests.demonstrations.played import played
 from tests.stress.processes import ROOT, TINY, alive, finish, rows, start, wait_for
 from tests.training.test_loop import flattened
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.saved_config import SavedConfig, restore
+from warp_torchrl.demonstrations.files import save
 from warp_torchrl.runs.checkpoint import newest
 
 LENGTH = ("processes=2", "total_frames=256", "checkpoint.interval=64", "checkpoint.keep=9")
@@ -58,6 +61,27 @@ def test_a_checkpoint_holds_the_worlds_of_both(whole):
     assert [int(row["time/frames"]) for row in told(whole)] == list(range(32, 257, 32))
     assert json.loads((newest(whole)[0].path / "config.json").read_text())["values"]["processes"] == 2
     assert (whole / "evaluation.json").exists()
+
+
+@pytest.mark.slow
+def test_two_processes_learn_from_people_together_and_go_on_exactly(tmp_path):
+    for seed in range(2):
+        save(played("horizon=16", seed=seed), tmp_path / "people")
+    people = [f"imitation.demonstrations={tmp_path / 'people'}", "imitation.until=1.0", "imitation.minibatch_size=32"]
+    whole = train(tmp_path / "whole", *people)
+    losses = [float(row["train/cloning_loss"]) for row in told(whole)]
+    assert losses[0] > losses[-1] > 0.0
+    state = newest(whole)[0].training()
+    first, second = (each["keeps"]["demonstrations"] for each in (state, state["others"][0]))
+    assert first["recordings"] == second["recordings"] and not torch.equal(first["random"], second["random"])
+    cut = train(tmp_path / "cut", *people)
+    for path in sorted((cut / "checkpoints").iterdir())[1:]:
+        shutil.rmtree(path)
+    finish(tmp_path / "cut", "resume=run")
+    ours, theirs = (flattened(newest(each)[0].training()) for each in (cut, whole))
+    for name, value in theirs.items():
+        if name != "/seconds":
+            assert torch.equal(ours[name], value) if isinstance(value, torch.Tensor) else ours[name] == value, name
 
 
 @pytest.mark.slow

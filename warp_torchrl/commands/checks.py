@@ -18,6 +18,7 @@ from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.run_config import RunConfig, run_config
 from warp_torchrl.config.saved_config import restore
 from warp_torchrl.config.seeds import BEYOND_EVALUATION
+from warp_torchrl.demonstrations.acts import demonstrations
 from warp_torchrl.evaluation.evaluate import check_policy
 from warp_torchrl.evaluation.picture import Kind
 from warp_torchrl.heuristics import HEURISTICS
@@ -83,6 +84,7 @@ def check_training(values: Mapping[str, Any], overrides: Sequence[str]) -> None:
     if values["resume"] is None:
         plan = run_config(values)
         plan.check_training()
+        _check_demonstrations(plan)
         if values["start_from"] is not None:
             check_start(plan, checkpoints.newest(find_policy(values["start_from"]))[0])
         return
@@ -95,7 +97,19 @@ def check_training(values: Mapping[str, Any], overrides: Sequence[str]) -> None:
     folder = Path(str(values["resume"]))
     if (folder / checkpoints.MANIFEST).exists():
         raise ConfigError(f"resume must be a run folder, got one of its checkpoints: {folder}")
-    resumption(folder, new_total(values, overrides)).run_config.check_training()
+    plan = resumption(folder, new_total(values, overrides)).run_config
+    plan.check_training()
+    _check_demonstrations(plan)
+
+
+def _check_demonstrations(plan: RunConfig) -> None:
+    """Check that there is what people did for a training to learn from, where it should.
+
+    Raises:
+        ConfigError: If there is not, or it does not fit.
+    """
+    if plan.imitation.demonstrations is not None:
+        demonstrations(plan, plan.make_env(1, 0))
 
 
 def new_total(values: Mapping[str, Any], overrides: Sequence[str]) -> Any:

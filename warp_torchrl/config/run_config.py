@@ -10,7 +10,7 @@ import torch
 from warp_torchrl import parallel
 from warp_torchrl.algorithms.on_policy import OnPolicy
 from warp_torchrl.collection.collectors import MultiProcess
-from warp_torchrl.collection.kickstarting import Kickstarting
+from warp_torchrl.collection.imitation import Imitation
 from warp_torchrl.config.construction import ConfigError, build, construct
 from warp_torchrl.config.seeds import BEYOND_EVALUATION, FIRST_EVALUATED, SEEDS, WORLDS
 from warp_torchrl.env import WildfireEnv
@@ -138,7 +138,7 @@ class RunConfig:
         compile: Fuse steps and losses of training with ``torch.compile``: faster after a minute or two.
         checkpoint: When training saves.
         evaluation: How policies are evaluated.
-        imitation: How a team learns from a teacher.
+        imitation: Whom a team learns from beside its rewards.
 
     Raises:
         ValueError: If a value is out of its range.
@@ -161,7 +161,7 @@ class RunConfig:
     graph: bool = False
     checkpoint: CheckpointConfig = field(default_factory=CheckpointConfig)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
-    imitation: Kickstarting = field(default_factory=Kickstarting)
+    imitation: Imitation = field(default_factory=Imitation)
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -222,8 +222,11 @@ class RunConfig:
         """Check that what is recorded stays as it is."""
         if torch.device(self.device).type != "cuda":
             raise ConfigError(f"graph must be false where device is not cuda, got device={self.device}")
-        if not isinstance(self.algorithm, OnPolicy) or self.imitation.teacher is not None or self.model.memory:
-            raise ConfigError("graph must be false with a teacher, with memory, and where the algorithm replays")
+        imitates = self.imitation.teacher is not None or self.imitation.demonstrations is not None
+        if not isinstance(self.algorithm, OnPolicy) or imitates or self.model.memory:
+            raise ConfigError(
+                "graph must be false with a teacher or demonstrations, with memory, and where the algorithm replays"
+            )
         if self.n_processes() > 1 or isinstance(self.collector, MultiProcess):
             raise ConfigError("graph must be false where several processes collect or learn")
 
@@ -263,7 +266,7 @@ def run_config(config: Mapping[str, Any]) -> RunConfig:
         if key not in config:
             raise ConfigError(f"{key} must be given")
     built = build_components(config)
-    parts = {"checkpoint": CheckpointConfig, "evaluation": EvaluationConfig, "imitation": Kickstarting}
+    parts = {"checkpoint": CheckpointConfig, "evaluation": EvaluationConfig, "imitation": Imitation}
     built |= {name: construct(kind, config.get(name, {}), name) for name, kind in parts.items()}
     values = _chosen(RunConfig, {**config, **built})
     _check_together(config)
@@ -275,7 +278,7 @@ def run_config(config: Mapping[str, Any]) -> RunConfig:
     with _in_section("collector"):
         made.collector.check_worlds(made.n_worlds)
     with _in_section("imitation"):
-        made.imitation.check_fits(made.algorithm, made.collector)
+        made.imitation.check_fits(made.algorithm, made.collector, made.model)
     return made
 
 

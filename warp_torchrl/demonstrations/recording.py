@@ -75,12 +75,27 @@ class Recording:
         return self.by(Mover.PERSON) & (self.steps[ACTION] != self.steps[PROPOSED])
 
 
+def recorded(shown: TensorDictBase, proposed: Tensor, mover: Tensor, after: TensorDictBase) -> TensorDictBase:
+    """Return what is recorded of a step of any number of worlds, batch size [B].
+
+    Args:
+        shown: Of an environment, with the actions done.
+        proposed: The policy's actions, int64 [B, A].
+        mover: Whose each action was, uint8 [B, A].
+        after: What the step led to.
+    """
+    row = shown.select(*_SHOWN, ACTION, strict=False).clone()
+    row[PROPOSED], row[MOVER] = proposed.clone(), mover.clone()
+    row["next"] = after.select(*_ENDS).clone()
+    return row
+
+
 @dataclass
 class Tape:
-    """The steps of an episode that is being played.
+    """The steps of an episode that is being played, or of one in each of several worlds.
 
     Attributes:
-        rows: A TensorDict of batch size [] for each step.
+        rows: A TensorDict of batch size [], or [B], for each step.
         events: What people have done to the world.
         acts: Actions of people so far.
         corrections: Those of them that the policy had not proposed.
@@ -107,10 +122,8 @@ class Tape:
             movers: Of each agent.
             after: What the step led to.
         """
-        row = shown.select(*_SHOWN, ACTION, strict=False)[0].clone()
-        row[PROPOSED] = proposed.clone()
-        row[MOVER] = torch.tensor(movers, dtype=torch.uint8)
-        row["next"] = after.select(*_ENDS)[0].clone()
+        whose = torch.tensor(movers, dtype=torch.uint8)
+        row = recorded(shown, proposed[None], whose[None], after)[0].clone()
         self.rows.append(row)
         others = (row[ACTION] != proposed).tolist()
         self.acts += sum(each == Mover.PERSON for each in movers)
@@ -118,7 +131,7 @@ class Tape:
         self.words += sum(each in (Mover.ORDER, Mover.FORBIDDEN) for each in movers)
 
     def steps(self) -> TensorDictBase:
-        """Return the steps, of which there is one at least, batch size [T]."""
+        """Return the steps, of which there is one at least, batch size [T] or [T, B]."""
         steps = torch.stack(self.rows)
         if not isinstance(steps, TensorDict):
             raise TypeError(f"the steps of a recording must be of one kind, got {type(steps).__name__}")

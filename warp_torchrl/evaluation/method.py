@@ -37,9 +37,11 @@ def unusual(record: SavedConfig) -> list[str]:
 
 
 def teacher_label(record: SavedConfig) -> list[str]:
-    """Return the part of a policy's name that names its teacher; empty without a teacher."""
-    teacher = record.values.get("imitation", {}).get("teacher")
-    return [f"taught by {teacher}"] if teacher else []
+    """Return the part of a policy's name that says whom it learned from beside rewards; empty where from nobody."""
+    imitation = record.values.get("imitation", {})
+    people = ["people"] if imitation.get("demonstrations") else []
+    taught = [imitation["teacher"]] if imitation.get("teacher") else []
+    return [f"taught by {' and '.join([*taught, *people])}"] if taught or people else []
 
 
 def _with_floats(node: Any) -> Any:

@@ -13,8 +13,11 @@ from torch import Tensor
 
 from warp_torchrl import parallel
 from warp_torchrl.algorithms.learner import Learner
+from warp_torchrl.collection.cloning import clone
+from warp_torchrl.collection.kickstarting import kickstart
 from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.config.seeds import first_world_seed
+from warp_torchrl.demonstrations.acts import demonstrations
 from warp_torchrl.runs import former
 from warp_torchrl.runs.checkpoint import Checkpoint
 from warp_torchrl.runs.transfer import learned_parameters
@@ -41,7 +44,7 @@ class Learning:
         learner = run_config.algorithm.build(self.env, run_config.model, run_config.collector.steps * worlds)
         if run_config.compile:
             learner.terms = compile_function(learner.terms)
-        self.learner: Learner = run_config.imitation.kickstart(learner, self.env)
+        self.learner = self._imitating(learner)
         self._steps = FiniteSteps(self.learner.optimizer)
         if run_config.graph:
             self._update = RecordedUpdate(self._update, self.learner.optimizer)  # type: ignore[method-assign]
@@ -57,6 +60,14 @@ class Learning:
         """What a checkpoint holds of the other processes."""
         if parallel.rank():
             torch.manual_seed(_seed_of_process(run_config.seed, parallel.rank()))
+
+    def _imitating(self, learner: Learner) -> Learner:
+        """Return a learner that learns from the run's teacher and people too, where it has them."""
+        plan = self.run_config
+        taught = kickstart(learner, plan.imitation, self.env)
+        n_networks = self.env.n_agents if plan.model.sharing == "none" else 1
+        seed = _seed_of_process(plan.seed, parallel.rank())
+        return clone(taught, plan.imitation, demonstrations(plan, self.env), n_networks, seed)
 
     @property
     def frames_per_batch(self) -> int:

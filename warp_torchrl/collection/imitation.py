@@ -1,0 +1,69 @@
+"""The configuration of learning from others: a teacher, people, or both."""
+
+from dataclasses import dataclass
+
+from warp_torchrl.algorithms.algorithm import Algorithm
+from warp_torchrl.algorithms.on_policy import OnPolicy
+from warp_torchrl.collection.collectors import InProcess, MultiProcess
+from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.models import Mlp
+from warp_torchrl.nearest import did_you_mean
+from warp_torchrl.validation import check_fields
+
+TEACHERS = tuple(name for name, heuristic in HEURISTICS.items() if not heuristic.is_stateful)
+"""Heuristics that can be teachers: their action depends on the state alone."""
+CLONING_LOSS, CLONING_COLUMN = "loss_bc", "train/cloning_loss"
+"""The term of the loss, the sum of the teacher's and the people's where there are both, and its column."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Imitation:
+    """Whom a team learns from beside its rewards: a heuristic teacher, people, or both.
+
+    The two losses add up, each a mean over its own samples, under the same weight. Reports of such a policy should say
+    whom it learned from.
+
+    Attributes:
+        teacher: One of ``TEACHERS``, which labels what the team visits; None has no teacher.
+        demonstrations: Folder of recordings, of which the acts of people are cloned; None clones nobody's.
+        minibatch_size: Acts of people in an optimiser step, of all processes.
+        weight: Weight of the cloning losses at the start; it falls linearly.
+        until: Share of the training after which the weight is 0.
+
+    Raises:
+        ValueError: If the teacher is unknown or a value is out of its range.
+    """
+
+    teacher: str | None = None
+    demonstrations: str | None = None
+    minibatch_size: int = 256
+    weight: float = 1.0
+    until: float = 0.3
+
+    def __post_init__(self) -> None:
+        check_fields(self, weight=(1e-6, 1e6), until=(1e-6, 1.0), minibatch_size=(1, 1_000_000))
+        if self.teacher is not None and self.teacher not in TEACHERS:
+            hint = did_you_mean(self.teacher, TEACHERS)
+            raise ValueError(f"teacher must be null or one of {', '.join(TEACHERS)}, got {self.teacher}{hint}")
+
+    def weight_at(self, progress: float) -> float:
+        """Return the weight at progress in 0..1."""
+        return self.weight * max(0.0, 1.0 - progress / self.until)
+
+    def check_fits(self, algorithm: Algorithm, collector: InProcess, model: Mlp) -> None:
+        """Check that the algorithm, the collector and the networks allow whom is learned from.
+
+        Raises:
+            ValueError: If the algorithm is off-policy, a teacher should label what workers collect, or networks that
+                remember should learn from single acts.
+        """
+        given = [name for name in ("teacher", "demonstrations") if getattr(self, name) is not None]
+        if given and not isinstance(algorithm, OnPolicy):
+            raise ValueError(f"{given[0]} must be null where the algorithm replays: choose mappo, ippo, ppo or a2c")
+        if self.teacher is not None and isinstance(collector, MultiProcess):
+            raise ValueError("teacher must be null where workers collect: choose collector=direct")
+        if self.demonstrations is not None and model.memory:
+            raise ValueError(
+                "demonstrations must be null where agents remember, since acts are learned one by one: choose "
+                f"model.memory=0, got {model.memory}"
+            )

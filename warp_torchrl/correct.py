@@ -1,0 +1,259 @@
+"""Records a scripted person who corrects a policy: ``python -m warp_torchrl.correct policy=RUN out=FOLDER``."""
+
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import torch
+import yaml
+from tensordict import TensorDictBase
+from torch import Tensor
+from torchrl.envs.utils import set_exploration_type
+
+from warp_torchrl.api import policy_of
+from warp_torchrl.commands.failure import DONE, fail
+from warp_torchrl.config.construction import ConfigError, construct
+from warp_torchrl.config.grammar import check_flags, check_overrides
+from warp_torchrl.config.run_config import ENVIRONMENT, build_components
+from warp_torchrl.config.saved_config import environment_record
+from warp_torchrl.config.seeds import SEEDS, WORLDS, first_world_seed
+from warp_torchrl.demonstrations.files import save
+from warp_torchrl.demonstrations.recording import Mover, Recording, Tape, recorded
+from warp_torchrl.demonstrations.scripted import Hands, Person
+from warp_torchrl.env import WildfireEnv
+from warp_torchrl.evaluation.play import play
+from warp_torchrl.heuristics import HEURISTICS, idle_action
+from warp_torchrl.live.player import Found
+from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, memory_apart
+from warp_torchrl.policy import MODES
+from warp_torchrl.validation import check_fields
+
+USAGE = (
+    "python -m warp_torchrl.correct policy=NAME or FOLDER out=FOLDER [episodes=32] [acts=1000] [seed=0] "
+    "[by=coordinated] [delay=1] [error=0.1] [threshold=0.5] [KEY=VALUE ...]"
+)
+_TEXTS = ("policy", "out", "by")
+_ABREAST = 32
+"""Episodes that are played at once: a step of few worlds costs what many do."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Session:
+    """What is recorded.
+
+    Attributes:
+        policy: A shipped policy, a run folder or a checkpoint folder; it must tell its probabilities, as baselines do
+            not.
+        out: New folder of the recordings.
+        episodes: How many, of the first worlds of the training seed.
+        acts: Acts of the person after which no further episode begins; None plays all.
+        seed: Training seed whose worlds are played: no evaluation has them.
+        overrides: Of the scenario of the policy's training, in the command line's grammar.
+
+    Raises:
+        ValueError: If a value is out of its range.
+    """
+
+    policy: str
+    out: str
+    episodes: int = 32
+    acts: int | None = None
+    seed: int = 0
+    overrides: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_fields(self, episodes=(1, WORLDS), acts=(1, 1_000_000_000), seed=(0, SEEDS))
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """What became of an episode.
+
+    Attributes:
+        recording: What was played with the person.
+        saved: Share of the trees that stood at its end.
+        saved_alone: The same of the policy without the person.
+    """
+
+    recording: Recording
+    saved: float
+    saved_alone: float
+
+
+class Correction:
+    """A policy on a scenario, and a scripted person who corrects it, in many worlds at once.
+
+    Args:
+        session: What is recorded.
+        person: How they correct.
+
+    Raises:
+        ConfigError: If the policy is unknown, tells no probabilities or does not fit, or an override is wrong.
+        CheckpointError: If a run folder holds no sound checkpoint.
+    """
+
+    def __init__(self, session: Session, person: Person) -> None:
+        found = Found(session.policy)
+        if found.checkpoint is None:
+            raise ConfigError(f"policy must be a trained one, which tells how sure it is, got {session.policy}")
+        config = found.config(session.overrides)
+        parts = build_components(config, ENVIRONMENT)
+        self.session, self.person, self.scenario = session, person, str(config["scenario"])
+        self.frames, self.environment = found.checkpoint.manifest.frames, environment_record(config)
+        self.env = WildfireEnv(
+            parts["world"],
+            observation=parts["observation"],
+            reward=parts["reward"],
+            n_worlds=min(session.episodes, _ABREAST),
+        )
+        try:
+            self.policy = policy_of(found.checkpoint).fitted(self.env)
+        except ValueError as error:
+            raise ConfigError(f"the policy {session.policy} does not fit here: {error}") from None
+        self.baseline = HEURISTICS[person.by](self.env)
+
+    def episodes(self) -> Iterator[Corrected]:
+        """Play so many episodes as are asked for, and yield them in the order of their seeds."""
+        count, acts = self.env.batch_size[0], 0
+        for start in range(0, self.session.episodes, count):
+            for played in self._play(start)[: self.session.episodes - start]:
+                yield played
+                acts += int(played.recording.by(Mover.PERSON).sum())
+                if self.session.acts is not None and acts >= self.session.acts:
+                    return
+
+    def _play(self, start: int) -> list[Corrected]:
+        """Play an episode in each world without the person and with them; ``start`` is the first one's number."""
+        env, first = self.env, first_world_seed(self.session.seed) + start
+        alone = play(env, self.policy, first, self.policy.mode)["saved"]
+        seeds = range(first, first + env.batch_size[0])
+        hands = [Hands(self.person, seed) for seed in seeds]
+        tape = Tape()
+        with (
+            torch.random.fork_rng(devices=[]),
+            torch.no_grad(),
+            set_exploration_type(MODES[self.policy.mode]),
+            memory_apart(self.policy),
+        ):
+            torch.manual_seed(first)
+            env.set_seeds(seeds)
+            shown = env.reset()
+            while not bool(env.world_state.done.all()):
+                row, shown = self._step(shown, hands)
+                tape.rows.append(row)
+        steps, saved = tape.steps(), env.tree_counts.saved()
+        lengths = (~steps["next", "done"][..., 0]).sum(0) + 1  # a world that has ended stays as it is
+        return [
+            Corrected(self._recording(seed, steps[: int(lengths[at]), at]), float(saved[at]), float(alone[at]))
+            for at, seed in enumerate(seeds)
+        ]
+
+    def _step(self, shown: TensorDictBase, hands: Sequence[Hands]) -> tuple[TensorDictBase, TensorDictBase]:
+        """Play a step in every world; return what is recorded of it, and what is shown then."""
+        env = self.env
+        out = self.policy(shown.copy())
+        proposed = out[ACTION]
+        chances, advice = self._chances(out), self.baseline(shown.select(ACTION_MASK))[ACTION]
+        possible = env.world.possible_actions(env.world_state)
+        idle = idle_action(possible, env.world.team)
+        action, mover = proposed.clone(), torch.full_like(proposed, Mover.POLICY, dtype=torch.uint8)
+        for world, person in enumerate(hands):
+            act = person.drive(chances[world], advice[world], possible[world])
+            if person.agent is not None:
+                at = (world, person.agent)
+                does = act is not None and (bool(possible[at][act]) or act == int(idle[at]))
+                action[at] = act if act is not None and does else idle[at]
+                mover[at] = Mover.PERSON if does else Mover.WAITING
+        after = env.step(shown.set(ACTION, action))["next"]
+        return recorded(shown, proposed, mover, after), after
+
+    def _chances(self, out: TensorDictBase) -> Tensor:
+        """Return the policy's probability of each act here, float32 [B, A, actions]."""
+        mask, here = out[ACTION_MASK], self.policy.shown.actions
+        scores = torch.full(mask.shape, -torch.inf)
+        scores[..., [here.index(name) for name in self.policy.trained.actions]] = out[LOGITS].float()
+        return scores.masked_fill(~mask, -torch.inf).softmax(dim=-1).nan_to_num(0.0)
+
+    def _recording(self, seed: int, steps: TensorDictBase) -> Recording:
+        return Recording(
+            steps=steps.clone(),
+            environment=self.environment,
+            seed=seed,
+            events=(),
+            policy=self.session.policy,
+            frames=self.frames,
+            agents=tuple(self.env.agent_names),
+            actions=tuple(self.env.action_names),
+        )
+
+
+def table(rows: Sequence[tuple[int, int, int, float, float]], scenario: str) -> str:
+    """Return a Markdown table of episodes: steps, acts of the person, corrections, saved with them and without."""
+    steps, acts, corrections = (sum(row[at] for row in rows) for at in range(3))
+    saved, alone = (100.0 * sum(row[at] for row in rows) / len(rows) for at in (3, 4))
+    return "\n".join(
+        [
+            "| scenario | episodes | steps | acts | corrections | saved with the person % | without % |",
+            "|---|---|---|---|---|---|---|",
+            f"| {scenario} | {len(rows)} | {steps} | {acts} | {corrections} | {saved:.1f} | {alone:.1f} |",
+        ]
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Record what the command line asks for, and return the exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    if any(each in ("-h", "--help") for each in given):
+        print(f"{USAGE}\n\n{Session.__doc__}\n{Person.__doc__}")
+        return DONE
+    try:
+        _record(*read([each for each in given if not each.startswith("debug=")]))
+    except Exception as error:
+        return fail(error, "debug=true" in given)[0]
+    return DONE
+
+
+def read(arguments: Sequence[str]) -> tuple[Session, Person]:
+    """Return what a command line asks for.
+
+    Raises:
+        ConfigError: If a word is no ``key=value``, or a value does not fit.
+    """
+    check_flags(arguments)
+    check_overrides(arguments)
+    own = {kind: [each.name for each in fields(kind) if each.name != "overrides"] for kind in (Session, Person)}
+    pairs = [each.partition("=")[::2] for each in arguments]
+    rest = tuple(f"{key}={value}" for key, value in pairs if not any(key in names for names in own.values()))
+    values = {kind: {key: _value(key, value) for key, value in pairs if key in names} for kind, names in own.items()}
+    session = construct(Session, {**values[Session], "overrides": rest}, "")
+    return session, construct(Person, values[Person], "")
+
+
+def _value(key: str, text: str) -> object:
+    """Return a plain value of one of the command's own keys."""
+    bare = text.strip("'\"")
+    if key in _TEXTS:
+        return bare
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError:
+        return bare
+
+
+def _record(session: Session, person: Person) -> None:
+    out = Path(session.out)
+    if out.is_dir() and any(out.iterdir()):
+        raise ConfigError(f"out must be a new folder, {out} holds files")
+    correction = Correction(session, person)
+    rows = []
+    for played in correction.episodes():
+        recording = played.recording
+        save(recording, out)
+        numbers = len(recording.steps), int(recording.by(Mover.PERSON).sum()), int(recording.corrected().sum())
+        rows.append((*numbers, played.saved, played.saved_alone))
+    print(table(rows, correction.scenario), flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
