@@ -57,7 +57,7 @@ def test_what_differs_is_told_and_the_others_are_listed(people, capsys):
     assert main([str(people), "check=true", f"export={people / 'all.npz'}"]) == UNSOUND
     out, err = capsys.readouterr()
     assert "skirmish-1000000-2" in out and len(err.splitlines()) == 1
-    assert err.startswith("error: skirmish-1000000-1: ") and err.endswith("; nothing was exported\n")
+    assert err.startswith("error: skirmish-1000000-1: ") and err.endswith("; nothing was written\n")
     assert not (people / "all.npz").exists()
 
 
@@ -121,3 +121,20 @@ def test_it_is_a_program(people):
     command = [sys.executable, "-m", "warp_torchrl.demonstrations", str(people)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0 and done.stdout.count("skirmish-") == 2 and done.stderr == ""
+
+
+def test_it_films_one_recording(people, capsys):
+    pytest.importorskip("viser", reason="needs the extra live")
+    one, path = people / "skirmish-1000000-1", people / "one.html"
+    assert main([str(one), f"html={path}"]) == DONE
+    assert capsys.readouterr().out.endswith(f"wrote {path}\n")
+    assert "noop and people, seed 1000000" in path.read_text() and path.stat().st_size < 3_000_000
+
+
+def test_a_film_of_several_or_into_another_kind_of_file_is_refused(people, capsys):
+    pytest.importorskip("viser", reason="needs the extra live")
+    assert main([str(people), f"html={people / 'all.html'}"]) == MISTAKE
+    assert main([str(people / "skirmish-1000000-1"), f"html={people / 'one.gif'}"]) == MISTAKE
+    several, kind = capsys.readouterr().err.splitlines()
+    assert f"html must be of one recording, and {people} holds 2" in several and "html must be a file" in kind
+    assert not list(people.glob("*.html"))

@@ -13,7 +13,7 @@ from warp_torchrl.evaluation.picture import record_episode
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.gallery.episode import _picture
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.live.episode import Film, SceneRecorder, legend, progress, short_names
+from warp_torchrl.live.episode import Film, SceneRecorder, legend, progress
 from warp_torchrl.world.state import is_burning
 
 SEED = 1_000_000
@@ -131,13 +131,6 @@ def test_the_legend_names_what_is_on_the_map_and_each_vehicle(make_match):
     assert {"fire", "ash", "wet"} <= set(names)
     assert names[-3:] == ["B0  bulldozer_0", "B1  bulldozer_1", "B2  bulldozer_2"]
     assert re.fullmatch(r"step 0 of 30:  \d+% saved, \d+% burning", progress(side))
-
-
-def test_short_names_tell_vehicles_apart():
-    assert short_names(["uav_0", "bulldozer_0", "bulldozer_1"]) == {
-        "uav_0": "U0", "bulldozer_0": "B0", "bulldozer_1": "B1",
-    }  # fmt: skip
-    assert list(short_names(["scout_0", "sweeper_0"]).values()) == ["scout_0", "sweeper_0"]
 
 
 def test_nothing_seen_is_no_episode(env, tmp_path):

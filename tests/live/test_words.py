@@ -81,9 +81,9 @@ def test_a_question_names_the_vehicle_and_the_act_and_tells_how_unsure_the_polic
 @pytest.mark.parametrize(
     ("names", "short"),
     [
-        (["bulldozer_0", "bulldozer_10"], ["b0", "b10"]),
-        (["bulldozer_0", "drone_0", "drone_1"], ["b0", "d0", "d1"]),
-        (["drone_0", "dozer_0"], ["dr0", "do0"]),
+        (["bulldozer_0", "bulldozer_10"], ["B0", "B10"]),
+        (["bulldozer_0", "drone_0", "drone_1"], ["B0", "D0", "D1"]),
+        (["drone_0", "dozer_0"], ["Dr0", "Do0"]),
     ],
 )
 def test_short_names_are_of_one_vehicle_each(names, short):

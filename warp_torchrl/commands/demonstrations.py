@@ -1,8 +1,9 @@
-"""The command demonstrations: recordings of people and policies in numbers, played again, and as NumPy arrays."""
+"""The command demonstrations: recordings in numbers, played again, as NumPy arrays, and as a page to look at."""
 
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 from warp_torchrl.commands.failure import DONE, fail
@@ -16,7 +17,7 @@ from warp_torchrl.demonstrations.summary import summary, table
 from warp_torchrl.runs.sealed import Unsound
 from warp_torchrl.validation import check_fields
 
-USAGE = "python -m warp_torchrl.demonstrations FOLDER [check=true] [export=FILE.npz]"
+USAGE = "python -m warp_torchrl.demonstrations FOLDER [check=true] [export=FILE.npz] [html=FILE.html]"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,6 +28,7 @@ class DemonstrationOptions:
         folder: A recording, or a folder of recordings.
         check: Play each again, and hold it against what was recorded.
         export: File to write the steps of all of them into, as NumPy arrays; None writes none.
+        html: File to write the one recording into, as a page that plays in a browser by itself, extra ``live``.
         overwrite: Write over a file that is there.
         debug: Print a traceback when something fails.
 
@@ -37,18 +39,22 @@ class DemonstrationOptions:
     folder: str
     check: bool = False
     export: str | None = None
+    html: str | None = None
     overwrite: bool = False
     debug: bool = False
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if self.export is None:
-            return
-        path = Path(self.export)
-        if path.suffix != ".npz":
-            raise ValueError(f"export must be a file that ends in .npz, got {path}")
-        if path.exists() and not self.overwrite:
-            raise ValueError(f"export must be a new file, got {path}; overwrite=true writes over it")
+        for key, ending in (("export", ".npz"), ("html", ".html")):
+            if getattr(self, key) is None:
+                continue
+            path = Path(getattr(self, key))
+            if path.suffix != ending:
+                raise ValueError(f"{key} must be a file that ends in {ending}, got {path}")
+            if path.exists() and not self.overwrite:
+                raise ValueError(f"{key} must be a new file, got {path}; overwrite=true writes over it")
+        if self.html is not None and find_spec("viser") is None:
+            raise ValueError('html needs viser, not installed: pip install "warp_torchrl[live]"')
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -80,9 +86,12 @@ def _read(arguments: Sequence[str]) -> DemonstrationOptions:
 
 
 def _run(options: DemonstrationOptions) -> int:
+    folders = find(Path(options.folder))
+    if options.html is not None and len(folders) != 1:
+        raise ConfigError(f"html must be of one recording, and {options.folder} holds {len(folders)}: name one of them")
     sound: dict[Path, Recording] = {}
     broken: list[str] = []
-    for folder in find(Path(options.folder)):
+    for folder in folders:
         try:
             sound[folder] = read(folder)
             if options.check:
@@ -91,10 +100,24 @@ def _run(options: DemonstrationOptions) -> int:
             broken.append(f"{folder.name}: {' '.join(str(error).split())}")
     print(table(summary(folder, recording) for folder, recording in sound.items()), flush=True)
     if broken:
-        raise Unsound("; ".join(broken) + ("; nothing was exported" if options.export else ""))
+        raise Unsound("; ".join(broken) + ("; nothing was written" if options.export or options.html else ""))
     if options.check:
         print(f"{len(sound)} of {len(sound)} play again as they were recorded", flush=True)
     if options.export is not None:
         export(list(sound.values()), Path(options.export))
         print(f"wrote {sum(len(each.steps) for each in sound.values())} steps into {options.export}", flush=True)
+    if options.html is not None:
+        _film(next(iter(sound.values())), Path(options.html))
+        print(f"wrote {options.html}", flush=True)
     return DONE
+
+
+def _film(recording: Recording, path: Path) -> None:
+    """Write a recording as a page that plays in a browser, verified as it is played for it."""
+    from warp_torchrl.live.episode import SceneRecorder  # the extra live
+
+    replay = Replay(recording)
+    scene = SceneRecorder(f"{recording.scenario}\n{recording.policy} and people, seed {recording.seed}", replay.env)
+    for state in replay.states():
+        scene.add(state)
+    scene.save(path)

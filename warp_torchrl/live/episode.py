@@ -15,9 +15,9 @@ from torch import Tensor
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.render import legend_colours
 from warp_torchrl.live.crew import Crew
-from warp_torchrl.live.scene import LocalServer, aim, furnish, places, quiet
+from warp_torchrl.live.scene import aim, furnish, local_server, places, quiet
 from warp_torchrl.live.stage import Shown, Stage
-from warp_torchrl.live.words import chips, vehicle_colours
+from warp_torchrl.live.words import chips, labels, vehicle_colours
 from warp_torchrl.runs import disk
 from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.state import Cover, WorldState, count_trees
@@ -43,12 +43,11 @@ class Film:
     def __init__(self, sides: Sequence[Shown], lines: Sequence[str]) -> None:
         self._sides, self._lines = sides, lines
         size = sides[0].env.world.size
-        with quiet():
-            self._server = LocalServer(host="127.0.0.1", port=0, verbose=False)
+        self._server = local_server("127.0.0.1", 0)
         furnish(self._server)
         aim(self._server, size, len(sides), aside=-0.04, up=0.02)  # heading and legend stand left
         self._stages = [
-            Stage(self._server, index, side, east, list(short_names(side.env.agent_names).values()))
+            Stage(self._server, index, side, east)
             for index, (side, east) in enumerate(zip(sides, places(size[1], len(sides))))
         ]
         self._film = self._server.get_scene_serializer()
@@ -91,16 +90,9 @@ def legend(side: Shown) -> dict[str, Sequence[int]]:
     colours: Mapping[str, Sequence[int]] = {
         name: colour for name, colour in legend_colours().items() if name not in absent
     }
-    short = short_names(side.env.agent_names)
-    vehicles = vehicle_colours(side.env.agent_names).items()
-    return {**colours, **{f"{short[name]}  {name}" if name != short[name] else name: each for name, each in vehicles}}
-
-
-def short_names(names: Sequence[str]) -> dict[str, str]:
-    """Return what stands at each vehicle, by its name: its kind's first letter and its number, where that tells all."""
-    parts = {name: name.rpartition("_") for name in names}
-    short = {name: f"{kind[:1].upper()}{number}" for name, (kind, _, number) in parts.items()}
-    return short if len(set(short.values())) == len(names) else {name: name for name in names}
+    names = side.env.agent_names
+    vehicles = zip(labels(names), vehicle_colours(names).items())
+    return {**colours, **{f"{short}  {name}": colour for short, (name, colour) in vehicles}}
 
 
 def _framed(page: str, lines: Sequence[str], colours: Mapping[str, Sequence[int]]) -> str:

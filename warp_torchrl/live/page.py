@@ -17,10 +17,9 @@ from warp_torchrl.live import words
 from warp_torchrl.live.keeping import Keeper
 from warp_torchrl.live.learning import Learning
 from warp_torchrl.live.match import Match, Setting
-from warp_torchrl.live.origin import only_own
 from warp_torchrl.live.panel.panel import Panel
 from warp_torchrl.live.panel.tab import told_if_refused
-from warp_torchrl.live.scene import LocalServer, aim, furnish, places, quiet
+from warp_torchrl.live.scene import aim, furnish, local_server, places, quiet
 from warp_torchrl.live.stage import Stage
 from warp_torchrl.validation import check_fields
 
@@ -91,8 +90,7 @@ class Page:
         self._stopped = threading.Event()
         self._followed = time.monotonic()
         warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")  # of a browser that just left
-        with quiet(), only_own(self.address.host):
-            self.server = LocalServer(host=self.address.host, port=self.address.port, verbose=False)
+        self.server = local_server(self.address.host, self.address.port)
         self._furnish()
         self.open(self.match)
         self.server.on_client_connect(self._welcome)

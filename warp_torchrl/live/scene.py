@@ -6,10 +6,12 @@ import io
 import numpy as np
 import viser
 
+from warp_torchrl.live.origin import only_own
+
 _SKY = np.linspace((13, 19, 33), (52, 50, 62), 64).round().astype(np.uint8)[:, None].repeat(2, axis=1)  # at dusk
 
 
-class LocalServer(viser.ViserServer):
+class _LocalServer(viser.ViserServer):
     """A server that stays local: viser's own would open a public tunnel when a browser asks for one."""
 
     def request_share_url(self, verbose: bool = True) -> str | None:
@@ -20,6 +22,17 @@ class LocalServer(viser.ViserServer):
 def quiet() -> contextlib.AbstractContextManager[object]:
     """Return a context in which viser's own lines are not printed."""
     return contextlib.redirect_stdout(io.StringIO())
+
+
+def local_server(host: str, port: int) -> viser.ViserServer:
+    """Return a server that shares nothing and listens to its own pages alone.
+
+    Args:
+        host: Network interface.
+        port: 0 takes any that is free.
+    """
+    with quiet(), only_own(host):
+        return _LocalServer(host=host, port=port, verbose=False)
 
 
 def furnish(server: viser.ViserServer) -> None:

@@ -1,6 +1,5 @@
 """Draws a side of a match in viser's scene, and changes what has changed."""
 
-from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -85,14 +84,11 @@ class Stage:
         index: Of the side; its nodes stand under ``/side_<index>``.
         side: The side, at the start of an episode.
         east: By how much its middle is east of the scene's [cells].
-        names: What stands at the vehicles; by default their own, short.
     """
 
-    def __init__(
-        self, server: viser.ViserServer, index: int, side: Shown, east: float, names: Sequence[str] | None = None
-    ) -> None:
+    def __init__(self, server: viser.ViserServer, index: int, side: Shown, east: float) -> None:
         self._server, self._side, self._root = server, side, f"/side_{index}"
-        self._called = labels(side.env.agent_names) if names is None else names
+        self._called = labels(side.env.agent_names)
         self.east = east
         self.ground: Ground = drawing.ground_of(side.state)
         scene, ground = server.scene, self.ground

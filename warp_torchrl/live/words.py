@@ -41,10 +41,10 @@ def title(side: Side) -> str:
 
 
 def labels(names: Sequence[str]) -> list[str]:
-    """Return short names of vehicles, which stand apart where they are close: ``b0`` of ``bulldozer_0``."""
-    stems = {name.rpartition("_")[0] for name in names}
+    """Return short names of vehicles, which stand apart where they are close: ``B0`` of ``bulldozer_0``."""
+    stems = {name.rpartition("_")[0].capitalize() for name in names}
     letters = next(count for count in range(1, 100) if len({stem[:count] for stem in stems}) == len(stems))
-    return [stem[:letters] + number for stem, _, number in (name.rpartition("_") for name in names)]
+    return [stem.capitalize()[:letters] + number for stem, _, number in (name.rpartition("_") for name in names)]
 
 
 def so_far(side: Side) -> str:
