@@ -100,7 +100,7 @@ def test_it_draws_what_it_is_asked_for(tmp_path, capsys, matplotlib):
 def test_it_lists_its_figures(capsys):
     assert main(["--list"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == [*WORLD, *REAL_GROUND, "curves"]
+    assert [line.split()[0] for line in lines] == [*WORLD, *REAL_GROUND, "curves", "episode"]
     assert all(len(line) > 40 for line in lines)
 
 
