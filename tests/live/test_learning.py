@@ -1,5 +1,6 @@
 """A training that the page starts."""
 
+import csv
 import time
 from pathlib import Path
 
@@ -9,11 +10,14 @@ from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.saved_config import SavedConfig, restore
 from warp_torchrl.live.crew import Refused
+from warp_torchrl.live.keeping import Keeper
 from warp_torchrl.live.learning import Learning, _literal, arguments
+from warp_torchrl.live.match import Match
 from warp_torchrl.live.player import Found
 from warp_torchrl.runs.checkpoint import newest
 from warp_torchrl.runs.manifest import CheckpointError
 from warp_torchrl.runs.transfer import check_start
+from warp_torchrl.world.state import Action
 
 PEOPLE, RUN = Path("people"), Path("people/runs/one")
 
@@ -155,3 +159,25 @@ def test_what_does_not_learn_is_told(learning, make_match, match, monkeypatch):
     with pytest.raises(Refused, match="was trained by qmix: from recordings learn mappo"):
         learning.start(match.sides[0], match.setting, 10)
     assert not learning.recordings.exists()
+
+
+@pytest.mark.slow
+def test_what_a_person_did_is_learned_by_a_real_training(tmp_path, match):
+    side, keeper = match.sides[0], Keeper(tmp_path / "people")
+    side.crew.take(0, person=1)
+    for step in range(20):
+        side.crew.press(0, 1, int(Action.EAST if step % 2 else Action.WEST))
+        match.step()
+    keeper.save(side)
+    learning = Learning(keeper.folder)
+    folder = learning.start(side, match.setting, 1600)
+    end = time.monotonic() + 300.0
+    while learning.goes_on and time.monotonic() < end:
+        time.sleep(0.2)
+    assert learning.told().startswith(f"{folder} is trained: "), learning.told()
+    with (folder / "metrics.csv").open() as file:
+        losses = [float(row["train/cloning_loss"]) for row in csv.DictReader(file)]
+    assert 0.0 < losses[4] < losses[0] and losses[-1] == 0.0, "the weight falls to 0 at three tenths"
+    shown = Match(learning.setting(match.setting.seed))
+    shown.step()
+    assert shown.sides[0].player.frames == learning.newest() >= 1600
