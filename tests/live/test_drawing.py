@@ -9,6 +9,7 @@ import torch
 from tests.world.drawing import draw
 from warp_torchrl.env.render import fire_colours, render
 from warp_torchrl.live import drawing
+from warp_torchrl.live.ground import ground_of
 from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.world.state import Action
 
@@ -17,47 +18,11 @@ MAP = """
     ~acT
     T#e1
 """
-HEIGHT, WIDTH = 3, 4
-SLOPE = [[30.0 * column for column in range(WIDTH)]] * HEIGHT  # 45 degrees up to the east, of cells of 30 m
-
-
-def test_the_middle_of_the_map_is_the_origin_east_is_x_and_north_is_y():
-    # Four columns stand at -1.5, -0.5, 0.5, 1.5; three rows at 1, 0, -1.
-    ground = drawing.ground_of(draw(MAP))
-    assert ground.position[0].tolist() == [-1.5, 1.0, 0.0] and ground.position[-1].tolist() == [1.5, -1.0, 0.0]
-    assert np.allclose(ground.turn, [1.0, 0.0, 0.0, 0.0])
-
-
-def test_heights_are_over_the_mean_in_cells_and_twice_as_large():
-    ground = drawing.ground_of(draw(MAP, elevation=SLOPE))
-    # Columns are 45 m below to 45 m above the mean: -1.5 to 1.5 cells, twice that; corners at the edge repeat it.
-    assert np.allclose(ground.height[1, 1:3], [-1.0, 1.0])
-
-
-def test_tiles_lie_on_the_slope():
-    ground = drawing.ground_of(draw(MAP, elevation=SLOPE))
-    w, x, y, z = ground.turn[5]
-    normal = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]
-    # Up two cells for one to the east: the normal is (-2, 0, 1) / sqrt 5.
-    assert np.allclose(normal, [-2 / math.sqrt(5), 0.0, 1 / math.sqrt(5)], atol=1e-6)
-
-
-def test_tiles_lie_on_a_slope_that_rises_to_the_south():
-    south = [[30.0 * row] * WIDTH for row in range(HEIGHT)]
-    w, x, y, z = drawing.ground_of(draw(MAP, elevation=south)).turn[5]
-    normal = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]
-    assert np.allclose(normal, [0.0, 2 / math.sqrt(5), 1 / math.sqrt(5)], atol=1e-6), "it looks to the north"
-
-
-def test_the_block_is_closed():
-    faces = drawing.ground_of(draw(MAP, elevation=SLOPE)).block.faces
-    edges = {tuple(edge) for edge in faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).tolist()}
-    assert len(edges) == 3 * len(faces) and all((end, start) in edges for start, end in edges)
 
 
 def test_tiles_have_the_colours_of_the_map_darker_under_trees():
     state = draw(MAP)
-    colours, painted = drawing.tiles(state, drawing.ground_of(state)), render(state, None, 1)[0].flatten(0, 1).numpy()
+    colours, painted = drawing.tiles(state, ground_of(state)), render(state, None, 1)[0].flatten(0, 1).numpy()
     bare_and_burning = [3, 4, 5, 6, 9, 10]
     assert (colours[bare_and_burning] == painted[bare_and_burning]).all()
     assert (colours[1] < painted[1]).all()
@@ -65,7 +30,7 @@ def test_tiles_have_the_colours_of_the_map_darker_under_trees():
 
 def test_every_tree_is_as_tall_as_it_is_old_and_where_none_is_it_has_no_size():
     state = draw(MAP)
-    ground = drawing.ground_of(state)
+    ground = ground_of(state)
     assert ground.trees.tolist() == [0, 1, 2, 3, 5, 6, 7, 8, 9, 10, 11], "all but the lake"
     tall = dict(zip(ground.trees.tolist(), drawing.trees(state, ground).scale[:, 2].tolist()))
     assert tall[3] == tall[9] == 0.0, "bare ground and a firebreak"
@@ -76,7 +41,7 @@ def test_every_tree_is_as_tall_as_it_is_old_and_where_none_is_it_has_no_size():
 
 def test_a_flame_stands_on_each_cell_that_burns_in_the_colour_of_its_stage():
     state = draw(MAP)
-    ground = drawing.ground_of(state)
+    ground = ground_of(state)
     shown = drawing.flames(state, ground)
     assert shown.position.tolist() == ground.position[[5, 6, 10]].tolist()
     assert shown.colour.tolist() == fire_colours()[[0, 2, 4]].tolist()
@@ -84,13 +49,13 @@ def test_a_flame_stands_on_each_cell_that_burns_in_the_colour_of_its_stage():
 
 def test_without_fire_there_is_neither_flame_nor_smoke_nor_glow():
     state = draw("5T. ~11")
-    ground = drawing.ground_of(state)
+    ground = ground_of(state)
     assert len(drawing.flames(state, ground).position) == len(drawing.smoke(state, ground).position) == 0
     assert drawing.glow(state, ground)[1] == 0.0
 
 
 def test_the_glow_stands_over_the_densest_fire_and_grows_with_it():
-    ground = drawing.ground_of(draw("TTTTTTTTTTTTTTTTTTTT"))
+    ground = ground_of(draw("TTTTTTTTTTTTTTTTTTTT"))
     few, more = draw("aTTTTTTTTTTTTTTTTabT"), draw("aTTTTTTTTTTTTTTTabcT")
     (x, y, z), strength = drawing.glow(few, ground)
     assert x == ground.position[17, 0] and (y, z) == (0.0, 4.0), "two cells burn there, and one at the other end"
@@ -99,7 +64,7 @@ def test_the_glow_stands_over_the_densest_fire_and_grows_with_it():
 
 def test_smoke_goes_up_and_with_the_wind():
     state = draw("cccc cccc cccc", wind=(10.0, 0.0))
-    ground = drawing.ground_of(state)
+    ground = ground_of(state)
     shown = drawing.smoke(state, ground)
     index = [int(np.abs(ground.position[:, 1] - place[1]).argmin()) for place in shown.position]
     assert len(index) > 0 and (shown.position[:, 2] >= 2.0).all()
@@ -108,9 +73,20 @@ def test_smoke_goes_up_and_with_the_wind():
     assert np.allclose(column, np.round(column - 0.5) + 0.5, atol=1e-4)
 
 
+def test_sparks_rise_with_the_wind_from_each_burning_cell_and_darken():
+    state = draw("Tc~ T#T", wind=(10.0, 0.0))  # one cell burns, at (0, 0.5)
+    places, colours = drawing.sparks(state, ground_of(state))
+    x, y, z = places.T
+    assert len(places) == 3 and (z >= 0.6).all() and (z <= 5.0).all()
+    # At a height of h cells a spark is 10 m/s x 0.12 h east of where it rose, within half a cell of the middle.
+    assert (abs(x - 1.2 * z) <= 0.5).all() and (abs(y - 0.5) <= 0.5).all()
+    assert colours[z.argmax()].sum() < colours[z.argmin()].sum()
+    assert len(drawing.sparks(draw("5T. ~11"), ground_of(draw("5T. ~11")))[0]) == 0
+
+
 def test_vehicles_stand_on_their_cells_aircraft_above_and_face_where_they_moved():
     state = draw(MAP, at=[(0, 1), (2, 3)])
-    ground = drawing.ground_of(state)
+    ground = ground_of(state)
     shown = drawing.vehicles(state, ground, torch.tensor([False, True]), torch.tensor([-1, int(Action.NORTH)]))
     assert np.allclose(shown.position, [[-0.5, 1.0, 0.05], [1.5, -1.0, 3.05]])
     # East, where none has moved yet, is no turn; north is a quarter: half of it is 45 degrees.
@@ -120,7 +96,7 @@ def test_vehicles_stand_on_their_cells_aircraft_above_and_face_where_they_moved(
 
 def test_a_heading_points_ahead_or_to_the_place_of_an_order():
     state = draw(MAP, at=[(0, 1), (2, 3)])
-    ground = drawing.ground_of(state)
+    ground = ground_of(state)
     shown = drawing.vehicles(state, ground, torch.tensor([False, False]), torch.tensor([int(Action.SOUTH)] * 2))
     lines = drawing.headings(shown, {1: (0, 0)}, ground)
     ahead = lines[0, 1] - lines[0, 0]
@@ -131,7 +107,7 @@ def test_a_heading_points_ahead_or_to_the_place_of_an_order():
 def test_wind_arrows_point_where_the_air_goes_and_a_calm_has_none():
     plain = " ".join(["." * 25] * 25)
     state = draw(plain, wind=(0.0, 12.0))
-    ground = drawing.ground_of(state)
+    ground = ground_of(state)
     arrows = drawing.wind_arrows(state, ground)
     # 12 m/s north is as long as the distance of two arrows: 25 cells / 5.
     assert np.allclose(arrows[:, 1] - arrows[:, 0], [0.0, 5.0, 0.0], atol=1e-5)
@@ -139,24 +115,9 @@ def test_wind_arrows_point_where_the_air_goes_and_a_calm_has_none():
     assert (calm[:, 0] == calm[:, 1]).all()
 
 
-@pytest.mark.parametrize("cell", [(0, 0), (2, 3), (1, 2)])
-def test_a_ray_meets_the_cell_that_it_was_aimed_at(cell):
-    ground = drawing.ground_of(draw(MAP, elevation=SLOPE))
-    target = ground.position[cell[0] * WIDTH + cell[1]].astype(float)
-    origin = target + np.array([-3.0, -6.0, 12.0])
-    direction = (target - origin) / np.linalg.norm(target - origin)
-    assert drawing.cell_at(tuple(origin), tuple(direction), ground) == cell
-
-
-def test_a_ray_into_the_sky_or_beside_the_map_meets_nothing():
-    ground = drawing.ground_of(draw(MAP))
-    assert drawing.cell_at((0.0, 0.0, 5.0), (0.0, 0.0, 1.0), ground) is None
-    assert drawing.cell_at((50.0, 0.0, 5.0), (0.0, 0.0, -1.0), ground) is None
-
-
 def test_a_large_map_has_no_trees_of_its_own():
     match = Match(Setting(policy="noop", overrides=("landscape.size=130", "team.n_agents=2")))
-    ground = drawing.ground_of(match.alone.state)
+    ground = ground_of(match.alone.state)
     assert len(ground.trees) == 0
     colours = drawing.tiles(match.alone.state, ground)
     assert (colours == render(match.alone.state, None, 1)[0].flatten(0, 1).numpy()).all()

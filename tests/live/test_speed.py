@@ -5,6 +5,7 @@ import time
 import pytest
 
 from warp_torchrl.live import drawing
+from warp_torchrl.live.ground import ground_of
 from warp_torchrl.live.match import Match, Setting
 
 
@@ -32,7 +33,7 @@ def draw(side, ground):
 def test_a_step_of_a_large_map_is_played_and_drawn_in_a_tenth_of_a_second():
     match = Match(Setting(policy="default", overrides=("scenario=large",)))
     assert match.world.size == (64, 64) and match.world.team.n_agents == 8
-    ground = drawing.ground_of(match.sides[0].state)
+    ground = ground_of(match.sides[0].state)
 
     def step():
         match.step()
@@ -45,5 +46,5 @@ def test_a_step_of_a_large_map_is_played_and_drawn_in_a_tenth_of_a_second():
 def test_the_largest_maps_are_drawn_in_a_tenth_of_a_second():
     overrides = ("scenario=giant", "landscape.size=256", "team.n_agents=32")
     match = Match(Setting(policy="noop", overrides=overrides))
-    ground = drawing.ground_of(match.sides[0].state)
+    ground = ground_of(match.sides[0].state)
     assert seconds(lambda: draw(match.sides[0], ground)) < 0.1

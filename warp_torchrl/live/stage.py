@@ -10,7 +10,8 @@ from torch import Tensor
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.live import drawing
 from warp_torchrl.live.crew import Crew
-from warp_torchrl.live.drawing import Ground, Instances
+from warp_torchrl.live.drawing import Instances
+from warp_torchrl.live.ground import Ground, ground_of
 from warp_torchrl.live.shapes import TILE, Shape, bulldozer, drone, flame, puff, tree
 from warp_torchrl.live.words import labels
 from warp_torchrl.world.role import ROLES
@@ -90,7 +91,7 @@ class Stage:
         self._server, self._side, self._root = server, side, f"/side_{index}"
         self._called = labels(side.env.agent_names)
         self.east = east
-        self.ground: Ground = drawing.ground_of(side.state)
+        self.ground: Ground = ground_of(side.state)
         scene, ground = server.scene, self.ground
         scene.add_frame(self._root, show_axes=False, position=(east, 0.0, 0.0))
         scene.add_mesh_simple(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import viser
 
 from warp_torchrl.live import words
-from warp_torchrl.live.drawing import cell_at
+from warp_torchrl.live.ground import cell_at
 from warp_torchrl.live.panel.agent import AgentTab
 from warp_torchrl.live.panel.drive import KEYS, DriveTab
 from warp_torchrl.live.panel.match import MatchTab
