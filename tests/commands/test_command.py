@@ -477,13 +477,14 @@ def test_a_run_starts_from_another_ones_networks_on_another_scenario(trained, ru
     ("path", "said", "expected"),
     [
         ("nowhere", "nowhere is not a run folder", 4),
-        ("alone", "holds a policy alone", 4),
+        ("alone algorithm=dqn", "holds a policy alone", 4),
+        ("alone algorithm=ippo model.actor_hidden=[8]", "was trained by another algorithm or other networks", 4),
         ("run model.symmetry=none", "was trained by another algorithm or other networks", 4),
     ],
 )
 def test_a_start_that_is_none_is_refused_before_anything_is_written(trained, run_here, tmp_path, path, said, expected):
     checkpoint.export(checkpoint.newest(trained[0])[0], tmp_path / "alone")
-    path, *others = path.replace("run", str(trained[0])).split()
+    path, *others = path.replace("run ", f"{trained[0]} ").split()
     code, errors, _ = run_here("train.py", *SHORT, f"start_from={path}", *others)
     assert code == expected and said in errors[-1] and len(errors) == 1
     assert not (tmp_path / "run").exists()
@@ -614,7 +615,7 @@ MISTAKES = [
     (("train.py", "hydra.run.dri=a"), 2, "hydra.run.dri is not a key"),
     (("train.py", "hydra/launcher=jobli"), 2, "hydra/launcher must be one of basic"),
     (("train.py", "resume=default"), 4, "default is not a run folder"),
-    (("train.py", "start_from=default"), 4, "holds a policy alone"),
+    (("train.py", "start_from=default"), 4, "was trained by another algorithm or other networks"),
     (("evaluate.py", "checkpoint=skirmsh"), 4, "policies default, single, skirmish: did you mean skirmish?"),
     (("evaluate.py", "checkpoint=nowhere"), 4, "nowhere"),
 ]

@@ -15,7 +15,6 @@ from warp_torchrl.live.learning import Learning, _literal, arguments
 from warp_torchrl.live.match import Match
 from warp_torchrl.live.player import Found
 from warp_torchrl.runs.checkpoint import newest
-from warp_torchrl.runs.manifest import CheckpointError
 from warp_torchrl.runs.transfer import check_start
 from warp_torchrl.world.state import Action
 
@@ -43,6 +42,13 @@ def test_a_training_may_start_from_the_run_of_which_it_is_made(trained):
     found = newest(trained)[0]
     values = composed(arguments(str(trained), found.record(), ("scenario=default",), PEOPLE, RUN, 200))
     assert values["model"]["actor_hidden"] == [16] and values["scenario"] == "default"
+    check_start(run_config(values), found)
+
+
+@pytest.mark.parametrize("policy", ["default", "single", "skirmish"])
+def test_the_shipped_policies_may_be_trained_too(policy):
+    found = Found(policy).checkpoint
+    values = composed(arguments(policy, found.record(), (), PEOPLE, RUN, 200))
     check_start(run_config(values), found)
 
 
@@ -148,9 +154,6 @@ def test_what_does_not_learn_is_told(learning, make_match, match, monkeypatch):
     with pytest.raises(Refused, match="coordinated does not learn"):
         baseline = make_match("coordinated")
         learning.start(baseline.sides[0], baseline.setting, 10)
-    with pytest.raises(CheckpointError, match="holds a policy alone: it acts, and nothing goes on from it"):
-        shipped = make_match("default")
-        learning.start(shipped.sides[0], shipped.setting, 10)
     with pytest.raises(Refused, match="steps must be in"):
         learning.start(match.sides[0], match.setting, 0)
     record = match.sides[0].player.checkpoint.record()

@@ -17,7 +17,7 @@ from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.models import ACTION
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs.checkpoint import CheckpointError, newest
+from warp_torchrl.runs.checkpoint import CheckpointError, export, newest
 from warp_torchrl.training.finite import NumericalFailure
 from warp_torchrl.training.loop import Training
 from warp_torchrl.training.signals import Stopped
@@ -458,6 +458,21 @@ def test_a_run_starts_from_another_ones_networks_and_its_own_settings(finished, 
     seen = training.env.reset()
     logits = [each.learner.policy[0](seen.clone())["agents", "logits"] for each in (training, finished[1])]
     assert torch.equal(*logits), "the policy is the other run's"
+
+
+def test_a_run_starts_from_an_exported_policy_with_a_critic_of_its_own(finished, tmp_path):
+    export(newest(finished[0])[0], tmp_path / "alone")
+    training = tiny(tmp_path, "landscape.size=16", "n_worlds=3")
+    before = {name: each.clone() for name, each in training.learner.loss.state_dict().items()}
+    training.start_from(newest(tmp_path / "alone")[0])
+    seen = training.env.reset()
+    logits = [each.learner.policy[0](seen.clone())["agents", "logits"] for each in (training, finished[1])]
+    assert torch.equal(*logits), "the policy is the exported one"
+    now = training.learner.loss.state_dict()
+    changed = {name.split(".")[0] for name in now if not torch.equal(now[name], before[name])}
+    assert changed == {"actor_network_params"}
+    training.train()
+    assert training.frames >= training.run_config.total_frames, "and it learns"
 
 
 @pytest.mark.parametrize("change", ["model.actor_hidden=[8]", "algorithm=ippo", "algorithm=dqn"])

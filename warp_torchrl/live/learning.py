@@ -86,7 +86,6 @@ class Learning:
 
         Raises:
             Refused: If a training goes on, or the policy does not learn from recordings.
-            CheckpointError: If it is a policy alone, such as the shipped ones, whose training was not kept.
             ConfigError: If an override does not fit.
         """
         found = side.player.checkpoint
@@ -94,7 +93,6 @@ class Learning:
             raise Refused(f"{self.folder} trains: stop it first")
         if found is None:
             raise Refused(f"{side.player.name} does not learn: load a trained policy in the tab Match")
-        found.check_goes_on()
         record = found.record()
         algorithm = record.choices.get("algorithm")
         if algorithm not in ON_POLICY:

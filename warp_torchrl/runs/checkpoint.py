@@ -77,13 +77,18 @@ class Checkpoint:
         self.check_goes_on()
         return self._load(TRAINING)
 
+    @property
+    def goes_on(self) -> bool:
+        """Return whether there is a training state: an exported policy has none, see ``export``."""
+        return TRAINING in self.manifest.files
+
     def check_goes_on(self) -> None:
         """Check that the checkpoint has a training state.
 
         Raises:
-            CheckpointError: If it is an exported policy, see ``export``.
+            CheckpointError: If it is an exported policy.
         """
-        if TRAINING not in self.manifest.files:
+        if not self.goes_on:
             raise CheckpointError(f"{self.path} holds a policy alone: it acts, and nothing goes on from it")
 
     def _load(self, name: str) -> dict[str, Any]:

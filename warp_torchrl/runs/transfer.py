@@ -3,6 +3,8 @@
 from torch import Tensor
 from torchrl.objectives import LossModule
 
+from warp_torchrl.algorithms.learner import Learner
+from warp_torchrl.algorithms.on_policy import OnPolicy
 from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.runs import former
 from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError
@@ -12,14 +14,33 @@ def check_start(run_config: RunConfig, found: Checkpoint) -> None:
     """Check that training can start from another run's learned parameters.
 
     Raises:
-        CheckpointError: If the checkpoint is an exported policy, or has another kind of loss or other networks.
+        CheckpointError: If the checkpoint has another kind of loss or other networks, or is an exported policy and
+            the algorithm replays.
     """
-    found.check_goes_on()
+    if not isinstance(run_config.algorithm, OnPolicy):
+        found.check_goes_on()
     symmetry = getattr(run_config.model, "symmetry", "none")  # networks of either have the same names and shapes
     if found.record().values.get("model", {}).get("symmetry", "none") != symmetry:
         raise CheckpointError(f"{found.path} was trained by another algorithm or other networks")
     batch = run_config.collector.steps * run_config.n_worlds
-    learned_parameters(found, run_config.algorithm.build(run_config.make_env(1, 0), run_config.model, batch).loss)
+    learner = run_config.algorithm.build(run_config.make_env(1, 0), run_config.model, batch)
+    if found.goes_on:
+        learned_parameters(found, learner.loss)
+    else:
+        actor_parameters(found, learner)
+
+
+def actor_parameters(found: Checkpoint, learner: Learner) -> dict[str, Tensor]:
+    """Return the parameters of an exported policy, by the names of a learner's policy.
+
+    Raises:
+        CheckpointError: If their names or shapes differ.
+    """
+    now = learner.policy.state_dict()
+    given = former.parameters(found.policy(), now)
+    if {name: each.shape for name, each in now.items()} != {name: each.shape for name, each in given.items()}:
+        raise CheckpointError(f"{found.path} was trained by another algorithm or other networks")
+    return given
 
 
 def learned_parameters(found: Checkpoint, loss: LossModule) -> dict[str, Tensor]:

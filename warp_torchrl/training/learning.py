@@ -20,7 +20,7 @@ from warp_torchrl.config.seeds import first_world_seed
 from warp_torchrl.demonstrations.acts import demonstrations
 from warp_torchrl.runs import former
 from warp_torchrl.runs.checkpoint import Checkpoint
-from warp_torchrl.runs.transfer import learned_parameters
+from warp_torchrl.runs.transfer import actor_parameters, learned_parameters
 from warp_torchrl.training.finite import FiniteSteps, NumericalFailure
 from warp_torchrl.training.progress import TRAIN_COLUMNS, episode_columns
 from warp_torchrl.training.recorded import RecordedUpdate
@@ -138,9 +138,14 @@ class Learning:
     def start_from(self, found: Checkpoint) -> None:
         """Load another run's networks and value normalisation; everything else starts anew.
 
+        Of an exported policy there are the actor's networks alone; the critic's start anew too.
+
         Raises:
             CheckpointError: If that run had another kind of loss or other networks.
         """
+        if not found.goes_on:
+            self.learner.policy.load_state_dict(actor_parameters(found, self.learner))
+            return
         loss = self.learner.loss
         loss.load_state_dict({**loss.state_dict(), **learned_parameters(found, loss)})
 
