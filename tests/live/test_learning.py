@@ -32,6 +32,7 @@ def test_the_policy_s_own_configuration_is_trained_in_the_scenario_that_is_playe
     record = Found(policy).checkpoint.record()
     values = composed(arguments(policy, record, overrides, PEOPLE, RUN, 200_000))
     wanted = plain(restore(record, overrides))
+    assert values["algorithm"].pop("learning_rate") == pytest.approx(0.2 * wanted["algorithm"].pop("learning_rate"))
     for key in ("scenario", "landscape", "team", "horizon", "observation", "reward", "model", "algorithm", "n_worlds"):
         assert values[key] == wanted[key], key
     assert values["seed"] == wanted["seed"]

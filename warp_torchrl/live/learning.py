@@ -22,6 +22,8 @@ from warp_torchrl.runs import checkpoint as checkpoints
 ON_POLICY = ("mappo", "ippo", "ppo", "a2c")
 """Algorithms that learn from recordings."""
 MOST_FRAMES = 100_000_000
+GENTLY = 0.2
+"""By how much the learning rate of the policy's training is multiplied: a skilled team loses less to a new critic."""
 _LEFT_TO_THE_PAGE = (
     *("start_from", "resume", "total_frames", "debug", "experiment", "imitation", "checkpoint", "evaluation"),
     *("device", "processes", "compile", "graph", "logger"),
@@ -38,7 +40,7 @@ def arguments(
 
     Args:
         policy: A shipped policy or a run folder.
-        record: Of its training: networks, algorithm and all else are its own.
+        record: Of its training: networks, algorithm and all else are its own, but for ``GENTLY``.
         overrides: Of the scenario that is played.
         recordings: Folder of recordings.
         folder: Run folder of the new training.
@@ -48,9 +50,11 @@ def arguments(
         ConfigError: If an override does not fit.
     """
     device = str(record.values.get("device", "cpu"))
+    rate = GENTLY * float(plain(restore(record, overrides))["algorithm"]["learning_rate"])
     return [
         *_configuration(record, overrides),
         *((f"device={device}",) if device.startswith("cuda") and torch.cuda.is_available() else ()),
+        f"algorithm.learning_rate={rate:g}",
         f"start_from={_literal(policy)}",
         f"imitation.demonstrations={_literal(str(recordings))}",
         f"total_frames={total_frames}",
