@@ -128,7 +128,7 @@ def test_the_command_writes_recordings_that_replay_and_prints_a_table(run, tmp_p
 def test_a_policy_with_more_actions_here_than_it_was_trained_with_has_chances_of_its_own(run):
     correction, played = corrected(run, ALWAYS, overrides=("team.roles=[ugv]", "team.tank=3"), episodes=1)
     shown = correction.env.reset()
-    chances = correction._chances(correction.policy(shown))
+    chances = correction.policy.probabilities(correction.policy(shown))
     open_to_it = shown[ACTION_MASK].clone()
     assert chances.shape == open_to_it.shape and torch.allclose(chances.sum(-1), torch.ones(1, 2))
     assert not chances[~open_to_it].any() and len(played) == 1

@@ -8,7 +8,6 @@ from pathlib import Path
 import torch
 import yaml
 from tensordict import TensorDictBase
-from torch import Tensor
 from torchrl.envs.utils import set_exploration_type
 
 from warp_torchrl.api import policy_of
@@ -25,7 +24,7 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.heuristics import HEURISTICS, idle_action
 from warp_torchrl.live.player import Found
-from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, memory_apart
+from warp_torchrl.models import ACTION, ACTION_MASK, memory_apart
 from warp_torchrl.policy import MODES
 from warp_torchrl.validation import check_fields
 
@@ -154,7 +153,10 @@ class Correction:
         env = self.env
         out = self.policy(shown.copy())
         proposed = out[ACTION]
-        chances, advice = self._chances(out), self.baseline(shown.select(ACTION_MASK))[ACTION]
+        chances = self.policy.probabilities(out)
+        if chances is None:
+            raise ConfigError(f"policy must tell how sure it is, and {self.session.policy} acts by values")
+        advice = self.baseline(shown.select(ACTION_MASK))[ACTION]
         possible = env.world.possible_actions(env.world_state)
         idle = idle_action(possible, env.world.team)
         action, mover = proposed.clone(), torch.full_like(proposed, Mover.POLICY, dtype=torch.uint8)
@@ -167,13 +169,6 @@ class Correction:
                 mover[at] = Mover.PERSON if does else Mover.WAITING
         after = env.step(shown.set(ACTION, action))["next"]
         return recorded(shown, proposed, mover, after), after
-
-    def _chances(self, out: TensorDictBase) -> Tensor:
-        """Return the policy's probability of each act here, float32 [B, A, actions]."""
-        mask, here = out[ACTION_MASK], self.policy.shown.actions
-        scores = torch.full(mask.shape, -torch.inf)
-        scores[..., [here.index(name) for name in self.policy.trained.actions]] = out[LOGITS].float()
-        return scores.masked_fill(~mask, -torch.inf).softmax(dim=-1).nan_to_num(0.0)
 
     def _recording(self, seed: int, steps: TensorDictBase) -> Recording:
         return Recording(

@@ -13,7 +13,7 @@ from torchrl.envs import EnvBase
 from torchrl.envs.utils import ExplorationType, exploration_type, set_exploration_type
 
 from warp_torchrl.env.flat import FLAT, unflattened
-from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, ROLE, Signature, recurrent_actors, signature
+from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, OBSERVATION, ROLE, Signature, recurrent_actors, signature
 from warp_torchrl.models.canonical import Canonicalise
 from warp_torchrl.models.fitting import fitted
 from warp_torchrl.models.networks import AgentNetworks
@@ -75,6 +75,23 @@ class TrainedPolicy(TensorDictModuleBase):
         own = set_exploration_type(MODES[self.mode]) if exploration_type() is None else nullcontext()
         with own:
             return tensordict.update(self.module(tensordict.copy()).select(*self.out_keys, strict=False))
+
+    def probabilities(self, acted: TensorDictBase) -> Tensor | None:
+        """Return how likely each action was; None of a policy that acts by values.
+
+        Args:
+            acted: What ``forward`` returned, with the mask.
+
+        Returns:
+            float32 [B, A, actions], 0 where the mask is closed or the policy does not know the action.
+        """
+        logits = acted.get(LOGITS, None)
+        if logits is None:
+            return None
+        mask, here = acted[ACTION_MASK], self.shown.actions
+        scores = torch.full(mask.shape, -torch.inf, device=mask.device)
+        scores[..., [here.index(name) for name in self.trained.actions]] = logits.float()
+        return scores.masked_fill(~mask, -torch.inf).softmax(dim=-1).nan_to_num(0.0)
 
     def numpy_policy(self) -> "NumpyPolicy":
         """Return the policy for the adapters' numpy observations, called as ``act(observation, info)``."""

@@ -16,7 +16,7 @@ from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.saved_config import restore
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS
+from warp_torchrl.models import ACTION
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.policy import MODES, TrainedPolicy
 from warp_torchrl.runs import checkpoint as checkpoints
@@ -114,15 +114,9 @@ class Player:
             self._draws = torch.get_rng_state()
         return out[ACTION][0], self._probabilities(out)
 
-    def _probabilities(self, out: TensorDictBase) -> Tensor | None:
-        logits = out.get(LOGITS, None)
-        if logits is None or not isinstance(self.policy, TrainedPolicy):
-            return None
-        mask, here = out[ACTION_MASK][0], self.policy.shown.actions
-        known = [here.index(name) for name in self.policy.trained.actions]
-        scores = torch.full(mask.shape, -torch.inf)
-        scores[:, known] = logits[0].float()
-        return scores.masked_fill(~mask, -torch.inf).softmax(dim=-1).nan_to_num(0.0)
+    def _probabilities(self, acted: TensorDictBase) -> Tensor | None:
+        found = self.policy.probabilities(acted) if isinstance(self.policy, TrainedPolicy) else None
+        return None if found is None else found[0]
 
     def follow(self, env: WildfireEnv) -> str | None:
         """Go on with the newest checkpoint of its run folder.
