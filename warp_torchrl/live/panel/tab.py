@@ -1,5 +1,6 @@
 """What every tab has: its part of the panel, and callbacks that tell what is refused."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     from warp_torchrl.live.panel.panel import Panel
 
 
-class Tab:
+class Tab(ABC):
     """A tab of a panel; it is made anew for every match.
 
     Args:
@@ -41,11 +42,11 @@ class Tab:
         """Return the side that people take part on."""
         return self.match.sides[0]
 
+    @abstractmethod
     def make(self) -> None:
         """Make the controls."""
-        raise NotImplementedError
 
-    def paint(self) -> None:
+    def paint(self) -> None:  # noqa: B027 - a tab may show nothing that changes
         """Show what takes long to make and to send."""
 
     def guarded(self, do: Callable[[Any], object]) -> Callable[[Any], None]:
