@@ -654,3 +654,11 @@ def test_a_sweep_of_evaluations_ends_in_one_table_and_one_figure(tmp_path, run_h
     text = (tmp_path / "sweep" / "summary.md").read_text()
     assert "| skirmish landscape.size=12 horizon=20 | greedy | 1 | 4 |" in text and text.strip() in said
     assert (tmp_path / "sweep" / "summary.png").stat().st_size > 10_000
+
+
+def test_a_picture_of_another_kind_takes_the_former_one_s_place(run_here, tmp_path):
+    pytest.importorskip("viser", reason="needs the extra live")
+    for kind in ("gif", "html"):
+        code, errors, _ = run_here("evaluate.py", *NOOP, f"picture={kind}", "hydra.run.dir=seen", "overwrite=true")
+        assert code == 0, errors
+    assert [each.name for each in (tmp_path / "seen").glob("episode.*")] == ["episode.html"]

@@ -13,7 +13,7 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation import cache
 from warp_torchrl.evaluation.maps import described, play_maps, write_maps
 from warp_torchrl.evaluation.method import method
-from warp_torchrl.evaluation.picture import Kind, record_episode
+from warp_torchrl.evaluation.picture import KINDS, Kind, record_episode
 from warp_torchrl.evaluation.play import BASELINES, Episodes, WithoutAgent, play, play_heuristics
 from warp_torchrl.evaluation.report import report, table, write_json
 from warp_torchrl.heuristics import HEURISTICS
@@ -73,6 +73,8 @@ def evaluate_policy(
         title = f"{plan.scenario}: {maps.seeds[1]} fires on one ground, {maps.horizon} steps"
         write_maps(folder, maps, getattr(plan.world.landscape, "grid", None), title, name)
     wrote = ["evaluation.json"]
+    for kind in KINDS:  # a former evaluation's picture would show another policy
+        (folder / f"episode.{kind}").unlink(missing_ok=True)
     if picture is not None:
         wrote += [f"episode.{picture}"]
         with disk.with_path(folder / wrote[-1]):

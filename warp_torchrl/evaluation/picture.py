@@ -4,7 +4,7 @@ import os
 from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 from PIL import Image
 from tensordict.nn import TensorDictModuleBase
@@ -15,6 +15,7 @@ from warp_torchrl.evaluation.play import play
 
 Kind = Literal["gif", "html", "mp4"]
 """As what an episode can be written; ``html`` needs the extra ``live``, ``mp4`` the extra ``video``."""
+KINDS: tuple[Kind, ...] = get_args(Kind)
 
 
 def record_episode(
