@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import logging
 
 import numpy as np
 import viser
@@ -31,6 +32,7 @@ def local_server(host: str, port: int) -> viser.ViserServer:
         host: Network interface.
         port: 0 takes any that is free.
     """
+    logging.getLogger("websockets").setLevel(logging.WARNING)  # its lines would stand between ours
     with quiet(), only_own(host):
         return _LocalServer(host=host, port=port, verbose=False)
 
