@@ -1,7 +1,6 @@
 """Recordings in folders: whole or not there, verified, and never executed."""
 
 import json
-import shutil
 
 import pytest
 import torch
@@ -112,4 +111,3 @@ def test_an_action_that_is_none_is_refused(folder):
 def test_a_pickle_beside_the_tensors_is_not_read(recording, folder):
     (folder / "steps" / "other.pickle").write_bytes(b"cos\nsystem\n(S'touch hacked'\ntR.")
     assert torch.equal(read(folder).steps["agents", "action"], recording.steps["agents", "action"])
-    shutil.rmtree(folder)

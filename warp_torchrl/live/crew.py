@@ -237,12 +237,8 @@ class Crew:
         action, idle, told = proposed.clone(), idle_action(possible, self.team), []
         movers = [Mover.POLICY] * self.team.n_agents
         for agent, seat in enumerate(self.seats):
-            if seat.person is not None:
-                wanted = seat.keys.popleft() if seat.keys else None
-                action[agent], movers[agent], refusal = self._asked_for(wanted, agent, possible[agent], idle[agent])
-                told += refusal
-            elif agent in self._chosen:
-                wanted = self._chosen[agent]
+            if seat.person is not None or agent in self._chosen:
+                wanted = self._chosen.get(agent, seat.keys.popleft() if seat.keys else None)
                 action[agent], movers[agent], refusal = self._asked_for(wanted, agent, possible[agent], idle[agent])
                 told += refusal
             elif self._answers.get((agent, int(proposed[agent]))) is False:
