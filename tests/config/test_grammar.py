@@ -7,7 +7,7 @@ from hydra._internal.utils import get_args_parser
 from hydra.core.override_parser.overrides_parser import OverridesParser
 
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.grammar import FLAGS, check_flags, check_overrides
+from warp_torchrl.config.grammar import FLAGS, check_flags, check_overrides, own_values
 
 
 def test_hydra_has_these_flags_and_no_others():
@@ -65,3 +65,17 @@ def test_what_else_cannot_be_read_is_told(overrides, said):
 
 def test_what_hydra_reads_passes():
     check_overrides(["a=b c", "~a.b", "+a.b=[1,{x:y}]", "hydra/launcher=joblib", "a='x=y'", "seed=range(3)", "a=1,2"])
+
+
+def test_a_command_s_own_values_are_read_and_the_others_left_as_they_are():
+    given = ["seed=3", "out=1", "error=0.5", "acts=null", "check=true", "host='::1'", "team.n_agents=2", "beside=null"]
+    values, rest = own_values(given, ("seed", "out", "error", "acts", "check", "host", "beside"), ("out", "beside"))
+    assert values == {
+        "seed": 3, "out": "1", "error": 0.5, "acts": None, "check": True, "host": "::1", "beside": None,
+    }  # fmt: skip
+    assert rest == ("team.n_agents=2",)
+
+
+def test_several_values_of_a_command_s_own_key_are_refused():
+    with pytest.raises(ConfigError, match="seed=1,2 has several values"):
+        own_values(["seed=1,2"], ("seed",))

@@ -3,7 +3,6 @@
 import json
 import logging
 import os
-import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
@@ -16,7 +15,7 @@ from warp_torchrl.calibration.options import CalibrationOptions
 from warp_torchrl.calibration.parameters import Parameter, parameters_of
 from warp_torchrl.calibration.report import as_numbers, law_yaml, means, table
 from warp_torchrl.calibration.scores import Scores
-from warp_torchrl.commands.failure import DONE, fail
+from warp_torchrl.commands.program import run_program
 from warp_torchrl.config.compose import compose_config, plain, without_targets
 from warp_torchrl.config.construction import ConfigError, build, construct
 from warp_torchrl.config.grammar import check_flags
@@ -33,15 +32,7 @@ LAW = "fire/calibrated.yaml"
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Score and fit what the command line asks for, and return the exit code."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    if any(each in ("-h", "--help") for each in given):
-        print(f"{USAGE}\n\n{CalibrationOptions.__doc__}\nfire.KEY as for train.py.")
-        return DONE
-    try:
-        _run(given)
-    except Exception as error:
-        return fail(error, "debug=true" in given)[0]
-    return DONE
+    return run_program(arguments, f"{USAGE}\n\n{CalibrationOptions.__doc__}\nfire.KEY as for train.py.", _run)
 
 
 def _run(arguments: Sequence[str]) -> None:

@@ -1,14 +1,14 @@
 """The command demonstrations: recordings in numbers, played again, as NumPy arrays, and as a page to look at."""
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from warp_torchrl.commands.failure import DONE, fail
+from warp_torchrl.commands.failure import DONE
+from warp_torchrl.commands.program import run_program
 from warp_torchrl.config.construction import ConfigError, construct
-from warp_torchrl.config.grammar import check_flags
+from warp_torchrl.config.grammar import check_flags, own_values
 from warp_torchrl.demonstrations.export import export
 from warp_torchrl.demonstrations.files import find, read
 from warp_torchrl.demonstrations.recording import Recording
@@ -59,14 +59,7 @@ class DemonstrationOptions:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """List, check and export what the command line asks for, and return the exit code."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    if any(each in ("-h", "--help") for each in given):
-        print(f"{USAGE}\n\n{DemonstrationOptions.__doc__}")
-        return DONE
-    try:
-        return _run(_read(given))
-    except Exception as error:
-        return fail(error, "debug=true" in given)[0]
+    return run_program(arguments, f"{USAGE}\n\n{DemonstrationOptions.__doc__}", lambda given: _run(_read(given)))
 
 
 def _read(arguments: Sequence[str]) -> DemonstrationOptions:
@@ -79,9 +72,8 @@ def _read(arguments: Sequence[str]) -> DemonstrationOptions:
     folders = [each for each in arguments if "=" not in each]
     if len(folders) != 1:
         raise ConfigError(f"one folder of recordings is expected, got {' '.join(folders) or 'none'}: {USAGE}")
-    pairs = [each.partition("=") for each in arguments if "=" in each]
-    words = {"true": True, "false": False, "null": None}
-    values = {key: words.get(value.lower(), value) for key, _, value in pairs}
+    given = [each for each in arguments if "=" in each]
+    values, _ = own_values(given, [each.partition("=")[0] for each in given], texts=("export", "html"))
     return construct(DemonstrationOptions, {"folder": folders[0], **values}, "")
 
 

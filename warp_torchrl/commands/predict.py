@@ -3,7 +3,6 @@
 import json
 import logging
 import os
-import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
@@ -13,7 +12,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from warp_torchrl.commands.failure import DONE, fail
+from warp_torchrl.commands.program import run_program
 from warp_torchrl.config.compose import compose_config, plain, without_targets
 from warp_torchrl.config.construction import ConfigError, build, construct
 from warp_torchrl.config.grammar import check_flags
@@ -39,15 +38,9 @@ USAGE = (
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Predict what the command line asks for, and return the exit code."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    if any(each in ("-h", "--help") for each in given):
-        print(f"{USAGE}\n\n{PredictionOptions.__doc__}\nlandscape.KEY and fire.KEY as for train.py.")
-        return DONE
-    try:
-        _run(given)
-    except Exception as error:
-        return fail(error, "debug=true" in given)[0]
-    return DONE
+    return run_program(
+        arguments, f"{USAGE}\n\n{PredictionOptions.__doc__}\nlandscape.KEY and fire.KEY as for train.py.", _run
+    )
 
 
 def composed(overrides: Sequence[str]) -> dict[str, Any]:

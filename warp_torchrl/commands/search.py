@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 import torch
 
 from warp_torchrl.commands.checks import check_training
-from warp_torchrl.commands.failure import DONE, fail
+from warp_torchrl.commands.failure import DONE
+from warp_torchrl.commands.program import run_program
 from warp_torchrl.config.compose import GROUPS, compose_config, conf_folder, plain, without_targets
 from warp_torchrl.config.construction import ConfigError, UnknownKeyError, construct
 from warp_torchrl.config.grammar import check_flags, check_overrides
@@ -49,18 +50,17 @@ _MAY_CHANGE = ("trials", "jobs", "out")
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Search what the command line asks for, and return the exit code."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    if any(each in ("-h", "--help") for each in given):
-        print(f"{USAGE}\n\n{SearchOptions.__doc__}\nEvery other KEY as for train.py; several values are searched.")
-        return DONE
+    about = f"{USAGE}\n\n{SearchOptions.__doc__}\nEvery other KEY as for train.py; several values are searched."
+    return run_program(arguments, about, _run_until_a_signal)
+
+
+def _run_until_a_signal(arguments: Sequence[str]) -> int:
     try:
         with exit_on_signal():
-            return _run(renamed_overrides(given))
+            return _run(renamed_overrides(arguments))
     except SearchEnded as error:
         print(f"error: {error}", file=sys.stderr, flush=True)
         return error.code
-    except Exception as error:
-        return fail(error, "debug=true" in given)[0]
 
 
 def _run(arguments: Sequence[str]) -> int:

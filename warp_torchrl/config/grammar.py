@@ -57,6 +57,36 @@ def check_overrides(overrides: Sequence[str]) -> None:
         )
 
 
+def own_values(
+    arguments: Sequence[str], names: Sequence[str], texts: Sequence[str] = ()
+) -> tuple[dict[str, object], tuple[str, ...]]:
+    """Return the values of a command's own keys, read by Hydra's parser, and the overrides that are left.
+
+    Args:
+        arguments: The command line, ``key=value`` each.
+        names: The command's own keys.
+        texts: Those whose values are texts, whatever they look like; ``null`` is None.
+
+    Raises:
+        ConfigError: If a word is no override, or one of the command's keys has several values.
+    """
+    check_flags(arguments)
+    check_overrides(arguments)
+    values: dict[str, object] = {}
+    rest = []
+    for argument in arguments:
+        key, _, text = argument.partition("=")
+        if key not in names:
+            rest.append(argument)
+            continue
+        override = OverridesParser.create().parse_override(argument)
+        if override.is_sweep_override():
+            raise ConfigError(several_values(argument))
+        value = override.value()
+        values[key] = text.strip("'\"") if key in texts and value is not None else value
+    return values, tuple(rest)
+
+
 def several_values(override: str) -> str:
     """Return what is said of values with commas between them where no sweep was asked for."""
     key, _, value = override.partition("=")

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
 
-from warp_torchrl.commands.failure import DONE, fail
+from warp_torchrl.commands.program import run_program
 from warp_torchrl.config.construction import ConfigError, construct
-from warp_torchrl.config.grammar import check_flags, check_overrides
+from warp_torchrl.config.grammar import own_values
 from warp_torchrl.live.match import Setting
 
 USAGE = (
@@ -17,20 +17,13 @@ USAGE = (
     "[host=127.0.0.1] [recordings=recordings] [scenario=NAME] [KEY=VALUE ...]"
 )
 _OURS, _WHERE, _RECORDINGS = ("policy", "beside", "seed"), ("host", "port"), "recordings"
+_TEXTS = ("policy", "beside", "host", _RECORDINGS)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Serve what the command line asks for until it is interrupted, and return the exit code."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    if any(each in ("-h", "--help") for each in given):
-        print(f"{USAGE}\n\n{Setting.__doc__}\nOther keys are those of train.py, such as team.n_agents.")
-        return DONE
-    debug = "debug=true" in given
-    try:
-        _serve([each for each in given if not each.startswith("debug=")])
-    except Exception as error:
-        return fail(error, debug)[0]
-    return DONE
+    about = f"{USAGE}\n\n{Setting.__doc__}\nOther keys are those of train.py, such as team.n_agents."
+    return run_program(arguments, about, _serve)
 
 
 def _serve(arguments: Sequence[str]) -> None:
@@ -55,26 +48,13 @@ def _read(arguments: Sequence[str]) -> tuple[Setting, dict[str, object], Path]:
     Raises:
         ConfigError: If a word is no ``key=value``, or a value does not fit.
     """
-    check_flags(arguments)
-    check_overrides(arguments)
-    pairs = [each.partition("=") for each in arguments]
-    known = (*_OURS, *_WHERE, _RECORDINGS)
-    own = {key: _value(key, value) for key, _, value in pairs if key in known}
-    overrides = tuple("=".join((key, value)) for key, _, value in pairs if key not in known)
-    values = {key: value for key, value in own.items() if key in _OURS}
-    setting = construct(Setting, {**values, "overrides": overrides}, "")
-    recordings = Path(str(own.get(_RECORDINGS, _RECORDINGS)))
+    values, overrides = own_values(arguments, (*_OURS, *_WHERE, _RECORDINGS, "debug"), _TEXTS)
+    ours = {key: value for key, value in values.items() if key in _OURS}
+    setting = construct(Setting, {**ours, "overrides": overrides}, "")
+    recordings = Path(str(values.get(_RECORDINGS, _RECORDINGS)))
     if recordings.exists() and not recordings.is_dir():
         raise ConfigError(f"recordings must be a folder, got the file {recordings}")
-    return setting, {key: value for key, value in own.items() if key in _WHERE}, recordings
-
-
-def _value(key: str, given: str) -> object:
-    """Return the value of one of the command's own keys."""
-    text = given.strip("'\"")
-    if key in ("seed", "port"):
-        return int(text) if text.lstrip("-").isdigit() else text
-    return None if text == "null" and key == "beside" else text
+    return setting, {key: value for key, value in values.items() if key in _WHERE}, recordings
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
