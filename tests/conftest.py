@@ -8,7 +8,11 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # the tests run side by side; rea
 import pytest
 import torch
 
+from warp_torchrl.config.compose import compose_config, plain, without_targets
+from warp_torchrl.config.run_config import run_config
+from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.training.loop import Training
 from warp_torchrl.world.ignition import Ignition
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
@@ -83,3 +87,21 @@ def _no_files_at_home(tmp_path_factory):
 @pytest.fixture(autouse=True)
 def _same_start():
     torch.manual_seed(0)
+
+
+@pytest.fixture(scope="session")
+def weak_run(tmp_path_factory):
+    """The folder of a run of two agents that has hardly learned."""
+    folder = tmp_path_factory.mktemp("weak")
+    overrides = ["landscape.size=12", "horizon=16", "n_worlds=4", "collector.steps=8", "total_frames=32"]
+    small = [
+        "algorithm.minibatch_size=32",
+        "model.actor_hidden=[8]",
+        "model.critic_hidden=[8]",
+        "evaluation.mode=sampled",
+    ]
+    config = compose_config("train", [*overrides, *small])
+    values = {k: v for k, v in without_targets(plain(config)).items() if k not in ("resume", "debug")}
+    choices = {"algorithm": "mappo", "reward": "efficiency", "observation": "surroundings", "scenario": "skirmish"}
+    Training(run_config(plain(config)), SavedConfig(choices=choices, values=values), folder).train()
+    return folder

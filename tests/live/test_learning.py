@@ -13,7 +13,7 @@ from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.keeping import Keeper
 from warp_torchrl.live.learning import Learning, _literal, arguments
 from warp_torchrl.live.match import Match
-from warp_torchrl.live.player import Found
+from warp_torchrl.named_policy import NamedPolicy
 from warp_torchrl.runs.checkpoint import newest
 from warp_torchrl.runs.transfer import check_start
 from warp_torchrl.world.state import Action
@@ -29,7 +29,7 @@ def composed(given):
 @pytest.mark.parametrize("policy", ["default", "single", "skirmish"])
 @pytest.mark.parametrize("overrides", [(), ("scenario=large", "team.n_agents=3", "seed=5")])
 def test_the_policy_s_own_configuration_is_trained_in_the_scenario_that_is_played(policy, overrides):
-    record = Found(policy).checkpoint.record()
+    record = NamedPolicy(policy).checkpoint.record()
     values = composed(arguments(policy, record, overrides, PEOPLE, RUN, 200_000))
     wanted = plain(restore(record, overrides))
     assert values["algorithm"].pop("learning_rate") == pytest.approx(0.2 * wanted["algorithm"].pop("learning_rate"))
@@ -48,13 +48,13 @@ def test_a_training_may_start_from_the_run_of_which_it_is_made(trained):
 
 @pytest.mark.parametrize("policy", ["default", "single", "skirmish"])
 def test_the_shipped_policies_may_be_trained_too(policy):
-    found = Found(policy).checkpoint
+    found = NamedPolicy(policy).checkpoint
     values = composed(arguments(policy, found.record(), (), PEOPLE, RUN, 200))
     check_start(run_config(values), found)
 
 
 def test_recordings_and_folder_are_named_in_hydra_s_grammar():
-    record = Found("skirmish").checkpoint.record()
+    record = NamedPolicy("skirmish").checkpoint.record()
     given = arguments("out puts/run", record, (), Path("it's, mine"), RUN, 10)
     assert "imitation.demonstrations='it\\'s, mine'" in given and "start_from='out puts/run'" in given
     assert f"hydra.run.dir={RUN}" in given
@@ -62,7 +62,7 @@ def test_recordings_and_folder_are_named_in_hydra_s_grammar():
 
 
 def test_what_is_of_another_machine_is_not_asked_for():
-    old = Found("skirmish").checkpoint.record()
+    old = NamedPolicy("skirmish").checkpoint.record()
     values = {**old.values, "device": "cuda:7", "processes": 8, "compile": True, "total_frames": 10**12}
     choices = {**old.choices, "collector": "process", "logger": "wandb"}
     values["collector"] = {"steps": 16, "workers": 4}

@@ -6,9 +6,9 @@ import torch
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.live.match import Match, Setting
-from warp_torchrl.live.player import Found
+from warp_torchrl.live.player import player_of
 from warp_torchrl.models import ACTION
-from warp_torchrl.runs.manifest import CheckpointError
+from warp_torchrl.named_policy import NamedPolicy
 
 
 @pytest.mark.parametrize("name", ["skirmish", "local", "random"])
@@ -28,7 +28,7 @@ def match_env(match):
 
 
 def again(match):
-    return Found(match.sides[0].player.name).player(match.sides[0].env, 0).policy
+    return player_of(NamedPolicy(match.sides[0].player.name), match.sides[0].env, 0).policy
 
 
 def mode(side):
@@ -71,16 +71,6 @@ def test_a_policy_that_does_not_fit_is_told_with_what_is_missing(make_match):
 def test_a_baseline_has_no_probabilities(make_match):
     side = make_match("greedy").sides[0]
     assert side.player.act(side.shown)[1] is None and side.player.frames is None
-
-
-def test_a_word_that_names_no_policy_is_told_with_the_nearest():
-    with pytest.raises(ConfigError, match=r"policy must be one of noop, .*, or a run folder, got gredy: did you mean"):
-        Found("gredy")
-
-
-def test_a_folder_without_a_checkpoint_is_told(tmp_path):
-    with pytest.raises(CheckpointError, match="no sound checkpoint"):
-        Found(str(tmp_path))
 
 
 def test_a_run_that_goes_on_is_followed_to_its_newest_checkpoint(run_folder, make_match):

@@ -17,8 +17,9 @@ from warp_torchrl.demonstrations.events import at_cell
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.live.crew import Question, Refused
-from warp_torchrl.live.player import Found, Player
+from warp_torchrl.live.player import Player, player_of
 from warp_torchrl.live.side import Side
+from warp_torchrl.named_policy import NamedPolicy
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.intervention import can_be_lit
 from warp_torchrl.world.state import is_tree
@@ -61,7 +62,7 @@ class Match:
     """
 
     def __init__(self, setting: Setting) -> None:
-        found = [Found(name) for name in (setting.policy, setting.beside) if name is not None]
+        found = [NamedPolicy(name) for name in (setting.policy, setting.beside) if name is not None]
         config = found[0].config(setting.overrides)
         parts = build_components(config, ENVIRONMENT)
         sides = []
@@ -73,7 +74,7 @@ class Match:
                 parts["world"], observation=seen["observation"], reward=parts["reward"], seed=setting.seed
             )
             env.reset()
-            sides.append(Side(env, each.player(env, setting.seed), environment_record(values)))
+            sides.append(Side(env, player_of(each, env, setting.seed), environment_record(values)))
         self._set(setting, config, parts, sides)
 
     def _set(
@@ -191,9 +192,7 @@ class Match:
         Raises:
             Refused: If it is not.
         """
-        height, width = self.world.size
-        if not (0 <= row < height and 0 <= column < width):
-            raise Refused(f"cell {row}, {column} is not on the map of {height} x {width} cells")
+        self._cell(row, column)
 
     def _cell(self, row: int, column: int) -> Tensor:
         """Return where a cell is, bool [1, H, W].
@@ -201,5 +200,7 @@ class Match:
         Raises:
             Refused: If it is not on the map.
         """
-        self.check_cell(row, column)
-        return at_cell(self.alone.env, row, column)
+        try:
+            return at_cell(self.alone.env, row, column)
+        except ValueError as error:
+            raise Refused(str(error)) from None

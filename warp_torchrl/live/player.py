@@ -1,8 +1,6 @@
-"""A policy as a match plays it: found by name, acting with its own draws, and newer where its run goes on training."""
+"""A policy as a match plays it: acting with its own draws, and newer where its run goes on training."""
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import torch
 from tensordict import TensorDictBase
@@ -10,62 +8,13 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs.utils import set_exploration_type
 
-from warp_torchrl.api import policy_of
-from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.saved_config import restore
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION
-from warp_torchrl.nearest import did_you_mean
+from warp_torchrl.named_policy import NamedPolicy, fitted_policy
 from warp_torchrl.policy import MODES, TrainedPolicy
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs.shipped import find_policy, policy_names
-
-
-class Found:
-    """What a policy's name stands for: a baseline, or a verified checkpoint.
-
-    Args:
-        name: A baseline, a shipped policy, a run folder or a checkpoint folder.
-
-    Raises:
-        ConfigError: If a single word is none of them.
-        CheckpointError: If a folder holds no sound checkpoint.
-    """
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-        self.checkpoint: checkpoints.Checkpoint | None = None
-        if name in HEURISTICS:
-            return
-        if len(Path(name).parts) == 1 and not Path(name).exists() and name not in policy_names():
-            names = [*HEURISTICS, *policy_names()]
-            raise ConfigError(
-                f"policy must be one of {', '.join(names)}, or a run folder, got {name}{did_you_mean(name, names)}"
-            )
-        self.checkpoint, _ = checkpoints.newest(find_policy(name))
-
-    def config(self, overrides: Sequence[str]) -> dict[str, Any]:
-        """Return the configuration that it plays in: of a checkpoint that of its training, under the overrides.
-
-        Raises:
-            ConfigError: If an override does not fit, in one line.
-        """
-        if self.checkpoint is None:
-            return plain(compose_config("train", overrides))
-        return plain(restore(self.checkpoint.record(), overrides))
-
-    def player(self, env: WildfireEnv, seed: int) -> "Player":
-        """Return the policy in an environment.
-
-        Raises:
-            ConfigError: If it does not fit there.
-        """
-        if self.checkpoint is None:
-            return Player(self.name, HEURISTICS[self.name](env), "sampled", seed)
-        policy = _fitted(self.checkpoint, env, self.name)
-        return Player(self.name, policy, policy.mode, seed, self.checkpoint)
 
 
 class Player:
@@ -130,20 +79,23 @@ class Player:
             found, _ = checkpoints.newest(self.name)
             if found.manifest.frames <= self.checkpoint.manifest.frames:
                 return None
-            self.policy = _fitted(found, env, self.name)
+            self.policy = fitted_policy(found, env, self.name)
         except (checkpoints.CheckpointError, ConfigError, OSError) as error:
             return f"{self.name} keeps its weights: {' '.join(str(error).split())}"
         self.checkpoint = found
         return f"{self.name} plays its newest weights, of {found.manifest.frames:,} steps"
 
 
-def _fitted(found: checkpoints.Checkpoint, env: WildfireEnv, name: str) -> TrainedPolicy:
-    try:
-        return policy_of(found).fitted(env)
-    except checkpoints.CheckpointError:
-        raise
-    except ValueError as error:
-        raise ConfigError(f"the policy {name} does not fit here: {error}") from None
+def player_of(named: NamedPolicy, env: WildfireEnv, seed: int) -> Player:
+    """Return a policy as it plays in an environment.
+
+    Raises:
+        ConfigError: If it does not fit there.
+    """
+    if named.checkpoint is None:
+        return Player(named.name, HEURISTICS[named.name](env), "sampled", seed)
+    policy = fitted_policy(named.checkpoint, env, named.name)
+    return Player(named.name, policy, policy.mode, seed, named.checkpoint)
 
 
 def _is_run(name: str) -> bool:

@@ -1,0 +1,30 @@
+"""A policy by the name that a command gives it."""
+
+import pytest
+
+from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.named_policy import NamedPolicy, fitted_policy
+from warp_torchrl.observation import Paper
+from warp_torchrl.runs.manifest import CheckpointError
+
+
+def test_a_word_that_names_no_policy_is_told_with_the_nearest():
+    with pytest.raises(ConfigError, match=r"policy must be one of noop, .*, or a run folder, got gredy: did you mean"):
+        NamedPolicy("gredy")
+
+
+def test_a_folder_without_a_checkpoint_is_told(tmp_path):
+    with pytest.raises(CheckpointError, match="no sound checkpoint"):
+        NamedPolicy(str(tmp_path))
+
+
+def test_a_shipped_policy_is_verified_and_a_baseline_has_no_checkpoint():
+    assert NamedPolicy("skirmish").checkpoint.manifest.scenario == "skirmish"
+    assert NamedPolicy("greedy").checkpoint is None
+
+
+def test_a_trained_policy_plays_in_the_scenario_of_its_training_unless_told(make_small_env):
+    named = NamedPolicy("skirmish")
+    assert named.config([])["scenario"] == "skirmish" and named.config(["scenario=large"])["scenario"] == "large"
+    with pytest.raises(ConfigError, match="the policy skirmish does not fit here"):
+        fitted_policy(named.checkpoint, make_small_env(observation=Paper()), "skirmish")

@@ -1,0 +1,63 @@
+"""The command correct: a scripted person corrects a policy, and is recorded."""
+
+from collections.abc import Sequence
+from dataclasses import fields
+from pathlib import Path
+
+from warp_torchrl.commands.program import run_program
+from warp_torchrl.config.construction import ConfigError, construct
+from warp_torchrl.config.grammar import own_values
+from warp_torchrl.correction import Correction, Session
+from warp_torchrl.demonstrations.files import save
+from warp_torchrl.demonstrations.scripted import Person
+from warp_torchrl.demonstrations.summary import Summary, summary
+
+USAGE = (
+    "python -m warp_torchrl.correct policy=NAME or FOLDER out=FOLDER [episodes=32] [acts=1000] [seed=0] "
+    "[by=coordinated] [delay=1] [error=0.1] [threshold=0.5] [KEY=VALUE ...]"
+)
+_TEXTS = ("policy", "out", "by")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Record what the command line asks for, and return the exit code."""
+    about = f"{USAGE}\n\n{Session.__doc__}\n{Person.__doc__}"
+    return run_program(arguments, about, lambda given: _record(*read(given)))
+
+
+def read(arguments: Sequence[str]) -> tuple[Session, Person]:
+    """Return what a command line asks for.
+
+    Raises:
+        ConfigError: If a word is no ``key=value``, or a value does not fit.
+    """
+    session, person = ([each.name for each in fields(kind) if each.name != "overrides"] for kind in (Session, Person))
+    values, rest = own_values(arguments, (*session, *person, "debug"), _TEXTS)
+    parts = [{key: value for key, value in values.items() if key in names} for names in (session, person)]
+    return construct(Session, {**parts[0], "overrides": rest}, ""), construct(Person, parts[1], "")
+
+
+def _record(session: Session, person: Person) -> None:
+    out = Path(session.out)
+    if out.is_dir() and any(out.iterdir()):
+        raise ConfigError(f"out must be a new folder, {out} holds files")
+    correction = Correction(session, person)
+    rows = []
+    for played in correction.episodes():
+        rows.append((summary(save(played.recording, out), played.recording), played.saved_alone))
+    print(table(rows, correction.scenario), flush=True)
+
+
+def table(rows: Sequence[tuple[Summary, float]], scenario: str) -> str:
+    """Return a Markdown table of episodes in all, and the forest that was saved with the person and without."""
+    found = [each for each, _ in rows]
+    steps, acts, corrections = (sum(each) for each in zip(*((one.steps, one.acts, one.corrections) for one in found)))
+    saved = 100.0 * sum(each.saved or 0.0 for each in found) / len(found)
+    alone = 100.0 * sum(each for _, each in rows) / len(rows)
+    return "\n".join(
+        [
+            "| scenario | episodes | steps | acts | corrections | saved with the person % | without % |",
+            "|---|---|---|---|---|---|---|",
+            f"| {scenario} | {len(rows)} | {steps} | {acts} | {corrections} | {saved:.1f} | {alone:.1f} |",
+        ]
+    )

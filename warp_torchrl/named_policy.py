@@ -1,0 +1,70 @@
+"""A policy by the name that a command gives it: a baseline, a shipped policy, a run folder or a checkpoint."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from warp_torchrl.api import policy_of
+from warp_torchrl.config.compose import compose_config, plain
+from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.config.saved_config import restore
+from warp_torchrl.env import WildfireEnv
+from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.nearest import did_you_mean
+from warp_torchrl.policy import TrainedPolicy
+from warp_torchrl.runs import checkpoint as checkpoints
+from warp_torchrl.runs.shipped import find_policy, policy_names
+
+
+class NamedPolicy:
+    """What a policy's name stands for: a baseline, or a verified checkpoint.
+
+    Args:
+        name: A baseline, a shipped policy, a run folder or a checkpoint folder.
+
+    Raises:
+        ConfigError: If a single word is none of them.
+        CheckpointError: If a folder holds no sound checkpoint.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.checkpoint: checkpoints.Checkpoint | None = None
+        if name in HEURISTICS:
+            return
+        if len(Path(name).parts) == 1 and not Path(name).exists() and name not in policy_names():
+            names = [*HEURISTICS, *policy_names()]
+            raise ConfigError(
+                f"policy must be one of {', '.join(names)}, or a run folder, got {name}{did_you_mean(name, names)}"
+            )
+        self.checkpoint, _ = checkpoints.newest(find_policy(name))
+
+    def config(self, overrides: Sequence[str]) -> dict[str, Any]:
+        """Return the configuration that it plays in: of a checkpoint that of its training, under the overrides.
+
+        Raises:
+            ConfigError: If an override does not fit, in one line.
+        """
+        if self.checkpoint is None:
+            return plain(compose_config("train", overrides))
+        return plain(restore(self.checkpoint.record(), overrides))
+
+
+def fitted_policy(found: checkpoints.Checkpoint, env: WildfireEnv, name: str) -> TrainedPolicy:
+    """Return the policy of a checkpoint, adapted to an environment.
+
+    Args:
+        found: The checkpoint.
+        env: Where it acts.
+        name: What the policy is called.
+
+    Raises:
+        ConfigError: If it does not fit there.
+        CheckpointError: If its weights are of another architecture.
+    """
+    try:
+        return policy_of(found).fitted(env)
+    except checkpoints.CheckpointError:
+        raise
+    except ValueError as error:
+        raise ConfigError(f"the policy {name} does not fit here: {error}") from None
