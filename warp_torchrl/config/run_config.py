@@ -11,8 +11,10 @@ from warp_torchrl import parallel
 from warp_torchrl.algorithms.on_policy import OnPolicy
 from warp_torchrl.collection.collectors import MultiProcess
 from warp_torchrl.collection.imitation import Imitation
+from warp_torchrl.config.checkpoint_config import CheckpointConfig
 from warp_torchrl.config.construction import ConfigError, build, construct
-from warp_torchrl.config.seeds import BEYOND_EVALUATION, FIRST_EVALUATED, SEEDS, WORLDS
+from warp_torchrl.config.evaluation_config import EvaluationConfig
+from warp_torchrl.config.seeds import SEEDS, WORLDS
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.validation import check_fields
@@ -50,69 +52,6 @@ WORLD_KEYS = (
 """What a scenario sets."""
 COMMAND_KEYS = ("resume", "start_from", "debug", "policy", "overwrite", "maps", "maps_fires", "picture")
 """What the commands read themselves."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class CheckpointConfig:
-    """When training saves.
-
-    Attributes:
-        interval: Frames between checkpoints.
-        minutes: Between checkpoints by the clock, as ``SaveClock`` has it; 0: none.
-        keep: Checkpoints that stay: the newest two, and of the others those of the interval.
-
-    Raises:
-        ValueError: If the interval is not positive, the minutes are negative or fewer than two are kept.
-    """
-
-    interval: int = 500_000
-    minutes: float = 2.0
-    keep: int = 2
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-        if self.interval < 1:
-            raise ValueError(f"interval must be at least 1 frame, got {self.interval}")
-        if not 0.0 <= self.minutes <= 1e6:
-            raise ValueError(f"minutes must be in 0..1e6, where 0 saves by frames alone, got {self.minutes}")
-        if not 2 <= self.keep <= 10_000:
-            raise ValueError(f"keep must be in 2..10000, got {self.keep}")
-
-
-@dataclass(frozen=True, kw_only=True)
-class EvaluationConfig:
-    """How policies are evaluated.
-
-    Attributes:
-        interval: Frames between evaluations during training; 0 evaluates only at the end.
-        episodes: Worlds.
-        first_seed: Seed of the first; training has those below 1 000 000 and from 2^61 on.
-        mode: ``sampled``, ``deterministic``, or ``best``: whichever did better on training seeds.
-        leave_one_out: Play once more for each agent, without it, to see what it is worth.
-        cache: Keep the baselines' episodes in ``~/.cache/warp_torchrl`` (or ``XDG_CACHE_HOME``), and read those kept.
-
-    Raises:
-        ValueError: If a value is out of its range.
-    """
-
-    interval: int = 0
-    episodes: int = 256
-    first_seed: int = FIRST_EVALUATED
-    mode: Literal["sampled", "deterministic", "best"] = "best"
-    leave_one_out: bool = False
-    cache: bool = True
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-        if self.interval < 0:
-            raise ValueError(f"interval must be 0 or more frames, got {self.interval}")
-        if not 1 <= self.episodes <= 1_000_000:
-            raise ValueError(f"episodes must be in 1..1000000, got {self.episodes}")
-        if not 0 <= self.first_seed <= BEYOND_EVALUATION - self.episodes:
-            raise ValueError(
-                f"first_seed must be in 0..{BEYOND_EVALUATION - self.episodes}, so that no episode has a training "
-                f"world's seed, got {self.first_seed}"
-            )
 
 
 @dataclass(frozen=True, kw_only=True)
