@@ -11,8 +11,8 @@ from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.run_config import ENVIRONMENT, build_components
 from warp_torchrl.config.saved_config import environment_record
 from warp_torchrl.config.seeds import SEEDS, WORLDS, first_world_seed
-from warp_torchrl.demonstrations.recording import Mover, Recording, Tape, recorded
-from warp_torchrl.demonstrations.scripted import Hands, Person
+from warp_torchrl.demonstrations.recording import Mover, OpenRecording, Recording, recorded
+from warp_torchrl.demonstrations.scripted import Person, ScriptedPerson
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.heuristics import HEURISTICS, idle_action
@@ -110,8 +110,8 @@ class Correction:
         env, first = self.env, first_world_seed(self.session.seed) + start
         alone = play(env, self.policy, first, self.policy.mode)["saved"]
         seeds = range(first, first + env.batch_size[0])
-        hands = [Hands(self.person, seed) for seed in seeds]
-        tape = Tape()
+        people = [ScriptedPerson(self.person, seed) for seed in seeds]
+        open_recording = OpenRecording()
         with (
             torch.random.fork_rng(devices=[]),
             torch.no_grad(),
@@ -122,16 +122,16 @@ class Correction:
             env.set_seeds(seeds)
             shown = env.reset()
             while not bool(env.world_state.done.all()):
-                row, shown = self._step(shown, hands)
-                tape.rows.append(row)
-        steps, saved = tape.steps(), env.tree_counts.saved()
+                row, shown = self._step(shown, people)
+                open_recording.rows.append(row)
+        steps, saved = open_recording.steps(), env.tree_counts.saved()
         lengths = (~steps["next", "done"][..., 0]).sum(0) + 1  # a world that has ended stays as it is
         return [
             Corrected(self._recording(seed, steps[: int(lengths[at]), at], float(saved[at])), float(alone[at]))
             for at, seed in enumerate(seeds)
         ]
 
-    def _step(self, shown: TensorDictBase, hands: Sequence[Hands]) -> tuple[TensorDictBase, TensorDictBase]:
+    def _step(self, shown: TensorDictBase, people: Sequence[ScriptedPerson]) -> tuple[TensorDictBase, TensorDictBase]:
         """Play a step in every world; return what is recorded of it, and what is shown then."""
         env = self.env
         out = self.policy(shown.copy())
@@ -143,7 +143,7 @@ class Correction:
         possible = env.world.possible_actions(env.world_state)
         idle = idle_action(possible, env.world.team)
         action, mover = proposed.clone(), torch.full_like(proposed, Mover.POLICY, dtype=torch.uint8)
-        for world, person in enumerate(hands):
+        for world, person in enumerate(people):
             act = person.drive(chances[world], advice[world], possible[world])
             if person.agent is not None:
                 at = (world, person.agent)

@@ -5,7 +5,7 @@ import torch
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.run_config import ENVIRONMENT, build_components
 from warp_torchrl.config.saved_config import environment_record
-from warp_torchrl.demonstrations.recording import Mover, Recording, Tape
+from warp_torchrl.demonstrations.recording import Mover, OpenRecording, Recording
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION
@@ -18,15 +18,15 @@ def played(*overrides, mover=Mover.PERSON, seed=7, steps=16, by="greedy"):
     config = plain(compose_config("train", [*SMALL, *overrides]))
     parts = build_components(config, ENVIRONMENT)
     env = WildfireEnv(parts["world"], observation=parts["observation"], reward=parts["reward"], seed=seed)
-    baseline, tape, shown = HEURISTICS[by](env), Tape(), env.reset()
-    while len(tape.rows) < steps and not bool(env.world_state.done[0]):
+    baseline, open_recording, shown = HEURISTICS[by](env), OpenRecording(), env.reset()
+    while len(open_recording.rows) < steps and not bool(env.world_state.done[0]):
         shown = baseline(shown)
         proposed = torch.zeros_like(shown[ACTION][0])
         after = env.step(shown)["next"]
-        tape.add(shown, proposed, [mover] * env.n_agents, after)
+        open_recording.add(shown, proposed, [mover] * env.n_agents, after)
         shown = after
     return Recording(
-        steps=tape.steps(),
+        steps=open_recording.steps(),
         environment=environment_record(config),
         seed=seed,
         events=(),

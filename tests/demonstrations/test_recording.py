@@ -52,17 +52,17 @@ def test_nothing_is_no_recording(match):
 
 
 def test_a_tape_counts_what_people_do(match, recording):
-    tape = match.sides[0].tape
-    assert tape.acts == int(recording.by(Mover.PERSON).sum()) > 0
-    assert tape.corrections == int(recording.corrected().sum()) > 0
-    assert tape.words == int(recording.by(Mover.ORDER).sum()) == 12 and tape.has_people
+    open_recording = match.sides[0].open_recording
+    assert open_recording.acts == int(recording.by(Mover.PERSON).sum()) > 0
+    assert open_recording.corrections == int(recording.corrected().sum()) > 0
+    assert open_recording.words == int(recording.by(Mover.ORDER).sum()) == 12 and open_recording.has_people
     match.restart()
     match.sides[0].crew.hand_back(0, 1)
     match.sides[0].order(1, None)
     match.step()
-    assert not match.sides[0].tape.has_people, "it is the policy's alone"
+    assert not match.sides[0].open_recording.has_people, "it is the policy's alone"
     match.blow(3.0, 0.0)
-    assert match.sides[0].tape.has_people
+    assert match.sides[0].open_recording.has_people
 
 
 def test_it_tells_what_was_saved_where_it_was_left(match, recording):

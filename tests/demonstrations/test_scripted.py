@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from warp_torchrl.demonstrations.scripted import Hands, Person
+from warp_torchrl.demonstrations.scripted import Person, ScriptedPerson
 
 OPEN = torch.ones(2, 4, dtype=torch.bool)
 
@@ -15,11 +15,11 @@ def sure(*of_agents):
 
 def driven(person, steps, advice=lambda step: [step % 4, 3]):
     """Vehicle and act of each step, of policies that are as sure as ``steps`` says."""
-    hands = Hands(person, seed=3)
+    scripted = ScriptedPerson(person, seed=3)
     found = []
     for step, chances in enumerate(steps):
-        act = hands.drive(sure(*chances), torch.tensor(advice(step)), OPEN)
-        found.append((hands.agent, act))
+        act = scripted.drive(sure(*chances), torch.tensor(advice(step)), OPEN)
+        found.append((scripted.agent, act))
     return found
 
 
@@ -43,15 +43,15 @@ def test_a_new_vehicle_waits_for_them_anew():
 
 def test_a_vehicle_that_can_do_nothing_needs_nobody():
     nothing = torch.tensor([[False] * 4, [True] * 4])
-    hands = Hands(Person(delay=0, error=0.0, threshold=0.6), 0)
-    hands.drive(torch.tensor([[0.0] * 4, [0.5, 0.3, 0.1, 0.1]]), torch.tensor([0, 0]), nothing)
-    assert hands.agent == 1
+    scripted = ScriptedPerson(Person(delay=0, error=0.0, threshold=0.6), 0)
+    scripted.drive(torch.tensor([[0.0] * 4, [0.5, 0.3, 0.1, 0.1]]), torch.tensor([0, 0]), nothing)
+    assert scripted.agent == 1
 
 
 def test_so_many_of_their_acts_are_random_and_open():
     only = torch.tensor([[False, True, False, True]])
-    hands = Hands(Person(delay=0, error=0.25, threshold=1.0), 5)
-    acts = [hands.drive(torch.full((1, 4), 0.25), torch.tensor([2]), only) for _ in range(4000)]
+    scripted = ScriptedPerson(Person(delay=0, error=0.25, threshold=1.0), 5)
+    acts = [scripted.drive(torch.full((1, 4), 0.25), torch.tensor([2]), only) for _ in range(4000)]
     wrong = [each for each in acts if each != 2]
     assert 0.22 < len(wrong) / len(acts) < 0.28, "0.25, of which none happens to be the baseline's"
     assert set(wrong) == {1, 3}
@@ -59,8 +59,8 @@ def test_so_many_of_their_acts_are_random_and_open():
 
 def test_errors_are_those_of_the_seed():
     def acts(seed):
-        hands = Hands(Person(delay=0, error=0.5, threshold=1.0), seed)
-        return [hands.drive(sure(0.5, 0.9), torch.tensor([0, 0]), OPEN) for _ in range(40)]
+        scripted = ScriptedPerson(Person(delay=0, error=0.5, threshold=1.0), seed)
+        return [scripted.drive(sure(0.5, 0.9), torch.tensor([0, 0]), OPEN) for _ in range(40)]
 
     assert acts(1) == acts(1) != acts(2)
 

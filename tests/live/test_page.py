@@ -187,17 +187,17 @@ def test_an_episode_that_cannot_be_saved_is_not_left_and_its_end_is_told_once(ke
     monkeypatch.setattr(page, "tell", lambda line, mistake=False: told.append(line))
     page.keeper.folder.write_text("a file")
     drive()
-    tape = page.match.sides[0].tape
+    open_recording = page.match.sides[0].open_recording
     for leave in (page.restart, lambda: page.open(Match(page.given))):
         with pytest.raises(Refused, match="cannot be written"):
             leave()
-    assert page.match.sides[0].tape is tape and told == []
+    assert page.match.sides[0].open_recording is open_recording and told == []
     while not page.match.ended:
         page.step()
     assert len(told) == 1 and "this episode is not saved" in told[0]
     page.keeper.every = False
     page.restart()
-    assert page.match.sides[0].tape is not tape
+    assert page.match.sides[0].open_recording is not open_recording
 
 
 def test_a_recording_is_watched_and_the_match_is_loaded_again(kept):
@@ -376,7 +376,7 @@ def test_a_person_drives_by_the_keyboard_saves_what_was_played_and_watches_it(pa
     _until(lambda: side.crew.seats[0].person is not None)
     for count, key in enumerate("ss", start=1):
         tab.keyboard.press(key)
-        _until(lambda steps=count: len(side.tape.rows) == steps)
+        _until(lambda steps=count: len(side.open_recording.rows) == steps)
     tab.get_by_role("tab", name="Record").click()
     tab.get_by_role("button", name="Save what was played", exact=True).click()
     folder = page.keeper.folder / "skirmish-1000000-1"
@@ -422,16 +422,16 @@ def test_a_person_answers_by_keys_where_the_policy_is_unsure(page, browser):
         stay = side.env.action_names.index("stay")
     tab.get_by_text(f"What should {side.env.agent_names[asked.agent]} do?").first.wait_for(timeout=30_000)
     tab.keyboard.press("s")
-    _until(lambda: len(side.tape.rows) == 1)
-    row = side.tape.rows[0]
+    _until(lambda: len(side.open_recording.rows) == 1)
+    row = side.open_recording.rows[0]
     assert int(row["agents", "action"][asked.agent]) == stay
     assert int(row["agents", "mover"][asked.agent]) == Mover.PERSON
 
     _until(lambda: page.match.questions())
-    while len(side.tape.rows) == 1:
+    while len(side.open_recording.rows) == 1:
         before = len(page.match.questions())
         tab.keyboard.press("g")
-        _until(lambda left=before: len(side.tape.rows) == 2 or len(page.match.questions()) < left)
-    row = side.tape.rows[1]
+        _until(lambda left=before: len(side.open_recording.rows) == 2 or len(page.match.questions()) < left)
+    row = side.open_recording.rows[1]
     agreed = row["agents", "mover"] == Mover.PERSON
     assert agreed.any() and row["agents", "action"].equal(row["agents", "proposed"])

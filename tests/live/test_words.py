@@ -98,7 +98,8 @@ def test_what_was_played_so_far_tells_whose_acts_there_were(match):
         side.crew.press(0, 1, side.env.action_names.index(name))
         match.step()
     assert (
-        words.so_far(side) == f"**2** steps so far, **2** acts of people, {side.tape.corrections} of them corrections."
+        words.so_far(side)
+        == f"**2** steps so far, **2** acts of people, {side.open_recording.corrections} of them corrections."
     )
 
 

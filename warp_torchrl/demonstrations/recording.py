@@ -91,7 +91,7 @@ def recorded(shown: TensorDictBase, proposed: Tensor, mover: Tensor, after: Tens
 
 
 @dataclass
-class Tape:
+class OpenRecording:
     """The steps of an episode that is being played, or of one in each of several worlds.
 
     Attributes:

@@ -40,7 +40,7 @@ class Person:
             raise ValueError(f"by must be one of {', '.join(TEACHERS)}, got {self.by}{hint}")
 
 
-class Hands:
+class ScriptedPerson:
     """A scripted person in one episode.
 
     Args:

@@ -4,7 +4,7 @@ import shutil
 from pathlib import Path
 
 from warp_torchrl.demonstrations.files import MANIFEST, find, read, save
-from warp_torchrl.demonstrations.recording import Recording, Tape
+from warp_torchrl.demonstrations.recording import OpenRecording, Recording
 from warp_torchrl.demonstrations.summary import Summary, summary
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.side import Side
@@ -24,7 +24,7 @@ class Keeper:
         """Whether ``keep`` saves."""
         self.changes = 0
         """How often the list of recordings may have changed."""
-        self._last: tuple[Tape, tuple[int, int], Path] | None = None
+        self._last: tuple[OpenRecording, tuple[int, int], Path] | None = None
         self._known: dict[tuple[Path, int], Summary | str] = {}
 
     def save(self, side: Side) -> Path:
@@ -40,9 +40,9 @@ class Keeper:
             raise Refused(
                 f"{error.filename or self.folder} cannot be written ({error.strerror}): this episode is not saved"
             ) from None
-        if self._last is not None and self._last[0] is side.tape:
+        if self._last is not None and self._last[0] is side.open_recording:
             shutil.rmtree(self._last[2], ignore_errors=True)
-        self._last = (side.tape, _length(side.tape), folder)
+        self._last = (side.open_recording, _length(side.open_recording), folder)
         self.changes += 1
         return folder
 
@@ -55,8 +55,9 @@ class Keeper:
         Raises:
             Refused: As of ``save``.
         """
-        is_saved = self._last is not None and self._last[0] is side.tape and self._last[1] == _length(side.tape)
-        if not self.every or not side.tape.has_people or not side.tape.rows or is_saved:
+        played = side.open_recording
+        is_saved = self._last is not None and self._last[0] is played and self._last[1] == _length(played)
+        if not self.every or not played.has_people or not played.rows or is_saved:
             return None
         return self.save(side)
 
@@ -92,5 +93,5 @@ class Keeper:
             return []
 
 
-def _length(tape: Tape) -> tuple[int, int]:
-    return len(tape.rows), len(tape.events)
+def _length(open_recording: OpenRecording) -> tuple[int, int]:
+    return len(open_recording.rows), len(open_recording.events)

@@ -12,7 +12,7 @@ from pathlib import Path
 import viser
 
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.demonstrations.recording import Tape
+from warp_torchrl.demonstrations.recording import OpenRecording
 from warp_torchrl.live import words
 from warp_torchrl.live.keeping import Keeper
 from warp_torchrl.live.learning import Learning
@@ -83,7 +83,7 @@ class Page:
         self.lock = threading.RLock()
         self.playing, self.pace = False, 8.0
         self.keeper, self.learning = Keeper(recordings), Learning(recordings)
-        self._ended: Tape | None = None  # of the last episode that was seen to end
+        self._ended: OpenRecording | None = None  # of the last episode that was seen to end
         self._training = ""
         self._panels: dict[int, Panel] = {}
         self._stages: list[Stage] = []
@@ -148,8 +148,8 @@ class Page:
         self.playing &= not self.match.ended
         self.show()
         side = self.match.sides[0]
-        if side.ended and side.tape is not self._ended:
-            self._ended = side.tape
+        if side.ended and side.open_recording is not self._ended:
+            self._ended = side.open_recording
             with told_if_refused(self.tell):
                 self._keep()
 

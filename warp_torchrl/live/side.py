@@ -8,7 +8,7 @@ from torch import Tensor
 
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.demonstrations.events import Event, carry_out
-from warp_torchrl.demonstrations.recording import Recording, Tape
+from warp_torchrl.demonstrations.recording import OpenRecording, Recording
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.live.crew import Crew, Question, Refused
 from warp_torchrl.live.order import Order
@@ -82,7 +82,7 @@ class Side:
         self.curves = Curves(
             extinguished=torch.zeros(agents, dtype=torch.int64), cleared=torch.zeros(agents, dtype=torch.int64)
         )
-        self.tape, self.seed = Tape(), seed
+        self.open_recording, self.seed = OpenRecording(), seed
         self.crew.restart()
         self.player.restart(seed)
         self._proposed: Tensor | None = None
@@ -122,7 +122,7 @@ class Side:
         position = self.state.vehicles.position[0]
         action, movers, told = self.crew.decide(self._proposed, self.mask, self.possible, position)
         before, self.shown = self.shown, self.env.step(self.shown.set(ACTION, action[None]))["next"]
-        self.tape.add(before, self._proposed, movers, self.shown)
+        self.open_recording.add(before, self._proposed, movers, self.shown)
         self._proposed = None
         self._note()
         return told
@@ -142,13 +142,13 @@ class Side:
         Raises:
             Refused: If nothing was played.
         """
-        if not self.tape.rows:
+        if not self.open_recording.rows:
             raise Refused("nothing was played yet: there is no step to keep")
         return Recording(
-            steps=self.tape.steps(),
+            steps=self.open_recording.steps(),
             environment=self.environment,
             seed=self.seed,
-            events=tuple(self.tape.events),
+            events=tuple(self.open_recording.events),
             policy=self.player.name,
             frames=self.player.frames,
             agents=tuple(self.env.agent_names),
@@ -163,9 +163,9 @@ class Side:
             ValueError: If a number is out of its range.
         """
         row, column = numbers
-        event = Event(step=len(self.tape.rows), kind=kind, numbers=(float(row), float(column)))
+        event = Event(step=len(self.open_recording.rows), kind=kind, numbers=(float(row), float(column)))
         self.shown = carry_out(self.env, event)
-        self.tape.events.append(event)
+        self.open_recording.events.append(event)
         self._proposed = None
         self.curves.saved.pop()
         self.curves.burning.pop()

@@ -49,9 +49,9 @@ def labels(names: Sequence[str]) -> list[str]:
 
 def so_far(side: Side) -> str:
     """Return how much was played, and how much of it by people."""
-    tape = side.tape
-    corrections = f"{tape.corrections} of them corrections" if tape.acts else "no corrections"
-    return f"**{len(tape.rows)}** steps so far, **{tape.acts}** acts of people, {corrections}."
+    open_recording = side.open_recording
+    corrections = f"{open_recording.corrections} of them corrections" if open_recording.acts else "no corrections"
+    return f"**{len(open_recording.rows)}** steps so far, **{open_recording.acts}** acts of people, {corrections}."
 
 
 def recordings(folder: Path, found: Mapping[str, Summary | str]) -> str:
