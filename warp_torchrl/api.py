@@ -11,6 +11,7 @@ from warp_torchrl.config.construction import build
 from warp_torchrl.config.run_config import ENVIRONMENT, build_components
 from warp_torchrl.config.saved_config import restore
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.models import RADIO
 from warp_torchrl.policy import TrainedPolicy
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs import former
@@ -104,4 +105,5 @@ def policy_of(found: checkpoints.Checkpoint, mode: str = "best") -> TrainedPolic
     seen = {name: value for name, value in config["observation"].items() if name != "_target_"}
     overrides = [f"observation={name}" for group, name in record.choices.items() if group == "observation"]
     overrides += [f"observation.{name}={json.dumps(value)}" for name, value in seen.items()]
+    overrides += ["team.messages=graph"] if RADIO in policy.in_keys else []
     return TrainedPolicy(policy.requires_grad_(False).eval(), chosen, found.manifest.signature, overrides)

@@ -13,7 +13,17 @@ from torchrl.envs import EnvBase
 from torchrl.envs.utils import ExplorationType, exploration_type, set_exploration_type
 
 from warp_torchrl.env.flat import FLAT, unflattened
-from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, OBSERVATION, ROLE, Signature, recurrent_actors, signature
+from warp_torchrl.models import (
+    ACTION,
+    ACTION_MASK,
+    LOGITS,
+    OBSERVATION,
+    RADIO,
+    ROLE,
+    Signature,
+    recurrent_actors,
+    signature,
+)
 from warp_torchrl.models.canonical import Canonicalise
 from warp_torchrl.models.fitting import fitted
 from warp_torchrl.models.networks import AgentNetworks
@@ -58,6 +68,8 @@ class TrainedPolicy(TensorDictModuleBase):
             ValueError: If the environment lacks a channel or action of the policy; the message names it.
         """
         here = signature(env)
+        if self.talks and RADIO not in env.full_observation_spec.keys(True, True):
+            raise ValueError("its agents talk by radio, which this environment does not have: team.messages=graph")
         if self.is_by_agent and here.n_agents != self.trained.n_agents:
             raise ValueError(
                 f"it has a network for each of {self.trained.n_agents} agents, this team has {here.n_agents}"
@@ -69,6 +81,11 @@ class TrainedPolicy(TensorDictModuleBase):
     def is_by_agent(self) -> bool:
         """Return whether it has a network for each agent; then it fits one team size only."""
         return any(isinstance(module, AgentNetworks) for module in self.modules())
+
+    @property
+    def talks(self) -> bool:
+        """Return whether its agents exchange messages."""
+        return RADIO in self.in_keys
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write the team's actions, int64 [B, A]."""
@@ -102,8 +119,9 @@ class NumpyPolicy:
     """A trained policy on the numpy observations of ``warp_torchrl.adapters``, in either layout.
 
     Each agent's action depends on its own observation and mask alone, so it takes one agent, a team, or a batch of
-    worlds. A policy with a network for each agent (``sharing: none``) needs the whole team, in the order of
-    ``possible_agents``. A policy with a network for each role (``sharing: role``) reads the role from the agent's name
+    worlds. A policy whose agents talk (``model.messages``) needs the whole team, in the order of ``possible_agents``,
+    and infos, which tell whom each hears. A policy with a network for each agent (``sharing: none``) needs the whole
+    team likewise. A policy with a network for each role (``sharing: role``) reads the role from the agent's name
     (``bulldozer_0``), or from its ``self`` if it has no name. A recurrent policy (``memory``) keeps a hidden state for
     each name; agents without names need a ``numpy_policy()`` each.
 
@@ -132,7 +150,8 @@ class NumpyPolicy:
         Args:
             observation: Of one agent, as in the Gymnasium adapter, or a dict by agent name, as in PettingZoo. A batch
                 of worlds comes first, [B, ...].
-            info: The same step's info. Only preset ``paper`` needs it: its mask is there unless the layout is flat.
+            info: The same step's info. Preset ``paper`` needs it, whose mask is there unless the layout is flat, and
+                policies whose agents talk, whose ``radio`` is there.
 
         Returns:
             The agent's action, or a dict by agent name; int64 [B] for a batch of worlds.
@@ -152,6 +171,11 @@ class NumpyPolicy:
                 f"at once, got {len(team)}"
             )
         agents = [self._of_agent(name, seen, infos.get(name, {})) for name, seen in team.items()]
+        if self._policy.talks and agents[0][RADIO].shape[-2] != len(team):
+            raise ValueError(
+                f"this policy's agents talk: observations must be of the whole team of {agents[0][RADIO].shape[-2]} at "
+                f"once, got {len(team)}"
+            )
         actions = self._act(list(team), agents)
         numbers = [each if each.ndim else int(each) for each in actions]
         return numbers[0] if alone else dict(zip(team, numbers))
@@ -185,6 +209,10 @@ class NumpyPolicy:
                 rule = f"{entry or 'observation'}{who} must be {dtype} of shape {list(expected)}"
                 raise ValueError(f"{rule}, got {value.dtype} {list(value.shape)}")
             read[(*OBSERVATION, entry) if entry else OBSERVATION] = value
+        if self._policy.talks:
+            if "radio" not in info:
+                raise ValueError(f"info{who} must have radio, since this policy's agents talk: give its infos too")
+            read[RADIO] = np.asarray(info["radio"], dtype=np.float32)
         if self._by_role:
             read[ROLE] = np.full(mask.shape[:-1], self._role(name, entries.get("self")))
         return read

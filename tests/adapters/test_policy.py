@@ -38,6 +38,25 @@ def test_a_team_acts_as_it_does_in_torchrl(sharing, observation):
     assert len(set(chosen)) > 1
 
 
+def test_a_team_that_talks_acts_as_it_does_in_torchrl():
+    model = Mlp(actor_hidden=(32,), messages="graph")
+    options = {"team.messages": "graph", "team.radio_range": 4}
+    ours, policy = policy_for("default", model, **options)
+    theirs, act = parallel_env("default", seed=3, **options), policy.numpy_policy()
+    now, (seen, infos) = ours.reset(), theirs.reset()
+    for _ in range(6):
+        expected, actions = policy(now)["agents", "action"], act(seen, infos)
+        assert list(actions.values()) == expected[0].tolist()
+        now = ours.step(TensorDict({"agents": {"action": expected}}, batch_size=[1]))["next"]
+        seen, _, _, _, infos = theirs.step(actions)
+    with pytest.raises(ValueError, match="info of bulldozer_0 must have radio"):
+        act(seen)
+    with pytest.raises(ValueError, match="must be of the whole team of 4 at once, got 1"):
+        act({"bulldozer_0": seen["bulldozer_0"]}, infos)
+    with pytest.raises(ValueError, match=r"talk by radio, which this environment does not have: team\.messages=graph"):
+        policy.fitted(make_env("default", n_worlds=1))
+
+
 @pytest.mark.parametrize("algorithm", [Ppo(), Dqn()], ids=lambda each: type(each).__name__)
 @pytest.mark.parametrize("sharing", ["team", "role"])
 def test_an_agent_may_ask_alone(sharing, algorithm):

@@ -16,11 +16,12 @@ from warp_torchrl.observation import Local, Paper, Surroundings
 from warp_torchrl.reward import Efficiency
 from warp_torchrl.world.fast import road
 from warp_torchrl.world.fire import Fire
+from warp_torchrl.world.sensing import Sight
 from warp_torchrl.world.state import Action, count_trees
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.wind import Paper as PaperWind
-from warp_torchrl.world.world import in_wind
+from warp_torchrl.world.world import World, in_wind
 
 STAY = int(Action.STAY)
 
@@ -335,3 +336,32 @@ def test_steps_that_are_not_compiled_are_told_in_one_line(caplog, monkeypatch):
     assert "33792 cells is faster eager with AVX2" in many.why_eager
     monkeypatch.setattr("warp_torchrl.env.scene.compiled", None)  # a compiled step would call it
     many.rand_step(many.reset())
+
+
+def test_steps_of_agents_that_do_not_see_all_are_not_compiled(monkeypatch):
+    monkeypatch.setattr(wildfire, "check_compiler", lambda device: None)
+    env = WildfireEnv(World(sensing=Sight()), n_worlds=1, fuse=True)
+    assert "do not see all" in env.why_eager and WildfireEnv(n_worlds=1, fuse=True).why_eager is None
+
+
+def test_agents_know_the_same_in_any_batch_and_after_a_masked_reset(make_small_env):
+    world = small_world(horizon=7, sensing=Sight(radius=2, share=True, miss=0.2, smoke=1.0))
+    many, one = make_small_env(4, world, seed=0), make_small_env(1, world, seed=2)
+    ours, theirs = many.reset(), one.reset()
+    for step in range(12):
+        action = torch.full((4, 2), step % 9)
+        ours, theirs = (
+            env.step_and_maybe_reset(now.set(("agents", "action"), action[: len(now)]))[1]
+            for env, now in ((many, ours), (one, theirs))
+        )
+        for name in ("view", "picture"):
+            assert torch.equal(ours["agents", "observation", name][2:3], theirs["agents", "observation", name])
+    assert many.world_state.step.max() < 7
+
+
+def test_what_agents_know_is_kept_and_restored(make_small_env):
+    world = small_world(sensing=Sight(radius=2, share=True))
+    env, other = make_small_env(3, world, seed=4), make_small_env(3, world, seed=9)
+    env.rollout(6, break_when_any_done=False)
+    other.load_state_dict(env.state_dict())
+    assert torch.equal(other.world_state.knowledge, env.world_state.knowledge)

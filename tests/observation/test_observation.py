@@ -139,7 +139,7 @@ def test_the_picture_pools_the_whole_map():
     cells = torch.full((16, 16), 5)
     cells[0, 0] = 12  # one burning cell of four in the first block
     state, world = drawn(cells.tolist(), [[8, 8], [0, 15]])
-    seen = picture(state, world.forecast(state))
+    seen = picture(state, world, world.forecast(state))
     assert seen[0, 0, 0, 0, 0] == pytest.approx(0.5) and seen[0, 0, 0].sum() == pytest.approx(0.5)  # sqrt(1 / 4)
     assert seen[0, 0, 1, 7, 7] == pytest.approx(0.8)
     assert seen[0, 0, 2].nonzero().tolist() == [[0, 7]] and seen[0, 1, 2].nonzero().tolist() == [[4, 4]]

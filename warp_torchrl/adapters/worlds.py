@@ -27,6 +27,7 @@ class NumpyStep(NamedTuple):
     terminated: np.ndarray  # bool [B]
     truncated: np.ndarray  # bool [B]
     info: dict[str, np.ndarray]  # float64 [B] each
+    radio: np.ndarray | None  # float32 [B, A, A, 3], ``world.radio.radio``; None where agents do not talk
     layout: str
 
     def of_agent(self, world: int | slice, agent: int) -> np.ndarray | dict[str, np.ndarray]:
@@ -38,11 +39,12 @@ class NumpyStep(NamedTuple):
         return entries.get("", {**entries, "action_mask": mask})
 
     def info_of_agent(self, world: int | slice, agent: int) -> dict[str, np.ndarray]:
-        """Return the world's metrics, and the agent's mask if its observation has none.
+        """Return the world's metrics, whom the agent hears if it talks, and its mask if its observation has none.
 
         TorchRL's ``PettingZooWrapper`` fails if both have it.
         """
         info = {name: value[world] for name, value in self.info.items()}
+        info |= {} if self.radio is None else {"radio": self.radio[world, agent]}
         has_mask = self.layout == "flat" or "" not in self.observation
         return info if has_mask else {**info, "action_mask": self.action_mask[world, agent]}
 
@@ -200,6 +202,7 @@ class Worlds:
             terminated=self.now["terminated"][:, 0].numpy(force=True),
             truncated=self.now["truncated"][:, 0].numpy(force=True),
             info=dict(zip(info.keys(), rows)),
+            radio=agents["radio"].numpy(force=True) if "radio" in agents.keys() else None,
             layout=self._layout,
         )
 

@@ -95,11 +95,16 @@ class OffPolicy(Algorithm):
             )
 
     def check_model(self, model: Mlp) -> None:
-        """Check that the actors are not recurrent: transitions are replayed one by one.
+        """Check that the actors are not recurrent, since transitions are replayed one by one, and do not talk.
 
         Raises:
-            ValueError: If they are.
+            ValueError: If they are, or do.
         """
+        if model.messages != "none":
+            raise ValueError(
+                f"messages must be none where the algorithm replays, got {model.messages}: choose mappo, ippo, ppo or "
+                "a2c"
+            )
         if model.memory:
             raise ValueError(
                 f"memory must be 0 where the algorithm replays, got {model.memory}: choose mappo, ippo, ppo or a2c"

@@ -55,7 +55,7 @@ class Imitation:
 
         Raises:
             ValueError: If the algorithm is off-policy, a teacher should label what workers collect, or networks that
-                remember should learn from single acts.
+                remember or talk should learn from single acts.
         """
         given = [name for name in ("teacher", "demonstrations") if getattr(self, name) is not None]
         if given and not isinstance(algorithm, OnPolicy):
@@ -66,4 +66,9 @@ class Imitation:
             raise ValueError(
                 "demonstrations must be null where agents remember, since acts are learned one by one: choose "
                 f"model.memory=0, got {model.memory}"
+            )
+        if self.demonstrations is not None and model.messages != "none":
+            raise ValueError(
+                "demonstrations must be null where agents talk, since acts are learned one by one: choose "
+                f"model.messages=none, got {model.messages}"
             )

@@ -43,7 +43,8 @@ class RecordedStep:
 def _tensors(step: Step) -> list[Tensor]:
     seen = step.observations
     parts = step.transition.leaves(), seen.entries, seen.metrics
-    return [*(each for part in parts for each in part.values()), seen.action_mask, seen.state, step.reward]
+    radio = [] if seen.radio is None else [seen.radio]
+    return [*(each for part in parts for each in part.values()), *radio, seen.action_mask, seen.state, step.reward]
 
 
 def _with_tensors(like: Step, tensors: list[Tensor]) -> Step:
@@ -52,4 +53,5 @@ def _with_tensors(like: Step, tensors: list[Tensor]) -> Step:
     transition = like.transition.with_leaves({name: next(given) for name in like.transition.leaves()})
     entries = {name: next(given) for name in seen.entries}
     metrics = {name: next(given) for name in seen.metrics}
-    return Step(transition, Observations(entries, mask, metrics, state), reward)
+    radio = None if seen.radio is None else next(given)
+    return Step(transition, Observations(entries, mask, metrics, state, radio), reward)

@@ -41,7 +41,10 @@ def make_specs(world: World, observation: Observation, n_worlds: int, device: to
         action_mask=Binary(n_actions, shape=(*team, n_actions), dtype=torch.bool, device=device),
         role=Categorical(len(world.team.role_names), shape=team, dtype=torch.int64, device=device),
     )
-    planes = len(state_names(world.team))
+    if world.team.messages == "graph":
+        reach = float(max(world.size))
+        seen["agents", "radio"] = Bounded(-reach, reach, shape=(*team, world.team.n_agents, 3), device=device)
+    planes = len(state_names(world))
     seen["state"] = Bounded(-3.0, 256.0, shape=(*batch, planes, STATE_SIDE, STATE_SIDE), device=device)
     seen["info"] = Composite(
         {name: Unbounded(shape=(*batch, 1), device=device) for name in EPISODE_METRICS}, shape=batch, device=device

@@ -25,6 +25,7 @@ from warp_torchrl.world.fast.compile import check_compiler
 from warp_torchrl.world.fast.road import why_eager
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.saved import filled
+from warp_torchrl.world.sensing import Full
 from warp_torchrl.world.state import Transition, TreeCounts, WorldState, count_trees
 from warp_torchrl.world.world import World
 
@@ -86,11 +87,11 @@ class WildfireEnv(EnvBase):
         self._recorded = RecordedStep(self._scene) if graph else None
         names, roles = self.world.team.agent_names, self.world.team.agent_roles
         self.agent_names, self.action_names = names, self.world.team.action_names
-        self.role_names, self.state_names = self.world.team.role_names, state_names(self.world.team)
+        self.role_names, self.state_names = self.world.team.role_names, state_names(self.world)
         spaces = self.observation.spaces(self.world)
         self.channel_names = {name: space.names for name, space in spaces.items()}
         self.symmetries = {name: space.symmetry for name, space in spaces.items()}
-        self.state_symmetry = state_symmetry(self.world.team)
+        self.state_symmetry = state_symmetry(self.world)
         self.contents = {name: space.content for name, space in spaces.items()}
         self.state_content = state_content(self.world)
         self.group_map = {"agents": list(names)}
@@ -315,6 +316,8 @@ class WildfireEnv(EnvBase):
     def _check_compiling(self) -> str | None:
         check_compiler(self.device)
         why = why_eager(self.world.fire, self.device, self.batch_size[0] * math.prod(self.world.size))
+        if not isinstance(self.world.sensing, Full):
+            why = "a step of agents that do not see all is not compiled"
         if why is not None:
             _log.info("compile: %s", why)
         return why
@@ -363,6 +366,7 @@ class WildfireEnv(EnvBase):
         views = entries[""] if "" in entries else TensorDict(entries, batch_size=team, device=device)
         roles = self.world.team.table(self.device).index.repeat(*batch, 1)
         agents = {"observation": views, "action_mask": observed.action_mask, "role": roles}
+        agents |= {} if observed.radio is None else {"radio": observed.radio}
         info = observed.metrics | {"episode_reward": episode_reward, "episode_length": state.step.to(torch.float32)}
         return TensorDict(
             {

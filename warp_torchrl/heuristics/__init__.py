@@ -1,12 +1,14 @@
 """Heuristic policies, the baselines. Each is a TensorDictModule like any policy.
 
-They read the state through the environment: all but ``local`` see every cell, which no learned policy does.
+They read the state through the environment. ``local``, ``oldest`` and ``lawnmower`` know of the fire what their agents
+know; the others see every cell, which no learned policy does.
 """
 
 from warp_torchrl.heuristics.base import Heuristic, idle_action
 from warp_torchrl.heuristics.coordinated import Coordinated
 from warp_torchrl.heuristics.reactive import Greedy, Local, NoOp, Random
 from warp_torchrl.heuristics.ring import Mixed, Ring
+from warp_torchrl.heuristics.searching import Lawnmower, Oldest, Searching
 
 HEURISTICS: dict[str, type[Heuristic]] = {
     "noop": NoOp,
@@ -16,6 +18,8 @@ HEURISTICS: dict[str, type[Heuristic]] = {
     "coordinated": Coordinated,
     "ring": Ring,
     "mixed": Mixed,
+    "oldest": Oldest,
+    "lawnmower": Lawnmower,
 }
 """Heuristic policies by name."""
 
@@ -24,10 +28,13 @@ __all__ = [
     "Coordinated",
     "Greedy",
     "Heuristic",
+    "Lawnmower",
     "Local",
     "Mixed",
     "NoOp",
+    "Oldest",
     "Random",
     "Ring",
+    "Searching",
     "idle_action",
 ]

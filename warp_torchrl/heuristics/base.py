@@ -13,8 +13,9 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.world.fast.constants import whole_numbers
 from warp_torchrl.world.fast.distances import FAR, nearest
 from warp_torchrl.world.geometry import DIRECTIONS
-from warp_torchrl.world.random import Stream, uniform_at
-from warp_torchrl.world.state import Action, Cover, WorldState, is_burning
+from warp_torchrl.world.random import Stream, uniform, uniform_at
+from warp_torchrl.world.sensing import known_codes
+from warp_torchrl.world.state import FIRST_FIRE, Action, Cover, WorldState, is_burning
 from warp_torchrl.world.team import Team
 
 
@@ -103,6 +104,33 @@ def nearest_fire(state: WorldState, fire: Tensor) -> tuple[Tensor, Tensor]:
     tie_break = uniform_at(state.key, 0, Stream.POLICY, draw.flatten(1)).view(draw.shape)
     best = (chebyshev_distance(state, cells) + tie_break).masked_fill_(~valid[:, None], float(FAR)).min(dim=-1)
     return best.values.floor(), cells.gather(1, best.indices)
+
+
+def known_fire(state: WorldState, env: WildfireEnv) -> Tensor:
+    """Return the burning cells that each agent knows of and could extinguish, bool [B, A, H, W]."""
+    if state.knowledge is None:
+        return can_be_put_out(state, env)[:, None].expand(-1, state.vehicles.position.shape[1], -1, -1)
+    codes = known_codes(state)
+    return (codes >= FIRST_FIRE) & (codes <= env.world.fire.last_spreading)
+
+
+def nearest_marked(state: WorldState, marked: Tensor) -> tuple[Tensor, Tensor]:
+    """Return whether each agent has a marked cell, bool [B, A], and the flat index of the one nearest to it.
+
+    Ties are broken as in ``nearest_fire``.
+
+    Args:
+        state: The worlds.
+        marked: Cells of each agent's own, bool [B, A, H, W].
+    """
+    agents, height, width = marked.shape[1:]
+    row, column = (torch.arange(side, device=marked.device) for side in (height, width))
+    own = state.vehicles.position[..., None]
+    away_row, away_column = (row - own[:, :, 0]).abs(), (column - own[:, :, 1]).abs()
+    distance = torch.maximum(away_row[..., :, None], away_column[..., None, :]).to(torch.float32)
+    distance += uniform(state.key, 0, Stream.POLICY, (agents, height, width))
+    best = distance.masked_fill_(~marked, float(FAR)).flatten(2).min(dim=-1)
+    return best.values < FAR, best.indices
 
 
 def place(index: Tensor, state: WorldState) -> Tensor:

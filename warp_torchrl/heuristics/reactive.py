@@ -8,12 +8,15 @@ from warp_torchrl.heuristics.base import (
     can_be_put_out,
     extinguish_or,
     idle_action,
+    known_fire,
     move_towards,
     nearest_fire,
+    nearest_marked,
     place,
     target_or_water,
 )
 from warp_torchrl.world.random import Stream, uniform
+from warp_torchrl.world.sensing import Sight, in_reach
 from warp_torchrl.world.state import WorldState
 
 
@@ -37,17 +40,25 @@ class Random(Heuristic):
 class Local(Heuristic):
     """Sees only cells within Chebyshev distance ``radius``: extinguishes what it can reach, else goes to the nearest
     fire in sight, else searches the map: first the agents fan out, then each goes from one random point to the next.
+
+    Where sight is limited (``sensing=sight``) its own sight is its radius, with all that hinders it.
     """
 
     radius = 5
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
-        fire = can_be_put_out(state, self.env)
-        distance, index = nearest_fire(state, fire)
-        sees = distance <= self.radius
+        sees, index = self._fire_in_sight(state)
         target = torch.where(sees[..., None], place(index, state), self._waypoint(state))
         return extinguish_or(move_towards(state, self.env, target_or_water(state, self.env, target)), mask)
+
+    def _fire_in_sight(self, state: WorldState) -> tuple[Tensor, Tensor]:
+        """Return whether each agent sees fire, bool [B, A], and the flat index of the nearest."""
+        world = self.env.world
+        if isinstance(world.sensing, Sight):
+            return nearest_marked(state, known_fire(state, self.env) & in_reach(state, world.sensing.reach(world.team)))
+        distance, index = nearest_fire(state, can_be_put_out(state, self.env))
+        return distance <= self.radius, index
 
     def _waypoint(self, state: WorldState) -> Tensor:
         """Return each agent's next search point, int64 [B, A, 2]: fanned out at first, then random."""

@@ -15,6 +15,7 @@ from warp_torchrl.models.canonical import (
     Restore,
 )
 from warp_torchrl.models.memory import RecurrentActor, RecurrentNetwork
+from warp_torchrl.models.messages import TalkingNetwork
 from warp_torchrl.models.networks import (
     AgentNetworks,
     Central,
@@ -31,6 +32,7 @@ from warp_torchrl.models.signature import (
     CANONICAL_STATE,
     LOGITS,
     ORIENTATION,
+    RADIO,
     ROLE,
     STATE,
     STATE_ACTION_VALUE,
@@ -62,11 +64,16 @@ class Mlp:
             of the square. ``none``, they read it as it is, north up.
         memory: Units of the recurrent layer by which actors remember what they saw since their episode began, see
             ``RecurrentNetwork``, a multiple of 8; 0, they act on what they see now. On-policy algorithms learn it.
+        messages: ``graph``, actors tell each other what helps, see ``TalkingNetwork``: those that hear each other by
+            ``team.radio_range``. On-policy algorithms learn it. ``none``, they do not talk.
+        message_size: Numbers of a message, a multiple of 8.
+        message_rounds: Messages that each agent sends in a step, each after hearing those before.
         dtype: ``bfloat16`` computes the layers in half precision (weights stay float32), several times faster on
             processors that have it and several times slower on those that have not; ``auto`` takes it where they do.
 
     Raises:
-        ValueError: If a size is out of range or there is no hidden layer, or, when networks are made, if observations
+        ValueError: If a size is out of range or there is no hidden layer, if agents that talk have a memory or do not
+            share one network, or, when networks are made, if observations
             do not say how they turn and should be canonical, or have no clock and should be remembered.
     """
 
@@ -76,18 +83,28 @@ class Mlp:
     activation: Literal["tanh", "relu"] = "tanh"
     symmetry: Literal["canonical", "none"] = "canonical"
     memory: int = 0
+    messages: Literal["none", "graph"] = "none"
+    message_size: int = 32
+    message_rounds: int = 1
     dtype: Literal["auto", "float32", "bfloat16"] = "auto"
 
     def __post_init__(self) -> None:
-        check_fields(self, memory=(0, 8192))
+        check_fields(self, memory=(0, 8192), message_size=(8, 8192), message_rounds=(1, 16))
         for name in ("actor_hidden", "critic_hidden"):
             check_sizes(name, getattr(self, name))
         if self.memory % 8:
             raise ValueError(f"memory must be a multiple of 8, got {self.memory}")
+        if self.message_size % 8:
+            raise ValueError(f"message_size must be a multiple of 8, got {self.message_size}")
+        if self.messages != "none" and self.memory:
+            raise ValueError(f"memory must be 0 where agents talk, messages={self.messages}, got {self.memory}")
+        if self.messages != "none" and self.sharing != "team":
+            raise ValueError(f"sharing must be team where agents talk, messages={self.messages}, got {self.sharing}")
 
     def actor(self, signature: Signature) -> TensorDictModuleBase:
         """Return the module that writes logits [..., A, actions] from each agent's own observation, and memory."""
-        return self._of_agents(signature, self.actor_hidden, signature.n_actions, 0.01, LOGITS, memory=self.memory)
+        n_actions, talks = signature.n_actions, self.messages == "graph"
+        return self._of_agents(signature, self.actor_hidden, n_actions, 0.01, LOGITS, memory=self.memory, talks=talks)
 
     def action_value(self, signature: Signature) -> TensorDictModuleBase:
         """Return the module that writes each action's value [..., A, actions] from each agent's own observation."""
@@ -149,6 +166,7 @@ class Mlp:
         central: bool = False,
         judges: bool = False,
         memory: int = 0,
+        talks: bool = False,
     ) -> TensorDictModuleBase:
         """Return the module that writes [..., A, out] from each agent's entries.
 
@@ -161,6 +179,7 @@ class Mlp:
             central: Whether it reads the state too.
             judges: Whether it reads the action that was chosen too, and that of the team where it is central.
             memory: Units that it remembers by.
+            talks: Whether agents exchange messages.
         """
         names = _read(list(signature.observation), central and not judges)
         entries, keys = [signature.observation[name] for name in names], [self._key(name) for name in names]
@@ -171,7 +190,7 @@ class Mlp:
         if central:
             joint = [Entry((signature.n_agents * signature.n_actions,), "float32")] if judges else []
             entries = [signature.state, *joint, *entries]
-        network = self._shared(signature, lambda: self._network(entries, hidden, out, head_gain, memory))
+        network = self._shared(signature, lambda: self._network(entries, hidden, out, head_gain, memory, talks))
         if self.sharing == "role":
             keys.append(ROLE)
         module: TensorDictModuleBase
@@ -182,6 +201,8 @@ class Mlp:
             central_network = Central(network, signature.state, action)
             module = TensorDictModule(central_network, in_keys=[self.state_key, *keys], out_keys=[key])
         else:
+            if talks:
+                keys += [RADIO, ORIENTATION] if self._is_canonical else [RADIO]
             module = TensorDictModule(network, in_keys=keys, out_keys=[key])
         return self._sequence(signature, module, central, judges) if self._is_canonical else module
 
@@ -211,7 +232,9 @@ class Mlp:
                 return self._key(name), entry.symmetry.names.index(TIME_LEFT)
         raise ValueError(f"model.memory must be 0 where observations have no clock, got {self.memory}")
 
-    def _shared(self, signature: Signature, make: Callable[[], Network | RecurrentNetwork]) -> nn.Module:
+    def _shared(
+        self, signature: Signature, make: Callable[[], Network | RecurrentNetwork | TalkingNetwork]
+    ) -> nn.Module:
         """Return as many networks as the team has."""
         if self.sharing == "team":
             return make()
@@ -221,10 +244,12 @@ class Mlp:
         return AgentNetworks(networks, networks[0].entries)
 
     def _network(
-        self, entries: list[Entry], hidden: tuple[int, ...], out: int, head_gain: float, memory: int
-    ) -> Network | RecurrentNetwork:
+        self, entries: list[Entry], hidden: tuple[int, ...], out: int, head_gain: float, memory: int, talks: bool
+    ) -> Network | RecurrentNetwork | TalkingNetwork:
         encoder, activation = self._encoder(entries, hidden[0]), _ACTIVATIONS[self.activation]
         network = Network(encoder, tuple(hidden), out, activation, head_gain, self.dtype)
+        if talks:
+            return TalkingNetwork(network, hidden[0], self.message_size, self.message_rounds)
         return RecurrentNetwork(network, hidden[0], memory) if memory else network
 
     def _encoder(self, entries: list[Entry], size: int) -> LinearEncoder | ConvolutionalEncoder:

@@ -21,6 +21,7 @@ LOG_PROB = ("agents", "action_log_prob")
 MEMORY = ("agents", "memory")
 OBSERVATION = ("agents", "observation")
 ORIENTATION = ("agents", "orientation")
+RADIO = ("agents", "radio")
 REWARD = ("agents", "reward")
 ROLE = ("agents", "role")
 STATE = "state"

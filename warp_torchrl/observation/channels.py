@@ -18,18 +18,27 @@ from warp_torchrl.content import Content, Empty, Follows
 from warp_torchrl.validation import check_new_name
 from warp_torchrl.world.fast.bytes import at_least, byte, equal, to_codes, to_int32
 from warp_torchrl.world.fast.squares import Window, window
+from warp_torchrl.world.radio import heard
 from warp_torchrl.world.role import PAPER_ROLES
+from warp_torchrl.world.sensing import Full, Sight, freshness, others_in_sight, read
 from warp_torchrl.world.state import FIRST_FIRE, Forecast, WorldState, is_burning, is_tree
 from warp_torchrl.world.world import World
 
 ELEVATION_SCALE = 100.0
 """Difference in height that an observation shows as 1 [m]."""
+LAST_SEEN = "last_seen"
+"""The channel that tells how fresh is what an agent knows."""
 FIRE = "fire_stage"
 """The channel that tells where fire is, by which networks turn what an agent sees."""
 
 
 class Look(NamedTuple):
-    """What a channel reads: the worlds, and the square of 2 r + 1 = V cells about each agent, north up."""
+    """What a channel reads: the worlds, and the square of 2 r + 1 = V cells about each agent, north up.
+
+    Where agents know of the fire what was seen alone (``world.sensing.Sight``), ``cells``, ``ash`` and ``firebreak``
+    are what the agent knows, ``wet`` is of cells in sight, ``others`` are those that it hears or sees, and
+    ``fire_risk`` is 0.
+    """
 
     state: WorldState
     world: World
@@ -43,6 +52,7 @@ class Look(NamedTuple):
     alpha: Tensor  # flammability, 255 times
     fire_risk: Tensor  # ``Forecast.fire_risk``, 255 times
     others: Tensor  # 63 for each other agent of each of ``Team.role_names``, four at most, [B, A, R, V, V]
+    fresh: Tensor | None = None  # how fresh is what is known, ``sensing.freshness`` 255 times; None where all is seen
 
 
 class Channel(NamedTuple):
@@ -157,7 +167,7 @@ def relative_elevation(look: Look) -> Tensor:
     return to_codes(((heights - own) / ELEVATION_SCALE).clamp_(-1.0, 1.0).mul_(127.0).add_(128.0))
 
 
-@channel()
+@channel(content=lambda world, names: None if isinstance(world.sensing, Full) else Empty())
 def threat(look: Look) -> Tensor:
     """Return where the fire is about to grow, see ``Forecast.fire_risk``, 255 times."""
     return look.fire_risk
@@ -179,6 +189,19 @@ DEFAULT = tuple(CHANNELS)
 """The channels of a view unless others are chosen."""
 
 
+@channel()
+def last_seen(look: Look) -> Tensor:
+    """Return how long ago cells were seen, 255 now, 128 sixteen steps ago, 0 never, see ``sensing.freshness``."""
+    return look.on_map * 255 if look.fresh is None else look.fresh
+
+
+@channel(high=252, content=lambda world, names: others_of("scout", world))
+def other_scout(look: Look) -> Tensor:
+    """Return where other scouts are, 63 each, four at most."""
+    roles = look.world.team.role_names
+    return look.others[:, :, roles.index("scout")] if "scout" in roles else torch.zeros_like(look.others[:, :, 0])
+
+
 _CELLS, _BURNED, _FIREBREAK, _ON_MAP = 0x0F, 0x10, 0x20, 0x40
 
 
@@ -187,6 +210,8 @@ def look_at(state: WorldState, world: World, forecast: Forecast, radius: int) ->
 
     Codes, ash, firebreaks and the map are read at once, as the bits of a byte.
     """
+    if state.knowledge is not None:
+        return _look_by_knowledge(state, state.knowledge, world, forecast, radius)
     burned, cleared = to_int32(state.burned.view(torch.uint8)), to_int32(state.firebreak.view(torch.uint8))
     code = torch.add(to_int32(state.cells), burned, alpha=_BURNED).add_(cleared, alpha=_FIREBREAK).add_(_ON_MAP)
     risk = forecast.expected_ignitions, forecast.ignition_probability
@@ -205,6 +230,29 @@ def look_at(state: WorldState, world: World, forecast: Forecast, radius: int) ->
         alpha=alpha,
         fire_risk=fire_risk,
         others=_others(state, world, radius),
+    )
+
+
+def _look_by_knowledge(state: WorldState, knowledge: Tensor, world: World, forecast: Forecast, radius: int) -> Look:
+    """Return the squares about the agents as each of them knows them."""
+    square = window(state.vehicles.position, state.cells.shape[1:], radius)
+    record = square.of_own(knowledge)
+    fresh = freshness(record, state.step)
+    cells, ash, cleared = read(record)
+    return Look(
+        state=state,
+        world=world,
+        forecast=forecast,
+        window=square,
+        on_map=square.inside,
+        cells=cells,
+        ash=byte(ash),
+        firebreak=byte(cleared),
+        wet=square.of(state.wet) * byte(fresh == 1.0),
+        alpha=(square.of(state.alpha) * 255.0).to(torch.uint8),
+        fire_risk=torch.zeros_like(square.inside),
+        others=_others(state, world, radius),
+        fresh=(fresh * 255.0).to(torch.uint8) * square.inside,
     )
 
 
@@ -230,13 +278,24 @@ def stages(cells: Tensor) -> Tensor:
     return (cells - (FIRST_FIRE - 1)) * byte(is_burning(cells)) * 51
 
 
+def knows_where(state: WorldState, world: World) -> Tensor:
+    """Return of which others each agent knows where they are, bool [B or 1, A, A].
+
+    It is of all, or where sight is limited of those that it hears or sees.
+    """
+    sensing, agents = world.sensing, state.vehicles.position.shape[1]
+    if not isinstance(sensing, Sight):
+        return ~torch.eye(agents, dtype=torch.bool, device=state.cells.device)[None]
+    return heard(state, world.team) | others_in_sight(state, sensing.reach(world.team))
+
+
 def _others(state: WorldState, world: World, radius: int) -> Tensor:
     """Return where the other agents of each role are, 63 each, at most 4 to a cell, uint8 [B, A, R, V, V]."""
     position, role = state.vehicles.position, world.team.table(state.cells.device).index
     side, roles = 2 * radius + 1, len(world.team.role_names)
     row, column = (position[:, None] - position[:, :, None] + radius).unbind(-1)  # of each in each other's square
     is_near = (row >= 0) & (row < side) & (column >= 0) & (column < side)
-    is_near &= ~torch.eye(len(role), dtype=torch.bool, device=role.device)
+    is_near &= knows_where(state, world)
     index = torch.where(is_near, (role * side + row) * side + column, roles * side**2)
     count = torch.zeros(*row.shape[:2], roles * side**2 + 1, dtype=torch.uint8, device=role.device)
     count = count.scatter_add(2, index, torch.ones_like(index, dtype=torch.uint8))[..., :-1]

@@ -5,82 +5,109 @@ from torch import Tensor
 from torch.nn.functional import one_hot
 
 from warp_torchrl.content import Content, Empty, Quarters
-from warp_torchrl.observation.channels import ELEVATION_SCALE
+from warp_torchrl.observation.channels import ELEVATION_SCALE, LAST_SEEN, knows_where
 from warp_torchrl.observation.own import WIND_SCALE, steps_to_tick, time_left
 from warp_torchrl.symmetry import Planes, Target, TeamPlanes
 from warp_torchrl.world.fast.blocks import block_means
 from warp_torchrl.world.fast.squares import window
 from warp_torchrl.world.role import PAPER_ROLES
-from warp_torchrl.world.state import Forecast, WorldState, is_burning
-from warp_torchrl.world.team import Team
+from warp_torchrl.world.sensing import Full, freshness, known_codes
+from warp_torchrl.world.state import FIRST_FIRE, OLDEST, Forecast, WorldState, is_burning
 from warp_torchrl.world.world import World
 
 PICTURE = ("fire", "fuel", "team_mates")
 """Channels of ``picture``."""
-CENTRED_HIGHS = (255, 255, 252)
-"""Largest number in each of them, where the picture is centred."""
 PICTURE_SIDE = 8
 STATE = ("fire", "fuel", "front", "threat", *PAPER_ROLES, "elevation", "clock_and_wind")
 """Channels of the critic's ``state``: ``front`` is what fire is expected to ignite in a tick, ``threat`` the chance of
 trees to ignite, and the quarters of ``clock_and_wind`` are filled with the time left, the steps to the tick, and the
 wind to the east and to the north."""
 _FIRST_ROLE = STATE.index(PAPER_ROLES[0])
+KNOWN = ("known_fire", LAST_SEEN)
+"""Channels of the critic's ``state`` where sight is limited."""
 STATE_SIDE = 16
 STATE_SYMMETRY = TeamPlanes(len(STATE), STATE.index("fire"), (_FIRST_ROLE, len(PAPER_ROLES)))
 """How the state turns with the map in teams of the paper's roles."""
 
 
-def picture_symmetry(centred: bool) -> Planes:
+def picture_names(world: World) -> tuple[str, ...]:
+    """Return the channels of the picture: ``PICTURE``, and where sight is limited ``last_seen``, how fresh they are."""
+    return PICTURE if isinstance(world.sensing, Full) else (*PICTURE, LAST_SEEN)
+
+
+def picture_highs(world: World) -> tuple[float, ...]:
+    """Return the largest number in each channel of the picture, where it is centred."""
+    return tuple(255 if name != "team_mates" else 252 for name in picture_names(world))
+
+
+def picture_symmetry(centred: bool, channels: int = len(PICTURE)) -> Planes:
     """Return how the picture turns with the map; agents turn towards its fire where their view shows none."""
     fire = Target(PICTURE.index("fire"), order=1, near=0.5, is_share=True, in_middle=centred)
-    return Planes(len(PICTURE), fire)
+    return Planes(channels, fire)
 
 
-def picture(state: WorldState, forecast: Forecast) -> Tensor:
-    """Return the state of the fire in 8 x 8 blocks of the map, float32 [B, A, 3, 8, 8]."""
-    seen, place = (
-        _fire_and_fuel(state, forecast),
-        one_hot(_block(state, PICTURE_SIDE), PICTURE_SIDE**2).to(torch.float32),
-    )
-    mates = ((place.sum(1, keepdim=True) - place) * 0.25).clamp_(max=1.0)
+def picture(state: WorldState, world: World, forecast: Forecast) -> Tensor:
+    """Return the state of the fire in 8 x 8 blocks of the map, float32 [B, A, C, 8, 8], see ``picture_names``."""
+    place = one_hot(_block(state, PICTURE_SIDE), PICTURE_SIDE**2).to(torch.float32)
+    mates = (knows_where(state, world).to(torch.float32) @ place).mul_(0.25).clamp_(max=1.0)
     mates = mates.view(*place.shape[:2], 1, PICTURE_SIDE, PICTURE_SIDE)
-    return torch.cat((seen[:, None].expand(-1, place.shape[1], -1, -1, -1), mates), dim=2)
+    seen = _maps(state, forecast).expand(-1, place.shape[1], -1, -1, -1)
+    return torch.cat((seen[:, :, :2], mates, seen[:, :, 2:]), dim=2)
 
 
-def centred_picture(state: WorldState, forecast: Forecast) -> Tensor:
-    """Return the picture with the agent's own block in the middle, uint8 [B, A, 3, 15, 15]; 0 off the map.
+def centred_picture(state: WorldState, world: World, forecast: Forecast) -> Tensor:
+    """Return the picture with the agent's own block in the middle, uint8 [B, A, C, 15, 15]; 0 off the map.
 
     What it tells is what ``picture`` does; where things are is told from where the agent is.
     """
     sides, middle = (PICTURE_SIDE, PICTURE_SIDE), PICTURE_SIDE - 1
-    fire, fuel = (_fire_and_fuel(state, forecast) * 255.0).to(torch.uint8).unbind(1)
+    maps = (_maps(state, forecast) * 255.0).to(torch.uint8).unbind(2)
     block = _block(state, PICTURE_SIDE)
     about = window(torch.stack((block // PICTURE_SIDE, block % PICTURE_SIDE), dim=-1), sides, middle)
-    mates = about.of(one_hot(block, PICTURE_SIDE**2).sum(1).view(-1, *sides))
-    mates[..., middle, middle] -= 1
-    return torch.stack((about.of(fire), about.of(fuel), (mates.clamp_(max=4) * 63).to(torch.uint8)), dim=2)
+    if state.knowledge is None:
+        fire, fuel = (about.of(each[:, 0]) for each in maps)
+        mates = about.of(one_hot(block, PICTURE_SIDE**2).sum(1).view(-1, *sides))
+        mates[..., middle, middle] -= 1
+        return torch.stack((fire, fuel, (mates.clamp_(max=4) * 63).to(torch.uint8)), dim=2)
+    fire, fuel, fresh = (about.of_own(each) for each in maps)
+    places = one_hot(block, PICTURE_SIDE**2).to(torch.float32)
+    mates = (knows_where(state, world).to(torch.float32) @ places).clamp_(max=4.0)
+    mates = about.of_own(mates.mul_(63.0).to(torch.uint8).unflatten(-1, sides))
+    return torch.stack((fire, fuel, mates, fresh), dim=2)
 
 
-def state_names(team: Team) -> tuple[str, ...]:
-    """Return the channels of the critic's ``state``: ``STATE``, with the team's further roles beside the paper's."""
-    return (*STATE[:_FIRST_ROLE], *team.role_names, *STATE[_FIRST_ROLE + len(PAPER_ROLES) :])
+def state_names(world: World) -> tuple[str, ...]:
+    """Return the channels of the critic's ``state``: ``STATE``, with the team's further roles beside the paper's.
+
+    Where sight is limited it has ``KNOWN`` too: the burning cells that agents know of, and how fresh what they know is,
+    both the mean of the agents.
+    """
+    known = () if isinstance(world.sensing, Full) else KNOWN
+    return (
+        *STATE[:_FIRST_ROLE],
+        *world.team.role_names,
+        *STATE[_FIRST_ROLE + len(PAPER_ROLES) : -1],
+        *known,
+        STATE[-1],
+    )
 
 
-def state_symmetry(team: Team) -> TeamPlanes:
+def state_symmetry(world: World) -> TeamPlanes:
     """Return how the state turns with the map."""
-    return TeamPlanes(len(state_names(team)), STATE.index("fire"), (_FIRST_ROLE, len(team.role_names)))
+    return TeamPlanes(len(state_names(world)), STATE.index("fire"), (_FIRST_ROLE, len(world.team.role_names)))
 
 
-def picture_content(team: Team) -> tuple[Content, ...]:
+def picture_content(world: World) -> tuple[Content, ...]:
     """Return what each channel of the picture can hold."""
-    return (None, None, None if team.n_agents > 1 else Empty())
+    alone = {"team_mates": Empty()} if world.team.n_agents == 1 else {}
+    return tuple(alone.get(name) for name in picture_names(world))
 
 
 def state_content(world: World) -> tuple[Content, ...]:
     """Return what each channel of the critic's ``state`` can hold."""
     held: dict[str, Content] = {role: Empty() for role in world.team.role_names if role not in world.team.agent_roles}
     held |= {"elevation": Empty()} if world.is_flat else {}
-    return (*(held.get(name) for name in state_names(world.team)[:-1]), Quarters())
+    return (*(held.get(name) for name in state_names(world)[:-1]), Quarters())
 
 
 def central_state(state: WorldState, world: World, forecast: Forecast) -> Tensor:
@@ -98,6 +125,7 @@ def central_state(state: WorldState, world: World, forecast: Forecast) -> Tensor
             *(block_means(each, STATE_SIDE) for each in maps),
             *agents.unbind(1),
             _elevation(state.landscape.elevation, agents[:, 0]),
+            *_known(state),
             quarters.reshape(worlds, *blocks),
         ),
         dim=1,
@@ -112,10 +140,27 @@ def _elevation(elevation: Tensor | None, blocks: Tensor) -> Tensor:
     return block_means(relative, STATE_SIDE).clamp(-3.0, 3.0)
 
 
-def _fire_and_fuel(state: WorldState, forecast: Forecast) -> Tensor:
-    """Return the whole map's fire (square root of the share that burns) and fuel in blocks, float32 [B, 2, 8, 8]."""
-    fire, fuel = (block_means(maps, PICTURE_SIDE) for maps in (is_burning(state.cells), forecast.fuel))
-    return torch.stack((fire.sqrt_(), fuel), dim=1)
+def _maps(state: WorldState, forecast: Forecast) -> Tensor:
+    """Return fire (square root of the share that burns) and fuel in blocks, float32 [B, 1, 2, 8, 8].
+
+    Where sight is limited they are what each agent knows, with how fresh that is, float32 [B, A, 3, 8, 8].
+    """
+    if state.knowledge is None:
+        maps = [is_burning(state.cells)[:, None], forecast.fuel[:, None]]
+    else:
+        codes = known_codes(state)
+        fuel = state.alpha[:, None] * ((codes >= 1) & (codes <= OLDEST))
+        maps = [codes >= FIRST_FIRE, fuel, freshness(state.knowledge, state.step)]
+    fire, *others = (block_means(each, PICTURE_SIDE) for each in maps)
+    return torch.stack((fire.sqrt_(), *others), dim=2)
+
+
+def _known(state: WorldState) -> list[Tensor]:
+    """Return ``KNOWN`` in blocks, float32 [B, 16, 16] each; nothing where all is seen."""
+    if state.knowledge is None:
+        return []
+    maps = (known_codes(state) >= FIRST_FIRE).to(torch.float32), freshness(state.knowledge, state.step)
+    return [block_means(each.mean(dim=1), STATE_SIDE) for each in maps]
 
 
 def _block(state: WorldState, side: int) -> Tensor:

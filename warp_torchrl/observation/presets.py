@@ -13,12 +13,12 @@ from torch import Tensor
 from warp_torchrl.content import Content
 from warp_torchrl.observation.channels import CHANNELS, DEFAULT, FIRE, ages, check_channels, stages
 from warp_torchrl.observation.coarse import (
-    CENTRED_HIGHS,
-    PICTURE,
     PICTURE_SIDE,
     centred_picture,
     picture,
     picture_content,
+    picture_highs,
+    picture_names,
     picture_symmetry,
 )
 from warp_torchrl.observation.own import IDENTITY, SELF, SELF_SIZE, own_entries, own_vector
@@ -114,14 +114,15 @@ class Surroundings(Local):
         """Return the space of each entry."""
         side = 2 * PICTURE_SIDE - 1 if self.centred else PICTURE_SIDE
         dtype = torch.uint8 if self.centred else torch.float32
-        high: float | tuple[float, ...] = CENTRED_HIGHS if self.centred else 1.0
-        shape, symmetry = (len(PICTURE), side, side), picture_symmetry(self.centred)
-        space = Space(shape, dtype, 0, high, PICTURE, symmetry, self._told(picture_content(world.team)))
+        high: float | tuple[float, ...] = picture_highs(world) if self.centred else 1.0
+        names = picture_names(world)
+        shape, symmetry = (len(names), side, side), picture_symmetry(self.centred, len(names))
+        space = Space(shape, dtype, 0, high, names, symmetry, self._told(picture_content(world)))
         return {**super().spaces(world), "picture": space}
 
     def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
-        """Return ``view``, ``self`` and ``picture``: uint8 [B, A, 3, 15, 15]; of the map, float32 [B, A, 3, 8, 8]."""
-        shown = centred_picture(state, forecast) if self.centred else picture(state, forecast)
+        """Return ``view``, ``self`` and ``picture``: uint8 [B, A, C, 15, 15]; of the map, float32 [B, A, C, 8, 8]."""
+        shown = centred_picture(state, world, forecast) if self.centred else picture(state, world, forecast)
         return {**super().__call__(state, world, forecast), "picture": shown}
 
 

@@ -35,6 +35,9 @@ class Stream(IntEnum):
     PACE = 13
     WEATHER = 14
     AGE_IN_TENTH = 15
+    RADIO = 16
+    SENSING = 17
+    SMOKE = 18
 
 
 def world_key(seed: Tensor, episode: Tensor | int = 0) -> Tensor:

@@ -25,6 +25,8 @@ ROLES: dict[str, Role] = {
 """All roles by name: ground vehicles (bulldozers) and aircraft of WARP-CA, and those that users add."""
 PAPER_ROLES = tuple(ROLES)
 """The roles that observations of every team tell of."""
+ROLES["scout"] = Role("scout", ("move",), stride=2, flies=True)
+"""An aircraft that sees and cannot act (FireCommander's perception agents, Seraj et al. 2020)."""
 
 
 def add_role(key: str, role: Role) -> None:

@@ -171,6 +171,7 @@ class WorldState(Batch):
     terminated: Tensor  # bool [B], no cell burns any more
     truncated: Tensor  # bool [B], the horizon was reached
     arrivals: Arrivals | None = None  # None but under law ``rate``
+    knowledge: Tensor | None = None  # int32 [B,A,H,W], records of ``world.sensing``; None where all is seen
 
     def what_changes(self) -> dict[str, Tensor]:
         """Return all tensors by name but those that follow from others, of which they can be made again."""

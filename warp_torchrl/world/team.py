@@ -54,6 +54,11 @@ class Team:
         extinguish_p: Chance that putting a fire out succeeds.
         tank: Extinguish acts that a vehicle carries water for; None is unlimited, 0 none at all. It fills up beside a
             lake and at the corner where the team started.
+        messages: ``graph`` shows agents whom they hear and where those are, for networks that exchange messages
+            (``model.messages``, which sets it).
+        radio_range: How far agents hear each other, by Euclidean distance [cells]; None is everywhere, 0 not at all.
+        radio_loss: Chance that a packet is lost, drawn for each pair of agents and step.
+        radio_line_of_sight: Whether hills between two antennas keep them from hearing each other.
         start: ``corner`` starts the team in a corner drawn for each episode, ``anywhere`` on cells drawn over the map.
 
     Raises:
@@ -65,10 +70,21 @@ class Team:
     allow_stay: bool = True
     extinguish_p: float = 1.0
     tank: int | None = None
+    messages: Literal["none", "graph"] = "none"
+    radio_range: float | None = None
+    radio_loss: float = 0.0
+    radio_line_of_sight: bool = False
     start: Literal["corner", "anywhere"] = "corner"
 
     def __post_init__(self) -> None:
-        check_fields(self, n_agents=(1, 256), extinguish_p=(0.0, 1.0), tank=(0, 10_000))
+        check_fields(
+            self,
+            n_agents=(1, 256),
+            extinguish_p=(0.0, 1.0),
+            tank=(0, 10_000),
+            radio_range=(0.0, 1e6),
+            radio_loss=(0.0, 1.0),
+        )
         if not self.roles or any(role not in ROLES for role in self.roles):
             raise ValueError(f"roles must be a list of {', '.join(ROLES)}, got {list(self.roles)}")
         unknown = {name for role in self.roles for name in ROLES[role].abilities} - ABILITIES.keys()

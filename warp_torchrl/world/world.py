@@ -15,6 +15,7 @@ from warp_torchrl.world.fast import road
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.ignition import Ignition, IgnitionSource
 from warp_torchrl.world.random import world_key
+from warp_torchrl.world.sensing import Full, Sensing
 from warp_torchrl.world.state import (
     EMBER,
     FIRST_FIRE,
@@ -45,6 +46,7 @@ class World:
         fire: The automaton.
         team: The vehicles.
         ignition: Where the fire starts.
+        sensing: What agents know of the fire.
         steps_per_tick: Agent steps to a fire tick.
         horizon: Agent steps to an episode.
         cell_size: Side of a cell [m]; None takes the landscape's own, 30 m where it has none.
@@ -60,6 +62,7 @@ class World:
     fire: Automaton = field(default_factory=Fire)
     team: Team = field(default_factory=Team)
     ignition: IgnitionSource = field(default_factory=Ignition)
+    sensing: Sensing = field(default_factory=Full)
     steps_per_tick: int = 5
     horizon: int = 256
     cell_size: float | None = None
@@ -171,12 +174,12 @@ class World:
         for _ in range(self.ignition.head_start):
             spreads = (state.cells >= FIRST_FIRE) & (state.cells < EMBER)
             state = self._tick(state, spreads.flatten(1).any(dim=1))
-        return state, torch.stack((is_dark, is_crowded))
+        return self.sensing.begun(state, self.team), torch.stack((is_dark, is_crowded))
 
     def step(self, state: WorldState, action: Tensor, counts: TreeCounts | None = None) -> Transition:
         """Advance every world that has not ended by one agent step.
 
-        Agents move; agents act; on every ``steps_per_tick``-th step the fire ticks; the clock advances.
+        Agents move; agents act; on every ``steps_per_tick``-th step the fire ticks; the clock advances; agents look.
 
         Args:
             state: The worlds, batch size [B].
@@ -191,10 +194,11 @@ class World:
         ticks_now = running & ((state.step + 1) % self.steps_per_tick == 0)
         after = self._tick(after, ticks_now)
         counts_after = count_trees(after)
+        after = self._advance_clock(after, counts_after, running)
         return Transition(
             before=state,
             result=result,
-            after=self._advance_clock(after, counts_after, running),
+            after=self.sensing.updated(after, self.team, running),
             counts_before=count_trees(state) if counts is None else counts,
             counts_after=counts_after,
         )

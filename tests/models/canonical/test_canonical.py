@@ -66,9 +66,9 @@ SIZE = 16
 ACTIONS = tuple(action.name.lower() for action in Action)
 
 
-def fighting(observation, n_worlds=6, steps=12):
+def fighting(observation, n_worlds=6, steps=12, messages="none"):
     """Worlds of a windy, flat map that burn, with a team among the trees."""
-    team = Team(n_agents=3, roles=("ugv", "ugv", "uav"), start="anywhere")
+    team = Team(n_agents=3, roles=("ugv", "ugv", "uav"), start="anywhere", messages=messages)
     world = small_world(
         landscape=Perlin(size=SIZE), wind=Uniform(speed=7.0, direction=35.0), team=team, horizon=60, steps_per_tick=3
     )

@@ -30,6 +30,11 @@ class Window:
         """Return what a plane [B, H, W] of numbers shows, [B, A, V, V]; 0 beyond the map."""
         return plane.flatten(1).gather(1, self.index).view_as(self.inside).mul_(self.inside)
 
+    def of_own(self, planes: Tensor) -> Tensor:
+        """Return what each agent's own plane [B, A, H, W] of numbers shows, [B, A, V, V]; 0 beyond the map."""
+        index = self.index.view(*self.position.shape[:2], -1)
+        return planes.flatten(2).gather(2, index).view_as(self.inside).mul_(self.inside)
+
     def bytes_of(self, codes: Sequence[Tensor], fractions: Sequence[Sequence[Tensor]]) -> list[Tensor]:
         """Return what planes show, in bytes 0..255, uint8 or ``to_int32``, [B, A, V, V] each; 0 beyond the map.
 

@@ -1,0 +1,172 @@
+"""Agents that talk: who can move whom, and what is learnt from it."""
+
+import pytest
+import torch
+
+from tests.conftest import small_world
+from tests.models.canonical.test_canonical import (
+    PRESETS,
+    fighting,
+    pulled,
+    turned_actions,
+    turned_world,
+)
+from warp_torchrl.algorithms.ppo import Ppo
+from warp_torchrl.config.compose import compose_config, plain
+from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.config.run_config import run_config
+from warp_torchrl.config.saved_config import SavedConfig, restore
+from warp_torchrl.models import ACTION, LOGITS, OBSERVATION, RADIO, Cnn, Mlp, over_canonical, signature
+from warp_torchrl.models.messages import Round
+from warp_torchrl.world.team import Team
+
+SMALL = {"actor_hidden": (16, 16), "critic_hidden": (16,), "messages": "graph", "message_size": 16}
+MODELS = {
+    "canonical": Mlp(**SMALL),
+    "north up": Mlp(**SMALL, symmetry="none"),
+    "two rounds": Mlp(**SMALL, message_rounds=2),
+    "cnn": Cnn(**SMALL, channels=(4,)),
+}
+OWN = (*OBSERVATION, "self")
+
+
+@pytest.fixture
+def make_env(make_small_env):
+    def make(n_worlds=4, n_agents=4, **team):
+        return make_small_env(n_worlds, small_world(team=Team(n_agents=n_agents, messages="graph", **team)))
+
+    return make
+
+
+def lively(model, env):
+    """Return an actor whose last layer and messages tell, the same each time."""
+    torch.manual_seed(0)
+    actor = model.actor(signature(env))
+    with torch.no_grad():
+        for weight in actor.parameters():
+            weight += 0.2 * torch.randn_like(weight)
+    return actor
+
+
+def heard_in_a_line(now):
+    """Let each agent hear the one before it, and no other."""
+    now[RADIO] = torch.zeros_like(now[RADIO])
+    for agent in range(1, now[RADIO].shape[1]):
+        now[RADIO][:, agent, agent - 1, 0] = 1.0
+    return now
+
+
+def changed_by(actor, now, agent):
+    """Return which agents' logits change with what one agent observes, bool [A]."""
+    before, other = actor(now.clone())[LOGITS], now.clone()
+    other[OWN][:, agent] += 0.5
+    return (actor(other)[LOGITS] != before).flatten(2).any(-1).all(0)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_an_agent_acts_on_what_it_sees_and_hears_and_on_nothing_else(make_env, name):
+    env = make_env()
+    actor, now = lively(MODELS[name], env), heard_in_a_line(env.reset())
+    reach = MODELS[name].message_rounds
+    for agent in range(4):
+        expected = [agent <= other <= agent + reach for other in range(4)]
+        assert changed_by(actor, now, agent).tolist() == expected
+
+
+def test_alone_it_acts_as_if_nobody_were_there(make_env):
+    env = make_env()
+    actor, now = lively(MODELS["canonical"], env), env.reset()
+    now[RADIO] = torch.zeros_like(now[RADIO])
+    alone = actor(now.clone())[LOGITS]
+    one = make_env(n_agents=1).reset()
+    for key in [key for key in now.keys(True, True) if key[0] == "agents" and key in one.keys(True, True)]:
+        one[key] = now[key][:, :1] if key != RADIO else now[key][:, :1, :1]
+    torch.testing.assert_close(actor(one)[LOGITS], alone[:, :1])
+
+
+def test_a_network_fits_a_team_of_any_size_and_order(make_env):
+    env = make_env(n_agents=6)
+    actor, now = lively(MODELS["two rounds"], make_env(n_agents=2)), env.reset()
+    logits = actor(now.clone())[LOGITS]
+    order = torch.tensor([3, 0, 5, 1, 2, 4])
+    other = now.clone()
+    for key in [key for key in now.keys(True, True) if key[0] == "agents"]:
+        other[key] = now[key][:, order]
+    other[RADIO] = other[RADIO][:, :, order]
+    torch.testing.assert_close(actor(other)[LOGITS], logits[:, order])
+
+
+def test_what_an_agent_says_is_learnt_from_what_the_others_do(make_env):
+    env = make_env(n_agents=2)
+    actor, now = lively(MODELS["canonical"], env), env.reset()
+    actor(now)[LOGITS][:, 0].square().sum().backward()
+    network = next(each for each in actor.modules() if isinstance(each, Round))
+    assert network.send.weight.grad.abs().sum() > 0
+    now = env.reset()
+    now[RADIO] = torch.zeros_like(now[RADIO])
+    actor.zero_grad()
+    actor(now)[LOGITS][:, 0].square().sum().backward()
+    assert not network.send.weight.grad.any(), "nobody heard it"
+
+
+@pytest.mark.parametrize("turn", [(-1, 1, True), (1, -1, False), (-1, -1, True)], ids=str)
+def test_a_team_that_talks_does_the_same_in_a_turned_world(turn):
+    preset = PRESETS["whole map"]
+    env = fighting(preset, n_worlds=24, messages="graph")
+    state = env.world_state.clone()
+    here, there = (env.set_state(each).clone() for each in (state, turned_world(state, turn)))
+    sees = pulled(preset, state, 24).all(-1)
+    assert sees.sum() >= 4
+    for model in (Mlp(messages="graph", message_size=16, message_rounds=2), Mlp(messages="graph", symmetry="none")):
+        actor = lively(model, env)
+        ours, theirs = actor(here.clone())[LOGITS], actor(there.clone())[LOGITS]
+        expected = torch.empty_like(ours).index_copy_(2, turned_actions(torch.arange(11), turn), ours)
+        same = torch.allclose(theirs[sees], expected[sees], atol=1e-4)
+        assert same == (model.symmetry == "canonical")
+    actor = lively(Mlp(messages="graph"), env)
+    silent = here.clone()
+    silent[RADIO] = torch.zeros_like(silent[RADIO])
+    assert not torch.allclose(actor(silent)[LOGITS], actor(here.clone())[LOGITS], atol=1e-3), "talk has a say"
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_stored_batch_says_what_was_acted_on(make_env, name):
+    env, model = make_env(radio_range=6.0), MODELS[name]
+    policy = Ppo().policy(signature(env), model)
+    with torch.no_grad():
+        batch = env.rollout(5, policy)
+    canonical = model.canonical_batch(signature(env), packed=True)(batch)
+    ours = over_canonical(policy).get_dist(canonical.reshape(-1)).log_prob(canonical[ACTION].flatten(0, 1))
+    torch.testing.assert_close(ours, policy.get_dist(batch).log_prob(batch[ACTION]).flatten(0, 1))
+    again = policy(batch.exclude(LOGITS).reshape(-1))[LOGITS]
+    torch.testing.assert_close(again, batch[LOGITS].flatten(0, 1))
+
+
+@pytest.mark.parametrize(
+    ("overrides", "rule"),
+    [
+        (["model.memory=8"], r"model\.memory must be 0 where agents talk"),
+        (["model.sharing=role"], r"model\.sharing must be team where agents talk"),
+        (["model.message_size=12"], r"model\.message_size must be a multiple of 8"),
+        (["algorithm=dqn"], r"model\.messages must be none where the algorithm replays"),
+        (["imitation.demonstrations=somewhere"], r"imitation\.demonstrations must be null where agents talk"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(overrides, rule):
+    with pytest.raises(ConfigError, match=rule):
+        run_config(plain(compose_config("train", ["model.messages=graph", *overrides])))
+
+
+def test_one_word_lets_the_environment_tell_whom_agents_hear():
+    made = run_config(plain(compose_config("train", ["model.messages=graph", "team.radio_range=5"])))
+    assert RADIO in made.make_env(2, 0).reset().keys(True, True)
+    silent = run_config(plain(compose_config("train", [])))
+    assert RADIO not in silent.make_env(2, 0).reset().keys(True, True)
+
+
+def test_another_scenario_leaves_a_talking_team_its_radio():
+    record = SavedConfig(
+        choices={"scenario": "skirmish"}, values={"model": {"messages": "graph"}, "team": {"messages": "graph"}}
+    )
+    config = restore(record, ["scenario=large", "team.radio_range=7"])
+    assert config.team.messages == "graph" and config.team.n_agents == 8 and config.team.radio_range == 7

@@ -1,0 +1,96 @@
+"""Baselines that search: they act on what their agents know, as learned policies do.
+
+Where sight is not limited (``sensing=full``) they know all, and go straight to the fire.
+"""
+
+from abc import abstractmethod
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.heuristics.base import (
+    Heuristic,
+    extinguish_or,
+    known_fire,
+    move_towards,
+    nearest_marked,
+    place,
+    target_or_water,
+)
+from warp_torchrl.world.random import Stream, uniform
+from warp_torchrl.world.sensing import Sight, freshness
+from warp_torchrl.world.state import WorldState
+
+
+class Searching(Heuristic):
+    """Extinguishes what it can reach, else goes to the nearest fire that it knows of, else searches.
+
+    Agents whose role cannot extinguish always search.
+    """
+
+    def choose(self, state: WorldState, mask: Tensor) -> Tensor:
+        """Return the actions, int64 [B, A]."""
+        team = self.env.world.team
+        fire = known_fire(state, self.env) & team.table(mask.device).can["extinguish"][:, None, None]
+        found, index = nearest_marked(state, fire)
+        target = torch.where(found[..., None], place(index, state), self.search(state))
+        return extinguish_or(move_towards(state, self.env, target_or_water(state, self.env, target)), mask)
+
+    @abstractmethod
+    def search(self, state: WorldState) -> Tensor:
+        """Return the cell to which each agent goes while it knows of no fire, int64 [B, A, 2]."""
+
+
+class Oldest(Searching):
+    """Searches where it has not looked for longest: greedy in staleness, distance, and the agent's own sector.
+
+        score = (1 - freshness) - 2 distance / max(H, W) - |sector of the cell - own sector| + draw / 10
+
+    Sectors are shares of the right angle at the corner where the team started; the draw is one for each agent and cell.
+    """
+
+    def search(self, state: WorldState) -> Tensor:
+        """Return the cell with the best score for each agent, int64 [B, A, 2]."""
+        (height, width), agents = state.cells.shape[1:], state.vehicles.position.shape[1]
+        row, column = _grid(state)
+        own = state.vehicles.position[..., None, None]
+        distance = torch.maximum((row - own[:, :, 0]).abs(), (column - own[:, :, 1]).abs())
+        away_row = (row - state.vehicles.base[:, 0, None, None]).abs()
+        away_column = (column - state.vehicles.base[:, 1, None, None]).abs()
+        sector = torch.atan2(away_row.float(), away_column.float()) / (torch.pi / 2.0)
+        mine = (torch.arange(agents, device=row.device) + 0.5)[:, None, None] / agents
+        stale = torch.zeros_like(distance) if state.knowledge is None else 1.0 - freshness(state.knowledge, state.step)
+        draw = uniform(state.key, 0, Stream.POLICY, (agents, height, width))
+        score = stale - 2.0 * distance / max(height, width) - (sector[:, None] - mine).abs() + 0.1 * draw
+        return place(score.flatten(2).argmax(dim=-1), state)
+
+
+class Lawnmower(Searching):
+    """Searches in lanes: each agent mows its own strip of the map, back and forth, as wide as it sees."""
+
+    def search(self, state: WorldState) -> Tensor:
+        """Return the point of its lanes where each agent should be by now, int64 [B, A, 2]."""
+        (height, width), agents = state.cells.shape[1:], state.vehicles.position.shape[1]
+        device, sensing, team = state.cells.device, self.env.world.sensing, self.env.world.team
+        reach = sensing.reach(team) if isinstance(sensing, Sight) else [max(height, width)] * agents
+        sees = torch.tensor(reach, device=device)
+        edge = torch.arange(agents + 1, device=device) * width // agents
+        first, last = edge[:-1], edge[1:] - 1
+        lane = (2 * sees + 1).clamp(max=height)
+        lanes = (height + lane - 1) // lane
+        strip = (last - first + 1).clamp(min=1)
+        length = strip + lane  # along one lane, and over to the next
+        gone = state.step[:, None] * team.table(device).stride
+        turn, along = gone // length % (2 * lanes), gone % length
+        down = torch.where(turn < lanes, turn, 2 * lanes - 1 - turn)  # to the last lane and back again
+        across = torch.where(turn % 2 == 0, first + along.clamp(max=strip - 1), last - along.clamp(max=strip - 1))
+        row = (down * lane + sees).clamp(max=height - 1)
+        row = torch.where(state.vehicles.base[:, :1] > 0, height - 1 - row, row)
+        return torch.stack((row, across), dim=-1)
+
+
+def _grid(state: WorldState) -> tuple[Tensor, Tensor]:
+    """Return the row of each cell, int64 [H, 1], and its column, int64 [1, W]."""
+    height, width = state.cells.shape[1:]
+    device = state.cells.device
+    return torch.arange(height, device=device)[:, None], torch.arange(width, device=device)[None]

@@ -1,0 +1,118 @@
+"""Networks whose agents talk: attention over the messages of those whom each of them hears."""
+
+import torch
+from torch import Tensor, nn
+
+from warp_torchrl.models.canonical import Orientation
+from warp_torchrl.models.networks import Network
+from warp_torchrl.models.signature import Entry
+
+RADIO_SCALE = 1.0 / 16.0
+"""What a cell of distance is to the networks."""
+
+
+class Round(nn.Module):
+    """One round of talk: each agent sends a message, and attends to those that it hears.
+
+    The graph is who hears whom, and changes every step; it is small and dense, so that torch's own attention over all
+    pairs with a mask needs no lists of edges, no scatter and no copies of a batch.
+
+    A message is told in the orientation of the map (``Orientation.units_back``), and heard in that of its receiver,
+    with the place of its sender about the receiver; so what a team does turns with the map as each of its agents does.
+
+    Args:
+        size: Features of an agent.
+        message: Numbers of a message, a multiple of 8.
+        heads: Of the attention.
+    """
+
+    def __init__(self, size: int, message: int, heads: int) -> None:
+        super().__init__()
+        self.heads = heads
+        self.send, self.ask = nn.Linear(size, message), nn.Linear(size, message)
+        self.hear = nn.Linear(message + 2, 2 * message)
+        self.take = nn.Linear(message, size, bias=False)
+        for layer in (self.send, self.ask, self.hear):
+            nn.init.orthogonal_(layer.weight, 2.0**0.5)
+            nn.init.zeros_(layer.bias)
+        nn.init.orthogonal_(self.take.weight)
+
+    def told(self, features: Tensor, index: Tensor) -> Tensor:
+        """Return the messages that agents send, in the orientation of the map, [..., A, M], numbers in -1..1.
+
+        Args:
+            features: [..., A, F].
+            index: Of the agents' ``Orientation``, int64 [..., A].
+        """
+        return Orientation(index).units_back(torch.tanh(self.send(features)))
+
+    def forward(self, features: Tensor, radio: Tensor, index: Tensor) -> Tensor:
+        """Return features with what was heard added, [..., A, F].
+
+        Args:
+            features: [..., A, F].
+            radio: Of each agent and each other: 1 where it hears it, else 0; rows and columns from it to the other
+                [cells]; float32 [..., A, A, 3].
+            index: Of the agents' ``Orientation``, int64 [..., A].
+        """
+        team = radio.shape[-2]
+        own = Orientation(index[..., None].expand(*index.shape, team))
+        heard = own.units(self.told(features, index)[..., None, :, :].expand(*index.shape, team, -1))
+        place = own.offsets(radio[..., 1:] * RADIO_SCALE).to(heard.dtype)
+        key, value = self.hear(torch.cat((heard, place), dim=-1)).chunk(2, dim=-1)
+        nothing = torch.zeros_like(key[..., :1, :])  # attended to by whom nobody reaches
+        keys, values = (self._by_head(torch.cat((each, nothing), dim=-2)) for each in (key, value))
+        hears = nn.functional.pad(radio[..., 0] > 0.5, (0, 1), value=True).flatten(0, -2)[:, None, None]
+        query = self._by_head(self.ask(features)[..., None, :])
+        found = nn.functional.scaled_dot_product_attention(query, keys, values, attn_mask=hears)
+        return features + self.take(found.transpose(1, 2).reshape(*index.shape, -1))
+
+    def _by_head(self, given: Tensor) -> Tensor:
+        """Return [..., A, n, M] as [all, heads, n, M / heads]."""
+        return given.flatten(0, -3).unflatten(-1, (self.heads, -1)).transpose(1, 2)
+
+
+class TalkingNetwork(nn.Module):
+    """A network whose agents exchange messages beside its first layer, in some rounds, and decide then.
+
+    Run by each agent for itself it needs the agent's own entries, and the messages of those whom it hears: one in each
+    round. Gradients flow from what an agent does into what the others told it (Sukhbaatar et al. 2016, "Learning
+    multiagent communication with backpropagation"; over graphs by attention, as in Das et al. 2019, "TarMAC").
+
+    Args:
+        network: The network without talk; rounds are computed in float32 whatever its arithmetic.
+        size: Features of its first layer.
+        message: Numbers of a message, a multiple of 8.
+        rounds: Of talk in a step.
+        heads: Of the attention.
+    """
+
+    def __init__(self, network: Network, size: int, message: int, rounds: int, heads: int = 4) -> None:
+        super().__init__()
+        self.network = network
+        self.rounds = nn.ModuleList(Round(size, message, heads) for _ in range(rounds))
+
+    @property
+    def entries(self) -> list[Entry]:
+        """What it reads of each agent, before the radio and the orientation."""
+        return self.network.entries
+
+    def forward(self, *inputs: Tensor) -> Tensor:
+        """Return float32 [..., A, out].
+
+        Args:
+            inputs: Entries [..., A, ...], the radio float32 [..., A, A, 3] as in ``Round.forward``, and the index of
+                the agents' ``Orientation`` int64 [..., A], where they have one.
+        """
+        seen = inputs[: len(self.entries)]
+        radio, *turned = inputs[len(self.entries) :]
+        index = turned[0] if turned else torch.zeros(radio.shape[:-2], dtype=torch.int64, device=radio.device)
+        device, network = radio.device.type, self.network
+        with network.arithmetic(device):
+            features = network.body[0](network.encoder(*seen))
+        with torch.autocast(device, enabled=False):
+            features = features.to(torch.float32)
+            for each in self.rounds:
+                features = each(features, radio, index)
+        with network.arithmetic(device):
+            return network.body[1:](features).to(torch.float32)
