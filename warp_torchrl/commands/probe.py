@@ -1,0 +1,78 @@
+"""The command probe: what can be read from the messages of a policy."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from warp_torchrl.commands.program import run_program
+from warp_torchrl.config.construction import ConfigError, construct
+from warp_torchrl.config.grammar import own_values
+from warp_torchrl.config.run_config import run_config
+from warp_torchrl.config.seeds import FIRST_EVALUATED
+from warp_torchrl.evaluation.probe import Reading, probe
+from warp_torchrl.named_policy import NamedPolicy, fitted_policy
+from warp_torchrl.validation import check_fields
+
+USAGE = "python -m warp_torchrl.probe policy=NAME or FOLDER [episodes=64] [KEY=VALUE ...]"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Probe:
+    """What is probed.
+
+    Attributes:
+        policy: A run folder, or a checkpoint, of a team that talks.
+        episodes: Worlds that it plays in; half of them fit the linear maps, the others judge.
+        overrides: Of the scenario.
+
+    Raises:
+        ValueError: If a value is out of its range.
+    """
+
+    policy: str
+    episodes: int = 64
+    overrides: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_fields(self, episodes=(2, 4096))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print what can be read from the messages of the policy that the command line names; return the exit code."""
+    return run_program(arguments, f"{USAGE}\n\n{Probe.__doc__}", lambda given: _probe(read(given)))
+
+
+def read(arguments: Sequence[str]) -> Probe:
+    """Return what a command line asks for.
+
+    Raises:
+        ConfigError: If a word is no ``key=value``, or a value does not fit.
+    """
+    values, rest = own_values(arguments, ("policy", "episodes", "debug"), ("policy",))
+    return construct(Probe, {**{key: each for key, each in values.items() if key != "debug"}, "overrides": rest}, "")
+
+
+def _probe(asked: Probe) -> None:
+    named = NamedPolicy(asked.policy)
+    if named.checkpoint is None:
+        raise ConfigError(f"policy must be a trained one, got {asked.policy}")
+    config: dict[str, Any] = named.config(asked.overrides)
+    made = run_config(config)
+    env = made.make_env(asked.episodes, FIRST_EVALUATED)
+    policy = fitted_policy(named.checkpoint, env, asked.policy)
+    try:
+        found = probe(policy, env, FIRST_EVALUATED)
+    except ValueError as error:
+        raise ConfigError(str(error)) from None
+    print(table(found, made.scenario), flush=True)
+
+
+def table(found: Sequence[Reading], scenario: str) -> str:
+    """Return a Markdown table of what can be read."""
+    return "\n".join(
+        [
+            f"| what a message tells on `{scenario}` (R^2) | trained | weights drawn anew | messages |",
+            "|---|---|---|---|",
+            *(f"| {each.what} | {each.trained:.2f} | {each.drawn_anew:.2f} | {each.messages} |" for each in found),
+        ]
+    )
