@@ -80,6 +80,19 @@ def test_every_kind_of_cell_has_its_own_colour():
     assert len(kinds.unique(dim=0)) == len(kinds) == 33 + 33 + 5 + 2 + 2
 
 
+def test_what_nobody_saw_lately_is_in_fog():
+    state = drawn([[6, 12, 6, 12, 6]])
+    plain = colours(state)[0]
+    record = torch.tensor([[[[18, 1, 18, 1, 0]], [[1, 1, 1, 18, 0]]]], dtype=torch.int32) * 64
+    state = state.replace(knowledge=record, step=torch.full_like(state.step, 17))  # seen now, or 17 steps ago
+    fog = colours(state)[0]
+    assert [torch.equal(ours, theirs) for ours, theirs in zip(fog, plain)] == [True, False, True, True, False]
+    assert (fog[1].int() < plain[1].int()).all() and (fog[4].int() < plain[4].int()).all()
+    assert not torch.equal(fog[1], fog[4]), "fire is seen through it"
+    earlier = colours(state.replace(step=torch.full_like(state.step, 16)))[0]
+    assert torch.equal(earlier[1], plain[1]) and not torch.equal(earlier[4], plain[4])
+
+
 def test_marks_are_drawn_where_they_are():
     # forest of age 6; burnt, cleared, wet and burning cells on the diagonal
     cells = [[0, 6, 6, 6], [6, 0, 6, 6], [6, 6, 6, 6], [6, 6, 6, 12]]

@@ -13,6 +13,7 @@ from torch import Tensor
 from torch.nn.functional import interpolate
 
 from warp_torchrl.world.role import ROLES
+from warp_torchrl.world.sensing import freshness
 from warp_torchrl.world.state import EMPTY, FIRST_FIRE, OLDEST, Cover, WorldState, count_trees, is_burning
 
 # The fire front, 11..13, is lighter than any ground; 14 stays 16 units of CIE Lab off without the red or green cone.
@@ -26,7 +27,8 @@ _GROUND = {  # without a tree, youngest tree, oldest tree
 _FIRE = ((255, 246, 120), (255, 198, 44), (255, 138, 34), (226, 42, 26), (136, 16, 48))
 _ASH, _FIREBREAK, _WATER = (40, 38, 42), (230, 204, 168), (84, 196, 255)
 _AGENT = (((255, 255, 255), (124, 30, 190)), ((16, 18, 24), (90, 236, 255)))  # each role's outline and body
-_AGES, _FIRE_ROW, _ASH_ROW, _FIREBREAK_ROW, _WET_ROW = 11, 55, 60, 61, 62  # where kinds start in the colour table
+_AGES, _FIRE_ROW, _ASH_ROW, _FIREBREAK_ROW, _WET_ROW, _FOG_ROW = 11, 55, 60, 61, 62, 124  # in the colour table
+_LATELY = 0.5  # freshness of what was seen 16 steps ago, from which a cell is in fog
 _MAP_SIDE, _PANEL, _COLUMN, _MARGIN = 384, (216, 384), 112, 12  # [pixels]
 _PAPER, _INK, _SOFT, _LINE = (24, 27, 32), (240, 241, 243), (168, 170, 174), (98, 101, 105)
 _MOST_FRAMES, _FRAME_MS, _LAST_FRAME_MS = 130, 120, 2000  # 130: an episode of 256 steps keeps every second frame
@@ -128,25 +130,33 @@ class EpisodeRecorder:
 
 
 def _ground_colours(state: WorldState) -> Tensor:
-    """Return the colour of each cell, uint8 [B, H, W, 3]."""
+    """Return the colour of each cell, uint8 [B, H, W, 3]; in fog what no agent saw in the last 16 steps."""
     cells = state.cells.to(torch.int64)
     row = state.landscape.cover.to(torch.int64) * _AGES + cells
     row = torch.where(is_burning(state.cells), cells + (_FIRE_ROW - FIRST_FIRE), row)
     row = row.masked_fill(state.burned & (cells == EMPTY), _ASH_ROW)
     row = row.masked_fill(state.firebreak & (cells == EMPTY), _FIREBREAK_ROW)
-    return _colour_table(cells.device)[row + (state.wet > 0) * _WET_ROW]
+    row = row + (state.wet > 0) * _WET_ROW
+    if state.knowledge is not None:
+        lately = freshness(state.knowledge.amax(dim=1, keepdim=True), state.step)[:, 0] >= _LATELY
+        row = torch.where(lately, row, row % _WET_ROW + _FOG_ROW)
+    return _colour_table(cells.device)[row]
 
 
 @lru_cache(maxsize=8)
 def _colour_table(device: torch.device) -> Tensor:
-    """Return the colours of dry, then of wet cells: trees by cover and age, fire, ash, firebreak; uint8 [124, 3]."""
+    """Return the colours of dry, of wet, and of cells in fog: trees by cover and age, fire, ash, firebreak.
+
+    uint8 [186, 3].
+    """
     empty, young, old = torch.tensor([_GROUND[cover] for cover in Cover], dtype=torch.float32).unbind(1)
     ages = young[:, None] + (old - young)[:, None] * torch.linspace(0.0, 1.0, OLDEST)[:, None]
     ground = torch.cat((empty[:, None], ages), dim=1).flatten(0, 1)
     dry = torch.cat((ground, torch.tensor([*_FIRE, _ASH, _FIREBREAK])))
     wet = dry.lerp(torch.tensor(_WATER, dtype=torch.float32), 0.65)
     wet[_FIRE_ROW:_ASH_ROW] = dry[_FIRE_ROW:_ASH_ROW]
-    return torch.cat((dry, wet)).round().to(torch.uint8).to(device)
+    fog = dry.lerp(torch.tensor(_PAPER, dtype=torch.float32), 0.6)
+    return torch.cat((dry, wet, fog)).round().to(torch.uint8).to(device)
 
 
 def _glyphs(radius: int, device: torch.device) -> Tensor:

@@ -17,11 +17,15 @@ from warp_torchrl.evaluation.match import Match, fits
 from warp_torchrl.heuristics import HEURISTICS, idle_action
 from warp_torchrl.models import ACTION, ACTION_MASK, memory_apart
 from warp_torchrl.policy import MODES
+from warp_torchrl.world.sensing import Full
 from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.team import Team
+from warp_torchrl.world.world import World
 
 BASELINES = ("noop", "random", "local", "greedy", "coordinated")
 """Baselines of every table."""
+SEARCHING = ("oldest", "lawnmower")
+"""Those that are there too where agents know what was seen alone."""
 
 _CELLS_ABREAST = 2**21
 """Of the worlds of all heuristics that play in one batch; more take much memory, and gain nothing."""
@@ -36,6 +40,11 @@ class Recorder(Protocol):
     def add(self, state: WorldState) -> None:
         """Append world 0 of a batch."""
         ...
+
+
+def baselines_of(world: World) -> tuple[str, ...]:
+    """Return the baselines that stand beside a policy in a world."""
+    return BASELINES if isinstance(world.sensing, Full) else (*BASELINES, *SEARCHING)
 
 
 def play(
