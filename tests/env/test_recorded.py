@@ -17,7 +17,7 @@ SCENARIOS = [
     ["scenario=default", "observation=paper", "landscape.relief=200", "fire=paper"],
     ["scenario=hazard", "reward=adaptive"],
     ["scenario=hetero", "reward=collaborative"],
-    ["scenario=smoke", "sensing.share=true", "team.messages=graph", "team.radio_range=6", "team.radio_loss=0.1"],
+    ["scenario=smoke", "team.messages=both", "team.radio_range=6", "team.radio_loss=0.1"],
 ]
 
 

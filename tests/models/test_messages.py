@@ -148,7 +148,7 @@ def test_a_stored_batch_says_what_was_acted_on(make_env, name):
         (["model.memory=8"], r"model\.memory must be 0 where agents talk"),
         (["model.sharing=role"], r"model\.sharing must be team where agents talk"),
         (["model.message_size=12"], r"model\.message_size must be a multiple of 8"),
-        (["algorithm=dqn"], r"model\.messages must be none where the algorithm replays"),
+        (["algorithm=dqn"], r"model\.messages must be none or map where the algorithm replays"),
         (["imitation.demonstrations=somewhere"], r"imitation\.demonstrations must be null where agents talk"),
     ],
 )
@@ -164,9 +164,19 @@ def test_one_word_lets_the_environment_tell_whom_agents_hear():
     assert RADIO not in silent.make_env(2, 0).reset().keys(True, True)
 
 
-def test_another_scenario_leaves_a_talking_team_its_radio():
+@pytest.mark.parametrize(("trained", "kept"), [("graph", "graph"), ("map", "none")])
+def test_another_scenario_leaves_a_talking_team_its_radio(trained, kept):
+    """... and takes the maps of a team that does not see all."""
     record = SavedConfig(
-        choices={"scenario": "skirmish"}, values={"model": {"messages": "graph"}, "team": {"messages": "graph"}}
+        choices={"scenario": "search"}, values={"model": {"messages": trained}, "team": {"messages": trained}}
     )
     config = restore(record, ["scenario=large", "team.radio_range=7"])
-    assert config.team.messages == "graph" and config.team.n_agents == 8 and config.team.radio_range == 7
+    assert config.team.messages == kept and config.team.n_agents == 8 and config.team.radio_range == 7
+
+
+def test_maps_are_the_worlds_to_tell_and_any_learner_takes_them():
+    told = run_config(plain(compose_config("train", ["scenario=search", "model.messages=map", "algorithm=dqn"])))
+    env = told.make_env(2, 0)
+    assert env.world.team.sends_maps and RADIO not in env.reset().keys(True, True)
+    with pytest.raises(ConfigError, match=r"team\.messages must be none or graph where agents see all"):
+        run_config(plain(compose_config("train", ["model.messages=map"])))

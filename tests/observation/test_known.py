@@ -53,7 +53,7 @@ def test_what_nobody_has_seen_makes_no_difference_to_what_is_shown(preset):
     before, after = shown(preset, state, world), shown(preset, other, world)
     assert all(torch.equal(before[name], after[name]) for name in before)
     moved = state.vehicles.position.clone()
-    moved[:, 1] = (moved[:, 0] + 6) % 12
+    moved[:, 1] = torch.where(moved[:, 0] < 8, moved[:, 0] + 4, moved[:, 0] - 4)  # in view, beyond sight
     far = state.replace(vehicles=state.vehicles.replace(position=moved))
     assert not knows_where(far, world).any()
     alone = far.replace(vehicles=far.vehicles.replace(position=moved[:, :1].expand(-1, 2, -1).contiguous()))

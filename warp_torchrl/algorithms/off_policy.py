@@ -100,10 +100,10 @@ class OffPolicy(Algorithm):
         Raises:
             ValueError: If they are, or do.
         """
-        if model.messages != "none":
+        if model.talks:
             raise ValueError(
-                f"messages must be none where the algorithm replays, got {model.messages}: choose mappo, ippo, ppo or "
-                "a2c"
+                f"messages must be none or map where the algorithm replays, got {model.messages}: choose mappo, ippo, "
+                "ppo or a2c"
             )
         if model.memory:
             raise ValueError(

@@ -67,8 +67,8 @@ class Imitation:
                 "demonstrations must be null where agents remember, since acts are learned one by one: choose "
                 f"model.memory=0, got {model.memory}"
             )
-        if self.demonstrations is not None and model.messages != "none":
+        if self.demonstrations is not None and model.talks:
             raise ValueError(
                 "demonstrations must be null where agents talk, since acts are learned one by one: choose "
-                f"model.messages=none, got {model.messages}"
+                f"model.messages=none or map, got {model.messages}"
             )

@@ -23,8 +23,8 @@ _BEFORE = {
     "algorithm.logit_penalty": 0.0,
 }
 """What runs did whose record has none of a key yet."""
-_OF_NETWORKS = ("team.messages",)
-"""Keys of a scenario that follow from a policy's networks: another scenario does not change them."""
+_OF_NETWORKS = {"team.messages": ("graph", "both")}
+"""Values of a scenario's keys that a policy's networks need: another scenario does not change them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +82,8 @@ def restore(record: SavedConfig, overrides: Sequence[str] = ()) -> DictConfig:
     for path, value in {**before, **recorded}.items():
         if "${" in str(value):  # what is recorded was resolved: this one was put there to read what is ours
             raise ConfigError(f"{path} in the run folder must be a plain value, got {value!r}")
-        if path not in _OF_NETWORKS and any(path == key or path.startswith(f"{key}.") for key in touched):
+        is_touched = any(path == key or path.startswith(f"{key}.") for key in touched)
+        if is_touched and value not in _OF_NETWORKS.get(path, ()):
             continue
         try:
             OmegaConf.update(config, path, value, merge=False, force_add=path.count(".") > 1)  # into a field's mapping

@@ -116,5 +116,5 @@ def _observe(
         world.action_mask(state),
         metrics(state, counts, world.horizon),
         central_state(state, world, forecast),
-        radio(state, world.team) if world.team.messages == "graph" else None,
+        radio(state, world.team) if world.team.sends_vectors else None,
     )

@@ -41,7 +41,7 @@ def make_specs(world: World, observation: Observation, n_worlds: int, device: to
         action_mask=Binary(n_actions, shape=(*team, n_actions), dtype=torch.bool, device=device),
         role=Categorical(len(world.team.role_names), shape=team, dtype=torch.int64, device=device),
     )
-    if world.team.messages == "graph":
+    if world.team.sends_vectors:
         reach = float(max(world.size))
         seen["agents", "radio"] = Bounded(-reach, reach, shape=(*team, world.team.n_agents, 3), device=device)
     planes = len(state_names(world))

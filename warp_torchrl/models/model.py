@@ -65,7 +65,8 @@ class Mlp:
         memory: Units of the recurrent layer by which actors remember what they saw since their episode began, see
             ``RecurrentNetwork``, a multiple of 8; 0, they act on what they see now. On-policy algorithms learn it.
         messages: ``graph``, actors tell each other what helps, see ``TalkingNetwork``: those that hear each other by
-            ``team.radio_range``. On-policy algorithms learn it. ``none``, they do not talk.
+            ``team.radio_range``. On-policy algorithms learn it. ``map``, they tell what they know of the fire, which
+            the world does for them; ``both``, or ``none``.
         message_size: Numbers of a message, a multiple of 8.
         message_rounds: Messages that each agent sends in a step, each after hearing those before.
         dtype: ``bfloat16`` computes the layers in half precision (weights stay float32), several times faster on
@@ -83,7 +84,7 @@ class Mlp:
     activation: Literal["tanh", "relu"] = "tanh"
     symmetry: Literal["canonical", "none"] = "canonical"
     memory: int = 0
-    messages: Literal["none", "graph"] = "none"
+    messages: Literal["none", "map", "graph", "both"] = "none"
     message_size: int = 32
     message_rounds: int = 1
     dtype: Literal["auto", "float32", "bfloat16"] = "auto"
@@ -96,14 +97,19 @@ class Mlp:
             raise ValueError(f"memory must be a multiple of 8, got {self.memory}")
         if self.message_size % 8:
             raise ValueError(f"message_size must be a multiple of 8, got {self.message_size}")
-        if self.messages != "none" and self.memory:
+        if self.talks and self.memory:
             raise ValueError(f"memory must be 0 where agents talk, messages={self.messages}, got {self.memory}")
-        if self.messages != "none" and self.sharing != "team":
+        if self.talks and self.sharing != "team":
             raise ValueError(f"sharing must be team where agents talk, messages={self.messages}, got {self.sharing}")
+
+    @property
+    def talks(self) -> bool:
+        """Return whether actors exchange messages of their own making."""
+        return self.messages in ("graph", "both")
 
     def actor(self, signature: Signature) -> TensorDictModuleBase:
         """Return the module that writes logits [..., A, actions] from each agent's own observation, and memory."""
-        n_actions, talks = signature.n_actions, self.messages == "graph"
+        n_actions, talks = signature.n_actions, self.talks
         return self._of_agents(signature, self.actor_hidden, n_actions, 0.01, LOGITS, memory=self.memory, talks=talks)
 
     def action_value(self, signature: Signature) -> TensorDictModuleBase:

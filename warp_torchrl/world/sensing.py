@@ -51,7 +51,7 @@ class Full(Sensing):
 
 @dataclass(frozen=True, kw_only=True)
 class Sight(Sensing):
-    """Agents know of the fire what they saw themselves, and with ``share`` what those saw whom they hear.
+    """Agents know of the fire what they saw themselves, and where they send maps what those know whom they hear.
 
     An agent sees the cells within its radius by Chebyshev distance. Through smoke it sees a cell with the chance
     exp(-smoke S), the law of Beer and Lambert, where S is the smoke at the cell: the burning cells upwind of it, each
@@ -60,7 +60,6 @@ class Sight(Sensing):
     Attributes:
         radius: How far agents see [cells].
         radius_of: The same by role, where it is another.
-        share: Whether agents tell their maps, each step, to those that hear them (``team.radio_range``).
         miss: Chance a step that a burning cell in sight is taken for the tree that it was.
         false_alarm: Chance a step that a tree in sight is taken for a young fire.
         smoke: Extinction by the smoke of one burning cell [1].
@@ -72,7 +71,6 @@ class Sight(Sensing):
 
     radius: int = 3
     radius_of: Mapping[str, int] = field(default_factory=dict)
-    share: bool = False
     miss: float = 0.0
     false_alarm: float = 0.0
     smoke: float = 0.0
@@ -107,7 +105,7 @@ class Sight(Sensing):
         known = _known(state)
         record = ((state.step + 1)[:, None, None, None] * _KINDS + self._taken_for(state)).to(torch.int32)
         knows = torch.where(self._sees(state, team), record, known)
-        if self.share:
+        if team.sends_maps:
             told = torch.where(heard(state, team)[..., None, None], knows[:, None], 0)
             knows = torch.maximum(knows, told.amax(dim=2))
         return state.replace(knowledge=torch.where(running[:, None, None, None], knows, known))

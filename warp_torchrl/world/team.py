@@ -54,8 +54,9 @@ class Team:
         extinguish_p: Chance that putting a fire out succeeds.
         tank: Extinguish acts that a vehicle carries water for; None is unlimited, 0 none at all. It fills up beside a
             lake and at the corner where the team started.
-        messages: ``graph`` shows agents whom they hear and where those are, for networks that exchange messages
-            (``model.messages``, which sets it).
+        messages: What the radio carries each step: ``map``, what agents know of the fire, to those that hear them;
+            ``graph``, the messages of networks (``model.messages``, which sets it), for which agents are shown whom
+            they hear and where those are; ``both``, or ``none``.
         radio_range: How far agents hear each other, by Euclidean distance [cells]; None is everywhere, 0 not at all.
         radio_loss: Chance that a packet is lost, drawn for each pair of agents and step.
         radio_line_of_sight: Whether hills between two antennas keep them from hearing each other.
@@ -70,7 +71,7 @@ class Team:
     allow_stay: bool = True
     extinguish_p: float = 1.0
     tank: int | None = None
-    messages: Literal["none", "graph"] = "none"
+    messages: Literal["none", "map", "graph", "both"] = "none"
     radio_range: float | None = None
     radio_loss: float = 0.0
     radio_line_of_sight: bool = False
@@ -90,6 +91,16 @@ class Team:
         unknown = {name for role in self.roles for name in ROLES[role].abilities} - ABILITIES.keys()
         if unknown:
             raise ValueError(f"abilities of a role must be of {', '.join(ABILITIES)}, got {', '.join(sorted(unknown))}")
+
+    @property
+    def sends_maps(self) -> bool:
+        """Return whether agents tell each other what they know of the fire."""
+        return self.messages in ("map", "both")
+
+    @property
+    def sends_vectors(self) -> bool:
+        """Return whether agents' networks send messages to each other."""
+        return self.messages in ("graph", "both")
 
     @property
     def n_actions(self) -> int:

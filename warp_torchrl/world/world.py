@@ -78,6 +78,10 @@ class World:
             raise ValueError(
                 f"team.n_agents must be at most a quarter of the map's {height * width} cells, got {self.team.n_agents}"
             )
+        if self.team.sends_maps and isinstance(self.sensing, Full):
+            raise ValueError(
+                f"team.messages must be none or graph where agents see all (sensing=full), got {self.team.messages}"
+            )
         _ = self.lighting  # refuses an ignition that does not fit the landscape
 
     @property
