@@ -35,6 +35,7 @@ class Stream(IntEnum):
     PACE = 13
     WEATHER = 14
     AGE_IN_TENTH = 15
+    LEVEL = 16
 
 
 def world_key(seed: Tensor, episode: Tensor | int = 0) -> Tensor:
