@@ -32,7 +32,7 @@ def test_shares_are_the_regrets(successes, shares):
 @pytest.mark.parametrize(
     ("values", "line"),
     [
-        ({"baseline": "locla"}, "baseline must be one of noop, .*, got locla: did you mean local"),
+        ({"baseline": "greedi"}, "baseline must be one of noop, .*, got greedi: did you mean greedy"),
         ({"worlds": 0}, r"worlds must be in \[1, 4096\], got 0"),
     ],
 )

@@ -7,24 +7,24 @@ from warp_torchrl.curriculum.standing import episodes_by_level
 
 
 def test_a_level_is_judged_by_each_full_group_and_counts_anew():
-    standing, judged = Standing.first(2).after([3, 1], [1.5, 1.0], group=4)
-    assert (standing.counts, standing.judged, judged) == ((3, 1), (None, None), set())
-    standing, judged = standing.after([2, 0], [1.0, 0.0], group=4)
-    assert (standing.judged, judged) == ((0.5, None), {0})  # (1.5 + 1.0) / 5
+    standing = Standing.first(2).after([3, 1], [1.5, 1.0], group=4)
+    assert (standing.counts, standing.judged) == ((3, 1), (None, None))
+    standing = standing.after([2, 0], [1.0, 0.0], group=4)
+    assert standing.judged == (0.5, None)  # (1.5 + 1.0) / 5
     assert (standing.counts, standing.sums) == ((0.0, 1), (0.0, 1.0))
-    standing, judged = standing.after([1, 3], [0.9, 3.0], group=4)
-    assert (standing.judged, judged) == ((0.5, 1.0), {1})  # (1.0 + 3.0) / 4; the other level's group is open
+    standing = standing.after([1, 3], [0.9, 3.0], group=4)
+    assert standing.judged == (0.5, 1.0)  # (1.0 + 3.0) / 4; the other level's group is open
 
 
 def test_a_level_that_is_entered_is_judged_by_what_follows():
-    standing, _ = Standing.first(2).after([4, 6], [2.0, 6.0], group=4)
-    standing, _ = standing.after([1, 1], [0.0, 0.0], group=4)
+    standing = Standing.first(2).after([4, 6], [2.0, 6.0], group=4)
+    standing = standing.after([1, 1], [0.0, 0.0], group=4)
     entered = standing.at(1)
     assert (entered.level, entered.judged, entered.counts, entered.sums) == (1, (0.5, None), (1.0, 0.0), (0.0, 0.0))
 
 
 def test_a_standing_comes_back_from_its_state():
-    standing, _ = Standing.first(3, baseline=(0.9, 0.5, 0.25)).after([4, 1, 0], [2.0, 0.5, 0.0], group=4)
+    standing = Standing.first(3, baseline=(0.9, 0.5, 0.25)).after([4, 1, 0], [2.0, 0.5, 0.0], group=4)
     assert Standing.of(standing.at(2).state_dict()) == standing.at(2)
 
 

@@ -15,7 +15,7 @@ from warp_torchrl.collection.imitation import Imitation
 from warp_torchrl.config.checkpoint_config import CheckpointConfig
 from warp_torchrl.config.construction import ConfigError, build, construct
 from warp_torchrl.config.evaluation_config import EvaluationConfig
-from warp_torchrl.config.levels import check_alike, level_configs
+from warp_torchrl.config.levels import WORLD_KEYS, check_alike, level_worlds
 from warp_torchrl.config.seeds import SEEDS, WORLDS
 from warp_torchrl.curriculum import Curriculum
 from warp_torchrl.env import LeveledEnv, WildfireEnv
@@ -41,21 +41,6 @@ COMPONENTS = (
 """Groups whose options are classes."""
 ENVIRONMENT = COMPONENTS[: COMPONENTS.index("reward") + 1]
 """Those that make an environment."""
-WORLD_COMPONENTS = COMPONENTS[: COMPONENTS.index("ignition") + 1]
-"""Those that make a world."""
-WORLD_KEYS = (
-    "scenario",
-    "landscape",
-    "wind",
-    "fire",
-    "team",
-    "ignition",
-    "steps_per_tick",
-    "horizon",
-    "cell_size",
-    "action_masking",
-)
-"""What a scenario sets."""
 COMMAND_KEYS = ("resume", "start_from", "debug", "policy", "overwrite", "maps", "maps_fires", "picture")
 """What the commands read themselves."""
 
@@ -242,7 +227,7 @@ def run_config(config: Mapping[str, Any]) -> RunConfig:
     built = build_components(config)
     parts = {"checkpoint": CheckpointConfig, "evaluation": EvaluationConfig, "imitation": Imitation}
     built |= {name: construct(kind, config.get(name, {}), name) for name, kind in parts.items()}
-    built["make_levels"] = partial(_levels, config, built)
+    built["make_levels"] = partial(level_worlds, config, built)
     values = _chosen(RunConfig, {**config, **built})
     _check_together(config)
     made = construct(RunConfig, values, "")
@@ -278,18 +263,6 @@ def build_components(config: Mapping[str, Any], names: Sequence[str] = COMPONENT
     """
     built = {name: build(config[name], name) for name in names}
     return {**built, "world": construct(World, _chosen(World, {**config, **built}), "")}
-
-
-def _levels(config: Mapping[str, Any], built: Mapping[str, Any]) -> list[World]:
-    """Return the world of each level of a configuration's curriculum; components that are the same are the same one."""
-    levels = []
-    for number, values in enumerate(level_configs(config, built["curriculum"], WORLD_KEYS)):
-        try:
-            others = {name: build(values[name], name) for name in WORLD_COMPONENTS if values[name] != config[name]}
-            levels.append(construct(World, _chosen(World, {**values, **built, **others}), ""))
-        except ConfigError as error:
-            raise ConfigError(f"curriculum.over, level {number}: {error}") from None
-    return levels
 
 
 def _chosen(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:

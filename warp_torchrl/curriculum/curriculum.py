@@ -84,7 +84,7 @@ class Curriculum:
 
     def after(self, standing: Standing, counts: Sequence[float], sums: Sequence[float]) -> Standing:
         """Return the standing after episodes that ended, ``counts`` at each level with ``sums`` of the measure."""
-        return standing.after(counts, sums, self.episodes)[0]
+        return standing.after(counts, sums, self.episodes)
 
     def shares(self, standing: Standing) -> Sequence[float]:
         """Return the share of each level in the episodes that are not the floor's; they add up to 1."""

@@ -36,16 +36,13 @@ class Standing:
         none = (0.0,) * n_levels
         return cls(counts=none, sums=none, judged=(None,) * n_levels, baseline=tuple(baseline))
 
-    def after(self, counts: Sequence[float], sums: Sequence[float], group: int) -> "tuple[Standing, set[int]]":
+    def after(self, counts: Sequence[float], sums: Sequence[float], group: int) -> "Standing":
         """Add episodes that ended.
 
         Args:
             counts: Of each level.
             sums: Of the measure over them.
             group: Episodes of a full group, at least.
-
-        Returns:
-            The new standing, and the levels that were judged just now.
         """
         now = [
             (n + more, total + its) for n, more, total, its in zip(self.counts, counts, self.sums, sums, strict=True)
@@ -54,7 +51,7 @@ class Standing:
         judged = [now[at][1] / now[at][0] if at in full else known for at, known in enumerate(self.judged)]
         open_ = [(0.0, 0.0) if at in full else each for at, each in enumerate(now)]
         counts, sums = zip(*open_, strict=True)
-        return replace(self, counts=counts, sums=sums, judged=tuple(judged)), full
+        return replace(self, counts=counts, sums=sums, judged=tuple(judged))
 
     def at(self, level: int) -> "Standing":
         """Return the same, but at a level that is learned from now on, and judged by what is played from now on."""

@@ -41,9 +41,9 @@ class Success(Curriculum):
 
     def after(self, standing: Standing, counts: Sequence[float], sums: Sequence[float]) -> Standing:
         """Return the standing after episodes that ended, at the next level where the present one was judged so."""
-        now, judged = standing.after(counts, sums, self.episodes)
-        success = now.judged[now.level]
-        if now.level not in judged or success is None:
+        now = super().after(standing, counts, sums)
+        success = now.judged[now.level]  # of the last full group since the level was entered, which kept it
+        if success is None:
             return now
         step = int(success > self.high) - int(success < self.low)
         level = min(max(now.level + step, 0), self.n_levels - 1)
