@@ -83,12 +83,12 @@ def test_levels_are_drawn_by_their_chances_and_alike_in_any_batch():
 
 def test_chances_that_change_hold_for_the_next_start():
     env = leveled(chances=(1.0, 0.0, 0.0))
-    found = played(env, 21)  # ends at the horizon of 20 at the latest: the next starts lie ready
-    assert (found[LEVEL] == 0).all()
+    worlds = torch.arange(16)[:, None]
+    env.reset(env.reset().set("_reset", worlds < 5))  # makes the next starts of all of them, of which 11 lie ready
+    assert env.level.tolist() == [0] * 16
     env.draw_by((0.0, 1.0, 0.0))
-    shown, mask = env._observe(), torch.arange(16)[:, None] < 5
-    env.reset(shown.set("_reset", mask))
-    assert env.level.tolist() == [1] * 5 + [0] * 11
+    env.reset(env._observe().set("_reset", worlds >= 12))
+    assert env.level.tolist() == [0] * 12 + [1] * 4
 
 
 def test_a_state_that_is_restored_goes_on_as_it_would_have():
