@@ -127,5 +127,6 @@ def test_a_state_that_does_not_fit_changes_nothing(change, line):
 
 
 def test_parts_are_joined_in_the_order_of_the_worlds():
-    parts = [({"a": torch.tensor([1, 4])},), ({"a": torch.tensor([2, 3])},)]
-    assert joined(parts, torch.tensor([0, 2, 3, 1]))[0]["a"].tolist() == [1, 2, 3, 4]
+    parts = [({"a": torch.tensor([1, 4])}, None), ({"a": torch.tensor([2, 3])}, None)]
+    made, nothing = joined(parts, torch.tensor([0, 2, 3, 1]))
+    assert made["a"].tolist() == [1, 2, 3, 4] and nothing is None

@@ -16,35 +16,22 @@ from warp_torchrl.observation import Observation
 from warp_torchrl.world.batch import Batch
 from warp_torchrl.world.world import World
 
-WORLD_KEYS = (
-    "scenario",
-    "landscape",
-    "wind",
-    "fire",
-    "team",
-    "ignition",
-    "steps_per_tick",
-    "horizon",
-    "cell_size",
-    "action_masking",
-)
-"""What a scenario sets."""
 
-
-def level_worlds(config: Mapping[str, Any], built: Mapping[str, Any]) -> list[World]:
+def level_worlds(config: Mapping[str, Any], built: Mapping[str, Any], keys: tuple[str, ...]) -> list[World]:
     """Return the world of each level of a configuration's curriculum, easy to hard.
 
     Args:
         config: Composed, as plain values.
         built: Its components, the curriculum among them; levels share those that are the same.
+        keys: What a scenario sets.
 
     Raises:
         ConfigError: If the curriculum names what is no key of a scenario, a list does not end with the scenario's own
             value, or a value breaks a rule.
     """
     levels = []
-    for number, values in enumerate(_configs(config, built["curriculum"])):
-        groups = [name for name in WORLD_KEYS if isinstance(values[name], Mapping) and values[name] != config[name]]
+    for number, values in enumerate(_configs(config, built["curriculum"], keys)):
+        groups = [name for name in keys if isinstance(values[name], Mapping) and values[name] != config[name]]
         try:
             parts = {**values, **built, **{name: build(values[name], name) for name in groups}}
             fitting = {each.name: parts[each.name] for each in fields(World)}
@@ -54,13 +41,13 @@ def level_worlds(config: Mapping[str, Any], built: Mapping[str, Any]) -> list[Wo
     return levels
 
 
-def _configs(config: Mapping[str, Any], curriculum: Curriculum) -> list[dict[str, Any]]:
+def _configs(config: Mapping[str, Any], curriculum: Curriculum, keys: tuple[str, ...]) -> list[dict[str, Any]]:
     """Return the configuration of each level."""
     lists = curriculum.values()
     if not lists:
         raise ConfigError("curriculum.over must name a key of the scenario: curriculum.over.steps_per_tick=[20,10,5]")
     for key, values in lists.items():
-        own = _value(config, key)
+        own = _value(config, key, keys)
         if values[-1] != own or isinstance(values[-1], bool) != isinstance(own, bool):
             raise ConfigError(f"curriculum.over.{key} must end with the scenario's own value, {own}, got {values[-1]}")
     return [
@@ -68,9 +55,9 @@ def _configs(config: Mapping[str, Any], curriculum: Curriculum) -> list[dict[str
     ]
 
 
-def _value(config: Mapping[str, Any], key: str) -> Any:
+def _value(config: Mapping[str, Any], key: str, keys: tuple[str, ...]) -> Any:
     """Return the value of a scenario's key."""
-    known = [path for path in _paths(config) if path.partition(".")[0] in WORLD_KEYS and not path.endswith("_target_")]
+    known = [path for path in _paths(config) if path.partition(".")[0] in keys and not path.endswith("_target_")]
     if key not in known:
         raise ConfigError(f"curriculum.over.{key} is not a key of the scenario{did_you_mean(key, known)}")
     node: Any = config

@@ -15,7 +15,7 @@ from warp_torchrl.collection.imitation import Imitation
 from warp_torchrl.config.checkpoint_config import CheckpointConfig
 from warp_torchrl.config.construction import ConfigError, build, construct
 from warp_torchrl.config.evaluation_config import EvaluationConfig
-from warp_torchrl.config.levels import WORLD_KEYS, check_alike, level_worlds
+from warp_torchrl.config.levels import check_alike, level_worlds
 from warp_torchrl.config.seeds import SEEDS, WORLDS
 from warp_torchrl.curriculum import Curriculum
 from warp_torchrl.env import LeveledEnv, WildfireEnv
@@ -41,6 +41,19 @@ COMPONENTS = (
 """Groups whose options are classes."""
 ENVIRONMENT = COMPONENTS[: COMPONENTS.index("reward") + 1]
 """Those that make an environment."""
+WORLD_KEYS = (
+    "scenario",
+    "landscape",
+    "wind",
+    "fire",
+    "team",
+    "ignition",
+    "steps_per_tick",
+    "horizon",
+    "cell_size",
+    "action_masking",
+)
+"""What a scenario sets."""
 COMMAND_KEYS = ("resume", "start_from", "debug", "policy", "overwrite", "maps", "maps_fires", "picture")
 """What the commands read themselves."""
 
@@ -227,7 +240,7 @@ def run_config(config: Mapping[str, Any]) -> RunConfig:
     built = build_components(config)
     parts = {"checkpoint": CheckpointConfig, "evaluation": EvaluationConfig, "imitation": Imitation}
     built |= {name: construct(kind, config.get(name, {}), name) for name, kind in parts.items()}
-    built["make_levels"] = partial(level_worlds, config, built)
+    built["make_levels"] = partial(level_worlds, config, built, WORLD_KEYS)
     values = _chosen(RunConfig, {**config, **built})
     _check_together(config)
     made = construct(RunConfig, values, "")

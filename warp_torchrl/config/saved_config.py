@@ -12,8 +12,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from warp_torchrl.config.compose import OPTION, compose_config, conf_folder, option_of, plain, without_targets
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.levels import WORLD_KEYS
-from warp_torchrl.config.run_config import COMPONENTS, ENVIRONMENT
+from warp_torchrl.config.run_config import COMPONENTS, ENVIRONMENT, WORLD_KEYS
 
 _BEFORE = {
     "model.symmetry": "none",

@@ -154,8 +154,10 @@ class LeveledEnv(WildfireEnv):
 
 
 def joined(parts: Sequence[Any], order: Tensor) -> Any:
-    """Return tensors, batches, or tuples and dictionaries of them, one after the other, then in an order int64 [B]."""
+    """Return tensors, batches, None, or tuples and dictionaries of them, one after the other, in an order int64 [B]."""
     first = parts[0]
+    if first is None:
+        return None
     if isinstance(first, Tensor):
         return torch.cat(list(parts)).index_select(0, order)
     if isinstance(first, Batch):

@@ -11,7 +11,7 @@ from typing import Any
 import torch
 
 from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.levels import WORLD_KEYS
+from warp_torchrl.config.run_config import WORLD_KEYS
 from warp_torchrl.config.saved_config import SavedConfig, restore
 from warp_torchrl.hyperparameters.training import STOPPED, Training, TrainingProcess
 from warp_torchrl.live.crew import Refused

@@ -35,7 +35,7 @@ class Stream(IntEnum):
     PACE = 13
     WEATHER = 14
     AGE_IN_TENTH = 15
-    LEVEL = 16
+    LEVEL = 19
 
 
 def world_key(seed: Tensor, episode: Tensor | int = 0) -> Tensor:
