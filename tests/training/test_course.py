@@ -29,7 +29,8 @@ def test_rows_tell_the_levels_their_chances_and_how_the_team_did(tmp_path):
     assert [each[-1] for each in chances] == [0.0, 0.0, 1.0] and level[-1] == 2.0
     assert level == sorted(level) and 0.75 * 1 + 0.25 * 2 in level
     assert saved[0] is None and 0.02 < saved[-1] <= 1.0
-    # 10 batches of 32 frames: eight of them begin below four fifths, and until then the floor's share alone is certain.
+    judged = next(at for at, each in enumerate(saved) if each is not None)
+    assert level[judged] == 0.5 and level[judged + 1] == 1.25, "a row has the chances by which its batch was drawn"
     assert all(sum(each) == pytest.approx(1.0) for each in zip(*chances, strict=True))
 
 
