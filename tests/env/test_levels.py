@@ -9,12 +9,13 @@ from torchrl.envs.utils import check_env_specs
 from tests.conftest import small_world
 from warp_torchrl.env import LeveledEnv, WildfireEnv
 from warp_torchrl.env.levels import LEVEL, joined
+from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.ignition import Ignition
 from warp_torchrl.world.wind import Uniform
 
 TARGET = small_world(horizon=12)
 EASY = replace(TARGET, steps_per_tick=6, horizon=20)
-CALM = replace(TARGET, ignition=Ignition(count=2), wind=Uniform(speed=1.0))
+CALM = replace(TARGET, ignition=Ignition(count=2), wind=Uniform(speed=1.0), fire=Fire(slope_gain=0.3, wind_gain=0.2))
 LEVELS = [EASY, CALM, TARGET]
 
 
