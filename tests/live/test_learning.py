@@ -66,10 +66,13 @@ def test_what_is_of_another_machine_is_not_asked_for():
     values = {**old.values, "device": "cuda:7", "processes": 8, "compile": True, "total_frames": 10**12}
     choices = {**old.choices, "collector": "process", "logger": "wandb"}
     values["collector"] = {"steps": 16, "workers": 4}
+    choices["curriculum"] = "success"
+    values["curriculum"] = {"over": {"steps_per_tick": [9, 4]}, "low": 0.1}
     made = composed(arguments("skirmish", SavedConfig(choices=choices, values=values), (), PEOPLE, RUN, 10))
     assert (made["device"], made["compile"], made["total_frames"]) == ("cpu", False, 10)
     assert "InProcess" in made["collector"]["_target_"] and made["collector"]["steps"] == 16
     assert "CsvOnly" in made["logger"]["_target_"]
+    assert "NoCurriculum" in made["curriculum"]["_target_"], "a trained policy goes on in the scenario that is played"
     assert made["imitation"]["teacher"] is None, "people teach now"
 
 

@@ -70,6 +70,14 @@ def test_another_class_of_the_same_fields_is_told_and_another_module_is_not(writ
     assert _other_classes(other, config) == ["wind is Calm and was Uniform"]
 
 
+def test_a_group_that_is_newer_than_the_run_is_no_edit(written):
+    config, record = written
+    before = {key: value for key, value in config.items() if key != "curriculum"}
+    assert _other_classes(before, config) == []
+    assert edits(before, {key: value for key, value in record.items() if key != "curriculum"}) == []
+    assert edits(before, record) == ["curriculum is not there and was {}"]
+
+
 @pytest.mark.parametrize("text", ["[1, 2]", "a: [", "seed: !!python/object/apply:os.system [id]", "x" * 2_000_000, ""])
 def test_what_is_no_configuration_is_refused_in_one_line(tmp_path, text):
     (tmp_path / "config.yaml").write_text(text)

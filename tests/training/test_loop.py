@@ -92,6 +92,10 @@ RUNS = {
     "taught": ["imitation.teacher=greedy", "imitation.until=0.7"],
     "remembers": ["model.memory=8"],
     "grows": ["collector.first_steps=2", "collector.grows_at=0.3", "total_frames=72"],
+    "climbs": ["curriculum=success", "curriculum.over.steps_per_tick=[9,6,4]", "curriculum.over.horizon=[6,8,10]",
+               "curriculum.episodes=4", "curriculum.low=0.01", "curriculum.high=0.02", "curriculum.floor=0.25"],
+    "regrets": ["curriculum=regret", "curriculum.over.steps_per_tick=[9,6,4]", "curriculum.over.wind.speed=[0,2,4]",
+                "curriculum.episodes=2", "curriculum.worlds=4", "algorithm=dqn", *REPLAY],
     "compiled": ["compile=true", "imitation.teacher=greedy", "imitation.until=0.7"],
     **{name: [f"algorithm={name}", *(REPLAY if name in REPLAYS else [])] for name in ALGORITHMS},
 }  # fmt: skip
@@ -119,6 +123,10 @@ FAST = {
     ("all that moves", 1),
     ("taught", 3),
     ("remembers", 3),
+    ("climbs", 1),
+    ("climbs", 3),
+    ("climbs", LAST - 1),
+    ("regrets", 3),
     ("grows", 1),
     ("grows", 3),
     ("mappo", LAST),
@@ -160,7 +168,7 @@ def test_a_run_resumed_equals_a_run_not_interrupted(tmp_path, never_stopped, sto
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", [each for each in RUNS if each not in ("climbs", "regrets")])
 def test_a_compiled_loss_is_the_eager_one(tmp_path, name):
     training = tiny(tmp_path, *RUNS[name], "compile=true", "model.dtype=float32", "algorithm.learning_rate=0")
     learner, eager = training.learner, tiny(tmp_path, *RUNS[name], "model.dtype=float32").learner

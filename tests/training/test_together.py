@@ -85,6 +85,24 @@ def test_two_processes_learn_from_people_together_and_go_on_exactly(tmp_path):
 
 
 @pytest.mark.slow
+def test_two_processes_have_one_curriculum_and_go_on_exactly(tmp_path):
+    levels = ["curriculum.over.steps_per_tick=[9,6,4]", "curriculum.over.horizon=[8,10,12]", "horizon=12"]
+    climbs = ["curriculum=success", *levels, "curriculum.episodes=6", "curriculum.low=0.01", "curriculum.high=0.02"]
+    whole = train(tmp_path / "whole", *climbs)
+    assert sorted({float(row["curriculum/level"]) for row in told(whole)}) == pytest.approx([0.2, 1.1, 2.0])
+    cut = train(tmp_path / "cut", *climbs)
+    for path in sorted((cut / "checkpoints").iterdir(), key=lambda each: int(each.name))[1:]:
+        shutil.rmtree(path)
+    finish(tmp_path / "cut", "resume=run")
+    ours, theirs = (flattened(newest(each)[0].training()) for each in (cut, whole))
+    assert set(ours) == set(theirs) and "/curriculum/level" in ours
+    for name, value in theirs.items():
+        if name != "/seconds":
+            assert torch.equal(ours[name], value) if isinstance(value, torch.Tensor) else ours[name] == value, name
+    assert told(cut) == told(whole)
+
+
+@pytest.mark.slow
 def test_a_run_that_is_stopped_goes_on_exactly(tmp_path, whole):
     (tmp_path / "cut").mkdir()
     command = [*TINY, *LENGTH, "hydra.run.dir=run", "reward.normalise=true"]

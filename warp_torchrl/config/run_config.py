@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
+from functools import cached_property, partial
 from typing import Any, Literal
 
 import torch
@@ -14,8 +15,10 @@ from warp_torchrl.collection.imitation import Imitation
 from warp_torchrl.config.checkpoint_config import CheckpointConfig
 from warp_torchrl.config.construction import ConfigError, build, construct
 from warp_torchrl.config.evaluation_config import EvaluationConfig
+from warp_torchrl.config.levels import check_alike, level_worlds
 from warp_torchrl.config.seeds import SEEDS, WORLDS
-from warp_torchrl.env import WildfireEnv
+from warp_torchrl.curriculum import Curriculum
+from warp_torchrl.env import LeveledEnv, WildfireEnv
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.fast.compile import check_compiler
@@ -33,6 +36,7 @@ COMPONENTS = (
     "model",
     "algorithm",
     "collector",
+    "curriculum",
     "logger",
 )
 """Groups whose options are classes."""
@@ -68,6 +72,8 @@ class RunConfig:
         model: The networks.
         algorithm: How they learn.
         collector: Where they collect.
+        curriculum: Which levels of the scenario they play.
+        make_levels: Returns the worlds of the levels, easy to hard, the scenario's last.
         logger: The tracker, beside ``metrics.csv``.
         n_worlds: Worlds in the batch.
         total_frames: World steps in all; agent steps are frames x agents.
@@ -92,6 +98,8 @@ class RunConfig:
     model: Any
     algorithm: Any
     collector: Any
+    curriculum: Any
+    make_levels: Any = field(compare=False)
     logger: Any
     n_worlds: int = 256
     total_frames: int = 2_000_000
@@ -151,6 +159,8 @@ class RunConfig:
             self._check_shares(self.n_processes())
         except ValueError as error:
             raise ConfigError(str(error)) from None
+        if isinstance(self.curriculum, Curriculum):
+            self._check_curriculum(self.curriculum)
         if self.graph:
             self._check_graph()
         if self.compile:
@@ -171,6 +181,26 @@ class RunConfig:
         if self.n_processes() > 1 or isinstance(self.collector, MultiProcess):
             raise ConfigError("graph must be false where several processes collect or learn")
 
+    def _check_curriculum(self, curriculum: Curriculum) -> None:
+        """Check that worlds of several rules can be played together, and by whom this training plays them."""
+        if isinstance(self.collector, MultiProcess):
+            raise ConfigError("curriculum must be none where workers collect: choose collector=direct")
+        if self.imitation.teacher is not None:
+            raise ConfigError("curriculum must be none with a teacher, who knows the rules of one level alone")
+        for name in ("graph", "compile"):
+            if getattr(self, name):
+                raise ConfigError(f"{name} must be false with a curriculum, whose steps are of ever other sizes")
+        check_alike(self.levels, curriculum, self.observation)
+
+    @cached_property
+    def levels(self) -> list[World]:
+        """Return the worlds of the curriculum's levels, easy to hard; the scenario's alone without one.
+
+        Raises:
+            ConfigError: If the curriculum names what is no key of the scenario, or a value breaks a rule.
+        """
+        return self.make_levels() if isinstance(self.curriculum, Curriculum) else [self.world]
+
     def make_env(self, n_worlds: int, seed: int, fuse: bool = False, graph: bool = False) -> WildfireEnv:
         """Return an environment of the run's scenario, on the run's device."""
         return WildfireEnv(
@@ -185,10 +215,13 @@ class RunConfig:
         )
 
     def make_training_env(self, n_worlds: int, seed: int) -> WildfireEnv:
-        """Return an environment to learn from, fused or recorded where that is asked for.
+        """Return an environment to learn from, of all levels, fused or recorded where that is asked for.
 
         The few episodes of an evaluation would take less time than their compilation.
         """
+        if isinstance(self.curriculum, Curriculum):
+            parts = {"observation": self.observation, "reward": self.reward, "device": self.device}
+            return LeveledEnv(self.levels, n_worlds=n_worlds, seed=seed, **parts)
         return self.make_env(n_worlds, seed, fuse=self.compile, graph=self.graph)
 
 
@@ -201,7 +234,7 @@ def run_config(config: Mapping[str, Any]) -> RunConfig:
     known = {each.name for each in fields(RunConfig)} | {*COMPONENTS, *WORLD_KEYS, *COMMAND_KEYS}
     for key in config:
         if key not in known:
-            has = f"it has {', '.join(sorted(known - {'world'}))}"
+            has = f"it has {', '.join(sorted(known - {'world', 'make_levels'}))}"
             raise ConfigError(f"{key} is not a key of the configuration; {has}{did_you_mean(key, known)}")
     for key in COMPONENTS:
         if key not in config:
@@ -209,6 +242,7 @@ def run_config(config: Mapping[str, Any]) -> RunConfig:
     built = build_components(config)
     parts = {"checkpoint": CheckpointConfig, "evaluation": EvaluationConfig, "imitation": Imitation}
     built |= {name: construct(kind, config.get(name, {}), name) for name, kind in parts.items()}
+    built["make_levels"] = partial(level_worlds, config, built, WORLD_KEYS)
     values = _chosen(RunConfig, {**config, **built})
     _check_together(config)
     made = construct(RunConfig, values, "")

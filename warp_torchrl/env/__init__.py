@@ -1,5 +1,6 @@
 """The environment: batched worlds behind TorchRL's ``EnvBase``."""
 
+from warp_torchrl.env.levels import LeveledEnv
 from warp_torchrl.env.wildfire import WildfireEnv
 
-__all__ = ["WildfireEnv"]
+__all__ = ["LeveledEnv", "WildfireEnv"]

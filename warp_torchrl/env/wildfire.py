@@ -212,10 +212,7 @@ class WildfireEnv(EnvBase):
             raise ValueError(f"state_dict must have {', '.join(missing)}, got {', '.join(state_dict) or 'nothing'}")
         if missing:
             state_dict = {**self.state_dict(), **state_dict}
-        worlds = state_dict["worlds"]
-        state = None
-        if worlds:
-            state = self.world.restored(filled(self.world.reset(self.seeds, self._episodes), worlds))
+        state = self._restored(state_dict["worlds"]) if state_dict["worlds"] else None
         for name in ("seeds", "episodes", "episode_reward"):
             if state_dict[name].shape != self.batch_size:
                 raise ValueError(f"{name} must have shape {list(self.batch_size)}, got {state_dict[name].shape}")
@@ -224,6 +221,10 @@ class WildfireEnv(EnvBase):
         self._episode_reward = state_dict["episode_reward"].to(self.device).clone()
         self._enter(state)
         self._resets.clear()
+
+    def _restored(self, worlds: dict[str, Tensor]) -> WorldState:
+        """Return the worlds whose entries these are."""
+        return self.world.restored(filled(self.world.reset(self.seeds, self._episodes), worlds))
 
     # Interface for TorchRL
 

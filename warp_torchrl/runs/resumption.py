@@ -139,7 +139,7 @@ def _other_classes(held: Mapping[str, Any], trained: Mapping[str, Any]) -> list[
         written = str(node.get("_target_")).rpartition(".")[2] if isinstance(node, Mapping) else ""
         return _RENAMED.get(written, written)
 
-    pairs = {group: (name(held.get(group)), name(trained[group])) for group in COMPONENTS}
+    pairs = {group: (name(held.get(group)), name(trained[group])) for group in COMPONENTS if group in held}
     return [f"{group} is {there} and was {here}" for group, (there, here) in pairs.items() if there != here]
 
 

@@ -21,6 +21,7 @@ from warp_torchrl.demonstrations.acts import demonstrations
 from warp_torchrl.runs import former
 from warp_torchrl.runs.checkpoint import Checkpoint
 from warp_torchrl.runs.transfer import actor_parameters, learned_parameters
+from warp_torchrl.training.course import course
 from warp_torchrl.training.finite import FiniteSteps, NumericalFailure
 from warp_torchrl.training.progress import TRAIN_COLUMNS, episode_columns
 from warp_torchrl.training.recorded import RecordedUpdate
@@ -41,6 +42,7 @@ class Learning:
         worlds = run_config.n_worlds // parallel.size()
         first = first_world_seed(run_config.seed) + worlds * parallel.rank()
         self.env = run_config.make_training_env(worlds, first)
+        self.course = course(run_config, self.env)
         learner = run_config.algorithm.build(self.env, run_config.model, run_config.collector.steps * worlds)
         if run_config.compile:
             learner.terms = compile_function(learner.terms)
@@ -88,6 +90,8 @@ class Learning:
         """Learn from one batch [B, T] and return its row of ``metrics.csv``."""
         learner = self.learner
         row, unsound = episode_columns(batch)
+        if self.course is not None:
+            row |= self.course.columns(batch)
         if unsound:
             raise NumericalFailure(f"after {self.frames} frames a reward is not finite; the last checkpoint stands")
         if self.reward_scale is not None:
@@ -116,6 +120,8 @@ class Learning:
     def _schedule(self) -> None:
         """Update the scheduled hyperparameters; their columns belong to the next row."""
         progress = min(1.0, self.frames / self.run_config.total_frames)
+        if self.course is not None:
+            self.course.draw(progress)
         self._scheduled = self.learner.schedule(progress)
         self._segments = self.collector.segments(progress)
         """Segments of the next batch."""
@@ -155,6 +161,7 @@ class Learning:
             "loss": dict(self.learner.loss.state_dict()),
             "optimizer": self.learner.optimizer.state_dict(),
             **self._own(),
+            **({} if self.course is None else {"curriculum": self.course.state_dict()}),
             "frames": self.frames,
         }
 
@@ -181,6 +188,8 @@ class Learning:
         self.learner.loss.load_state_dict(loss)
         self.learner.optimizer.load_state_dict(state["optimizer"])
         self.frames = int(state["frames"])
+        if self.course is not None:
+            self.course.load_state_dict(state["curriculum"])
         self._schedule()
 
     def _restore_own(self, state: Mapping[str, Any]) -> None:

@@ -35,9 +35,10 @@ class Stream(IntEnum):
     PACE = 13
     WEATHER = 14
     AGE_IN_TENTH = 15
-    RADIO = 16
-    SENSING = 17
-    SMOKE = 18
+    LEVEL = 16
+    RADIO = 17
+    SENSING = 18
+    SMOKE = 19
 
 
 def world_key(seed: Tensor, episode: Tensor | int = 0) -> Tensor:

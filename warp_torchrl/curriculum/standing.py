@@ -1,0 +1,86 @@
+"""How a team stands at each level of a curriculum."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import torch
+from torch import Tensor
+
+_LISTS = ("counts", "sums", "judged", "baseline")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Standing:
+    """What a curriculum knows of its L levels, easy to hard.
+
+    A level is judged by groups of episodes: when one is full, its mean is kept and the next one begins.
+
+    Attributes:
+        counts: Episodes in the open group of each level.
+        sums: Sums of the measure over them.
+        judged: Mean of the last full group of each level; None where there is none yet.
+        baseline: Mean of the measure that a baseline reached at each level; empty where the rule asks for none.
+        level: Index of the level that is learned now; of rules that learn one at a time.
+    """
+
+    counts: tuple[float, ...]
+    sums: tuple[float, ...]
+    judged: tuple[float | None, ...]
+    baseline: tuple[float, ...] = ()
+    level: int = 0
+
+    @classmethod
+    def first(cls, n_levels: int, baseline: Sequence[float] = ()) -> "Standing":
+        """Return the standing of a team that has played nothing yet."""
+        none = (0.0,) * n_levels
+        return cls(counts=none, sums=none, judged=(None,) * n_levels, baseline=tuple(baseline))
+
+    def after(self, counts: Sequence[float], sums: Sequence[float], group: int) -> "Standing":
+        """Add episodes that ended.
+
+        Args:
+            counts: Of each level.
+            sums: Of the measure over them.
+            group: Episodes of a full group, at least.
+        """
+        now = [
+            (n + more, total + its) for n, more, total, its in zip(self.counts, counts, self.sums, sums, strict=True)
+        ]
+        full = {level for level, (n, _) in enumerate(now) if n >= group}
+        judged = [now[at][1] / now[at][0] if at in full else known for at, known in enumerate(self.judged)]
+        open_ = [(0.0, 0.0) if at in full else each for at, each in enumerate(now)]
+        counts, sums = zip(*open_, strict=True)
+        return replace(self, counts=counts, sums=sums, judged=tuple(judged))
+
+    def at(self, level: int) -> "Standing":
+        """Return the same, but at a level that is learned from now on, and judged by what is played from now on."""
+
+        def anew(values: Sequence[Any], value: float | None) -> tuple[Any, ...]:
+            return (*values[:level], value, *values[level + 1 :])
+
+        counts, sums = anew(self.counts, 0.0), anew(self.sums, 0.0)
+        return replace(self, counts=counts, sums=sums, judged=anew(self.judged, None), level=level)
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return plain values."""
+        return {name: list(getattr(self, name)) for name in _LISTS} | {"level": self.level}
+
+    @classmethod
+    def of(cls, state: Mapping[str, Any]) -> "Standing":
+        """Return the standing whose ``state_dict`` this is."""
+        lists = {name: tuple(state[name]) for name in _LISTS}
+        return cls(level=int(state["level"]), **lists)
+
+
+def episodes_by_level(level: Tensor, done: Tensor, measure: Tensor, n_levels: int) -> Tensor:
+    """Return how many episodes ended at each level, and the sum of a measure over them, float64 [2, L].
+
+    Args:
+        level: Of each step's world, int64 [...].
+        done: Whether the episode ended with it, bool [...].
+        measure: Of the episode so far, float32 [...].
+        n_levels: L.
+    """
+    ended = torch.stack((done.double(), torch.where(done, measure, 0.0).double())).flatten(1)
+    return ended.new_zeros(2, n_levels).index_add_(1, level.flatten(), ended)

@@ -1,0 +1,88 @@
+"""A training's way through its curriculum: how the team stands at each level, and what its worlds draw from that."""
+
+import logging
+from collections.abc import Mapping
+from typing import Any
+
+from tensordict import TensorDictBase
+
+from warp_torchrl import parallel
+from warp_torchrl.config.run_config import RunConfig
+from warp_torchrl.config.seeds import first_world_seed
+from warp_torchrl.curriculum import Curriculum, Standing
+from warp_torchrl.curriculum.standing import episodes_by_level
+from warp_torchrl.env import LeveledEnv, WildfireEnv
+from warp_torchrl.evaluation.play import play_heuristics
+
+log = logging.getLogger("warp_torchrl")
+
+
+class Course:
+    """What a curriculum makes of a training's episodes; the same in each of its processes.
+
+    Args:
+        curriculum: The rule.
+        env: Whose worlds draw their levels by it.
+        baseline: What a baseline reached at each level, where the rule asks for one.
+    """
+
+    def __init__(self, curriculum: Curriculum, env: LeveledEnv, baseline: tuple[float, ...] = ()) -> None:
+        self.curriculum, self.env = curriculum, env
+        self.standing = Standing.first(len(env.levels), baseline)
+        self.draw(0.0)
+
+    def draw(self, progress: float) -> None:
+        """Let episodes that start from now on draw their levels by the rule, at progress in 0..1."""
+        self.chances = self.curriculum.chances(self.standing, progress)
+        self.env.draw_by(self.chances)
+
+    def columns(self, batch: TensorDictBase) -> dict[str, float | None]:
+        """Judge the team by the episodes that ended in a batch [B, T] of all processes.
+
+        Returns:
+            The columns of ``metrics.csv``: the mean level of the draws while the batch was played, each level's chance,
+            and the mean of the episodes by which it was judged last.
+        """
+        info, done = batch["next", "info"], batch["next", "done"]
+        measure, n_levels = self.curriculum.measure, len(self.env.levels)
+        ended = parallel.sum_(episodes_by_level(info["level"], done, info[measure], n_levels))
+        counts, sums = ended.tolist()
+        before, self.standing = self.standing.level, self.curriculum.after(self.standing, counts, sums)
+        if self.standing.level != before:
+            log.info("curriculum: from level %d to level %d", before, self.standing.level)
+        chances, judged = self.chances, self.standing.judged
+        return {
+            "curriculum/level": sum(level * chance for level, chance in enumerate(chances)),
+            **{f"curriculum/chance_{level}": chance for level, chance in enumerate(chances)},
+            **{f"curriculum/{measure}_{level}": value for level, value in enumerate(judged)},
+        }
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return how the team stands."""
+        return self.standing.state_dict()
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Restore what ``state_dict`` returned; ``draw`` lets it be drawn by."""
+        self.standing = Standing.of(state)
+
+
+def course(plan: RunConfig, env: WildfireEnv) -> Course | None:
+    """Return a run's course, for which its baseline plays if there is one; None where it has no curriculum."""
+    if not isinstance(env, LeveledEnv):
+        return None
+    return Course(plan.curriculum, env, _baseline(plan))
+
+
+def _baseline(plan: RunConfig) -> tuple[float, ...]:
+    """Return what the curriculum's baseline reaches at each level, on worlds of the training."""
+    if plan.curriculum.asks_for is None:
+        return ()
+    name, count = plan.curriculum.asks_for
+    first, reached = first_world_seed(plan.seed), []
+    for world in plan.levels:
+        parts = {"observation": plan.observation, "reward": plan.reward, "device": plan.device}
+        env = WildfireEnv(world, n_worlds=count, seed=first, **parts)
+        reached.append(float(play_heuristics(env, first, (name,))[name][plan.curriculum.measure].mean()))
+    told = ", ".join(f"{value:.3f}" for value in reached)
+    log.info("curriculum: %s reaches %s of %s, level by level", name, told, plan.curriculum.measure)
+    return tuple(reached)
