@@ -1,9 +1,11 @@
 """Heuristic policies, the baselines. Each is a TensorDictModule like any policy.
 
-They read the state through the environment: all but ``local`` see every cell, which no learned policy does.
+They read the state through the environment: all but ``local`` and ``clockwise`` see every cell, which no learned
+policy does.
 """
 
 from warp_torchrl.heuristics.base import Heuristic, idle_action
+from warp_torchrl.heuristics.clockwise import Clockwise
 from warp_torchrl.heuristics.coordinated import Coordinated
 from warp_torchrl.heuristics.reactive import Greedy, Local, NoOp, Random
 from warp_torchrl.heuristics.ring import Mixed, Ring
@@ -16,11 +18,13 @@ HEURISTICS: dict[str, type[Heuristic]] = {
     "coordinated": Coordinated,
     "ring": Ring,
     "mixed": Mixed,
+    "clockwise": Clockwise,
 }
 """Heuristic policies by name."""
 
 __all__ = [
     "HEURISTICS",
+    "Clockwise",
     "Coordinated",
     "Greedy",
     "Heuristic",

@@ -83,31 +83,35 @@ class RetardantTeam(Team):
         An aircraft that treats a tree is credited for it, unless it was treated in this tick already: then that was
         redundant.
         """
-        drops = self._drops(action.device) & running[:, None]
-        leaves, arrived = own_cell(state), has_reached(state)
-        before = state
+        drops, step = self._drops(action.device) & running[:, None], state.step
+        target, reached = own_cell(state), has_reached(state) & running[:, None]
         treated = first = torch.zeros_like(drops)
         if self.treats == "path":
             state, treated, first = _treat(state, drops)
         state, result = super().act(state, action, running, last_spreading, wet_ticks)
-        state, ends, new = _treat(state, drops & (result.moved if self.treats == "path" else True))
+        state, ends, new = _treat(state, drops & result.moved if self.treats == "path" else drops)
         treated, first = treated | ends, first | new
-        target = torch.where(drops, torch.where(ends, own_cell(state), leaves), result.target)
-        redundant = treated & ~first
-        vehicles, step = state.vehicles, before.step[:, None]
-        empty = drops & (vehicles.tank == 0) & (self.tank != 0)
-        state = state.replace(
-            vehicles=vehicles.replace(
-                position=torch.where(empty[..., None], vehicles.base[:, None], vehicles.position),
-                tank=vehicles.tank if self.tank is None else torch.where(empty, self.tank, vehicles.tank),
-                acts=vehicles.acts + treated,
-                redundant=vehicles.redundant + redundant,
-                last_useful=torch.where(first, step, vehicles.last_useful),
-                arrived=torch.where(running[:, None], arrived & ~empty, vehicles.arrived),
-            )
+        target = torch.where(drops, torch.where(ends, own_cell(state), target), result.target)
+        redundant, vehicles = treated & ~first, state.vehicles
+        vehicles = vehicles.replace(
+            acts=vehicles.acts + treated,
+            redundant=vehicles.redundant + redundant,
+            last_useful=torch.where(first, step[:, None], vehicles.last_useful),
+            arrived=reached if vehicles.arrived is None else reached | vehicles.arrived,
         )
-        return state, result.replace(
+        return state.replace(vehicles=self._sent_back(vehicles, drops)), result.replace(
             credited=result.credited | first, redundant=result.redundant | redundant, target=target
+        )
+
+    def _sent_back(self, vehicles: Vehicles, drops: Tensor) -> Vehicles:
+        """Return the vehicles, of which those that dropped their last, bool [B, A], are at the base with full tanks."""
+        if not self.tank:
+            return vehicles
+        empty = drops & (vehicles.tank == 0)
+        return vehicles.replace(
+            position=torch.where(empty[..., None], vehicles.base[:, None], vehicles.position),
+            tank=torch.where(empty, self.tank, vehicles.tank),
+            arrived=None if vehicles.arrived is None else vehicles.arrived & ~empty,
         )
 
     def _drops(self, device: torch.device) -> Tensor:
