@@ -17,6 +17,7 @@ SCENARIOS = [
     ["scenario=default", "observation=paper", "landscape.relief=200", "fire=paper"],
     ["scenario=hazard", "reward=adaptive"],
     ["scenario=hetero", "reward=collaborative"],
+    ["scenario=haksar", "team.tank=3", "team.approach=true", "observation=at_fire", "reward=round_fire"],
 ]
 
 

@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.reward.base import Reward
+from warp_torchrl.world.fast.constants import whole_numbers
 from warp_torchrl.world.fast.squares import window
 from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.retardant import from_middle, nearest_mate
@@ -44,7 +45,7 @@ class RoundFire(Reward):
         """Return each agent's reward before sharing and shaping, float32 [B, A]."""
         before = transition.before
         moved = transition.result.moved[..., None]
-        offsets = torch.tensor(DIRECTIONS, device=moved.device)
+        offsets = whole_numbers(sum(DIRECTIONS, ()), moved.device).view(8, 2)
         step = offsets[transition.result.action.clamp(0, 7)] * moved
         comes = before.vehicles.position + step
         return self._place(before, comes) + self._company(before, comes) + self._turn(before, step)
@@ -54,8 +55,7 @@ class RoundFire(Reward):
         burns, stands = is_burning(before.cells), is_tree(before.cells)
         codes = burns.to(torch.uint8) + (~burns & ~stands).to(torch.uint8) * 2
         seen = window(comes, before.cells.shape[1:], 1).of(codes).flatten(2)
-        here, axes = seen[..., 4], (1, 3, 5, 7)
-        is_edge = (seen[..., axes] == 0).any(dim=-1)
+        here, is_edge = seen[..., 4], (seen[..., 1::2] == 0).any(dim=-1)
         is_beside = (seen != 0).any(dim=-1)
         burning = torch.where(is_edge, self.edge, self.interior)
         healthy = torch.where(is_beside, self.beside, self.far)
