@@ -52,7 +52,7 @@ def test_it_is_named_in_reports():
 
 
 def test_what_it_cannot_guide_is_told():
-    with pytest.raises(ValueError, match="guide must be null or one of noop, .* got greddy: did you mean greedy"):
+    with pytest.raises(ValueError, match=r"guide must be null or one of noop, .* got greddy: did you mean greedy"):
         Imitation(guide="greddy")
     with pytest.raises(ConfigError, match=r"imitation.guide must be null where the algorithm does not explore by it"):
         configured("algorithm=mappo", "imitation.guide=greedy")

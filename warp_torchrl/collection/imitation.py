@@ -60,8 +60,8 @@ class Imitation:
         """Check that the algorithm, the collector and the networks allow whom is learned from.
 
         Raises:
-            ValueError: If the algorithm is off-policy, or not one that a guide helps, a teacher or a guide should act where
-                workers collect, or networks that remember should learn from single acts.
+            ValueError: If the algorithm is off-policy, or not one that a guide helps, a teacher or a guide should act
+                where workers collect, or networks that remember should learn from single acts.
         """
         given = [name for name in ("teacher", "demonstrations") if getattr(self, name) is not None]
         if given and not isinstance(algorithm, OnPolicy):
