@@ -97,9 +97,9 @@ def test_an_aircraft_has_reached_the_fire_until_it_sets_out_again():
 
 def test_the_way_to_the_middle_is_diagonal_and_then_along_the_axis_with_north_before_east():
     # 6 x 6: the middle is between rows 2, 3 and columns 2, 3.
-    state = over(" ".join(["TTTTTT"] * 6), (0, 0), (5, 0), (2, 0), (0, 3))[1]
-    assert from_middle(state)[0].tolist() == [[-2.5, 2.5], [-2.5, -2.5], [-2.5, 0.5], [0.5, 2.5]]
-    # From (2, 0) the moves east, and south-east, end 2 and 2 cells from the middle; east comes first by the order.
+    state = over(" ".join(["TTTTTT"] * 6), (0, 0), (5, 0), (3, 0), (0, 3))[1]
+    assert from_middle(state)[0].tolist() == [[-2.5, 2.5], [-2.5, -2.5], [-2.5, -0.5], [0.5, 2.5]]
+    # From (3, 0) east and north-east both end 2 cells from the middle, along rows and columns; east is preferred.
     assert approach_move(state).tolist() == [[3, NORTH_EAST, EAST, 4]]
 
 
