@@ -18,6 +18,7 @@ SCENARIOS = [
     ["scenario=hazard", "reward=adaptive"],
     ["scenario=hetero", "reward=collaborative"],
     ["scenario=smoke", "team.messages=both", "team.radio_range=6", "team.radio_loss=0.1"],
+    ["scenario=haksar", "team.tank=3", "team.approach=true", "observation=at_fire", "reward=round_fire"],
 ]
 
 

@@ -30,6 +30,8 @@ SCENARIOS = (
     "paper_marl",
 )
 """Default scenarios of ``tasks``; ``giant`` takes long, and ``landfire`` needs its rasters."""
+GENERAL = tuple(name for name in HEURISTICS if name != "clockwise")
+"""The heuristics of the tables: ``clockwise`` is made for a fire in the middle of the map."""
 EPISODES = 256
 FIRST_SEED = 1_000_000
 
@@ -37,8 +39,8 @@ FIRST_SEED = 1_000_000
 def calibrate(scenario: str, device: str, episodes: int, overrides: Sequence[str] = ()) -> dict[str, Any]:
     """Return the trees saved by each heuristic on the evaluation seeds of a scenario."""
     env = make_env(scenario, n_worlds=episodes, seed=FIRST_SEED, device=device, overrides=overrides)
-    rows = play_heuristics(env, FIRST_SEED, tuple(HEURISTICS))
-    return {"scenario": scenario, "episodes": episodes} | {name: summarise(rows[name]["saved"]) for name in HEURISTICS}
+    rows = play_heuristics(env, FIRST_SEED, GENERAL)
+    return {"scenario": scenario, "episodes": episodes} | {name: summarise(rows[name]["saved"]) for name in GENERAL}
 
 
 def rank_rewards(scenario: str, device: str, episodes: int, overrides: Sequence[str] = ()) -> dict[str, Any]:
@@ -94,12 +96,12 @@ def task_table(rows: list[dict[str, Any]]) -> str:
     lines = [
         f"Trees saved, % (mean of {count} episodes, seeds from {FIRST_SEED}, and its 95 % interval)",
         "",
-        "| scenario | " + " | ".join(HEURISTICS) + " |",
-        "|---|" + "---|" * len(HEURISTICS),
+        "| scenario | " + " | ".join(GENERAL) + " |",
+        "|---|" + "---|" * len(GENERAL),
     ]
     for row in rows:
         cells = []
-        for name in HEURISTICS:
+        for name in GENERAL:
             low, high = (100 * bound for bound in row[name]["ci95"])
             cells.append(f"{100 * row[name]['mean']:.1f} ({low:.1f} .. {high:.1f})")
         lines.append(f"| {row['scenario']} | " + " | ".join(cells) + " |")

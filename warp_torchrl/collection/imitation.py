@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from warp_torchrl.algorithms.algorithm import Algorithm
+from warp_torchrl.algorithms.dqn import Dqn
 from warp_torchrl.algorithms.on_policy import OnPolicy
 from warp_torchrl.collection.collectors import InProcess, MultiProcess
 from warp_torchrl.heuristics import HEURISTICS
@@ -29,9 +30,11 @@ class Imitation:
         minibatch_size: Acts of people in an optimiser step, of all processes.
         weight: Weight of the cloning losses at the start; it falls linearly.
         until: Share of the training after which the weight is 0.
+        guide: One of ``TEACHERS``, whose actions ``dqn``, ``vdn`` and ``qmix`` take where they would explore at random;
+            None has them explore at random.
 
     Raises:
-        ValueError: If the teacher is unknown or a value is out of its range.
+        ValueError: If the teacher or the guide is unknown or a value is out of its range.
     """
 
     teacher: str | None = None
@@ -39,12 +42,15 @@ class Imitation:
     minibatch_size: int = 256
     weight: float = 1.0
     until: float = 0.3
+    guide: str | None = None
 
     def __post_init__(self) -> None:
         check_fields(self, weight=(1e-6, 1e6), until=(1e-6, 1.0), minibatch_size=(1, 1_000_000))
-        if self.teacher is not None and self.teacher not in TEACHERS:
-            hint = did_you_mean(self.teacher, TEACHERS)
-            raise ValueError(f"teacher must be null or one of {', '.join(TEACHERS)}, got {self.teacher}{hint}")
+        for name in ("teacher", "guide"):
+            given = getattr(self, name)
+            if given is not None and given not in TEACHERS:
+                hint = did_you_mean(given, TEACHERS)
+                raise ValueError(f"{name} must be null or one of {', '.join(TEACHERS)}, got {given}{hint}")
 
     def weight_at(self, progress: float) -> float:
         """Return the weight at progress in 0..1."""
@@ -54,14 +60,17 @@ class Imitation:
         """Check that the algorithm, the collector and the networks allow whom is learned from.
 
         Raises:
-            ValueError: If the algorithm is off-policy, a teacher should label what workers collect, or networks that
-                remember or talk should learn from single acts.
+            ValueError: If the algorithm is off-policy, or not one that a guide helps, a teacher or a guide should act
+                where workers collect, or networks that remember or talk should learn from single acts.
         """
         given = [name for name in ("teacher", "demonstrations") if getattr(self, name) is not None]
         if given and not isinstance(algorithm, OnPolicy):
             raise ValueError(f"{given[0]} must be null where the algorithm replays: choose mappo, ippo, ppo or a2c")
-        if self.teacher is not None and isinstance(collector, MultiProcess):
-            raise ValueError("teacher must be null where workers collect: choose collector=direct")
+        if self.guide is not None and not isinstance(algorithm, Dqn):
+            raise ValueError("guide must be null where the algorithm does not explore by it: choose dqn, vdn or qmix")
+        for name in ("teacher", "guide"):
+            if getattr(self, name) is not None and isinstance(collector, MultiProcess):
+                raise ValueError(f"{name} must be null where workers collect: choose collector=direct")
         if self.demonstrations is not None and model.memory:
             raise ValueError(
                 "demonstrations must be null where agents remember, since acts are learned one by one: choose "

@@ -41,7 +41,8 @@ def teacher_label(record: SavedConfig) -> list[str]:
     imitation = record.values.get("imitation", {})
     people = ["people"] if imitation.get("demonstrations") else []
     taught = [imitation["teacher"]] if imitation.get("teacher") else []
-    return [f"taught by {' and '.join([*taught, *people])}"] if taught or people else []
+    guided = [f"guided by {imitation['guide']}"] if imitation.get("guide") else []
+    return guided + ([f"taught by {' and '.join([*taught, *people])}"] if taught or people else [])
 
 
 def _with_floats(node: Any) -> Any:

@@ -1,10 +1,11 @@
 """Heuristic policies, the baselines. Each is a TensorDictModule like any policy.
 
-They read the state through the environment. ``local``, ``oldest`` and ``lawnmower`` know of the fire what their agents
-know; the others see every cell, which no learned policy does.
+They read the state through the environment. ``local``, ``oldest``, ``lawnmower`` and ``clockwise`` know of the fire what
+their agents know or see; the others see every cell, which no learned policy does.
 """
 
 from warp_torchrl.heuristics.base import Heuristic, idle_action
+from warp_torchrl.heuristics.clockwise import Clockwise
 from warp_torchrl.heuristics.coordinated import Coordinated
 from warp_torchrl.heuristics.reactive import Greedy, Local, NoOp, Random
 from warp_torchrl.heuristics.ring import Mixed, Ring
@@ -20,11 +21,13 @@ HEURISTICS: dict[str, type[Heuristic]] = {
     "mixed": Mixed,
     "oldest": Oldest,
     "lawnmower": Lawnmower,
+    "clockwise": Clockwise,
 }
 """Heuristic policies by name."""
 
 __all__ = [
     "HEURISTICS",
+    "Clockwise",
     "Coordinated",
     "Greedy",
     "Heuristic",

@@ -14,6 +14,7 @@ from torch import Tensor
 from warp_torchrl import parallel
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.collection.cloning import clone
+from warp_torchrl.collection.guidance import guided
 from warp_torchrl.collection.kickstarting import kickstart
 from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.config.seeds import first_world_seed
@@ -66,7 +67,7 @@ class Learning:
     def _imitating(self, learner: Learner) -> Learner:
         """Return a learner that learns from the run's teacher and people too, where it has them."""
         plan = self.run_config
-        taught = kickstart(learner, plan.imitation, self.env)
+        taught = kickstart(guided(learner, plan.imitation, self.env), plan.imitation, self.env)
         n_networks = self.env.n_agents if plan.model.sharing == "none" else 1
         seed = _seed_of_process(plan.seed, parallel.rank())
         return clone(taught, plan.imitation, demonstrations(plan, self.env), n_networks, seed)

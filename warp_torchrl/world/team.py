@@ -229,9 +229,9 @@ class Team:
             chosen.append(wanted)
             deeds.append((done, deed.becomes))
         acting = reduce(or_, [done for done, _ in deeds])
-        redundant = _is_second(target, acting)
+        redundant = is_second(target, acting)
         credited = acting & ~redundant
-        after = _changed(state, target, [(done & credited, becomes) for done, becomes in deeds])
+        after = changed(state, target, [(done & credited, becomes) for done, becomes in deeds])
         after = after.replace(
             vehicles=vehicles.replace(
                 tank=self._refill(state, tank),
@@ -273,7 +273,7 @@ class Team:
         return torch.where(by_lake | at_base, self.tank, tank)
 
 
-def _changed(state: WorldState, target: Tensor, deeds: list[tuple[Tensor, Mapping[str, Tensor | int]]]) -> WorldState:
+def changed(state: WorldState, target: Tensor, deeds: list[tuple[Tensor, Mapping[str, Tensor | int]]]) -> WorldState:
     """Return worlds with what credited acts make of their targets, int64 [B, A].
 
     It is written as sums of differences, so that the order of the agents does not matter.
@@ -293,7 +293,7 @@ def _changed(state: WorldState, target: Tensor, deeds: list[tuple[Tensor, Mappin
     return state.replace(**after)
 
 
-def _is_second(target: Tensor, acting: Tensor) -> Tensor:
+def is_second(target: Tensor, acting: Tensor) -> Tensor:
     """Return which agents act on a target that an acting agent of lower index has, bool [B, A]."""
     same = (target[:, :, None] == target[:, None, :]) & acting[:, :, None] & acting[:, None, :]
     return same.tril(diagonal=-1).any(dim=-1)
