@@ -131,7 +131,7 @@ def test_a_pupil_comes_to_do_what_its_teacher_does(tmp_path):
 @pytest.mark.parametrize(
     ("overrides", "said"),
     [
-        (["imitation.teacher=nobody"], r"imitation.teacher must be null or one of .*coordinated, got nobody"),
+        (["imitation.teacher=nobody"], r"imitation.teacher must be null or one of .*coordinated.*, got nobody"),
         (["imitation.teacher=ring"], r"imitation.teacher must be null or one of .*, got ring"),
         (["imitation.teacher=greedy", "algorithm=dqn"], r"imitation.teacher must be null where the algorithm replays"),
         (["imitation.teacher=greedy", "collector=process"], r"imitation.teacher must be null where workers collect"),

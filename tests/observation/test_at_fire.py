@@ -44,3 +44,8 @@ def test_networks_read_it_north_up():
     assert Mlp(symmetry="none").actor(signature(env))(env.reset())[LOGITS].shape == (2, 10, 11)
     with pytest.raises(ValueError, match="symmetry"):
         Mlp().actor(signature(env))
+
+
+def test_it_is_refused_where_agents_do_not_see_all():
+    with pytest.raises(ValueError, match="sensing must be full with observation=at_fire"):
+        make_env("haksar", n_worlds=1, overrides=["observation=at_fire", "sensing=sight"])

@@ -1,7 +1,7 @@
 """Heuristic policies, the baselines. Each is a TensorDictModule like any policy.
 
-They read the state through the environment. ``local``, ``oldest``, ``lawnmower`` and ``clockwise`` know of the fire what
-their agents know or see; the others see every cell, which no learned policy does.
+They read the state through the environment. ``local``, ``oldest``, ``lawnmower`` and ``clockwise`` know of the fire
+what their agents know or see; the others see every cell, which no learned policy does.
 """
 
 from warp_torchrl.heuristics.base import Heuristic, idle_action

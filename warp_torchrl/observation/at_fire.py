@@ -9,6 +9,7 @@ from warp_torchrl.observation.presets import Space
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.fast.squares import window
 from warp_torchrl.world.retardant import from_middle, nearest_mate
+from warp_torchrl.world.sensing import Full
 from warp_torchrl.world.state import Forecast, WorldState, is_burning
 from warp_torchrl.world.world import World
 
@@ -41,6 +42,8 @@ class AtFire:
 
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
+        if not isinstance(world.sensing, Full):
+            raise ValueError("sensing must be full with observation=at_fire, which shows what aircraft see as it is")
         cells = (2 * self.radius + 1) ** 2
         return {
             "image": Space((cells,), torch.float32, 0.0, 2.0),
