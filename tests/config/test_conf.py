@@ -334,6 +334,8 @@ def test_a_yaml_file_that_was_edited_is_read_anew(tmp_path, monkeypatch):
             ["landscape=raster", "landscape.table.11=3", "landscape.table.98=0"],
         ),
         (["action_masking=false"], ["action_masking=False"]),
+        (["scenario=search", "model.messages=graph"], []),  # what networks send changes no world
+        (["scenario=search", "model.messages=both"], ["team.messages=map"]),
         (["wind=calm", "fire=paper"], ["wind=calm", "fire.growth=True", "fire.beta=0.65", "fire.p_regrow=0.01"]),
     ],
 )

@@ -111,10 +111,16 @@ def world_overrides(values: Mapping[str, Any]) -> list[str]:
     usual = dict(_leaves(usual))
     changed = [
         f"{path}={value}".replace(" ", "")
-        for path, value in _leaves({key: values[key] for key in WORLD_KEYS if key in values})
+        for path, value in map(_of_worlds, _leaves({key: values[key] for key in WORLD_KEYS if key in values}))
         if (path not in usual or usual[path] != value) and not path.endswith(".path")
     ]
     return choices[1:] + changed
+
+
+def _of_worlds(leaf: tuple[str, Any]) -> tuple[str, Any]:
+    """Return a leaf as it is for the worlds: what networks send each other changes none."""
+    path, value = leaf
+    return (path, {"graph": "none", "both": "map"}.get(value, value)) if path == "team.messages" else leaf
 
 
 def _composed_worlds(choices: Sequence[str]) -> dict[str, Any]:

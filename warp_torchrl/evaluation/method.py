@@ -22,6 +22,7 @@ _USUAL = {
     ("model", "sharing"): "team",
     ("model", "symmetry"): "canonical",
     ("model", "memory"): 0,
+    ("model", "messages"): "none",
     ("observation", "radius"): 5,
     ("reward", "barrier_rule"): "cut_off",
 }
