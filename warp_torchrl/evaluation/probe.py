@@ -98,11 +98,13 @@ def _joined(parts: list[_Heard]) -> _Heard:
 def _known(state: WorldState, env: WildfireEnv) -> dict[str, Tensor]:
     """Return what each agent knows and might tell, float32 [B, A] each; NaN where it knows of no fire."""
     knows, index = nearest_marked(state, known_fire(state, env))
-    offset = (place(index, state) - state.vehicles.position).to(torch.float32)
-    offset = offset.masked_fill(~knows[..., None], torch.nan)
+    fire = place(index, state).to(torch.float32).masked_fill(~knows[..., None], torch.nan)
+    offset = fire - state.vehicles.position
     row, column = state.vehicles.position.to(torch.float32).unbind(-1)
     return {
         "whether it knows of fire": knows.to(torch.float32),
+        "row of the nearest fire it knows of": fire[..., 0],
+        "column of the nearest fire it knows of": fire[..., 1],
         "rows to the nearest fire it knows of": offset[..., 0],
         "columns to the nearest fire it knows of": offset[..., 1],
         "its own row": row,
