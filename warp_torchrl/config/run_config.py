@@ -243,6 +243,11 @@ def build_components(config: Mapping[str, Any], names: Sequence[str] = COMPONENT
         ConfigError: With key, value and rule.
     """
     built = {name: build(config[name], name) for name in names}
+    if "reward" in built:
+        try:
+            built["reward"].check_sensing(built["sensing"])
+        except ValueError as error:
+            raise ConfigError(str(error)) from None
     return {**built, "world": construct(World, _chosen(World, {**config, **built}), "")}
 
 

@@ -1,11 +1,12 @@
 """Heuristic policies, the baselines. Each is a TensorDictModule like any policy.
 
-They read the state through the environment. ``local``, ``oldest`` and ``lawnmower`` know of the fire what their agents
-know; the others see every cell, which no learned policy does.
+They read the state through the environment. ``local``, ``oldest``, ``lawnmower`` and ``follower`` know of the fire what
+their agents know; the others see every cell, which no learned policy does.
 """
 
 from warp_torchrl.heuristics.base import Heuristic, idle_action
 from warp_torchrl.heuristics.coordinated import Coordinated
+from warp_torchrl.heuristics.following import Follower
 from warp_torchrl.heuristics.reactive import Greedy, Local, NoOp, Random
 from warp_torchrl.heuristics.ring import Mixed, Ring
 from warp_torchrl.heuristics.searching import Lawnmower, Oldest, Searching
@@ -20,12 +21,14 @@ HEURISTICS: dict[str, type[Heuristic]] = {
     "mixed": Mixed,
     "oldest": Oldest,
     "lawnmower": Lawnmower,
+    "follower": Follower,
 }
 """Heuristic policies by name."""
 
 __all__ = [
     "HEURISTICS",
     "Coordinated",
+    "Follower",
     "Greedy",
     "Heuristic",
     "Lawnmower",

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.abilities import ABILITIES, PAPER_ABILITIES, Ability, Deed, Situation, neighbourhood
+from warp_torchrl.world.flight import near_misses
 from warp_torchrl.world.role import ROLES, RoleTable, role_names, role_table
 from warp_torchrl.world.start import starting_cells
 from warp_torchrl.world.state import Action, ActionResult, Cover, Vehicles, WorldState
@@ -59,6 +60,8 @@ class Team:
         radio_range: How far agents hear each other, by Euclidean distance [cells]; None is everywhere, 0 not at all.
         radio_loss: Chance that a packet is lost, drawn for each pair of agents and step.
         radio_line_of_sight: Whether hills between two antennas keep them from hearing each other.
+        separation: Aircraft that end a step nearer to each other than this, by Euclidean distance [cells], have a near
+            miss each (after Ali, Ali and Baig 2023, whose swarms keep apart); None counts none.
         start: ``corner`` starts the team in a corner drawn for each episode, ``anywhere`` on cells drawn over the map.
 
     Raises:
@@ -74,6 +77,7 @@ class Team:
     radio_range: float | None = None
     radio_loss: float = 0.0
     radio_line_of_sight: bool = False
+    separation: float | None = None
     start: Literal["corner", "anywhere"] = "corner"
 
     def __post_init__(self) -> None:
@@ -84,6 +88,7 @@ class Team:
             tank=(0, 10_000),
             radio_range=(0.0, 1e6),
             radio_loss=(0.0, 1.0),
+            separation=(0.0, 1e6),
         )
         if not self.roles or any(role not in ROLES for role in self.roles):
             raise ValueError(f"roles must be a list of {', '.join(ROLES)}, got {list(self.roles)}")
@@ -161,6 +166,7 @@ class Team:
             acts=counter,
             redundant=counter.clone(),
             last_useful=torch.full_like(counter, -1),
+            near_misses=None if self.separation is None else counter.clone(),
         )
 
     def open_moves(self, state: WorldState) -> Tensor:
@@ -228,6 +234,7 @@ class Team:
                 acts=vehicles.acts + reduce(or_, chosen),
                 redundant=vehicles.redundant + redundant,
                 last_useful=torch.where(credited, state.step[:, None], vehicles.last_useful),
+                near_misses=near_misses(vehicles, self.table(target.device).flies, self.separation, running),
             )
         )
         return after, ActionResult(action=action, moved=moved, credited=credited, redundant=redundant, target=target)
