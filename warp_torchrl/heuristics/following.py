@@ -3,7 +3,7 @@
 import torch
 from torch import Tensor
 
-from warp_torchrl.heuristics.base import move_towards, place, target_or_water
+from warp_torchrl.heuristics.base import move_towards, place, target_or_supply
 from warp_torchrl.heuristics.searching import Oldest
 from warp_torchrl.world.geometry import grow
 from warp_torchrl.world.radio import heard
@@ -28,7 +28,7 @@ class Follower(Oldest):
         """Return the actions, int64 [B, A]."""
         found, cell = self._oldest_of_front(state)
         target = torch.where(found[..., None], cell, self.search(state))
-        return move_towards(state, self.env, target_or_water(state, self.env, target))
+        return move_towards(state, self.env, target_or_supply(state, self.env, target))
 
     def _oldest_of_front(self, state: WorldState) -> tuple[Tensor, Tensor]:
         """Return whether each agent has a cell of the front to go to, bool [B, A], and which, int64 [B, A, 2]."""

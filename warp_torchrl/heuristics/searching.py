@@ -15,7 +15,7 @@ from warp_torchrl.heuristics.base import (
     move_towards,
     nearest_marked,
     place,
-    target_or_water,
+    target_or_supply,
 )
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.sensing import Sight, freshness
@@ -34,7 +34,7 @@ class Searching(Heuristic):
         fire = known_fire(state, self.env) & team.table(mask.device).can["extinguish"][:, None, None]
         found, index = nearest_marked(state, fire)
         target = torch.where(found[..., None], place(index, state), self.search(state))
-        return extinguish_or(move_towards(state, self.env, target_or_water(state, self.env, target)), mask)
+        return extinguish_or(move_towards(state, self.env, target_or_supply(state, self.env, target)), mask)
 
     @abstractmethod
     def search(self, state: WorldState) -> Tensor:

@@ -38,6 +38,7 @@ class Stream(IntEnum):
     RADIO = 16
     SENSING = 17
     SMOKE = 18
+    DRIFT = 19
 
 
 def world_key(seed: Tensor, episode: Tensor | int = 0) -> Tensor:

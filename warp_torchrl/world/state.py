@@ -94,6 +94,7 @@ class Vehicles(Batch):
     redundant: Tensor  # int32 [B,A], those on a target that a team-mate had
     last_useful: Tensor  # int32 [B,A], step of the last credited act; -1 before the first
     near_misses: Tensor | None = None  # int32 [B,A], steps that ended too near another aircraft; None: not counted
+    battery: Tensor | None = None  # int32 [B,A], steps of flight left; None where they are not counted
 
 
 @dataclass(eq=False, repr=False)
