@@ -209,7 +209,7 @@ def test_a_follower_goes_to_the_front_that_it_saw_longest_ago():
     env = watched_forest(Team(n_agents=1, roles=("scout",)))
     assert told(env, [[9, 9]], fires={(9, 3): 30, (3, 9): 20}) == [Action.NORTH]
     assert told(env, [[9, 9]], fires={(9, 3): 20, (3, 9): 30}) == [Action.WEST]
-    # 9 steps away and seen 10 ago, or 1 step away and seen 5 ago: the one that is near, for all that is worth.
+    # Seen 10 steps ago and 9 moves away, or seen 5 steps ago and 1 move away.
     assert told(env, [[9, 0]], fires={(9, 18): 30, (7, 0): 35}) == [Action.NORTH]
 
 

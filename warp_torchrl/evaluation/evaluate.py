@@ -14,13 +14,12 @@ from warp_torchrl.evaluation import cache
 from warp_torchrl.evaluation.maps import described, play_maps, write_maps
 from warp_torchrl.evaluation.method import method
 from warp_torchrl.evaluation.picture import KINDS, Kind, record_episode
-from warp_torchrl.evaluation.play import BASELINES, SEARCHING, Episodes, WithoutAgent, play, play_heuristics
+from warp_torchrl.evaluation.play import Episodes, WithoutAgent, baselines, play, play_heuristics
 from warp_torchrl.evaluation.report import report, table, write_json
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.policy import MODES
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs import disk
-from warp_torchrl.world.sensing import Full
 
 log = logging.getLogger("warp_torchrl")
 
@@ -46,8 +45,7 @@ def evaluate_policy(
     first, folder = plan.evaluation.first_seed, folder.resolve()
     env, one = plan.make_env(plan.evaluation.episodes, first), plan.make_env(1, first)
     name, mode, actor, filmed = _actors(plan, found, env, one)
-    usual = BASELINES if isinstance(plan.world.sensing, Full) else BASELINES + SEARCHING
-    others = _baselines(plan, env, [each for each in usual if each != found])
+    others = _baselines(plan, env, [each for each in baselines(plan.world) if each != found])
     episodes = play(env, actor, first, mode, watch=True)
     learner, digest, frames, other_modes, left_out = None, "", None, {}, {}
     if isinstance(found, checkpoints.Checkpoint):

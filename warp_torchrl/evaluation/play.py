@@ -17,13 +17,15 @@ from warp_torchrl.evaluation.match import Match, fits
 from warp_torchrl.heuristics import HEURISTICS, idle_action
 from warp_torchrl.models import ACTION, ACTION_MASK, memory_apart
 from warp_torchrl.policy import MODES
+from warp_torchrl.world.sensing import Full
 from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.team import Team
+from warp_torchrl.world.world import World
 
 BASELINES = ("noop", "random", "local", "greedy", "coordinated")
 """Baselines of every table."""
 SEARCHING = ("oldest", "lawnmower", "follower")
-"""Further ones where sight is limited."""
+"""Further ones where sight is limited, see ``baselines``."""
 
 _CELLS_ABREAST = 2**21
 """Of the worlds of all heuristics that play in one batch; more take much memory, and gain nothing."""
@@ -108,6 +110,11 @@ def _steps(
         recorder.add(env.world_state)
     env.watcher = None
     return {name: now["info", name][:, 0] for name in episode_metrics(env.world)}
+
+
+def baselines(world: World) -> tuple[str, ...]:
+    """Return the baselines of a world's table."""
+    return BASELINES if isinstance(world.sensing, Full) else BASELINES + SEARCHING
 
 
 class WithoutAgent(TensorDictModuleBase):

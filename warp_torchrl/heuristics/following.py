@@ -3,7 +3,7 @@
 import torch
 from torch import Tensor
 
-from warp_torchrl.heuristics.base import move_towards, place, target_or_supply
+from warp_torchrl.heuristics.base import idle_action, move_towards, place, target_or_supply
 from warp_torchrl.heuristics.searching import Oldest
 from warp_torchrl.world.geometry import grow
 from warp_torchrl.world.radio import heard
@@ -20,15 +20,16 @@ class Follower(Oldest):
 
         score = steps since the cell was seen - steps to go there + draw
 
-    Where it knows of no such cell it searches as ``Oldest`` does. It never extinguishes. Of the others it knows those
-    whom it hears or sees.
+    Where it knows of no such cell it searches as ``Oldest`` does; where it cannot move at all it does nothing. It never
+    extinguishes. Of the others it knows those whom it hears or sees.
     """
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
         found, cell = self._oldest_of_front(state)
         target = torch.where(found[..., None], cell, self.search(state))
-        return move_towards(state, self.env, target_or_supply(state, self.env, target))
+        move = move_towards(state, self.env, target_or_supply(state, self.env, target))
+        return torch.where(mask.gather(-1, move[..., None])[..., 0], move, idle_action(mask, self.env.world.team))
 
     def _oldest_of_front(self, state: WorldState) -> tuple[Tensor, Tensor]:
         """Return whether each agent has a cell of the front to go to, bool [B, A], and which, int64 [B, A, 2]."""
