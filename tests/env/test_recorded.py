@@ -18,6 +18,7 @@ SCENARIOS = [
     ["scenario=hazard", "reward=adaptive"],
     ["scenario=hetero", "reward=collaborative"],
     ["scenario=smoke", "sensing.share=true", "team.messages=graph", "team.radio_range=6", "team.radio_loss=0.1"],
+    ["scenario=front", "team.battery=9", "team.drift=0.05"],
 ]
 
 

@@ -26,10 +26,10 @@ class Monitor(Reward):
 
     A fire that is found sooner is watched for longer, and discounted less.
 
-    Rewards of this kind train aircraft to watch wildfires in Julian and Kochenderfer (2019, Distributed wildfire
-    surveillance with autonomous aircraft using deep reinforcement learning, JGCD 42(8)), whose aircraft keep a map of
-    the fire and of when they were where, and in Viseras, Meissner and Marchal (2021, Wildfire front monitoring with
-    multiple UAVs using deep Q-learning, IEEE Access). The terms and weights are ours.
+    After Julian and Kochenderfer (2019, Distributed wildfire surveillance with autonomous aircraft using deep
+    reinforcement learning, JGCD 42(8)), whose aircraft share a map of the fire and of when each place was visited, and
+    Viseras, Meissner and Marchal (2021, Wildfire front monitoring with multiple UAVs using deep Q-learning, IEEE
+    Access). The terms and weights are ours.
 
     Attributes:
         watched: w_w.

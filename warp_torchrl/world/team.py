@@ -61,7 +61,8 @@ class Team:
         radio_loss: Chance that a packet is lost, drawn for each pair of agents and step.
         radio_line_of_sight: Whether hills between two antennas keep them from hearing each other.
         separation: Aircraft that end a step nearer to each other than this, by Euclidean distance [cells], have a near
-            miss each (after Ali, Ali and Baig 2023, whose swarms keep apart); None counts none.
+            miss each; None counts none. Swarms that watch wildfires, as those of Ali, Ali and Baig (2023), must keep
+            apart.
         battery: Steps of flight of an aircraft, hovering too, charged at the corner where the team started; with an
             empty battery it stays where it is. None is unlimited.
         drift: Chance a step for each m/s of the wind at its cell that an aircraft is carried one cell downwind [s/m].
