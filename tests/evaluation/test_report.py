@@ -23,6 +23,7 @@ def test_what_is_watched_has_a_table_of_its_own():
     shown = table(content).splitlines()
     assert "mine                        75.0    75.0 .. 75.0     50.0        0.250" in shown
     assert "mine - noop: +50.0 points watched, +50.0 .. +50.0; more on 100 % of fires" in shown
+    assert not any("points saved" in line for line in shown), "none can act"
     near = {"near_misses": np.full(4, 0.125)}
     flown = report("front", "mine", 7, episodes(0.75, *WATCHING) | near, {"noop": episodes(0.25, *WATCHING) | near})
     assert "mine                        75.0    75.0 .. 75.0     50.0        0.250           12.5" in table(flown)

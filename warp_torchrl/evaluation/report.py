@@ -101,6 +101,8 @@ def table(content: Mapping[str, Any]) -> str:
             f"{100 * summary['cleared']['mean']:>11.2f}"
         )
     for name, difference in content["versus"].items():
+        if name in content.get("watching", {}) and difference["ci95"] == [0.0, 0.0]:
+            continue  # a team that cannot act
         low, high = (100.0 * bound for bound in difference["ci95"])
         lines.append(
             f"{content['policy']} - {name}: {100 * difference['saved_difference']:+.1f} points saved, "
