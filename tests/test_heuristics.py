@@ -13,6 +13,7 @@ from warp_torchrl.heuristics.base import can_be_put_out, claim_cells, list_cells
 from warp_torchrl.world.fast.distances import FAR, chebyshev_distance
 from warp_torchrl.world.ignition import Ignition
 from warp_torchrl.world.random import Stream, uniform
+from warp_torchrl.world.sensing import Sight
 from warp_torchrl.world.state import Action
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.array import Array
@@ -182,3 +183,70 @@ def test_baselines_rank_on_skirmish():
     assert saved["random"] < saved["local"] - 0.2
     assert saved["coordinated"] > saved["local"] + 0.1 and saved["coordinated"] > saved["greedy"] + 0.1
     assert saved["noop"] < saved["ring"] < saved["mixed"] < saved["coordinated"]
+
+
+def watched_forest(team, sensing=None, side=19):
+    """A forest of trees in calm air, and a team that knows what it saw."""
+    land = Array(cover=np.full((side, side), 3), age=np.full((side, side), 9))
+    ignition = Ignition(count=1, region=0.01, head_start=0)
+    world = World(landscape=land, wind=Calm(), team=team, ignition=ignition, sensing=sensing or Sight(radius=2))
+    return WildfireEnv(world, n_worlds=1, seed=0)
+
+
+def told(env, at, *, fires, step=40):
+    """The worlds at a step, agents at places, who all know of fires, (row, column): when they were seen."""
+    env.reset()
+    state = env.world_state
+    knowledge = state.landscape.age.to(torch.int32)[:, None].expand_as(state.knowledge) + 64 * (step + 1)
+    for (row, column), seen in fires.items():
+        knowledge[..., row, column] = (1 + seen) * 64 + 11
+    vehicles = state.vehicles.replace(position=torch.tensor([at]))
+    now = env.set_state(state.replace(knowledge=knowledge, vehicles=vehicles, step=torch.full_like(state.step, step)))
+    return HEURISTICS["follower"](env)(now)["agents", "action"][0].tolist()
+
+
+def test_a_follower_goes_to_the_front_that_it_saw_longest_ago():
+    env = watched_forest(Team(n_agents=1, roles=("scout",)))
+    assert told(env, [[9, 9]], fires={(9, 3): 30, (3, 9): 20}) == [Action.NORTH]
+    assert told(env, [[9, 9]], fires={(9, 3): 20, (3, 9): 30}) == [Action.WEST]
+    # Seen 10 steps ago and 9 moves away, or seen 5 steps ago and 1 move away.
+    assert told(env, [[9, 0]], fires={(9, 18): 30, (7, 0): 35}) == [Action.NORTH]
+
+
+def test_followers_leave_to_each_other_what_is_nearer_to_them():
+    env = watched_forest(Team(n_agents=2, roles=("scout",)))
+    at = [[9, 2], [9, 16]]
+    assert told(env, at, fires={(3, 2): 10, (15, 16): 30}) == [Action.NORTH, Action.SOUTH]
+    deaf = watched_forest(Team(n_agents=2, roles=("scout",), radio_range=0.0))
+    assert told(deaf, at, fires={(3, 2): 5, (15, 16): 30}) == [Action.NORTH, Action.NORTH_WEST], "it knows of no other"
+
+
+def test_a_follower_that_knows_of_no_fire_searches_and_one_that_could_put_it_out_does_not():
+    env = watched_forest(Team(n_agents=2, roles=("uav",)))
+    now = env.reset()
+    assert not (env.world_state.knowledge % 16 > 10).any()
+    choices = [HEURISTICS[name](env)(now)["agents", "action"].tolist() for name in ("follower", "oldest")]
+    assert choices[0] == choices[1]
+    assert told(env, [[9, 9], [9, 9]], fires={(9, 9): 40, (3, 9): 20}) == [Action.NORTH, Action.NORTH]
+
+
+def test_followers_watch_more_than_searchers_and_idlers_of_front():
+    """8 fires: standard errors of the means are under 4 points, the gaps over 25."""
+    env = make_env("front", n_worlds=8, overrides=["horizon=128"])
+    watched = {
+        name: play(env, HEURISTICS[name](env), 1_000_000)["watched"].mean() for name in ("noop", "oldest", "follower")
+    }
+    assert watched["noop"] < 0.1 < watched["oldest"] - 0.1 and watched["oldest"] + 0.15 < watched["follower"]
+
+
+@pytest.mark.parametrize("name", ["oldest", "lawnmower", "follower"])
+def test_aircraft_turn_back_before_their_batteries_are_empty(name):
+    env = make_env("front", n_worlds=4, overrides=["team.battery=24"])
+    policy, now, lowest, charged = HEURISTICS[name](env), env.reset(), 24, False
+    for _ in range(80):
+        before = env.world_state.vehicles.battery
+        now = env.step(policy(now))["next"]
+        battery = env.world_state.vehicles.battery
+        lowest = min(lowest, int(battery.min()))
+        charged |= bool(((battery == 24) & (before < 10)).any())
+    assert 0 < lowest < 24 and charged

@@ -6,7 +6,6 @@ import torch
 from tests.conftest import small_world
 from tests.world.drawing import draw
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.evaluation.play import BASELINES, baselines_of
 from warp_torchrl.heuristics import HEURISTICS, Lawnmower, Oldest
 from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.sensing import Sight, freshness, in_reach, known_codes
@@ -124,8 +123,3 @@ def test_a_lawnmower_sees_the_whole_map_there_and_back(n_agents, radius):
     state = env.world_state
     seen = (freshness(state.knowledge, state.step) > 0).any(dim=1)
     assert seen.all()
-
-
-def test_the_tables_have_those_that_search_where_sight_is_limited():
-    assert baselines_of(small_world()) == BASELINES
-    assert baselines_of(small_world(sensing=Sight())) == (*BASELINES, "oldest", "lawnmower")

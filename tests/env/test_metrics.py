@@ -3,8 +3,11 @@
 import pytest
 import torch
 
-from warp_torchrl.env.metrics import METRICS, metrics
+from tests.conftest import small_world
+from warp_torchrl.env.metrics import FLYING, METRICS, WATCHING, metrics
+from warp_torchrl.world.sensing import Sight
 from warp_torchrl.world.state import Action, count_trees
+from warp_torchrl.world.team import Team
 
 
 def test_metrics_are_fractions_that_add_up(make_small_env):
@@ -30,3 +33,28 @@ def test_acts_are_counted_for_what_they_are(make_small_env):
     assert found["redundant"].item() == 0.5  # both at one tree
     assert found["cleared"].item() == pytest.approx(1.0 / count_trees(state).initial.item())
     assert found["control_time"].item() == pytest.approx(1.0 / env.world.horizon)
+
+
+def test_limited_sight_and_aircraft_have_metrics_of_their_own(make_small_env):
+    team = Team(n_agents=2, roles=("scout",), separation=2.0)
+    env = make_small_env(4, small_world(sensing=Sight(radius=2), team=team))
+    now = env.rollout(20, break_when_any_done=False)
+    found = metrics(env.world_state, env.tree_counts, env.world.horizon)
+    assert tuple(found) == (*METRICS, *WATCHING, *FLYING)
+    assert set(now["next", "info"].keys()) == {*found, "episode_reward", "episode_length"} == {*env_names(env)}
+    for name, value in found.items():
+        assert ((value >= 0) & (value <= 1)).all(), name
+        assert torch.equal(now["next", "info", name][:, -1, 0], value)
+    state = env.world_state
+    watching, fronts = state.watching, torch.full((4,), 4, dtype=torch.int32)
+    watching = watching.replace(fronts=fronts, watched=torch.ones(4), found=torch.full((4,), 2.0))
+    misses = torch.tensor([[5, 3]] * 4, dtype=torch.int32)
+    vehicles = state.vehicles.replace(near_misses=misses)
+    step = torch.full((4,), 8, dtype=torch.int32)
+    state = state.replace(step=step, vehicles=vehicles, watching=watching.replace(uncertainty=torch.full((4,), 6.0)))
+    found = metrics(state, env.tree_counts, env.world.horizon)
+    assert [found[name][0].item() for name in (*WATCHING, *FLYING)] == [0.25, 0.5, 0.75, 0.5]
+
+
+def env_names(env):
+    return env.full_observation_spec["info"].keys()

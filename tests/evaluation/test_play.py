@@ -5,10 +5,12 @@ import json
 import pytest
 import torch
 
+from tests.conftest import small_world
 from warp_torchrl.evaluation.behaviour import BEHAVIOUR
-from warp_torchrl.evaluation.play import WithoutAgent, play
+from warp_torchrl.evaluation.play import BASELINES, WithoutAgent, baselines_of, play
 from warp_torchrl.evaluation.report import report, table, write_json
 from warp_torchrl.heuristics import Coordinated, Greedy, NoOp, Random
+from warp_torchrl.world.sensing import Sight
 
 
 def test_policies_meet_the_same_worlds_and_the_generator_is_left_alone(make_small_env):
@@ -80,3 +82,8 @@ def test_the_agent_left_out_stays_where_it_is(make_small_env):
         now = env.step(policy(now))["next"]
     after = env.world_state.vehicles.position
     assert (after[:, 0] == start[:, 0]).all() and (after[:, 1] != start[:, 1]).any()
+
+
+def test_those_that_search_are_baselines_where_sight_is_limited():
+    assert baselines_of(small_world()) == BASELINES
+    assert baselines_of(small_world(sensing=Sight())) == (*BASELINES, "oldest", "lawnmower", "follower")

@@ -149,6 +149,7 @@ def test_a_stored_batch_says_what_was_acted_on(make_env, name):
         (["model.sharing=role"], r"model\.sharing must be team where agents talk"),
         (["model.message_size=12"], r"model\.message_size must be a multiple of 8"),
         (["algorithm=dqn"], r"model\.messages must be none or map where the algorithm replays"),
+        (["team.messages=none"], r"team\.messages must be graph or both where networks talk"),
         (["imitation.demonstrations=somewhere"], r"imitation\.demonstrations must be null where agents talk"),
     ],
 )

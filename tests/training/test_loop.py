@@ -7,7 +7,9 @@ import signal
 from copy import deepcopy
 from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import torch
 
@@ -18,6 +20,7 @@ from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.models import ACTION
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.checkpoint import CheckpointError, export, newest
+from warp_torchrl.training import loop
 from warp_torchrl.training.finite import NumericalFailure
 from warp_torchrl.training.loop import Training
 from warp_torchrl.training.signals import Stopped
@@ -522,3 +525,15 @@ def test_a_batch_of_segments_is_one_of_all_steps(tmp_path):
     assert one.shape == other.shape == (4, 8)
     for key, value in one.items(include_nested=True, leaves_only=True):
         assert torch.equal(value, other[key]), key
+
+
+def test_a_policy_acts_in_the_mode_that_reaches_more_of_what_its_team_is_for(monkeypatch):
+    reached = {"sampled": {"saved": 0.5, "watched": 0.1}, "deterministic": {"saved": 0.2, "watched": 0.9}}
+
+    def played(env, policy, first_seed, mode):
+        return {name: np.full(2, value) for name, value in reached[mode].items()}
+
+    monkeypatch.setattr(loop, "play", played)
+    for scenario, mode in (("skirmish", "sampled"), ("scouts", "sampled"), ("front", "deterministic")):
+        plan = run_config(plain(compose_config("train", [f"scenario={scenario}", "evaluation.episodes=2"])))
+        assert Training._better_mode(SimpleNamespace(run_config=plan, learner=SimpleNamespace(policy=None))) == mode

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from warp_torchrl.world.front import alignment, block_shares, centre, containment, exposure, sector
+from warp_torchrl.world.front import alignment, block_shares, centre, containment, exposure, sector, spreading_front
 from warp_torchrl.world.state import count_trees
 
 from .drawing import draw, marks
@@ -65,3 +65,10 @@ def test_blocks_count_among_their_own_cells() -> None:
     shares = block_shares(mask, among, side=4)
     # The left block 4 of 16; the right one, 4 x 2 of which the upper half counts, none.
     assert shares.tolist() == [[[0.25, 0.0]]]
+
+
+def test_the_front_is_what_burns_and_can_spread() -> None:
+    state = draw("TaT .e. ..a")  # the ember spreads no more, and the last one has nothing beside it that can burn
+    assert spreading_front(state)[0].tolist() == [[False, True, False], [False] * 3, [False] * 3]
+    lakes = draw("aT", ground="g~")  # no ground that can burn
+    assert not spreading_front(lakes).any()

@@ -277,6 +277,11 @@ def build_components(config: Mapping[str, Any], names: Sequence[str] = COMPONENT
         ConfigError: With key, value and rule.
     """
     built = {name: build(config[name], name) for name in names}
+    if "reward" in built:
+        try:
+            built["reward"].check_sensing(built["sensing"])
+        except ValueError as error:
+            raise ConfigError(str(error)) from None
     return {**built, "world": construct(World, _chosen(World, {**config, **built}), "")}
 
 
@@ -287,6 +292,9 @@ def _chosen(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:
 
 def _check_together(config: Mapping[str, Any]) -> None:
     reward, algorithm = config["reward"], config["algorithm"]
+    model, team = config["model"]["messages"], config["team"]["messages"]
+    if model in ("graph", "both") and team not in ("graph", "both"):
+        raise ConfigError(f"team.messages must be graph or both where networks talk, model.messages={model}, got {team}")
     if reward["shaping"] > 0.0 and reward["gamma"] != algorithm["gamma"]:
         raise ConfigError(
             f"reward.gamma must be algorithm.gamma, {algorithm['gamma']}, for shaping to leave optimal policies as "

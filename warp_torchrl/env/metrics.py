@@ -18,6 +18,10 @@ METRICS = (
     "success",
 )
 """Names of the metrics, in the order of tables."""
+WATCHING = ("watched", "found", "uncertainty")
+"""Further ones where sight is limited, see ``world.sensing.Sight``."""
+FLYING = ("near_misses",)
+"""Further ones of teams whose aircraft keep apart, see ``Team.separation``."""
 SUCCESS_LEVEL = 0.6
 
 
@@ -30,6 +34,12 @@ def metrics(state: WorldState, counts: TreeCounts, horizon: int) -> dict[str, Te
     ``actions``: extinguish and clear actions, a share of the agents' steps. ``redundant``: the share of those on a
     target that a team-mate had. ``success``: 1 where the fire is out and at least 60 % is saved.
 
+    Where sight is limited: ``watched``, the share of the front that the team saw burn within the last steps, as many as
+    ``sensing.recent``; ``found``, the share of the front that it knows to burn; both as means over the steps with a
+    front, see ``spreading_front``. ``uncertainty``: 1 - freshness of the team's newest records, mean over cells and
+    steps. Of teams whose aircraft keep apart: ``near_misses``, those at the ends of steps, a share of the agents'
+    steps.
+
     Args:
         state: The worlds.
         counts: Of their trees.
@@ -39,7 +49,7 @@ def metrics(state: WorldState, counts: TreeCounts, horizon: int) -> dict[str, Te
     acts = vehicles.acts.sum(1)
     agent_steps = (state.step * vehicles.acts.shape[1]).clamp(min=1)
     saved = counts.saved()
-    return {
+    found = {
         "saved": saved,
         "burned": counts.burned / counts.initial,
         "extinguished": counts.extinguished / counts.initial,
@@ -51,3 +61,11 @@ def metrics(state: WorldState, counts: TreeCounts, horizon: int) -> dict[str, Te
         "redundant": vehicles.redundant.sum(1) / acts.clamp(min=1),
         "success": ((counts.alight == 0) & (saved >= SUCCESS_LEVEL)).to(torch.float32),
     }
+    if state.watching is not None:
+        watching, fronts = state.watching, state.watching.fronts.clamp(min=1)
+        found["watched"] = watching.watched / fronts
+        found["found"] = watching.found / fronts
+        found["uncertainty"] = watching.uncertainty / state.step.clamp(min=1)
+    if vehicles.near_misses is not None:
+        found["near_misses"] = vehicles.near_misses.sum(1) / agent_steps
+    return found

@@ -5,12 +5,13 @@ from typing import NamedTuple
 import torch
 from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 
-from warp_torchrl.env.metrics import METRICS
+from warp_torchrl.env.metrics import FLYING, METRICS, WATCHING
 from warp_torchrl.observation import STATE_SIDE, Observation, Space, state_names
+from warp_torchrl.world.sensing import Full
 from warp_torchrl.world.world import World
 
 EPISODE_METRICS = (*METRICS, "episode_reward", "episode_length")
-"""Entries of ``info``: the metrics, the team's mean return so far, and the steps so far."""
+"""Entries of ``info`` of every world: the metrics, the team's mean return so far, and the steps so far."""
 _FLAGS = ("done", "terminated", "truncated")
 
 
@@ -21,6 +22,12 @@ class Specs(NamedTuple):
     action: Composite
     reward: Composite
     done: Composite
+
+
+def episode_metrics(world: World) -> tuple[str, ...]:
+    """Return the entries of ``info`` of a world: ``EPISODE_METRICS``, then those that only worlds like it have."""
+    watching = () if isinstance(world.sensing, Full) else WATCHING
+    return (*EPISODE_METRICS, *watching, *(() if world.team.separation is None else FLYING))
 
 
 def make_specs(world: World, observation: Observation, n_worlds: int, device: torch.device) -> Specs:
@@ -47,7 +54,9 @@ def make_specs(world: World, observation: Observation, n_worlds: int, device: to
     planes = len(state_names(world))
     seen["state"] = Bounded(-3.0, 256.0, shape=(*batch, planes, STATE_SIDE, STATE_SIDE), device=device)
     seen["info"] = Composite(
-        {name: Unbounded(shape=(*batch, 1), device=device) for name in EPISODE_METRICS}, shape=batch, device=device
+        {name: Unbounded(shape=(*batch, 1), device=device) for name in episode_metrics(world)},
+        shape=batch,
+        device=device,
     )
     flags = {name: Categorical(2, shape=(*batch, 1), dtype=torch.bool, device=device) for name in _FLAGS}
     return Specs(

@@ -54,8 +54,8 @@ class WildfireEnv(EnvBase):
         graph: Record the step as one CUDA graph. World and observation must then stay as they are.
 
     Raises:
-        ValueError: If ``n_worlds`` is not positive, ``seeds`` are not as many, a seed is out of range, or there is no
-            C++ compiler to compile with.
+        ValueError: If ``n_worlds`` is not positive, ``seeds`` are not as many, a seed is out of range, the reward needs
+            another sensing than the world's, or there is no C++ compiler to compile with.
     """
 
     batch_locked = True
@@ -80,6 +80,7 @@ class WildfireEnv(EnvBase):
         self.world = World() if world is None else world
         self.observation = Surroundings() if observation is None else observation
         self.reward_function = Efficiency() if reward is None else reward
+        self.reward_function.check_sensing(self.world.sensing)
         self.validate = reads_freely(self.device) if validate is None else validate
         self.why_eager = self._check_compiling() if fuse else None
         """Why steps are not compiled where that was asked for; None where they are."""

@@ -11,7 +11,7 @@ from torch import Tensor
 from torchrl.envs.utils import set_exploration_type
 
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.env.specs import EPISODE_METRICS
+from warp_torchrl.env.specs import episode_metrics
 from warp_torchrl.evaluation.behaviour import Behaviour
 from warp_torchrl.evaluation.match import Match, fits
 from warp_torchrl.heuristics import HEURISTICS, idle_action
@@ -24,7 +24,7 @@ from warp_torchrl.world.world import World
 
 BASELINES = ("noop", "random", "local", "greedy", "coordinated")
 """Baselines of every table."""
-SEARCHING = ("oldest", "lawnmower")
+SEARCHING = ("oldest", "lawnmower", "follower")
 """Those that are there too where agents know what was seen alone."""
 
 _CELLS_ABREAST = 2**21
@@ -78,7 +78,7 @@ def play(
         behaviour = Behaviour(env.world_state) if watch else None
         plays = _steps if recorder is not None or not fits(env, policy) else _match
         found = plays(env, policy, now, recorder, behaviour)
-    episodes = {name: found[name].double().cpu().numpy() for name in EPISODE_METRICS}
+    episodes = {name: found[name].double().cpu().numpy() for name in episode_metrics(env.world)}
     return episodes if behaviour is None else episodes | behaviour.summary()
 
 
@@ -114,7 +114,7 @@ def _steps(
     if recorder is not None:
         recorder.add(env.world_state)
     env.watcher = None
-    return {name: now["info", name][:, 0] for name in EPISODE_METRICS}
+    return {name: now["info", name][:, 0] for name in episode_metrics(env.world)}
 
 
 class WithoutAgent(TensorDictModuleBase):
@@ -167,5 +167,7 @@ def play_abreast(env: WildfireEnv, first_seed: int, names: Sequence[str]) -> dic
     with torch.random.fork_rng(), torch.no_grad():
         start = wide.reset()
         ends = Match(wide, [HEURISTICS[name](wide) for name in names]).play(start)
-    numbers = {metric: ends[metric].double().cpu().numpy().reshape(len(names), count) for metric in EPISODE_METRICS}
+    numbers = {
+        metric: ends[metric].double().cpu().numpy().reshape(len(names), count) for metric in episode_metrics(env.world)
+    }
     return {name: {metric: rows[at] for metric, rows in numbers.items()} for at, name in enumerate(names)}

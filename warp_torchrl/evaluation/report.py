@@ -67,12 +67,18 @@ def report(
             name: {metric: other[metric].tolist() for metric in ("saved", "success")} for name, other in others.items()
         },
         "other_modes": {name: _summaries(other) for name, other in (other_modes or {}).items()},
+        "watching": {name: _compare_watching(episodes, other) for name, other in others.items() if "watched" in other},
         "left_out": {agent: compare(episodes["saved"], other["saved"]) for agent, other in (left_out or {}).items()},
     }
 
 
 def _summaries(episodes: Episodes) -> dict[str, dict[str, Any]]:
     return {name: summarise(values) for name, values in episodes.items()}
+
+
+def _compare_watching(episodes: Episodes, other: Episodes) -> dict[str, Any]:
+    found = compare(episodes["watched"], other["watched"])
+    return {"watched_difference": found.pop("saved_difference"), **found}
 
 
 def _number(value: float) -> float | None:
@@ -95,13 +101,36 @@ def table(content: Mapping[str, Any]) -> str:
             f"{100 * summary['cleared']['mean']:>11.2f}"
         )
     for name, difference in content["versus"].items():
+        if name in content.get("watching", {}) and difference["ci95"] == [0.0, 0.0]:
+            continue  # a team that cannot act
         low, high = (100.0 * bound for bound in difference["ci95"])
         lines.append(
             f"{content['policy']} - {name}: {100 * difference['saved_difference']:+.1f} points saved, "
             f"{low:+.1f} .. {high:+.1f}; more on {100 * difference['probability_of_improvement']:.0f} % of fires"
         )
+    lines += _watching_lines(content, rows) if content.get("watching") else []
     lines += _behaviour_lines(content)
     return "\n".join(lines)
+
+
+def _watching_lines(content: Mapping[str, Any], rows: Mapping[str, Any]) -> list[str]:
+    lines = [
+        f"{'policy':<22}{'watched %':>10}{'95 % interval':>16}{'found %':>9}{'uncertainty':>13}{'near misses %':>15}"
+    ]
+    for name, summary in rows.items():
+        watched, near = summary["watched"], summary.get("near_misses")
+        interval = "{:.1f} .. {:.1f}".format(*(100.0 * bound for bound in watched["ci95"]))
+        lines.append(
+            f"{name:<22}{100 * watched['mean']:>10.1f}{interval:>16}{100 * summary['found']['mean']:>9.1f}"
+            f"{summary['uncertainty']['mean']:>13.3f}" + ("" if near is None else f"{100 * near['mean']:>15.1f}")
+        )
+    for name, difference in content["watching"].items():
+        low, high = (100.0 * bound for bound in difference["ci95"])
+        lines.append(
+            f"{content['policy']} - {name}: {100 * difference['watched_difference']:+.1f} points watched, "
+            f"{low:+.1f} .. {high:+.1f}; more on {100 * difference['probability_of_improvement']:.0f} % of fires"
+        )
+    return lines
 
 
 def place(content: Mapping[str, Any]) -> str:

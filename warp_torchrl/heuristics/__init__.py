@@ -1,12 +1,13 @@
 """Heuristic policies, the baselines. Each is a TensorDictModule like any policy.
 
-They read the state through the environment. ``local``, ``oldest``, ``lawnmower`` and ``clockwise`` know of the fire
-what their agents know or see; the others see every cell, which no learned policy does.
+They read the state through the environment. ``local``, ``oldest``, ``lawnmower``, ``follower`` and ``clockwise`` know
+of the fire what their agents know or see; the others see every cell, which no learned policy does.
 """
 
 from warp_torchrl.heuristics.base import Heuristic, idle_action
 from warp_torchrl.heuristics.clockwise import Clockwise
 from warp_torchrl.heuristics.coordinated import Coordinated
+from warp_torchrl.heuristics.following import Follower
 from warp_torchrl.heuristics.reactive import Greedy, Local, NoOp, Random
 from warp_torchrl.heuristics.ring import Mixed, Ring
 from warp_torchrl.heuristics.searching import Lawnmower, Oldest, Searching
@@ -21,6 +22,7 @@ HEURISTICS: dict[str, type[Heuristic]] = {
     "mixed": Mixed,
     "oldest": Oldest,
     "lawnmower": Lawnmower,
+    "follower": Follower,
     "clockwise": Clockwise,
 }
 """Heuristic policies by name."""
@@ -29,6 +31,7 @@ __all__ = [
     "HEURISTICS",
     "Clockwise",
     "Coordinated",
+    "Follower",
     "Greedy",
     "Heuristic",
     "Lawnmower",

@@ -155,9 +155,18 @@ def move_towards(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
     return way.masked_fill(~team.open_moves(state), float(FAR)).argmin(dim=-1)
 
 
-def target_or_water(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
-    """Return the given targets, but the nearest lake or the base for agents with an empty tank, int64 [B, A, 2]."""
-    if not env.world.team.tank:
+def target_or_supply(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
+    """Return the given targets, but the nearest lake or the base for agents whom water or charge runs out.
+
+    int64 [B, A, 2]; aircraft turn back to the base with two steps to spare.
+    """
+    team, vehicles = env.world.team, state.vehicles
+    if vehicles.battery is not None:
+        table, base = team.table(target.device), vehicles.base[:, None]
+        away = (vehicles.position - base).abs().amax(dim=-1)
+        turns_back = table.flies & (vehicles.battery <= away / table.stride + 2.0)
+        target = torch.where(turns_back[..., None], base, target)
+    if not team.tank:
         return target
     water = state.landscape.cover == Cover.LAKE
     base = state.vehicles.base[:, 0] * water.shape[2] + state.vehicles.base[:, 1]

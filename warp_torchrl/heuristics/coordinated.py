@@ -12,7 +12,7 @@ from warp_torchrl.heuristics.base import (
     extinguish_or,
     list_cells,
     move_towards,
-    target_or_water,
+    target_or_supply,
 )
 from warp_torchrl.world.state import WorldState
 
@@ -30,7 +30,7 @@ class Coordinated(Heuristic):
         cells, valid = list_cells(front)
         worth = value.flatten(1).gather(1, cells).masked_fill_(~valid, -math.inf)
         claims = claim_cells(state, cells, worth[:, None], spacing=3, discount=6.0, taken=1000.0)
-        return extinguish_or(move_towards(state, self.env, target_or_water(state, self.env, claims)), mask)
+        return extinguish_or(move_towards(state, self.env, target_or_supply(state, self.env, claims)), mask)
 
     def value(self, state: WorldState) -> tuple[Tensor, Tensor]:
         """Return each cell's value [cells of distance], float32 [B, H, W], and the fire front, bool [B, H, W]."""

@@ -13,7 +13,7 @@ from warp_torchrl.heuristics.base import (
     nearest_fire,
     nearest_marked,
     place,
-    target_or_water,
+    target_or_supply,
 )
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.sensing import Sight, in_reach
@@ -50,7 +50,7 @@ class Local(Heuristic):
         """Return the actions, int64 [B, A]."""
         sees, index = self._fire_in_sight(state)
         target = torch.where(sees[..., None], place(index, state), self._waypoint(state))
-        return extinguish_or(move_towards(state, self.env, target_or_water(state, self.env, target)), mask)
+        return extinguish_or(move_towards(state, self.env, target_or_supply(state, self.env, target)), mask)
 
     def _fire_in_sight(self, state: WorldState) -> tuple[Tensor, Tensor]:
         """Return whether each agent sees fire, bool [B, A], and the flat index of the nearest."""
@@ -79,5 +79,5 @@ class Greedy(Heuristic):
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
         _, index = nearest_fire(state, can_be_put_out(state, self.env))
-        target = target_or_water(state, self.env, place(index, state))
+        target = target_or_supply(state, self.env, place(index, state))
         return extinguish_or(move_towards(state, self.env, target), mask)

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.heuristics.base import claim_cells, extinguish_or, list_cells, move_towards, target_or_water
+from warp_torchrl.heuristics.base import claim_cells, extinguish_or, list_cells, move_towards, target_or_supply
 from warp_torchrl.heuristics.coordinated import Coordinated
 from warp_torchrl.world.fast.distances import distance_to_nearest
 from warp_torchrl.world.geometry import grow
@@ -43,7 +43,7 @@ class Ring(Coordinated):
         unbroken = torch.zeros_like(worth).masked_fill_(~(todo.flatten(1).gather(1, cells) & valid), -math.inf)
         worth = torch.where(builds[..., None], unbroken[:, None], worth[:, None])
         claims = claim_cells(state, cells, worth, spacing=1, discount=2.0, taken=1000.0)
-        attack = extinguish_or(move_towards(state, self.env, target_or_water(state, self.env, claims)), mask)
+        attack = extinguish_or(move_towards(state, self.env, target_or_supply(state, self.env, claims)), mask)
         there = (claims == state.vehicles.position).all(dim=-1) & mask[..., Action.CLEAR]
         build = torch.where(there, int(Action.CLEAR), move_towards(state, self.env, claims))
         return torch.where(builds, build, attack)

@@ -15,7 +15,7 @@ from warp_torchrl.heuristics.base import (
     move_towards,
     nearest_marked,
     place,
-    target_or_water,
+    target_or_supply,
 )
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.sensing import Sight, freshness
@@ -34,7 +34,7 @@ class Searching(Heuristic):
         fire = known_fire(state, self.env) & team.table(mask.device).can["extinguish"][:, None, None]
         found, index = nearest_marked(state, fire)
         target = torch.where(found[..., None], place(index, state), self.search(state))
-        return extinguish_or(move_towards(state, self.env, target_or_water(state, self.env, target)), mask)
+        return extinguish_or(move_towards(state, self.env, target_or_supply(state, self.env, target)), mask)
 
     @abstractmethod
     def search(self, state: WorldState) -> Tensor:
@@ -53,8 +53,7 @@ class Oldest(Searching):
         """Return the cell with the best score for each agent, int64 [B, A, 2]."""
         (height, width), agents = state.cells.shape[1:], state.vehicles.position.shape[1]
         row, column = _grid(state)
-        own = state.vehicles.position[..., None, None]
-        distance = torch.maximum((row - own[:, :, 0]).abs(), (column - own[:, :, 1]).abs())
+        distance = self._away(state)
         away_row = (row - state.vehicles.base[:, 0, None, None]).abs()
         away_column = (column - state.vehicles.base[:, 1, None, None]).abs()
         sector = torch.atan2(away_row.float(), away_column.float()) / (torch.pi / 2.0)
@@ -63,6 +62,13 @@ class Oldest(Searching):
         draw = uniform(state.key, 0, Stream.POLICY, (agents, height, width))
         score = stale - 2.0 * distance / max(height, width) - (sector[:, None] - mine).abs() + 0.1 * draw
         return place(score.flatten(2).argmax(dim=-1), state)
+
+    @staticmethod
+    def _away(state: WorldState) -> Tensor:
+        """Return the Chebyshev distance from each agent to each cell, int64 [B, A, H, W]."""
+        row, column = _grid(state)
+        own = state.vehicles.position[..., None, None]
+        return torch.maximum((row - own[:, :, 0]).abs(), (column - own[:, :, 1]).abs())
 
 
 class Lawnmower(Searching):

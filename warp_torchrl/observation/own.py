@@ -7,6 +7,7 @@ from torch import Tensor
 from torch.nn.functional import one_hot
 
 from warp_torchrl.symmetry import LAST, TIME_LEFT, Part, Vector
+from warp_torchrl.world.flight import wind_at
 from warp_torchrl.world.role import PAPER_ROLES
 from warp_torchrl.world.state import Action, WorldState
 from warp_torchrl.world.team import Team
@@ -33,11 +34,13 @@ WIND_SCALE = 20.0
 def own_entries(team: Team, identity: bool = False) -> Vector:
     """Return the entries of ``self``, by name and as they turn with the map.
 
-    They are ``SELF``, the identity if it is shown, then the team's roles and actions beside the paper's.
+    They are ``SELF``, the identity if it is shown, then the team's roles and actions beside the paper's, then the
+    battery if it runs down.
     """
     roles = tuple(f"role_{role}" for role in team.role_names[len(PAPER_ROLES) :])
     actions = tuple(f"{LAST}{action}" for action in team.further_actions)
-    further = [Part("scalar", names) for names in (roles, actions) if names]
+    battery = () if team.battery is None else ("battery",)
+    further = [Part("scalar", names) for names in (roles, actions, battery) if names]
     return Vector((*SELF.parts, *([IDENTITY] if identity else []), *further))
 
 
@@ -50,7 +53,7 @@ def own_vector(state: WorldState, world: World, shows_identity: bool = False) ->
     roles = one_hot(team.table(row.device).index, len(team.role_names)).expand(*shape, -1)
     last = _last_action(vehicles.last_action, team)
     full = world.team.tank or 1
-    wind = _own_wind(state)
+    wind = (wind_at(state) / WIND_SCALE).clamp(-3.0, 3.0)
     columns = [
         row / max(height - 1, 1),
         column / max(width - 1, 1),
@@ -67,6 +70,8 @@ def own_vector(state: WorldState, world: World, shows_identity: bool = False) ->
         parts.append(identity(shape[1], row.device).expand(*shape, -1))
     if team.role_names != PAPER_ROLES or team.further_actions:
         parts += [roles[..., len(PAPER_ROLES) :], last[..., len(Action) :]]
+    if team.battery is not None and vehicles.battery is not None:
+        parts.append((vehicles.battery / team.battery)[..., None])
     return torch.cat(parts, dim=-1)
 
 
@@ -95,14 +100,3 @@ def _last_action(code: Tensor, team: Team) -> Tensor:
     if further and not team.allow_stay:
         code = code + (code >= int(Action.STAY))  # the place of stay is kept
     return one_hot(code + 1, len(Action) + further + 1)[..., 1:]
-
-
-def _own_wind(state: WorldState) -> Tensor:
-    """Return the wind at each agent's cell, scaled, float32 [B, A, 2]."""
-    wind, position = state.wind, state.vehicles.position
-    if wind.shape[2:] == (1, 1):
-        own = wind[:, None, :, 0, 0].expand(-1, position.shape[1], -1)
-    else:
-        index = position[..., 0] * wind.shape[3] + position[..., 1]
-        own = wind.flatten(2).gather(2, index[:, None].expand(-1, 2, -1)).transpose(1, 2)
-    return (own / WIND_SCALE).clamp(-3.0, 3.0)

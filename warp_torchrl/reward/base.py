@@ -8,6 +8,7 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.fast.distances import distance_to_nearest
 from warp_torchrl.world.front import exposure
+from warp_torchrl.world.sensing import Sensing
 from warp_torchrl.world.state import Transition, TreeCounts, WorldState, is_burning
 
 
@@ -55,6 +56,13 @@ class Reward:
         team = own.mean(dim=1, keepdim=True) if self.team_reward == "mean" else own.sum(dim=1, keepdim=True)
         reward = self.scale * ((1.0 - self.team_share) * own + self.team_share * team)
         return (reward * ~transition.before.done[:, None])[..., None]
+
+    def check_sensing(self, sensing: Sensing) -> None:
+        """Check that the reward can be computed where agents know of the fire what a sensing tells them.
+
+        Raises:
+            ValueError: If it cannot; this one can everywhere.
+        """
 
     def own(self, transition: Transition) -> Tensor:
         """Return each agent's reward before sharing and shaping, float32 [B, A]."""

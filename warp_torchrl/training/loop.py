@@ -18,6 +18,7 @@ from warp_torchrl import parallel
 from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.config.seeds import WORLDS, first_world_seed
+from warp_torchrl.evaluation.goal import goal
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.models import signature
 from warp_torchrl.parallel import WorkerDied
@@ -169,14 +170,15 @@ class Training(Learning):
         return float(play(env, self.learner.policy, plan.first_seed)["saved"].mean())
 
     def _better_mode(self) -> str:
-        """Return the mode, sampled or deterministic, that saves more on training seeds."""
+        """Return the mode, sampled or deterministic, that does better on training seeds, see ``goal``."""
         chosen = self.run_config.evaluation.mode
         if chosen != "best":
             return chosen
         first = first_world_seed(self.run_config.seed)
         env = self.run_config.make_env(min(self.run_config.evaluation.episodes, WORLDS), first)
-        saved = {mode: play(env, self.learner.policy, first, mode)["saved"].mean() for mode in MODES}
-        return max(saved, key=saved.__getitem__)
+        aim = goal(env.world)
+        reached = {mode: play(env, self.learner.policy, first, mode)[aim].mean() for mode in MODES}
+        return max(reached, key=reached.__getitem__)
 
     def save(self) -> Path | None:
         """Write a checkpoint and return its folder; every process must call it at once, and the first one writes."""

@@ -6,6 +6,7 @@ import torch
 from tensordict import TensorDictBase
 
 from warp_torchrl import parallel
+from warp_torchrl.env.metrics import FLYING, WATCHING
 from warp_torchrl.env.specs import EPISODE_METRICS
 from warp_torchrl.models import REWARD
 
@@ -31,10 +32,11 @@ def episode_columns(batch: TensorDictBase) -> tuple[dict[str, float | None], int
     """
     done = batch["next", "done"][..., 0]
     info = batch["next", "info"]
+    names = [*EPISODE_METRICS, *(name for name in (*WATCHING, *FLYING) if name in info.keys())]
     unsound = (~batch["next", *REWARD].isfinite()).sum()
-    sums = [unsound, done.sum(), *(torch.where(done, info[name][..., 0], 0.0).sum() for name in EPISODE_METRICS)]
+    sums = [unsound, done.sum(), *(torch.where(done, info[name][..., 0], 0.0).sum() for name in names)]
     unsound_rewards, count, *totals = parallel.sum_(torch.stack([each.double() for each in sums])).tolist()
-    means = {name: total / count if count else None for name, total in zip(EPISODE_METRICS, totals, strict=True)}
+    means = {name: total / count if count else None for name, total in zip(names, totals, strict=True)}
     row = {"rollout/ep_rew_mean": means.pop("episode_reward"), "rollout/ep_len_mean": means.pop("episode_length")}
     return row | {f"world/{name}": value for name, value in means.items()}, int(unsound_rewards)
 

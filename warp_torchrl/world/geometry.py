@@ -31,14 +31,14 @@ def neighbour_in(direction: int, plane: Tensor) -> Tensor:
 
 
 def grow(mask: Tensor, radius: int = 1) -> Tensor:
-    """Return the cells within a Chebyshev distance ``radius`` of a marked cell, bool [B, H, W]."""
+    """Return the cells within a Chebyshev distance ``radius`` of a marked cell, bool [..., H, W]."""
     for _ in range(radius):
         rows = mask.clone()
-        rows[:, 1:] |= mask[:, :-1]
-        rows[:, :-1] |= mask[:, 1:]
+        rows[..., 1:, :] |= mask[..., :-1, :]
+        rows[..., :-1, :] |= mask[..., 1:, :]
         mask = rows.clone()
-        mask[:, :, 1:] |= rows[:, :, :-1]
-        mask[:, :, :-1] |= rows[:, :, 1:]
+        mask[..., 1:] |= rows[..., :-1]
+        mask[..., :-1] |= rows[..., 1:]
     return mask
 
 

@@ -39,6 +39,7 @@ class Stream(IntEnum):
     RADIO = 17
     SENSING = 18
     SMOKE = 19
+    DRIFT = 20
 
 
 def world_key(seed: Tensor, episode: Tensor | int = 0) -> Tensor:

@@ -14,6 +14,10 @@ _SINCE = tuple(f"ground.landscape.{name}" for name in ("fuel", "canopy_cover", "
 """What landscapes once had not: worlds that were saved without it are read back without it."""
 
 
+_BEGINS_NOW = "watching."
+"""Of entries that worlds of limited sight once had not: such worlds begin to count when they are read back."""
+
+
 def filled(template: WorldState, entries: dict[str, Tensor]) -> WorldState:
     """Return worlds like a template with the entries that ``WorldState.what_changes`` once returned.
 
@@ -24,6 +28,7 @@ def filled(template: WorldState, entries: dict[str, Tensor]) -> WorldState:
     entries = {_FORMER.get(name, name): value for name, value in kept.items()}
     template = _without(template, [name for name in _SINCE if name not in entries])
     expected = template.what_changes()
+    entries = {name: value for name, value in expected.items() if name.startswith(_BEGINS_NOW)} | entries
     if set(expected) != set(entries):
         raise ValueError(f"worlds must have the entries {sorted(expected)}, got {sorted(entries)}")
     for name, value in entries.items():

@@ -16,8 +16,9 @@ from warp_torchrl.validation import check_fields
 from warp_torchrl.world.radio import heard
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.role import ROLES
-from warp_torchrl.world.state import FIRST_FIRE, WorldState, is_burning, is_tree
+from warp_torchrl.world.state import FIRST_FIRE, Watching, WorldState, is_burning, is_tree
 from warp_torchrl.world.team import Team
+from warp_torchrl.world.watching import Records, at_start, counted, unwatched
 
 _CODES, _ASH, _FIREBREAK, _KINDS = 16, 16, 32, 64
 HALF_FRESH = 16.0
@@ -64,6 +65,7 @@ class Sight(Sensing):
         false_alarm: Chance a step that a tree in sight is taken for a young fire.
         smoke: Extinction by the smoke of one burning cell [1].
         smoke_length: How far smoke drifts [cells].
+        recent: For how long the team watches a cell of the front that it saw burn [steps]; of metrics and rewards.
 
     Raises:
         ValueError: If a value is out of its range or a role is unknown.
@@ -75,6 +77,7 @@ class Sight(Sensing):
     false_alarm: float = 0.0
     smoke: float = 0.0
     smoke_length: int = 6
+    recent: int = 8
 
     def __post_init__(self) -> None:
         check_fields(
@@ -85,6 +88,7 @@ class Sight(Sensing):
             false_alarm=(0.0, 1.0),
             smoke=(0.0, 100.0),
             smoke_length=(1, 64),
+            recent=(0, 1_000_000),
         )
         unknown = [role for role in self.radius_of if role not in ROLES]
         if unknown:
@@ -98,17 +102,24 @@ class Sight(Sensing):
         """Return the worlds with what the agents see where they start."""
         agents = state.vehicles.position.shape[1]
         before = state.landscape.age.to(torch.int32)[:, None].expand(-1, agents, -1, -1)
-        return self.updated(state.replace(knowledge=before), team, torch.ones_like(state.done))
+        blank = state.replace(knowledge=before, watching=unwatched(state))
+        begun = self.updated(blank, team, torch.ones_like(state.done))
+        return begun.replace(watching=at_start(_watching(begun)))
 
     def updated(self, state: WorldState, team: Team, running: Tensor) -> WorldState:
         """Return the worlds with what the agents see now, and are told."""
         known = _known(state)
         record = ((state.step + 1)[:, None, None, None] * _KINDS + self._taken_for(state)).to(torch.int32)
-        knows = torch.where(self._sees(state, team), record, known)
+        sees, watching = self._sees(state, team), _watching(state)
+        knows, itself = torch.where(sees, record, known), watching.itself | sees
         if team.sends_maps:
-            told = torch.where(heard(state, team)[..., None, None], knows[:, None], 0)
-            knows = torch.maximum(knows, told.amax(dim=2))
-        return state.replace(knowledge=torch.where(running[:, None, None, None], knows, known))
+            told = torch.where(heard(state, team)[..., None, None], knows[:, None], 0).amax(dim=2)
+            itself = itself & (told <= knows)
+            knows = torch.maximum(knows, told)
+        goes_on = running[:, None, None, None]
+        knows, itself = torch.where(goes_on, knows, known), torch.where(goes_on, itself, watching.itself)
+        after = counted(state, watching, itself, _newest(known, knows, itself, state.step), self.recent)
+        return state.replace(knowledge=knows, watching=_where(running, after, watching))
 
     def _sees(self, state: WorldState, team: Team) -> Tensor:
         """Return which cells each agent sees, bool [B, A, H, W]."""
@@ -204,9 +215,41 @@ def freshness(record: Tensor, step: Tensor) -> Tensor:
         record: int32 [B, A, ...].
         step: The worlds' steps, int32 [B].
     """
-    seen = record // _KINDS
-    age = step.view(-1, *[1] * (record.ndim - 1)) + 1 - seen
-    return torch.where(seen > 0, HALF_FRESH / (HALF_FRESH + age), 0.0)
+    return torch.where(record >= _KINDS, HALF_FRESH / (HALF_FRESH + steps_since(record, step)), 0.0)
+
+
+def steps_since(record: Tensor, step: Tensor) -> Tensor:
+    """Return how old records are [steps], int32; step + 1 of what was never seen. The arguments are ``freshness``'s."""
+    return step.view(-1, *[1] * (record.ndim - 1)) + 1 - record // _KINDS
+
+
+def _newest(before: Tensor, records: Tensor, itself: Tensor, step: Tensor) -> Records:
+    """Return what the team's newest records tell; before a step and after it, int32 [B, A, H, W]."""
+    newest = records.amax(dim=1)
+    return Records(
+        burns=newest % _CODES >= FIRST_FIRE,
+        burned_before=before.amax(dim=1) % _CODES >= FIRST_FIRE,
+        since=steps_since(newest, step),
+        fresh=freshness(newest, step),
+        holders=itself & (records == newest[:, None]),
+    )
+
+
+def _where(running: Tensor, after: Watching, before: Watching) -> Watching:
+    """Return what was watched, after a step in the worlds that go on, bool [B], and else before it."""
+    old = before.leaves()
+    return after.with_leaves(
+        {
+            name: torch.where(running.view(-1, *[1] * (leaf.ndim - 1)), leaf, old[name])
+            for name, leaf in after.leaves().items()
+        }
+    )
+
+
+def _watching(state: WorldState) -> Watching:
+    if state.watching is None:
+        raise ValueError("what the team of these worlds watched is not counted: let its sensing begin them")
+    return state.watching
 
 
 def _known(state: WorldState) -> Tensor:

@@ -94,6 +94,8 @@ class Vehicles(Batch):
     redundant: Tensor  # int32 [B,A], those on a target that a team-mate had
     last_useful: Tensor  # int32 [B,A], step of the last credited act; -1 before the first
     arrived: Tensor | None = None  # bool [B,A], was over the fire since it set out; None but in ``retardant`` teams
+    near_misses: Tensor | None = None  # int32 [B,A], steps that ended too near another aircraft; None: not counted
+    battery: Tensor | None = None  # int32 [B,A], steps of flight left; None where they are not counted
 
 
 @dataclass(eq=False, repr=False)
@@ -148,6 +150,20 @@ class Forecast(Batch):
 
 
 @dataclass(eq=False, repr=False)
+class Watching(Batch):
+    """What a team of limited sight has watched of the fire so far; ``world.watching`` counts it."""
+
+    itself: Tensor  # bool [B,A,H,W], whether the agent saw itself what its record tells
+    watches: Tensor  # float32 [B,A], share of the front that the team watches by this agent's records, now
+    finds: Tensor  # float32 [B,A], burning cells that this agent was the first to record in the last step / all of them
+    uncertain: Tensor  # float32 [B], mean over the map of 1 - freshness of the team's newest records, now
+    watched: Tensor  # float32 [B], sum over steps of the share of the front that the team watches
+    found: Tensor  # float32 [B], sum over steps of the share of the front that the team knows to burn
+    uncertainty: Tensor  # float32 [B], sum over steps of ``uncertain``
+    fronts: Tensor  # int32 [B], steps at whose end there was a front
+
+
+@dataclass(eq=False, repr=False)
 class WorldState(Batch):
     """What changes in the worlds, and the ground and air that it changes in; batch size [B].
 
@@ -173,6 +189,7 @@ class WorldState(Batch):
     truncated: Tensor  # bool [B], the horizon was reached
     arrivals: Arrivals | None = None  # None but under law ``rate``
     knowledge: Tensor | None = None  # int32 [B,A,H,W], records of ``world.sensing``; None where all is seen
+    watching: Watching | None = None  # None where all is seen
 
     def what_changes(self) -> dict[str, Tensor]:
         """Return all tensors by name but those that follow from others, of which they can be made again."""

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.abilities import ABILITIES, PAPER_ABILITIES, Ability, Deed, Situation, neighbourhood
+from warp_torchrl.world.flight import batteries, carried, grounded, near_misses
 from warp_torchrl.world.role import ROLES, RoleTable, role_names, role_table
 from warp_torchrl.world.start import starting_cells
 from warp_torchrl.world.state import Action, ActionResult, Cover, Vehicles, WorldState
@@ -60,6 +61,12 @@ class Team:
         radio_range: How far agents hear each other, by Euclidean distance [cells]; None is everywhere, 0 not at all.
         radio_loss: Chance that a packet is lost, drawn for each pair of agents and step.
         radio_line_of_sight: Whether hills between two antennas keep them from hearing each other.
+        separation: Aircraft that end a step nearer to each other than this, by Euclidean distance [cells], have a near
+            miss each; None counts none. Swarms that watch wildfires, as those of Ali, Ali and Baig (2023), must keep
+            apart.
+        battery: Steps of flight of an aircraft, hovering too, charged at the corner where the team started; with an
+            empty battery it stays where it is. None is unlimited.
+        drift: Chance a step for each m/s of the wind at its cell that an aircraft is carried one cell downwind [s/m].
         start: ``corner`` starts the team in a corner drawn for each episode, ``anywhere`` on cells drawn over the map.
 
     Raises:
@@ -75,6 +82,9 @@ class Team:
     radio_range: float | None = None
     radio_loss: float = 0.0
     radio_line_of_sight: bool = False
+    separation: float | None = None
+    battery: int | None = None
+    drift: float = 0.0
     start: Literal["corner", "anywhere"] = "corner"
 
     def __post_init__(self) -> None:
@@ -85,6 +95,9 @@ class Team:
             tank=(0, 10_000),
             radio_range=(0.0, 1e6),
             radio_loss=(0.0, 1.0),
+            separation=(0.0, 1e6),
+            battery=(1, 1_000_000),
+            drift=(0.0, 1.0),
         )
         if not self.roles or any(role not in ROLES for role in self.roles):
             raise ValueError(f"roles must be a list of {', '.join(ROLES)}, got {list(self.roles)}")
@@ -172,6 +185,8 @@ class Team:
             acts=counter,
             redundant=counter.clone(),
             last_useful=torch.full_like(counter, -1),
+            near_misses=None if self.separation is None else counter.clone(),
+            battery=None if self.battery is None else torch.full_like(counter, self.battery),
         )
 
     def open_moves(self, state: WorldState) -> Tensor:
@@ -232,6 +247,7 @@ class Team:
         redundant = is_second(target, acting)
         credited = acting & ~redundant
         after = changed(state, target, [(done & credited, becomes) for done, becomes in deeds])
+        flies = self.table(target.device).flies
         after = after.replace(
             vehicles=vehicles.replace(
                 tank=self._refill(state, tank),
@@ -239,6 +255,8 @@ class Team:
                 acts=vehicles.acts + reduce(or_, chosen),
                 redundant=vehicles.redundant + redundant,
                 last_useful=torch.where(credited, state.step[:, None], vehicles.last_useful),
+                near_misses=near_misses(vehicles, flies, self.separation, running),
+                battery=batteries(vehicles, flies, self.battery, running),
             )
         )
         return after, ActionResult(action=action, moved=moved, credited=credited, redundant=redundant, target=target)
@@ -246,9 +264,10 @@ class Team:
     def _situation(self, state: WorldState, last_spreading: int, wet_ticks: int = 0) -> Situation:
         return Situation(state, self.table(state.cells.device), self.extinguish_p, last_spreading, wet_ticks)
 
-    @staticmethod
-    def _mask(skill: Skill, now: Situation) -> Tensor:
+    def _mask(self, skill: Skill, now: Situation) -> Tensor:
         mask = skill.ability.mask(now)
+        if skill.ability.moves and self.battery is not None:
+            mask = mask & ~grounded(now.state.vehicles, now.roles.flies)[..., None]
         return mask if skill.of_all else mask & now.roles.can[skill.name][:, None]
 
     def _move(self, state: WorldState, action: Tensor, running: Tensor) -> tuple[WorldState, Tensor]:
@@ -257,10 +276,17 @@ class Team:
         for skill in self.skills:
             if skill.ability.moves:
                 possible, deed = skill.act(now, action)
+                if self.battery is not None:
+                    possible = possible & ~grounded(state.vehicles, now.roles.flies)
                 moved.append(skill.is_chosen(action) & running & possible)
                 if deed.step is not None:
                     position = position + deed.step * moved[-1][..., None]
-        return state.replace(vehicles=state.vehicles.replace(position=position)), reduce(or_, moved)
+        state = state.replace(vehicles=state.vehicles.replace(position=position))
+        if self.drift > 0.0:
+            flying = running & now.roles.flies & ~grounded(state.vehicles, now.roles.flies)
+            position = position + carried(state, flying, self.drift)
+            state = state.replace(vehicles=state.vehicles.replace(position=position))
+        return state, reduce(or_, moved)
 
     def _refill(self, state: WorldState, tank: Tensor) -> Tensor:
         """Fill the tanks of vehicles beside a lake or at the base."""

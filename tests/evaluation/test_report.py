@@ -1,0 +1,34 @@
+"""The table of an evaluation where sight is limited."""
+
+import numpy as np
+
+from warp_torchrl.env.metrics import METRICS, WATCHING
+from warp_torchrl.evaluation.report import report, table
+
+
+def episodes(watched, *further):
+    return {
+        **{name: np.zeros(4) for name in (*METRICS, *further)},
+        **(
+            {"watched": np.full(4, watched), "found": np.full(4, 0.5), "uncertainty": np.full(4, 0.25)}
+            if further
+            else {}
+        ),
+    }
+
+
+def test_what_is_watched_has_a_table_of_its_own():
+    content = report("front", "mine", 7, episodes(0.75, *WATCHING), {"noop": episodes(0.25, *WATCHING)})
+    assert content["watching"]["noop"]["watched_difference"] == 0.5
+    shown = table(content).splitlines()
+    assert "mine                        75.0    75.0 .. 75.0     50.0        0.250" in shown
+    assert "mine - noop: +50.0 points watched, +50.0 .. +50.0; more on 100 % of fires" in shown
+    assert not any("points saved" in line for line in shown), "none can act"
+    near = {"near_misses": np.full(4, 0.125)}
+    flown = report("front", "mine", 7, episodes(0.75, *WATCHING) | near, {"noop": episodes(0.25, *WATCHING) | near})
+    assert "mine                        75.0    75.0 .. 75.0     50.0        0.250           12.5" in table(flown)
+
+
+def test_elsewhere_it_has_none():
+    content = report("skirmish", "mine", 7, episodes(0.0), {"noop": episodes(0.0)})
+    assert content["watching"] == {} and "watched" not in table(content)

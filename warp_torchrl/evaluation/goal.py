@@ -1,0 +1,17 @@
+"""What policies of a team are compared by."""
+
+from typing import Literal
+
+from warp_torchrl.world.abilities import ABILITIES
+from warp_torchrl.world.role import ROLES
+from warp_torchrl.world.sensing import Full
+from warp_torchrl.world.world import World
+
+Goal = Literal["saved", "watched"]
+"""A metric."""
+
+
+def goal(world: World) -> Goal:
+    """Return what policies are compared by: the trees saved, or the front watched where nobody of the team can act."""
+    acts = any(not ABILITIES[name].moves for role in world.team.agent_roles for name in ROLES[role].abilities)
+    return "saved" if acts or isinstance(world.sensing, Full) else "watched"
