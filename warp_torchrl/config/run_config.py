@@ -294,7 +294,9 @@ def _check_together(config: Mapping[str, Any]) -> None:
     reward, algorithm = config["reward"], config["algorithm"]
     model, team = config["model"]["messages"], config["team"]["messages"]
     if model in ("graph", "both") and team not in ("graph", "both"):
-        raise ConfigError(f"team.messages must be graph or both where networks talk, model.messages={model}, got {team}")
+        raise ConfigError(
+            f"team.messages must be graph or both where networks talk, model.messages={model}, got {team}"
+        )
     if reward["shaping"] > 0.0 and reward["gamma"] != algorithm["gamma"]:
         raise ConfigError(
             f"reward.gamma must be algorithm.gamma, {algorithm['gamma']}, for shaping to leave optimal policies as "
