@@ -58,6 +58,11 @@ OUT_OF_RANGE = [
     (Team, "roles", [(), ("tank",), ("ugv", "boat"), "ugv"]),
     (Team, "extinguish_p", [-0.1, 1.1, NAN]),
     (Team, "tank", [-1, 10_001]),
+    (Team, "radio_range", [-0.1, 1.1e6, NAN]),
+    (Team, "radio_loss", [-0.1, 1.1, NAN]),
+    (Team, "separation", [-0.1, 1.1e6, NAN]),
+    (Team, "battery", [0, 1_000_001]),
+    (Team, "drift", [-0.1, 1.1, NAN]),
     (Uniform, "speed", [-0.1, 60.1, NAN]),
     (Uniform, "direction", [NAN, INF]),
     (Paper, "scale", [-0.1, 10.1, NAN]),
@@ -79,6 +84,7 @@ NO_SUCH_OPTION = [
     (Perlin, "ages", ["old"]),
     (Array, "ages", ["old"]),
     (Team, "start", ["corners"]),
+    (Team, "messages", ["graphs"]),
 ]
 
 NOT_WHOLE = [
@@ -147,8 +153,9 @@ def test_every_field_with_a_range_is_in_the_list() -> None:
         (Array, "row"),
         (Array, "column"),
         (Team, "allow_stay"),
+        (Team, "radio_line_of_sight"),
         (Paper, "rotate"),
-        *((World, part) for part in ("landscape", "wind", "fire", "team", "ignition", "action_masking")),
+        *((World, part) for part in ("landscape", "wind", "fire", "team", "ignition", "sensing", "action_masking")),
     }
     for component in (Fire, Ignition, Perlin, Array, Team, Uniform, Paper, Wandering, World):
         for name in (field.name for field in fields(component) if field.init):
