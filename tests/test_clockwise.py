@@ -66,6 +66,7 @@ def test_a_move_off_the_map_is_made_along_its_border():
     assert chosen([(8, 0)], {(6, 0): FIRE, (7, 0): FIRE, (8, 0): FIRE}) == [NORTH]
 
 
+@pytest.mark.slow
 def test_it_saves_what_nobody_does():
     env = make_env("haksar", n_worlds=24, overrides=["landscape.size=20", "horizon=400"])
     noop, clockwise = (play(env, HEURISTICS[name](env), 0)["saved"].mean() for name in ("noop", "clockwise"))

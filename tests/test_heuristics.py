@@ -230,6 +230,7 @@ def test_a_follower_that_knows_of_no_fire_searches_and_one_that_could_put_it_out
     assert told(env, [[9, 9], [9, 9]], fires={(9, 9): 40, (3, 9): 20}) == [Action.NORTH, Action.NORTH]
 
 
+@pytest.mark.slow
 def test_followers_watch_more_than_searchers_and_idlers_of_front():
     """8 fires: standard errors of the means are under 4 points, the gaps over 25."""
     env = make_env("front", n_worlds=8, overrides=["horizon=128"])

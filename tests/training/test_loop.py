@@ -127,8 +127,6 @@ FAST = {
     ("taught", 3),
     ("remembers", 3),
     ("climbs", 1),
-    ("climbs", 3),
-    ("climbs", LAST - 1),
     ("regrets", 3),
     ("grows", 1),
     ("grows", 3),
