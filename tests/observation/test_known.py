@@ -11,7 +11,7 @@ from warp_torchrl import load_policy, make_env
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.observation import Local, Paper, Surroundings, central_state, state_names
-from warp_torchrl.observation.channels import DEFAULT, knows_where
+from warp_torchrl.observation.channels import DEFAULT
 from warp_torchrl.world.sensing import Full, Sight, in_reach
 from warp_torchrl.world.state import Forecast
 from warp_torchrl.world.team import Team
@@ -63,7 +63,7 @@ def test_what_nobody_has_seen_makes_no_difference_to_what_is_shown(preset):
     moved = state.vehicles.position.clone()
     moved[:, 1] = torch.where(moved[:, 0] < 8, moved[:, 0] + 4, moved[:, 0] - 4)  # in view, beyond sight
     far = state.replace(vehicles=state.vehicles.replace(position=moved))
-    assert not knows_where(far, world).any()
+    assert not world.sensing.knows_where(far, world.team).any()
     alone = far.replace(vehicles=far.vehicles.replace(position=moved[:, :1].expand(-1, 2, -1).contiguous()))
     ours, theirs = shown(preset, far, world), shown(preset, alone, world)
     mates = [CHANNELS.index("other_ugv")]

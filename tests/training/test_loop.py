@@ -99,6 +99,8 @@ RUNS = {
                "curriculum.episodes=4", "curriculum.low=0.01", "curriculum.high=0.02", "curriculum.floor=0.25"],
     "regrets": ["curriculum=regret", "curriculum.over.steps_per_tick=[9,6,4]", "curriculum.over.wind.speed=[0,2,4]",
                 "curriculum.episodes=2", "curriculum.worlds=4", "algorithm=dqn", *REPLAY],
+    "talks": ["scenario=search", "landscape.size=12", "horizon=10", "model.messages=both", "model.message_size=8",
+              "team.radio_range=4", "team.radio_loss=0.2", "sensing.miss=0.1", "sensing.smoke=1.0"],
     "compiled": ["compile=true", "imitation.teacher=greedy", "imitation.until=0.7"],
     **{name: [f"algorithm={name}", *(REPLAY if name in REPLAYS else [])] for name in ALGORITHMS},
 }  # fmt: skip
@@ -128,6 +130,7 @@ FAST = {
     ("remembers", 3),
     ("climbs", 1),
     ("regrets", 3),
+    ("talks", 3),
     ("grows", 1),
     ("grows", 3),
     ("mappo", LAST),

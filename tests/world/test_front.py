@@ -69,6 +69,6 @@ def test_blocks_count_among_their_own_cells() -> None:
 
 def test_the_front_is_what_burns_and_can_spread() -> None:
     state = draw("TaT .e. ..a")  # the ember spreads no more, and the last one has nothing beside it that can burn
-    assert spreading_front(state)[0].tolist() == [[False, True, False], [False] * 3, [False] * 3]
+    assert spreading_front(state.cells, state.alpha)[0].tolist() == [[False, True, False], [False] * 3, [False] * 3]
     lakes = draw("aT", ground="g~")  # no ground that can burn
-    assert not spreading_front(lakes).any()
+    assert not spreading_front(lakes.cells, lakes.alpha).any()

@@ -276,7 +276,8 @@ def build_components(config: Mapping[str, Any], names: Sequence[str] = COMPONENT
     Raises:
         ConfigError: With key, value and rule.
     """
-    built = {name: build(config[name], name) for name in names}
+    first = ("model",) if "model" in names else ()  # the team's messages are the model's: a mistake is told of the latter
+    built = {name: build(config[name], name) for name in dict.fromkeys((*first, *names))}
     if "reward" in built:
         try:
             built["reward"].check_sensing(built["sensing"])

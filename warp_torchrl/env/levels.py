@@ -73,21 +73,18 @@ class LeveledEnv(WildfireEnv):
         """
         if strict and "level" not in state_dict:
             raise ValueError("state_dict must have level, which worlds without a curriculum have not")
-        before, level = self.level, state_dict.get("level", self.level)
+        level = state_dict.get("level", self.level)
         if level.shape != self.batch_size or not ((level >= 0) & (level < len(self.levels))).all():
             raise ValueError(
                 f"level must be {list(self.batch_size)} of 0..{len(self.levels) - 1}, got {level.tolist()}"
             )
-        self.level = level.to(self.device).clone()
-        try:
-            super().load_state_dict(state_dict, strict, **kwargs)
-        except Exception:
-            self.level = before
-            raise
+        level = level.to(self.device).clone()
+        super().load_state_dict({**state_dict, "level": level}, strict, **kwargs)
+        self.level = level
 
-    def _restored(self, worlds: Mapping[str, Tensor]) -> WorldState:
-        state = filled(self.world.reset(self.seeds, self._episodes), dict(worlds))
-        return self._by_level(self.level, lambda scene, rows: scene.world.restored(state[rows]))
+    def _restored(self, state_dict: Mapping[str, Any]) -> WorldState:
+        state = filled(self.world.reset(self.seeds, self._episodes), state_dict["worlds"])
+        return self._by_level(state_dict["level"], lambda scene, rows: scene.world.restored(state[rows]))
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
         mask = None if tensordict is None else tensordict.get("_reset", None)

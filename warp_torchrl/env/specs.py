@@ -7,7 +7,6 @@ from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 
 from warp_torchrl.env.metrics import FLYING, METRICS, WATCHING
 from warp_torchrl.observation import STATE_SIDE, Observation, Space, state_names
-from warp_torchrl.world.sensing import Full
 from warp_torchrl.world.world import World
 
 EPISODE_METRICS = (*METRICS, "episode_reward", "episode_length")
@@ -26,7 +25,7 @@ class Specs(NamedTuple):
 
 def episode_metrics(world: World) -> tuple[str, ...]:
     """Return the entries of ``info`` of a world: ``EPISODE_METRICS``, then those that only worlds like it have."""
-    watching = () if isinstance(world.sensing, Full) else WATCHING
+    watching = WATCHING if world.sensing.is_limited else ()
     return (*EPISODE_METRICS, *watching, *(() if world.team.separation is None else FLYING))
 
 

@@ -25,7 +25,6 @@ from warp_torchrl.world.fast.compile import check_compiler
 from warp_torchrl.world.fast.road import why_eager
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.saved import filled
-from warp_torchrl.world.sensing import Full
 from warp_torchrl.world.state import Transition, TreeCounts, WorldState, count_trees
 from warp_torchrl.world.world import World
 
@@ -213,7 +212,7 @@ class WildfireEnv(EnvBase):
             raise ValueError(f"state_dict must have {', '.join(missing)}, got {', '.join(state_dict) or 'nothing'}")
         if missing:
             state_dict = {**self.state_dict(), **state_dict}
-        state = self._restored(state_dict["worlds"]) if state_dict["worlds"] else None
+        state = self._restored(state_dict) if state_dict["worlds"] else None
         for name in ("seeds", "episodes", "episode_reward"):
             if state_dict[name].shape != self.batch_size:
                 raise ValueError(f"{name} must have shape {list(self.batch_size)}, got {state_dict[name].shape}")
@@ -223,9 +222,9 @@ class WildfireEnv(EnvBase):
         self._enter(state)
         self._resets.clear()
 
-    def _restored(self, worlds: dict[str, Tensor]) -> WorldState:
-        """Return the worlds whose entries these are."""
-        return self.world.restored(filled(self.world.reset(self.seeds, self._episodes), worlds))
+    def _restored(self, state_dict: Mapping[str, Any]) -> WorldState:
+        """Return the worlds of a ``state_dict``."""
+        return self.world.restored(filled(self.world.reset(self.seeds, self._episodes), state_dict["worlds"]))
 
     # Interface for TorchRL
 
@@ -318,7 +317,7 @@ class WildfireEnv(EnvBase):
     def _check_compiling(self) -> str | None:
         check_compiler(self.device)
         why = why_eager(self.world.fire, self.device, self.batch_size[0] * math.prod(self.world.size))
-        if not isinstance(self.world.sensing, Full):
+        if self.world.sensing.is_limited:
             why = "a step of agents that do not see all is not compiled"
         if why is not None:
             _log.info("compile: %s", why)

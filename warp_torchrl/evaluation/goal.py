@@ -4,7 +4,6 @@ from typing import Literal
 
 from warp_torchrl.world.abilities import ABILITIES
 from warp_torchrl.world.role import ROLES
-from warp_torchrl.world.sensing import Full
 from warp_torchrl.world.world import World
 
 Goal = Literal["saved", "watched"]
@@ -14,4 +13,4 @@ Goal = Literal["saved", "watched"]
 def goal(world: World) -> Goal:
     """Return what policies are compared by: the trees saved, or the front watched where nobody of the team can act."""
     acts = any(not ABILITIES[name].moves for role in world.team.agent_roles for name in ROLES[role].abilities)
-    return "saved" if acts or isinstance(world.sensing, Full) else "watched"
+    return "watched" if world.sensing.is_limited and not acts else "saved"

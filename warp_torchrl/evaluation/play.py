@@ -17,7 +17,6 @@ from warp_torchrl.evaluation.match import Match, fits
 from warp_torchrl.heuristics import HEURISTICS, idle_action
 from warp_torchrl.models import ACTION, ACTION_MASK, memory_apart
 from warp_torchrl.policy import MODES
-from warp_torchrl.world.sensing import Full
 from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.world import World
@@ -44,7 +43,7 @@ class Recorder(Protocol):
 
 def baselines_of(world: World) -> tuple[str, ...]:
     """Return the baselines that stand beside a policy in a world."""
-    return BASELINES if isinstance(world.sensing, Full) else (*BASELINES, *SEARCHING)
+    return (*BASELINES, *SEARCHING) if world.sensing.is_limited else BASELINES
 
 
 def play(

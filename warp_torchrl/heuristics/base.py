@@ -10,9 +10,8 @@ from torch import Tensor
 
 from warp_torchrl.device import reads_freely
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.world.fast.constants import whole_numbers
 from warp_torchrl.world.fast.distances import FAR, nearest
-from warp_torchrl.world.geometry import DIRECTIONS
+from warp_torchrl.world.geometry import offsets
 from warp_torchrl.world.random import Stream, uniform, uniform_at
 from warp_torchrl.world.sensing import known_codes
 from warp_torchrl.world.state import FIRST_FIRE, Action, Cover, WorldState, is_burning
@@ -114,6 +113,13 @@ def known_fire(state: WorldState, env: WildfireEnv) -> Tensor:
     return (codes >= FIRST_FIRE) & (codes <= env.world.fire.last_spreading)
 
 
+def distance_to_cells(state: WorldState) -> Tensor:
+    """Return the Chebyshev distance from each agent to each cell, int64 [B, A, H, W]."""
+    row, column = (torch.arange(side, device=state.cells.device) for side in state.cells.shape[1:])
+    own = state.vehicles.position[..., None]
+    return torch.maximum((row - own[:, :, 0]).abs()[..., :, None], (column - own[:, :, 1]).abs()[..., None, :])
+
+
 def nearest_marked(state: WorldState, marked: Tensor) -> tuple[Tensor, Tensor]:
     """Return whether each agent has a marked cell, bool [B, A], and the flat index of the one nearest to it.
 
@@ -123,12 +129,7 @@ def nearest_marked(state: WorldState, marked: Tensor) -> tuple[Tensor, Tensor]:
         state: The worlds.
         marked: Cells of each agent's own, bool [B, A, H, W].
     """
-    agents, height, width = marked.shape[1:]
-    row, column = (torch.arange(side, device=marked.device) for side in (height, width))
-    own = state.vehicles.position[..., None]
-    away_row, away_column = (row - own[:, :, 0]).abs(), (column - own[:, :, 1]).abs()
-    distance = torch.maximum(away_row[..., :, None], away_column[..., None, :]).to(torch.float32)
-    distance += uniform(state.key, 0, Stream.POLICY, (agents, height, width))
+    distance = distance_to_cells(state) + uniform(state.key, 0, Stream.POLICY, tuple(marked.shape[1:]))
     best = distance.masked_fill_(~marked, float(FAR)).flatten(2).min(dim=-1)
     return best.values < FAR, best.indices
 
@@ -145,8 +146,7 @@ def move_towards(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
     Reversing costs one cell of distance, so that agents follow a lake's shore instead of oscillating.
     """
     vehicles, team = state.vehicles, env.world.team
-    offsets = whole_numbers(sum(DIRECTIONS, ()), target.device).view(8, 2)
-    reached = vehicles.position[:, :, None] + offsets * team.table(target.device).stride[:, None, None]
+    reached = vehicles.position[:, :, None] + offsets(target.device) * team.table(target.device).stride[:, None, None]
     gap = (reached - target[:, :, None]).abs().to(torch.float32)
     way = gap.amax(-1) + 0.01 * gap.sum(-1)
     direction = torch.arange(8, device=target.device)

@@ -1,13 +1,11 @@
 """The hand-made heuristic of Haksar and Schwager."""
 
-from functools import lru_cache
-
 import torch
 from torch import Tensor
 
 from warp_torchrl.heuristics.base import Heuristic, extinguish_or, idle_action
 from warp_torchrl.world.fast.squares import window
-from warp_torchrl.world.geometry import DIRECTIONS, unit_vectors
+from warp_torchrl.world.geometry import offsets, unit_vectors
 from warp_torchrl.world.retardant import approach_move, from_middle, has_reached, nearest_mate
 from warp_torchrl.world.state import WorldState, is_burning
 
@@ -36,9 +34,8 @@ class Clockwise(Heuristic):
         turn = self._round_the_fire(state)
         mate = nearest_mate(state)
         at = state.vehicles.position
-        offsets = _offsets(at.device)
         theirs = at.gather(1, mate[..., None].expand(-1, -1, 2))
-        gap = (at + offsets[turn] - theirs).square().sum(-1)
+        gap = (at + offsets(at.device)[turn] - theirs).square().sum(-1)
         yields = (gap <= 1) & (torch.arange(at.shape[1], device=at.device) > mate)
         idle = idle_action(mask, team)
         way = torch.where(has_reached(state), torch.where(yields, -1, turn), approach_move(state))
@@ -53,10 +50,10 @@ class Clockwise(Heuristic):
         burns = is_burning(state.cells)
         burnt = (state.burned != 0) & (state.cells == 0)
         seen = window(state.vehicles.position, state.cells.shape[1:], 2).of(burns.to(torch.uint8) + 2 * burnt)
-        offsets = _offsets(ahead.device)
-        at = seen[..., 2 + offsets[:, 0], 2 + offsets[:, 1]]  # by direction, [B, A, 8]
+        row, column = offsets(ahead.device).unbind(1)
+        at = seen[..., 2 + row, 2 + column]  # by direction, [B, A, 8]
         healthy = (seen == 0).to(torch.int64).unfold(-2, 3, 1).unfold(-2, 3, 1).sum((-2, -1))  # in each 3 x 3
-        about = healthy[..., 1 + offsets[:, 0], 1 + offsets[:, 1]] - (at == 0).to(torch.int64)
+        about = healthy[..., 1 + row, 1 + column] - (at == 0).to(torch.int64)
 
         def of(plane: Tensor, direction: Tensor) -> Tensor:
             return plane.gather(-1, (direction % 8)[..., None])[..., 0]
@@ -71,16 +68,11 @@ class Clockwise(Heuristic):
         """Return moves as they are where they are open, else along the border, else none, int64 [B, A]."""
         height, width = state.cells.shape[1:]
         stride = self.env.world.team.table(way.device).stride[:, None]
-        at, offsets = state.vehicles.position, _offsets(way.device)
-        row, column = (at + offsets[way.clamp(0, 7)] * stride).unbind(-1)
+        at, toward = state.vehicles.position, offsets(way.device)
+        row, column = (at + toward[way.clamp(0, 7)] * stride).unbind(-1)
         inside = torch.stack((row.clamp(0, height - 1), column.clamp(0, width - 1)), dim=-1)
         short = ((inside - at) // stride).sign()
-        is_it = (short[..., None, :] == offsets).all(dim=-1)
+        is_it = (short[..., None, :] == toward).all(dim=-1)
         move = is_it.to(torch.uint8).argmax(dim=-1)
         is_open = is_it.any(dim=-1) & mask.gather(-1, move[..., None])[..., 0]
         return torch.where(is_open, move, idle)
-
-
-@lru_cache(maxsize=8)
-def _offsets(device: torch.device) -> Tensor:
-    return torch.tensor(DIRECTIONS, device=device)

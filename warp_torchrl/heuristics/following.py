@@ -3,13 +3,12 @@
 import torch
 from torch import Tensor
 
-from warp_torchrl.heuristics.base import idle_action, move_towards, place, target_or_supply
+from warp_torchrl.heuristics.base import distance_to_cells, idle_action, move_towards, place, target_or_supply
 from warp_torchrl.heuristics.searching import Oldest
-from warp_torchrl.world.geometry import grow
-from warp_torchrl.world.radio import heard
+from warp_torchrl.world.front import spreading_front
 from warp_torchrl.world.random import Stream, uniform
-from warp_torchrl.world.sensing import Sight, known_codes, others_in_sight, steps_since
-from warp_torchrl.world.state import EMBER, FIRST_FIRE, OLDEST, WorldState
+from warp_torchrl.world.sensing import known_codes, steps_since
+from warp_torchrl.world.state import WorldState
 
 _ANOTHERS = 1e6
 """What a cell is worth less to an agent that knows another to be nearer to it."""
@@ -36,20 +35,13 @@ class Follower(Oldest):
         agents, (height, width) = state.vehicles.position.shape[1], state.cells.shape[1:]
         device, team = state.cells.device, self.env.world.team
         codes = state.cells[:, None].expand(-1, agents, -1, -1) if state.knowledge is None else known_codes(state)
-        fuel = (codes >= 1) & (codes <= OLDEST) & (state.alpha > 0.0)[:, None]
-        front = (codes >= FIRST_FIRE) & (codes < EMBER) & grow(fuel)
+        front = spreading_front(codes, state.alpha[:, None])
         since = 0 if state.knowledge is None else steps_since(state.knowledge, state.step)
-        away = self._away(state)
+        away = distance_to_cells(state)
         draw = uniform(state.key, 0, Stream.POLICY, (agents, height, width))
         score = since - away / team.table(device).stride[:, None, None] + draw
-        known = self._knows_of(state)[..., None, None]
+        known = self.env.world.sensing.knows_where(state, team)[..., None, None]
         nearest = torch.where(known, away[:, None], height + width).amin(dim=2)  # of the others
         score = score - _ANOTHERS * (nearest < away)
         best = score.masked_fill(~front, -2.0 * _ANOTHERS).flatten(2).max(dim=-1)
         return best.values > -0.5 * _ANOTHERS, place(best.indices, state)
-
-    def _knows_of(self, state: WorldState) -> Tensor:
-        """Return of which others each agent knows where they are, bool [B, A, A]."""
-        sensing, team = self.env.world.sensing, self.env.world.team
-        reach = sensing.reach(team) if isinstance(sensing, Sight) else [max(state.cells.shape[1:])] * team.n_agents
-        return heard(state, team) | others_in_sight(state, reach)

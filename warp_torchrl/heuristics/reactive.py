@@ -16,7 +16,7 @@ from warp_torchrl.heuristics.base import (
     target_or_supply,
 )
 from warp_torchrl.world.random import Stream, uniform
-from warp_torchrl.world.sensing import Sight, in_reach
+from warp_torchrl.world.sensing import in_reach
 from warp_torchrl.world.state import WorldState
 
 
@@ -55,7 +55,7 @@ class Local(Heuristic):
     def _fire_in_sight(self, state: WorldState) -> tuple[Tensor, Tensor]:
         """Return whether each agent sees fire, bool [B, A], and the flat index of the nearest."""
         world = self.env.world
-        if isinstance(world.sensing, Sight):
+        if world.sensing.is_limited:
             return nearest_marked(state, known_fire(state, self.env) & in_reach(state, world.sensing.reach(world.team)))
         distance, index = nearest_fire(state, can_be_put_out(state, self.env))
         return distance <= self.radius, index

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from warp_torchrl.heuristics.base import (
     Heuristic,
+    distance_to_cells,
     extinguish_or,
     known_fire,
     move_towards,
@@ -18,7 +19,7 @@ from warp_torchrl.heuristics.base import (
     target_or_supply,
 )
 from warp_torchrl.world.random import Stream, uniform
-from warp_torchrl.world.sensing import Sight, freshness
+from warp_torchrl.world.sensing import freshness
 from warp_torchrl.world.state import WorldState
 
 
@@ -52,8 +53,9 @@ class Oldest(Searching):
     def search(self, state: WorldState) -> Tensor:
         """Return the cell with the best score for each agent, int64 [B, A, 2]."""
         (height, width), agents = state.cells.shape[1:], state.vehicles.position.shape[1]
-        row, column = _grid(state)
-        distance = self._away(state)
+        row = torch.arange(height, device=state.cells.device)[:, None]
+        column = torch.arange(width, device=state.cells.device)
+        distance = distance_to_cells(state)
         away_row = (row - state.vehicles.base[:, 0, None, None]).abs()
         away_column = (column - state.vehicles.base[:, 1, None, None]).abs()
         sector = torch.atan2(away_row.float(), away_column.float()) / (torch.pi / 2.0)
@@ -63,13 +65,6 @@ class Oldest(Searching):
         score = stale - 2.0 * distance / max(height, width) - (sector[:, None] - mine).abs() + 0.1 * draw
         return place(score.flatten(2).argmax(dim=-1), state)
 
-    @staticmethod
-    def _away(state: WorldState) -> Tensor:
-        """Return the Chebyshev distance from each agent to each cell, int64 [B, A, H, W]."""
-        row, column = _grid(state)
-        own = state.vehicles.position[..., None, None]
-        return torch.maximum((row - own[:, :, 0]).abs(), (column - own[:, :, 1]).abs())
-
 
 class Lawnmower(Searching):
     """Searches in lanes: each agent mows its own strip of the map, back and forth, as wide as it sees."""
@@ -77,9 +72,8 @@ class Lawnmower(Searching):
     def search(self, state: WorldState) -> Tensor:
         """Return the point of its lanes where each agent should be by now, int64 [B, A, 2]."""
         (height, width), agents = state.cells.shape[1:], state.vehicles.position.shape[1]
-        device, sensing, team = state.cells.device, self.env.world.sensing, self.env.world.team
-        reach = sensing.reach(team) if isinstance(sensing, Sight) else [max(height, width)] * agents
-        sees = torch.tensor(reach, device=device)
+        device, team = state.cells.device, self.env.world.team
+        sees = torch.tensor(self.env.world.sensing.reach(team), device=device)
         edge = torch.arange(agents + 1, device=device) * width // agents
         first, last = edge[:-1], edge[1:] - 1
         lane = (2 * sees + 1).clamp(max=height)
@@ -93,10 +87,3 @@ class Lawnmower(Searching):
         row = (down * lane + sees).clamp(max=height - 1)
         row = torch.where(state.vehicles.base[:, :1] > 0, height - 1 - row, row)
         return torch.stack((row, across), dim=-1)
-
-
-def _grid(state: WorldState) -> tuple[Tensor, Tensor]:
-    """Return the row of each cell, int64 [H, 1], and its column, int64 [1, W]."""
-    height, width = state.cells.shape[1:]
-    device = state.cells.device
-    return torch.arange(height, device=device)[:, None], torch.arange(width, device=device)[None]

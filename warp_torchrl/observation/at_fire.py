@@ -9,7 +9,6 @@ from warp_torchrl.observation.presets import Space
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.fast.squares import window
 from warp_torchrl.world.retardant import from_middle, nearest_mate
-from warp_torchrl.world.sensing import Full
 from warp_torchrl.world.state import Forecast, WorldState, is_burning
 from warp_torchrl.world.world import World
 
@@ -42,7 +41,7 @@ class AtFire:
 
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
-        if not isinstance(world.sensing, Full):
+        if world.sensing.is_limited:
             raise ValueError("sensing must be full with observation=at_fire, which shows what aircraft see as it is")
         cells = (2 * self.radius + 1) ** 2
         return {

@@ -18,9 +18,8 @@ from warp_torchrl.content import Content, Empty, Follows
 from warp_torchrl.validation import check_new_name
 from warp_torchrl.world.fast.bytes import at_least, byte, equal, to_codes, to_int32
 from warp_torchrl.world.fast.squares import Window, window
-from warp_torchrl.world.radio import heard
 from warp_torchrl.world.role import PAPER_ROLES
-from warp_torchrl.world.sensing import Full, Sight, freshness, others_in_sight, read
+from warp_torchrl.world.sensing import freshness, read
 from warp_torchrl.world.state import FIRST_FIRE, Forecast, WorldState, is_burning, is_tree
 from warp_torchrl.world.world import World
 
@@ -167,7 +166,7 @@ def relative_elevation(look: Look) -> Tensor:
     return to_codes(((heights - own) / ELEVATION_SCALE).clamp_(-1.0, 1.0).mul_(127.0).add_(128.0))
 
 
-@channel(content=lambda world, names: None if isinstance(world.sensing, Full) else Empty())
+@channel(content=lambda world, names: Empty() if world.sensing.is_limited else None)
 def threat(look: Look) -> Tensor:
     """Return where the fire is about to grow, see ``Forecast.fire_risk``, 255 times."""
     return look.fire_risk
@@ -278,24 +277,13 @@ def stages(cells: Tensor) -> Tensor:
     return (cells - (FIRST_FIRE - 1)) * byte(is_burning(cells)) * 51
 
 
-def knows_where(state: WorldState, world: World) -> Tensor:
-    """Return of which others each agent knows where they are, bool [B or 1, A, A].
-
-    It is of all, or where sight is limited of those that it hears or sees.
-    """
-    sensing, agents = world.sensing, state.vehicles.position.shape[1]
-    if not isinstance(sensing, Sight):
-        return ~torch.eye(agents, dtype=torch.bool, device=state.cells.device)[None]
-    return heard(state, world.team) | others_in_sight(state, sensing.reach(world.team))
-
-
 def _others(state: WorldState, world: World, radius: int) -> Tensor:
     """Return where the other agents of each role are, 63 each, at most 4 to a cell, uint8 [B, A, R, V, V]."""
     position, role = state.vehicles.position, world.team.table(state.cells.device).index
     side, roles = 2 * radius + 1, len(world.team.role_names)
     row, column = (position[:, None] - position[:, :, None] + radius).unbind(-1)  # of each in each other's square
     is_near = (row >= 0) & (row < side) & (column >= 0) & (column < side)
-    is_near &= knows_where(state, world)
+    is_near &= world.sensing.knows_where(state, world.team)
     index = torch.where(is_near, (role * side + row) * side + column, roles * side**2)
     count = torch.zeros(*row.shape[:2], roles * side**2 + 1, dtype=torch.uint8, device=role.device)
     count = count.scatter_add(2, index, torch.ones_like(index, dtype=torch.uint8))[..., :-1]

@@ -5,13 +5,13 @@ from torch import Tensor
 from torch.nn.functional import one_hot
 
 from warp_torchrl.content import Content, Empty, Quarters
-from warp_torchrl.observation.channels import ELEVATION_SCALE, LAST_SEEN, knows_where
+from warp_torchrl.observation.channels import ELEVATION_SCALE, LAST_SEEN
 from warp_torchrl.observation.own import WIND_SCALE, steps_to_tick, time_left
 from warp_torchrl.symmetry import Planes, Target, TeamPlanes
 from warp_torchrl.world.fast.blocks import block_means
 from warp_torchrl.world.fast.squares import window
 from warp_torchrl.world.role import PAPER_ROLES
-from warp_torchrl.world.sensing import Full, freshness, known_codes
+from warp_torchrl.world.sensing import freshness, known_codes
 from warp_torchrl.world.state import FIRST_FIRE, OLDEST, Forecast, WorldState, is_burning
 from warp_torchrl.world.world import World
 
@@ -32,7 +32,7 @@ STATE_SYMMETRY = TeamPlanes(len(STATE), STATE.index("fire"), (_FIRST_ROLE, len(P
 
 def picture_names(world: World) -> tuple[str, ...]:
     """Return the channels of the picture: ``PICTURE``, and where sight is limited ``last_seen``, how fresh they are."""
-    return PICTURE if isinstance(world.sensing, Full) else (*PICTURE, LAST_SEEN)
+    return (*PICTURE, LAST_SEEN) if world.sensing.is_limited else PICTURE
 
 
 def picture_highs(world: World) -> tuple[float, ...]:
@@ -49,7 +49,7 @@ def picture_symmetry(centred: bool, channels: int = len(PICTURE)) -> Planes:
 def picture(state: WorldState, world: World, forecast: Forecast) -> Tensor:
     """Return the state of the fire in 8 x 8 blocks of the map, float32 [B, A, C, 8, 8], see ``picture_names``."""
     place = one_hot(_block(state, PICTURE_SIDE), PICTURE_SIDE**2).to(torch.float32)
-    mates = (knows_where(state, world).to(torch.float32) @ place).mul_(0.25).clamp_(max=1.0)
+    mates = (world.sensing.knows_where(state, world.team).to(torch.float32) @ place).mul_(0.25).clamp_(max=1.0)
     mates = mates.view(*place.shape[:2], 1, PICTURE_SIDE, PICTURE_SIDE)
     seen = _maps(state, forecast).expand(-1, place.shape[1], -1, -1, -1)
     return torch.cat((seen[:, :, :2], mates, seen[:, :, 2:]), dim=2)
@@ -71,7 +71,7 @@ def centred_picture(state: WorldState, world: World, forecast: Forecast) -> Tens
         return torch.stack((fire, fuel, (mates.clamp_(max=4) * 63).to(torch.uint8)), dim=2)
     fire, fuel, fresh = (about.of_own(each) for each in maps)
     places = one_hot(block, PICTURE_SIDE**2).to(torch.float32)
-    mates = (knows_where(state, world).to(torch.float32) @ places).clamp_(max=4.0)
+    mates = (world.sensing.knows_where(state, world.team).to(torch.float32) @ places).clamp_(max=4.0)
     mates = about.of_own(mates.mul_(63.0).to(torch.uint8).unflatten(-1, sides))
     return torch.stack((fire, fuel, mates, fresh), dim=2)
 
@@ -82,7 +82,7 @@ def state_names(world: World) -> tuple[str, ...]:
     Where sight is limited it has ``KNOWN`` too: the burning cells that agents know of, and how fresh what they know is,
     both the mean of the agents.
     """
-    known = () if isinstance(world.sensing, Full) else KNOWN
+    known = KNOWN if world.sensing.is_limited else ()
     return (
         *STATE[:_FIRST_ROLE],
         *world.team.role_names,

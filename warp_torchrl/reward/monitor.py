@@ -6,7 +6,7 @@ from torch import Tensor
 
 from warp_torchrl.reward.base import Reward
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.sensing import Full, Sensing
+from warp_torchrl.world.sensing import Sensing
 from warp_torchrl.world.state import Transition
 
 
@@ -59,7 +59,7 @@ class Monitor(Reward):
         Raises:
             ValueError: If it is not.
         """
-        if isinstance(sensing, Full):
+        if not sensing.is_limited:
             raise ValueError("sensing must be sight where reward is monitor, which pays for what was seen, got full")
 
     def own(self, transition: Transition) -> Tensor:

@@ -6,9 +6,8 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.reward.base import Reward
-from warp_torchrl.world.fast.constants import whole_numbers
 from warp_torchrl.world.fast.squares import window
-from warp_torchrl.world.geometry import DIRECTIONS
+from warp_torchrl.world.geometry import offsets
 from warp_torchrl.world.retardant import from_middle, nearest_mate
 from warp_torchrl.world.state import Transition, WorldState, is_burning, is_tree
 
@@ -45,8 +44,7 @@ class RoundFire(Reward):
         """Return each agent's reward before sharing and shaping, float32 [B, A]."""
         before = transition.before
         moved = transition.result.moved[..., None]
-        offsets = whole_numbers(sum(DIRECTIONS, ()), moved.device).view(8, 2)
-        step = offsets[transition.result.action.clamp(0, 7)] * moved
+        step = offsets(moved.device)[transition.result.action.clamp(0, 7)] * moved
         comes = before.vehicles.position + step
         return self._place(before, comes) + self._company(before, comes) + self._turn(before, step)
 

@@ -17,7 +17,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_new_name
-from warp_torchrl.world.geometry import DIRECTIONS
+from warp_torchrl.world.geometry import offsets
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.role import RoleTable
 from warp_torchrl.world.state import FIRST_FIRE, Cover, WorldState, is_burning, is_tree
@@ -38,8 +38,7 @@ class Situation:
     @property
     def own_cell(self) -> Tensor:
         """Return the flat index of each agent's cell, row * W + column, int64 [B, A]."""
-        position = self.state.vehicles.position
-        return position[..., 0] * self.state.cells.shape[2] + position[..., 1]
+        return own_cell(self.state)
 
     @staticmethod
     def at(plane: Tensor, index: Tensor) -> Tensor:
@@ -115,7 +114,7 @@ class Move(Ability):
     def mask(self, now: Situation) -> Tensor:
         """Return which of the eight moves each agent can make, bool [B, A, 8]; nobody leaves the map."""
         state, roles = now.state, now.roles
-        index, inside = places(state, _offsets(state.cells.device) * roles.stride[:, None, None])
+        index, inside = places(state, offsets(state.cells.device) * roles.stride[:, None, None])
         flat = index.flatten(1)
         ground, cells = now.at(state.cover, flat), now.at(state.cells, flat)
         blocked = ((ground == int(Cover.LAKE)) | is_burning(cells)).view_as(inside)
@@ -123,7 +122,7 @@ class Move(Ability):
 
     def act(self, now: Situation, choice: Tensor) -> Deed:
         """Return the moves."""
-        step = _offsets(choice.device)[choice] * now.roles.stride[:, None]
+        step = offsets(choice.device)[choice] * now.roles.stride[:, None]
         return Deed(self.mask(now).gather(-1, choice[..., None])[..., 0], step=step)
 
 
@@ -189,6 +188,12 @@ PAPER_ABILITIES = tuple(ABILITIES)
 """Those of WARP-CA, whose ten actions every team has: a vehicle whose role lacks one is shown it as closed."""
 
 
+def own_cell(state: WorldState) -> Tensor:
+    """Return the flat index of each agent's cell, row * W + column, int64 [B, A]."""
+    position = state.vehicles.position
+    return position[..., 0] * state.cells.shape[2] + position[..., 1]
+
+
 def neighbourhood(state: WorldState) -> tuple[Tensor, Tensor]:
     """Return the 3 x 3 cells about each agent, its own first, then in row-major order; as ``places``, n = 9."""
     return places(state, _around(state.cells.device))
@@ -210,11 +215,6 @@ def places(state: WorldState, away: Tensor) -> tuple[Tensor, Tensor]:
     row, column = position[..., 0, None] + away[..., 0], position[..., 1, None] + away[..., 1]
     on_row, on_column = row.clamp(0, height - 1), column.clamp(0, width - 1)
     return on_row * width + on_column, (on_row == row) & (on_column == column)
-
-
-@lru_cache(maxsize=8)
-def _offsets(device: torch.device) -> Tensor:
-    return torch.tensor(DIRECTIONS, device=device)
 
 
 @lru_cache(maxsize=8)

@@ -5,8 +5,7 @@ import math
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.fast.constants import whole_numbers
-from warp_torchrl.world.geometry import DIRECTIONS
+from warp_torchrl.world.geometry import offsets
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import Vehicles, WorldState
 
@@ -72,7 +71,7 @@ def carried(state: WorldState, flying: Tensor, drift: float) -> Tensor:
     east, north = wind_at(state).unbind(-1)
     chance = drift * torch.hypot(east, north)
     turn = (torch.atan2(east, north) / (math.pi / 4.0)).round().to(torch.int64) % 8
-    step = whole_numbers(sum(DIRECTIONS, ()), position.device).view(8, 2)[turn]
+    step = offsets(position.device)[turn]
     row, column = (position + step).unbind(-1)
     on_map = (row >= 0) & (row < height) & (column >= 0) & (column < width)
     gust = uniform(state.key, state.step, Stream.DRIFT, (position.shape[1],)) < chance

@@ -8,7 +8,7 @@ from torch import Tensor
 from torch.nn.functional import avg_pool2d
 
 from warp_torchrl.world.geometry import grow
-from warp_torchrl.world.state import EMBER, FIRST_FIRE, TreeCounts, WorldState, is_burning, is_tree
+from warp_torchrl.world.state import EMBER, FIRST_FIRE, OLDEST, TreeCounts, WorldState, is_burning, is_tree
 
 RAYS = 32
 """Rays from a fire's centre on which barriers are looked for."""
@@ -57,10 +57,18 @@ def sector(place: Tensor, middle: Tensor, count: int = 8) -> Tensor:
     return (turn.remainder(1.0) * count).to(torch.int64).clamp(max=count - 1)
 
 
-def spreading_front(state: WorldState) -> Tensor:
-    """Return the burning cells that can spread, bool [B, H, W]: before the last stage, beside a tree that can burn."""
-    fuel = is_tree(state.cells) & (state.alpha > 0.0)
-    return (state.cells >= FIRST_FIRE) & (state.cells < EMBER) & grow(fuel, 1)
+def spreading_front(cells: Tensor, alpha: Tensor) -> Tensor:
+    """Return the burning cells that can spread: before the last stage, beside a tree that can burn.
+
+    Args:
+        cells: Codes as they are, or as an agent knows them, [..., H, W].
+        alpha: Flammability, float32 [..., H, W].
+
+    Returns:
+        bool, shape of the cells.
+    """
+    fuel = (cells >= 1) & (cells <= OLDEST) & (alpha > 0.0)
+    return (cells >= FIRST_FIRE) & (cells < EMBER) & grow(fuel)
 
 
 def exposure(state: WorldState, counts: TreeCounts, reach: int = 3) -> Tensor:

@@ -5,6 +5,7 @@ direction ``d`` and ``(d + 4) % 8`` are opposite.
 """
 
 import math
+from functools import lru_cache
 
 import torch
 from torch import Tensor
@@ -15,6 +16,12 @@ DIRECTIONS = ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -
 
 DISTANCES = tuple(math.hypot(row, column) for row, column in DIRECTIONS)
 """Distance to the neighbour in each direction [cells]: 1 along the axes, sqrt(2) along the diagonals."""
+
+
+@lru_cache(maxsize=8)
+def offsets(device: torch.device) -> Tensor:
+    """Return the (row, column) offset of each direction, int64 [N, 2], kept for the next time [cells]."""
+    return torch.tensor(DIRECTIONS, device=device)
 
 
 def unit_vectors(device: torch.device | str = "cpu") -> Tensor:

@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
+from warp_torchrl.world.abilities import own_cell
 from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.role import Role, add_role
 from warp_torchrl.world.state import Action, ActionResult, Vehicles, WorldState, is_burning
@@ -137,12 +138,6 @@ def _treat(state: WorldState, drops: Tensor) -> tuple[WorldState, Tensor, Tensor
     after = changed(state, cell, [(first, {"wet": 1})])
     left = tank - (treated & (tank > 0)).to(torch.int32)
     return after.replace(vehicles=after.vehicles.replace(tank=left)), treated, first
-
-
-def own_cell(state: WorldState) -> Tensor:
-    """Return the flat index of each agent's cell, row * W + column, int64 [B, A]."""
-    position = state.vehicles.position
-    return position[..., 0] * state.cells.shape[2] + position[..., 1]
 
 
 def has_reached(state: WorldState) -> Tensor:

@@ -21,12 +21,27 @@ from warp_torchrl.world.team import Team
 from warp_torchrl.world.watching import Records, at_start, counted, unwatched
 
 _CODES, _ASH, _FIREBREAK, _KINDS = 16, 16, 32, 64
+_EVERYWHERE = 1 << 20
+"""A sight that no map limits [cells]."""
 HALF_FRESH = 16.0
 """Steps after which what was seen is half as fresh as what is seen now."""
 
 
 class Sensing(ABC):
     """What the world needs of a sensing component."""
+
+    @property
+    @abstractmethod
+    def is_limited(self) -> bool:
+        """Return whether something may burn that agents do not know of."""
+
+    @abstractmethod
+    def reach(self, team: Team) -> list[int]:
+        """Return how far each agent sees [cells]."""
+
+    @abstractmethod
+    def knows_where(self, state: WorldState, team: Team) -> Tensor:
+        """Return of which others each agent knows where they are, bool [B or 1, A, A]."""
 
     @abstractmethod
     def begun(self, state: WorldState, team: Team) -> WorldState:
@@ -40,6 +55,19 @@ class Sensing(ABC):
 @dataclass(frozen=True, kw_only=True)
 class Full(Sensing):
     """Agents are shown the fire as it is, as far as their observation reaches."""
+
+    @property
+    def is_limited(self) -> bool:
+        """Return that it is not."""
+        return False
+
+    def reach(self, team: Team) -> list[int]:
+        """Return more than any map is long [cells]."""
+        return [_EVERYWHERE] * team.n_agents
+
+    def knows_where(self, state: WorldState, team: Team) -> Tensor:
+        """Return that each knows where all others are, bool [1, A, A]."""
+        return ~torch.eye(team.n_agents, dtype=torch.bool, device=state.cells.device)[None]
 
     def begun(self, state: WorldState, team: Team) -> WorldState:
         """Return the worlds."""
@@ -94,9 +122,18 @@ class Sight(Sensing):
         if unknown:
             raise ValueError(f"radius_of must name roles of {', '.join(ROLES)}, got {unknown[0]}")
 
+    @property
+    def is_limited(self) -> bool:
+        """Return that it is."""
+        return True
+
     def reach(self, team: Team) -> list[int]:
         """Return how far each agent sees [cells]."""
         return [self.radius_of.get(role, self.radius) for role in team.agent_roles]
+
+    def knows_where(self, state: WorldState, team: Team) -> Tensor:
+        """Return of which others each agent knows where they are, bool [B, A, A]: those that it hears or sees."""
+        return heard(state, team) | others_in_sight(state, self.reach(team))
 
     def begun(self, state: WorldState, team: Team) -> WorldState:
         """Return the worlds with what the agents see where they start."""

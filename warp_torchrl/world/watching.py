@@ -55,7 +55,7 @@ def counted(state: WorldState, before: Watching, itself: Tensor, newest: Records
         newest: What the team's records tell after it.
         recent: n [steps].
     """
-    front, burning = spreading_front(state), is_burning(state.cells)
+    front, burning = spreading_front(state.cells, state.alpha), is_burning(state.cells)
     watched = front & newest.burns & (newest.since <= recent)
     found = burning & newest.burns & ~newest.burned_before & (newest.since == 0)
     share = newest.holders / newest.holders.sum(dim=1, keepdim=True).clamp(min=1)

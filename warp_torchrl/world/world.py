@@ -78,7 +78,7 @@ class World:
             raise ValueError(
                 f"team.n_agents must be at most a quarter of the map's {height * width} cells, got {self.team.n_agents}"
             )
-        if self.team.sends_maps and isinstance(self.sensing, Full):
+        if self.team.sends_maps and not self.sensing.is_limited:
             raise ValueError(
                 f"team.messages must be none or graph where agents see all (sensing=full), got {self.team.messages}"
             )
