@@ -276,7 +276,7 @@ def build_components(config: Mapping[str, Any], names: Sequence[str] = COMPONENT
     Raises:
         ConfigError: With key, value and rule.
     """
-    first = ("model",) if "model" in names else ()  # the team's messages are the model's: a mistake is told of the latter
+    first = ("model",) if "model" in names else ()  # whose messages are the team's: mistakes are told of the model
     built = {name: build(config[name], name) for name in dict.fromkeys((*first, *names))}
     if "reward" in built:
         try:

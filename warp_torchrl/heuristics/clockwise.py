@@ -18,11 +18,11 @@ class Clockwise(Heuristic):
     (Haksar and Schwager, "Distributed Deep Reinforcement Learning for Fighting Forest Fires with a Network of Aerial
     Robots", IROS 2018, and the authors' public code).
 
-    Of the eight moves it takes the one that turns most clockwise; but of the two next to it on the left, which lead
-    outwards, one that comes to a burning tree, or else one that comes to a burnt one; and if it would come to a healthy
-    tree among six others or more, the move next to it on the right. It stays where it would come within a cell of the
-    team-mate nearest to it, if that has a lower number. It sees the 5 x 5 cells about it, its team-mates, and where
-    the middle of the map is; beyond the map all is healthy.
+    Of the eight moves it takes the one that turns most clockwise, with two exceptions. If one of the two moves next to
+    it on the left, which lead outwards, comes to a burning tree, or else to a burnt one, it takes that. If it would
+    come to a healthy tree among six others or more, it takes the move next to it on the right. It stays where it would
+    come within a cell of the team-mate nearest to it, if that has a lower number. It sees the 5 x 5 cells about it, its
+    team-mates, and where the middle of the map is; beyond the map all is healthy.
 
     A move that leads off the map, where the authors' aircraft can go, is made along the border. Vehicles that can put
     fire out do so first.

@@ -20,16 +20,15 @@ class Monitor(Reward):
     ago, as far as agent i saw it last. F_i: burning cells that nobody of the team knew to burn and that agent i records
     first, a share of all that burn. Agents that saw a cell in the same step share W and F of it. M_i: 1 where aircraft
     i ends the step with a near miss (``team.separation``), else 0. U: mean over the map of 1 - freshness of the team's
-    newest records. Like other rewards it pays A times for an agent's own part, so that the team's mean is
+    newest records. An agent's own part counts A times, as in other rewards. The team's mean is
 
         R = sum_i (w_w W_i + w_f F_i - w_m M_i) + w_u (U(t-1) - U(t))
 
     A fire that is found sooner is watched for longer, and discounted less.
 
-    After Julian and Kochenderfer (2019, Distributed wildfire surveillance with autonomous aircraft using deep
-    reinforcement learning, JGCD 42(8)), whose aircraft share a map of the fire and of when each place was visited, and
-    Viseras, Meissner and Marchal (2021, Wildfire front monitoring with multiple UAVs using deep Q-learning, IEEE
-    Access). The terms and weights are ours.
+    The task is that of Julian and Kochenderfer, "Distributed wildfire surveillance with autonomous aircraft using deep
+    reinforcement learning" (JGCD 42(8), 2019), and of Viseras, Meissner and Marchal, "Wildfire front monitoring with
+    multiple UAVs using deep Q-learning" (IEEE Access, 2021). The terms and weights are ours.
 
     Attributes:
         watched: w_w.
