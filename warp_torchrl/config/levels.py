@@ -10,6 +10,7 @@ from torch import Tensor
 
 from warp_torchrl.config.construction import ConfigError, build, construct
 from warp_torchrl.curriculum import Curriculum
+from warp_torchrl.dotted import dotted
 from warp_torchrl.env.specs import make_specs
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.observation import Observation
@@ -46,31 +47,16 @@ def _configs(config: Mapping[str, Any], curriculum: Curriculum, keys: tuple[str,
     lists = curriculum.values()
     if not lists:
         raise ConfigError("curriculum.over must name a key of the scenario: curriculum.over.steps_per_tick=[20,10,5]")
+    known = dotted({name: config[name] for name in keys})
     for key, values in lists.items():
-        own = _value(config, key, keys)
+        if key not in known or key.endswith("_target_"):
+            raise ConfigError(f"curriculum.over.{key} is not a key of the scenario{did_you_mean(key, list(known))}")
+        own = known[key]
         if values[-1] != own or isinstance(values[-1], bool) != isinstance(own, bool):
             raise ConfigError(f"curriculum.over.{key} must end with the scenario's own value, {own}, got {values[-1]}")
     return [
         _with(config, {key: values[level] for key, values in lists.items()}) for level in range(curriculum.n_levels)
     ]
-
-
-def _value(config: Mapping[str, Any], key: str, keys: tuple[str, ...]) -> Any:
-    """Return the value of a scenario's key."""
-    known = [path for path in _paths(config) if path.partition(".")[0] in keys and not path.endswith("_target_")]
-    if key not in known:
-        raise ConfigError(f"curriculum.over.{key} is not a key of the scenario{did_you_mean(key, known)}")
-    node: Any = config
-    for name in key.split("."):
-        node = node[name]
-    return node
-
-
-def _paths(node: Mapping[str, Any], prefix: str = "") -> list[str]:
-    found = []
-    for key, value in node.items():
-        found += _paths(value, f"{prefix}{key}.") if isinstance(value, Mapping) else [f"{prefix}{key}"]
-    return found
 
 
 def _with(config: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:

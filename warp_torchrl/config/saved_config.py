@@ -13,6 +13,7 @@ from omegaconf.errors import OmegaConfBaseException
 from warp_torchrl.config.compose import OPTION, compose_config, conf_folder, option_of, plain, without_targets
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.run_config import COMPONENTS, ENVIRONMENT, WORLD_KEYS
+from warp_torchrl.dotted import dotted
 
 _BEFORE = {
     "model.symmetry": "none",
@@ -72,7 +73,7 @@ def restore(record: SavedConfig, overrides: Sequence[str] = ()) -> DictConfig:
         touched += WORLD_KEYS
     choices = [f"{group}={option}" for group, option in record.choices.items() if group not in touched]
     config = compose_config("train", [*choices, *overrides])
-    recorded = dict(_leaves(record.values))
+    recorded = dotted(record.values)
     groups = {*record.values, "processes"}
     before = {
         key: value
@@ -108,10 +109,10 @@ def world_overrides(values: Mapping[str, Any]) -> list[str]:
             )
             choices.append(next(of_its_class))
             usual = _composed_worlds(choices)
-    usual = dict(_leaves(usual))
+    usual = dotted(usual)
     changed = [
         f"{path}={value}".replace(" ", "")
-        for path, value in map(_of_worlds, _leaves({key: values[key] for key in WORLD_KEYS if key in values}))
+        for path, value in map(_of_worlds, dotted({key: values[key] for key in WORLD_KEYS if key in values}).items())
         if (path not in usual or usual[path] != value) and not path.endswith(".path")
     ]
     return choices[1:] + changed
@@ -126,11 +127,3 @@ def _of_worlds(leaf: tuple[str, Any]) -> tuple[str, Any]:
 def _composed_worlds(choices: Sequence[str]) -> dict[str, Any]:
     composed = plain(compose_config("train", choices))
     return {key: composed[key] for key in WORLD_KEYS}
-
-
-def _leaves(node: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
-    found = []
-    for key, value in node.items():
-        path = f"{prefix}{key}"
-        found += _leaves(value, f"{path}.") if isinstance(value, Mapping) else [(path, value)]
-    return found

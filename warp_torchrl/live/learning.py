@@ -3,16 +3,16 @@
 import csv
 import re
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 import torch
 
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.run_config import WORLD_KEYS
 from warp_torchrl.config.saved_config import SavedConfig, restore
+from warp_torchrl.dotted import dotted
 from warp_torchrl.hyperparameters.training import STOPPED, Training, TrainingProcess
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.match import Setting
@@ -173,8 +173,8 @@ def _configuration(record: SavedConfig, overrides: Sequence[str]) -> list[str]:
         touched |= set(WORLD_KEYS)
     chosen = record.choices | {"collector": "direct", "curriculum": "none", "logger": "csv"}
     given = [*(f"{group}={option}" for group, option in chosen.items() if group not in touched), *overrides]
-    usual = dict(_leaves(plain(compose_config("train", given))))
-    wanted = _leaves(plain(restore(record, overrides)))
+    usual = dotted(plain(compose_config("train", given)))
+    wanted = dotted(plain(restore(record, overrides))).items()
     return given + [
         f"{'' if path in usual else '+'}{path}={_literal(value)}"
         for path, value in wanted
@@ -183,14 +183,6 @@ def _configuration(record: SavedConfig, overrides: Sequence[str]) -> list[str]:
         and (path not in usual or usual[path] != value)
         and (path in usual or not path.startswith("collector."))
     ]
-
-
-def _leaves(node: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    for key, value in node.items():
-        if isinstance(value, Mapping):
-            yield from _leaves(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", value
 
 
 def _literal(value: object) -> str:
