@@ -16,6 +16,7 @@ from warp_torchrl.env.flat import FLAT, unflattened
 from warp_torchrl.models import (
     ACTION,
     ACTION_MASK,
+    AGENCY,
     LOGITS,
     OBSERVATION,
     RADIO,
@@ -122,7 +123,8 @@ class NumpyPolicy:
     worlds. A policy whose agents talk (``model.messages``) needs the whole team, in the order of ``possible_agents``,
     and infos, which tell whom each hears. A policy with a network for each agent (``sharing: none``) needs the whole
     team likewise. A policy with a network for each role (``sharing: role``) reads the role from the agent's name
-    (``bulldozer_0``), or from its ``self`` if it has no name. A recurrent policy (``memory``) keeps a hidden state for
+    (``bulldozer_0``), or from its ``self`` if it has no name; one with a network for each agency (``sharing: agency``)
+    reads the agency from ``self``. A recurrent policy (``memory``) keeps a hidden state for
     each name; agents without names need a ``numpy_policy()`` each.
 
     Args:
@@ -136,7 +138,7 @@ class NumpyPolicy:
         self._entries = {name: policy.shown.observation[name] for name in read}
         self._shapes = {name: (entry.shape, entry.dtype) for name, entry in self._entries.items()}
         self._n_agents = next((len(each.networks) for each in modules if isinstance(each, AgentNetworks)), None)
-        self._by_role = ROLE in policy.in_keys
+        self._by_role, self._by_agency = ROLE in policy.in_keys, AGENCY in policy.in_keys
         self._role_index = {ROLES[role].name: at for at, role in enumerate(policy.shown.roles) if role in ROLES}
         self._recurrent = recurrent_actors(policy)
         self._memory: dict[str, Tensor] = {}  # float32 [B, M] of each agent
@@ -215,6 +217,8 @@ class NumpyPolicy:
             read[RADIO] = np.asarray(info["radio"], dtype=np.float32)
         if self._by_role:
             read[ROLE] = np.full(mask.shape[:-1], self._role(name, entries.get("self")))
+        if self._by_agency:
+            read[AGENCY] = self._agency(entries.get("self"))
         return read
 
     @torch.no_grad()
@@ -252,3 +256,10 @@ class NumpyPolicy:
         told = self._entries["self"].names
         columns = [told.index(f"role_{role}") for role in self._policy.shown.roles]
         return int(np.asarray(own)[..., columns].reshape(-1, len(columns))[0].argmax())
+
+    def _agency(self, own: np.ndarray | None) -> np.ndarray:
+        """Return the index of the agency that an agent serves, int64 [] or [B], from its ``self``."""
+        if own is None:
+            raise ValueError("this policy has a network for each agency: observations must have self, which tells it")
+        told = self._entries["self"].names
+        return np.asarray(own)[..., [told.index(name) for name in self._policy.shown.agencies]].argmax(-1)

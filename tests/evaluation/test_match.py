@@ -13,6 +13,7 @@ from warp_torchrl.evaluation.play import WithoutAgent, play
 from warp_torchrl.heuristics import HEURISTICS, Greedy
 from warp_torchrl.models import Mlp, signature
 from warp_torchrl.observation import Paper, Surroundings
+from warp_torchrl.world.agencies import Several
 from warp_torchrl.world.team import Team
 
 
@@ -50,6 +51,17 @@ def test_a_trained_policy_plays_as_step_by_step(mode, observation, lamed, monkey
     quick = play(env, policy, 5, mode, watch=True)
     monkeypatch.setattr(play_module, "fits", lambda env, policy: False)
     assert alike(quick, play(env, policy, 5, mode, watch=True))
+
+
+def test_agencies_play_as_step_by_step(monkeypatch):
+    several = Several(own=1, lending="need", term=2)
+    env = WildfireEnv(small_world(team=Team(n_agents=4), agencies=several), n_worlds=9)
+    policy = trained(env, sharing="agency", symmetry="none")
+    assert fits(env, policy)
+    quick = play(env, policy, 5, "sampled")
+    monkeypatch.setattr(play_module, "fits", lambda env, policy: False)
+    slow = play(env, policy, 5, "sampled")
+    assert alike(quick, slow) and {"saved_agency_0", "saved_agency_1"} <= slow.keys()
 
 
 def test_heuristics_play_side_by_side_as_they_do_alone(make_small_env, monkeypatch):

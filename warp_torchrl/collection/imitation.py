@@ -61,7 +61,8 @@ class Imitation:
 
         Raises:
             ValueError: If the algorithm is off-policy, or not one that a guide helps, a teacher or a guide should act
-                where workers collect, or networks that remember or talk should learn from single acts.
+                where workers collect, or networks that remember, talk or are an agency's should learn from single
+                acts.
         """
         given = [name for name in ("teacher", "demonstrations") if getattr(self, name) is not None]
         if given and not isinstance(algorithm, OnPolicy):
@@ -76,6 +77,8 @@ class Imitation:
                 "demonstrations must be null where agents remember, since acts are learned one by one: choose "
                 f"model.memory=0, got {model.memory}"
             )
+        if self.demonstrations is not None and model.sharing == "agency":
+            raise ValueError("demonstrations must be null where each agency has a network, since acts name none")
         if self.demonstrations is not None and model.talks:
             raise ValueError(
                 "demonstrations must be null where agents talk, since acts are learned one by one: choose "

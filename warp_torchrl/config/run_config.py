@@ -31,6 +31,7 @@ COMPONENTS = (
     "team",
     "ignition",
     "sensing",
+    "agencies",
     "observation",
     "reward",
     "model",
@@ -50,6 +51,7 @@ WORLD_KEYS = (
     "team",
     "ignition",
     "sensing",
+    "agencies",
     "steps_per_tick",
     "horizon",
     "cell_size",
@@ -278,12 +280,13 @@ def build_components(config: Mapping[str, Any], names: Sequence[str] = COMPONENT
     """
     first = ("model",) if "model" in names else ()  # whose messages are the team's: mistakes are told of the model
     built = {name: build(config[name], name) for name in dict.fromkeys((*first, *names))}
+    world = construct(World, _chosen(World, {**config, **built}), "")
     if "reward" in built:
         try:
-            built["reward"].check_sensing(built["sensing"])
+            built["reward"].check_world(world)
         except ValueError as error:
             raise ConfigError(str(error)) from None
-    return {**built, "world": construct(World, _chosen(World, {**config, **built}), "")}
+    return {**built, "world": world}
 
 
 def _chosen(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:

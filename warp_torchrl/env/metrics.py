@@ -3,6 +3,7 @@
 import torch
 from torch import Tensor
 
+from warp_torchrl.world.agencies import standing
 from warp_torchrl.world.state import TreeCounts, WorldState
 
 METRICS = (
@@ -22,6 +23,8 @@ WATCHING = ("watched", "found", "uncertainty")
 """Further ones where sight is limited, see ``world.sensing.Sight``."""
 FLYING = ("near_misses",)
 """Further ones of teams whose aircraft keep apart, see ``Team.separation``."""
+SAVED_BY = "saved_"
+"""Of agencies, before the name of each: ``saved_agency_0``."""
 SUCCESS_LEVEL = 0.6
 
 
@@ -38,7 +41,8 @@ def metrics(state: WorldState, counts: TreeCounts, horizon: int) -> dict[str, Te
     ``sensing.recent``; ``found``, the share of the front that it knows to burn; both as means over the steps with a
     front, see ``spreading_front``. ``uncertainty``: 1 - freshness of the team's newest records, mean over cells and
     steps. Of teams whose aircraft keep apart: ``near_misses``, those at the ends of steps, a share of the agents'
-    steps.
+    steps. Where there are several agencies, ``saved_agency_0`` and so on: what stands of the trees on the land of each,
+    by their worth.
 
     Args:
         state: The worlds.
@@ -68,4 +72,7 @@ def metrics(state: WorldState, counts: TreeCounts, horizon: int) -> dict[str, Te
         found["uncertainty"] = watching.uncertainty / state.step.clamp(min=1)
     if vehicles.near_misses is not None:
         found["near_misses"] = vehicles.near_misses.sum(1) / agent_steps
+    if state.lands is not None:
+        left = standing(state).unbind(dim=1)
+        found |= {f"{SAVED_BY}agency_{index}": share for index, share in enumerate(left)}
     return found

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import torch
 from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 
-from warp_torchrl.env.metrics import FLYING, METRICS, WATCHING
+from warp_torchrl.env.metrics import FLYING, METRICS, SAVED_BY, WATCHING
 from warp_torchrl.observation import STATE_SIDE, Observation, Space, state_names
 from warp_torchrl.world.world import World
 
@@ -26,7 +26,8 @@ class Specs(NamedTuple):
 def episode_metrics(world: World) -> tuple[str, ...]:
     """Return the entries of ``info`` of a world: ``EPISODE_METRICS``, then those that only worlds like it have."""
     watching = WATCHING if world.sensing.is_limited else ()
-    return (*EPISODE_METRICS, *watching, *(() if world.team.separation is None else FLYING))
+    flying = () if world.team.separation is None else FLYING
+    return (*EPISODE_METRICS, *watching, *flying, *(SAVED_BY + name for name in world.agencies.names))
 
 
 def make_specs(world: World, observation: Observation, n_worlds: int, device: torch.device) -> Specs:
@@ -50,6 +51,8 @@ def make_specs(world: World, observation: Observation, n_worlds: int, device: to
     if world.team.sends_vectors:
         reach = float(max(world.size))
         seen["agents", "radio"] = Bounded(-reach, reach, shape=(*team, world.team.n_agents, 3), device=device)
+    if agencies := len(world.agencies.names):
+        seen["agents", "agency"] = Categorical(agencies, shape=team, dtype=torch.int64, device=device)
     planes = len(state_names(world))
     seen["state"] = Bounded(-3.0, 256.0, shape=(*batch, planes, STATE_SIDE, STATE_SIDE), device=device)
     seen["info"] = Composite(

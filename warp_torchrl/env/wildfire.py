@@ -53,8 +53,8 @@ class WildfireEnv(EnvBase):
         graph: Record the step as one CUDA graph. World and observation must then stay as they are.
 
     Raises:
-        ValueError: If ``n_worlds`` is not positive, ``seeds`` are not as many, a seed is out of range, the reward needs
-            another sensing than the world's, or there is no C++ compiler to compile with.
+        ValueError: If ``n_worlds`` is not positive, ``seeds`` are not as many, a seed is out of range, the world lacks
+            what the reward pays for, or there is no C++ compiler to compile with.
     """
 
     batch_locked = True
@@ -79,7 +79,7 @@ class WildfireEnv(EnvBase):
         self.world = World() if world is None else world
         self.observation = Surroundings() if observation is None else observation
         self.reward_function = Efficiency() if reward is None else reward
-        self.reward_function.check_sensing(self.world.sensing)
+        self.reward_function.check_world(self.world)
         self.validate = reads_freely(self.device) if validate is None else validate
         self.why_eager = self._check_compiling() if fuse else None
         """Why steps are not compiled where that was asked for; None where they are."""
@@ -94,6 +94,7 @@ class WildfireEnv(EnvBase):
         self.state_symmetry = state_symmetry(self.world)
         self.contents = {name: space.content for name, space in spaces.items()}
         self.state_content = state_content(self.world)
+        self.agency_names = self.world.agencies.names
         self.group_map = {"agents": list(names)}
         self.role_map = {role: [n for n, r in zip(names, roles) if r == role] for role in ROLES if role in roles}
         self._worlds: tuple[WorldState, TreeCounts] | None = None  # and the counts of their trees
@@ -368,6 +369,7 @@ class WildfireEnv(EnvBase):
         roles = self.world.team.table(self.device).index.repeat(*batch, 1)
         agents = {"observation": views, "action_mask": observed.action_mask, "role": roles}
         agents |= {} if observed.radio is None else {"radio": observed.radio}
+        agents |= {} if state.vehicles.serves is None else {"agency": state.vehicles.serves.clone()}
         info = observed.metrics | {"episode_reward": episode_reward, "episode_length": state.step.to(torch.float32)}
         return TensorDict(
             {

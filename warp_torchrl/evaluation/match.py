@@ -10,7 +10,7 @@ from torch import Tensor
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.metrics import metrics
 from warp_torchrl.heuristics import Heuristic
-from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, ROLE
+from warp_torchrl.models import ACTION, ACTION_MASK, AGENCY, OBSERVATION, ROLE
 from warp_torchrl.world.state import Transition, count_trees
 
 Watcher = Callable[[Transition, Tensor], None]
@@ -94,7 +94,9 @@ class Match:
             return
         seen = self.env.observation(self.state, self.world, self.world.forecast(self.state))
         keys = {(*OBSERVATION, name) if name else OBSERVATION: value for name, value in seen.items()}
-        for key, value in {**keys, ACTION_MASK: self.world.action_mask(self.state)}.items():
+        serves = self.state.vehicles.serves
+        agencies = {} if serves is None else {AGENCY: serves}
+        for key, value in {**keys, **agencies, ACTION_MASK: self.world.action_mask(self.state)}.items():
             shown.get(key).index_copy_(0, self.rows, value)
 
 
@@ -110,5 +112,5 @@ def fits(env: WildfireEnv, policy: TensorDictModuleBase) -> bool:
         return not policy.is_stateful and type(policy).__module__.startswith("warp_torchrl.")
     heuristics = any(isinstance(each, Heuristic) for each in policy.modules())
     keys = [key if isinstance(key, tuple) else (key,) for key in policy.in_keys]
-    own = all(key in (ACTION_MASK, ROLE) or key[: len(OBSERVATION)] == OBSERVATION for key in keys)
+    own = all(key in (ACTION_MASK, ROLE, AGENCY) or key[: len(OBSERVATION)] == OBSERVATION for key in keys)
     return own and not heuristics

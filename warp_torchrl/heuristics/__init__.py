@@ -8,6 +8,7 @@ from warp_torchrl.heuristics.base import Heuristic, idle_action
 from warp_torchrl.heuristics.clockwise import Clockwise
 from warp_torchrl.heuristics.coordinated import Coordinated
 from warp_torchrl.heuristics.following import Follower
+from warp_torchrl.heuristics.own_land import OwnLand
 from warp_torchrl.heuristics.reactive import Greedy, Local, NoOp, Random
 from warp_torchrl.heuristics.ring import Mixed, Ring
 from warp_torchrl.heuristics.searching import Lawnmower, Oldest, Searching
@@ -24,6 +25,7 @@ HEURISTICS: dict[str, type[Heuristic]] = {
     "lawnmower": Lawnmower,
     "follower": Follower,
     "clockwise": Clockwise,
+    "own_land": OwnLand,
 }
 """Heuristic policies by name."""
 
@@ -39,6 +41,7 @@ __all__ = [
     "Mixed",
     "NoOp",
     "Oldest",
+    "OwnLand",
     "Random",
     "Ring",
     "Searching",

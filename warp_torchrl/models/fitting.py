@@ -5,7 +5,7 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
-from warp_torchrl.models.signature import ACTION, ACTION_MASK, ROLE, Entry, Signature
+from warp_torchrl.models.signature import ACTION, ACTION_MASK, AGENCY, ROLE, Entry, Signature
 
 
 class Fitted(TensorDictModuleBase):
@@ -56,9 +56,14 @@ def fitted(policy: TensorDictModuleBase, trained: Signature, here: Signature, fa
 
     Raises:
         ValueError: If the environment lacks an entry, a channel or an action, or has it in another form, or has a role
-            that a policy with a network for each does not know; which one.
+            or agencies that a policy with a network for each does not know; which one.
     """
     trained, here = trained.bare(), here.bare()
+    if AGENCY in policy.in_keys and here.agencies != trained.agencies:
+        raise ValueError(
+            f"it has a network for each of {len(trained.agencies)} agencies, this environment has "
+            f"{len(here.agencies) or 1}"
+        )
     if (trained.observation, trained.actions, trained.roles) == (here.observation, here.actions, here.roles):
         return policy
     lacking = [name for name in trained.actions if name not in here.actions]

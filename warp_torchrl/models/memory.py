@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from warp_torchrl.models.canonical import Orientation
 from warp_torchrl.models.networks import Network
-from warp_torchrl.models.signature import LOGITS, MEMORY, ORIENTATION, ROLE, Entry, Key
+from warp_torchrl.models.signature import AGENCY, LOGITS, MEMORY, ORIENTATION, ROLE, Entry, Key
 
 
 class RecurrentNetwork(nn.Module):
@@ -98,7 +98,7 @@ class RecurrentActor(TensorDictModuleBase):
         super().__init__()
         self.in_keys, self.out_keys = [*keys, MEMORY], [LOGITS, MEMORY]
         self.network, self.size, self._clock = network, [n_actions, memory], clock
-        self._seen = [key for key in keys if key not in (ROLE, ORIENTATION)]
+        self._seen = [key for key in keys if key not in (ROLE, AGENCY, ORIENTATION)]
         self.remembered = torch.zeros(0, 0, memory)  # [B, A, M], of the last step's worlds
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
@@ -108,10 +108,10 @@ class RecurrentActor(TensorDictModuleBase):
         whole = tensordict.ndim == 2
         before = tensordict.get(MEMORY)[:, 0] if whole else self._before(fresh)
         seen = [tensordict.get(key) for key in self._seen]
-        role = [tensordict.get(ROLE)] if ROLE in self.in_keys else []
+        kind = [tensordict.get(key) for key in (ROLE, AGENCY) if key in self.in_keys]
         turned = ORIENTATION in self.in_keys
         index = tensordict.get(ORIENTATION) if turned else torch.zeros_like(fresh, dtype=torch.int64)
-        logits, after = self.network(*seen, fresh, index, before, *role).split(self.size, dim=-1)
+        logits, after = self.network(*seen, fresh, index, before, *kind).split(self.size, dim=-1)
         if not whole:
             tensordict.set(MEMORY, before)
             self.remembered = after.detach()

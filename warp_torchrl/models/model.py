@@ -20,14 +20,15 @@ from warp_torchrl.models.networks import (
     AgentNetworks,
     Central,
     ConvolutionalEncoder,
+    IndexedNetworks,
     LinearEncoder,
     Network,
-    RoleNetworks,
 )
 from warp_torchrl.models.packing import Packings
 from warp_torchrl.models.signature import (
     ACTION_ONE_HOT,
     ACTION_VALUE,
+    AGENCY,
     CANONICAL_ACTION_ONE_HOT,
     CANONICAL_STATE,
     LOGITS,
@@ -47,6 +48,8 @@ from warp_torchrl.symmetry import TIME_LEFT, Vector
 from warp_torchrl.validation import check_fields
 
 _ACTIVATIONS = {"tanh": nn.Tanh, "relu": nn.ReLU}
+_INDEX = {"role": ROLE, "agency": AGENCY}
+"""Where the index is by which an agent's network is chosen."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +58,8 @@ class Mlp:
 
     Attributes:
         sharing: ``team`` gives all agents one network, ``role`` one to each role (chosen by the role index, so that
-            it fits any team), ``none`` one to each agent (which fits teams of the same size only).
+            it fits any team), ``agency`` one to each agency, which drives the vehicles that serve it, ``none`` one to
+            each agent (which fits teams of the same size only).
         actor_hidden: Sizes of the hidden layers of actors and of the action values that act.
         critic_hidden: Sizes of the critics'.
         activation: ``tanh`` or ``relu``.
@@ -78,7 +82,7 @@ class Mlp:
             do not say how they turn and should be canonical, or have no clock and should be remembered.
     """
 
-    sharing: Literal["team", "role", "none"] = "team"
+    sharing: Literal["team", "role", "agency", "none"] = "team"
     actor_hidden: tuple[int, ...] = (128, 128)
     critic_hidden: tuple[int, ...] = (128, 128)
     activation: Literal["tanh", "relu"] = "tanh"
@@ -197,8 +201,8 @@ class Mlp:
             joint = [Entry((signature.n_agents * signature.n_actions,), "float32")] if judges else []
             entries = [signature.state, *joint, *entries]
         network = self._shared(signature, lambda: self._network(entries, hidden, out, head_gain, memory, talks))
-        if self.sharing == "role":
-            keys.append(ROLE)
+        if self.sharing in _INDEX:
+            keys.append(_INDEX[self.sharing])
         module: TensorDictModuleBase
         if memory:
             keys += [ORIENTATION] if self._is_canonical else []
@@ -241,11 +245,19 @@ class Mlp:
     def _shared(
         self, signature: Signature, make: Callable[[], Network | RecurrentNetwork | TalkingNetwork]
     ) -> nn.Module:
-        """Return as many networks as the team has."""
+        """Return as many networks as the team has.
+
+        Raises:
+            ValueError: If each agency should have one, and there is but one.
+        """
+        if self.sharing == "agency" and not signature.agencies:
+            raise ValueError("model.sharing must be team, role or none where there is but one agency, got agency")
         if self.sharing == "team":
             return make()
         if self.sharing == "role":
-            return RoleNetworks([make() for _ in range(signature.n_roles)])
+            return IndexedNetworks([make() for _ in range(signature.n_roles)])
+        if self.sharing == "agency":
+            return IndexedNetworks([make() for _ in signature.agencies])
         networks = [make() for _ in range(signature.n_agents)]
         return AgentNetworks(networks, networks[0].entries)
 

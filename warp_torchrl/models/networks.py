@@ -211,11 +211,11 @@ class Central(nn.Module):
         return self.network(*shared, *own)
 
 
-class RoleNetworks(nn.Module):
-    """One network for each role, chosen by an agent's role index, whatever the team.
+class IndexedNetworks(nn.Module):
+    """One network for each kind of agent, chosen by the agent's index: its role, or the agency that it serves.
 
     Args:
-        networks: By role index.
+        networks: By index.
     """
 
     def __init__(self, networks: Sequence[nn.Module]) -> None:
@@ -223,11 +223,11 @@ class RoleNetworks(nn.Module):
         self.networks = nn.ModuleList(networks)
 
     def forward(self, *inputs: Tensor) -> Tensor:
-        """Return float32 [..., A, out] from entries [..., A, ...] and, last, roles int64 [..., A]."""
-        *entries, role = inputs
+        """Return float32 [..., A, out] from entries [..., A, ...] and, last, indices int64 [..., A]."""
+        *entries, kind = inputs
         out = self.networks[0](*entries)
         for index, network in enumerate(self.networks):
-            out = out if index == 0 else torch.where((role == index)[..., None], network(*entries), out)
+            out = out if index == 0 else torch.where((kind == index)[..., None], network(*entries), out)
         return out
 
 

@@ -9,6 +9,7 @@ from warp_torchrl.content import Content
 from warp_torchrl.symmetry import Symmetry
 
 ACTION = ("agents", "action")
+AGENCY = ("agents", "agency")
 ACTION_MASK = ("agents", "action_mask")
 ACTION_ONE_HOT = ("agents", "action_one_hot")
 ACTION_VALUE = ("agents", "action_value")
@@ -71,6 +72,7 @@ class Signature(NamedTuple):
     n_agents: int
     actions: tuple[str, ...]  # by name, in order
     roles: tuple[str, ...]  # by name, in the order of their index
+    agencies: tuple[str, ...] = ()  # by name, in the order of their index; () where there is but one
 
     @property
     def n_actions(self) -> int:
@@ -117,4 +119,5 @@ def signature(env: EnvBase) -> Signature:
         for name, spec in sorted(named.items())
     }
     state = entry(specs["state"], 0, env.state_names, env.state_symmetry, env.state_content)
-    return Signature(observation, state, specs[ACTION_MASK].shape[0], env.action_names, env.role_names)
+    agents = specs[ACTION_MASK].shape[0]
+    return Signature(observation, state, agents, env.action_names, env.role_names, env.agency_names)

@@ -16,6 +16,7 @@ from torch import Tensor
 
 from warp_torchrl.content import Content, Empty, Follows
 from warp_torchrl.validation import check_new_name
+from warp_torchrl.world.agencies import own_land as land_served
 from warp_torchrl.world.fast.bytes import at_least, byte, equal, to_codes, to_int32
 from warp_torchrl.world.fast.squares import Window, window
 from warp_torchrl.world.role import PAPER_ROLES
@@ -27,6 +28,8 @@ ELEVATION_SCALE = 100.0
 """Difference in height that an observation shows as 1 [m]."""
 LAST_SEEN = "last_seen"
 """The channel that tells how fresh is what an agent knows."""
+OWN_LAND = "own_land"
+"""The channel that tells the land of the agency that a vehicle serves."""
 FIRE = "fire_stage"
 """The channel that tells where fire is, by which networks turn what an agent sees."""
 
@@ -199,6 +202,14 @@ def other_scout(look: Look) -> Tensor:
     """Return where other scouts are, 63 each, four at most."""
     roles = look.world.team.role_names
     return look.others[:, :, roles.index("scout")] if "scout" in roles else torch.zeros_like(look.others[:, :, 0])
+
+
+@channel(content=lambda world, names: None if world.agencies.names else Empty())
+def own_land(look: Look) -> Tensor:
+    """Return 255 on the land of the agency that the vehicle serves."""
+    if look.state.lands is None:
+        return torch.zeros_like(look.on_map)
+    return look.window.of_own(land_served(look.state).to(torch.uint8)) * 255
 
 
 _CELLS, _BURNED, _FIREBREAK, _ON_MAP = 0x0F, 0x10, 0x20, 0x40

@@ -5,9 +5,10 @@ from torch import Tensor
 from torch.nn.functional import one_hot
 
 from warp_torchrl.content import Content, Empty, Quarters
-from warp_torchrl.observation.channels import ELEVATION_SCALE, LAST_SEEN
+from warp_torchrl.observation.channels import ELEVATION_SCALE, LAST_SEEN, OWN_LAND
 from warp_torchrl.observation.own import WIND_SCALE, steps_to_tick, time_left
 from warp_torchrl.symmetry import Planes, Target, TeamPlanes
+from warp_torchrl.world.agencies import own_land
 from warp_torchrl.world.fast.blocks import block_means
 from warp_torchrl.world.fast.squares import window
 from warp_torchrl.world.role import PAPER_ROLES
@@ -31,8 +32,13 @@ STATE_SYMMETRY = TeamPlanes(len(STATE), STATE.index("fire"), (_FIRST_ROLE, len(P
 
 
 def picture_names(world: World) -> tuple[str, ...]:
-    """Return the channels of the picture: ``PICTURE``, and where sight is limited ``last_seen``, how fresh they are."""
-    return (*PICTURE, LAST_SEEN) if world.sensing.is_limited else PICTURE
+    """Return the channels of the picture.
+
+    They are ``PICTURE``, where sight is limited ``last_seen``, how fresh they are, and where there are several agencies
+    ``own_land``, the share of each block that is of the agency that the vehicle serves.
+    """
+    seen = (LAST_SEEN,) if world.sensing.is_limited else ()
+    return (*PICTURE, *seen, *((OWN_LAND,) if world.agencies.names else ()))
 
 
 def picture_highs(world: World) -> tuple[float, ...]:
@@ -52,7 +58,8 @@ def picture(state: WorldState, world: World, forecast: Forecast) -> Tensor:
     mates = (world.sensing.knows_where(state, world.team).to(torch.float32) @ place).mul_(0.25).clamp_(max=1.0)
     mates = mates.view(*place.shape[:2], 1, PICTURE_SIDE, PICTURE_SIDE)
     seen = _maps(state, forecast).expand(-1, place.shape[1], -1, -1, -1)
-    return torch.cat((seen[:, :, :2], mates, seen[:, :, 2:]), dim=2)
+    land = [] if state.lands is None else [block_means(own_land(state), PICTURE_SIDE)[:, :, None]]
+    return torch.cat((seen[:, :, :2], mates, seen[:, :, 2:], *land), dim=2)
 
 
 def centred_picture(state: WorldState, world: World, forecast: Forecast) -> Tensor:
@@ -64,30 +71,36 @@ def centred_picture(state: WorldState, world: World, forecast: Forecast) -> Tens
     maps = (_maps(state, forecast) * 255.0).to(torch.uint8).unbind(2)
     block = _block(state, PICTURE_SIDE)
     about = window(torch.stack((block // PICTURE_SIDE, block % PICTURE_SIDE), dim=-1), sides, middle)
+    land = []
+    if state.lands is not None:
+        land = [about.of_own((block_means(own_land(state), PICTURE_SIDE) * 255.0).to(torch.uint8))]
     if state.knowledge is None:
         fire, fuel = (about.of(each[:, 0]) for each in maps)
         mates = about.of(one_hot(block, PICTURE_SIDE**2).sum(1).view(-1, *sides))
         mates[..., middle, middle] -= 1
-        return torch.stack((fire, fuel, (mates.clamp_(max=4) * 63).to(torch.uint8)), dim=2)
+        return torch.stack((fire, fuel, (mates.clamp_(max=4) * 63).to(torch.uint8), *land), dim=2)
     fire, fuel, fresh = (about.of_own(each) for each in maps)
     places = one_hot(block, PICTURE_SIDE**2).to(torch.float32)
     mates = (world.sensing.knows_where(state, world.team).to(torch.float32) @ places).clamp_(max=4.0)
     mates = about.of_own(mates.mul_(63.0).to(torch.uint8).unflatten(-1, sides))
-    return torch.stack((fire, fuel, mates, fresh), dim=2)
+    return torch.stack((fire, fuel, mates, fresh, *land), dim=2)
 
 
 def state_names(world: World) -> tuple[str, ...]:
     """Return the channels of the critic's ``state``: ``STATE``, with the team's further roles beside the paper's.
 
     Where sight is limited it has ``KNOWN`` too: the burning cells that agents know of, and how fresh what they know is,
-    both the mean of the agents.
+    both the mean of the agents. Where there are several agencies it has the land of each, and the vehicles that serve
+    it.
     """
     known = KNOWN if world.sensing.is_limited else ()
+    land = [f"{what}_of_{name}" for what in ("land", "vehicles") for name in world.agencies.names]
     return (
         *STATE[:_FIRST_ROLE],
         *world.team.role_names,
         *STATE[_FIRST_ROLE + len(PAPER_ROLES) : -1],
         *known,
+        *land,
         STATE[-1],
     )
 
@@ -126,6 +139,7 @@ def central_state(state: WorldState, world: World, forecast: Forecast) -> Tensor
             *agents.unbind(1),
             _elevation(state.landscape.elevation, agents[:, 0]),
             *_known(state),
+            *_lands(state),
             quarters.reshape(worlds, *blocks),
         ),
         dim=1,
@@ -161,6 +175,17 @@ def _known(state: WorldState) -> list[Tensor]:
         return []
     maps = (known_codes(state) >= FIRST_FIRE).to(torch.float32), freshness(state.knowledge, state.step)
     return [block_means(each.mean(dim=1), STATE_SIDE) for each in maps]
+
+
+def _lands(state: WorldState) -> list[Tensor]:
+    """Return the land of each agency, then the vehicles that serve it, float32 [B, 16, 16] each."""
+    if state.lands is None or state.vehicles.serves is None:
+        return []
+    agencies = torch.arange(state.lands.worth.shape[1], device=state.cells.device)[:, None, None]
+    land = block_means(state.lands.owner[:, None] == agencies, STATE_SIDE)
+    place = one_hot(_block(state, STATE_SIDE), STATE_SIDE**2).to(torch.float32)
+    serving = (state.vehicles.serves[:, None] == agencies[..., 0]).to(torch.float32) @ place
+    return [*land.unbind(1), *serving.unflatten(-1, (STATE_SIDE, STATE_SIDE)).unbind(1)]
 
 
 def _block(state: WorldState, side: int) -> Tensor:

@@ -31,16 +31,17 @@ WIND_SCALE = 20.0
 """Wind that an observation shows as 1 [m/s]."""
 
 
-def own_entries(team: Team, identity: bool = False) -> Vector:
+def own_entries(world: World, identity: bool = False) -> Vector:
     """Return the entries of ``self``, by name and as they turn with the map.
 
     They are ``SELF``, the identity if it is shown, then the team's roles and actions beside the paper's, then the
-    battery if it runs down.
+    battery if it runs down, then the agency that the vehicle serves, one-hot, if there are several.
     """
+    team = world.team
     roles = tuple(f"role_{role}" for role in team.role_names[len(PAPER_ROLES) :])
     actions = tuple(f"{LAST}{action}" for action in team.further_actions)
     battery = () if team.battery is None else ("battery",)
-    further = [Part("scalar", names) for names in (roles, actions, battery) if names]
+    further = [Part("scalar", names) for names in (roles, actions, battery, world.agencies.names) if names]
     return Vector((*SELF.parts, *([IDENTITY] if identity else []), *further))
 
 
@@ -72,6 +73,8 @@ def own_vector(state: WorldState, world: World, shows_identity: bool = False) ->
         parts += [roles[..., len(PAPER_ROLES) :], last[..., len(Action) :]]
     if team.battery is not None and vehicles.battery is not None:
         parts.append((vehicles.battery / team.battery)[..., None])
+    if vehicles.serves is not None:
+        parts.append(one_hot(vehicles.serves, len(world.agencies.names)))
     return torch.cat(parts, dim=-1)
 
 

@@ -77,7 +77,7 @@ class Local:
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
         side, highs = 2 * self.radius + 1, tuple(CHANNELS[name].high for name in self.channels)
-        own, content = own_entries(world.team, self.identity), self._told(view_content(self.channels, world))
+        own, content = own_entries(world, self.identity), self._told(view_content(self.channels, world))
         symmetry = view_symmetry(self.channels)
         return {
             "view": Space((len(highs), side, side), torch.uint8, 0, highs, self.channels, symmetry, content),

@@ -8,8 +8,8 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.fast.distances import distance_to_nearest
 from warp_torchrl.world.front import exposure
-from warp_torchrl.world.sensing import Sensing
 from warp_torchrl.world.state import Transition, TreeCounts, WorldState, is_burning
+from warp_torchrl.world.world import World
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,8 +57,8 @@ class Reward:
         reward = self.scale * ((1.0 - self.team_share) * own + self.team_share * team)
         return (reward * ~transition.before.done[:, None])[..., None]
 
-    def check_sensing(self, sensing: Sensing) -> None:
-        """Check that the reward can be computed where agents know of the fire what a sensing tells them.
+    def check_world(self, world: World) -> None:
+        """Check that the reward can be computed in a world.
 
         Raises:
             ValueError: If it cannot; this one can everywhere.

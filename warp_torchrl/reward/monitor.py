@@ -6,8 +6,8 @@ from torch import Tensor
 
 from warp_torchrl.reward.base import Reward
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.sensing import Sensing
 from warp_torchrl.world.state import Transition
+from warp_torchrl.world.world import World
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,13 +52,13 @@ class Monitor(Reward):
         super().__post_init__()
         check_fields(self, watched=(0.0, 1e6), found=(0.0, 1e6), uncertainty=(0.0, 1e6), near_miss=(0.0, 1e6))
 
-    def check_sensing(self, sensing: Sensing) -> None:
+    def check_world(self, world: World) -> None:
         """Check that the sight of the agents is limited.
 
         Raises:
             ValueError: If it is not.
         """
-        if not sensing.is_limited:
+        if not world.sensing.is_limited:
             raise ValueError("sensing must be sight where reward is monitor, which pays for what was seen, got full")
 
     def own(self, transition: Transition) -> Tensor:

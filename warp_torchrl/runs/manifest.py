@@ -157,4 +157,5 @@ def _signature_from_json(content: dict[str, Any]) -> Signature:
     state = entry("state", content["state"], lambda shape, _: STATE_SYMMETRY if STATE_SYMMETRY.fits(shape) else None)
     actions = tuple(str(name) for name in content.get("actions", _FORMER_ACTIONS[: int(content["n_actions"])]))
     roles = tuple(str(name) for name in content.get("roles", PAPER_ROLES))
-    return Signature(observation, state, int(content["n_agents"]), actions, roles)
+    agencies = tuple(str(name) for name in content.get("agencies", ()))
+    return Signature(observation, state, int(content["n_agents"]), actions, roles, agencies)

@@ -6,7 +6,7 @@ import torch
 from tensordict import TensorDictBase
 
 from warp_torchrl import parallel
-from warp_torchrl.env.metrics import FLYING, WATCHING
+from warp_torchrl.env.metrics import FLYING, SAVED_BY, WATCHING
 from warp_torchrl.env.specs import EPISODE_METRICS
 from warp_torchrl.models import REWARD
 
@@ -33,6 +33,7 @@ def episode_columns(batch: TensorDictBase) -> tuple[dict[str, float | None], int
     done = batch["next", "done"][..., 0]
     info = batch["next", "info"]
     names = [*EPISODE_METRICS, *(name for name in (*WATCHING, *FLYING) if name in info.keys())]
+    names += sorted(name for name in info.keys() if name.startswith(SAVED_BY))
     unsound = (~batch["next", *REWARD].isfinite()).sum()
     sums = [unsound, done.sum(), *(torch.where(done, info[name][..., 0], 0.0).sum() for name in names)]
     unsound_rewards, count, *totals = parallel.sum_(torch.stack([each.double() for each in sums])).tolist()

@@ -40,6 +40,7 @@ class Stream(IntEnum):
     SENSING = 18
     SMOKE = 19
     DRIFT = 20
+    LANDS = 21
 
 
 def world_key(seed: Tensor, episode: Tensor | int = 0) -> Tensor:

@@ -55,12 +55,15 @@ def nearest_free(taken: Tensor, base: Tensor, n_agents: int) -> Tensor:
         index = (rows[:, :, None] * width + columns[:, None, :]).flatten(1)
         square = taken.flatten(1).gather(1, index).view(-1, side, side)
         if ((~square).flatten(1).sum(dim=1) >= n_agents).all():
-            return first_free(_distances(base - near[:, 0], side, side), square, n_agents) + near
-    return first_free(_distances(base, height, width), taken, n_agents)
+            return first_free(distances_to(base - near[:, 0], side, side), square, n_agents) + near
+    return first_free(distances_to(base, height, width), taken, n_agents)
 
 
-def _distances(base: Tensor, height: int, width: int) -> Tensor:
-    """Return numbers in the order of the cells' distances, int64 [B, H, W]: the longer way first, then the sum."""
+def distances_to(base: Tensor, height: int, width: int) -> Tensor:
+    """Return numbers in the order of the cells' distances to a cell, int64 [B, 2], int64 [B, H, W].
+
+    The longer way counts first, then the sum.
+    """
     row = (torch.arange(height, device=base.device) - base[:, :1]).abs()[:, :, None]
     column = (torch.arange(width, device=base.device) - base[:, 1:]).abs()[:, None, :]
     return torch.maximum(row, column) * (height + width) + row + column

@@ -96,6 +96,7 @@ class Vehicles(Batch):
     arrived: Tensor | None = None  # bool [B,A], was over the fire since it set out; None but in ``retardant`` teams
     near_misses: Tensor | None = None  # int32 [B,A], steps that ended too near another aircraft; None: not counted
     battery: Tensor | None = None  # int32 [B,A], steps of flight left; None where they are not counted
+    serves: Tensor | None = None  # int64 [B,A], the agency that each serves now; None where there is but one
 
 
 @dataclass(eq=False, repr=False)
@@ -164,6 +165,14 @@ class Watching(Batch):
 
 
 @dataclass(eq=False, repr=False)
+class Lands(Batch):
+    """Whose land is whose, where there are several agencies; see ``world.agencies``."""
+
+    owner: Tensor  # uint8 [B,H,W], index of an agency
+    worth: Tensor  # float32 [B,K], of the initial trees of each agency's land, in the unit of ``Landscape.assets`` or 1
+
+
+@dataclass(eq=False, repr=False)
 class WorldState(Batch):
     """What changes in the worlds, and the ground and air that it changes in; batch size [B].
 
@@ -190,6 +199,7 @@ class WorldState(Batch):
     arrivals: Arrivals | None = None  # None but under law ``rate``
     knowledge: Tensor | None = None  # int32 [B,A,H,W], records of ``world.sensing``; None where all is seen
     watching: Watching | None = None  # None where all is seen
+    lands: Lands | None = None  # None where there is but one agency
 
     def what_changes(self) -> dict[str, Tensor]:
         """Return all tensors by name but those that follow from others, of which they can be made again."""

@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
+from warp_torchrl.world.agencies import Agencies, OneAgency
 from warp_torchrl.world.automaton import Automaton
 from warp_torchrl.world.batch import concatenated
 from warp_torchrl.world.fast import road
@@ -47,6 +48,7 @@ class World:
         team: The vehicles.
         ignition: Where the fire starts.
         sensing: What agents know of the fire.
+        agencies: Whom the vehicles serve.
         steps_per_tick: Agent steps to a fire tick.
         horizon: Agent steps to an episode.
         cell_size: Side of a cell [m]; None takes the landscape's own, 30 m where it has none.
@@ -63,6 +65,7 @@ class World:
     team: Team = field(default_factory=Team)
     ignition: IgnitionSource = field(default_factory=Ignition)
     sensing: Sensing = field(default_factory=Full)
+    agencies: Agencies = field(default_factory=OneAgency)
     steps_per_tick: int = 5
     horizon: int = 256
     cell_size: float | None = None
@@ -82,6 +85,7 @@ class World:
             raise ValueError(
                 f"team.messages must be none or graph where agents see all (sensing=full), got {self.team.messages}"
             )
+        self.agencies.check(self.team)
         _ = self.lighting  # refuses an ignition that does not fit the landscape
 
     @property
@@ -160,9 +164,7 @@ class World:
         fuel = (ground.age >= self.fire.youngest_fuel) & (self.fire.flammability(ground) > 0.0)
         lit = self.lighting(key, fuel)
         vehicles = self.team.place(key, ground.cover, lit)
-        index = vehicles.position[..., 0] * self.size[1] + vehicles.position[..., 1]
         is_dark = ~lit.flatten(1).any(dim=1).all()
-        is_crowded = (ground.cover.flatten(1).gather(1, index) == int(Cover.LAKE)).any()
         state = initial_state(
             ground,
             self.fire,
@@ -178,12 +180,16 @@ class World:
         for _ in range(self.ignition.head_start):
             spreads = (state.cells >= FIRST_FIRE) & (state.cells < EMBER)
             state = self._tick(state, spreads.flatten(1).any(dim=1))
-        return self.sensing.begun(state, self.team), torch.stack((is_dark, is_crowded))
+        state = self.sensing.begun(self.agencies.begun(state, self.team), self.team)
+        index = state.vehicles.position[..., 0] * self.size[1] + state.vehicles.position[..., 1]
+        is_crowded = (ground.cover.flatten(1).gather(1, index) == int(Cover.LAKE)).any()
+        return state, torch.stack((is_dark, is_crowded))
 
     def step(self, state: WorldState, action: Tensor, counts: TreeCounts | None = None) -> Transition:
         """Advance every world that has not ended by one agent step.
 
-        Agents move; agents act; on every ``steps_per_tick``-th step the fire ticks; the clock advances; agents look.
+        Agents move; agents act; on every ``steps_per_tick``-th step the fire ticks; the clock advances;
+        vehicles are lent; agents look.
 
         Args:
             state: The worlds, batch size [B].
@@ -198,7 +204,7 @@ class World:
         ticks_now = running & ((state.step + 1) % self.steps_per_tick == 0)
         after = self._tick(after, ticks_now)
         counts_after = count_trees(after)
-        after = self._advance_clock(after, counts_after, running)
+        after = self.agencies.updated(self._advance_clock(after, counts_after, running), running)
         return Transition(
             before=state,
             result=result,
