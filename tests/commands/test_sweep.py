@@ -19,6 +19,7 @@ from warp_torchrl.evaluation.method import method
         (["reward=paper", "reward.barrier_rule=printed"], "mappo paper surroundings barrier_rule=printed"),
         (["observation=paper", "imitation.teacher=local"], "mappo efficiency paper taught by local"),
         (["imitation.demonstrations=people"], "mappo efficiency surroundings taught by people"),
+        (["reward=agency", "reward.cooperation=-1"], "mappo agency surroundings cooperation=-1"),
         (["model.messages=graph"], "mappo efficiency surroundings messages=graph"),
         (
             ["imitation.teacher=local", "imitation.demonstrations=people"],

@@ -20,6 +20,7 @@ SCENARIOS = [
     ["scenario=smoke", "team.messages=both", "team.radio_range=6", "team.radio_loss=0.1"],
     ["scenario=haksar", "team.tank=3", "team.approach=true", "observation=at_fire", "reward=round_fire"],
     ["scenario=front", "team.battery=9", "team.drift=0.05"],
+    ["scenario=agencies", "agencies.own=1", "agencies.lending=need", "agencies.term=3"],
 ]
 
 

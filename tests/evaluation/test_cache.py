@@ -133,7 +133,7 @@ def test_copies_of_layers_on_devices_do_not_count():
 
 
 @pytest.mark.parametrize(
-    "scenario", ["default", "hetero", "hazard", "water", "lightning", "paper_marl", "shift", "haksar"]
+    "scenario", ["default", "hetero", "hazard", "water", "lightning", "paper_marl", "shift", "haksar", "agencies"]
 )
 def test_all_that_episodes_of_a_scenario_follow_from_can_be_told(scenario):
     assert len(cache._paths(plan_of(scenario=scenario), list(HEURISTICS))) == len(HEURISTICS)

@@ -1,4 +1,4 @@
-"""The table of an evaluation where sight is limited."""
+"""The table of an evaluation where sight is limited, and where there are several agencies."""
 
 import numpy as np
 
@@ -29,6 +29,16 @@ def test_what_is_watched_has_a_table_of_its_own():
     assert "mine                        75.0    75.0 .. 75.0     50.0        0.250           12.5" in table(flown)
 
 
+def test_what_agencies_save_has_a_table_of_its_own():
+    shares = {"saved_agency_0": np.full(4, 0.75), "saved_agency_1": np.array([0.2, 0.2, 0.4, 0.4])}
+    none = {name: np.zeros(4) for name in shares}
+    shown = table(report("agencies", "mine", 7, episodes(0.0) | shares, {"noop": episodes(0.0) | none})).splitlines()
+    assert "saved %, by agency                    agency_0                agency_1" in shown
+    assert "noop                          0.0 (0.0 .. 0.0)         0.0 (0.0 .. 0.0)" in shown
+    (line,) = (line for line in shown if line.startswith("mine ") and "75.0 (75.0 .. 75.0)" in line)
+    assert " 30.0 (2" in line
+
+
 def test_elsewhere_it_has_none():
     content = report("skirmish", "mine", 7, episodes(0.0), {"noop": episodes(0.0)})
-    assert content["watching"] == {} and "watched" not in table(content)
+    assert content["watching"] == {} and "watched" not in table(content) and "agency" not in table(content)

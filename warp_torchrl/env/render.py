@@ -52,6 +52,8 @@ def render(state: WorldState, flies: Tensor | None, scale: int = 12) -> Tensor:
     if scale < 1:
         raise ValueError(f"scale must be at least 1 pixel, got {scale}")
     image = _ground_colours(state).repeat_interleave(scale, dim=1).repeat_interleave(scale, dim=2)
+    if state.lands is not None:
+        image = _with_borders(image, state.lands.owner.repeat_interleave(scale, dim=1).repeat_interleave(scale, dim=2))
     if flies is None:
         return image
     return _stamp(image, state.vehicles.position * scale + scale // 2, flies.to(torch.int64), scale)
@@ -141,6 +143,16 @@ def _ground_colours(state: WorldState) -> Tensor:
         lately = freshness(state.knowledge.amax(dim=1, keepdim=True), state.step)[:, 0] >= _LATELY
         row = torch.where(lately, row, row % _WET_ROW + _FOG_ROW)
     return _colour_table(cells.device)[row]
+
+
+def _with_borders(image: Tensor, owner: Tensor) -> Tensor:
+    """Return images, uint8 [B, h, w, 3], with a line two pixels wide between the lands of agencies, uint8 [B, h, w]."""
+    border = torch.zeros_like(owner, dtype=torch.bool)
+    for dim in (1, 2):
+        differs = owner.diff(dim=dim) != 0
+        border.narrow(dim, 0, owner.shape[dim] - 1).logical_or_(differs)
+        border.narrow(dim, 1, owner.shape[dim] - 1).logical_or_(differs)
+    return torch.where(border[..., None], torch.tensor(_INK, dtype=torch.uint8, device=image.device), image)
 
 
 @lru_cache(maxsize=8)

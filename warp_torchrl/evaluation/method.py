@@ -25,6 +25,7 @@ _USUAL = {
     ("model", "messages"): "none",
     ("observation", "radius"): 5,
     ("reward", "barrier_rule"): "cut_off",
+    ("reward", "cooperation"): 0.0,
 }
 """Values that a policy's name leaves out."""
 _PAPERS_RADIUS = 3

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from warp_torchrl.env.metrics import SAVED_BY
 from warp_torchrl.evaluation.behaviour import BEHAVIOUR
 from warp_torchrl.evaluation.play import Episodes
 from warp_torchrl.evaluation.statistics import compare, summarise
@@ -109,6 +110,7 @@ def table(content: Mapping[str, Any]) -> str:
             f"{low:+.1f} .. {high:+.1f}; more on {100 * difference['probability_of_improvement']:.0f} % of fires"
         )
     lines += _watching_lines(content, rows) if content.get("watching") else []
+    lines += _agency_lines(rows, [name for name in content["metrics"] if name.startswith(SAVED_BY)])
     lines += _behaviour_lines(content)
     return "\n".join(lines)
 
@@ -131,6 +133,22 @@ def _watching_lines(content: Mapping[str, Any], rows: Mapping[str, Any]) -> list
             f"{low:+.1f} .. {high:+.1f}; more on {100 * difference['probability_of_improvement']:.0f} % of fires"
         )
     return lines
+
+
+def _agency_lines(rows: Mapping[str, Any], names: Sequence[str]) -> list[str]:
+    """Return what each agency has saved of its land, a line for each policy; none where there is but one agency."""
+    if not names:
+        return []
+    lines = [f"{'saved %, by agency':<22}" + "".join(f"{name.removeprefix(SAVED_BY):>24}" for name in names)]
+    for policy, summary in rows.items():
+        cells = ["{:.1f} ({:.1f} .. {:.1f})".format(*_percent(summary[name])) for name in names]
+        lines.append(f"{policy:<22}" + "".join(f"{cell:>24}" for cell in cells))
+    return lines
+
+
+def _percent(summary: Mapping[str, Any]) -> tuple[float, float, float]:
+    low, high = summary["ci95"]
+    return 100.0 * summary["mean"], 100.0 * low, 100.0 * high
 
 
 def place(content: Mapping[str, Any]) -> str:
