@@ -34,7 +34,7 @@ def test_what_agencies_save_has_a_table_of_its_own():
     none = {name: np.zeros(4) for name in shares}
     shown = table(report("agencies", "mine", 7, episodes(0.0) | shares, {"noop": episodes(0.0) | none})).splitlines()
     assert "saved %, by agency                    agency_0                agency_1" in shown
-    assert "noop                          0.0 (0.0 .. 0.0)         0.0 (0.0 .. 0.0)" in shown
+    assert any(line.split() == ["noop", *("0.0 (0.0 .. 0.0)".split() * 2)] for line in shown)
     (line,) = (line for line in shown if line.startswith("mine ") and "75.0 (75.0 .. 75.0)" in line)
     assert " 30.0 (2" in line
 
