@@ -51,6 +51,13 @@ def test_the_example_of_a_prediction_runs(capsys):
     assert names["prediction"].burn_probability[40, 10] == 1.0
 
 
+def test_the_example_of_groups_runs():
+    names: dict = {}
+    exec(blocks("agencies.md")[0], names)
+    said = re.search(r"env.group_map  # (.*)", blocks("agencies.md")[0])[1]
+    assert str(names["env"].group_map) == said
+
+
 def test_the_example_of_a_live_match_runs(capsys):
     exec(blocks("live.md")[1], {})
     assert re.fullmatch(r"\d+% saved, \d+% without a team\n", capsys.readouterr().out)

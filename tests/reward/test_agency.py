@@ -7,7 +7,9 @@ import torch
 
 from tests.conftest import small_world
 from warp_torchrl import make_env
+from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.config.run_config import run_config
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.reward import Agency
 from warp_torchrl.world.agencies import Several, by_land
@@ -70,6 +72,11 @@ def test_of_two_agencies_that_share_each_earns_the_sum_and_of_two_at_odds_they_s
 def test_what_it_needs_is_told_in_one_line():
     with pytest.raises(ConfigError, match=r"^agencies must be several where reward is agency, got one$"):
         make_env("skirmish", n_worlds=1, overrides=["reward=agency"])
+    with pytest.raises(
+        ConfigError, match=r"^reward.cooperation must be 1 where the team has one value, algorithm.mixer=vdn"
+    ):
+        run_config(plain(compose_config("train", ["scenario=agencies", "algorithm=vdn"])))
+    run_config(plain(compose_config("train", ["scenario=agencies", "algorithm=vdn", "reward.cooperation=1"])))
     with pytest.raises(ValueError, match="agencies must be several"):
         WildfireEnv(small_world(), reward=Agency())
     with pytest.raises(ValueError, match=r"^cooperation must be in \[-1, 1\], got 1.5$"):

@@ -301,6 +301,11 @@ def _check_together(config: Mapping[str, Any]) -> None:
         raise ConfigError(
             f"team.messages must be graph or both where networks talk, model.messages={model}, got {team}"
         )
+    mixer, cooperation = algorithm.get("mixer", "none"), reward.get("cooperation", 1.0)
+    if mixer != "none" and cooperation != 1.0:
+        raise ConfigError(
+            f"reward.cooperation must be 1 where the team has one value, algorithm.mixer={mixer}, got {cooperation}"
+        )
     if reward["shaping"] > 0.0 and reward["gamma"] != algorithm["gamma"]:
         raise ConfigError(
             f"reward.gamma must be algorithm.gamma, {algorithm['gamma']}, for shaping to leave optimal policies as "
