@@ -16,7 +16,6 @@ from torch import Tensor
 
 from warp_torchrl.content import Content, Empty, Follows
 from warp_torchrl.validation import check_new_name
-from warp_torchrl.world.agencies import own_land as land_served
 from warp_torchrl.world.fast.bytes import at_least, byte, equal, to_codes, to_int32
 from warp_torchrl.world.fast.squares import Window, window
 from warp_torchrl.world.role import PAPER_ROLES
@@ -207,9 +206,10 @@ def other_scout(look: Look) -> Tensor:
 @channel(content=lambda world, names: None if world.agencies.names else Empty())
 def own_land(look: Look) -> Tensor:
     """Return 255 on the land of the agency that the vehicle serves."""
-    if look.state.lands is None:
+    lands, serves = look.state.lands, look.state.vehicles.serves
+    if lands is None or serves is None:
         return torch.zeros_like(look.on_map)
-    return look.window.of_own(land_served(look.state).to(torch.uint8)) * 255
+    return look.on_map * byte(look.window.of(lands.owner) == serves[..., None, None]) * 255
 
 
 _CELLS, _BURNED, _FIREBREAK, _ON_MAP = 0x0F, 0x10, 0x20, 0x40

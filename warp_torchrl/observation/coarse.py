@@ -8,7 +8,7 @@ from warp_torchrl.content import Content, Empty, Quarters
 from warp_torchrl.observation.channels import ELEVATION_SCALE, LAST_SEEN, OWN_LAND
 from warp_torchrl.observation.own import WIND_SCALE, steps_to_tick, time_left
 from warp_torchrl.symmetry import Planes, Target, TeamPlanes
-from warp_torchrl.world.agencies import own_land
+from warp_torchrl.world.agencies import land_of_each
 from warp_torchrl.world.fast.blocks import block_means
 from warp_torchrl.world.fast.squares import window
 from warp_torchrl.world.role import PAPER_ROLES
@@ -58,7 +58,7 @@ def picture(state: WorldState, world: World, forecast: Forecast) -> Tensor:
     mates = (world.sensing.knows_where(state, world.team).to(torch.float32) @ place).mul_(0.25).clamp_(max=1.0)
     mates = mates.view(*place.shape[:2], 1, PICTURE_SIDE, PICTURE_SIDE)
     seen = _maps(state, forecast).expand(-1, place.shape[1], -1, -1, -1)
-    land = [] if state.lands is None else [block_means(own_land(state), PICTURE_SIDE)[:, :, None]]
+    land = [each[:, :, None] for each in _land_served(state)]
     return torch.cat((seen[:, :, :2], mates, seen[:, :, 2:], *land), dim=2)
 
 
@@ -71,9 +71,7 @@ def centred_picture(state: WorldState, world: World, forecast: Forecast) -> Tens
     maps = (_maps(state, forecast) * 255.0).to(torch.uint8).unbind(2)
     block = _block(state, PICTURE_SIDE)
     about = window(torch.stack((block // PICTURE_SIDE, block % PICTURE_SIDE), dim=-1), sides, middle)
-    land = []
-    if state.lands is not None:
-        land = [about.of_own((block_means(own_land(state), PICTURE_SIDE) * 255.0).to(torch.uint8))]
+    land = [about.of_own((each * 255.0).to(torch.uint8)) for each in _land_served(state)]
     if state.knowledge is None:
         fire, fuel = (about.of(each[:, 0]) for each in maps)
         mates = about.of(one_hot(block, PICTURE_SIDE**2).sum(1).view(-1, *sides))
@@ -181,11 +179,23 @@ def _lands(state: WorldState) -> list[Tensor]:
     """Return the land of each agency, then the vehicles that serve it, float32 [B, 16, 16] each."""
     if state.lands is None or state.vehicles.serves is None:
         return []
-    agencies = torch.arange(state.lands.worth.shape[1], device=state.cells.device)[:, None, None]
-    land = block_means(state.lands.owner[:, None] == agencies, STATE_SIDE)
+    land = land_of_each(state.lands)
     place = one_hot(_block(state, STATE_SIDE), STATE_SIDE**2).to(torch.float32)
-    serving = (state.vehicles.serves[:, None] == agencies[..., 0]).to(torch.float32) @ place
-    return [*land.unbind(1), *serving.unflatten(-1, (STATE_SIDE, STATE_SIDE)).unbind(1)]
+    agencies = torch.arange(land.shape[1], device=land.device)[:, None]
+    serving = (state.vehicles.serves[:, None] == agencies).to(torch.float32) @ place
+    return [*block_means(land, STATE_SIDE).unbind(1), *serving.unflatten(-1, (STATE_SIDE, STATE_SIDE)).unbind(1)]
+
+
+def _land_served(state: WorldState) -> list[Tensor]:
+    """Return the share of each block that is of the agency that each vehicle serves, float32 [B, A, 8, 8].
+
+    Nothing where there is but one agency.
+    """
+    if state.lands is None or state.vehicles.serves is None:
+        return []
+    shares, serves = block_means(land_of_each(state.lands), PICTURE_SIDE), state.vehicles.serves
+    index = serves[..., None, None].expand(-1, -1, PICTURE_SIDE, PICTURE_SIDE)
+    return [shares.gather(1, index)]
 
 
 def _block(state: WorldState, side: int) -> Tensor:

@@ -66,11 +66,7 @@ class Agency(Conservation):
         """Return Q_k, float32 [B, K]; 0 where an agency has no tree."""
         lands, _ = lands_of(state)
         standing = state.initial & ~state.burned & is_tree(state.cells)
-        value = (
-            self.preserved * (standing & ~state.extinguished)
-            + self.extinguished * (standing & state.extinguished)
-            - self.cleared * (state.initial & ~state.burned & state.firebreak)
-            - self.burned * (state.initial & state.burned)
-        )
-        total = by_land(worth_of(state) * value, lands.owner, lands.worth.shape[1])
+        gain = torch.where(state.extinguished, self.extinguished, self.preserved) * standing
+        loss = torch.where(state.burned, self.burned, torch.where(state.firebreak, self.cleared, 0.0)) * state.initial
+        total = by_land(worth_of(state) * (gain - loss), lands.owner, lands.worth.shape[1])
         return torch.where(lands.worth > 0.0, total / lands.worth, 0.0)

@@ -214,8 +214,8 @@ def by_land(plane: Tensor, owner: Tensor, count: int) -> Tensor:
         owner: Of ``Lands``.
         count: K.
     """
-    sums = torch.zeros(len(plane), count, device=plane.device)
-    return sums.scatter_add(1, owner.flatten(1).to(torch.int64), plane.flatten(1))
+    agencies = torch.arange(count, device=owner.device)[:, None, None]
+    return torch.where(owner[:, None] == agencies, plane[:, None], 0.0).sum(dim=(2, 3))
 
 
 def standing(state: WorldState) -> Tensor:
@@ -227,6 +227,11 @@ def standing(state: WorldState) -> Tensor:
     alive = state.initial & ~state.burned & is_tree(state.cells)
     left = by_land(worth_of(state) * alive, lands.owner, lands.worth.shape[1])
     return torch.where(lands.worth > 0.0, left / lands.worth, 1.0)
+
+
+def land_of_each(lands: Lands) -> Tensor:
+    """Return the cells of each agency's land, bool [B, K, H, W]."""
+    return lands.owner[:, None] == torch.arange(lands.worth.shape[1], device=lands.owner.device)[:, None, None]
 
 
 def own_land(state: WorldState) -> Tensor:
