@@ -49,6 +49,14 @@ def test_whoever_serves_an_agency_earns_what_it_earns():
     assert earned(PLAIN, state, world, EXTINGUISH, STAY) == pytest.approx([0.0, 0.9 / 8])
 
 
+def test_a_step_is_paid_by_whom_a_vehicle_served_in_it():
+    state, world = parted([[3, 2], [3, 3]], [1, 1])
+    world = replace(world, agencies=Several(own=0, lending="need", term=1))
+    transition = world.step(state, torch.tensor([[STAY, CLEAR]]))
+    assert transition.after.vehicles.serves.tolist() == [[0, 0]], "fire burns on the land of agency 0 alone"
+    assert PLAIN(transition)[0, :, 0].tolist() == pytest.approx([-1.5 / 8, -1.5 / 8])
+
+
 def test_an_act_costs_as_often_as_vehicles_serve_the_agency():
     state, world = parted([[0, 1], [3, 3], [3, 2]], [0, 1, 1])
     own = earned(replace(PLAIN, act=0.01), state, world, EXTINGUISH, CLEAR, STAY)

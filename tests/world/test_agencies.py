@@ -1,5 +1,6 @@
 """Agencies: lands, who starts where, and who is lent to whom."""
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -9,8 +10,10 @@ from tests.conftest import small_world
 from warp_torchrl import make_env
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.world.agencies import OneAgency, Several, apportioned, by_land, own_land, standing, worth_of
+from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import Action, Cover, Lands, is_burning
 from warp_torchrl.world.team import Team
+from warp_torchrl.world.terrain.landscape import Perlin
 
 from .drawing import draw
 
@@ -65,6 +68,15 @@ def test_vehicles_start_on_dry_land_of_those_they_serve_and_no_two_on_one_cell()
     assert torch.equal(other.lands.owner, state.lands.owner)
 
 
+def test_a_vehicle_stands_at_home_in_the_middle_of_its_agency_s_land():
+    world = small_world(landscape=Perlin(size=17, levels=(0.0, 0.0, 0.0)), agencies=Several())
+    state = world.reset(torch.arange(16), torch.zeros(16, dtype=torch.int64))
+    angle = 2.0 * math.pi * (uniform(state.key, 0, Stream.LANDS, (1,)) + torch.tensor([0.0, 0.5]))
+    home = torch.stack((8 + 0.35 * 17 * angle.sin(), 8 + 0.35 * 17 * angle.cos()), dim=-1).round().long()
+    lit = is_burning(state.cells).flatten(1).gather(1, home[..., 0] * 17 + home[..., 1])
+    assert torch.equal(state.vehicles.position[~lit], home[~lit]) and (~lit).sum() > 24
+
+
 def test_worth_is_that_of_the_trees_of_each_land_before_the_fire():
     state = parted("T.a T5T", "001 011", [0, 1])
     assert state.lands.worth.tolist() == [[2.0, 3.0]]
@@ -75,6 +87,12 @@ def test_worth_is_that_of_the_trees_of_each_land_before_the_fire():
     assert worth.tolist() == [[5.0, 4.0]]
     state = state.replace(lands=state.lands.replace(worth=worth))
     assert standing(state).tolist() == [[1.0, 0.75]]
+
+
+def test_a_tree_that_grew_on_ash_is_lost_all_the_same():
+    state = parted("T6. T..", "001 011", [0, 1])
+    burned = torch.tensor([[[False, True, False], [False, False, False]]])
+    assert standing(state.replace(burned=burned)).tolist()[0] == [pytest.approx(2 / 3), 1.0]
 
 
 def test_an_agency_without_trees_has_lost_nothing():
