@@ -58,9 +58,9 @@ def test_agencies_play_as_step_by_step(monkeypatch):
     env = WildfireEnv(small_world(team=Team(n_agents=4), agencies=several), n_worlds=9)
     policy = trained(env, sharing="agency", symmetry="none")
     assert fits(env, policy)
-    quick = play(env, policy, 5, "sampled")
+    quick = play(env, policy, 5, "deterministic")  # a fresh policy's draws hardly depend on its networks
     monkeypatch.setattr(play_module, "fits", lambda env, policy: False)
-    slow = play(env, policy, 5, "sampled")
+    slow = play(env, policy, 5, "deterministic")
     assert alike(quick, slow) and {"saved_agency_0", "saved_agency_1"} <= slow.keys()
 
 

@@ -37,6 +37,18 @@ def test_each_earns_for_the_land_that_it_serves():
     assert earned(PLAIN, state, world, STAY, CLEAR) == pytest.approx([0.0, -1.5 / 8])
 
 
+def test_trees_count_by_their_worth():
+    state, world = parted([[0, 1], [3, 3]], [0, 1])
+    assets = torch.ones(1, 4, 4)
+    assets[0, 1, 1], assets[0, 3, 3] = 9.0, 0.0  # the burning tree, and one of the other agency's
+    ground = state.ground.replace(landscape=state.landscape.replace(assets=assets))
+    lands = state.lands.replace(worth=by_land(assets * state.initial, state.lands.owner, 2))
+    assert lands.worth.tolist() == [[16.0, 7.0]]
+    state = state.replace(ground=ground, lands=lands)
+    assert earned(PLAIN, state, world, EXTINGUISH, STAY) == pytest.approx([0.9 * 9 / 16, 0.0])
+    assert earned(PLAIN, state, world, STAY, CLEAR) == pytest.approx([0.0, 0.0])
+
+
 @pytest.mark.parametrize(("cooperation", "other"), [(1.0, 0.9 / 8), (0.5, 0.45 / 8), (0.0, 0.0), (-1.0, -0.9 / 8)])
 def test_the_other_earns_as_much_of_it_as_they_cooperate(cooperation, other):
     state, world = parted([[0, 1], [3, 3]], [0, 1])
