@@ -12,6 +12,7 @@ from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.heuristics.base import can_be_put_out, claim_cells, list_cells, nearest_fire
 from warp_torchrl.world.fast.distances import FAR, chebyshev_distance
 from warp_torchrl.world.ignition import Ignition
+from warp_torchrl.world.radio import Radio
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.sensing import Sight
 from warp_torchrl.world.state import Action
@@ -217,7 +218,7 @@ def test_followers_leave_to_each_other_what_is_nearer_to_them():
     env = watched_forest(Team(n_agents=2, roles=("scout",)))
     at = [[9, 2], [9, 16]]
     assert told(env, at, fires={(3, 2): 10, (15, 16): 30}) == [Action.NORTH, Action.SOUTH]
-    deaf = watched_forest(Team(n_agents=2, roles=("scout",), radio_range=0.0))
+    deaf = watched_forest(Team(n_agents=2, roles=("scout",), radio=Radio(range=0.0)))
     assert told(deaf, at, fires={(3, 2): 5, (15, 16): 30}) == [Action.NORTH, Action.NORTH_WEST], "it knows of no other"
 
 
@@ -242,7 +243,7 @@ def test_followers_watch_more_than_searchers_and_idlers_of_front():
 
 @pytest.mark.parametrize("name", ["oldest", "lawnmower", "follower"])
 def test_aircraft_turn_back_before_their_batteries_are_empty(name):
-    env = make_env("front", n_worlds=4, overrides=["team.battery=24"])
+    env = make_env("front", n_worlds=4, overrides=["team.flight.battery=24"])
     policy, now, lowest, charged = HEURISTICS[name](env), env.reset(), 24, False
     for _ in range(80):
         before = env.world_state.vehicles.battery

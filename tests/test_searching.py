@@ -8,6 +8,7 @@ from tests.world.drawing import draw
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS, Lawnmower, Oldest
 from warp_torchrl.world.geometry import DIRECTIONS
+from warp_torchrl.world.radio import Radio
 from warp_torchrl.world.sensing import Sight, freshness, in_reach, known_codes
 from warp_torchrl.world.state import Action
 from warp_torchrl.world.team import Team
@@ -34,7 +35,7 @@ def chosen(env, policy, state):
 
 @pytest.mark.parametrize("name", BLIND)
 def test_a_fire_that_nobody_knows_of_moves_nobody(name):
-    env = forest(radio_range=0.0)
+    env = forest(radio=Radio(range=0.0))
     env.reset()
     policy = HEURISTICS[name](env)
     state = env.world_state.clone()
@@ -58,7 +59,7 @@ def with_fire_known(env, place, agent=0):
 
 @pytest.mark.parametrize("name", ["oldest", "lawnmower"])
 def test_agents_go_to_the_fire_that_they_remember(name):
-    env = forest(start="anywhere", radio_range=0.0)
+    env = forest(start="anywhere", radio=Radio(range=0.0))
     env.reset()
     state = with_fire_known(env, (11, 11))
     state.vehicles.position[:] = torch.tensor([[3, 3], [3, 3]])
@@ -70,7 +71,7 @@ def test_agents_go_to_the_fire_that_they_remember(name):
 
 
 def test_local_remembers_no_fire():
-    env = forest(radio_range=0.0)
+    env = forest(radio=Radio(range=0.0))
     env.reset()
     state = with_fire_known(env, (11, 11))
     state.vehicles.position[:] = torch.tensor([[3, 3], [3, 3]])

@@ -105,5 +105,5 @@ def policy_of(found: checkpoints.Checkpoint, mode: str = "best") -> TrainedPolic
     seen = {name: value for name, value in config["observation"].items() if name != "_target_"}
     overrides = [f"observation={name}" for group, name in record.choices.items() if group == "observation"]
     overrides += [f"observation.{name}={json.dumps(value)}" for name, value in seen.items()]
-    overrides += [f"team.messages={record.values['team']['messages']}"] if RADIO in policy.in_keys else []
+    overrides += [f"team.radio.carries={record.values['team']['radio']['carries']}"] if RADIO in policy.in_keys else []
     return TrainedPolicy(policy.requires_grad_(False).eval(), chosen, found.manifest.signature, overrides)

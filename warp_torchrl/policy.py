@@ -70,7 +70,7 @@ class TrainedPolicy(TensorDictModuleBase):
         """
         here = signature(env)
         if self.talks and RADIO not in env.full_observation_spec.keys(True, True):
-            raise ValueError("its agents talk by radio, which this environment does not have: team.messages=graph")
+            raise ValueError("its agents talk by radio, which this environment does not have: team.radio.carries=graph")
         if self.is_by_agent and here.n_agents != self.trained.n_agents:
             raise ValueError(
                 f"it has a network for each of {self.trained.n_agents} agents, this team has {here.n_agents}"

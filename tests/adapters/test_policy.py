@@ -40,7 +40,7 @@ def test_a_team_acts_as_it_does_in_torchrl(sharing, observation):
 
 def test_a_team_that_talks_acts_as_it_does_in_torchrl():
     model = Mlp(actor_hidden=(32,), messages="graph")
-    options = {"team.messages": "graph", "team.radio_range": 4}
+    options = {"team.radio.carries": "graph", "team.radio.range": 4}
     ours, policy = policy_for("default", model, **options)
     theirs, act = parallel_env("default", seed=3, **options), policy.numpy_policy()
     now, (seen, infos) = ours.reset(), theirs.reset()
@@ -53,7 +53,9 @@ def test_a_team_that_talks_acts_as_it_does_in_torchrl():
         act(seen)
     with pytest.raises(ValueError, match="must be of the whole team of 4 at once, got 1"):
         act({"bulldozer_0": seen["bulldozer_0"]}, infos)
-    with pytest.raises(ValueError, match=r"talk by radio, which this environment does not have: team\.messages=graph"):
+    with pytest.raises(
+        ValueError, match=r"talk by radio, which this environment does not have: team\.radio\.carries=graph"
+    ):
         policy.fitted(make_env("default", n_worlds=1))
 
 

@@ -17,8 +17,11 @@ from warp_torchrl.config.construction import ConfigError, build, component
 from warp_torchrl.config.defaults import defaults
 from warp_torchrl.config.run_config import COMPONENTS, RunConfig, run_config
 from warp_torchrl.config.saved_config import SavedConfig, restore, world_overrides
+from warp_torchrl.world.flight import Flight
 from warp_torchrl.world.gridded import Gridded
 from warp_torchrl.world.ignition_file import IgnitionFile
+from warp_torchrl.world.radio import Radio
+from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.raster import Raster
 from warp_torchrl.world.weather import Weather
@@ -222,6 +225,17 @@ MISTAKES = [
     ("fire.p_regrow=2", r"fire\.p_regrow must be"),
     ("team.n_agents=70", r"team\.n_agents must be"),
     ("team.roles=[tank]", r"team\.roles must be"),
+    ("team.radio.rang=3", r"team\.radio\.rang is not a key of the configuration: did you mean team\.radio\.range\?"),
+    (
+        "+team.radio.rang=3",
+        r"team\.radio\.rang is not a key of team\.radio; it has carries, range, .*: did you mean team\.radio\.range\?",
+    ),
+    ("team.radio.range=-1", r"^team\.radio\.range must be in \[0, 1e\+06\], got -1"),
+    ("team.radio.carries=maps", r"^team\.radio\.carries must be none or map or graph or both, got 'maps'"),
+    ("team.radio=5", r"^team\.radio must be a mapping, got 5"),
+    ("team.radio=null", r"^team\.radio must be a mapping, got None"),
+    ("team.flight.battery=0", r"^team\.flight\.battery must be in"),
+    ("team.flight.battery=1.5", r"^team\.flight\.battery must be a whole number or null, got 1\.5"),
     ("ignition.count=0", r"ignition\.count must be"),
     ("observation.radius=2.5", r"observation\.radius must be a whole number"),
     ("reward.team_share=2", r"reward\.team_share must be"),
@@ -245,6 +259,29 @@ def test_mistakes_are_told_in_one_line(override, message):
     with pytest.raises(ConfigError, match=message) as error:
         run_config(plain(compose_config("train", override.split())))
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["team/mine.yaml", "scenario/mine.yaml"])
+def test_a_yaml_file_that_sets_a_part_of_a_component_leaves_the_rest_as_it_is(name, tmp_path, monkeypatch):
+    shutil.copytree(conf_folder(), tmp_path / "conf")
+    monkeypatch.setattr("warp_torchrl.config.compose.conf_folder", lambda: tmp_path / "conf")
+    part = {"radio": {"range": 5.0}, "flight": {"battery": 9}}
+    own = {"_target_": "warp_torchrl.world.team.Team", **part}
+    OmegaConf.save({"team": part} if name.startswith("scenario") else own, tmp_path / "conf" / name)
+    if name.startswith("scenario"):
+        path = tmp_path / "conf" / name
+        path.write_text(f"# @package _global_\nscenario: mine\n{path.read_text()}")
+    group = name.partition("/")[0]
+    team = run_config(plain(compose_config("train", [f"{group}=mine", "team.radio.loss=0.5"]))).world.team
+    assert team.radio == Radio(range=5.0, loss=0.5) and team.flight == Flight(battery=9)
+    merged = run_config(plain(compose_config("train", [f"{group}=mine", "team.radio={loss:0.5}"]))).world.team
+    assert merged == team
+
+
+def test_components_are_made_of_plain_parts():
+    node = {"_target_": "warp_torchrl.world.team.Team", "radio": {"carries": "graph"}}
+    assert build(node, "team") == Team(radio=Radio(carries="graph"))
+    assert build({**node, "radio": Radio(loss=1.0)}, "team") == Team(radio=Radio(loss=1.0))
 
 
 def test_a_number_that_is_whole_is_a_whole_number_however_it_is_written():
@@ -335,7 +372,7 @@ def test_a_yaml_file_that_was_edited_is_read_anew(tmp_path, monkeypatch):
         ),
         (["action_masking=false"], ["action_masking=False"]),
         (["scenario=search", "model.messages=graph"], []),  # what networks send changes no world
-        (["scenario=search", "model.messages=both"], ["team.messages=map"]),
+        (["scenario=search", "model.messages=both"], ["team.radio.carries=map"]),
         (["wind=calm", "fire=paper"], ["wind=calm", "fire.growth=True", "fire.beta=0.65", "fire.p_regrow=0.01"]),
     ],
 )

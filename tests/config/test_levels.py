@@ -6,6 +6,7 @@ from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.saved_config import SavedConfig, restore
+from warp_torchrl.world.radio import Radio
 
 SMALL = ["scenario=default", "landscape.size=12", "curriculum=success"]
 
@@ -23,6 +24,13 @@ def test_a_level_is_the_scenario_with_its_values_and_the_last_is_the_scenario():
     assert found == [(20, 1, 2.0), (10, 1, 3.0), (5, 2, 5.0)]
     assert plan.levels[-1] == plan.world
     assert all(world.landscape is plan.world.landscape for world in plan.levels), "what is the same is the same one"
+
+
+def test_a_level_may_have_another_value_of_a_part_of_a_component():
+    plan = planned("team.radio={range:9.0,loss:0.1}", "curriculum.over.team.radio.range=[3,9]")
+    plan.check_training()
+    assert [world.team.radio for world in plan.levels] == [Radio(range=each, loss=0.1) for each in (3.0, 9.0)]
+    assert plan.levels[-1] == plan.world
 
 
 def test_without_a_curriculum_there_is_one_level_and_the_plain_environment():
@@ -57,6 +65,10 @@ def test_evaluations_are_of_the_scenario():
         (
             ["curriculum.over.steps_per_tick=[-3,5]"],
             "curriculum.over, level 0: steps_per_tick must be in .*, got -3",
+        ),
+        (
+            ["curriculum.over.team.radio.loss=[2.0,0.0]"],
+            r"curriculum.over, level 0: team.radio.loss must be in \[0, 1\], got 2",
         ),
         (["curriculum.over.fire.tau=[slow,5.0]"], "curriculum.over, level 0: fire.tau must be a number, got 'slow'"),
         (

@@ -8,8 +8,10 @@ import pytest
 
 from tests.test_golden import GOLDEN
 from warp_torchrl.config.compose import compose_config, plain
+from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.renamed import RENAMED, renamed_overrides, renamed_values
-from warp_torchrl.config.saved_config import restore
+from warp_torchrl.config.saved_config import SavedConfig, restore
+from warp_torchrl.dotted import dotted
 from warp_torchrl.runs.checkpoint import newest
 from warp_torchrl.runs.resumption import read_config
 from warp_torchrl.runs.shipped import find_policy
@@ -22,6 +24,8 @@ from warp_torchrl.runs.shipped import find_policy
         ("model.facing=fire", "model.symmetry=canonical"),
         ("model.facing=north,fire", "model.symmetry=none,canonical"),
         ("model.facing=up", "model.symmetry=up"),
+        ("team.radio_range=3,5", "team.radio.range=3,5"),
+        ("team.drift=0.1", "team.flight.drift=0.1"),
     ],
 )
 def test_an_old_key_is_read_and_told_once(old, new, caplog):
@@ -45,6 +49,44 @@ def test_values_of_run_folders_keep_their_order_and_get_the_names_of_now():
     assert renamed_values({"model": None}) == {"model": None}
 
 
+def test_values_that_stand_one_level_deeper_now_are_put_there():
+    team = {
+        "n_agents": 3,
+        "messages": "map",
+        "radio_range": 4.0,
+        "separation": None,
+        "radio_loss": 0.1,
+        "start": "corner",
+    }
+    found = renamed_values({"team": team})["team"]
+    assert found == {
+        "n_agents": 3,
+        "radio": {"carries": "map", "range": 4.0, "loss": 0.1},
+        "flight": {"separation": None},
+        "start": "corner",
+    }
+    assert list(found) == ["n_agents", "radio", "flight", "start"] and "messages" in team
+    assert renamed_values({"team": found})["team"] == found
+    assert renamed_values({"team": {"radio_range": [1]}}) == {"team": {"radio": {"range": [1]}}}
+
+
+@pytest.mark.parametrize(
+    "both", [{"team": {"radio": 5, "radio_range": 3}}, {"model": {"facing": "up", "symmetry": "none"}}]
+)
+def test_an_old_name_beside_its_new_one_is_refused(both):
+    assert renamed_values(both) == both
+    with pytest.raises(ConfigError, match=r"(radio_range|facing) in the run folder is not a key of this version"):
+        restore(SavedConfig(values=renamed_values(both)))
+
+
+def test_a_former_team_is_restored_and_an_override_by_an_old_name_counts():
+    values = renamed_values({"team": {"messages": "map", "radio_range": 4.0, "battery": 9, "drift": 0.2}})
+    record = SavedConfig(choices={"scenario": "scouts"}, values=values)
+    team = plain(restore(record, ["team.radio_range=7", "team.drift=0.0"]))["team"]
+    assert team["radio"] == {"carries": "map", "range": 7, "loss": 0.0, "line_of_sight": False}
+    assert team["flight"] == {"separation": None, "battery": 9, "drift": 0.0}
+
+
 def test_shipped_and_former_runs_are_read_by_the_names_of_now(tmp_path):
     record = newest(find_policy("skirmish"))[0].record()
     assert record.values["model"]["symmetry"] == "canonical" and "facing" not in record.values["model"]
@@ -56,7 +98,5 @@ def test_shipped_and_former_runs_are_read_by_the_names_of_now(tmp_path):
 
 
 def test_every_new_name_is_a_key():
-    values = plain(compose_config("train"))
-    for old, (new, _) in RENAMED.items():
-        group, key = new.split(".")
-        assert key in values[group] and old.split(".")[1] not in values[group]
+    keys = dotted(plain(compose_config("train")))
+    assert all(new in keys and old not in keys for old, (new, _) in RENAMED.items())

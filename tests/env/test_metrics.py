@@ -5,6 +5,7 @@ import torch
 
 from tests.conftest import small_world
 from warp_torchrl.env.metrics import FLYING, METRICS, WATCHING, metrics
+from warp_torchrl.world.flight import Flight
 from warp_torchrl.world.sensing import Sight
 from warp_torchrl.world.state import Action, count_trees
 from warp_torchrl.world.team import Team
@@ -36,7 +37,7 @@ def test_acts_are_counted_for_what_they_are(make_small_env):
 
 
 def test_limited_sight_and_aircraft_have_metrics_of_their_own(make_small_env):
-    team = Team(n_agents=2, roles=("scout",), separation=2.0)
+    team = Team(n_agents=2, roles=("scout",), flight=Flight(separation=2.0))
     env = make_small_env(4, small_world(sensing=Sight(radius=2), team=team))
     now = env.rollout(20, break_when_any_done=False)
     found = metrics(env.world_state, env.tree_counts, env.world.horizon)

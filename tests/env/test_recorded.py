@@ -17,9 +17,9 @@ SCENARIOS = [
     ["scenario=default", "observation=paper", "landscape.relief=200", "fire=paper"],
     ["scenario=hazard", "reward=adaptive"],
     ["scenario=hetero", "reward=collaborative"],
-    ["scenario=smoke", "team.messages=both", "team.radio_range=6", "team.radio_loss=0.1"],
+    ["scenario=smoke", "team.radio.carries=both", "team.radio.range=6", "team.radio.loss=0.1"],
     ["scenario=haksar", "team.tank=3", "team.approach=true", "observation=at_fire", "reward=round_fire"],
-    ["scenario=front", "team.battery=9", "team.drift=0.05"],
+    ["scenario=front", "team.flight.battery=9", "team.flight.drift=0.05"],
     ["scenario=agencies", "agencies.own=1", "agencies.lending=need", "agencies.term=3"],
 ]
 

@@ -24,7 +24,9 @@ def played(steps, *overrides):
 
 
 @pytest.mark.parametrize(
-    "overrides", [[], ["scenario=lightning"], ["wind=wandering"], ["scenario=front", "team.battery=9"]], ids=" ".join
+    "overrides",
+    [[], ["scenario=lightning"], ["wind=wandering"], ["scenario=front", "team.flight.battery=9"]],
+    ids=" ".join,
 )
 def test_worlds_play_the_same_episodes_though_nobody_asks_which_have_ended(overrides):
     expected, env = played(40, *overrides)

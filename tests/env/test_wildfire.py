@@ -16,6 +16,7 @@ from warp_torchrl.observation import Local, Paper, Surroundings
 from warp_torchrl.reward import Efficiency
 from warp_torchrl.world.fast import road
 from warp_torchrl.world.fire import Fire
+from warp_torchrl.world.radio import Radio
 from warp_torchrl.world.sensing import Sight
 from warp_torchrl.world.state import Action, count_trees
 from warp_torchrl.world.team import Team
@@ -345,7 +346,9 @@ def test_steps_of_agents_that_do_not_see_all_are_not_compiled(monkeypatch):
 
 
 def test_agents_know_the_same_in_any_batch_and_after_a_masked_reset(make_small_env):
-    world = small_world(horizon=7, sensing=Sight(radius=2, miss=0.2, smoke=1.0), team=Team(n_agents=2, messages="map"))
+    world = small_world(
+        horizon=7, sensing=Sight(radius=2, miss=0.2, smoke=1.0), team=Team(n_agents=2, radio=Radio(carries="map"))
+    )
     many, one = make_small_env(4, world, seed=0), make_small_env(1, world, seed=2)
     ours, theirs = many.reset(), one.reset()
     for step in range(12):
@@ -360,7 +363,7 @@ def test_agents_know_the_same_in_any_batch_and_after_a_masked_reset(make_small_e
 
 
 def test_what_agents_know_is_kept_and_restored(make_small_env):
-    world = small_world(sensing=Sight(radius=2), team=Team(n_agents=2, messages="map"))
+    world = small_world(sensing=Sight(radius=2), team=Team(n_agents=2, radio=Radio(carries="map")))
     env, other = make_small_env(3, world, seed=4), make_small_env(3, world, seed=9)
     env.rollout(6, break_when_any_done=False)
     other.load_state_dict(env.state_dict())

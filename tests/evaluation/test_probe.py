@@ -9,12 +9,13 @@ from warp_torchrl.evaluation.probe import _Heard, _share, drawn_anew, probe
 from warp_torchrl.models import Mlp, signature
 from warp_torchrl.models.messages import Round
 from warp_torchrl.policy import TrainedPolicy
+from warp_torchrl.world.radio import Radio
 from warp_torchrl.world.sensing import Sight
 from warp_torchrl.world.team import Team
 
 
 def made(make_small_env, n_worlds=6, messages="graph", **team):
-    world = small_world(team=Team(n_agents=2, messages=messages, **team), sensing=Sight(radius=3))
+    world = small_world(team=Team(n_agents=2, radio=Radio(carries=messages), **team), sensing=Sight(radius=3))
     env = make_small_env(n_worlds, world)
     model = Mlp(actor_hidden=(32,), messages=messages)
     policy = Ppo().policy(signature(env), model).requires_grad_(False)

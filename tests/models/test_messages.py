@@ -18,6 +18,7 @@ from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.saved_config import SavedConfig, restore
 from warp_torchrl.models import ACTION, LOGITS, OBSERVATION, RADIO, Cnn, Mlp, over_canonical, signature
 from warp_torchrl.models.messages import Round
+from warp_torchrl.world.radio import Radio
 from warp_torchrl.world.team import Team
 
 SMALL = {"actor_hidden": (16, 16), "critic_hidden": (16,), "messages": "graph", "message_size": 16}
@@ -32,8 +33,9 @@ OWN = (*OBSERVATION, "self")
 
 @pytest.fixture
 def make_env(make_small_env):
-    def make(n_worlds=4, n_agents=4, **team):
-        return make_small_env(n_worlds, small_world(team=Team(n_agents=n_agents, messages="graph", **team)))
+    def make(n_worlds=4, n_agents=4, **radio):
+        team = Team(n_agents=n_agents, radio=Radio(carries="graph", **radio))
+        return make_small_env(n_worlds, small_world(team=team))
 
     return make
 
@@ -131,7 +133,7 @@ def test_a_team_that_talks_does_the_same_in_a_turned_world(turn):
 
 @pytest.mark.parametrize("name", MODELS)
 def test_a_stored_batch_says_what_was_acted_on(make_env, name):
-    env, model = make_env(radio_range=6.0), MODELS[name]
+    env, model = make_env(range=6.0), MODELS[name]
     policy = Ppo().policy(signature(env), model)
     with torch.no_grad():
         batch = env.rollout(5, policy)
@@ -149,7 +151,7 @@ def test_a_stored_batch_says_what_was_acted_on(make_env, name):
         (["model.sharing=role"], r"model\.sharing must be team where agents talk"),
         (["model.message_size=12"], r"model\.message_size must be a multiple of 8"),
         (["algorithm=dqn"], r"model\.messages must be none or map where the algorithm replays"),
-        (["team.messages=none"], r"team\.messages must be graph or both where networks talk"),
+        (["team.radio.carries=none"], r"team\.radio\.carries must be graph or both where networks talk"),
         (["imitation.demonstrations=somewhere"], r"imitation\.demonstrations must be null where agents talk"),
     ],
 )
@@ -159,7 +161,7 @@ def test_what_cannot_be_is_refused_in_one_line(overrides, rule):
 
 
 def test_one_word_lets_the_environment_tell_whom_agents_hear():
-    made = run_config(plain(compose_config("train", ["model.messages=graph", "team.radio_range=5"])))
+    made = run_config(plain(compose_config("train", ["model.messages=graph", "team.radio.range=5"])))
     assert RADIO in made.make_env(2, 0).reset().keys(True, True)
     silent = run_config(plain(compose_config("train", [])))
     assert RADIO not in silent.make_env(2, 0).reset().keys(True, True)
@@ -169,15 +171,15 @@ def test_one_word_lets_the_environment_tell_whom_agents_hear():
 def test_another_scenario_leaves_a_talking_team_its_radio(trained, kept):
     """... and takes the maps of a team that does not see all."""
     record = SavedConfig(
-        choices={"scenario": "search"}, values={"model": {"messages": trained}, "team": {"messages": trained}}
+        choices={"scenario": "search"}, values={"model": {"messages": trained}, "team": {"radio": {"carries": trained}}}
     )
-    config = restore(record, ["scenario=large", "team.radio_range=7"])
-    assert config.team.messages == kept and config.team.n_agents == 8 and config.team.radio_range == 7
+    config = restore(record, ["scenario=large", "team.radio.range=7"])
+    assert config.team.radio.carries == kept and config.team.n_agents == 8 and config.team.radio.range == 7
 
 
 def test_maps_are_the_worlds_to_tell_and_any_learner_takes_them():
     told = run_config(plain(compose_config("train", ["scenario=search", "model.messages=map", "algorithm=dqn"])))
     env = told.make_env(2, 0)
-    assert env.world.team.sends_maps and RADIO not in env.reset().keys(True, True)
-    with pytest.raises(ConfigError, match=r"team\.messages must be none or graph where agents see all"):
+    assert env.world.team.radio.sends_maps and RADIO not in env.reset().keys(True, True)
+    with pytest.raises(ConfigError, match=r"team\.radio\.carries must be none or graph where agents see all"):
         run_config(plain(compose_config("train", ["model.messages=map"])))

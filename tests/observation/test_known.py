@@ -12,6 +12,7 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.observation import Local, Paper, Surroundings, central_state, state_names
 from warp_torchrl.observation.channels import DEFAULT
+from warp_torchrl.world.radio import Radio
 from warp_torchrl.world.sensing import Full, Sight, in_reach
 from warp_torchrl.world.state import Forecast
 from warp_torchrl.world.team import Team
@@ -44,7 +45,7 @@ def drawn(sight, drawing, at, **team):
 def test_what_nobody_has_seen_makes_no_difference_to_what_is_shown(preset):
     """A fire beyond sight, ash, a firebreak, a wet tree and a silent team-mate change no number of any entry."""
     sight = Sight(radius=2)
-    world = limited(sight, radio_range=0.0)
+    world = limited(sight, radio=Radio(range=0.0))
     env = WildfireEnv(world, observation=preset, n_worlds=4, seed=5)
     env.reset()
     state = env.world_state
@@ -87,7 +88,7 @@ def test_a_world_that_shows_all_shows_the_same_fire_to_who_sees_all():
 
 
 def test_a_view_shows_what_is_known_and_how_fresh_it_is():
-    state, world = drawn(Sight(radius=1), "TTTTa TTTTT TTTTT TTTTT TTTTT", [(0, 3), (4, 0)], radio_range=0.0)
+    state, world = drawn(Sight(radius=1), "TTTTa TTTTT TTTTT TTTTT TTTTT", [(0, 3), (4, 0)], radio=Radio(range=0.0))
     gone = state.vehicles.position.clone()
     gone[0, 0] = torch.tensor([0, 0])
     later = state.replace(step=state.step + 16, vehicles=state.vehicles.replace(position=gone))
@@ -105,7 +106,7 @@ def test_a_view_shows_what_is_known_and_how_fresh_it_is():
 def test_the_picture_pools_what_is_known():
     sight = Sight(radius=1)
     drawing = " ".join(["T" * 16] * 7 + ["TTTTTTTTTTTTaaTT"] * 2 + ["T" * 16] * 7)
-    state, world = drawn(sight, drawing, [(7, 12), (15, 0)], radio_range=0.0)
+    state, world = drawn(sight, drawing, [(7, 12), (15, 0)], radio=Radio(range=0.0))
     preset = Surroundings(centred=False)
     picture = preset(state, world, world.forecast(state))["picture"][0]
     assert preset.spaces(world)["picture"].names == ("fire", "fuel", "team_mates", "last_seen")
@@ -138,7 +139,7 @@ def test_threat_is_not_told_of_what_may_not_be_known():
 
 def test_a_battery_is_shown_where_it_runs_down():
     plain = make_env("scouts", n_worlds=2)
-    env = make_env("scouts", n_worlds=2, overrides=["team.battery=10"])
+    env = make_env("scouts", n_worlds=2, overrides=["team.flight.battery=10"])
     names = env.channel_names["self"]
     assert names == (*plain.channel_names["self"], "battery")
     now = env.reset()
@@ -156,7 +157,7 @@ def test_an_older_policy_plays_on_beside_a_battery():
         env.rollout(12, policy.fitted(env), break_when_any_done=False)["agents", "action"]
         for env in (
             make_env("skirmish", n_worlds=4, overrides=[*policy.overrides, *further])
-            for further in ([], ["team.battery=9"])  # bulldozers do not fly
+            for further in ([], ["team.flight.battery=9"])  # bulldozers do not fly
         )
     ]
     assert torch.equal(*played)

@@ -9,6 +9,7 @@ from warp_torchrl import make_env
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.reward import Monitor
+from warp_torchrl.world.flight import Flight
 from warp_torchrl.world.sensing import Sight
 from warp_torchrl.world.state import Action
 from warp_torchrl.world.team import Team
@@ -43,7 +44,7 @@ def test_who_finds_fire_is_paid_and_less_uncertainty_is_everybodys():
 
 
 def test_near_misses_cost_those_who_have_them():
-    team = Team(n_agents=2, roles=("scout",), separation=2.0, start="anywhere")
+    team = Team(n_agents=2, roles=("scout",), flight=Flight(separation=2.0), start="anywhere")
     state, world = watched(FIELD, [[3, 2], [3, 3]], team)
     state = state.replace(vehicles=state.vehicles.replace(near_misses=state.vehicles.acts.clone()))
     assert earned(Monitor(scale=1.0, near_miss=0.5), state, world, STAY, STAY) == pytest.approx([-1.0, -1.0])

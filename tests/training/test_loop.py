@@ -100,7 +100,7 @@ RUNS = {
     "regrets": ["curriculum=regret", "curriculum.over.steps_per_tick=[9,6,4]", "curriculum.over.wind.speed=[0,2,4]",
                 "curriculum.episodes=2", "curriculum.worlds=4", "algorithm=dqn", *REPLAY],
     "talks": ["scenario=search", "landscape.size=12", "horizon=10", "model.messages=both", "model.message_size=8",
-              "team.radio_range=4", "team.radio_loss=0.2", "sensing.miss=0.1", "sensing.smoke=1.0"],
+              "team.radio.range=4", "team.radio.loss=0.2", "sensing.miss=0.1", "sensing.smoke=1.0"],
     "serves": ["scenario=agencies", "landscape.size=12", "horizon=10", "agencies.own=1", "agencies.lending=need",
                "agencies.term=3", "reward.cooperation=-0.5"],
     "compiled": ["compile=true", "imitation.teacher=greedy", "imitation.until=0.7"],

@@ -9,8 +9,10 @@ import pytest
 
 from warp_torchrl.world.agencies import Several
 from warp_torchrl.world.fire import Fire
+from warp_torchrl.world.flight import Flight
 from warp_torchrl.world.hazard import HazardFire
 from warp_torchrl.world.ignition import Ignition
+from warp_torchrl.world.radio import Radio
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.landscape import Perlin
@@ -62,11 +64,11 @@ OUT_OF_RANGE = [
     (Team, "roles", [(), ("tank",), ("ugv", "boat"), "ugv"]),
     (Team, "extinguish_p", [-0.1, 1.1, NAN]),
     (Team, "tank", [-1, 10_001]),
-    (Team, "radio_range", [-0.1, 1.1e6, NAN]),
-    (Team, "radio_loss", [-0.1, 1.1, NAN]),
-    (Team, "separation", [-0.1, 1.1e6, NAN]),
-    (Team, "battery", [0, 1_000_001]),
-    (Team, "drift", [-0.1, 1.1, NAN]),
+    (Radio, "range", [-0.1, 1.1e6, NAN]),
+    (Radio, "loss", [-0.1, 1.1, NAN]),
+    (Flight, "separation", [-0.1, 1.1e6, NAN]),
+    (Flight, "battery", [0, 1_000_001]),
+    (Flight, "drift", [-0.1, 1.1, NAN]),
     (Uniform, "speed", [-0.1, 60.1, NAN]),
     (Uniform, "direction", [NAN, INF]),
     (Paper, "scale", [-0.1, 10.1, NAN]),
@@ -88,7 +90,7 @@ NO_SUCH_OPTION = [
     (Perlin, "ages", ["old"]),
     (Array, "ages", ["old"]),
     (Team, "start", ["corners"]),
-    (Team, "messages", ["graphs"]),
+    (Radio, "carries", ["graphs"]),
     (Several, "lending", ["needs"]),
 ]
 
@@ -158,14 +160,16 @@ def test_every_field_with_a_range_is_in_the_list() -> None:
         (Array, "row"),
         (Array, "column"),
         (Team, "allow_stay"),
-        (Team, "radio_line_of_sight"),
+        (Team, "radio"),
+        (Team, "flight"),
+        (Radio, "line_of_sight"),
         (Paper, "rotate"),
         *(
             (World, part)
             for part in ("landscape", "wind", "fire", "team", "ignition", "sensing", "agencies", "action_masking")
         ),
     }
-    for component in (Fire, Ignition, Perlin, Array, Team, Uniform, Paper, Wandering, World, Several):
+    for component in (Fire, Ignition, Perlin, Array, Team, Radio, Flight, Uniform, Paper, Wandering, World, Several):
         for name in (field.name for field in fields(component) if field.init):
             assert (component, name) in listed | free, f"{component.__name__}.{name}"
 

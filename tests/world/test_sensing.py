@@ -7,6 +7,7 @@ import torch
 
 from tests.conftest import small_world
 from tests.world.drawing import CELLS, draw
+from warp_torchrl.world.radio import Radio
 from warp_torchrl.world.sensing import Full, Sight, freshness, known_codes, others_in_sight, smoke
 from warp_torchrl.world.state import EMBER, FIRST_FIRE, Action
 from warp_torchrl.world.team import Team
@@ -64,7 +65,7 @@ def test_what_was_seen_is_kept_and_grows_old():
 
 
 def test_maps_are_told_to_those_that_hear_and_the_newer_record_counts():
-    sight, team = Sight(radius=1), Team(n_agents=3, messages="map", radio_range=4.0)
+    sight, team = Sight(radius=1), Team(n_agents=3, radio=Radio(carries="map", range=4.0))
     at = [(0, 0), (0, 4), (0, 6)]  # the first hears the second, which hears the third
     state = draw("TTTTTTa TTTTTTT", team=team, at=at)
     first = sight.begun(state, team)
@@ -74,12 +75,12 @@ def test_maps_are_told_to_those_that_hear_and_the_newer_record_counts():
     later = sight.updated(later, team, running(later))
     assert known(later, 0) == ["TT?TTTa", "TT?TTTT"], "from hand to hand, one a step"
     assert freshness(later.knowledge, later.step)[0, 0, 0, 6].item() == pytest.approx(16 / 17)
-    alone = sight.begun(state, Team(n_agents=3, messages="graph"))
+    alone = sight.begun(state, Team(n_agents=3, radio=Radio(carries="graph")))
     assert known(alone, 1) == ["???TTT?", "???TTT?"]
 
 
 def test_without_range_nothing_is_shared():
-    team = Team(n_agents=2, messages="map", radio_range=0.0)
+    team = Team(n_agents=2, radio=Radio(carries="map", range=0.0))
     state = started(Sight(radius=1), team)
     assert known(state, 0)[0] == "TT?????" and known(state, 0)[-1] == "???????"
 
@@ -146,7 +147,7 @@ def test_full_sensing_keeps_no_maps():
 
 
 def test_a_world_keeps_what_its_agents_know():
-    sight, team = Sight(radius=2, smoke=1.0, miss=0.1, false_alarm=0.01), Team(n_agents=2, messages="both")
+    sight, team = Sight(radius=2, smoke=1.0, miss=0.1, false_alarm=0.01), Team(n_agents=2, radio=Radio(carries="both"))
     world = small_world(sensing=sight, team=team)
     seeds, episodes = torch.arange(4), torch.zeros(4, dtype=torch.int64)
     state, alone = world.reset(seeds, episodes), world.reset(seeds[2:3], episodes[2:3])

@@ -5,6 +5,7 @@ import torch
 
 from tests.conftest import small_world
 from tests.world.drawing import CELLS, codes, draw
+from warp_torchrl.world.radio import Radio
 from warp_torchrl.world.saved import filled
 from warp_torchrl.world.sensing import Sight
 from warp_torchrl.world.state import Action
@@ -14,8 +15,8 @@ TWO_FIRES = "TTTTTTTTT TaTTTTTaT TTTTTTTTT"
 WEST, MIDDLE, EAST = (1, 1), (1, 4), (1, 7)
 
 
-def started(*at, sight, drawing=TWO_FIRES, worlds=1, messages="none"):
-    team = Team(n_agents=len(at), messages=messages)
+def started(*at, sight, drawing=TWO_FIRES, worlds=1, carries="none"):
+    team = Team(n_agents=len(at), radio=Radio(carries=carries))
     return sight.begun(draw(drawing, team=team, at=list(at), worlds=worlds), team), team
 
 
@@ -36,9 +37,9 @@ def later(state, team, *at, sight, drawing=None, running=True):
         ([MIDDLE, MIDDLE], [0.0, 0.0]),
     ],
 )
-@pytest.mark.parametrize("messages", ["none", "map"])  # who was told of it has no part
-def test_the_front_is_watched_by_those_who_saw_it_last(at, watches, messages):
-    state, _ = started(*at, sight=Sight(radius=1), messages=messages)
+@pytest.mark.parametrize("carries", ["none", "map"])  # who was told of it has no part
+def test_the_front_is_watched_by_those_who_saw_it_last(at, watches, carries):
+    state, _ = started(*at, sight=Sight(radius=1), carries=carries)
     assert state.watching.watches[0].tolist() == watches
     assert state.watching.finds[0].tolist() == watches
 
@@ -57,7 +58,7 @@ def test_what_was_seen_lately_is_watched_and_what_was_seen_once_is_known():
 
 def test_the_credit_passes_to_who_sees_it_again():
     sight = Sight(radius=1)
-    state, team = started(WEST, MIDDLE, sight=sight, messages="map")
+    state, team = started(WEST, MIDDLE, sight=sight, carries="map")
     state = later(state, team, MIDDLE, WEST, sight=sight)
     assert state.watching.watches[0].tolist() == [0.0, 0.5] and state.watching.finds[0].tolist() == [0.0, 0.0]
 
@@ -110,7 +111,7 @@ def test_worlds_that_have_ended_are_watched_no_more():
 
 
 def test_a_world_is_watched_alike_in_any_batch_and_worlds_saved_before_begin_to_count():
-    world = small_world(sensing=Sight(radius=2), team=Team(n_agents=2, messages="map"))
+    world = small_world(sensing=Sight(radius=2), team=Team(n_agents=2, radio=Radio(carries="map")))
     seeds, episodes = torch.arange(4), torch.zeros(4, dtype=torch.int64)
     state, alone = world.reset(seeds, episodes), world.reset(seeds[2:3], episodes[2:3])
     for step in range(9):

@@ -27,7 +27,7 @@ class NumpyStep(NamedTuple):
     terminated: np.ndarray  # bool [B]
     truncated: np.ndarray  # bool [B]
     info: dict[str, np.ndarray]  # float64 [B] each
-    radio: np.ndarray | None  # float32 [B, A, A, 3], ``world.radio.radio``; None where agents do not talk
+    radio: np.ndarray | None  # float32 [B, A, A, 3], ``Radio.observed``; None where agents do not talk
     layout: str
 
     def of_agent(self, world: int | slice, agent: int) -> np.ndarray | dict[str, np.ndarray]:

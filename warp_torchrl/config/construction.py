@@ -63,6 +63,13 @@ def component(target: object) -> type | None:
 def construct(kind: type, values: Mapping[str, Any], where: str) -> Any:
     """Make a dataclass from plain values, each checked against its field's type.
 
+    A field whose type is a dataclass is made from a mapping in the same way.
+
+    Args:
+        kind: The dataclass.
+        values: By field.
+        where: Its key, for messages; empty for what has none.
+
     Raises:
         ConfigError: With key, value and rule.
     """
@@ -80,7 +87,14 @@ def construct(kind: type, values: Mapping[str, Any], where: str) -> Any:
         if name not in values and each.default is MISSING and each.default_factory is MISSING:
             raise ConfigError(f"{prefix}{name} must be given")
     try:
-        return kind(**{key: fit(value, hints[key], key) for key, value in values.items()})
+        return kind(**{key: _made(value, hints[key], key, prefix) for key, value in values.items()})
     except ValueError as error:
         message = str(error)
         raise ConfigError(message if message.startswith(prefix) else f"{prefix}{message}") from None
+
+
+def _made(value: Any, hint: Any, key: str, prefix: str) -> Any:
+    """Return a field's value in the form of its type hint."""
+    if isinstance(hint, type) and is_dataclass(hint) and not is_dataclass(value):
+        return construct(hint, value, f"{prefix}{key}")
+    return fit(value, hint, key)

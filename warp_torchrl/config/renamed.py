@@ -8,6 +8,13 @@ log = logging.getLogger("warp_torchrl")
 
 RENAMED: dict[str, tuple[str, dict[str, str]]] = {
     "model.facing": ("model.symmetry", {"fire": "canonical", "north": "none"}),
+    "team.messages": ("team.radio.carries", {}),
+    "team.radio_range": ("team.radio.range", {}),
+    "team.radio_loss": ("team.radio.loss", {}),
+    "team.radio_line_of_sight": ("team.radio.line_of_sight", {}),
+    "team.separation": ("team.flight.separation", {}),
+    "team.battery": ("team.flight.battery", {}),
+    "team.drift": ("team.flight.drift", {}),
 }
 """The new name of each, and of values that have one."""
 
@@ -28,12 +35,21 @@ def renamed_overrides(overrides: Sequence[str]) -> list[str]:
 
 def renamed_values(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values of a configuration, as a run folder keeps them, with the names of now."""
-    now = dict(values)
-    for old, (new, changed) in RENAMED.items():
-        group, _, key = old.partition(".")
-        if isinstance(now.get(group), Mapping) and key in now[group]:
-            renamed = {key: new.partition(".")[2]}
-            now[group] = {renamed.get(name, name): value for name, value in now[group].items()}
-            value = now[group][renamed[key]]
-            now[group][renamed[key]] = changed.get(value, value)
+    return {name: _renamed(name, part) if isinstance(part, Mapping) else part for name, part in values.items()}
+
+
+def _renamed(group: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of a group with the names of now; an old name beside its new one stays, and is refused."""
+    now: dict[str, Any] = {}
+    for key, value in values.items():
+        new, changed = RENAMED.get(f"{group}.{key}", ("", {}))
+        part, _, name = new.removeprefix(f"{group}.").partition(".")
+        if not new or part in values:
+            now[key] = value
+            continue
+        value_now = changed.get(value, value) if isinstance(value, str) else value
+        if name:
+            now.setdefault(part, {})[name] = value_now
+        else:
+            now[part] = value_now
     return now

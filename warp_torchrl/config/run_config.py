@@ -296,10 +296,10 @@ def _chosen(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:
 
 def _check_together(config: Mapping[str, Any]) -> None:
     reward, algorithm = config["reward"], config["algorithm"]
-    model, team = config["model"]["messages"], config["team"]["messages"]
-    if model in ("graph", "both") and team not in ("graph", "both"):
+    model, radio = config["model"]["messages"], config["team"]["radio"]["carries"]
+    if model in ("graph", "both") and radio not in ("graph", "both"):
         raise ConfigError(
-            f"team.messages must be graph or both where networks talk, model.messages={model}, got {team}"
+            f"team.radio.carries must be graph or both where networks talk, model.messages={model}, got {radio}"
         )
     mixer, cooperation = algorithm.get("mixer", "none"), reward.get("cooperation", 1.0)
     if mixer != "none" and cooperation != 1.0:

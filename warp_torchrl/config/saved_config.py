@@ -12,6 +12,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from warp_torchrl.config.compose import OPTION, compose_config, conf_folder, option_of, plain, without_targets
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.config.renamed import renamed_overrides
 from warp_torchrl.config.run_config import COMPONENTS, ENVIRONMENT, WORLD_KEYS
 from warp_torchrl.dotted import dotted
 
@@ -24,7 +25,7 @@ _BEFORE = {
     "algorithm.logit_penalty": 0.0,
 }
 """What runs did whose record has none of a key yet."""
-_OF_NETWORKS = {"team.messages": ("graph", "both")}
+_OF_NETWORKS = {"team.radio.carries": ("graph", "both")}
 """Values of a scenario's keys that a policy's networks need: another scenario does not change them."""
 
 
@@ -65,6 +66,7 @@ def restore(record: SavedConfig, overrides: Sequence[str] = ()) -> DictConfig:
     Raises:
         ConfigError: If a choice or a value does not fit.
     """
+    overrides = renamed_overrides(overrides)
     for group, option in record.choices.items():
         if group not in (*COMPONENTS, "scenario") or not OPTION.fullmatch(str(option)):
             raise ConfigError(f"{group}={option!r} in the run folder is not one of our options")
@@ -121,7 +123,7 @@ def world_overrides(values: Mapping[str, Any]) -> list[str]:
 def _of_worlds(leaf: tuple[str, Any]) -> tuple[str, Any]:
     """Return a leaf as it is for the worlds: what networks send each other changes none."""
     path, value = leaf
-    return (path, {"graph": "none", "both": "map"}.get(value, value)) if path == "team.messages" else leaf
+    return (path, {"graph": "none", "both": "map"}.get(value, value)) if path == "team.radio.carries" else leaf
 
 
 def _composed_worlds(choices: Sequence[str]) -> dict[str, Any]:

@@ -22,7 +22,7 @@ METRICS = (
 WATCHING = ("watched", "found", "uncertainty")
 """Further ones where sight is limited, see ``world.sensing.Sight``."""
 FLYING = ("near_misses",)
-"""Further ones of teams whose aircraft keep apart, see ``Team.separation``."""
+"""Further ones of teams whose aircraft keep apart, see ``Flight.separation``."""
 SAVED_BY = "saved_"
 """Of agencies, before the name of each: ``saved_agency_0``."""
 SUCCESS_LEVEL = 0.6

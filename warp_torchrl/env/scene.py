@@ -13,7 +13,6 @@ from warp_torchrl.observation import Observation, central_state
 from warp_torchrl.reward import Collaborative, Efficiency, Reward, Time
 from warp_torchrl.world.fast.compile import compiled
 from warp_torchrl.world.fast.road import in_bytes, in_flags
-from warp_torchrl.world.radio import radio
 from warp_torchrl.world.state import ActionResult, Forecast, Transition, TreeCounts, WorldState
 from warp_torchrl.world.world import World
 
@@ -30,7 +29,7 @@ class Observations(NamedTuple):
     state: Tensor
     """The critic's, float32 [B, C, 16, 16]."""
     radio: Tensor | None = None
-    """Of ``world.radio.radio``, float32 [B, A, A, 3]; None where agents do not talk."""
+    """Of ``Radio.observed``, float32 [B, A, A, 3]; None where agents do not talk."""
 
 
 class Step(NamedTuple):
@@ -116,5 +115,7 @@ def _observe(
         world.action_mask(state),
         metrics(state, counts, world.horizon),
         central_state(state, world, forecast),
-        radio(state, world.team) if world.team.sends_vectors else None,
+        world.team.radio.observed(state, world.team.table(state.cells.device).flies)
+        if world.team.radio.sends_vectors
+        else None,
     )

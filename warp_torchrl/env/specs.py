@@ -26,7 +26,7 @@ class Specs(NamedTuple):
 def episode_metrics(world: World) -> tuple[str, ...]:
     """Return the entries of ``info`` of a world: ``EPISODE_METRICS``, then those that only worlds like it have."""
     watching = WATCHING if world.sensing.is_limited else ()
-    flying = () if world.team.separation is None else FLYING
+    flying = () if world.team.flight.separation is None else FLYING
     return (*EPISODE_METRICS, *watching, *flying, *(SAVED_BY + name for name in world.agencies.names))
 
 
@@ -48,7 +48,7 @@ def make_specs(world: World, observation: Observation, n_worlds: int, device: to
         action_mask=Binary(n_actions, shape=(*team, n_actions), dtype=torch.bool, device=device),
         role=Categorical(len(world.team.role_names), shape=team, dtype=torch.int64, device=device),
     )
-    if world.team.sends_vectors:
+    if world.team.radio.sends_vectors:
         reach = float(max(world.size))
         seen["agents", "radio"] = Bounded(-reach, reach, shape=(*team, world.team.n_agents, 3), device=device)
     if agencies := len(world.agencies.names):

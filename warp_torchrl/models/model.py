@@ -69,7 +69,7 @@ class Mlp:
         memory: Units of the recurrent layer by which actors remember what they saw since their episode began, see
             ``RecurrentNetwork``, a multiple of 8; 0, they act on what they see now. On-policy algorithms learn it.
         messages: ``graph``, actors tell each other what helps, see ``TalkingNetwork``: those that hear each other by
-            ``team.radio_range``. On-policy algorithms learn it. ``map``, they tell what they know of the fire, which
+            ``team.radio.range``. On-policy algorithms learn it. ``map``, they tell what they know of the fire, which
             the world does for them; ``both``, or ``none``.
         message_size: Numbers of a message, a multiple of 8.
         message_rounds: Messages that each agent sends in a step, each after hearing those before.

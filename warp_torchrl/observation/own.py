@@ -40,7 +40,7 @@ def own_entries(world: World, identity: bool = False) -> Vector:
     team = world.team
     roles = tuple(f"role_{role}" for role in team.role_names[len(PAPER_ROLES) :])
     actions = tuple(f"{LAST}{action}" for action in team.further_actions)
-    battery = () if team.battery is None else ("battery",)
+    battery = () if team.flight.battery is None else ("battery",)
     further = [Part("scalar", names) for names in (roles, actions, battery, world.agencies.names) if names]
     return Vector((*SELF.parts, *([IDENTITY] if identity else []), *further))
 
@@ -71,8 +71,8 @@ def own_vector(state: WorldState, world: World, shows_identity: bool = False) ->
         parts.append(identity(shape[1], row.device).expand(*shape, -1))
     if team.role_names != PAPER_ROLES or team.further_actions:
         parts += [roles[..., len(PAPER_ROLES) :], last[..., len(Action) :]]
-    if team.battery is not None and vehicles.battery is not None:
-        parts.append((vehicles.battery / team.battery)[..., None])
+    if team.flight.battery is not None and vehicles.battery is not None:
+        parts.append((vehicles.battery / team.flight.battery)[..., None])
     if vehicles.serves is not None:
         parts.append(one_hot(vehicles.serves, len(world.agencies.names)))
     return torch.cat(parts, dim=-1)

@@ -13,7 +13,6 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.radio import heard
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.state import FIRST_FIRE, Watching, WorldState, is_burning, is_tree
@@ -133,7 +132,7 @@ class Sight(Sensing):
 
     def knows_where(self, state: WorldState, team: Team) -> Tensor:
         """Return of which others each agent knows where they are, bool [B, A, A]: those that it hears or sees."""
-        return heard(state, team) | others_in_sight(state, self.reach(team))
+        return _heard(state, team) | others_in_sight(state, self.reach(team))
 
     def begun(self, state: WorldState, team: Team) -> WorldState:
         """Return the worlds with what the agents see where they start."""
@@ -149,8 +148,8 @@ class Sight(Sensing):
         record = ((state.step + 1)[:, None, None, None] * _KINDS + self._taken_for(state)).to(torch.int32)
         sees, watching = self._sees(state, team), _watching(state)
         knows, itself = torch.where(sees, record, known), watching.itself | sees
-        if team.sends_maps:
-            told = torch.where(heard(state, team)[..., None, None], knows[:, None], 0).amax(dim=2)
+        if team.radio.sends_maps:
+            told = torch.where(_heard(state, team)[..., None, None], knows[:, None], 0).amax(dim=2)
             itself = itself & (told <= knows)
             knows = torch.maximum(knows, told)
         goes_on = running[:, None, None, None]
@@ -193,6 +192,11 @@ def in_reach(state: WorldState, reach: list[int]) -> Tensor:
     on_row = (torch.arange(height, device=row.device) - row[..., None]).abs() <= far
     on_column = (torch.arange(width, device=row.device) - column[..., None]).abs() <= far
     return on_row[..., :, None] & on_column[..., None, :]
+
+
+def _heard(state: WorldState, team: Team) -> Tensor:
+    """Return which agents hear which, bool [B, A, A]."""
+    return team.radio.heard(state, team.table(state.cells.device).flies)
 
 
 def others_in_sight(state: WorldState, reach: list[int]) -> Tensor:

@@ -1,7 +1,7 @@
 """The vehicles: where they start, and how a step makes one of what each of them does."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, reduce
 from operator import add, or_
 from typing import Literal, NamedTuple
@@ -11,7 +11,8 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.abilities import ABILITIES, PAPER_ABILITIES, Ability, Deed, Situation, neighbourhood
-from warp_torchrl.world.flight import batteries, carried, grounded, near_misses
+from warp_torchrl.world.flight import Flight, grounded
+from warp_torchrl.world.radio import Radio
 from warp_torchrl.world.role import ROLES, RoleTable, role_names, role_table
 from warp_torchrl.world.start import starting_cells
 from warp_torchrl.world.state import Action, ActionResult, Cover, Vehicles, WorldState
@@ -55,18 +56,8 @@ class Team:
         extinguish_p: Chance that putting a fire out succeeds.
         tank: Extinguish acts that a vehicle carries water for; None is unlimited, 0 none at all. It fills up beside a
             lake and at the corner where the team started.
-        messages: What the radio carries each step: ``map``, what agents know of the fire, to those that hear them;
-            ``graph``, the messages of networks (``model.messages``, which sets it), for which agents are shown whom
-            they hear and where those are; ``both``, or ``none``.
-        radio_range: How far agents hear each other, by Euclidean distance [cells]; None is everywhere, 0 not at all.
-        radio_loss: Chance that a packet is lost, drawn for each pair of agents and step.
-        radio_line_of_sight: Whether hills between two antennas keep them from hearing each other.
-        separation: Aircraft that end a step nearer to each other than this, by Euclidean distance [cells], have a near
-            miss each; None counts none. Swarms that watch wildfires, as those of Ali, Ali and Baig (2023), must keep
-            apart.
-        battery: Steps of flight of an aircraft, hovering too, charged at the corner where the team started; with an
-            empty battery it stays where it is. None is unlimited.
-        drift: Chance a step for each m/s of the wind at its cell that an aircraft is carried one cell downwind [s/m].
+        radio: What agents tell each other, and who hears whom.
+        flight: What binds its aircraft.
         start: ``corner`` starts the team in a corner drawn for each episode, ``anywhere`` on cells drawn over the map.
 
     Raises:
@@ -78,42 +69,17 @@ class Team:
     allow_stay: bool = True
     extinguish_p: float = 1.0
     tank: int | None = None
-    messages: Literal["none", "map", "graph", "both"] = "none"
-    radio_range: float | None = None
-    radio_loss: float = 0.0
-    radio_line_of_sight: bool = False
-    separation: float | None = None
-    battery: int | None = None
-    drift: float = 0.0
+    radio: Radio = field(default_factory=Radio)
+    flight: Flight = field(default_factory=Flight)
     start: Literal["corner", "anywhere"] = "corner"
 
     def __post_init__(self) -> None:
-        check_fields(
-            self,
-            n_agents=(1, 256),
-            extinguish_p=(0.0, 1.0),
-            tank=(0, 10_000),
-            radio_range=(0.0, 1e6),
-            radio_loss=(0.0, 1.0),
-            separation=(0.0, 1e6),
-            battery=(1, 1_000_000),
-            drift=(0.0, 1.0),
-        )
+        check_fields(self, n_agents=(1, 256), extinguish_p=(0.0, 1.0), tank=(0, 10_000))
         if not self.roles or any(role not in ROLES for role in self.roles):
             raise ValueError(f"roles must be a list of {', '.join(ROLES)}, got {list(self.roles)}")
         unknown = {name for role in self.roles for name in ROLES[role].abilities} - ABILITIES.keys()
         if unknown:
             raise ValueError(f"abilities of a role must be of {', '.join(ABILITIES)}, got {', '.join(sorted(unknown))}")
-
-    @property
-    def sends_maps(self) -> bool:
-        """Return whether agents tell each other what they know of the fire."""
-        return self.messages in ("map", "both")
-
-    @property
-    def sends_vectors(self) -> bool:
-        """Return whether agents' networks send messages to each other."""
-        return self.messages in ("graph", "both")
 
     @property
     def n_actions(self) -> int:
@@ -177,6 +143,7 @@ class Team:
         """Return the team at the start of an episode; see ``starting_cells``."""
         base, position = starting_cells(key, cover, burning, self.n_agents, self.start)
         counter = torch.zeros(position.shape[:2], dtype=torch.int32, device=cover.device)
+        battery = self.flight.battery
         return Vehicles(
             position=position,
             tank=torch.full_like(counter, -1 if self.tank is None else self.tank),
@@ -185,8 +152,8 @@ class Team:
             acts=counter,
             redundant=counter.clone(),
             last_useful=torch.full_like(counter, -1),
-            near_misses=None if self.separation is None else counter.clone(),
-            battery=None if self.battery is None else torch.full_like(counter, self.battery),
+            near_misses=None if self.flight.separation is None else counter.clone(),
+            battery=None if battery is None else torch.full_like(counter, battery),
         )
 
     def open_moves(self, state: WorldState) -> Tensor:
@@ -255,8 +222,8 @@ class Team:
                 acts=vehicles.acts + reduce(or_, chosen),
                 redundant=vehicles.redundant + redundant,
                 last_useful=torch.where(credited, state.step[:, None], vehicles.last_useful),
-                near_misses=near_misses(vehicles, flies, self.separation, running),
-                battery=batteries(vehicles, flies, self.battery, running),
+                near_misses=self.flight.near_misses(vehicles, flies, running),
+                battery=self.flight.batteries(vehicles, flies, running),
             )
         )
         return after, ActionResult(action=action, moved=moved, credited=credited, redundant=redundant, target=target)
@@ -266,7 +233,7 @@ class Team:
 
     def _mask(self, skill: Skill, now: Situation) -> Tensor:
         mask = skill.ability.mask(now)
-        if skill.ability.moves and self.battery is not None:
+        if skill.ability.moves and self.flight.battery is not None:
             mask = mask & ~grounded(now.state.vehicles, now.roles.flies)[..., None]
         return mask if skill.of_all else mask & now.roles.can[skill.name][:, None]
 
@@ -276,17 +243,13 @@ class Team:
         for skill in self.skills:
             if skill.ability.moves:
                 possible, deed = skill.act(now, action)
-                if self.battery is not None:
+                if self.flight.battery is not None:
                     possible = possible & ~grounded(state.vehicles, now.roles.flies)
                 moved.append(skill.is_chosen(action) & running & possible)
                 if deed.step is not None:
                     position = position + deed.step * moved[-1][..., None]
         state = state.replace(vehicles=state.vehicles.replace(position=position))
-        if self.drift > 0.0:
-            flying = running & now.roles.flies & ~grounded(state.vehicles, now.roles.flies)
-            position = position + carried(state, flying, self.drift)
-            state = state.replace(vehicles=state.vehicles.replace(position=position))
-        return state, reduce(or_, moved)
+        return self.flight.drifted(state, now.roles.flies, running), reduce(or_, moved)
 
     def _refill(self, state: WorldState, tank: Tensor) -> Tensor:
         """Fill the tanks of vehicles beside a lake or at the base."""

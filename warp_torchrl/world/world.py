@@ -81,9 +81,10 @@ class World:
             raise ValueError(
                 f"team.n_agents must be at most a quarter of the map's {height * width} cells, got {self.team.n_agents}"
             )
-        if self.team.sends_maps and not self.sensing.is_limited:
+        if self.team.radio.sends_maps and not self.sensing.is_limited:
             raise ValueError(
-                f"team.messages must be none or graph where agents see all (sensing=full), got {self.team.messages}"
+                "team.radio.carries must be none or graph where agents see all (sensing=full), "
+                f"got {self.team.radio.carries}"
             )
         self.agencies.check(self.team)
         _ = self.lighting  # refuses an ignition that does not fit the landscape

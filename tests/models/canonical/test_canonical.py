@@ -48,6 +48,7 @@ from warp_torchrl.policy import TrainedPolicy
 from warp_torchrl.symmetry import Part, Planes, Target, Vector
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.geometry import DIRECTIONS
+from warp_torchrl.world.radio import Radio
 from warp_torchrl.world.state import Action
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
@@ -68,7 +69,7 @@ ACTIONS = tuple(action.name.lower() for action in Action)
 
 def fighting(observation, n_worlds=6, steps=12, messages="none"):
     """Worlds of a windy, flat map that burn, with a team among the trees."""
-    team = Team(n_agents=3, roles=("ugv", "ugv", "uav"), start="anywhere", messages=messages)
+    team = Team(n_agents=3, roles=("ugv", "ugv", "uav"), start="anywhere", radio=Radio(carries=messages))
     world = small_world(
         landscape=Perlin(size=SIZE), wind=Uniform(speed=7.0, direction=35.0), team=team, horizon=60, steps_per_tick=3
     )
