@@ -23,6 +23,7 @@ AT_LENGTH = [
     ["fire=paper", "observation=paper", "team.allow_stay=false", "team.extinguish_p=0.5", "reward=paper"],
     ["fire=spread", "landscape.size=[9,16]", "observation.centred=false", "fire.neighbours=4", "reward=collaborative"],
     ["fire=lattice", "team=retardant", "ignition=square", "wind=calm", "team.tank=3", "observation=at_fire"],
+    ["agencies=several", "agencies.own=0", "agencies.lending=need", "agencies.term=3", "reward=agency"],
 ]
 
 
