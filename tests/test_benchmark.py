@@ -225,6 +225,7 @@ def test_only_sure_differences_disagree():
     assert disagreements(saved, saved) == []
 
 
+@pytest.mark.slow
 def test_fires_of_every_law_are_timed(capsys):
     main(["fires", "--fires", "2", "--json"])
     rows = json.loads(capsys.readouterr().out)["fires"]

@@ -90,7 +90,8 @@ def test_every_page_is_in_the_navigation():
     assert sorted(re.findall(r": (\S+\.md)", navigation)) == sorted(page.name for page in DOCS.glob("*.md"))
 
 
-def test_the_site_builds_without_warnings(tmp_path):
+@pytest.mark.slow
+def test_the_site_builds_without_warnings(tmp_path):  # .ci/run builds it too
     pytest.importorskip("material", reason="the site needs the extra docs")
     pytest.importorskip("mkdocstrings", reason="the site needs the extra docs")
     done = run("-m", "mkdocs", "build", "--strict", "-f", str(SITE), "-d", str(tmp_path / "site"), folder=tmp_path)
@@ -188,6 +189,7 @@ def test_an_extension_is_one_module_one_yaml_and_one_test(extended):
     assert [Path(path).parts[0] for path in files] == ["warp_torchrl", "conf", "tests"] * 7
 
 
+@pytest.mark.slow
 def test_the_extensions_keep_to_their_own_tests_and_the_configuration_s(extended):
     copy, files = extended
     tests = [path for path in files if path.startswith("tests/")]

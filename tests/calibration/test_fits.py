@@ -18,7 +18,10 @@ NAMES = ["rate_gain", "wind_gain"]
 
 @pytest.mark.parametrize(
     "method",
-    [Gradients(prior_weight=1e-4, softness=0.1, steps=4), Evolution(generations=10, prior_weight=1e-4)],
+    [
+        pytest.param(Gradients(prior_weight=1e-4, softness=0.1, steps=4), marks=pytest.mark.slow),
+        Evolution(generations=10, prior_weight=1e-4),
+    ],
     ids=["g", "e"],
 )
 def test_known_parameters_are_found_again(method):

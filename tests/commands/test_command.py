@@ -535,6 +535,7 @@ def test_a_loaded_policy_plays(trained):
     assert rollout["agents", "action"].shape == (2, 4, 2)
 
 
+@pytest.mark.slow
 def test_the_experiment_of_all_algorithms_is_a_sweep(tmp_path, run_here):
     arguments = (
         *TINY,

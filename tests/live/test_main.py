@@ -67,13 +67,23 @@ def test_help_names_the_keys(capsys):
 def test_it_prints_its_address_serves_and_ends_cleanly(number):
     pytest.importorskip("viser", reason="needs the extra live")
     command = [sys.executable, "-m", "warp_torchrl.live", "policy=noop", "port=0", "landscape.size=12"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ) as live:
-        line = live.stdout.readline()
-        url = line.split()[0]
-        assert url.startswith("http://127.0.0.1:") and line.endswith("shows noop; Ctrl-C ends it\n")
-        with urlopen(url, timeout=20) as page:
-            assert page.status == 200 and b"<html" in page.read().lower()
-        time.sleep(0.2)
-        live.send_signal(number)
-        out, err = live.communicate(timeout=30)
+    with subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background jobs ignore it
+    ) as live:
+        try:
+            line = live.stdout.readline()
+            url = line.split()[0]
+            assert url.startswith("http://127.0.0.1:") and line.endswith("shows noop; Ctrl-C ends it\n")
+            with urlopen(url, timeout=20) as page:
+                assert page.status == 200 and b"<html" in page.read().lower()
+            time.sleep(0.2)
+            live.send_signal(number)
+            out, err = live.communicate(timeout=30)
+        finally:
+            live.kill()
     assert live.returncode == 0 and out.strip() == "stopped" and err == ""

@@ -133,6 +133,7 @@ FAST = {
     ("climbs", 1),
     ("regrets", 3),
     ("talks", 3),
+    ("serves", 3),
     ("grows", 1),
     ("grows", 3),
     ("mappo", LAST),

@@ -23,7 +23,10 @@ def learned(folder, *overrides):
     return rows, [each.detach().clone() for each in run.learner.loss.parameters()], run
 
 
-@pytest.mark.parametrize("overrides", [[], ["algorithm=a2c"], ["algorithm.minibatch_size=100"]], ids=" ".join)
+MORE = [["algorithm=a2c"], ["algorithm.minibatch_size=100"]]
+
+
+@pytest.mark.parametrize("overrides", [[], *(pytest.param(each, marks=pytest.mark.slow) for each in MORE)], ids=str)
 def test_recorded_updates_learn_the_same(tmp_path, overrides):
     rows, weights, _ = learned(tmp_path, "collector.grows_at=0", *overrides)
     recorded_rows, recorded, run = learned(tmp_path, "graph=true", *overrides)

@@ -72,6 +72,7 @@ def test_a_fire_on_uniform_ground_is_the_told_ellipse(ratio: float, bearing: int
         assert abs((lean + 90.0) % 180.0 - 90.0) < 3.0
 
 
+@pytest.mark.slow
 def test_a_slope_makes_an_ellipse_without_wind() -> None:
     size, fire = 61, law()
     ground = forest(size).replace(elevation=torch.arange(size).flip(0)[None, :, None].expand(1, size, size) * 15.0)

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from warp_torchrl.world.ignition import _largest
-from warp_torchrl.world.start import _distances, first_free, nearest_free
+from warp_torchrl.world.start import distances_to, first_free, nearest_free
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
@@ -16,7 +16,7 @@ def test_a_small_square_tells_what_the_map_does(size: tuple[int, int], agents: i
     taken[:, :, width // 2] = False  # enough are free somewhere
     corner = (torch.rand(50, 2, generator=generator) < 0.5).long()
     base = corner * torch.tensor([height - 1, width - 1])
-    whole = first_free(_distances(base, height, width), taken, agents)
+    whole = first_free(distances_to(base, height, width), taken, agents)
     assert torch.equal(nearest_free(taken, base, agents), whole)
     assert not taken.flatten(1).gather(1, whole[..., 0] * width + whole[..., 1]).any()
 
