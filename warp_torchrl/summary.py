@@ -5,6 +5,7 @@ A sweep writes both at its end; ``python -m warp_torchrl.summary FOLDER ...`` ma
 
 import argparse
 import json
+import math
 import signal
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -158,8 +159,10 @@ def draw(entries: Sequence[Entry], path: Path) -> None:
     policies = list(dict.fromkeys(entry.policy for group in groups for entry in group))
     styles = {policy: line_style(index) for index, policy in enumerate(policies)}
     with rc_context({"font.size": 8.0, "axes.spines.top": False, "axes.spines.right": False}):
-        rows = [max(1.2, 0.3 * len(group) + 0.6) for group in groups]
-        figure = Figure(figsize=(8.0, sum(rows) + 0.6), dpi=140, layout="constrained")
+        rows = [max(1.2, _bar_height(group) * len(group) + 0.6) for group in groups]
+        columns = min(4, max(1, int(_LEGEND_WIDTH / max(len(policy) + 8 for policy in policies))))
+        legend = 0.17 * math.ceil(len(policies) / columns)
+        figure = Figure(figsize=(8.0, sum(rows) + legend + 0.2), dpi=140, layout="constrained")
         axes = figure.subplots(len(groups), 2, squeeze=False, height_ratios=rows)
         for (bars, profile), group in zip(axes, groups, strict=True):
             _draw_bars(bars, group, styles)
@@ -170,12 +173,21 @@ def draw(entries: Sequence[Entry], path: Path) -> None:
         axes[-1, 0].set_xlabel("forest saved: mean, 95 % interval, %")
         axes[-1, 1].set_xlabel("forest saved on so many fires, at least, %")
         handles = {h.get_label(): h for row in axes for h in row[1].get_lines()}
-        figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=4, frameon=False)
+        figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=columns, frameon=False)
         figure.savefig(path, metadata={"Software": None})
 
 
-_LABEL_WIDTH = 32  # characters in a line
+_LABEL_WIDTH, _LEGEND_WIDTH = 32, 130  # characters in a line
 _ROOM_BESIDE = 87.0  # longer bars have their number inside
+
+
+def _bar_height(group: Sequence[Entry]) -> float:
+    """Return the height of a bar that leaves room for the longest label [inches]."""
+    return max(0.3, 0.05 + 0.14 * max(_label(entry).count("\n") + 1 for entry in group))
+
+
+def _label(entry: Entry) -> str:
+    return fill(entry.policy, _LABEL_WIDTH, break_long_words=False)
 
 
 def _draw_bars(axes: Any, group: Sequence[Entry], styles: Mapping[str, Mapping[str, Any]]) -> None:
@@ -186,7 +198,7 @@ def _draw_bars(axes: Any, group: Sequence[Entry], styles: Mapping[str, Mapping[s
         axes.errorbar(mean, row, xerr=[[mean - low], [high - mean]], color="#222222", capsize=2.5, linewidth=1.0)
         place, side = (high + 1.5, "left") if high < _ROOM_BESIDE else (low - 1.5, "right")
         axes.text(place, row, f"{mean:.1f}", va="center", ha=side, fontsize=7.0)
-    labels = [fill(entry.policy, _LABEL_WIDTH, break_long_words=False) for entry in reversed(group)]
+    labels = [_label(entry) for entry in reversed(group)]
     axes.set(yticks=range(len(group)), yticklabels=labels, xlim=(0, 100))
     axes.set_title(group[0].scenario, fontsize=8.0, loc="left")
 
