@@ -7,6 +7,7 @@ import importlib
 import re
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass
+from inspect import isabstract
 from typing import Any, get_type_hints
 
 from warp_torchrl.nearest import did_you_mean
@@ -95,6 +96,6 @@ def construct(kind: type, values: Mapping[str, Any], where: str) -> Any:
 
 def _made(value: Any, hint: Any, key: str, prefix: str) -> Any:
     """Return a field's value in the form of its type hint."""
-    if isinstance(hint, type) and is_dataclass(hint) and not is_dataclass(value):
+    if isinstance(hint, type) and is_dataclass(hint) and not isabstract(hint) and not is_dataclass(value):
         return construct(hint, value, f"{prefix}{key}")
     return fit(value, hint, key)
