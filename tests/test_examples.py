@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 EXAMPLES = Path(__file__).parent.parent / "docs" / "examples"
-QUICK = {"pettingzoo_round_trip", "frame_stack_torchrl", "frame_stack_supersuit", "sb3_dqn", "training_loop"}
+QUICK = {"pettingzoo_round_trip", "frame_stack_torchrl", "training_loop"}
 CASES = {  # packages that it needs, steps, what it prints
     "training_loop": ((), 768, r"768 steps, \d+\.\d% of the trees saved"),
     "supersuit_sb3_ppo": (("supersuit", "stable_baselines3"), 1024, r"1024 agent steps, \d+\.\d% of the trees saved"),

@@ -176,6 +176,7 @@ def test_agents_with_empty_tanks_go_for_water(name):
     assert (env.world_state.vehicles.tank == 2).all()
 
 
+@pytest.mark.slow
 def test_baselines_rank_on_skirmish():
     """16 fires: standard errors of the means are 1 to 5 points, the gaps 10 and more but for two of seven."""
     env = make_env("skirmish", n_worlds=16)

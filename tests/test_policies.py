@@ -67,7 +67,7 @@ def test_it_is_trained_by_the_experiment_of_its_name(scenario):
     assert {"reward", "observation", "imitation", "algorithm", "model", "total_frames"} <= set(record.values)
 
 
-@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("scenario", [pytest.param("default", marks=pytest.mark.slow), *SCENARIOS[1:]])
 def test_it_saves_far_more_than_local(scenario):
     """On 12 fires the difference's standard error is below 6 points; its expectation is 27 and more."""
     policy, found = load_policy(SHIPPED / scenario), newest(SHIPPED / scenario)[0]

@@ -117,6 +117,7 @@ def test_a_folder_that_cannot_be_written_is_told(people, capsys):
     assert capsys.readouterr().err == f"error: {people}/nowhere/.all.npz.tmp: No such file or directory\n"
 
 
+@pytest.mark.slow
 def test_it_is_a_program(people):
     command = [sys.executable, "-m", "warp_torchrl.demonstrations", str(people)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)

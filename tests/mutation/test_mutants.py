@@ -69,6 +69,7 @@ def test_only_what_passes_its_tests_has_survived():
     assert Run(None, 60.0, "").verdict == TOO_LONG
 
 
+@pytest.mark.slow
 def test_a_fault_is_killed_by_a_test_that_sees_it_and_leaves_no_trace(tmp_path):
     sound = "def double(number):\n    return number * 2\n"
     fault = Mutant("double.py", 2, "return number * 2", "return number + 2", sound.replace("*", "+"))
