@@ -5,7 +5,7 @@ import torch
 from tests.conftest import small_world
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.world.agencies import Several
+from warp_torchrl.world.agencies import SeveralAgencies
 from warp_torchrl.world.state import Action
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
@@ -18,7 +18,7 @@ def played(**options):
 
 
 def test_who_serves_a_land_without_fire_waits_and_the_others_go():
-    env, now = played(agencies=Several())
+    env, now = played(agencies=SeveralAgencies())
     state = env.world_state
     of_first = state.lands.owner == 0
     # A fire in each world, on the first land alone, away from all vehicles.

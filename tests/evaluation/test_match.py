@@ -13,7 +13,7 @@ from warp_torchrl.evaluation.play import WithoutAgent, play
 from warp_torchrl.heuristics import HEURISTICS, Greedy
 from warp_torchrl.models import Mlp, signature
 from warp_torchrl.observation import Paper, Surroundings
-from warp_torchrl.world.agencies import Several
+from warp_torchrl.world.agencies import SeveralAgencies
 from warp_torchrl.world.team import Team
 
 
@@ -54,7 +54,7 @@ def test_a_trained_policy_plays_as_step_by_step(mode, observation, lamed, monkey
 
 
 def test_agencies_play_as_step_by_step(monkeypatch):
-    several = Several(own=1, lending="need", term=2)
+    several = SeveralAgencies(own=1, lending="need", term=2)
     env = WildfireEnv(small_world(team=Team(n_agents=4), agencies=several), n_worlds=9)
     policy = trained(env, sharing="agency", symmetry="none")
     assert fits(env, policy)

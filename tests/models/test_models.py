@@ -22,7 +22,7 @@ from warp_torchrl.models import (
 from warp_torchrl.models.networks import LinearEncoder
 from warp_torchrl.observation import Local, Paper, Surroundings
 from warp_torchrl.policy import TrainedPolicy
-from warp_torchrl.world.agencies import Several
+from warp_torchrl.world.agencies import SeveralAgencies
 from warp_torchrl.world.team import Team
 
 
@@ -150,7 +150,7 @@ def test_networks_are_chosen_by_the_role_whatever_the_team(make_small_env):
 
 
 def test_networks_are_chosen_by_the_agency_that_a_vehicle_serves(make_small_env):
-    several = small_world(team=Team(n_agents=4), agencies=Several(own=1, lending="need"))
+    several = small_world(team=Team(n_agents=4), agencies=SeveralAgencies(own=1, lending="need"))
     env = make_small_env(3, several)
     actor, now = Mlp(sharing="agency", symmetry="none").actor(signature(env)), env.reset()
     assert now[AGENCY].tolist() == [[0, 1, 0, 1]] * 3
@@ -166,7 +166,7 @@ def test_networks_are_chosen_by_the_agency_that_a_vehicle_serves(make_small_env)
 
 
 def test_networks_of_agencies_learn_from_their_own_vehicles_alone(make_small_env):
-    env = make_small_env(3, small_world(team=Team(n_agents=4), agencies=Several()))
+    env = make_small_env(3, small_world(team=Team(n_agents=4), agencies=SeveralAgencies()))
     model = Mlp(sharing="agency", actor_hidden=(16,), critic_hidden=(16,))
     learner = Ppo(minibatch_size=12).build(env, model, 12)
     with torch.no_grad():
@@ -185,7 +185,7 @@ def test_a_network_for_each_agency_needs_agencies_and_as_many_as_it_was_trained_
         Mlp(sharing="agency").actor(signature(make_small_env(1)))
 
     def of(count):
-        return make_small_env(1, small_world(team=Team(n_agents=4), agencies=Several(count=count)))
+        return make_small_env(1, small_world(team=Team(n_agents=4), agencies=SeveralAgencies(count=count)))
 
     policy = TrainedPolicy(Ppo().policy(signature(of(2)), Mlp(sharing="agency")), "sampled", signature(of(2)))
     assert policy.fitted(of(2)).module is policy.module

@@ -6,7 +6,7 @@ import torch
 from tests.conftest import small_world
 from warp_torchrl.observation import Local, Surroundings, central_state, state_names, state_symmetry
 from warp_torchrl.observation.channels import DEFAULT, OWN_LAND
-from warp_torchrl.world.agencies import Several
+from warp_torchrl.world.agencies import SeveralAgencies
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
 
@@ -14,7 +14,9 @@ CHANNELS = (*DEFAULT, OWN_LAND)
 
 
 def worlds(size=16, **options):
-    world = small_world(landscape=Perlin(size=size, relief=0.0), team=Team(n_agents=4), agencies=Several(**options))
+    world = small_world(
+        landscape=Perlin(size=size, relief=0.0), team=Team(n_agents=4), agencies=SeveralAgencies(**options)
+    )
     return world, world.reset(torch.arange(4), torch.zeros(4, dtype=torch.int64))
 
 

@@ -12,7 +12,7 @@ from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.run_config import run_config
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.reward import Agency
-from warp_torchrl.world.agencies import Several, by_land
+from warp_torchrl.world.agencies import SeveralAgencies, by_land
 from warp_torchrl.world.state import Lands
 
 from .drawing import CLEAR, EXTINGUISH, FIELD, STAY, drawn, earned
@@ -26,7 +26,7 @@ def parted(positions, serves):
     owner = torch.tensor([0, 0, 1, 1], dtype=torch.uint8).expand(1, 4, 4).contiguous()
     lands = Lands(owner=owner, worth=by_land(state.initial.float(), owner, 2))
     state = state.replace(lands=lands, vehicles=state.vehicles.replace(serves=torch.tensor([serves])))
-    return state, replace(world, agencies=Several())
+    return state, replace(world, agencies=SeveralAgencies())
 
 
 def test_each_earns_for_the_land_that_it_serves():
@@ -63,7 +63,7 @@ def test_whoever_serves_an_agency_earns_what_it_earns():
 
 def test_a_step_is_paid_by_whom_a_vehicle_served_in_it():
     state, world = parted([[3, 2], [3, 3]], [1, 1])
-    world = replace(world, agencies=Several(own=0, lending="need", term=1))
+    world = replace(world, agencies=SeveralAgencies(own=0, lending="need", term=1))
     transition = world.step(state, torch.tensor([[STAY, CLEAR]]))
     assert transition.after.vehicles.serves.tolist() == [[0, 0]], "fire burns on the land of agency 0 alone"
     assert PLAIN(transition)[0, :, 0].tolist() == pytest.approx([-1.5 / 8, -1.5 / 8])

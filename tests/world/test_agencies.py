@@ -9,7 +9,7 @@ import torch
 from tests.conftest import small_world
 from warp_torchrl import make_env
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.world.agencies import OneAgency, Several, apportioned, by_land, own_land, standing, worth_of
+from warp_torchrl.world.agencies import OneAgency, SeveralAgencies, apportioned, by_land, own_land, standing, worth_of
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import Action, Cover, Lands, is_burning
 from warp_torchrl.world.team import Team
@@ -19,7 +19,7 @@ from .drawing import draw
 
 
 def begun(n_agents=4, seeds=8, **options):
-    world = small_world(team=Team(n_agents=n_agents), agencies=Several(**options))
+    world = small_world(team=Team(n_agents=n_agents), agencies=SeveralAgencies(**options))
     seed = torch.arange(seeds)
     return world, world.reset(seed, torch.zeros_like(seed))
 
@@ -69,7 +69,7 @@ def test_vehicles_start_on_dry_land_of_those_they_serve_and_no_two_on_one_cell()
 
 
 def test_a_vehicle_stands_at_home_in_the_middle_of_its_agency_s_land():
-    world = small_world(landscape=Perlin(size=17, levels=(0.0, 0.0, 0.0)), agencies=Several())
+    world = small_world(landscape=Perlin(size=17, levels=(0.0, 0.0, 0.0)), agencies=SeveralAgencies())
     state = world.reset(torch.arange(16), torch.zeros(16, dtype=torch.int64))
     angle = 2.0 * math.pi * (uniform(state.key, 0, Stream.LANDS, (1,)) + torch.tensor([0.0, 0.5]))
     home = torch.stack((8 + 0.35 * 17 * angle.sin(), 8 + 0.35 * 17 * angle.cos()), dim=-1).round().long()
@@ -118,7 +118,7 @@ def test_vehicles_are_apportioned_by_d_hondt(need, expected):
 
 
 def test_the_pool_is_lent_by_need_when_a_term_is_over():
-    agencies = Several(own=1, lending="need", term=4)
+    agencies = SeveralAgencies(own=1, lending="need", term=4)
     state = parted("a.T.b ..T.c", "00011 00011", [0, 1, 0, 1])
     running = torch.tensor([True])
 
@@ -137,7 +137,7 @@ def test_the_pool_is_lent_by_need_when_a_term_is_over():
 
 
 def test_a_world_lends_as_it_steps():
-    world = small_world(team=Team(n_agents=3), agencies=Several(own=0, lending="need", term=2))
+    world = small_world(team=Team(n_agents=3), agencies=SeveralAgencies(own=0, lending="need", term=2))
     state = world.reset(torch.arange(16), torch.zeros(16, dtype=torch.int64))
     for _ in range(2):
         state = world.step(state, torch.full((16, 3), int(Action.STAY))).after
@@ -148,8 +148,8 @@ def test_a_world_lends_as_it_steps():
 
 
 def test_groups_are_the_agencies_and_the_pool():
-    assert Several().groups(Team(n_agents=5)) == {"agency_0": [0, 1], "agency_1": [2, 3], "pool": [4]}
-    assert Several(count=3, own=0).groups(Team(n_agents=2)) == {"pool": [0, 1]}
+    assert SeveralAgencies().groups(Team(n_agents=5)) == {"agency_0": [0, 1], "agency_1": [2, 3], "pool": [4]}
+    assert SeveralAgencies(count=3, own=0).groups(Team(n_agents=2)) == {"pool": [0, 1]}
     assert OneAgency().groups(Team(n_agents=2)) == {"agents": [0, 1]}
 
 
@@ -159,6 +159,6 @@ def test_a_team_that_is_too_small_is_refused_in_one_line():
     ):
         make_env("agencies", n_worlds=1, overrides=["team.n_agents=3", "agencies.own=2"])
     with pytest.raises(ValueError, match="at least 2, the vehicles that 2 agencies own, got 1"):
-        small_world(team=Team(n_agents=1), agencies=Several())
+        small_world(team=Team(n_agents=1), agencies=SeveralAgencies())
     with pytest.raises(ValueError, match=r"^count must be in \[2, 16\], got 1$"):
-        Several(count=1)
+        SeveralAgencies(count=1)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warp_torchrl.world.agencies import Several
+from warp_torchrl.world.agencies import SeveralAgencies
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.flight import Flight
 from warp_torchrl.world.hazard import HazardFire
@@ -38,9 +38,9 @@ OUT_OF_RANGE = [
     (Fire, "alpha", [(0.0, 0.1, 1.0, 0.8), (0, 0, 0, 0, 0, 0), (0, 0.1, 1.1, 0.8, 0), (0, -0.1, 1, 1, 0), (NAN,) * 5]),
     (HazardFire, "refinement", [0, 65]),
     (HazardFire, "wet_ticks", [-1, 32]),  # 32 * 8 = 256
-    (Several, "count", [1, 17]),
-    (Several, "own", [-1, 257]),
-    (Several, "term", [0, 1_000_001]),
+    (SeveralAgencies, "count", [1, 17]),
+    (SeveralAgencies, "own", [-1, 257]),
+    (SeveralAgencies, "term", [0, 1_000_001]),
     (Ignition, "count", [0, 65]),
     (Ignition, "radius", [-1, 9]),
     (Ignition, "region", [0.0, -0.5, 1.1, NAN]),
@@ -91,7 +91,7 @@ NO_SUCH_OPTION = [
     (Array, "ages", ["old"]),
     (Team, "start", ["corners"]),
     (Radio, "carries", ["graphs"]),
-    (Several, "lending", ["needs"]),
+    (SeveralAgencies, "lending", ["needs"]),
 ]
 
 NOT_WHOLE = [
@@ -169,7 +169,20 @@ def test_every_field_with_a_range_is_in_the_list() -> None:
             for part in ("landscape", "wind", "fire", "team", "ignition", "sensing", "agencies", "action_masking")
         ),
     }
-    for component in (Fire, Ignition, Perlin, Array, Team, Radio, Flight, Uniform, Paper, Wandering, World, Several):
+    for component in (
+        Fire,
+        Ignition,
+        Perlin,
+        Array,
+        Team,
+        Radio,
+        Flight,
+        Uniform,
+        Paper,
+        Wandering,
+        World,
+        SeveralAgencies,
+    ):
         for name in (field.name for field in fields(component) if field.init):
             assert (component, name) in listed | free, f"{component.__name__}.{name}"
 

@@ -47,9 +47,10 @@ def _configs(config: Mapping[str, Any], curriculum: Curriculum, keys: tuple[str,
     lists = curriculum.values()
     if not lists:
         raise ConfigError("curriculum.over must name a key of the scenario: curriculum.over.steps_per_tick=[20,10,5]")
-    known = dotted({name: config[name] for name in keys})
+    scenario = dotted({name: config[name] for name in keys})
+    known = {key: value for key, value in scenario.items() if not key.endswith("_target_")}
     for key, values in lists.items():
-        if key not in known or key.endswith("_target_"):
+        if key not in known:
             raise ConfigError(f"curriculum.over.{key} is not a key of the scenario{did_you_mean(key, list(known))}")
         own = known[key]
         if values[-1] != own or isinstance(values[-1], bool) != isinstance(own, bool):

@@ -16,12 +16,12 @@ from warp_torchrl.world.world import World
 class Agency(Conservation):
     """Pays each vehicle for the forest of the agency that it serves, and for that of others as far as they cooperate.
 
-        Q_k = (w_p T_p + w_e T_e - w_c T_c - w_b T_b) / N0 on the land of agency k, each tree by its worth
+        Q_k = (w_p T_p + w_e T_e - w_c T_c - w_b T_b) / N0
         own_i = dQ_k + cooperation x (mean of dQ_j over the other agencies) - w_a A_k a_i
 
-    with the agency k that vehicle i served in the step, the A_k vehicles that did, and a_i = 1 for an act. With
-    ``cooperation`` 1 two agencies earn the same, the sum of both; with 0 each is for itself; with -1 what one gains the
-    other loses, a zero-sum game but for acts and shaping.
+    Q_k is the value of the forest on the land of agency k, each tree by its worth. Vehicle i served agency k in the
+    step, A_k vehicles did, and a_i is 1 for an act. With ``cooperation`` 1 two agencies earn the same, the sum of both.
+    With 0 each is for itself. With -1 what one gains the other loses: a zero-sum game but for acts and shaping.
 
     Attributes:
         cooperation: Weight of the other agencies' forest.

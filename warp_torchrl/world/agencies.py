@@ -78,7 +78,7 @@ class OneAgency(Agencies):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Several(Agencies):
+class SeveralAgencies(Agencies):
     """Agencies with land and vehicles of their own, and a pool of vehicles that serve one of them at a time.
 
     The land is parted into sectors about the middle of the map, all of one angle, in a direction drawn for each
