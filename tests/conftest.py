@@ -8,8 +8,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # the tests run side by side; rea
 import pytest
 import torch
 
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain, without_targets
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.training.loop import Training

@@ -17,8 +17,8 @@ from warp_torchrl.benchmark.shares import training_shares
 from warp_torchrl.benchmark.tasks import disagreements
 from warp_torchrl.benchmark.ticks import numpy_copy
 from warp_torchrl.benchmark.timing import mean_rate
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.training.loop import Training
 from warp_torchrl.world.random import Stream, uniform

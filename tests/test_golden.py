@@ -9,8 +9,8 @@ import torch
 
 from tests.forgery import forge
 from warp_torchrl import load_policy, make_env
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import plain
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.saved_config import restore
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.models import ACTION

@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from warp_torchrl import load_policy, make_env
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain, without_targets
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.saved_config import restore
 from warp_torchrl.evaluation.play import play, play_heuristics
 from warp_torchrl.runs.checkpoint import CheckpointError, export, newest

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import torch
 
+from warp_torchrl.config.building import build_components
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import build
-from warp_torchrl.config.run_config import ENVIRONMENT, build_components
+from warp_torchrl.config.groups import ENVIRONMENT
 from warp_torchrl.config.saved_config import restore
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.models import RADIO

@@ -7,8 +7,9 @@ import torch
 from tensordict import TensorDictBase
 from torchrl.envs.utils import set_exploration_type
 
+from warp_torchrl.config.building import build_components
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.run_config import ENVIRONMENT, build_components
+from warp_torchrl.config.groups import ENVIRONMENT
 from warp_torchrl.config.saved_config import environment_record
 from warp_torchrl.config.seeds import SEEDS, WORLDS, first_world_seed
 from warp_torchrl.demonstrations.recording import Mover, OpenRecording, Recording, recorded

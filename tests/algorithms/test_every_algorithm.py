@@ -5,8 +5,8 @@ import torch
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from tests.conftest import small_world
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, conf_folder, plain
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, REWARD, Cnn, Mlp
 from warp_torchrl.world.team import Team
 

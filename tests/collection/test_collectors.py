@@ -9,9 +9,9 @@ import pytest
 import torch
 
 from warp_torchrl.collection.collectors import MultiProcess
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.config.seeds import first_world_seed
 from warp_torchrl.parallel import WorkerDied
@@ -43,7 +43,7 @@ def first_batches(folder: Path, *overrides: str) -> list:
     try:
         batches = iter(run.collection)
         first = next(batches).clone()
-        run._learn(first.clone())
+        run._learn([first.clone()])
         return [first, next(batches).clone()]
     finally:
         run.close()

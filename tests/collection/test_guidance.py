@@ -5,9 +5,9 @@ import torch
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from warp_torchrl.collection.imitation import Imitation
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.evaluation.method import teacher_label
 from warp_torchrl.heuristics import HEURISTICS

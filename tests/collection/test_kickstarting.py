@@ -10,9 +10,9 @@ from torchrl.objectives import BCLoss
 
 from warp_torchrl.collection.imitation import TEACHERS, Imitation
 from warp_torchrl.collection.kickstarting import kickstart
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.evaluation.method import method
 from warp_torchrl.heuristics import HEURISTICS
@@ -121,7 +121,7 @@ def test_a_pupil_comes_to_do_what_its_teacher_does(tmp_path):
     agreed = []
     for batch in training.collection:
         agreed.append(float((batch[ACTION] == batch[TEACHER_ACTION]).float().mean()))
-        training._learn(batch)
+        training._learn([batch])
         if training.frames >= 960:
             break
     early, late = sum(agreed[:5]) / 5, sum(agreed[-5:]) / 5

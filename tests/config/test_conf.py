@@ -12,10 +12,12 @@ from omegaconf import OmegaConf
 from torch._inductor.exc import InvalidCxxCompiler
 
 from warp_torchrl.api import make_env
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, conf_folder, plain, without_targets
 from warp_torchrl.config.construction import ConfigError, build, component
 from warp_torchrl.config.defaults import defaults
-from warp_torchrl.config.run_config import COMPONENTS, RunConfig, run_config
+from warp_torchrl.config.groups import COMPONENTS
+from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.config.saved_config import SavedConfig, restore, world_overrides
 from warp_torchrl.world.flight import Flight
 from warp_torchrl.world.gridded import Gridded

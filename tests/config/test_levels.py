@@ -2,9 +2,9 @@
 
 import pytest
 
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.saved_config import SavedConfig, restore
 from warp_torchrl.world.radio import Radio
 

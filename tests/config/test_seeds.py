@@ -4,9 +4,9 @@ from itertools import pairwise
 
 import pytest
 
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.config.seeds import BEYOND_EVALUATION, FIRST_EVALUATED, SEEDS, WORLDS, first_world_seed
 from warp_torchrl.runs.checkpoint import newest

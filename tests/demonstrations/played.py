@@ -2,8 +2,9 @@
 
 import torch
 
+from warp_torchrl.config.building import build_components
 from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.run_config import ENVIRONMENT, build_components
+from warp_torchrl.config.groups import ENVIRONMENT
 from warp_torchrl.config.saved_config import environment_record
 from warp_torchrl.demonstrations.recording import Mover, OpenRecording, Recording
 from warp_torchrl.env import WildfireEnv

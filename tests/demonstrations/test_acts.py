@@ -7,9 +7,9 @@ import torch
 
 from tests.demonstrations.played import SMALL, played
 from warp_torchrl.collection.cloning import AGENT
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.demonstrations.acts import acts_of, demonstrations
 from warp_torchrl.demonstrations.files import save
 from warp_torchrl.demonstrations.recording import MOVER, Mover

@@ -4,8 +4,8 @@ import pytest
 import torch
 from torch.fx.experimental.proxy_tensor import make_fx
 
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.device import unread
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.recorded import RecordedStep

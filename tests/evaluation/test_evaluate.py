@@ -1,7 +1,7 @@
 """What is told of a policy: the baselines of worlds that were met before are not played again."""
 
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.evaluation import evaluate as evaluation_module
 from warp_torchrl.evaluation.play import play_heuristics
 

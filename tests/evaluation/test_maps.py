@@ -5,8 +5,8 @@ import pytest
 import torch
 
 from tests.world.rasters import LANDFIRE, needs_landfire, rasterio
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.evaluation import maps as maps_module
 from warp_torchrl.evaluation.maps import described, play_maps, write_maps
 from warp_torchrl.evaluation.play import play

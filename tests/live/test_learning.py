@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.saved_config import SavedConfig, restore
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.keeping import Keeper

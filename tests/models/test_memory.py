@@ -10,9 +10,9 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 from tests.conftest import small_world
 from warp_torchrl.algorithms.a2c import A2c
 from warp_torchrl.algorithms.ppo import Ppo
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.models import (
     ACTION,

@@ -12,9 +12,9 @@ from tests.models.canonical.test_canonical import (
     turned_world,
 )
 from warp_torchrl.algorithms.ppo import Ppo
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.saved_config import SavedConfig, restore
 from warp_torchrl.models import ACTION, LOGITS, OBSERVATION, RADIO, Cnn, Mlp, over_canonical, signature
 from warp_torchrl.models.messages import Round

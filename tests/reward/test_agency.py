@@ -7,9 +7,9 @@ import torch
 
 from tests.conftest import small_world
 from warp_torchrl import make_env
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.reward import Agency
 from warp_torchrl.world.agencies import SeveralAgencies, by_land

@@ -116,7 +116,7 @@ def test_the_interval_s_checkpoints_are_the_same_whatever_the_clock_does(tmp_pat
 
 def test_what_a_save_writes_is_what_a_replay_memory_holds_and_not_its_room(tmp_path):
     run = tiny(tmp_path, *TINIER, *RUNS["dqn"], "algorithm.capacity=4000")
-    run._learn(next(iter(run.collection)))
+    run._learn([next(iter(run.collection))])
     whole = run.learner.keeps["replay"].buffer._storage._storage
     room = sum(each.nbytes for each in whole.values(True, True))
     written = (run.save() / "training.pt").stat().st_size

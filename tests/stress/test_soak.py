@@ -43,7 +43,7 @@ def test_nothing_grows(tmp_path):
     while (minutes := (time.monotonic() - start) / 60) < MINUTES:
         for name, run in runs.items():
             for _ in range(10):
-                row = run._learn(next(batches[name]))
+                row = run._learn([next(batches[name])])
                 run.metrics.add({"time/frames": run.frames, **row})
             run.save()
             policy = load_policy(run.run)

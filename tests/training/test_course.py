@@ -44,10 +44,10 @@ def test_a_run_without_a_curriculum_has_neither_columns_nor_state(tmp_path):
 def test_the_last_share_of_a_training_is_of_the_target_alone(tmp_path):
     training = tiny(tmp_path, *CLIMBS, "curriculum.high=1.0", "curriculum.until=0.5", "curriculum.floor=0.0")
     found = []
-    for batch in training.batches():
+    for [batch] in training.batches():
         starts = batch["info", "episode_length"][..., 0] == 0.0
         found.append((training.frames, set(batch["info", "level"][..., 0][starts].tolist())))
-        training._learn(batch)
+        training._learn([batch])
         if training.frames >= 192:
             break
     # 192 frames: 96 is the half; a world that ended with the last step of a batch has started by what held before

@@ -14,8 +14,8 @@ import pytest
 import torch
 
 from warp_torchrl.api import policy_of
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, conf_folder, plain, without_targets
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.models import ACTION
 from warp_torchrl.runs import checkpoint as checkpoints
@@ -103,6 +103,9 @@ RUNS = {
               "team.radio.range=4", "team.radio.loss=0.2", "sensing.miss=0.1", "sensing.smoke=1.0"],
     "serves": ["scenario=agencies", "landscape.size=12", "horizon=10", "agencies.own=1", "agencies.lending=need",
                "agencies.term=3", "reward.cooperation=-0.5"],
+    "mixes": ["reward.normalise=true", "model.memory=8", "imitation.teacher=local", "imitation.until=0.7",
+              "algorithm.minibatch_size=32", "mixture=several", "mixture.kinds={one:{scenario:single,over:{horizon:8}},"
+              "two:{scenario:skirmish,share:2,teacher:greedy,over:{horizon:10}}}"],
     "compiled": ["compile=true", "imitation.teacher=greedy", "imitation.until=0.7"],
     **{name: [f"algorithm={name}", *(REPLAY if name in REPLAYS else [])] for name in ALGORITHMS},
 }  # fmt: skip
@@ -134,6 +137,7 @@ FAST = {
     ("regrets", 3),
     ("talks", 3),
     ("serves", 3),
+    ("mixes", 3),
     ("grows", 1),
     ("grows", 3),
     ("mappo", LAST),
@@ -175,7 +179,7 @@ def test_a_run_resumed_equals_a_run_not_interrupted(tmp_path, never_stopped, sto
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [each for each in RUNS if each not in ("climbs", "regrets")])
+@pytest.mark.parametrize("name", [each for each in RUNS if each not in ("climbs", "regrets", "mixes")])
 def test_a_compiled_loss_is_the_eager_one(tmp_path, name):
     training = tiny(tmp_path, *RUNS[name], "compile=true", "model.dtype=float32", "algorithm.learning_rate=0")
     learner, eager = training.learner, tiny(tmp_path, *RUNS[name], "model.dtype=float32").learner
@@ -295,7 +299,7 @@ def test_a_gradient_that_is_not_finite_stops_before_the_weights_change(tmp_path)
     before = {name: value.clone() for name, value in training.learner.loss.state_dict().items() if "params" in name}
     batch["next", "agents", "reward"].fill_(float("inf"))
     with pytest.raises(NumericalFailure, match="not finite"):
-        training._learn(batch)
+        training._learn([batch])
     for name, value in before.items():
         assert torch.equal(training.learner.loss.state_dict()[name], value)
 
@@ -312,7 +316,7 @@ def test_a_loss_that_is_not_finite_stops_though_its_gradient_is(tmp_path):
 
     training.learner.loss.forward = infinite
     with pytest.raises(NumericalFailure, match=r"the loss, inf, or its gradient, of norm [0-9.]+, is not finite"):
-        training._learn(batch)
+        training._learn([batch])
     assert all(
         torch.equal(value, before[name]) for name, value in flattened(training.learner.policy.state_dict()).items()
     )
@@ -324,7 +328,7 @@ def test_a_reward_that_is_not_finite_is_never_remembered(tmp_path, bad):
     batch = next(iter(training.collection))
     batch["next", "agents", "reward"][2, 3] = bad
     with pytest.raises(NumericalFailure, match="a reward is not finite"):
-        training._learn(batch)
+        training._learn([batch])
     assert not training.state_dict()["keeps"]["replay"]["_storage"]
 
 
@@ -334,7 +338,7 @@ def test_a_numerical_failure_leaves_the_last_checkpoint(tmp_path):
 
     def poisoned(batch):
         if training.frames == 96:
-            batch["next", "agents", "reward"].fill_(float("nan"))
+            batch[0]["next", "agents", "reward"].fill_(float("nan"))
         return learn(batch)
 
     training._learn = poisoned
@@ -389,7 +393,7 @@ def make_dqn(tmp_path_factory):
     later = tiny(run, *RUNS["dqn"])
     later.train()
     training = tiny(tmp_path_factory.mktemp("young"), *RUNS["dqn"])
-    batches = iter(training.collection)
+    batches = training.batches()
     for _ in range(3):
         training._learn(next(batches))
     training.run = run
@@ -522,7 +526,7 @@ def test_a_batch_of_segments_is_one_of_all_steps(tmp_path):
         (tmp_path / name).mkdir()
         training = tiny(tmp_path / name, *overrides)
         training._segments = training.collector.segments(1.0)
-        return next(training.batches())
+        return next(training.batches())[0]
 
     one = first("whole")
     other = first("parts", "collector.first_steps=4", "collector.grows_at=0.5")

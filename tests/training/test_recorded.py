@@ -5,9 +5,9 @@ import torch
 from torch.fx.experimental.proxy_tensor import make_fx
 
 from tests.training.test_waits import training
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.device import unread
 from warp_torchrl.training.finite import NumericalFailure
 from warp_torchrl.training.recorded import RecordedUpdate
@@ -47,7 +47,7 @@ def test_the_rate_of_a_recorded_update_falls(tmp_path):
 def test_a_recorded_update_refuses_what_is_not_finite(tmp_path):
     with unread():
         run = training(tmp_path, "graph=true")
-        batch = next(run.batches())
+        [batch] = next(run.batches())
         run.learner.store(batch)
         for sample in run.learner.samples():
             weights = [each.detach().clone() for each in run.learner.loss.parameters()]
@@ -67,7 +67,7 @@ def test_no_size_in_loss_and_gradients_depends_on_a_result(tmp_path):
     with unread():
         run = training(tmp_path, "model.dtype=float32")
         learner = run.learner
-        learner.store(next(run.batches()))
+        learner.store(next(run.batches())[0])
         sample = next(iter(learner.samples()))
         run._update(sample)
         names, leaves = zip(*sample.flatten_keys(".").items())

@@ -4,8 +4,8 @@ import pytest
 import torch
 
 from warp_torchrl.benchmark.waits import counted_waits
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.device import unread
 from warp_torchrl.training.loop import Training
@@ -47,7 +47,7 @@ def test_an_iteration_waits_three_times_at_most(tmp_path, overrides):
 def test_a_step_and_an_update_do_not_wait(tmp_path):
     with unread():
         run = training(tmp_path)
-        batch = next(run.batches())
+        [batch] = next(run.batches())
         shown, learner = run.env.reset(), run.learner
         learner.store(batch)
         sample = next(iter(learner.samples()))

@@ -1,6 +1,6 @@
 """Base of the on-policy algorithms: actors, critics, advantages and schedules."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import torch
@@ -19,6 +19,8 @@ from warp_torchrl.models import (
     VALUE,
     Mlp,
     Recollection,
+    RecollectionApart,
+    RemembersApart,
     Signature,
     arithmetic_of,
     over_canonical,
@@ -72,15 +74,19 @@ class OnPolicy(Algorithm):
         """Return the team's decentralised policy: each agent's action from its own observation and mask."""
         return masked_actor(shape, model)
 
-    def build(self, env: EnvBase, model: Mlp, frames_per_batch: int) -> Learner:
+    def build(
+        self, env: EnvBase, model: Mlp, frames_per_batch: int, shape: Signature | None = None, share: float = 1.0
+    ) -> Learner:
         """Return a learner for an environment.
 
         Args:
             env: Whose specs it fits, and on whose device it lives.
             model: Makes the networks.
             frames_per_batch: World steps that are collected between updates.
+            shape: What the networks fit; None reads it off the environment.
+            share: Of a minibatch that this environment fills.
         """
-        shape = signature(env)
+        shape = signature(env) if shape is None else shape
         policy = self.policy(shape, model).to(env.device)
         critic = model.critic(shape, self.central_critic).to(env.device)
         loss = self.loss(over_canonical(policy), over_canonical(critic)).to(env.device)
@@ -92,17 +98,7 @@ class OnPolicy(Algorithm):
             return {"train/learning_rate": self.rate_at(progress, optimizer), **self.constants()}
 
         memory = Recollection(policy)
-        batch = HeldBatch(
-            loss,
-            model.canonical_batch(shape, state=self.central_critic, packed=True),
-            arithmetic_of(critic, env.device.type),
-            frames=frames_per_batch,
-            steps=frames_per_batch // env.batch_size[0] if memory.actors else None,
-            minibatch_size=self.minibatch_size // parallel.size(),
-            passes=self.passes(),
-            standardises=self.standardises() if parallel.size() > 1 else None,
-            device=env.device,
-        )
+        batch = self._held(loss, env, model, frames_per_batch, shape, share)
         return Learner(
             policy=policy,
             explore=policy,
@@ -118,6 +114,43 @@ class OnPolicy(Algorithm):
             schedule=schedule,
             keeps={"memory": memory} if memory.actors else {},
             batches_grow=not memory.actors,
+        )
+
+    def beside(
+        self, learner: Learner, env: EnvBase, model: Mlp, frames_per_batch: int, shape: Signature, share: float
+    ) -> Learner:
+        """Return a learner of the same networks, with the same optimiser, from batches of another environment.
+
+        Args:
+            learner: What ``build`` returned.
+            env: Whose worlds it learns from.
+            model: Made the networks.
+            frames_per_batch: World steps of this environment that are collected between updates.
+            shape: What the networks fit.
+            share: Of a minibatch that this environment fills.
+        """
+        batch = self._held(learner.loss, env, model, frames_per_batch, shape, share)
+        made = replace(learner, explore=learner.policy, store=batch.store, samples=batch.samples, keeps={})
+        if not model.memory:
+            return made
+        explore = RemembersApart(learner.policy)
+        return replace(made, explore=explore, keeps={"memory": RecollectionApart(explore)})
+
+    def _held(
+        self, loss: LossModule, env: EnvBase, model: Mlp, frames: int, shape: Signature, share: float
+    ) -> HeldBatch:
+        """Return what holds an environment's batches."""
+        remembers = bool(model.memory)
+        return HeldBatch(
+            loss,
+            model.canonical_batch(shape, state=self.central_critic, packed=True),
+            arithmetic_of(loss.critic_network, env.device.type),
+            frames=frames,
+            steps=frames // env.batch_size[0] if remembers else None,
+            minibatch_size=max(1, round(self.minibatch_size * share / parallel.size())),
+            passes=self.passes(),
+            standardises=self.standardises() if parallel.size() > 1 else None,
+            device=env.device,
         )
 
     def loss(self, policy: ProbabilisticActor, critic: torch.nn.Module) -> LossModule:

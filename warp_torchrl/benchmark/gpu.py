@@ -21,8 +21,8 @@ from warp_torchrl.benchmark.environments import random_play
 from warp_torchrl.benchmark.machine import machine, peak_memory
 from warp_torchrl.benchmark.timing import clock, spread, take_turns
 from warp_torchrl.benchmark.waits import counted_waits
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.device import unread
 from warp_torchrl.training.loop import Training

@@ -13,9 +13,10 @@ from omegaconf import DictConfig, OmegaConf
 
 from warp_torchrl.commands.failure import fail
 from warp_torchrl.commands.sweep import jobs
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import HYDRA_ERRORS, check_choices, explain, plain
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.run_config import RunConfig, run_config
+from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.config.saved_config import restore
 from warp_torchrl.config.seeds import BEYOND_EVALUATION
 from warp_torchrl.demonstrations.acts import demonstrations

@@ -18,11 +18,12 @@ from warp_torchrl.commands.checks import map_fires, new_total, of_worlds, pictur
 from warp_torchrl.commands.failure import fail
 from warp_torchrl.commands.following import FOLLOWING, folder_of_its_own, follow
 from warp_torchrl.commands.sweep import SweepSummary, remove_failure, save_failure, summarise_unfinished
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import HYDRA_ERRORS, conf_folder, explain, option_of, plain, without_targets
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.grammar import check_flags, check_overrides
+from warp_torchrl.config.groups import COMPONENTS
 from warp_torchrl.config.renamed import renamed_overrides
-from warp_torchrl.config.run_config import COMPONENTS, run_config
 from warp_torchrl.config.saved_config import SavedConfig, restore, world_overrides
 from warp_torchrl.evaluation.evaluate import evaluate_policy
 from warp_torchrl.runs import checkpoint as checkpoints

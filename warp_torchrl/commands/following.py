@@ -14,7 +14,7 @@ import torch
 
 from warp_torchrl import parallel
 from warp_torchrl.commands.allocation import keep_freed_memory
-from warp_torchrl.config.run_config import run_config
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.training.finite import NumericalFailure
 from warp_torchrl.training.loop import Training

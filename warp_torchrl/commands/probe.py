@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from warp_torchrl.commands.program import run_program
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.construction import ConfigError, construct
 from warp_torchrl.config.grammar import own_values
-from warp_torchrl.config.run_config import run_config
 from warp_torchrl.config.seeds import FIRST_EVALUATED
 from warp_torchrl.evaluation.probe import Reading, probe
 from warp_torchrl.named_policy import NamedPolicy, fitted_policy

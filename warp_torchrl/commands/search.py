@@ -20,8 +20,8 @@ from warp_torchrl.commands.program import run_program
 from warp_torchrl.config.compose import GROUPS, compose_config, conf_folder, plain, without_targets
 from warp_torchrl.config.construction import ConfigError, UnknownKeyError, construct
 from warp_torchrl.config.grammar import check_flags, check_overrides
+from warp_torchrl.config.groups import COMPONENTS
 from warp_torchrl.config.renamed import renamed_overrides
-from warp_torchrl.config.run_config import COMPONENTS
 from warp_torchrl.config.search_options import SearchOptions
 from warp_torchrl.config.space import Dimension, Value, divided
 from warp_torchrl.hyperparameters.training import SearchEnded, TrainingProcess

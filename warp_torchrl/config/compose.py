@@ -22,8 +22,8 @@ from omegaconf.errors import OmegaConfBaseException
 from warp_torchrl.config.construction import ConfigError, UnknownKeyError, component
 from warp_torchrl.config.defaults import defaults
 from warp_torchrl.config.grammar import check_overrides, several_values
+from warp_torchrl.config.groups import COMPONENTS
 from warp_torchrl.config.renamed import renamed_overrides
-from warp_torchrl.config.run_config import COMPONENTS
 from warp_torchrl.nearest import did_you_mean
 
 OmegaConf.register_new_resolver("pid", os.getpid, replace=True, use_cache=True)  # a sweep's jobs get its own process's

@@ -14,8 +14,9 @@ from hydra.plugins.config_source import ConfigResult
 from omegaconf import DictConfig, OmegaConf
 
 from warp_torchrl.config.construction import component
+from warp_torchrl.config.groups import COMPONENTS
 from warp_torchrl.config.prediction_options import PredictionOptions
-from warp_torchrl.config.run_config import COMPONENTS, RunConfig
+from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.config.search_options import SearchOptions
 from warp_torchrl.world.world import World
 

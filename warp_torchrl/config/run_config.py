@@ -1,9 +1,7 @@
 """The configuration of a run: every value checked, every component built, from plain values."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, fields
-from functools import cached_property, partial
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal
 
 import torch
@@ -13,53 +11,17 @@ from warp_torchrl.algorithms.on_policy import OnPolicy
 from warp_torchrl.collection.collectors import MultiProcess
 from warp_torchrl.collection.imitation import Imitation
 from warp_torchrl.config.checkpoint_config import CheckpointConfig
-from warp_torchrl.config.construction import ConfigError, build, construct
+from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.evaluation_config import EvaluationConfig
-from warp_torchrl.config.levels import check_alike, level_worlds
+from warp_torchrl.config.kinds import KindOfWorld, check_kinds
+from warp_torchrl.config.levels import check_alike
 from warp_torchrl.config.seeds import SEEDS, WORLDS
 from warp_torchrl.curriculum import Curriculum
 from warp_torchrl.env import LeveledEnv, WildfireEnv
-from warp_torchrl.nearest import did_you_mean
+from warp_torchrl.mixture import Mixture, apportioned
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.fast.compile import check_compiler
 from warp_torchrl.world.world import World
-
-COMPONENTS = (
-    "landscape",
-    "wind",
-    "fire",
-    "team",
-    "ignition",
-    "sensing",
-    "agencies",
-    "observation",
-    "reward",
-    "model",
-    "algorithm",
-    "collector",
-    "curriculum",
-    "logger",
-)
-"""Groups whose options are classes."""
-ENVIRONMENT = COMPONENTS[: COMPONENTS.index("reward") + 1]
-"""Those that make an environment."""
-WORLD_KEYS = (
-    "scenario",
-    "landscape",
-    "wind",
-    "fire",
-    "team",
-    "ignition",
-    "sensing",
-    "agencies",
-    "steps_per_tick",
-    "horizon",
-    "cell_size",
-    "action_masking",
-)
-"""What a scenario sets."""
-COMMAND_KEYS = ("resume", "start_from", "debug", "policy", "overwrite", "maps", "maps_fires", "picture")
-"""What the commands read themselves."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,6 +38,8 @@ class RunConfig:
         collector: Where they collect.
         curriculum: Which levels of the scenario they play.
         make_levels: Returns the worlds of the levels, easy to hard, the scenario's last.
+        mixture: Which kinds of worlds a training plays.
+        make_kinds: Returns the kinds, built.
         logger: The tracker, beside ``metrics.csv``.
         n_worlds: Worlds in the batch.
         total_frames: World steps in all; agent steps are frames x agents.
@@ -102,6 +66,8 @@ class RunConfig:
     collector: Any
     curriculum: Any
     make_levels: Any = field(compare=False)
+    mixture: Any
+    make_kinds: Any = field(compare=False)
     logger: Any
     n_worlds: int = 256
     total_frames: int = 2_000_000
@@ -163,6 +129,8 @@ class RunConfig:
             raise ConfigError(str(error)) from None
         if isinstance(self.curriculum, Curriculum):
             self._check_curriculum(self.curriculum)
+        if isinstance(self.mixture, Mixture):
+            self._check_mixture()
         if self.graph:
             self._check_graph()
         if self.compile:
@@ -194,6 +162,46 @@ class RunConfig:
                 raise ConfigError(f"{name} must be false with a curriculum, whose steps are of ever other sizes")
         check_alike(self.levels, curriculum, self.observation)
 
+    def _check_mixture(self) -> None:
+        """Check that several kinds of worlds can be played by this training, and who learns from them."""
+        if isinstance(self.curriculum, Curriculum):
+            raise ConfigError("mixture must be none with a curriculum, whose levels are of one scenario")
+        if isinstance(self.collector, MultiProcess):
+            raise ConfigError("mixture must be none where workers collect: choose collector=direct")
+        if not isinstance(self.algorithm, OnPolicy):
+            raise ConfigError("mixture must be none where the algorithm replays: choose mappo, ippo, ppo or a2c")
+        if self.model.sharing == "none":
+            raise ConfigError("mixture must be none where each agent has a network: choose model.sharing=team or role")
+        if self.imitation.demonstrations is not None:
+            raise ConfigError("mixture must be none with imitation.demonstrations, which are of one scenario")
+        for name in ("graph", "compile"):
+            if getattr(self, name):
+                raise ConfigError(f"{name} must be false with a mixture, whose batches are of several shapes")
+        self.worlds_of_kinds(self.n_worlds // self.n_processes())
+        check_kinds(self.kinds, self.observation, self.reward)
+
+    @cached_property
+    def kinds(self) -> list[KindOfWorld]:
+        """Return the kinds of worlds that a training plays: those of the mixture, or the scenario alone.
+
+        Raises:
+            ConfigError: If the mixture names what is no scenario, or a value breaks a rule.
+        """
+        if isinstance(self.mixture, Mixture):
+            return self.make_kinds(self.mixture)
+        return [KindOfWorld(name=self.scenario, world=self.world, teacher=self.imitation.teacher)]
+
+    def worlds_of_kinds(self, count: int) -> list[int]:
+        """Return how many of a process's worlds are of each kind.
+
+        Raises:
+            ConfigError: If there are fewer than kinds.
+        """
+        try:
+            return apportioned([kind.share for kind in self.kinds], count)
+        except ValueError as error:
+            raise ConfigError(str(error)) from None
+
     @cached_property
     def levels(self) -> list[World]:
         """Return the worlds of the curriculum's levels, easy to hard; the scenario's alone without one.
@@ -203,10 +211,12 @@ class RunConfig:
         """
         return self.make_levels() if isinstance(self.curriculum, Curriculum) else [self.world]
 
-    def make_env(self, n_worlds: int, seed: int, fuse: bool = False, graph: bool = False) -> WildfireEnv:
-        """Return an environment of the run's scenario, on the run's device."""
+    def make_env(
+        self, n_worlds: int, seed: int, fuse: bool = False, graph: bool = False, world: World | None = None
+    ) -> WildfireEnv:
+        """Return an environment of the run's scenario, or of a world of its mixture, on the run's device."""
         return WildfireEnv(
-            self.world,
+            self.world if world is None else world,
             observation=self.observation,
             reward=self.reward,
             n_worlds=n_worlds,
@@ -216,101 +226,16 @@ class RunConfig:
             graph=graph,
         )
 
-    def make_training_env(self, n_worlds: int, seed: int) -> WildfireEnv:
-        """Return an environment to learn from, of all levels, fused or recorded where that is asked for.
+    def make_training_env(self, n_worlds: int, seed: int, world: World | None = None) -> WildfireEnv:
+        """Return an environment to learn from, of all levels or of a world of the mixture, fused or recorded where that
+        is asked for.
 
         The few episodes of an evaluation would take less time than their compilation.
         """
         if isinstance(self.curriculum, Curriculum):
             parts = {"observation": self.observation, "reward": self.reward, "device": self.device}
             return LeveledEnv(self.levels, n_worlds=n_worlds, seed=seed, **parts)
-        return self.make_env(n_worlds, seed, fuse=self.compile, graph=self.graph)
-
-
-def run_config(config: Mapping[str, Any]) -> RunConfig:
-    """Check a composed configuration and build what it describes.
-
-    Raises:
-        ConfigError: With key, value and rule.
-    """
-    known = {each.name for each in fields(RunConfig)} | {*COMPONENTS, *WORLD_KEYS, *COMMAND_KEYS}
-    for key in config:
-        if key not in known:
-            has = f"it has {', '.join(sorted(known - {'world', 'make_levels'}))}"
-            raise ConfigError(f"{key} is not a key of the configuration; {has}{did_you_mean(key, known)}")
-    for key in COMPONENTS:
-        if key not in config:
-            raise ConfigError(f"{key} must be given")
-    built = build_components(config)
-    parts = {"checkpoint": CheckpointConfig, "evaluation": EvaluationConfig, "imitation": Imitation}
-    built |= {name: construct(kind, config.get(name, {}), name) for name, kind in parts.items()}
-    built["make_levels"] = partial(level_worlds, config, built, WORLD_KEYS)
-    values = _chosen(RunConfig, {**config, **built})
-    _check_together(config)
-    made = construct(RunConfig, values, "")
-    with _in_section("algorithm"):
-        made.algorithm.check_batch(made.n_worlds * made.collector.steps)
-    with _in_section("model"):
-        made.algorithm.check_model(made.model)
-    with _in_section("collector"):
-        made.collector.check_worlds(made.n_worlds)
-    with _in_section("imitation"):
-        made.imitation.check_fits(made.algorithm, made.collector, made.model)
-    return made
-
-
-@contextmanager
-def _in_section(section: str) -> Iterator[None]:
-    """Let a mistake name the section of the configuration that it is in."""
-    try:
-        yield
-    except ValueError as error:
-        raise ConfigError(f"{section}.{error}") from None
-
-
-def build_components(config: Mapping[str, Any], names: Sequence[str] = COMPONENTS) -> dict[str, Any]:
-    """Build components of a composed configuration, and the ``world`` of those that make one.
-
-    Args:
-        config: As plain values.
-        names: Which; those of the world must be among them.
-
-    Raises:
-        ConfigError: With key, value and rule.
-    """
-    first = ("model",) if "model" in names else ()  # whose messages are the team's: mistakes are told of the model
-    built = {name: build(config[name], name) for name in dict.fromkeys((*first, *names))}
-    world = construct(World, _chosen(World, {**config, **built}), "")
-    if "reward" in built:
-        try:
-            built["reward"].check_world(world)
-        except ValueError as error:
-            raise ConfigError(str(error)) from None
-    return {**built, "world": world}
-
-
-def _chosen(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return those values that are fields of a dataclass."""
-    return {each.name: values[each.name] for each in fields(kind) if each.name in values}
-
-
-def _check_together(config: Mapping[str, Any]) -> None:
-    reward, algorithm = config["reward"], config["algorithm"]
-    model, radio = config["model"]["messages"], config["team"]["radio"]["carries"]
-    if model in ("graph", "both") and radio not in ("graph", "both"):
-        raise ConfigError(
-            f"team.radio.carries must be graph or both where networks talk, model.messages={model}, got {radio}"
-        )
-    mixer, cooperation = algorithm.get("mixer", "none"), reward.get("cooperation", 1.0)
-    if mixer != "none" and cooperation != 1.0:
-        raise ConfigError(
-            f"reward.cooperation must be 1 where the team has one value, algorithm.mixer={mixer}, got {cooperation}"
-        )
-    if reward["shaping"] > 0.0 and reward["gamma"] != algorithm["gamma"]:
-        raise ConfigError(
-            f"reward.gamma must be algorithm.gamma, {algorithm['gamma']}, for shaping to leave optimal policies as "
-            f"they are, got {reward['gamma']}"
-        )
+        return self.make_env(n_worlds, seed, fuse=self.compile, graph=self.graph, world=world)
 
 
 def _check_device(name: str) -> None:

@@ -12,8 +12,8 @@ from omegaconf.errors import OmegaConfBaseException
 
 from warp_torchrl.config.compose import OPTION, compose_config, conf_folder, option_of, plain, without_targets
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.config.groups import COMPONENTS, ENVIRONMENT, WORLD_KEYS
 from warp_torchrl.config.renamed import renamed_overrides
-from warp_torchrl.config.run_config import COMPONENTS, ENVIRONMENT, WORLD_KEYS
 from warp_torchrl.dotted import dotted
 
 _BEFORE = {

@@ -5,8 +5,9 @@ from collections.abc import Iterator
 import torch
 from tensordict import TensorDictBase
 
+from warp_torchrl.config.building import build_components
 from warp_torchrl.config.compose import plain
-from warp_torchrl.config.run_config import ENVIRONMENT, build_components
+from warp_torchrl.config.groups import ENVIRONMENT
 from warp_torchrl.config.saved_config import restore
 from warp_torchrl.demonstrations.events import carry_out
 from warp_torchrl.demonstrations.recording import Recording

@@ -14,7 +14,7 @@ import yaml
 from optuna.trial import FrozenTrial, TrialState
 
 from warp_torchrl.config.compose import GROUPS, choices, compose_config, plain
-from warp_torchrl.config.run_config import COMPONENTS
+from warp_torchrl.config.groups import COMPONENTS
 from warp_torchrl.config.search_options import SearchOptions
 from warp_torchrl.config.space import Dimension, value_of
 from warp_torchrl.hyperparameters.search import TRIALS, best_of

@@ -10,7 +10,7 @@ from pathlib import Path
 import torch
 
 from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.run_config import WORLD_KEYS
+from warp_torchrl.config.groups import WORLD_KEYS
 from warp_torchrl.config.saved_config import SavedConfig, restore
 from warp_torchrl.dotted import dotted
 from warp_torchrl.hyperparameters.training import STOPPED, Training, TrainingProcess

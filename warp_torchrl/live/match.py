@@ -10,7 +10,8 @@ from typing import Any
 
 from torch import Tensor
 
-from warp_torchrl.config.run_config import ENVIRONMENT, build_components
+from warp_torchrl.config.building import build_components
+from warp_torchrl.config.groups import ENVIRONMENT
 from warp_torchrl.config.saved_config import environment_record
 from warp_torchrl.config.seeds import FIRST_EVALUATED
 from warp_torchrl.demonstrations.events import at_cell

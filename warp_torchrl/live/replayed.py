@@ -7,8 +7,9 @@ from typing import NoReturn
 from tensordict import TensorDictBase
 from torch import Tensor
 
+from warp_torchrl.config.building import build_components
 from warp_torchrl.config.compose import plain
-from warp_torchrl.config.run_config import ENVIRONMENT, build_components
+from warp_torchrl.config.groups import ENVIRONMENT
 from warp_torchrl.config.saved_config import restore
 from warp_torchrl.demonstrations.recording import Recording
 from warp_torchrl.demonstrations.replay import Replay

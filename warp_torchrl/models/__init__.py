@@ -4,7 +4,14 @@ They know the shapes of what they read, and how it turns with the map, from a ``
 """
 
 from warp_torchrl.models.canonical import CanonicalBatch, over_canonical
-from warp_torchrl.models.memory import Recollection, RecurrentActor, memory_apart, recurrent_actors
+from warp_torchrl.models.memory import (
+    Recollection,
+    RecollectionApart,
+    RecurrentActor,
+    RemembersApart,
+    memory_apart,
+    recurrent_actors,
+)
 from warp_torchrl.models.model import Cnn, Mlp
 from warp_torchrl.models.networks import arithmetic_of
 from warp_torchrl.models.signature import (
@@ -30,6 +37,8 @@ from warp_torchrl.models.signature import (
     VALUE,
     Entry,
     Signature,
+    differing,
+    joint,
     signature,
 )
 
@@ -59,9 +68,13 @@ __all__ = [
     "Entry",
     "Mlp",
     "Recollection",
+    "RecollectionApart",
     "RecurrentActor",
+    "RemembersApart",
     "Signature",
     "arithmetic_of",
+    "differing",
+    "joint",
     "memory_apart",
     "over_canonical",
     "recurrent_actors",

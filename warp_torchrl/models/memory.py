@@ -1,6 +1,6 @@
 """Actors with a memory: a recurrent layer, and what is remembered from one step to the next."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -142,6 +142,53 @@ class Recollection:
         """Remember it."""
         for index, actor in enumerate(self.actors):
             actor.remembered = state_dict[str(index)].to(next(actor.parameters()).device)
+
+
+class RemembersApart(TensorDictModuleBase):
+    """A policy that remembers what it saw in worlds of one kind, whatever it plays in between.
+
+    Args:
+        policy: Some parts of which remember; others of its kind may share it.
+    """
+
+    def __init__(self, policy: TensorDictModuleBase) -> None:
+        super().__init__()
+        self.in_keys, self.out_keys = policy.in_keys, policy.out_keys
+        self.policy, self._actors = policy, recurrent_actors(policy)
+        self.remembered = [torch.zeros_like(actor.remembered) for actor in self._actors]
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Write what the policy does."""
+        others = [actor.remembered for actor in self._actors]
+        self._remember(self.remembered)
+        out = self.policy(tensordict)
+        self.remembered = [actor.remembered for actor in self._actors]
+        self._remember(others)
+        return out
+
+    def _remember(self, memories: Sequence[Tensor]) -> None:
+        for actor, memory in zip(self._actors, memories, strict=True):
+            actor.remembered = memory
+
+
+class RecollectionApart:
+    """What a checkpoint keeps of the memory of a policy that remembers apart.
+
+    Args:
+        policy: The policy.
+    """
+
+    def __init__(self, policy: RemembersApart) -> None:
+        self.policy = policy
+
+    def state_dict(self) -> dict[str, Tensor]:
+        """Return the memory of each actor."""
+        return {str(index): memory.clone() for index, memory in enumerate(self.policy.remembered)}
+
+    def load_state_dict(self, state_dict: Mapping[str, Tensor]) -> None:
+        """Remember it."""
+        device = next(self.policy.parameters()).device
+        self.policy.remembered = [memory.to(device) for memory in state_dict.values()]
 
 
 def recurrent_actors(policy: nn.Module) -> list[RecurrentActor]:

@@ -1,5 +1,6 @@
 """The keys of learning, and what a network must fit: shapes and types, read off an environment's specs."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from torchrl.data import TensorSpec
@@ -121,3 +122,33 @@ def signature(env: EnvBase) -> Signature:
     state = entry(specs["state"], 0, env.state_names, env.state_symmetry, env.state_content)
     agents = specs[ACTION_MASK].shape[0]
     return Signature(observation, state, agents, env.action_names, env.role_names, env.agency_names)
+
+
+def differing(one: Signature, other: Signature) -> str | None:
+    """Return in what two signatures differ for a team of any size: the first entry by name; None where in nothing."""
+    one, other = one.bare(), other.bare()
+    for name in sorted({*one.observation, *other.observation}):
+        if one.observation.get(name) != other.observation.get(name):
+            return f"observation {name}".strip()
+    return next(
+        (name for name in ("state", "actions", "roles", "agencies") if getattr(one, name) != getattr(other, name)), None
+    )
+
+
+def joint(signatures: Sequence[Signature]) -> Signature:
+    """Return the signature of a team that plays in several kinds of worlds, which differ in the team's size at most.
+
+    What a channel can hold is told where it is the same in all of them; else it can hold anything.
+    """
+    first = signatures[0]
+    return first._replace(
+        observation={name: _joint([each.observation[name] for each in signatures]) for name in first.observation},
+        state=_joint([each.state for each in signatures]),
+    )
+
+
+def _joint(entries: Sequence[Entry]) -> Entry:
+    if not all(each.content for each in entries):
+        return entries[0]._replace(content=())
+    told = zip(*(each.content for each in entries), strict=True)
+    return entries[0]._replace(content=tuple(each[0] if len(set(each)) == 1 else None for each in told))

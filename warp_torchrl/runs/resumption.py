@@ -9,10 +9,12 @@ from typing import Any
 
 import yaml
 
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import plain
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.config.groups import COMPONENTS
 from warp_torchrl.config.renamed import renamed_values
-from warp_torchrl.config.run_config import COMPONENTS, RunConfig, run_config
+from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.config.saved_config import SavedConfig, restore
 from warp_torchrl.runs.checkpoint import Checkpoint, newest
 

@@ -3,8 +3,9 @@
 What differs between algorithms is a field of ``Learner``. Every process of a run learns from its share of the worlds.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import zip_longest
 from typing import Any
 
 import torch
@@ -16,9 +17,10 @@ from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.collection.cloning import clone
 from warp_torchrl.collection.guidance import guided
 from warp_torchrl.collection.kickstarting import kickstart
+from warp_torchrl.collection.running import Collection
 from warp_torchrl.config.run_config import RunConfig
-from warp_torchrl.config.seeds import first_world_seed
 from warp_torchrl.demonstrations.acts import demonstrations
+from warp_torchrl.env import WildfireEnv
 from warp_torchrl.runs import former
 from warp_torchrl.runs.checkpoint import Checkpoint
 from warp_torchrl.runs.transfer import actor_parameters, learned_parameters
@@ -26,7 +28,7 @@ from warp_torchrl.training.course import course
 from warp_torchrl.training.finite import FiniteSteps, NumericalFailure
 from warp_torchrl.training.progress import TRAIN_COLUMNS, episode_columns
 from warp_torchrl.training.recorded import RecordedUpdate
-from warp_torchrl.training.reward_scale import RewardScale
+from warp_torchrl.training.share import Played, Share, learners, played
 from warp_torchrl.world.fast.compile import compile_function
 
 
@@ -40,21 +42,21 @@ class Learning:
     def __init__(self, run_config: RunConfig) -> None:
         torch.manual_seed(run_config.seed)  # the same in every process: all begin with the same networks
         self.run_config = run_config
-        worlds = run_config.n_worlds // parallel.size()
-        first = first_world_seed(run_config.seed) + worlds * parallel.rank()
-        self.env = run_config.make_training_env(worlds, first)
-        self.course = course(run_config, self.env)
-        learner = run_config.algorithm.build(self.env, run_config.model, run_config.collector.steps * worlds)
+        worlds = played(run_config)
+        self.course = course(run_config, worlds[0].env)
+        made = learners(run_config, worlds)
         if run_config.compile:
-            learner.terms = compile_function(learner.terms)
-        self.learner = self._imitating(learner)
+            made[0].terms = compile_function(made[0].terms)
+        made = [self._imitating(learner, each) for learner, each in zip(made, worlds, strict=True)]
+        grows = made[0].batches_grow and not run_config.graph  # a recorded update has one size
+        self.collector = run_config.collector if grows else replace(run_config.collector, grows_at=0.0)
+        self.shares = [
+            Share(each, learner, self.collector, run_config) for learner, each in zip(made, worlds, strict=True)
+        ]
+        """One for each kind of worlds."""
         self._steps = FiniteSteps(self.learner.optimizer)
         if run_config.graph:
-            self._update = RecordedUpdate(self._update, self.learner.optimizer)  # type: ignore[method-assign]
-        self.reward_scale = RewardScale(run_config.reward.gamma) if run_config.reward.normalise else None
-        grows = self.learner.batches_grow and not run_config.graph  # a recorded update has one size
-        self.collector = run_config.collector if grows else replace(run_config.collector, grows_at=0.0)
-        self.collection = self.collector.open(self.env, self.learner, run_config.make_training_env, first)
+            self._update = RecordedUpdate(self._update, self.learner.optimizer)  # type: ignore[method-assign, assignment]
         self.frames = 0
         self._schedule()
         self.last_batch = self.frames_per_batch
@@ -64,44 +66,60 @@ class Learning:
         if parallel.rank():
             torch.manual_seed(_seed_of_process(run_config.seed, parallel.rank()))
 
-    def _imitating(self, learner: Learner) -> Learner:
-        """Return a learner that learns from the run's teacher and people too, where it has them."""
-        plan = self.run_config
-        taught = kickstart(guided(learner, plan.imitation, self.env), plan.imitation, self.env)
-        n_networks = self.env.n_agents if plan.model.sharing == "none" else 1
+    @property
+    def env(self) -> WildfireEnv:
+        """Return the worlds, of the first kind if there are several."""
+        return self.shares[0].env
+
+    @property
+    def learner(self) -> Learner:
+        """Return what learns, of the first kind of worlds if there are several: the networks are the same."""
+        return self.shares[0].learner
+
+    @property
+    def collection(self) -> Collection:
+        """Return what collects, of the first kind of worlds if there are several."""
+        return self.shares[0].collection
+
+    def _imitating(self, learner: Learner, played: Played) -> Learner:
+        """Return a learner that learns from a teacher and people too, where it has them."""
+        plan, env = self.run_config, played.env
+        whom = replace(plan.imitation, teacher=played.kind.teacher)
+        taught = kickstart(guided(learner, whom, env), whom, env)
+        n_networks = env.n_agents if plan.model.sharing == "none" else 1
         seed = _seed_of_process(plan.seed, parallel.rank())
-        return clone(taught, plan.imitation, demonstrations(plan, self.env), n_networks, seed)
+        return clone(taught, whom, demonstrations(plan, env), n_networks, seed)
 
     @property
     def frames_per_batch(self) -> int:
         """Return the frames of the current batch, of all processes."""
         return self.run_config.n_worlds * self.collector.segment * self._segments
 
-    def batches(self) -> Iterator[TensorDictBase]:
-        """Yield batches [B, T] of so many segments as are due."""
-        held: list[TensorDictBase] = []
-        for segment in self.collection:
-            if len(held) + 1 < self._segments:
-                held.append(segment.clone())  # the collector writes over it
-                continue
-            yield torch.cat([*held, segment], dim=1) if held else segment
-            held = []
+    def batches(self) -> Iterator[list[TensorDictBase]]:
+        """Yield batches [B, T] of so many segments as are due, one of each kind of worlds."""
+        collections = [iter(share.collection) for share in self.shares]
+        while True:
+            yield [self._batch(segments) for segments in collections]
 
-    def _learn(self, batch: TensorDictBase) -> dict[str, float | None]:
-        """Learn from one batch [B, T] and return its row of ``metrics.csv``."""
-        learner = self.learner
-        row, unsound = episode_columns(batch)
+    def _batch(self, segments: Iterator[TensorDictBase]) -> TensorDictBase:
+        held = [next(segments).clone() for _ in range(self._segments - 1)]  # the collector writes over them
+        return torch.cat([*held, next(segments)], dim=1) if held else next(segments)
+
+    def _learn(self, batches: Sequence[TensorDictBase]) -> dict[str, float | None]:
+        """Learn from batches [B, T], one of each kind of worlds, and return their row of ``metrics.csv``."""
+        row, unsound = episode_columns(batches, [share.name for share in self.shares])
         if self.course is not None:
-            row |= self.course.columns(batch)
+            row |= self.course.columns(batches[0])
         if unsound:
             raise NumericalFailure(f"after {self.frames} frames a reward is not finite; the last checkpoint stands")
-        if self.reward_scale is not None:
-            self.reward_scale(batch)
-        learner.store(batch)
+        for share, batch in zip(self.shares, batches, strict=True):
+            if share.reward_scale is not None:
+                share.reward_scale(batch)
+            share.learner.store(batch)
         sums: dict[str, Tensor] = {}
         updates = 0
-        for sample in learner.samples():
-            for name, value in self._update(sample).items():
+        for samples in zip_longest(*(share.learner.samples() for share in self.shares)):
+            for name, value in self._update(*samples).items():
                 sums[name] = sums.get(name, 0.0) + value
             updates += 1
         if updates:
@@ -109,38 +127,62 @@ class Learning:
         means = {name: value / updates for name, value in self._steps.read(sums, self.frames).items()}
         self.last_batch = self.frames_per_batch
         self.frames += self.last_batch
-        row["train/loss"] = sum(means[key] for key in learner.loss_keys) if updates else None
+        row["train/loss"] = sum(means[key] for key in self._loss_keys) if updates else None
         row |= dict.fromkeys(TRAIN_COLUMNS)
-        row |= {column: means.get(key) for key, column in learner.columns.items()} | self._scheduled
+        row |= {column: means.get(key) for key, column in self._columns.items()} | self._scheduled
         entropy = row["train/entropy"]
         row["train/entropy_loss"] = None if entropy is None else -entropy  # whatever its weight, as others have it
         self._schedule()
-        self.collection.refresh()
+        for share in self.shares:
+            share.collection.refresh()
         return row
+
+    @property
+    def _loss_keys(self) -> tuple[str, ...]:
+        """Return the terms of the loss, of all kinds of worlds: some may have no teacher."""
+        return tuple(dict.fromkeys(key for share in self.shares for key in share.learner.loss_keys))
+
+    @property
+    def _columns(self) -> dict[str, str]:
+        """Return the names of ``metrics.csv`` by entry of the terms, of all kinds of worlds."""
+        return {key: column for share in self.shares for key, column in share.learner.columns.items()}
 
     def _schedule(self) -> None:
         """Update the scheduled hyperparameters; their columns belong to the next row."""
         progress = min(1.0, self.frames / self.run_config.total_frames)
         if self.course is not None:
             self.course.draw(progress)
-        self._scheduled = self.learner.schedule(progress)
+        scheduled = [share.learner.schedule(progress) for share in self.shares]
+        self._scheduled = scheduled[0]
         self._segments = self.collector.segments(progress)
         """Segments of the next batch."""
 
-    def _update(self, sample: TensorDictBase) -> dict[str, Tensor]:
-        """Take one optimiser step and return the loss terms."""
-        learner = self.learner
-        terms = learner.terms(sample)
-        loss = sum(terms[key] for key in learner.loss_keys)
-        loss.backward()
+    def _update(self, *samples: TensorDictBase | None) -> dict[str, Tensor]:
+        """Take one optimiser step and return the loss terms.
+
+        Args:
+            samples: One of each kind of worlds; None of those that have no more.
+        """
+        learner, total = self.learner, torch.zeros((), device=self.env.device)
+        found: dict[str, Tensor] = {}
+        for share, sample in zip(self.shares, samples, strict=True):
+            if sample is None:
+                continue
+            terms = share.learner.terms(sample)
+            loss = share.weight * sum(terms[key] for key in share.learner.loss_keys)
+            loss.backward()
+            total = total + loss.detach()
+            for name in {*share.learner.loss_keys, *share.learner.columns} & set(terms.keys()):
+                found[name] = found.get(name, 0.0) + share.weight * terms[name].detach().mean()
         trained = [each.grad for each in learner.loss.parameters() if each.grad is not None]
-        parallel.mean_([*trained, total := loss.detach().clone()])
+        parallel.mean_([*trained, total])
         norm = torch.nn.utils.clip_grad_norm_(learner.loss.parameters(), learner.max_grad_norm)
         self._steps.take(total, norm, self.frames)
         learner.optimizer.zero_grad()
-        learner.after_step(sample)
-        wanted = {*learner.loss_keys, *learner.columns} & set(terms.keys())
-        return {name: terms[name].detach().mean() for name in wanted}
+        for share, sample in zip(self.shares, samples, strict=True):
+            if sample is not None:
+                share.learner.after_step(sample)
+        return found
 
     def start_from(self, found: Checkpoint) -> None:
         """Load another run's networks and value normalisation; everything else starts anew.
@@ -169,11 +211,10 @@ class Learning:
     def _own(self) -> dict[str, Any]:
         """Return what differs from process to process."""
         return {
-            "keeps": {name: each.state_dict() for name, each in self.learner.keeps.items()},
+            **self.shares[0].state_dict(),
+            **({"shares": [share.state_dict() for share in self.shares[1:]]} if len(self.shares) > 1 else {}),
             "random": torch.get_rng_state(),
             "random_cuda": torch.cuda.get_rng_state(self.env.device) if self.env.device.type == "cuda" else None,
-            "collection": self.collection.state_dict(),
-            "reward_scale": {} if self.reward_scale is None else self.reward_scale.state_dict(),
         }
 
     def _restore(self, state: Mapping[str, Any]) -> None:
@@ -194,11 +235,8 @@ class Learning:
         self._schedule()
 
     def _restore_own(self, state: Mapping[str, Any]) -> None:
-        for name, each in self.learner.keeps.items():
-            each.load_state_dict(state["keeps"][name])
-        self.collection.load_state_dict(state["collection"])
-        if self.reward_scale is not None:
-            self.reward_scale.load_state_dict(state["reward_scale"])
+        for share, its in zip(self.shares, [state, *state.get("shares", ())], strict=True):
+            share.load_state_dict(its)
         torch.set_rng_state(state["random"])
         if state.get("random_cuda") is not None:
             torch.cuda.set_rng_state(state["random_cuda"], self.env.device)
@@ -214,11 +252,13 @@ class Learning:
         if begun["others"] is not None:
             self._restore_own(begun["others"][parallel.rank() - 1])
         elif self.frames:  # saved when this process had ended
-            self.collection.start_anew(self.frames // self.run_config.n_worlds)
+            for share in self.shares:
+                share.collection.start_anew(self.frames // self.run_config.n_worlds)
 
     def close(self) -> None:
-        """Shut the collector down."""
-        self.collection.close()
+        """Shut the collectors down."""
+        for share in self.shares:
+            share.collection.close()
 
 
 def _seed_of_process(seed: int, rank: int) -> int:

@@ -5,7 +5,7 @@ Every process of a run goes through it with its share of the worlds; the first o
 
 import logging
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from copy import deepcopy
 from pathlib import Path
@@ -100,8 +100,8 @@ class Training(Learning):
         if notice is not None and self.frames < total and self.is_first:
             log.log(logging.WARNING if total < self.frames_per_batch else logging.INFO, notice)
         self._began = time.perf_counter() - self.seconds
-        for batch in self.batches() if self.frames < total else ():
-            row = self._learn(batch)
+        for batches in self.batches() if self.frames < total else ():
+            row = self._learn(batches)
             if tracker is not None and bar is not None:
                 self._report(row, tracker, bar)
             if self.frames >= total:
@@ -138,9 +138,9 @@ class Training(Learning):
             self._next_line = self.seconds + _SECONDS_BETWEEN_LINES
             log.info(line(row, total))
 
-    def _learn(self, batch: TensorDictBase) -> dict[str, float | None]:
-        row = super()._learn(batch)
-        return row | {"evaluation/saved": self._evaluate() if self.is_first else None}
+    def _learn(self, batches: Sequence[TensorDictBase]) -> dict[str, float | None]:
+        row = super()._learn(batches)
+        return row | (self._evaluate() if self.is_first else {"evaluation/saved": None})
 
     def _save_alone(self) -> None:
         """Save without the processes that may have ended: on resume their worlds start new episodes."""
@@ -162,12 +162,18 @@ class Training(Learning):
             before, total, 100.0 * self.frames / total, f", {columns}" if columns else "",
         )  # fmt: skip
 
-    def _evaluate(self) -> float | None:
-        plan = self.run_config.evaluation
+    def _evaluate(self) -> dict[str, float | None]:
+        """Return the columns of an evaluation on the way: the share saved, and of each kind if there are several."""
+        plan, kinds = self.run_config.evaluation, self.run_config.kinds
+        names = ["saved"] if len(kinds) == 1 else ["saved", *(f"saved_{kind.name}" for kind in kinds)]
         if not plan.interval or not passes(plan.interval, self.frames, self.last_batch):
-            return None
-        env = self.run_config.make_env(plan.episodes, plan.first_seed)
-        return float(play(env, self.learner.policy, plan.first_seed)["saved"].mean())
+            return {f"evaluation/{name}": None for name in names}
+        saved = []
+        for kind in kinds:
+            env = self.run_config.make_env(plan.episodes, plan.first_seed, world=kind.world)
+            saved.append(float(play(env, self.learner.policy, plan.first_seed)["saved"].mean()))
+        values = saved if len(kinds) == 1 else [sum(saved) / len(saved), *saved]
+        return {f"evaluation/{name}": value for name, value in zip(names, values, strict=True)}
 
     def _better_mode(self) -> str:
         """Return the mode, sampled or deterministic, that does better on training seeds, see ``goal``."""
@@ -175,9 +181,11 @@ class Training(Learning):
         if chosen != "best":
             return chosen
         first = first_world_seed(self.run_config.seed)
-        env = self.run_config.make_env(min(self.run_config.evaluation.episodes, WORLDS), first)
-        aim = goal(env.world)
-        reached = {mode: play(env, self.learner.policy, first, mode)[aim].mean() for mode in MODES}
+        reached = dict.fromkeys(MODES, 0.0)
+        for kind in self.run_config.kinds:
+            env = self.run_config.make_env(min(self.run_config.evaluation.episodes, WORLDS), first, world=kind.world)
+            for mode in MODES:
+                reached[mode] += float(play(env, self.learner.policy, first, mode)[goal(env.world)].mean())
         return max(reached, key=reached.__getitem__)
 
     def save(self) -> Path | None:

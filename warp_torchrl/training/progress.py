@@ -1,9 +1,10 @@
 """The rows of ``metrics.csv`` and the lines of the log."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import torch
 from tensordict import TensorDictBase
+from torch import Tensor
 
 from warp_torchrl import parallel
 from warp_torchrl.env.metrics import FLYING, SAVED_BY, WATCHING
@@ -24,22 +25,42 @@ TRAIN_COLUMNS = (
 """Columns of ``metrics.csv`` that every run has; empty where an algorithm has no value for them."""
 
 
-def episode_columns(batch: TensorDictBase) -> tuple[dict[str, float | None], int]:
-    """Return what a batch [B, T] of all processes holds, read from the device at once.
+def episode_columns(
+    batches: Sequence[TensorDictBase], kinds: Sequence[str] = ("",)
+) -> tuple[dict[str, float | None], int]:
+    """Return what batches [B, T] of all processes hold, read from the device at once.
+
+    Args:
+        batches: One of each kind of worlds.
+        kinds: Their names.
 
     Returns:
-        The mean metrics of the episodes that ended, None where none ended; and how many rewards are not finite.
+        The mean metrics of the episodes that ended, None where none ended, and the share of trees saved of each kind if
+        there are several; and how many rewards are not finite.
     """
-    done = batch["next", "done"][..., 0]
-    info = batch["next", "info"]
+    info = batches[0]["next", "info"]
     names = [*EPISODE_METRICS, *(name for name in (*WATCHING, *FLYING) if name in info.keys())]
     names += sorted(name for name in info.keys() if name.startswith(SAVED_BY))
-    unsound = (~batch["next", *REWARD].isfinite()).sum()
-    sums = [unsound, done.sum(), *(torch.where(done, info[name][..., 0], 0.0).sum() for name in names)]
-    unsound_rewards, count, *totals = parallel.sum_(torch.stack([each.double() for each in sums])).tolist()
+    of_kinds = parallel.sum_(torch.stack([_sums(batch, names) for batch in batches])).tolist()
+    unsound, count, *totals = map(sum, zip(*of_kinds, strict=True))
     means = {name: total / count if count else None for name, total in zip(names, totals, strict=True)}
     row = {"rollout/ep_rew_mean": means.pop("episode_reward"), "rollout/ep_len_mean": means.pop("episode_length")}
-    return row | {f"world/{name}": value for name, value in means.items()}, int(unsound_rewards)
+    row |= {f"world/{name}": value for name, value in means.items()}
+    if len(kinds) > 1:
+        saved = 2 + names.index("saved")
+        row |= {
+            f"mixture/saved_{kind}": sums[saved] / sums[1] if sums[1] else None
+            for kind, sums in zip(kinds, of_kinds, strict=True)
+        }
+    return row, int(unsound)
+
+
+def _sums(batch: TensorDictBase, names: Sequence[str]) -> Tensor:
+    """Return how many rewards are not finite, how many episodes ended, and the sums of their metrics, float64."""
+    done, info = batch["next", "done"][..., 0], batch["next", "info"]
+    unsound = (~batch["next", *REWARD].isfinite()).sum()
+    sums = [unsound, done.sum(), *(torch.where(done, info[name][..., 0], 0.0).sum() for name in names)]
+    return torch.stack([each.double() for each in sums])
 
 
 def line(row: Mapping[str, float | None], total: int) -> str:

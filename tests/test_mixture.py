@@ -1,0 +1,33 @@
+"""Mixtures: how many worlds each kind has."""
+
+import pytest
+
+from warp_torchrl.mixture import Kind, Mixture, apportioned
+
+
+@pytest.mark.parametrize(
+    ("shares", "count", "given"),
+    [
+        ([1.0, 1.0], 8, [4, 4]),
+        ([2.0, 1.0, 1.0], 8, [4, 2, 2]),
+        ([1.0, 1.0, 1.0], 8, [3, 3, 2]),  # quotas of 2.67: two remainders are given, the first ones of equals
+        ([5.0, 3.0, 1.0], 10, [6, 3, 1]),  # 5.56, 3.33, 1.11
+        ([100.0, 1.0, 1.0], 6, [4, 1, 1]),  # none has nothing
+        ([0.1, 0.1], 2, [1, 1]),
+    ],
+)
+def test_worlds_are_apportioned_by_largest_remainders(shares, count, given):
+    assert apportioned(shares, count) == given
+
+
+def test_fewer_worlds_than_kinds_are_refused():
+    with pytest.raises(ValueError, match="n_worlds must be at least 3, one for each kind of the mixture, got 2"):
+        apportioned([1.0, 1.0, 1.0], 2)
+
+
+def test_a_mixture_has_two_kinds_or_more():
+    for kinds, told in (({}, "none: mixture.kinds="), ({"water": {}}, "got water")):
+        with pytest.raises(ValueError, match=f"kinds must be two or more, .*{told}"):
+            Mixture(kinds=kinds)
+    with pytest.raises(ValueError, match="share must be in"):
+        Kind(scenario="water", share=0.0)

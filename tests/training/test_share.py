@@ -1,0 +1,123 @@
+"""Several kinds of worlds in one training: their seeds, weights, gradients and columns."""
+
+import pytest
+import torch
+
+from tests.training.test_loop import TINY, rows, tiny
+from warp_torchrl.config.building import run_config
+from warp_torchrl.config.compose import compose_config, plain
+from warp_torchrl.config.seeds import first_world_seed
+from warp_torchrl.models import REWARD, differing, joint, signature
+
+THREE = [
+    "mixture=several",
+    "mixture.kinds={one:{scenario:single,over:{horizon:8}},two:{scenario:skirmish,share:2,over:{horizon:8}},"
+    "large:{scenario:default,over:{horizon:8,landscape:{size:24}}}}",
+    "n_worlds=8",
+    "algorithm.minibatch_size=64",
+    "model.dtype=float32",
+]
+
+
+def gradients(training):
+    return {n: each.grad.clone() for n, each in training.learner.loss.named_parameters() if each.grad is not None}
+
+
+def test_kinds_have_their_share_of_the_worlds_and_seeds_of_their_own(tmp_path):
+    training = tiny(tmp_path, *THREE, "seed=3")
+    assert [share.name for share in training.shares] == ["one", "two", "large"]
+    assert [share.weight for share in training.shares] == [0.25, 0.5, 0.25]
+    seeds = torch.cat([share.env.seeds for share in training.shares])
+    assert seeds.tolist() == list(range(first_world_seed(3), first_world_seed(3) + 8))
+    assert [share.env.n_agents for share in training.shares] == [1, 2, 4]
+    assert len({id(share.learner.loss) for share in training.shares}) == 1
+    assert len({id(share.learner.optimizer) for share in training.shares}) == 1
+
+
+def test_the_gradient_is_the_mean_of_the_kinds_gradients_by_their_shares(tmp_path, monkeypatch):
+    training = tiny(tmp_path, *THREE, "algorithm.value_norm=false")
+    optimizer = training.learner.optimizer
+    for share, batch in zip(training.shares, next(training.batches()), strict=True):
+        share.learner.store(batch)
+    samples = [next(iter(share.learner.samples())) for share in training.shares]
+    alone = []
+    for share, sample in zip(training.shares, samples, strict=True):
+        terms = share.learner.terms(sample.clone())
+        optimizer.zero_grad()
+        sum(terms[key] for key in share.learner.loss_keys).backward()
+        alone.append(gradients(training))
+    optimizer.zero_grad()
+    monkeypatch.setattr(torch.nn.utils, "clip_grad_norm_", lambda *_: torch.ones(()))
+    monkeypatch.setattr(training._steps, "take", lambda *_: None)
+    monkeypatch.setattr(optimizer, "zero_grad", lambda: None)
+    training._update(*samples)
+    for name, found in gradients(training).items():
+        expected = 0.25 * alone[0][name] + 0.5 * alone[1][name] + 0.25 * alone[2][name]
+        assert torch.allclose(found, expected, rtol=1e-4, atol=1e-6), name
+
+
+def test_every_sample_of_every_kind_is_learned_from_once_a_pass(tmp_path):
+    training = tiny(tmp_path, *THREE, "algorithm.epochs=1")
+    for share, batch in zip(training.shares, next(training.batches()), strict=True):
+        share.learner.store(batch)
+    counts = [[len(sample) for sample in share.learner.samples()] for share in training.shares]
+    assert counts == [[16], [32], [16]]  # of 8 steps of 2, 4 and 2 worlds, in minibatches of 64 steps of all
+
+
+def test_columns_tell_what_each_kind_saves(tmp_path):
+    training = tiny(tmp_path, *THREE, "total_frames=128", "evaluation.interval=128", "evaluation.episodes=2")
+    training.train()
+    found = rows(tmp_path)[-1]
+    saved = [float(found[f"mixture/saved_{name}"]) for name in ("one", "two", "large")]
+    assert float(found["world/saved"]) == pytest.approx(0.25 * saved[0] + 0.5 * saved[1] + 0.25 * saved[2])
+    of_kinds = [float(found[f"evaluation/saved_{name}"]) for name in ("one", "two", "large")]
+    assert float(found["evaluation/saved"]) == pytest.approx(sum(of_kinds) / 3)
+    assert len(set(of_kinds)) == 3
+
+
+def test_rewards_are_normalised_kind_by_kind(tmp_path):
+    training = tiny(tmp_path, *THREE, "reward.normalise=true")
+    batches = next(training.batches())
+    expected = []
+    for batch in batches:
+        scale = type(training.shares[0].reward_scale)(training.run_config.reward.gamma)
+        scale(other := batch.clone())
+        expected.append(other["next", *REWARD])
+    training._learn(batches)
+    for batch, reward in zip(batches, expected, strict=True):
+        assert torch.equal(batch["next", *REWARD], reward)
+
+
+def test_a_network_for_several_kinds_reads_whole_what_any_of_them_can_fill():
+    def shape(scenario, *overrides):
+        plan = run_config(plain(compose_config("train", [*TINY, f"scenario={scenario}", *overrides])))
+        return signature(plan.make_env(1, 0))
+
+    ground, air, hills = shape("default"), shape("hetero"), shape("default", "landscape.relief=200.0")
+    assert differing(ground, air) is None and differing(ground, shape("default", "team.n_agents=7")) is None
+    assert differing(ground, shape("default", "observation.radius=3")) == "observation view"
+    assert joint([ground, ground]) == ground
+    both = joint([ground, air, hills])
+    for name in ("view", "picture"):
+        told = zip(*(each.observation[name].content for each in (ground, air, hills)), strict=True)
+        expected = tuple(each[0] if len(set(each)) == 1 else None for each in told)
+        assert both.observation[name].content == expected
+    assert both.observation["view"].content != ground.observation["view"].content
+
+
+def test_actors_remember_each_kind_apart(tmp_path):
+    kinds = "mixture.kinds={one:{scenario:skirmish},two:{scenario:skirmish}}"
+
+    def second_batch(name, beside):
+        (tmp_path / name).mkdir()
+        training = tiny(tmp_path / name, "mixture=several", kinds, "model.memory=8", "algorithm.minibatch_size=32")
+        (one, *rest), found = training.shares, []
+        for share in (*rest, *([one] if beside else []), *rest):
+            torch.manual_seed(0)
+            found.append(training._batch(iter(share.collection)).clone())
+        return found[-1]
+
+    alone, beside = second_batch("alone", False), second_batch("beside", True)
+    assert (alone["agents", "memory"][:, 0] != 0.0).any(), "it remembers its last batch"
+    for key in (("agents", "memory"), ("agents", "action")):
+        assert torch.equal(alone[key], beside[key])

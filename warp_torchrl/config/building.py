@@ -1,0 +1,105 @@
+"""Building a run's configuration: every component made and checked from plain values."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import fields
+from functools import partial
+from typing import Any
+
+from warp_torchrl.collection.imitation import Imitation
+from warp_torchrl.config.checkpoint_config import CheckpointConfig
+from warp_torchrl.config.composed_kinds import kinds_of_worlds
+from warp_torchrl.config.construction import ConfigError, build, construct
+from warp_torchrl.config.evaluation_config import EvaluationConfig
+from warp_torchrl.config.groups import COMMAND_KEYS, COMPONENTS, WORLD_KEYS
+from warp_torchrl.config.levels import level_worlds
+from warp_torchrl.config.run_config import RunConfig
+from warp_torchrl.nearest import did_you_mean
+from warp_torchrl.world.world import World
+
+
+def run_config(config: Mapping[str, Any]) -> RunConfig:
+    """Check a composed configuration and build what it describes.
+
+    Raises:
+        ConfigError: With key, value and rule.
+    """
+    known = {each.name for each in fields(RunConfig)} | {*COMPONENTS, *WORLD_KEYS, *COMMAND_KEYS}
+    for key in config:
+        if key not in known:
+            has = f"it has {', '.join(sorted(known - {'world', 'make_levels', 'make_kinds'}))}"
+            raise ConfigError(f"{key} is not a key of the configuration; {has}{did_you_mean(key, known)}")
+    for key in COMPONENTS:
+        if key not in config:
+            raise ConfigError(f"{key} must be given")
+    built = build_components(config)
+    parts = {"checkpoint": CheckpointConfig, "evaluation": EvaluationConfig, "imitation": Imitation}
+    built |= {name: construct(kind, config.get(name, {}), name) for name, kind in parts.items()}
+    built["make_levels"] = partial(level_worlds, config, built, WORLD_KEYS)
+    built["make_kinds"] = partial(kinds_of_worlds, config, teacher=built["imitation"].teacher)
+    values = _chosen(RunConfig, {**config, **built})
+    _check_together(config)
+    made = construct(RunConfig, values, "")
+    with _in_section("algorithm"):
+        made.algorithm.check_batch(made.n_worlds * made.collector.steps)
+    with _in_section("model"):
+        made.algorithm.check_model(made.model)
+    with _in_section("collector"):
+        made.collector.check_worlds(made.n_worlds)
+    with _in_section("imitation"):
+        made.imitation.check_fits(made.algorithm, made.collector, made.model)
+    return made
+
+
+@contextmanager
+def _in_section(section: str) -> Iterator[None]:
+    """Let a mistake name the section of the configuration that it is in."""
+    try:
+        yield
+    except ValueError as error:
+        raise ConfigError(f"{section}.{error}") from None
+
+
+def build_components(config: Mapping[str, Any], names: Sequence[str] = COMPONENTS) -> dict[str, Any]:
+    """Build components of a composed configuration, and the ``world`` of those that make one.
+
+    Args:
+        config: As plain values.
+        names: Which; those of the world must be among them.
+
+    Raises:
+        ConfigError: With key, value and rule.
+    """
+    first = ("model",) if "model" in names else ()  # whose messages are the team's: mistakes are told of the model
+    built = {name: build(config[name], name) for name in dict.fromkeys((*first, *names))}
+    world = construct(World, _chosen(World, {**config, **built}), "")
+    if "reward" in built:
+        try:
+            built["reward"].check_world(world)
+        except ValueError as error:
+            raise ConfigError(str(error)) from None
+    return {**built, "world": world}
+
+
+def _chosen(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return those values that are fields of a dataclass."""
+    return {each.name: values[each.name] for each in fields(kind) if each.name in values}
+
+
+def _check_together(config: Mapping[str, Any]) -> None:
+    reward, algorithm = config["reward"], config["algorithm"]
+    model, radio = config["model"]["messages"], config["team"]["radio"]["carries"]
+    if model in ("graph", "both") and radio not in ("graph", "both"):
+        raise ConfigError(
+            f"team.radio.carries must be graph or both where networks talk, model.messages={model}, got {radio}"
+        )
+    mixer, cooperation = algorithm.get("mixer", "none"), reward.get("cooperation", 1.0)
+    if mixer != "none" and cooperation != 1.0:
+        raise ConfigError(
+            f"reward.cooperation must be 1 where the team has one value, algorithm.mixer={mixer}, got {cooperation}"
+        )
+    if reward["shaping"] > 0.0 and reward["gamma"] != algorithm["gamma"]:
+        raise ConfigError(
+            f"reward.gamma must be algorithm.gamma, {algorithm['gamma']}, for shaping to leave optimal policies as "
+            f"they are, got {reward['gamma']}"
+        )

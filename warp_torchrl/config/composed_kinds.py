@@ -1,0 +1,60 @@
+"""The worlds of a mixture's kinds: scenarios of ``conf/scenario``, with what differs."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from warp_torchrl.collection.imitation import TEACHERS
+from warp_torchrl.config.compose import OPTION, compose_config, plain
+from warp_torchrl.config.construction import ConfigError, build, construct
+from warp_torchrl.config.groups import COMPONENTS, WORLD_KEYS
+from warp_torchrl.config.kinds import KindOfWorld
+from warp_torchrl.dotted import dotted
+from warp_torchrl.mixture import Kind, Mixture
+from warp_torchrl.nearest import did_you_mean
+from warp_torchrl.world.world import World
+
+
+def kinds_of_worlds(config: Mapping[str, Any], mixture: Mixture, teacher: str | None) -> list[KindOfWorld]:
+    """Return the kinds of a mixture, built.
+
+    Args:
+        config: Composed, as plain values: what the team's radio carries is the run's in every kind.
+        mixture: Names them.
+        teacher: Of kinds that name none.
+
+    Raises:
+        ConfigError: If a kind has an unknown key or scenario, an override that changes no world, or a value that breaks
+            a rule.
+    """
+    found = []
+    for name, node in mixture.kinds.items():
+        where = f"mixture.kinds.{name}"
+        kind = construct(Kind, {"scenario": name, **(node or {})}, where)
+        taught_by = kind.teacher or teacher
+        if taught_by is not None and taught_by not in TEACHERS:
+            hint = did_you_mean(taught_by, TEACHERS)
+            raise ConfigError(f"{where}.teacher must be null or one of {', '.join(TEACHERS)}, got {taught_by}{hint}")
+        try:
+            world = _world(config, kind)
+        except ConfigError as error:
+            raise ConfigError(f"{where}: {error}") from None
+        found.append(KindOfWorld(name=name, world=world, share=kind.share, teacher=taught_by))
+    return found
+
+
+def _written(value: Any) -> str:
+    """Return a value in the grammar of the command line."""
+    return value if isinstance(value, str) and OPTION.fullmatch(value) else json.dumps(value)
+
+
+def _world(config: Mapping[str, Any], kind: Kind) -> World:
+    for key in kind.over:
+        if key not in WORLD_KEYS or key == "scenario":
+            raise ConfigError(f"over must name keys of the worlds, {', '.join(WORLD_KEYS[1:])}, got {key}")
+    overrides = [f"{key}={_written(value)}" for key, value in dotted(kind.over).items()]
+    values = plain(compose_config("train", [f"scenario={kind.scenario}", *overrides]))
+    values["team"]["radio"]["carries"] = config["team"]["radio"]["carries"]
+    groups = [name for name in WORLD_KEYS if name in COMPONENTS]
+    parts = {**values, **{name: build(values[name], name) for name in groups}}
+    return construct(World, {name: parts[name] for name in WORLD_KEYS if name != "scenario"}, "")

@@ -1,0 +1,88 @@
+"""The shares of a training: what it plays of each kind of worlds, and learns of that."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from warp_torchrl import parallel
+from warp_torchrl.algorithms.learner import Learner
+from warp_torchrl.collection.collectors import InProcess
+from warp_torchrl.collection.running import Collection
+from warp_torchrl.config.kinds import KindOfWorld
+from warp_torchrl.config.run_config import RunConfig
+from warp_torchrl.config.seeds import first_world_seed
+from warp_torchrl.env import WildfireEnv
+from warp_torchrl.models import joint, signature
+from warp_torchrl.training.reward_scale import RewardScale
+
+
+@dataclass(frozen=True, kw_only=True)
+class Played:
+    """The worlds of one kind that this process plays.
+
+    Attributes:
+        kind: Their rules.
+        env: The worlds.
+        first_seed: Of the first.
+        weight: Their share of this process's worlds.
+    """
+
+    kind: KindOfWorld
+    env: WildfireEnv
+    first_seed: int
+    weight: float
+
+
+def played(plan: RunConfig) -> list[Played]:
+    """Return what this process plays: the worlds of each kind, with seeds one after the other."""
+    worlds = plan.n_worlds // parallel.size()
+    seed, found = first_world_seed(plan.seed) + worlds * parallel.rank(), []
+    for kind, count in zip(plan.kinds, plan.worlds_of_kinds(worlds), strict=True):
+        env = plan.make_training_env(count, seed, kind.world)
+        found.append(Played(kind=kind, env=env, first_seed=seed, weight=count / worlds))
+        seed += count
+    return found
+
+
+def learners(plan: RunConfig, played: Sequence[Played]) -> list[Learner]:
+    """Return a learner for each kind of worlds; all have the same networks, loss and optimiser."""
+    frames = [plan.collector.steps * each.env.batch_size[0] for each in played]
+    first, model = played[0], plan.model
+    if len(played) == 1:
+        return [plan.algorithm.build(first.env, model, frames[0])]
+    shape = joint([signature(each.env) for each in played])
+    made = plan.algorithm.build(first.env, model, frames[0], shape, first.weight)
+    further = zip(played[1:], frames[1:], strict=True)
+    return [made, *(plan.algorithm.beside(made, its.env, model, count, shape, its.weight) for its, count in further)]
+
+
+class Share:
+    """What this process plays of one kind of worlds, and learns of that.
+
+    Args:
+        played: The worlds.
+        learner: Learns of them.
+        collector: Says how they are played.
+        plan: Of the training.
+    """
+
+    def __init__(self, played: Played, learner: Learner, collector: InProcess, plan: RunConfig) -> None:
+        self.name, self.env, self.weight, self.learner = played.kind.name, played.env, played.weight, learner
+        self.reward_scale = RewardScale(plan.reward.gamma) if plan.reward.normalise else None
+        self.collection: Collection = collector.open(played.env, learner, plan.make_training_env, played.first_seed)
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return everything that an exact resume needs of it."""
+        return {
+            "keeps": {name: each.state_dict() for name, each in self.learner.keeps.items()},
+            "collection": self.collection.state_dict(),
+            "reward_scale": {} if self.reward_scale is None else self.reward_scale.state_dict(),
+        }
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Restore what ``state_dict`` returned."""
+        for name, each in self.learner.keeps.items():
+            each.load_state_dict(state["keeps"][name])
+        self.collection.load_state_dict(state["collection"])
+        if self.reward_scale is not None:
+            self.reward_scale.load_state_dict(state["reward_scale"])
