@@ -28,9 +28,7 @@ def test_a_kind_is_its_scenario_with_what_differs():
 
 
 def test_a_kind_may_have_another_name_than_its_scenario():
-    plan = planned(
-        "mixture=several", "mixture.kinds={a:{scenario:default},b:{scenario:default,over:{steps_per_tick:9}}}"
-    )
+    plan = planned("mixture=several", "mixture.kinds={a:{scenario:default},b:{scenario:default,over:{horizon:9}}}")
     assert [(kind.name, kind.world.horizon) for kind in plan.kinds] == [("a", 256), ("b", 9)]
 
 
