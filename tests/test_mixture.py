@@ -2,7 +2,7 @@
 
 import pytest
 
-from warp_torchrl.mixture import Kind, Mixture, apportioned
+from warp_torchrl.mixture import Kind, apportioned
 
 
 @pytest.mark.parametrize(
@@ -25,9 +25,6 @@ def test_fewer_worlds_than_kinds_are_refused():
         apportioned([1.0, 1.0, 1.0], 2)
 
 
-def test_a_mixture_has_two_kinds_or_more():
-    for kinds, told in (({}, "none: mixture.kinds="), ({"water": {}}, "got water")):
-        with pytest.raises(ValueError, match=f"kinds must be two or more, .*{told}"):
-            Mixture(kinds=kinds)
+def test_a_kind_has_a_share():
     with pytest.raises(ValueError, match="share must be in"):
         Kind(scenario="water", share=0.0)

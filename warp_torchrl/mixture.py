@@ -41,17 +41,9 @@ class Mixture:
 
     Attributes:
         kinds: By name, each with the fields of ``Kind``; the scenario is that of the name where it is left out.
-
-    Raises:
-        ValueError: If there are fewer than two.
     """
 
     kinds: Mapping[str, Any] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        if len(self.kinds) < 2:
-            told = ", ".join(self.kinds) or "none: mixture.kinds={default: {}, water: {share: 2}}"
-            raise ValueError(f"kinds must be two or more, got {told}")
 
 
 def apportioned(shares: Sequence[float], count: int) -> list[int]:

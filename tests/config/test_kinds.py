@@ -40,6 +40,7 @@ def test_without_a_mixture_there_is_one_kind():
 @pytest.mark.parametrize(
     ("overrides", "line"),
     [
+        ([], "mixture.kinds must be two or more, got none: 'mixture.kinds={default:{},water:{share:2}}' names two"),
         (["mixture.kinds={default:{}}"], "mixture.kinds must be two or more, got default"),
         (["mixture.kinds={default:{},watr:{}}"], "mixture.kinds.watr: scenario must be one of .*did you mean water"),
         (["mixture.kinds={default:{},water:{shares:2}}"], "mixture.kinds.water.shares is not a key.*did you mean"),
