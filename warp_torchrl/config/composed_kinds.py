@@ -24,8 +24,8 @@ def kinds_of_worlds(config: Mapping[str, Any], mixture: Mixture, teacher: str | 
         teacher: Of kinds that name none.
 
     Raises:
-        ConfigError: If there are fewer than two, or a kind has an unknown key or scenario, an override that changes no world, or a value that breaks
-            a rule.
+        ConfigError: If there are fewer than two, or a kind has an unknown key or scenario, a key that is none of the
+            worlds, or a value that breaks a rule.
     """
     if len(mixture.kinds) < 2:
         told = ", ".join(mixture.kinds) or "none: 'mixture.kinds={default:{},water:{share:2}}' names two"
