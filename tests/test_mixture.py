@@ -2,7 +2,7 @@
 
 import pytest
 
-from warp_torchrl.mixture import Kind, apportioned
+from warp_torchrl.mixture import Kind, Mixture, apportioned, weights
 
 
 @pytest.mark.parametrize(
@@ -28,3 +28,20 @@ def test_fewer_worlds_than_kinds_are_refused():
 def test_a_kind_has_a_share():
     with pytest.raises(ValueError, match="share must be in"):
         Kind(scenario="water", share=0.0)
+
+
+def test_what_is_left_to_learn_weighs_by_hand():
+    """Left are 0.25 + 0.5, 0.25 + 1 where nothing is known yet, and the floor where the team is ahead."""
+    found = weights([0.5, 0.25, 0.25], [0.4, None, 0.9], [0.8, 0.6, 0.7], 0.25)
+    left = [0.5 * 0.75, 0.25 * 1.25, 0.25 * 0.25]
+    assert found == pytest.approx([each / sum(left) for each in left])
+
+
+def test_kinds_that_are_equally_far_keep_their_shares():
+    assert weights([0.7, 0.3], [0.3, 0.4], [0.6, 0.8], 0.25) == pytest.approx([0.7, 0.3])
+    assert weights([0.7, 0.3], [0.9, 0.9], [0.6, 0.8], 1e-6) == pytest.approx([0.7, 0.3])
+
+
+def test_an_unknown_baseline_is_refused():
+    with pytest.raises(ValueError, match=r"baseline must be one of .*, got gredy: did you mean greedy"):
+        Mixture(baseline="gredy")

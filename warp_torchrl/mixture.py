@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
+from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.validation import check_fields
 
 
@@ -41,9 +43,44 @@ class Mixture:
 
     Attributes:
         kinds: By name, each with the fields of ``Kind``; the scenario is that of the name where it is left out.
+        weigh: What each kind's loss counts: its ``share`` of the worlds, or what is ``left`` to learn, see ``weights``.
+        baseline: The heuristic from which what is left is told.
+        worlds: Of each kind that the baseline plays before the training.
+        floor: Of what is left, which a kind that is learned keeps.
+
+    Raises:
+        ValueError: If a value is out of its range, or the baseline is unknown.
     """
 
     kinds: Mapping[str, Any] = field(default_factory=dict)
+    weigh: Literal["share", "left"] = "share"
+    baseline: str = "coordinated"
+    worlds: int = 64
+    floor: float = 0.25
+
+    def __post_init__(self) -> None:
+        check_fields(self, worlds=(1, 100_000), floor=(1e-6, 1e6))
+        if self.baseline not in HEURISTICS:
+            hint = did_you_mean(self.baseline, list(HEURISTICS))
+            raise ValueError(f"baseline must be one of {', '.join(HEURISTICS)}, got {self.baseline}{hint}")
+
+
+def weights(
+    shares: Sequence[float], saved: Sequence[float | None], baseline: Sequence[float], floor: float
+) -> list[float]:
+    """Return what each kind's loss counts by what is left to learn.
+
+        w_k = share_k left_k / sum_j share_j left_j,   left_k = floor + max(0, 1 - saved_k / baseline_k)
+
+    Args:
+        shares: Of the worlds, by kind.
+        saved: Shares of trees that the team saves; None where no episode has ended yet, which counts as 0.
+        baseline: Those that the baseline saves.
+        floor: What is left at least.
+    """
+    left = [floor + max(0.0, 1.0 - (its or 0.0) / max(best, 1e-6)) for its, best in zip(saved, baseline, strict=True)]
+    whole = sum(share * its for share, its in zip(shares, left, strict=True))
+    return [share * its / whole for share, its in zip(shares, left, strict=True)]
 
 
 def apportioned(shares: Sequence[float], count: int) -> list[int]:

@@ -29,6 +29,7 @@ from warp_torchrl.training.finite import FiniteSteps, NumericalFailure
 from warp_torchrl.training.progress import TRAIN_COLUMNS, episode_columns
 from warp_torchrl.training.recorded import RecordedUpdate
 from warp_torchrl.training.share import Played, Share, learners, played
+from warp_torchrl.training.weighing import weighing
 from warp_torchrl.world.fast.compile import compile_function
 
 
@@ -54,6 +55,7 @@ class Learning:
             Share(each, learner, self.collector, run_config) for learner, each in zip(made, worlds, strict=True)
         ]
         """One for each kind of worlds."""
+        self.weighing = weighing(run_config, [share.weight for share in self.shares])
         self._steps = FiniteSteps(self.learner.optimizer)
         if run_config.graph:
             self._update = RecordedUpdate(self._update, self.learner.optimizer)  # type: ignore[method-assign, assignment]
@@ -110,6 +112,8 @@ class Learning:
         row, unsound = episode_columns(batches, [share.name for share in self.shares])
         if self.course is not None:
             row |= self.course.columns(batches[0])
+        if self.weighing is not None:
+            row |= self.weighing.columns(row)
         if unsound:
             raise NumericalFailure(f"after {self.frames} frames a reward is not finite; the last checkpoint stands")
         for share, batch in zip(self.shares, batches, strict=True):
@@ -152,6 +156,9 @@ class Learning:
         progress = min(1.0, self.frames / self.run_config.total_frames)
         if self.course is not None:
             self.course.draw(progress)
+        if self.weighing is not None:
+            for share, weight in zip(self.shares, self.weighing.weights(), strict=True):
+                share.weight = weight
         scheduled = [share.learner.schedule(progress) for share in self.shares]
         self._scheduled = scheduled[0]
         self._segments = self.collector.segments(progress)
@@ -205,6 +212,7 @@ class Learning:
             "optimizer": self.learner.optimizer.state_dict(),
             **self._own(),
             **({} if self.course is None else {"curriculum": self.course.state_dict()}),
+            **({} if self.weighing is None else {"weighing": self.weighing.state_dict()}),
             "frames": self.frames,
         }
 
@@ -232,6 +240,8 @@ class Learning:
         self.frames = int(state["frames"])
         if self.course is not None:
             self.course.load_state_dict(state["curriculum"])
+        if self.weighing is not None:
+            self.weighing.load_state_dict(state["weighing"])
         self._schedule()
 
     def _restore_own(self, state: Mapping[str, Any]) -> None:

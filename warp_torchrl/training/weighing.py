@@ -1,0 +1,70 @@
+"""How much the losses of a mixture's kinds count in a training, by what is left to learn."""
+
+import logging
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from warp_torchrl.config.run_config import RunConfig
+from warp_torchrl.config.seeds import first_world_seed
+from warp_torchrl.evaluation.play import play_heuristics
+from warp_torchrl.mixture import Mixture, weights
+
+log = logging.getLogger("warp_torchrl")
+
+_MEMORY = 0.8
+"""Share of what was saved before in what is taken for saved after a batch."""
+
+
+class Weighing:
+    """What each kind counts, by what the team saves of it and what a baseline does.
+
+    Args:
+        mixture: Says how.
+        names: Of the kinds.
+        shares: Of the worlds.
+        baseline: Shares of trees that the baseline saves.
+    """
+
+    def __init__(
+        self, mixture: Mixture, names: Sequence[str], shares: Sequence[float], baseline: Sequence[float]
+    ) -> None:
+        self.mixture, self.names, self.shares, self.baseline = mixture, names, shares, tuple(baseline)
+        self.saved: list[float | None] = [None for _ in shares]
+        """Running means of the shares of trees that the team saves in episodes that end."""
+
+    def weights(self) -> list[float]:
+        """Return the weight of each kind; they add up to 1."""
+        return weights(self.shares, self.saved, self.baseline, self.mixture.floor)
+
+    def columns(self, row: Mapping[str, float | None]) -> dict[str, float | None]:
+        """Return the columns of the weights by which a batch was learned, and learn what was saved from its row."""
+        found: dict[str, float | None] = {
+            f"mixture/weight_{name}": weight for name, weight in zip(self.names, self.weights(), strict=True)
+        }
+        for at, name in enumerate(self.names):
+            before, now = self.saved[at], row[f"mixture/saved_{name}"]
+            if now is not None:
+                self.saved[at] = now if before is None else _MEMORY * before + (1.0 - _MEMORY) * now
+        return found
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return what was saved, and what the baseline saves."""
+        return {"saved": list(self.saved), "baseline": list(self.baseline)}
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Restore what ``state_dict`` returned."""
+        self.saved, self.baseline = list(state["saved"]), tuple(state["baseline"])
+
+
+def weighing(plan: RunConfig, shares: Sequence[float]) -> Weighing | None:
+    """Return how a run weighs its kinds, for which the baseline plays first; None where their shares stand."""
+    if not isinstance(plan.mixture, Mixture) or plan.mixture.weigh == "share":
+        return None
+    first, name, reached = first_world_seed(plan.seed), plan.mixture.baseline, []
+    for kind in plan.kinds:
+        env = plan.make_env(plan.mixture.worlds, first, world=kind.world)
+        reached.append(float(play_heuristics(env, first, (name,))[name]["saved"].mean()))
+    names = [kind.name for kind in plan.kinds]
+    told = ", ".join(f"{kind} {value:.3f}" for kind, value in zip(names, reached, strict=True))
+    log.info("mixture: %s saves of each kind: %s", name, told)
+    return Weighing(plan.mixture, names, shares, reached)
