@@ -32,6 +32,18 @@ def test_a_kind_may_have_another_name_than_its_scenario():
     assert [(kind.name, kind.world.horizon) for kind in plan.kinds] == [("a", 256), ("b", 9)]
 
 
+def test_a_kind_has_what_the_radio_of_the_run_carries():
+    plan = planned("mixture=several", TWO, "model.messages=graph")
+    assert [kind.world.team.radio.carries for kind in plan.kinds] == ["graph", "graph"]
+
+
+def test_all_has_kinds_that_one_team_can_play():
+    plan = planned("mixture=all", "n_worlds=64", "imitation.teacher=coordinated")
+    plan.check_training()
+    assert {"water", "ring", "hazard", "sixteen"} <= {kind.name for kind in plan.kinds}
+    assert {kind.world.team.n_agents for kind in plan.kinds} >= {1, 2, 4, 6, 8, 16}
+
+
 def test_without_a_mixture_there_is_one_kind():
     (kind,) = planned("scenario=default", "imitation.teacher=greedy").kinds
     assert (kind.name, kind.world.team.n_agents, kind.teacher) == ("default", 4, "greedy")

@@ -1,7 +1,7 @@
 """Measures speed, calibrates scenarios and checks fires: ``python -m warp_torchrl.benchmark WHAT``.
 
-WHAT is tick, env, train, scaling, tasks, rewards, fires or ellipses; several are measured one after the other. Alone,
-gpu measures all that a card is asked, in under five minutes, and writes it to a file.
+WHAT is tick, env, train, scaling, tasks, rewards, generalist, fires or ellipses; several are measured one after the
+other. Alone, gpu measures all that a card is asked, in under five minutes, and writes it to a file.
 """
 
 import argparse
@@ -17,6 +17,7 @@ import torch
 
 from warp_torchrl.benchmark.environments import LARGE, environment_speed, rate_table
 from warp_torchrl.benchmark.fires import ellipse_errors, fire_table, law_times
+from warp_torchrl.benchmark.generalist import PLACES, generalise, generalist_table, on_ground
 from warp_torchrl.benchmark.gpu import SMALL, Size, measure_gpu
 from warp_torchrl.benchmark.growth_figure import draw_growth
 from warp_torchrl.benchmark.machine import header, machine, peak_memory
@@ -35,6 +36,7 @@ from warp_torchrl.benchmark.ticks import tick_cost, tick_table
 from warp_torchrl.benchmark.trainings import training_speed
 from warp_torchrl.commands.allocation import keep_freed_memory
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.runs.checkpoint import CheckpointError
 
 Rows = list[dict[str, Any]]
 _WORLDS = 256
@@ -100,6 +102,16 @@ def _rewards(options: Namespace) -> dict[str, Rows]:
     return {"rewards": [rank_rewards(name, options.device, options.episodes, options.set) for name in names]}
 
 
+def _generalist(options: Namespace) -> dict[str, Rows]:
+    groups = PLACES if options.ground is None else {**PLACES, "ground": on_ground(options.ground)}
+    unknown = [name for name in options.places or () if name not in groups]
+    if unknown:
+        needs = ", which needs --ground" if unknown[0] == "ground" else ""
+        raise ConfigError(f"places must be of {', '.join(groups)}, got {unknown[0]}{needs}")
+    places = [place for name in options.places or groups for place in groups[name]]
+    return {"generalist": list(generalise(options.policy, places, options.device, options.episodes, options.set))}
+
+
 def _fires(options: Namespace) -> dict[str, Rows]:
     return {"fires": law_times(options.fires)}
 
@@ -115,6 +127,7 @@ _MEASURES = {
     "scaling": _scaling,
     "tasks": _tasks,
     "rewards": _rewards,
+    "generalist": _generalist,
     "fires": _fires,
     "ellipses": _ellipses,
 }
@@ -126,6 +139,7 @@ _TABLES = {
     "scaling": growth_table,
     "tasks": task_table,
     "rewards": reward_table,
+    "generalist": generalist_table,
     "fires": fire_table,
     "ellipses": fire_table,
 }
@@ -147,6 +161,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--no-compile", action="store_true", help="for tick and env: leave what is compiled out")
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="for scaling: draw it too")
     parser.add_argument("--episodes", type=int, default=EPISODES)
+    parser.add_argument("--policy", default="default", help="for generalist: a run folder, or a shipped policy")
+    parser.add_argument("--places", nargs="+", metavar="GROUP", help=f"for generalist: {', '.join(PLACES)}, ground")
+    parser.add_argument("--ground", metavar="FOLDER", help="for generalist: rasters, for places on real ground")
     parser.add_argument("--fires", type=int, default=1000, help="for fires: how many of each law")
     parser.add_argument("--reach", type=int, default=60, help="for ellipses: cells that the heads go")
     parser.add_argument("--device", help="cpu by default; for gpu cuda, and cpu shows in small that it runs")
@@ -185,7 +202,7 @@ def main(arguments: list[str] | None = None) -> None:
     for each in options.what or ["env", "train"]:
         try:
             sections = _MEASURES[each](options)
-        except ConfigError as error:
+        except (ConfigError, CheckpointError) as error:
             parser.exit(2, f"error: {error}\n")
         found |= sections
         for name, rows in sections.items() if not options.json else ():

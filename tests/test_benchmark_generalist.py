@@ -1,0 +1,68 @@
+"""One policy on every kind of fire, beside the best baseline of each."""
+
+import json
+
+import numpy as np
+import pytest
+
+from warp_torchrl import load_policy, make_env
+from warp_torchrl.benchmark import __main__ as command
+from warp_torchrl.benchmark.generalist import PLACES, Place, generalist_table, on_ground
+from warp_torchrl.config.compose import compose_config
+from warp_torchrl.evaluation.play import play, play_heuristics
+from warp_torchrl.evaluation.statistics import compare, summarise
+
+SMALL = ["horizon=12", "landscape.size=12"]
+TWO = {"scenarios": (Place("skirmish", "skirmish"), Place("windy", "skirmish", ("wind.speed=9",)))}
+
+
+def test_a_row_is_the_policy_beside_the_best_baseline_on_the_same_fires(capsys, monkeypatch):
+    monkeypatch.setattr(command, "PLACES", TWO)
+    monkeypatch.setattr("warp_torchrl.benchmark.generalist.GENERAL", ("noop", "coordinated"))
+    command.main(["generalist", "--policy", "skirmish", "--episodes", "4", "--json", "--set", *SMALL])
+    rows = json.loads(capsys.readouterr().out)["generalist"]
+    assert [row["place"] for row in rows] == ["skirmish", "windy"]
+    policy = load_policy("skirmish")
+    for row, more in zip(rows, ((), ("wind.speed=9",)), strict=True):
+        env = make_env("skirmish", n_worlds=4, seed=1_000_000, overrides=[*policy.overrides, *more, *SMALL])
+        own = play(env, policy, 1_000_000, policy.mode)["saved"]
+        others = play_heuristics(env, 1_000_000, ("noop", "coordinated"))
+        best = max(others, key=lambda name: others[name]["saved"].mean())
+        assert row["baseline"] == best
+        assert row["policy"]["mean"] == pytest.approx(own.mean())
+        assert row["difference"]["saved_difference"] == pytest.approx((own - others[best]["saved"]).mean())
+    assert rows[0]["policy"] != rows[1]["policy"]
+
+
+def test_the_table_counts_where_the_policy_is_surely_ahead_and_behind():
+    saved = np.linspace(0.5, 0.7, 20)
+
+    def row(place, own):
+        found = {"policy": summarise(own), "baseline": "ring", "best": summarise(saved)}
+        return {"place": place, "episodes": 20, **found, "difference": compare(own, saved)}
+
+    noise = np.where(np.arange(20) % 2, 0.1, -0.1)
+    text = generalist_table([row("a", saved + 0.1), row("b", saved - 0.2), row("c", saved + noise)])
+    assert "| a | 70.0 (" in text and "| ring | 60.0 (" in text and "| +10.0 (+10.0 .. +10.0) |" in text
+    assert text.endswith("Ahead of the best baseline, intervals apart, on 1 of 3 places, and behind it on 1.")
+
+
+@pytest.mark.parametrize(
+    "place", [place for places in PLACES.values() for place in places], ids=lambda place: place.name
+)
+def test_every_place_is_one_of_ours(place):
+    compose_config("train", [f"scenario={place.scenario}", *place.overrides])
+
+
+def test_places_on_real_ground_need_a_folder(capsys):
+    assert [place.overrides[0] for place in on_ground("a b")] == ["landscape.path='a b'"] * 2
+    for group, told in (("ground", "got ground, which needs --ground"), ("tems", "got tems")):
+        with pytest.raises(SystemExit, match="2"):
+            command.main(["generalist", "--places", group])
+        assert told in capsys.readouterr().err
+
+
+def test_a_policy_that_is_none_is_one_line(capsys):
+    with pytest.raises(SystemExit, match="2"):
+        command.main(["generalist", "--policy", "nowhere", "--places", "giant"])
+    assert capsys.readouterr().err.startswith("error: ")

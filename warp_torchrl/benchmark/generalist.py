@@ -1,0 +1,100 @@
+"""One policy on every kind of fire, beside the best baseline of each."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+from warp_torchrl.api import load_policy, make_env
+from warp_torchrl.benchmark.tasks import FIRST_SEED, GENERAL
+from warp_torchrl.evaluation.play import play, play_heuristics
+from warp_torchrl.evaluation.statistics import compare, summarise
+
+
+class Place(NamedTuple):
+    """Where a policy is played: a scenario with what differs from it.
+
+    Attributes:
+        name: Of its row.
+        scenario: One of ``conf/scenario``.
+        overrides: In the command line's grammar.
+    """
+
+    name: str
+    scenario: str
+    overrides: tuple[str, ...] = ()
+
+
+SCENARIOS = tuple(
+    Place(name, name)
+    for name in ("skirmish", "single", "default", "large", "water", "hetero", "hazard", "shift", "ring", "lightning")
+)
+TEAMS = tuple(Place(f"default, {n} vehicles", "default", (f"team.n_agents={n}",)) for n in (1, 2, 3, 6, 12, 16))
+MAPS = tuple(
+    Place(f"default, {side} x {side} cells", "default", (f"landscape.size={side}",)) for side in (16, 24, 48, 96, 192)
+)
+WINDS = tuple(Place(f"default, {speed} m/s", "default", (f"wind.speed={speed}",)) for speed in (0, 2, 8, 12))
+GIANT = (Place("giant", "giant"),)
+
+
+def on_ground(folder: str) -> tuple[Place, ...]:
+    """Return the places on the real ground of a folder: under law ``paper``, and in metres and minutes."""
+    path = f"landscape.path='{folder}'"
+    return (Place("landfire", "landfire", (path,)), Place("landfire, fire=rate", "landfire", (path, "fire=rate")))
+
+
+PLACES = {"scenarios": SCENARIOS, "teams": TEAMS, "maps": MAPS, "winds": WINDS, "giant": GIANT}
+"""Groups of places; those on real ground need a folder."""
+
+
+def generalise(
+    path: str, places: Sequence[Place], device: str, episodes: int, overrides: Sequence[str] = ()
+) -> Iterator[dict[str, Any]]:
+    """Yield a row for each place: what the policy saves, what the best baseline does, and the paired difference.
+
+    Args:
+        path: Of a policy, or the name of a shipped one.
+        places: Where it plays.
+        device: Where the worlds live.
+        episodes: Fires, on seeds from ``FIRST_SEED`` on.
+        overrides: Further ones in all places.
+    """
+    policy = load_policy(path).to(device)
+    for place in places:
+        changes = [*policy.overrides, *place.overrides, *overrides]
+        env = make_env(place.scenario, n_worlds=episodes, seed=FIRST_SEED, device=device, overrides=changes)
+        saved = {name: found["saved"] for name, found in play_heuristics(env, FIRST_SEED, GENERAL).items()}
+        best = max(saved, key=lambda name: float(saved[name].mean()))
+        own = play(env, policy.fitted(env), FIRST_SEED, policy.mode)["saved"]
+        yield {
+            "place": place.name,
+            "episodes": episodes,
+            "policy": summarise(own),
+            "baseline": best,
+            "best": summarise(saved[best]),
+            "difference": compare(own, saved[best]),
+        }
+
+
+def generalist_table(rows: Sequence[dict[str, Any]]) -> str:
+    """Return the rows as a Markdown table, and on how many places the policy beats the best baseline."""
+    lines = [
+        f"Trees saved, %, and 95 % intervals over {rows[0]['episodes']} fires, seeds from {FIRST_SEED}; the difference "
+        "is paired by fire",
+        "",
+        "| where | policy | best baseline | | difference |",
+        "|---|---|---|---|---|",
+    ]
+    for row in rows:
+        low, high = (100 * bound for bound in row["difference"]["ci95"])
+        lines.append(
+            f"| {row['place']} | {_interval(row['policy'])} | {row['baseline']} | {_interval(row['best'])} | "
+            f"{100 * row['difference']['saved_difference']:+.1f} ({low:+.1f} .. {high:+.1f}) |"
+        )
+    ahead = sum(row["difference"]["ci95"][0] > 0.0 for row in rows)
+    behind = sum(row["difference"]["ci95"][1] < 0.0 for row in rows)
+    told = f"Ahead of the best baseline, intervals apart, on {ahead} of {len(rows)} places, and behind it on {behind}."
+    return "\n".join([*lines, "", told])
+
+
+def _interval(found: dict[str, Any]) -> str:
+    low, high = (100 * bound for bound in found["ci95"])
+    return f"{100 * found['mean']:.1f} ({low:.1f} .. {high:.1f})"
