@@ -43,7 +43,7 @@ def holds(planes, content):
 
 
 @pytest.mark.parametrize("world", WORLDS.values(), ids=WORLDS)
-@pytest.mark.parametrize("observation", [Surroundings(), Surroundings(centred=False), Local(radius=2)], ids=str)
+@pytest.mark.parametrize("observation", [Surroundings(), Surroundings(centred=False, near=3), Local(radius=2)], ids=str)
 def test_a_plane_holds_what_is_told_of_it(world, observation):
     env = WildfireEnv(small_world(**world), observation=observation, n_worlds=4)
     torch.manual_seed(0)

@@ -22,6 +22,7 @@ CHANNELS = (*DEFAULT, "last_seen")
 PRESETS = {
     "centred": Surroundings(channels=CHANNELS),
     "whole map": Surroundings(channels=CHANNELS, centred=False),
+    "near": Surroundings(channels=CHANNELS, near=2),
     "local": Local(channels=CHANNELS),
     "paper": Paper(),
 }

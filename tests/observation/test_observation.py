@@ -39,7 +39,7 @@ def channel(view, name):
     return view[0, 0, DEFAULT.index(name)]
 
 
-@pytest.mark.parametrize("observation", [Surroundings(), Surroundings(centred=False, identity=False), Paper()])
+@pytest.mark.parametrize("observation", [Surroundings(near=2), Surroundings(centred=False, identity=False), Paper()])
 def test_what_is_seen_stays_within_its_space_and_reaches_its_bounds(observation):
     steep = Perlin(size=12, relief=900.0)
     world = small_world(landscape=steep, team=Team(n_agents=6, roles=("ugv", "uav")), horizon=60)

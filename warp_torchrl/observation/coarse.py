@@ -46,9 +46,15 @@ def picture_highs(world: World) -> tuple[float, ...]:
     return tuple(255 if name != "team_mates" else 252 for name in picture_names(world))
 
 
-def picture_symmetry(centred: bool, channels: int = len(PICTURE)) -> Planes:
-    """Return how the picture turns with the map; agents turn towards its fire where their view shows none."""
-    fire = Target(PICTURE.index("fire"), order=1, near=0.5, is_share=True, in_middle=centred)
+def picture_symmetry(centred: bool, channels: int = len(PICTURE), order: int = 1) -> Planes:
+    """Return how the picture turns with the map; agents turn towards its fire where nothing of a lower order shows one.
+
+    Args:
+        centred: Whether the agent is in the middle.
+        channels: How many there are.
+        order: Of its fire among what shows fire; that of the view is 0.
+    """
+    fire = Target(PICTURE.index("fire"), order=order, near=0.5, is_share=True, in_middle=centred)
     return Planes(channels, fire)
 
 
@@ -62,23 +68,30 @@ def picture(state: WorldState, world: World, forecast: Forecast) -> Tensor:
     return torch.cat((seen[:, :, :2], mates, seen[:, :, 2:], *land), dim=2)
 
 
-def centred_picture(state: WorldState, world: World, forecast: Forecast) -> Tensor:
+def centred_picture(state: WorldState, world: World, forecast: Forecast, side: int = PICTURE_SIDE) -> Tensor:
     """Return the picture with the agent's own block in the middle, uint8 [B, A, C, 15, 15]; 0 off the map.
 
     What it tells is what ``picture`` does; where things are is told from where the agent is.
+
+    Args:
+        state: The worlds.
+        world: Their rules.
+        forecast: What the fire is about to do.
+        side: Blocks to a side of the map, of which those within seven blocks of the agent are shown.
     """
-    sides, middle = (PICTURE_SIDE, PICTURE_SIDE), PICTURE_SIDE - 1
-    maps = (_maps(state, forecast) * 255.0).to(torch.uint8).unbind(2)
-    block = _block(state, PICTURE_SIDE)
-    about = window(torch.stack((block // PICTURE_SIDE, block % PICTURE_SIDE), dim=-1), sides, middle)
-    land = [about.of_own((each * 255.0).to(torch.uint8)) for each in _land_served(state)]
+    sides, middle = (side, side), PICTURE_SIDE - 1
+    maps = (_maps(state, forecast, side) * 255.0).to(torch.uint8).unbind(2)
+    block = _block(state, side)
+    about = window(torch.stack((block // side, block % side), dim=-1), sides, middle)
+    land = [about.of_own((each * 255.0).to(torch.uint8)) for each in _land_served(state, side)]
     if state.knowledge is None:
         fire, fuel = (about.of(each[:, 0]) for each in maps)
-        mates = about.of(one_hot(block, PICTURE_SIDE**2).sum(1).view(-1, *sides))
+        counts = block.new_zeros(len(block), side**2).scatter_add_(1, block, torch.ones_like(block))
+        mates = about.of(counts.view(-1, *sides))
         mates[..., middle, middle] -= 1
         return torch.stack((fire, fuel, (mates.clamp_(max=4) * 63).to(torch.uint8), *land), dim=2)
     fire, fuel, fresh = (about.of_own(each) for each in maps)
-    places = one_hot(block, PICTURE_SIDE**2).to(torch.float32)
+    places = one_hot(block, side**2).to(torch.float32)
     mates = (world.sensing.knows_where(state, world.team).to(torch.float32) @ places).clamp_(max=4.0)
     mates = about.of_own(mates.mul_(63.0).to(torch.uint8).unflatten(-1, sides))
     return torch.stack((fire, fuel, mates, fresh, *land), dim=2)
@@ -152,10 +165,10 @@ def _elevation(elevation: Tensor | None, blocks: Tensor) -> Tensor:
     return block_means(relative, STATE_SIDE).clamp(-3.0, 3.0)
 
 
-def _maps(state: WorldState, forecast: Forecast) -> Tensor:
-    """Return fire (square root of the share that burns) and fuel in blocks, float32 [B, 1, 2, 8, 8].
+def _maps(state: WorldState, forecast: Forecast, side: int = PICTURE_SIDE) -> Tensor:
+    """Return fire (square root of the share that burns) and fuel in S x S blocks, float32 [B, 1, 2, S, S].
 
-    Where sight is limited they are what each agent knows, with how fresh that is, float32 [B, A, 3, 8, 8].
+    Where sight is limited they are what each agent knows, with how fresh that is, float32 [B, A, 3, S, S].
     """
     if state.knowledge is None:
         maps = [is_burning(state.cells)[:, None], forecast.fuel[:, None]]
@@ -163,7 +176,7 @@ def _maps(state: WorldState, forecast: Forecast) -> Tensor:
         codes = known_codes(state)
         fuel = state.alpha[:, None] * ((codes >= 1) & (codes <= OLDEST))
         maps = [codes >= FIRST_FIRE, fuel, freshness(state.knowledge, state.step)]
-    fire, *others = (block_means(each, PICTURE_SIDE) for each in maps)
+    fire, *others = (block_means(each, side) for each in maps)
     return torch.stack((fire.sqrt_(), *others), dim=2)
 
 
@@ -186,15 +199,15 @@ def _lands(state: WorldState) -> list[Tensor]:
     return [*block_means(land, STATE_SIDE).unbind(1), *serving.unflatten(-1, (STATE_SIDE, STATE_SIDE)).unbind(1)]
 
 
-def _land_served(state: WorldState) -> list[Tensor]:
-    """Return the share of each block that is of the agency that each vehicle serves, float32 [B, A, 8, 8].
+def _land_served(state: WorldState, side: int = PICTURE_SIDE) -> list[Tensor]:
+    """Return the share of each block that is of the agency that each vehicle serves, float32 [B, A, S, S].
 
     Nothing where there is but one agency.
     """
     if state.lands is None or state.vehicles.serves is None:
         return []
-    shares, serves = block_means(land_of_each(state.lands), PICTURE_SIDE), state.vehicles.serves
-    index = serves[..., None, None].expand(-1, -1, PICTURE_SIDE, PICTURE_SIDE)
+    shares, serves = block_means(land_of_each(state.lands), side), state.vehicles.serves
+    index = serves[..., None, None].expand(-1, -1, side, side)
     return [shares.gather(1, index)]
 
 

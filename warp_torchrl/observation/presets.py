@@ -106,12 +106,19 @@ class Surroundings(Local):
     Attributes:
         centred: Whether the agent's own block is the middle of the picture, which then has 15 x 15 blocks, uint8; else
             it is of the map, 8 x 8 blocks, float32.
+        near: Side of the blocks of a second picture, ``near``, of 15 x 15 blocks about the agent whatever the map's
+            size [cells]: on large maps the blocks of ``picture`` are too coarse to find a fire by; 0 shows none.
 
     Raises:
-        ValueError: If the radius is not in 1..32.
+        ValueError: If the radius is not in 1..32, or near not in 0..64.
     """
 
     centred: bool = True
+    near: int = 0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_fields(self, near=(0, 64))
 
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
@@ -119,14 +126,28 @@ class Surroundings(Local):
         dtype = torch.uint8 if self.centred else torch.float32
         high: float | tuple[float, ...] = picture_highs(world) if self.centred else 1.0
         names = picture_names(world)
-        shape, symmetry = (len(names), side, side), picture_symmetry(self.centred, len(names))
-        space = Space(shape, dtype, 0, high, names, symmetry, self._told(picture_content(world)))
-        return {**super().spaces(world), "picture": space}
+        content = self._told(picture_content(world))
+        symmetry = picture_symmetry(self.centred, len(names), order=2 if self.near else 1)
+        found = {
+            **super().spaces(world),
+            "picture": Space((len(names), side, side), dtype, 0, high, names, symmetry, content),
+        }
+        if self.near:
+            wide, highs = 2 * PICTURE_SIDE - 1, picture_highs(world)
+            about = picture_symmetry(centred=True, channels=len(names))
+            found["near"] = Space((len(names), wide, wide), torch.uint8, 0, highs, names, about, content)
+        return found
 
     def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
-        """Return ``view``, ``self`` and ``picture``: uint8 [B, A, C, 15, 15]; of the map, float32 [B, A, C, 8, 8]."""
+        """Return ``view``, ``self`` and ``picture``: uint8 [B, A, C, 15, 15]; of the map, float32 [B, A, C, 8, 8].
+
+        And ``near`` if it is shown, uint8 [B, A, C, 15, 15].
+        """
         shown = centred_picture(state, world, forecast) if self.centred else picture(state, world, forecast)
-        return {**super().__call__(state, world, forecast), "picture": shown}
+        found = {**super().__call__(state, world, forecast), "picture": shown}
+        if self.near:
+            found["near"] = centred_picture(state, world, forecast, max(1, round(max(world.size) / self.near)))
+        return found
 
 
 @dataclass(frozen=True, kw_only=True)

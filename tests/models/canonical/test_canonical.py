@@ -60,6 +60,7 @@ TURNS = list(itertools.product((1, -1), (1, -1), (False, True)))
 PRESETS = {
     "whole map": Surroundings(centred=False, identity=False),
     "centred": Surroundings(),
+    "near": Surroundings(near=2),
     "local": Local(),
     "paper": Paper(),
 }
