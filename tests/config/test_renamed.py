@@ -83,7 +83,7 @@ def test_a_former_team_is_restored_and_an_override_by_an_old_name_counts():
     values = renamed_values({"team": {"messages": "map", "radio_range": 4.0, "battery": 9, "drift": 0.2}})
     record = SavedConfig(choices={"scenario": "scouts"}, values=values)
     team = plain(restore(record, ["team.radio_range=7", "team.drift=0.0"]))["team"]
-    assert team["radio"] == {"carries": "map", "range": 7, "loss": 0.0, "line_of_sight": False}
+    assert team["radio"] == {"carries": "map", "range": 7, "loss": 0.0, "line_of_sight": False, "delay": 0}
     assert team["flight"] == {"separation": None, "battery": 9, "drift": 0.0}
 
 

@@ -65,7 +65,7 @@ def test_what_nobody_has_seen_makes_no_difference_to_what_is_shown(preset):
     moved = state.vehicles.position.clone()
     moved[:, 1] = torch.where(moved[:, 0] < 8, moved[:, 0] + 4, moved[:, 0] - 4)  # in view, beyond sight
     far = state.replace(vehicles=state.vehicles.replace(position=moved))
-    assert not world.sensing.knows_where(far, world.team).any()
+    assert not world.sensing.knows_where(far, world.team)[0].any()
     alone = far.replace(vehicles=far.vehicles.replace(position=moved[:, :1].expand(-1, 2, -1).contiguous()))
     ours, theirs = shown(preset, far, world), shown(preset, alone, world)
     mates = [CHANNELS.index("other_ugv")]

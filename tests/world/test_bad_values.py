@@ -66,6 +66,7 @@ OUT_OF_RANGE = [
     (Team, "tank", [-1, 10_001]),
     (Radio, "range", [-0.1, 1.1e6, NAN]),
     (Radio, "loss", [-0.1, 1.1, NAN]),
+    (Radio, "delay", [-1, 65]),
     (Flight, "separation", [-0.1, 1.1e6, NAN]),
     (Flight, "battery", [0, 1_000_001]),
     (Flight, "drift", [-0.1, 1.1, NAN]),
@@ -96,6 +97,7 @@ NO_SUCH_OPTION = [
 
 NOT_WHOLE = [
     (Fire, "youngest_fuel", [2.5]),
+    (Radio, "delay", [0.5]),
     (Fire, "oldest", [9.5]),
     (Fire, "burning_stages", [4.5]),
     (Fire, "wet_ticks", [2.5]),

@@ -115,9 +115,14 @@ def known_fire(state: WorldState, env: WildfireEnv) -> Tensor:
 
 def distance_to_cells(state: WorldState) -> Tensor:
     """Return the Chebyshev distance from each agent to each cell, int64 [B, A, H, W]."""
-    row, column = (torch.arange(side, device=state.cells.device) for side in state.cells.shape[1:])
-    own = state.vehicles.position[..., None]
-    return torch.maximum((row - own[:, :, 0]).abs()[..., :, None], (column - own[:, :, 1]).abs()[..., None, :])
+    return distance_from(state.vehicles.position, state)
+
+
+def distance_from(place: Tensor, state: WorldState) -> Tensor:
+    """Return the Chebyshev distance from places, (row, column) int64 [..., 2], to each cell, int64 [..., H, W]."""
+    row, column = (torch.arange(side, device=place.device) for side in state.cells.shape[1:])
+    own = place[..., None]
+    return torch.maximum((row - own[..., 0, :]).abs()[..., :, None], (column - own[..., 1, :]).abs()[..., None, :])
 
 
 def nearest_marked(state: WorldState, marked: Tensor) -> tuple[Tensor, Tensor]:

@@ -3,7 +3,14 @@
 import torch
 from torch import Tensor
 
-from warp_torchrl.heuristics.base import distance_to_cells, idle_action, move_towards, place, target_or_supply
+from warp_torchrl.heuristics.base import (
+    distance_from,
+    distance_to_cells,
+    idle_action,
+    move_towards,
+    place,
+    target_or_supply,
+)
 from warp_torchrl.heuristics.searching import Oldest
 from warp_torchrl.world.front import spreading_front
 from warp_torchrl.world.random import Stream, uniform
@@ -40,8 +47,9 @@ class Follower(Oldest):
         away = distance_to_cells(state)
         draw = uniform(state.key, 0, Stream.POLICY, (agents, height, width))
         score = since - away / team.table(device).stride[:, None, None] + draw
-        known = self.env.world.sensing.knows_where(state, team)[..., None, None]
-        nearest = torch.where(known, away[:, None], height + width).amin(dim=2)  # of the others
+        known, place_of_others = self.env.world.sensing.knows_where(state, team)
+        theirs = distance_from(place_of_others, state)
+        nearest = torch.where(known[..., None, None], theirs, height + width).amin(dim=2)
         score = score - _ANOTHERS * (nearest < away)
         best = score.masked_fill(~front, -2.0 * _ANOTHERS).flatten(2).max(dim=-1)
         return best.values > -0.5 * _ANOTHERS, place(best.indices, state)

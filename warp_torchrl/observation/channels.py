@@ -292,9 +292,10 @@ def _others(state: WorldState, world: World, radius: int) -> Tensor:
     """Return where the other agents of each role are, 63 each, at most 4 to a cell, uint8 [B, A, R, V, V]."""
     position, role = state.vehicles.position, world.team.table(state.cells.device).index
     side, roles = 2 * radius + 1, len(world.team.role_names)
-    row, column = (position[:, None] - position[:, :, None] + radius).unbind(-1)  # of each in each other's square
+    known, place = world.sensing.knows_where(state, world.team)
+    row, column = (place - position[:, :, None] + radius).unbind(-1)  # of each in each other's square
     is_near = (row >= 0) & (row < side) & (column >= 0) & (column < side)
-    is_near &= world.sensing.knows_where(state, world.team)
+    is_near &= known
     index = torch.where(is_near, (role * side + row) * side + column, roles * side**2)
     count = torch.zeros(*row.shape[:2], roles * side**2 + 1, dtype=torch.uint8, device=role.device)
     count = count.scatter_add(2, index, torch.ones_like(index, dtype=torch.uint8))[..., :-1]

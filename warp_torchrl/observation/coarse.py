@@ -60,10 +60,8 @@ def picture_symmetry(centred: bool, channels: int = len(PICTURE), order: int = 1
 
 def picture(state: WorldState, world: World, forecast: Forecast) -> Tensor:
     """Return the state of the fire in 8 x 8 blocks of the map, float32 [B, A, C, 8, 8], see ``picture_names``."""
-    place = one_hot(_block(state, PICTURE_SIDE), PICTURE_SIDE**2).to(torch.float32)
-    mates = (world.sensing.knows_where(state, world.team).to(torch.float32) @ place).mul_(0.25).clamp_(max=1.0)
-    mates = mates.view(*place.shape[:2], 1, PICTURE_SIDE, PICTURE_SIDE)
-    seen = _maps(state, forecast).expand(-1, place.shape[1], -1, -1, -1)
+    mates = _mates(state, world).mul_(0.25).clamp_(max=1.0)[:, :, None]
+    seen = _maps(state, forecast).expand(-1, mates.shape[1], -1, -1, -1)
     land = [each[:, :, None] for each in _land_served(state)]
     return torch.cat((seen[:, :, :2], mates, seen[:, :, 2:], *land), dim=2)
 
@@ -91,9 +89,7 @@ def centred_picture(state: WorldState, world: World, forecast: Forecast, side: i
         mates[..., middle, middle] -= 1
         return torch.stack((fire, fuel, (mates.clamp_(max=4) * 63).to(torch.uint8), *land), dim=2)
     fire, fuel, fresh = (about.of_own(each) for each in maps)
-    places = one_hot(block, side**2).to(torch.float32)
-    mates = (world.sensing.knows_where(state, world.team).to(torch.float32) @ places).clamp_(max=4.0)
-    mates = about.of_own(mates.mul_(63.0).to(torch.uint8).unflatten(-1, sides))
+    mates = about.of_own(_mates(state, world, side).clamp_(max=4.0).mul_(63.0).to(torch.uint8))
     return torch.stack((fire, fuel, mates, fresh, *land), dim=2)
 
 
@@ -211,8 +207,23 @@ def _land_served(state: WorldState, side: int = PICTURE_SIDE) -> list[Tensor]:
     return [shares.gather(1, index)]
 
 
+def _mates(state: WorldState, world: World, side: int = PICTURE_SIDE) -> Tensor:
+    """Return how many others each agent takes to be in each block of the map, float32 [B, A, S, S]."""
+    known, place = world.sensing.knows_where(state, world.team)
+    team = state.vehicles.position.shape[:2]
+    index = _block_at(place, state, side).expand(*team, -1)
+    count = torch.zeros(*team, side**2, device=index.device)
+    count = count.scatter_add(2, index, known.to(torch.float32).expand_as(index))
+    return count.unflatten(-1, (side, side))
+
+
 def _block(state: WorldState, side: int) -> Tensor:
     """Return in which of side x side blocks of the map each agent is, int64 [B, A]."""
+    return _block_at(state.vehicles.position, state, side)
+
+
+def _block_at(place: Tensor, state: WorldState, side: int) -> Tensor:
+    """Return in which of side x side blocks of the map cells are, int64 [...], of (row, column) int64 [..., 2]."""
     height, width = state.cells.shape[1:]
-    row, column = state.vehicles.position.unbind(-1)
+    row, column = place.unbind(-1)
     return (row * side // height) * side + column * side // width

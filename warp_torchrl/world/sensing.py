@@ -39,8 +39,11 @@ class Sensing(ABC):
         """Return how far each agent sees [cells]."""
 
     @abstractmethod
-    def knows_where(self, state: WorldState, team: Team) -> Tensor:
-        """Return of which others each agent knows where they are, bool [B or 1, A, A]."""
+    def knows_where(self, state: WorldState, team: Team) -> tuple[Tensor, Tensor]:
+        """Return of which others each agent knows where they are, bool [B or 1, A, A], and what it takes for that.
+
+        The places are int64 [B, A or 1, A, 2], (row, column) [cells]: [b, i, j] is where agent i takes agent j to be.
+        """
 
     @abstractmethod
     def begun(self, state: WorldState, team: Team) -> WorldState:
@@ -64,9 +67,10 @@ class Full(Sensing):
         """Return more than any map is long [cells]."""
         return [_EVERYWHERE] * team.n_agents
 
-    def knows_where(self, state: WorldState, team: Team) -> Tensor:
-        """Return that each knows where all others are, bool [1, A, A]."""
-        return ~torch.eye(team.n_agents, dtype=torch.bool, device=state.cells.device)[None]
+    def knows_where(self, state: WorldState, team: Team) -> tuple[Tensor, Tensor]:
+        """Return that each knows where all others are, bool [1, A, A], and where they are, int64 [B, 1, A, 2]."""
+        others = ~torch.eye(team.n_agents, dtype=torch.bool, device=state.cells.device)[None]
+        return others, state.vehicles.position[:, None]
 
     def begun(self, state: WorldState, team: Team) -> WorldState:
         """Return the worlds."""
@@ -130,9 +134,14 @@ class Sight(Sensing):
         """Return how far each agent sees [cells]."""
         return [self.radius_of.get(role, self.radius) for role in team.agent_roles]
 
-    def knows_where(self, state: WorldState, team: Team) -> Tensor:
-        """Return of which others each agent knows where they are, bool [B, A, A]: those that it hears or sees."""
-        return _heard(state, team) | others_in_sight(state, self.reach(team))
+    def knows_where(self, state: WorldState, team: Team) -> tuple[Tensor, Tensor]:
+        """Return of which others each agent knows where they are, bool [B, A, A], and where, int64 [B, A, A, 2].
+
+        It knows where those are that it sees, and where those were whose packets reach it, when they sent them.
+        """
+        sees, hears = others_in_sight(state, self.reach(team)), team.radio.arriving(state, _flies(state, team))
+        here, then = state.vehicles.position[:, None], team.radio.places(state)[:, None]
+        return hears | sees, torch.where(sees[..., None], here, then)
 
     def begun(self, state: WorldState, team: Team) -> WorldState:
         """Return the worlds with what the agents see where they start."""
@@ -149,7 +158,7 @@ class Sight(Sensing):
         sees, watching = self._sees(state, team), _watching(state)
         knows, itself = torch.where(sees, record, known), watching.itself | sees
         if team.radio.sends_maps:
-            told = torch.where(_heard(state, team)[..., None, None], knows[:, None], 0).amax(dim=2)
+            state, told = team.radio.told(state, knows, _flies(state, team), running)
             itself = itself & (told <= knows)
             knows = torch.maximum(knows, told)
         goes_on = running[:, None, None, None]
@@ -194,9 +203,9 @@ def in_reach(state: WorldState, reach: list[int]) -> Tensor:
     return on_row[..., :, None] & on_column[..., None, :]
 
 
-def _heard(state: WorldState, team: Team) -> Tensor:
-    """Return which agents hear which, bool [B, A, A]."""
-    return team.radio.heard(state, team.table(state.cells.device).flies)
+def _flies(state: WorldState, team: Team) -> Tensor:
+    """Return which agents fly, bool [A]."""
+    return team.table(state.cells.device).flies
 
 
 def others_in_sight(state: WorldState, reach: list[int]) -> Tensor:

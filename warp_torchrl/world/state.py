@@ -10,6 +10,7 @@ from torch import Tensor
 
 from warp_torchrl.world.batch import Batch
 from warp_torchrl.world.fast.bytes import at_least, between, byte, counts
+from warp_torchrl.world.packets import Packets
 
 
 class Cover(IntEnum):
@@ -200,6 +201,7 @@ class WorldState(Batch):
     knowledge: Tensor | None = None  # int32 [B,A,H,W], records of ``world.sensing``; None where all is seen
     watching: Watching | None = None  # None where all is seen
     lands: Lands | None = None  # None where there is but one agency
+    packets: Packets | None = None  # None where packets arrive in the step in which they are sent
 
     def what_changes(self) -> dict[str, Tensor]:
         """Return all tensors by name but those that follow from others, of which they can be made again."""
