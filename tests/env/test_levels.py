@@ -11,6 +11,8 @@ from warp_torchrl.env import LeveledEnv, WildfireEnv
 from warp_torchrl.env.levels import LEVEL, joined
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.ignition import Ignition
+from warp_torchrl.world.radio import Radio
+from warp_torchrl.world.team import Team
 from warp_torchrl.world.wind import Uniform
 
 TARGET = small_world(horizon=12)
@@ -51,6 +53,17 @@ def test_it_is_an_environment_of_torchrl():
 
 def test_with_all_chances_at_the_target_it_is_the_plain_environment():
     same(played(leveled(chances=(0.0, 0.0, 1.0)), 30), played(WildfireEnv(TARGET, n_worlds=16), 30))
+
+
+def test_what_comes_late_comes_as_in_the_plain_environment():
+    late = replace(TARGET, team=Team(n_agents=2, radio=Radio(carries="graph", delay=2, loss=0.2)))
+    env = LeveledEnv([replace(late, steps_per_tick=6), late], n_worlds=8)
+    same(played(env, 30), played(WildfireEnv(late, n_worlds=8), 30))
+    env.draw_by([0.5, 0.5])
+    env.rollout(20, break_when_any_done=False)
+    other = LeveledEnv(env.levels, n_worlds=8, seed=9)
+    other.load_state_dict(env.state_dict())
+    assert env.level.unique().tolist() == [0, 1] and (env._observe() == other._observe()).all()
 
 
 @pytest.mark.parametrize("level", range(3))

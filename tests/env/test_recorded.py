@@ -18,6 +18,7 @@ SCENARIOS = [
     ["scenario=hazard", "reward=adaptive"],
     ["scenario=hetero", "reward=collaborative"],
     ["scenario=smoke", "team.radio.carries=both", "team.radio.range=6", "team.radio.loss=0.1"],
+    ["scenario=smoke", "team.radio.carries=both", "team.radio.delay=2", "team.radio.loss=0.1"],
     ["scenario=haksar", "team.tank=3", "team.approach=true", "observation=at_fire", "reward=round_fire"],
     ["scenario=front", "team.flight.battery=9", "team.flight.drift=0.05"],
     ["scenario=agencies", "agencies.own=1", "agencies.lending=need", "agencies.term=3"],

@@ -10,6 +10,7 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.reset_pool import ResetPool
 
 SHORT = ["landscape.size=10", "horizon=12"]
+LATE = ["scenario=search", "team.radio.carries=both", "team.radio.delay=2", "team.radio.loss=0.2"]
 
 
 def played(steps, *overrides):
@@ -25,7 +26,7 @@ def played(steps, *overrides):
 
 @pytest.mark.parametrize(
     "overrides",
-    [[], ["scenario=lightning"], ["wind=wandering"], ["scenario=front", "team.flight.battery=9"]],
+    [[], ["scenario=lightning"], ["wind=wandering"], ["scenario=front", "team.flight.battery=9"], LATE],
     ids=" ".join,
 )
 def test_worlds_play_the_same_episodes_though_nobody_asks_which_have_ended(overrides):

@@ -14,7 +14,7 @@ from warp_torchrl.env.wildfire import WildfireEnv
 from warp_torchrl.world.batch import Batch, concatenated
 from warp_torchrl.world.random import Stream, uniform, world_key
 from warp_torchrl.world.saved import filled
-from warp_torchrl.world.state import ActionResult, Transition, TreeCounts, WorldState, count_trees
+from warp_torchrl.world.state import ActionResult, Transition, TreeCounts, WorldState
 from warp_torchrl.world.world import World
 
 LEVEL = ("info", "level")
@@ -83,7 +83,8 @@ class LeveledEnv(WildfireEnv):
         self.level = level
 
     def _restored(self, state_dict: Mapping[str, Any]) -> WorldState:
-        state = filled(self.world.reset(self.seeds, self._episodes), state_dict["worlds"])
+        like, *_ = self._sound_start(self.seeds, self._episodes)
+        state = filled(like, state_dict["worlds"])
         return self._by_level(state_dict["level"], lambda scene, rows: scene.world.restored(state[rows]))
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
@@ -106,9 +107,8 @@ class LeveledEnv(WildfireEnv):
         level = self.drawn(seeds, episodes)
 
         def start(scene: Scene, rows: Tensor) -> tuple[WorldState, TreeCounts, Observations, Tensor]:
-            state, faults = scene.world.start(seeds[rows], episodes[rows])
-            counts = count_trees(state)
-            return state, counts, scene.observe(state, counts), faults.expand(len(rows), -1)
+            state, counts, observed, faults = scene.start(seeds[rows], episodes[rows])
+            return state, counts, observed, faults.expand(len(rows), -1)
 
         state, counts, observed, faults = self._by_level(level, start)
         seen = self._pack(state, observed, torch.zeros(len(seeds), device=self.device))

@@ -6,6 +6,7 @@ Compiled, it is two functions: one moves the agents, ticks the fire and makes th
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import torch
 from torch import Tensor
 
 from warp_torchrl.env.metrics import metrics
@@ -13,7 +14,7 @@ from warp_torchrl.observation import Observation, central_state
 from warp_torchrl.reward import Collaborative, Efficiency, Reward, Time
 from warp_torchrl.world.fast.compile import compiled
 from warp_torchrl.world.fast.road import in_bytes, in_flags
-from warp_torchrl.world.state import ActionResult, Forecast, Transition, TreeCounts, WorldState
+from warp_torchrl.world.state import ActionResult, Forecast, Transition, TreeCounts, WorldState, count_trees
 from warp_torchrl.world.world import World
 
 
@@ -58,6 +59,18 @@ class Scene:
     reward: Reward
     compile: bool = False
 
+    def start(self, seeds: Tensor, episodes: Tensor) -> tuple[WorldState, TreeCounts, Observations, Tensor]:
+        """Start episodes of seeds, int64 [n] each.
+
+        Returns:
+            The worlds, the counts of their trees, what is observed of them, and their faults: see ``World.start``.
+        """
+        state, faults = self.world.start(seeds, episodes)
+        counts = count_trees(state)
+        observed = self.observe(state, counts)
+        state = self.world.team.radio.with_shown(state, observed.entries, torch.ones_like(state.done))
+        return state, counts, observed, faults
+
     def observe(self, state: WorldState, counts: TreeCounts) -> Observations:
         """Observe the worlds, given their counts of trees."""
         return _observe(self.world, self.observation, state, counts, self.world.forecast(state))
@@ -67,7 +80,9 @@ class Scene:
         if self.compile:
             return self._compiled_step(before, counts, action)
         transition = self.world.step(before, action, counts)
-        return Step(transition, self.observe(transition.after, transition.counts_after), self.reward(transition))
+        observed = self.observe(transition.after, transition.counts_after)
+        after = self.world.team.radio.with_shown(transition.after, observed.entries, ~before.done)
+        return Step(transition.replace(after=after), observed, self.reward(transition))
 
     def _compiled_step(self, before: WorldState, counts: TreeCounts, action: Tensor) -> Step:
         given, earns = in_bytes(before), self.reward if compiles(self.reward) else None

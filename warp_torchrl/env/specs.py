@@ -51,6 +51,8 @@ def make_specs(world: World, observation: Observation, n_worlds: int, device: to
     if world.team.radio.sends_vectors:
         reach = float(max(world.size))
         seen["agents", "radio"] = Bounded(-reach, reach, shape=(*team, world.team.n_agents, 3), device=device)
+        if world.team.radio.delay:
+            seen["agents", "sent"] = seen["agents", "observation"].clone()
     if agencies := len(world.agencies.names):
         seen["agents", "agency"] = Categorical(agencies, shape=team, dtype=torch.int64, device=device)
     planes = len(state_names(world))

@@ -178,7 +178,7 @@ class WildfireEnv(EnvBase):
         """Replace the worlds, and return their tensordict as a reset would.
 
         Raises:
-            ValueError: If the batch, the map or the team differs from this environment's.
+            ValueError: If the batch, the map or the team differs from this environment's, or its radio's delay.
         """
         expected = (self.batch_size[0], *self.world.size, self.n_agents)
         got = (*state.cells.shape, state.vehicles.position.shape[1])
@@ -225,7 +225,8 @@ class WildfireEnv(EnvBase):
 
     def _restored(self, state_dict: Mapping[str, Any]) -> WorldState:
         """Return the worlds of a ``state_dict``."""
-        return self.world.restored(filled(self.world.reset(self.seeds, self._episodes), state_dict["worlds"]))
+        like, *_ = self._sound_start(self.seeds, self._episodes)
+        return self.world.restored(filled(like, state_dict["worlds"]))
 
     # Interface for TorchRL
 
@@ -236,10 +237,11 @@ class WildfireEnv(EnvBase):
             return self._masked_reset(self._resets, mask.flatten(), self._observe())
         if mask is None or self._worlds is None or mask.all():
             self._resets.clear()
-            self._enter(self.world.reset(self.seeds, self._episodes))
+            state, counts, seen = self._sound_start(self.seeds, self._episodes)
+            self._worlds = state, counts
             self._episodes = self._episodes + 1
             self._episode_reward = torch.zeros_like(self._episode_reward)
-            return self._observe()
+            return seen
         index = mask.flatten().nonzero()[:, 0]
         seen = self._start_again(index)
         rows = torch.zeros(len(mask), dtype=torch.int64, device=self.device).index_copy_(
@@ -292,9 +294,7 @@ class WildfireEnv(EnvBase):
 
     def _start(self, seeds: Tensor, episodes: Tensor) -> tuple[Start, Tensor]:
         """Return starts of seeds and episodes, and their faults: see ``World.start``."""
-        worlds, faults = self.world.start(seeds, episodes)
-        counts = count_trees(worlds)
-        observed = self._scene.observe(worlds, counts)
+        worlds, counts, observed, faults = self._scene.start(seeds, episodes)
         return (worlds, counts, self._pack(worlds, observed, torch.zeros(len(seeds), device=self.device))), faults
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
@@ -320,6 +320,8 @@ class WildfireEnv(EnvBase):
         why = why_eager(self.world.fire, self.device, self.batch_size[0] * math.prod(self.world.size))
         if self.world.sensing.is_limited:
             why = "a step of agents that do not see all is not compiled"
+        elif self.world.team.radio.delay:
+            why = "a step of a team whose packets come late is not compiled"
         if why is not None:
             _log.info("compile: %s", why)
         return why
@@ -364,12 +366,16 @@ class WildfireEnv(EnvBase):
         """Pack observations, masks and metrics into TorchRL's layout."""
         batch, device = state.batch_size, self.device  # without a device a tensordict copies those that it holds
         team = [*batch, self.n_agents]
-        entries = observed.entries
-        views = entries[""] if "" in entries else TensorDict(entries, batch_size=team, device=device)
+
+        def of_team(entries: dict[str, Tensor]) -> Tensor | TensorDict:
+            return entries[""] if "" in entries else TensorDict(entries, batch_size=team, device=device)
+
+        views = of_team(observed.entries)
         roles = self.world.team.table(self.device).index.repeat(*batch, 1)
         agents = {"observation": views, "action_mask": observed.action_mask, "role": roles}
         agents |= {} if observed.radio is None else {"radio": observed.radio}
         agents |= {} if state.vehicles.serves is None else {"agency": state.vehicles.serves.clone()}
+        agents |= {"sent": of_team(sent)} if (sent := self.world.team.radio.shown(state)) else {}
         info = observed.metrics | {"episode_reward": episode_reward, "episode_length": state.step.to(torch.float32)}
         return TensorDict(
             {
