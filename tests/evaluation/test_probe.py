@@ -14,8 +14,9 @@ from warp_torchrl.world.sensing import Sight
 from warp_torchrl.world.team import Team
 
 
-def made(make_small_env, n_worlds=6, messages="graph", **team):
-    world = small_world(team=Team(n_agents=2, radio=Radio(carries=messages), **team), sensing=Sight(radius=3))
+def made(make_small_env, n_worlds=6, messages="graph", delay=0, **team):
+    radio = Radio(carries=messages, delay=delay)
+    world = small_world(team=Team(n_agents=2, radio=radio, **team), sensing=Sight(radius=3))
     env = make_small_env(n_worlds, world)
     model = Mlp(actor_hidden=(32,), messages=messages)
     policy = Ppo().policy(signature(env), model).requires_grad_(False)
@@ -39,8 +40,9 @@ def test_what_messages_tell_is_read_from_them_and_what_they_do_not_tell_is_not()
     assert _share([nothing, nothing], "it") != _share([nothing, nothing], "it"), "not a number"
 
 
-def test_a_row_for_each_thing_of_the_worlds_that_judge(make_small_env):
-    env, policy = made(make_small_env)
+@pytest.mark.parametrize("delay", [0, 3])
+def test_a_row_for_each_thing_of_the_worlds_that_judge(make_small_env, delay):
+    env, policy = made(make_small_env, delay=delay)
     found = {each.what: each for each in probe(policy, env, 7)}
     assert len(found) == 7 and all(each.messages > 0 for each in found.values())
     steps = found["its own row"].messages
@@ -50,16 +52,17 @@ def test_a_row_for_each_thing_of_the_worlds_that_judge(make_small_env):
     assert again == found
 
 
-def test_an_agent_that_tells_where_it_is_is_heard_to(make_small_env, monkeypatch):
-    """... by the policy, and not by the one with other weights."""
-    env, policy = made(make_small_env, start="anywhere")
+@pytest.mark.parametrize("delay", [0, 3])
+def test_an_agent_that_tells_where_it_is_is_heard_to(make_small_env, monkeypatch, delay):
+    """... by the policy, and not by the one with other weights; what counts is what it says now, not what arrives."""
+    env, policy = made(make_small_env, start="anywhere", delay=delay)
 
     def told(self, features, index):
         place = env.world_state.vehicles.position.to(torch.float32)
         return place if self is trained else torch.zeros_like(place)
 
     trained = next(each for each in policy.modules() if isinstance(each, Round))
-    monkeypatch.setattr(Round, "forward", lambda self, features, radio, index: features)
+    monkeypatch.setattr(Round, "forward", lambda self, features, radio, index, sent: features)
     monkeypatch.setattr(Round, "told", told)
     row = next(each for each in probe(policy, env, 3) if each.what == "its own row")
     assert row.trained > 0.99 and row.drawn_anew < 0.05

@@ -1,5 +1,7 @@
 """Agents that talk: who can move whom, and what is learnt from it."""
 
+from dataclasses import dataclass
+
 import pytest
 import torch
 
@@ -16,8 +18,10 @@ from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.saved_config import SavedConfig, restore
-from warp_torchrl.models import ACTION, LOGITS, OBSERVATION, RADIO, Cnn, Mlp, over_canonical, signature
+from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.models import ACTION, LOGITS, OBSERVATION, RADIO, SENT, Cnn, Mlp, over_canonical, signature
 from warp_torchrl.models.messages import Round
+from warp_torchrl.observation import Surroundings
 from warp_torchrl.world.radio import Radio
 from warp_torchrl.world.team import Team
 
@@ -40,10 +44,10 @@ def make_env(make_small_env):
     return make
 
 
-def lively(model, env):
+def lively(model, env, **changes):
     """Return an actor whose last layer and messages tell, the same each time."""
     torch.manual_seed(0)
-    actor = model.actor(signature(env))
+    actor = model.actor(signature(env)._replace(**changes))
     with torch.no_grad():
         for weight in actor.parameters():
             weight += 0.2 * torch.randn_like(weight)
@@ -131,9 +135,12 @@ def test_a_team_that_talks_does_the_same_in_a_turned_world(turn):
     assert not torch.allclose(actor(silent)[LOGITS], actor(here.clone())[LOGITS], atol=1e-3), "talk has a say"
 
 
+@pytest.mark.parametrize("delay", [0, 2])
 @pytest.mark.parametrize("name", MODELS)
-def test_a_stored_batch_says_what_was_acted_on(make_env, name):
-    env, model = make_env(range=6.0), MODELS[name]
+def test_a_stored_batch_says_what_was_acted_on(make_env, name, delay):
+    env, model = make_env(range=6.0, delay=delay), MODELS[name]
+    if delay and model.message_rounds > 1:
+        pytest.skip("messages come late in one round")
     policy = Ppo().policy(signature(env), model)
     with torch.no_grad():
         batch = env.rollout(5, policy)
@@ -151,6 +158,12 @@ def test_a_stored_batch_says_what_was_acted_on(make_env, name):
         (["model.sharing=role"], r"model\.sharing must be team where agents talk"),
         (["model.message_size=12"], r"model\.message_size must be a multiple of 8"),
         (["algorithm=dqn"], r"model\.messages must be none or map where the algorithm replays"),
+        (
+            ["team.radio.delay=1", "model.message_rounds=2"],
+            r"model\.message_rounds must be 1 where messages come late, team\.radio\.delay=1, got 2",
+        ),
+        (["team.radio.delay=65"], r"team\.radio\.delay must be in \[0, 64\], got 65"),
+        (["team.radio.delay=0.5"], r"team\.radio\.delay must be a whole number, got 0\.5"),
         (["team.radio.carries=none"], r"team\.radio\.carries must be graph or both where networks talk"),
         (["imitation.demonstrations=somewhere"], r"imitation\.demonstrations must be null where agents talk"),
     ],
@@ -183,3 +196,122 @@ def test_maps_are_the_worlds_to_tell_and_any_learner_takes_them():
     assert env.world.team.radio.sends_maps and RADIO not in env.reset().keys(True, True)
     with pytest.raises(ConfigError, match=r"team\.radio\.carries must be none or graph where agents see all"):
         run_config(plain(compose_config("train", ["model.messages=map"])))
+
+
+@pytest.fixture
+def make_late_env(make_small_env):
+    def make(n_worlds=4, n_agents=4, delay=2, **options):
+        team = Team(n_agents=n_agents, radio=Radio(carries="graph", delay=delay))
+        return make_small_env(n_worlds, small_world(team=team), seed=0, **options)
+
+    return make
+
+
+LATE = {name: model for name, model in MODELS.items() if model.message_rounds == 1}
+SENT_SELF = (*SENT, "self")
+
+
+def after_steps(env, steps):
+    """What is shown after some steps east and south."""
+    now = env.reset()
+    for step in range(steps):
+        now["agents", "action"] = torch.full_like(now["agents", "role"], 2 + 2 * (step % 2))
+        now = env.step(now)["next"]
+    return now.exclude(("agents", "reward"))
+
+
+@pytest.mark.parametrize("name", LATE)
+def test_a_late_message_is_what_its_sender_made_of_what_it_saw_then(make_late_env, name):
+    env = make_late_env()
+    actor, now = lively(LATE[name], env), heard_in_a_line(after_steps(env, 5))
+    before = actor(now.clone())[LOGITS]
+
+    def changed(key, agent):
+        other = now.clone()
+        other[key][:, agent] += 0.5
+        return (actor(other)[LOGITS] != before).flatten(2).any(-1).all(0).tolist()
+
+    for agent in range(4):
+        assert changed(OWN, agent) == [other == agent for other in range(4)], (
+            "by what it sees now itself alone is moved"
+        )
+        assert changed(SENT_SELF, agent) == [other == agent + 1 for other in range(4)], "by what it saw then its hearer"
+
+
+@pytest.mark.parametrize("name", LATE)
+def test_a_team_that_has_stood_still_hears_late_what_it_hears_at_once(make_late_env, make_env, name):
+    """The same networks, weights and arithmetic: where nothing has changed a delay makes no difference."""
+    late, prompt = make_late_env(), make_env()
+    now = after_steps(late, 4)
+    for key in (OBSERVATION, SENT):
+        now[key] = now[OBSERVATION].clone()
+    ours, theirs = lively(LATE[name], late), lively(LATE[name], prompt)
+    assert all(torch.equal(one, other) for one, other in zip(ours.parameters(), theirs.parameters(), strict=True))
+    assert torch.equal(ours(now.clone())[LOGITS], theirs(now.exclude(SENT))[LOGITS])
+    changed = now.clone()
+    changed[SENT_SELF] += 0.5
+    assert not torch.equal(ours(changed)[LOGITS], ours(now)[LOGITS])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Twitches(Surroundings):
+    """As ``Surroundings``, but agent 0 observes something else in step 1."""
+
+    def __call__(self, state, world, forecast):
+        shown = super().__call__(state, world, forecast)
+        shown["self"][:, 0] += 0.5 * (state.step == 1)[:, None]
+        return shown
+
+
+@pytest.mark.parametrize("delay", [1, 2, 4])
+def test_what_an_agent_observes_moves_the_others_so_many_steps_later(make_late_env, delay):
+    one, other = make_late_env(n_agents=2, delay=delay), make_late_env(n_agents=2, delay=delay, observation=Twitches())
+    actor, moved = lively(LATE["canonical"], one), []
+    for steps in range(7):
+        ours, theirs = (actor(after_steps(env, steps))[LOGITS] for env in (one, other))
+        moved.append((ours != theirs).flatten(2).any(-1).any(0).tolist())
+    assert [step for step, (first, _) in enumerate(moved) if first] == [1], "itself at once"
+    assert [step for step, (_, second) in enumerate(moved) if second] == [1 + delay]
+
+
+def test_what_an_agent_said_is_learnt_from_what_the_others_do_later(make_late_env):
+    env = make_late_env(n_agents=2)
+    actor, now = lively(LATE["canonical"], env), after_steps(env, 4)
+    actor(now)[LOGITS][:, 0].square().sum().backward()
+    network = next(each for each in actor.modules() if isinstance(each, Round))
+    assert network.send.weight.grad.abs().sum() > 0
+    actor.zero_grad()
+    actor(after_steps(env, 1))[LOGITS][:, 0].square().sum().backward()
+    assert not network.send.weight.grad.any(), "nothing has arrived yet"
+
+
+@pytest.mark.parametrize("turn", [(-1, 1, True), (1, -1, False)], ids=str)
+def test_a_team_that_hears_late_does_the_same_in_a_turned_world(turn):
+    """What was sent is turned as its sender saw it then, and heard as its receiver sees it now."""
+    preset = PRESETS["whole map"]
+    env = fighting(preset, n_worlds=24, messages="graph")
+    then, rule = env.world_state.clone(), HEURISTICS["local"](env)
+    for _ in range(4):
+        env.step(rule(env._observe()))
+    now = env.world_state.clone()
+
+    def shown(turn):
+        here, there = (turned_world(each, turn) for each in (now, then))
+        sent, seen = env.set_state(there)[OBSERVATION].clone(), env.set_state(here).clone()
+        seen[RADIO][..., 1:] *= 0.0
+        seen[RADIO][..., 1:] += there.vehicles.position[:, None] - here.vehicles.position[:, :, None]
+        return seen.set(SENT, sent)
+
+    sees = pulled(preset, now, 24).all(-1) & pulled(preset, then, 24).all(-1)
+    assert sees.sum() >= 4 and not torch.equal(now.vehicles.position, then.vehicles.position)
+    for model in (Mlp(messages="graph", message_size=16), Mlp(messages="graph", symmetry="none")):
+        actor = lively(model, env, is_late=True)
+        ours, theirs = actor(shown((1, 1, False)))[LOGITS], actor(shown(turn))[LOGITS]
+        expected = torch.empty_like(ours).index_copy_(2, turned_actions(torch.arange(11), turn), ours)
+        assert torch.allclose(theirs[sees], expected[sees], atol=1e-4) == (model.symmetry == "canonical")
+
+
+def test_networks_do_not_answer_what_comes_late(make_late_env):
+    with pytest.raises(ValueError, match=r"model\.message_rounds must be 1 where messages come late .*, got 2"):
+        Mlp(messages="graph", message_rounds=2).actor(signature(make_late_env()))
+    assert Mlp(message_rounds=2).actor(signature(make_late_env())), "who is silent hears nothing"

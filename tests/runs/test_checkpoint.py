@@ -20,12 +20,12 @@ ACTIONS = tuple(f"action_{code}" for code in range(11))
 SIGNATURE = Signature({"view": Entry((3, 5, 5), "uint8")}, Entry((9, 16, 16), "float32"), 2, ACTIONS, ("ugv", "uav"))
 
 
-def saved(run, frames, keep=3, **options):
+def saved(run, frames, keep=3, signature=SIGNATURE, **options):
     return checkpoints.save(
         run,
         frames=frames,
         scenario="tiny",
-        signature=SIGNATURE,
+        signature=signature,
         mode="sampled",
         record=SavedConfig(choices={"algorithm": "mappo"}, values={"seed": 3}),
         policy={"weight": torch.arange(4.0)},
@@ -33,6 +33,12 @@ def saved(run, frames, keep=3, **options):
         keep=keep,
         **options,
     )
+
+
+def test_a_policy_whose_messages_come_late_is_known_as_one(tmp_path):
+    late = SIGNATURE._replace(is_late=True)
+    saved(tmp_path, 100, signature=late)
+    assert newest(tmp_path)[0].manifest.signature == late
 
 
 def test_what_was_saved_comes_back(tmp_path):

@@ -93,6 +93,11 @@ def _check_together(config: Mapping[str, Any]) -> None:
         raise ConfigError(
             f"team.radio.carries must be graph or both where networks talk, model.messages={model}, got {radio}"
         )
+    rounds, delay = config["model"]["message_rounds"], config["team"]["radio"]["delay"]
+    if model in ("graph", "both") and delay and rounds != 1:
+        raise ConfigError(
+            f"model.message_rounds must be 1 where messages come late, team.radio.delay={delay}, got {rounds}"
+        )
     mixer, cooperation = algorithm.get("mixer", "none"), reward.get("cooperation", 1.0)
     if mixer != "none" and cooperation != 1.0:
         raise ConfigError(

@@ -5,7 +5,37 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
-from warp_torchrl.models.signature import ACTION, ACTION_MASK, AGENCY, ROLE, Entry, Signature
+from warp_torchrl.models.signature import (
+    ACTION,
+    ACTION_MASK,
+    AGENCY,
+    OBSERVATION,
+    ROLE,
+    SENT,
+    Entry,
+    Key,
+    Signature,
+    observation_key,
+)
+
+
+class Prompt(TensorDictModuleBase):
+    """A policy whose messages come late, where they come at once: what was sent is what is observed.
+
+    Args:
+        policy: Reads what was sent beside what is observed.
+    """
+
+    def __init__(self, policy: TensorDictModuleBase) -> None:
+        super().__init__()
+        self.in_keys = [key for key in policy.in_keys if key[: len(SENT)] != SENT]
+        self.out_keys, self.policy = policy.out_keys, policy
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Write what the policy writes."""
+        seen = tensordict.select(*self.in_keys, strict=False)
+        out = self.policy(seen.set(SENT, seen.get(OBSERVATION)))
+        return tensordict.update(out.select(*self.out_keys, strict=False))
 
 
 class Fitted(TensorDictModuleBase):
@@ -64,6 +94,8 @@ def fitted(policy: TensorDictModuleBase, trained: Signature, here: Signature, fa
             f"it has a network for each of {len(trained.agencies)} agencies, this environment has "
             f"{len(here.agencies) or 1}"
         )
+    if trained.is_late and not here.is_late and any(key[: len(SENT)] == SENT for key in policy.in_keys):
+        policy = Prompt(policy)
     if (trained.observation, trained.actions, trained.roles) == (here.observation, here.actions, here.roles):
         return policy
     lacking = [name for name in trained.actions if name not in here.actions]
@@ -77,14 +109,14 @@ def fitted(policy: TensorDictModuleBase, trained: Signature, here: Signature, fa
             f"it has a network for each of the roles {', '.join(trained.roles)}, this environment has "
             f"{', '.join(here.roles)}"
         )
-    keys = dict(zip(trained.observation, trained.observation_keys(), strict=True))
-    channels = {}
+    channels: dict[Key, tuple[int, Tensor]] = {}
     for name, entry in trained.observation.items():
         if name not in here.observation:
             raise ValueError(f"it was trained to see {name or 'a vector'}, which this environment does not show")
         index = _places(name, entry, here.observation[name])
         if index is not None:
-            channels[keys[name]] = -len(entry.shape), index
+            both = (observation_key(name, sent) for sent in (False, True))
+            channels |= {key: (-len(entry.shape), index) for key in both if key in policy.in_keys}
     return Fitted(policy, channels, torch.tensor([here.actions.index(name) for name in trained.actions]), fallback)
 
 

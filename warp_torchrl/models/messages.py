@@ -46,7 +46,9 @@ class Round(nn.Module):
         """
         return Orientation(index).units_back(torch.tanh(self.send(features)))
 
-    def forward(self, features: Tensor, radio: Tensor, index: Tensor) -> Tensor:
+    def forward(
+        self, features: Tensor, radio: Tensor, index: Tensor, sent: tuple[Tensor, Tensor] | None = None
+    ) -> Tensor:
         """Return features with what was heard added, [..., A, F].
 
         Args:
@@ -54,10 +56,12 @@ class Round(nn.Module):
             radio: Of each agent and each other: 1 where it hears it, else 0; rows and columns from it to the other
                 [cells]; float32 [..., A, A, 3].
             index: Of the agents' ``Orientation``, int64 [..., A].
+            sent: Features and index of which the messages are made that arrive now; None: those given.
         """
+        told = self.told(*((features, index) if sent is None else sent))
         team = radio.shape[-2]
         own = Orientation(index[..., None].expand(*index.shape, team))
-        heard = own.units(self.told(features, index)[..., None, :, :].expand(*index.shape, team, -1))
+        heard = own.units(told[..., None, :, :].expand(*index.shape, team, -1))
         place = own.offsets(radio[..., 1:] * RADIO_SCALE).to(heard.dtype)
         key, value = self.hear(torch.cat((heard, place), dim=-1)).chunk(2, dim=-1)
         nothing = torch.zeros_like(key[..., :1, :])  # attended to by whom nobody reaches
@@ -79,40 +83,51 @@ class TalkingNetwork(nn.Module):
     round. Gradients flow from what an agent does into what the others told it (Sukhbaatar et al. 2016, "Learning
     multiagent communication with backpropagation"; over graphs by attention, as in Das et al. 2019, "TarMAC").
 
+    Messages that come late are made of what their senders observed when they sent them, in one round: those of a second
+    would answer what was heard then.
+
     Args:
         network: The network without talk; rounds are computed in float32 whatever its arithmetic.
         size: Features of its first layer.
         message: Numbers of a message, a multiple of 8.
-        rounds: Of talk in a step.
+        rounds: Of talk in a step, 1 where messages come late.
+        is_late: Whether messages come late.
         heads: Of the attention.
     """
 
-    def __init__(self, network: Network, size: int, message: int, rounds: int, heads: int = 4) -> None:
+    def __init__(
+        self, network: Network, size: int, message: int, rounds: int, is_late: bool = False, heads: int = 4
+    ) -> None:
         super().__init__()
-        self.network = network
+        self.network, self.is_late = network, is_late
         self.rounds = nn.ModuleList(Round(size, message, heads) for _ in range(rounds))
 
     @property
     def entries(self) -> list[Entry]:
-        """What it reads of each agent, before the radio and the orientation."""
+        """What it reads of each agent, beside the radio and the orientation."""
         return self.network.entries
 
-    def forward(self, *inputs: Tensor) -> Tensor:
+    def forward(self, radio: Tensor, *inputs: Tensor) -> Tensor:
         """Return float32 [..., A, out].
 
         Args:
-            inputs: Entries [..., A, ...], the radio float32 [..., A, A, 3] as in ``Round.forward``, and the index of
-                the agents' ``Orientation`` int64 [..., A], where they have one.
+            radio: float32 [..., A, A, 3] as in ``Round.forward``.
+            inputs: Entries [..., A, ...], and the index of the agents' ``Orientation`` int64 [..., A], where they have
+                one. Where messages come late the same follows, of the time when what arrives now was sent.
         """
-        seen = inputs[: len(self.entries)]
-        radio, *turned = inputs[len(self.entries) :]
-        index = turned[0] if turned else torch.zeros(radio.shape[:-2], dtype=torch.int64, device=radio.device)
+        count = len(inputs) // 2 if self.is_late else len(inputs)
         device, network = radio.device.type, self.network
-        with network.arithmetic(device):
-            features = network.body[0](network.encoder(*seen))
+        features, index = self._features(*inputs[:count])
         with torch.autocast(device, enabled=False):
-            features = features.to(torch.float32)
             for each in self.rounds:
-                features = each(features, radio, index)
+                sent = self._features(*inputs[count:]) if self.is_late else None
+                features = each(features, radio, index, sent)
         with network.arithmetic(device):
             return network.body[1:](features).to(torch.float32)
+
+    def _features(self, *inputs: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the first layer's features, float32 [..., A, F], and the index of the agents' ``Orientation``."""
+        seen, turned = inputs[: len(self.entries)], inputs[len(self.entries) :]
+        with self.network.arithmetic(inputs[0].device.type):
+            features = self.network.body[0](self.network.encoder(*seen)).to(torch.float32)
+        return features, turned[0] if turned else torch.zeros_like(features[..., 0], dtype=torch.int64)

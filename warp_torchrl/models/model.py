@@ -35,6 +35,7 @@ from warp_torchrl.models.signature import (
     ORIENTATION,
     RADIO,
     ROLE,
+    SENT_ORIENTATION,
     STATE,
     STATE_ACTION_VALUE,
     VALUE,
@@ -72,14 +73,16 @@ class Mlp:
             ``team.radio.range``. On-policy algorithms learn it. ``map``, they tell what they know of the fire, which
             the world does for them; ``both``, or ``none``.
         message_size: Numbers of a message, a multiple of 8.
-        message_rounds: Messages that each agent sends in a step, each after hearing those before.
+        message_rounds: Messages that each agent sends in a step, each after hearing those before; 1 where messages come
+            late (``team.radio.delay``).
         dtype: ``bfloat16`` computes the layers in half precision (weights stay float32), several times faster on
             processors that have it and several times slower on those that have not; ``auto`` takes it where they do.
 
     Raises:
         ValueError: If a size is out of range or there is no hidden layer, if agents that talk have a memory or do not
             share one network, or, when networks are made, if observations
-            do not say how they turn and should be canonical, or have no clock and should be remembered.
+            do not say how they turn and should be canonical, or have no clock and should be remembered, or if messages
+            come late in several rounds.
     """
 
     sharing: Literal["team", "role", "agency", "none"] = "team"
@@ -154,7 +157,7 @@ class Mlp:
         if not self._is_canonical:
             return CanonicalBatch(None, packings=packings)
         return CanonicalBatch(
-            Canonicalise(signature.observation),
+            Canonicalise(signature.observation, self._is_late(signature)),
             CanonicaliseState(signature.state) if state else None,
             () if restored else signature.actions,
             packings,
@@ -163,6 +166,8 @@ class Mlp:
     def _packings(self, signature: Signature) -> Packings:
         """Return what packs the entries that these networks read packed or whole."""
         entries: dict[Any, Entry] = {self._key(name): entry for name, entry in signature.observation.items()}
+        if self._is_late(signature):
+            entries |= {self._key(name, sent=True): entry for name, entry in signature.observation.items()}
         return Packings({**entries, self.state_key: signature.state})
 
     def _of_agents(
@@ -200,7 +205,10 @@ class Mlp:
         if central:
             joint = [Entry((signature.n_agents * signature.n_actions,), "float32")] if judges else []
             entries = [signature.state, *joint, *entries]
-        network = self._shared(signature, lambda: self._network(entries, hidden, out, head_gain, memory, talks))
+        is_late = talks and self._is_late(signature)
+        network = self._shared(
+            signature, lambda: self._network(entries, hidden, out, head_gain, memory, talks, is_late)
+        )
         if self.sharing in _INDEX:
             keys.append(_INDEX[self.sharing])
         module: TensorDictModuleBase
@@ -212,22 +220,40 @@ class Mlp:
             module = TensorDictModule(central_network, in_keys=[self.state_key, *keys], out_keys=[key])
         else:
             if talks:
-                keys += [RADIO, ORIENTATION] if self._is_canonical else [RADIO]
+                keys = [RADIO, *self._observed(names), *(self._observed(names, sent=True) if is_late else [])]
             module = TensorDictModule(network, in_keys=keys, out_keys=[key])
-        return self._sequence(signature, module, central, judges) if self._is_canonical else module
+        return self._sequence(signature, module, central, judges, is_late) if self._is_canonical else module
 
     @property
     def _is_canonical(self) -> bool:
         return self.symmetry == "canonical"
 
-    def _key(self, name: str) -> Key:
-        return canonical_key(name) if self._is_canonical else observation_key(name)
+    def _key(self, name: str, sent: bool = False) -> Key:
+        return canonical_key(name, sent) if self._is_canonical else observation_key(name, sent)
+
+    def _observed(self, names: list[str], sent: bool = False) -> list[Key]:
+        """Return the keys of entries of the observation, or of what was sent, and of their orientation."""
+        turned = [SENT_ORIENTATION if sent else ORIENTATION] if self._is_canonical else []
+        return [*(self._key(name, sent) for name in names), *turned]
+
+    def _is_late(self, signature: Signature) -> bool:
+        """Return whether actors are told messages, and those come late.
+
+        Raises:
+            ValueError: If they are of several rounds.
+        """
+        is_late = self.talks and signature.is_late
+        if is_late and self.message_rounds > 1:
+            raise ValueError(
+                f"model.message_rounds must be 1 where messages come late (team.radio.delay), got {self.message_rounds}"
+            )
+        return is_late
 
     def _sequence(
-        self, signature: Signature, module: TensorDictModuleBase, central: bool, judges: bool
+        self, signature: Signature, module: TensorDictModuleBase, central: bool, judges: bool, is_late: bool
     ) -> TensorDictSequential:
         """Return the sequence that makes what a module reads, and restores what it says of actions."""
-        before: list[TensorDictModuleBase] = [Canonicalise(signature.observation)]
+        before: list[TensorDictModuleBase] = [Canonicalise(signature.observation, is_late)]
         if central:
             before.append(CanonicaliseState(signature.state))
         if judges:
@@ -262,12 +288,19 @@ class Mlp:
         return AgentNetworks(networks, networks[0].entries)
 
     def _network(
-        self, entries: list[Entry], hidden: tuple[int, ...], out: int, head_gain: float, memory: int, talks: bool
+        self,
+        entries: list[Entry],
+        hidden: tuple[int, ...],
+        out: int,
+        head_gain: float,
+        memory: int,
+        talks: bool,
+        is_late: bool,
     ) -> Network | RecurrentNetwork | TalkingNetwork:
         encoder, activation = self._encoder(entries, hidden[0]), _ACTIVATIONS[self.activation]
         network = Network(encoder, tuple(hidden), out, activation, head_gain, self.dtype)
         if talks:
-            return TalkingNetwork(network, hidden[0], self.message_size, self.message_rounds)
+            return TalkingNetwork(network, hidden[0], self.message_size, self.message_rounds, is_late)
         return RecurrentNetwork(network, hidden[0], memory) if memory else network
 
     def _encoder(self, entries: list[Entry], size: int) -> LinearEncoder | ConvolutionalEncoder:

@@ -26,6 +26,8 @@ ORIENTATION = ("agents", "orientation")
 RADIO = ("agents", "radio")
 REWARD = ("agents", "reward")
 ROLE = ("agents", "role")
+SENT = ("agents", "sent")
+SENT_ORIENTATION = ("agents", "sent_orientation")
 STATE = "state"
 STATE_ACTION_VALUE = ("agents", "state_action_value")
 TEACHER_ACTION = ("agents", "teacher_action")
@@ -34,17 +36,19 @@ Key = tuple[str, ...]
 """Of a tensordict's nested entry."""
 
 
-def observation_key(name: str) -> Key:
-    """Return the key of an entry of the observation; "" where it is one tensor."""
-    return (*OBSERVATION, name) if name else OBSERVATION
+def observation_key(name: str, sent: bool = False) -> Key:
+    """Return the key of an entry of the observation, or of that which was sent; "" where it is one tensor."""
+    whole = SENT if sent else OBSERVATION
+    return (*whole, name) if name else whole
 
 
-def canonical_key(name: str) -> Key:
+def canonical_key(name: str, sent: bool = False) -> Key:
     """Return the key of the same entry in canonical orientation.
 
     They are not nested: TorchRL 0.14 moves no spec that has an entry ``self`` to a device.
     """
-    return ("agents", f"canonical_{name}") if name else CANONICAL
+    (team, whole), tail = CANONICAL, f"_{name}" if name else ""
+    return (team, f"{whole}_sent{tail}" if sent else whole + tail)
 
 
 class Entry(NamedTuple):
@@ -74,6 +78,7 @@ class Signature(NamedTuple):
     actions: tuple[str, ...]  # by name, in order
     roles: tuple[str, ...]  # by name, in the order of their index
     agencies: tuple[str, ...] = ()  # by name, in the order of their index; () where there is but one
+    is_late: bool = False  # whether messages come late, and are made of what was observed when they were sent
 
     @property
     def n_actions(self) -> int:
@@ -121,7 +126,8 @@ def signature(env: EnvBase) -> Signature:
     }
     state = entry(specs["state"], 0, env.state_names, env.state_symmetry, env.state_content)
     agents = specs[ACTION_MASK].shape[0]
-    return Signature(observation, state, agents, env.action_names, env.role_names, env.agency_names)
+    names = env.action_names, env.role_names, env.agency_names
+    return Signature(observation, state, agents, *names, is_late=SENT[-1] in specs[SENT[:-1]].keys())
 
 
 def differing(one: Signature, other: Signature) -> str | None:
@@ -130,6 +136,8 @@ def differing(one: Signature, other: Signature) -> str | None:
     for name in sorted({*one.observation, *other.observation}):
         if one.observation.get(name) != other.observation.get(name):
             return f"observation {name}".strip()
+    if one.is_late != other.is_late:
+        return "team.radio.delay"
     return next(
         (name for name in ("state", "actions", "roles", "agencies") if getattr(one, name) != getattr(other, name)), None
     )

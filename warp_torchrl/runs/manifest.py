@@ -158,4 +158,5 @@ def _signature_from_json(content: dict[str, Any]) -> Signature:
     actions = tuple(str(name) for name in content.get("actions", _FORMER_ACTIONS[: int(content["n_actions"])]))
     roles = tuple(str(name) for name in content.get("roles", PAPER_ROLES))
     agencies = tuple(str(name) for name in content.get("agencies", ()))
-    return Signature(observation, state, int(content["n_agents"]), actions, roles, agencies)
+    is_late = content.get("is_late", False) is True
+    return Signature(observation, state, int(content["n_agents"]), actions, roles, agencies, is_late)

@@ -7,7 +7,7 @@ from tensordict.nn import TensorDictModuleBase
 
 from warp_torchrl.models.canonical.orientation import Orientation
 from warp_torchrl.models.packing import Packings
-from warp_torchrl.models.signature import ACTION, ACTION_MASK, OBSERVATION, ORIENTATION, STATE, TEACHER_ACTION
+from warp_torchrl.models.signature import ACTION, ACTION_MASK, OBSERVATION, ORIENTATION, SENT, STATE, TEACHER_ACTION
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class CanonicalBatch:
             self.state(out)
         if self.actions:
             self._turn_actions(out)
-        return out.exclude(OBSERVATION, STATE)
+        return out.exclude(OBSERVATION, SENT, STATE)
 
     def _turn_actions(self, batch: TensorDictBase) -> None:
         orientation, keys = Orientation(batch.get(ORIENTATION)), batch.keys(include_nested=True)

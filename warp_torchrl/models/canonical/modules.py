@@ -13,6 +13,7 @@ from warp_torchrl.models.signature import (
     CANONICAL_ACTION_ONE_HOT,
     CANONICAL_STATE,
     ORIENTATION,
+    SENT_ORIENTATION,
     STATE,
     Entry,
     Key,
@@ -27,25 +28,34 @@ class Canonicalise(TensorDictModuleBase):
 
     Args:
         observation: The entries, by name.
+        is_late: Whether to turn what each observed when it sent what arrives now too, by its orientation then.
 
     Raises:
         ValueError: If an entry does not declare how it turns, or no entry shows a target.
     """
 
-    def __init__(self, observation: Mapping[str, Entry]) -> None:
+    def __init__(self, observation: Mapping[str, Entry], is_late: bool = False) -> None:
         super().__init__()
         self._symmetries = _declared(observation)
-        self._keys = {name: (observation_key(name), canonical_key(name)) for name in observation}
-        self.in_keys = [read for read, _ in self._keys.values()]
-        self.out_keys = [*(written for _, written in self._keys.values()), ORIENTATION]
+        times = {ORIENTATION: False, SENT_ORIENTATION: True} if is_late else {ORIENTATION: False}
+        self._keys = {
+            orientation: {name: (observation_key(name, sent), canonical_key(name, sent)) for name in observation}
+            for orientation, sent in times.items()
+        }
+        self.in_keys = [read for keys in self._keys.values() for read, _ in keys.values()]
+        self.out_keys = []
+        for orientation, keys in self._keys.items():
+            self.out_keys += [*(written for _, written in keys.values()), orientation]
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write the entries in canonical orientation."""
-        entries = {name: tensordict.get(read) for name, (read, _) in self._keys.items()}
-        orientation = orientation_of(entries, self._symmetries)
-        for name, (_, written) in self._keys.items():
-            tensordict.set(written, turned(entries[name], self._symmetries[name], orientation))
-        return tensordict.set(ORIENTATION, orientation.index)
+        for written_at, keys in self._keys.items():
+            entries = {name: tensordict.get(read) for name, (read, _) in keys.items()}
+            orientation = orientation_of(entries, self._symmetries)
+            for name, (_, written) in keys.items():
+                tensordict.set(written, turned(entries[name], self._symmetries[name], orientation))
+            tensordict.set(written_at, orientation.index)
+        return tensordict
 
 
 class CanonicaliseState(TensorDictModuleBase):
