@@ -21,6 +21,7 @@ from warp_torchrl.models import (
     OBSERVATION,
     RADIO,
     ROLE,
+    SENT,
     Signature,
     recurrent_actors,
     signature,
@@ -28,6 +29,7 @@ from warp_torchrl.models import (
 from warp_torchrl.models.canonical import Canonicalise
 from warp_torchrl.models.fitting import fitted
 from warp_torchrl.models.networks import AgentNetworks
+from warp_torchrl.models.signature import observation_key
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.state import Action
 
@@ -71,6 +73,8 @@ class TrainedPolicy(TensorDictModuleBase):
         here = signature(env)
         if self.talks and RADIO not in env.full_observation_spec.keys(True, True):
             raise ValueError("its agents talk by radio, which this environment does not have: team.radio.carries=graph")
+        if self.talks and here.is_late and not self.trained.is_late:
+            raise ValueError("its agents' messages come at once, and in this environment late: team.radio.delay=0")
         if self.is_by_agent and here.n_agents != self.trained.n_agents:
             raise ValueError(
                 f"it has a network for each of {self.trained.n_agents} agents, this team has {here.n_agents}"
@@ -121,11 +125,11 @@ class NumpyPolicy:
 
     Each agent's action depends on its own observation and mask alone, so it takes one agent, a team, or a batch of
     worlds. A policy whose agents talk (``model.messages``) needs the whole team, in the order of ``possible_agents``,
-    and infos, which tell whom each hears. A policy with a network for each agent (``sharing: none``) needs the whole
-    team likewise. A policy with a network for each role (``sharing: role``) reads the role from the agent's name
-    (``bulldozer_0``), or from its ``self`` if it has no name; one with a network for each agency (``sharing: agency``)
-    reads the agency from ``self``. A recurrent policy (``memory``) keeps a hidden state for
-    each name; agents without names need a ``numpy_policy()`` each.
+    and infos, which tell whom each hears, and what each observed when it sent what comes late. A policy with a network
+    for each agent (``sharing: none``) needs the whole team likewise. A policy with a network for each role
+    (``sharing: role``) reads the role from the agent's name (``bulldozer_0``), or from its ``self`` if it has no name;
+    one with a network for each agency (``sharing: agency``) reads the agency from ``self``. A recurrent policy
+    (``memory``) keeps a hidden state for each name; agents without names need a ``numpy_policy()`` each.
 
     Args:
         policy: Acts in its own mode; sampled actions use torch's generator.
@@ -138,6 +142,7 @@ class NumpyPolicy:
         self._entries = {name: policy.shown.observation[name] for name in read}
         self._shapes = {name: (entry.shape, entry.dtype) for name, entry in self._entries.items()}
         self._n_agents = next((len(each.networks) for each in modules if isinstance(each, AgentNetworks)), None)
+        self._is_late = any(key[: len(SENT)] == SENT for key in policy.in_keys)
         self._by_role, self._by_agency = ROLE in policy.in_keys, AGENCY in policy.in_keys
         self._role_index = {ROLES[role].name: at for at, role in enumerate(policy.shown.roles) if role in ROLES}
         self._recurrent = recurrent_actors(policy)
@@ -153,7 +158,7 @@ class NumpyPolicy:
             observation: Of one agent, as in the Gymnasium adapter, or a dict by agent name, as in PettingZoo. A batch
                 of worlds comes first, [B, ...].
             info: The same step's info. Preset ``paper`` needs it, whose mask is there unless the layout is flat, and
-                policies whose agents talk, whose ``radio`` is there.
+                policies whose agents talk, whose ``radio`` is there, and ``sent`` where messages come late.
 
         Returns:
             The agent's action, or a dict by agent name; int64 [B] for a batch of worlds.
@@ -210,16 +215,26 @@ class NumpyPolicy:
             if value.shape != expected or value.dtype != dtype:
                 rule = f"{entry or 'observation'}{who} must be {dtype} of shape {list(expected)}"
                 raise ValueError(f"{rule}, got {value.dtype} {list(value.shape)}")
-            read[(*OBSERVATION, entry) if entry else OBSERVATION] = value
+            read[observation_key(entry)] = value
         if self._policy.talks:
-            if "radio" not in info:
-                raise ValueError(f"info{who} must have radio, since this policy's agents talk: give its infos too")
-            read[RADIO] = np.asarray(info["radio"], dtype=np.float32)
+            read |= self._of_radio(who, info)
         if self._by_role:
             read[ROLE] = np.full(mask.shape[:-1], self._role(name, entries.get("self")))
         if self._by_agency:
             read[AGENCY] = self._agency(entries.get("self"))
         return read
+
+    def _of_radio(self, who: str, info: Mapping[str, Any]) -> dict[Any, np.ndarray]:
+        """Return whom an agent hears, and what it observed when it sent what comes late, by key."""
+        missing = [name for name in ("radio", *(["sent"] if self._is_late else [])) if name not in info]
+        if missing:
+            what = ", ".join(missing)
+            raise ValueError(f"info{who} must have {what}, since this policy's agents talk: give its infos too")
+        read = {RADIO: np.asarray(info["radio"], dtype=np.float32)}
+        if not self._is_late:
+            return read
+        sent = unflattened(np.asarray(info["sent"]), self._shapes, f"sent of info{who}")
+        return {**read, **{observation_key(entry, sent=True): value for entry, value in sent.items()}}
 
     @torch.no_grad()
     def _act(self, names: list[str], agents: list[dict[Any, np.ndarray]]) -> Iterable[np.ndarray]:

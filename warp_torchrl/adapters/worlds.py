@@ -28,6 +28,7 @@ class NumpyStep(NamedTuple):
     truncated: np.ndarray  # bool [B]
     info: dict[str, np.ndarray]  # float64 [B] each
     radio: np.ndarray | None  # float32 [B, A, A, 3], ``Radio.observed``; None where agents do not talk
+    sent: np.ndarray | None  # float32 [B, A, n], what each observed when it sent what comes late, flat; else None
     layout: str
 
     def of_agent(self, world: int | slice, agent: int) -> np.ndarray | dict[str, np.ndarray]:
@@ -41,10 +42,12 @@ class NumpyStep(NamedTuple):
     def info_of_agent(self, world: int | slice, agent: int) -> dict[str, np.ndarray]:
         """Return the world's metrics, whom the agent hears if it talks, and its mask if its observation has none.
 
-        TorchRL's ``PettingZooWrapper`` fails if both have it.
+        Where messages come late, ``sent`` is what the agent observed when it sent what arrives now. TorchRL's
+        ``PettingZooWrapper`` fails if both have the mask.
         """
         info = {name: value[world] for name, value in self.info.items()}
-        info |= {} if self.radio is None else {"radio": self.radio[world, agent]}
+        radio = {"radio": self.radio, "sent": self.sent}
+        info |= {name: value[world, agent] for name, value in radio.items() if value is not None}
         has_mask = self.layout == "flat" or "" not in self.observation
         return info if has_mask else {**info, "action_mask": self.action_mask[world, agent]}
 
@@ -192,19 +195,24 @@ class Worlds:
 
     def _to_numpy(self, reward: np.ndarray) -> NumpyStep:
         agents, info = self.now["agents"], self.now["info"]
-        observation = agents["observation"]
-        named = {"": observation} if isinstance(observation, torch.Tensor) else dict(observation.items())
         rows = torch.cat(list(info.values()), dim=-1).to(torch.float64).T.numpy(force=True)
         return NumpyStep(
-            observation={name: value.numpy(force=True) for name, value in named.items()},
+            observation=_named(agents["observation"]),
             action_mask=agents["action_mask"].to(torch.int8).numpy(force=True),
             reward=reward,
             terminated=self.now["terminated"][:, 0].numpy(force=True),
             truncated=self.now["truncated"][:, 0].numpy(force=True),
             info=dict(zip(info.keys(), rows)),
             radio=agents["radio"].numpy(force=True) if "radio" in agents.keys() else None,
+            sent=flattened(_named(agents["sent"]), n_batch=2) if "sent" in agents.keys() else None,
             layout=self._layout,
         )
+
+
+def _named(entries: torch.Tensor | TensorDictBase) -> dict[str, np.ndarray]:
+    """Return entries by name, [B, A, ...] each; "" where they are one tensor."""
+    named = {"": entries} if isinstance(entries, torch.Tensor) else dict(entries.items())
+    return {name: value.numpy(force=True) for name, value in named.items()}
 
 
 def action_number(name: str, action: object, n_actions: int) -> int:
