@@ -195,14 +195,21 @@ def watched_forest(team, sensing=None, side=19):
     return WildfireEnv(world, n_worlds=1, seed=0)
 
 
-def told(env, at, *, fires, step=40):
-    """The worlds at a step, agents at places, who all know of fires, (row, column): when they were seen."""
+def told(env, at, *, fires, step=40, heard_at=None):
+    """The worlds at a step, agents at places, who all know of fires, (row, column): when they were seen.
+
+    Where packets come late, those arrive that were sent at the places ``heard_at``.
+    """
     env.reset()
     state = env.world_state
     knowledge = state.landscape.age.to(torch.int32)[:, None].expand_as(state.knowledge) + 64 * (step + 1)
     for (row, column), seen in fires.items():
         knowledge[..., row, column] = (1 + seen) * 64 + 11
     vehicles = state.vehicles.replace(position=torch.tensor([at]))
+    if heard_at is not None:
+        places = torch.tensor([heard_at]).expand_as(state.packets.places)
+        others = ~torch.eye(len(at), dtype=torch.bool)
+        state = state.replace(packets=state.packets.replace(links=others.expand_as(state.packets.links), places=places))
     now = env.set_state(state.replace(knowledge=knowledge, vehicles=vehicles, step=torch.full_like(state.step, step)))
     return HEURISTICS["follower"](env)(now)["agents", "action"][0].tolist()
 
@@ -221,6 +228,10 @@ def test_followers_leave_to_each_other_what_is_nearer_to_them():
     assert told(env, at, fires={(3, 2): 10, (15, 16): 30}) == [Action.NORTH, Action.SOUTH]
     deaf = watched_forest(Team(n_agents=2, roles=("scout",), radio=Radio(range=0.0)))
     assert told(deaf, at, fires={(3, 2): 5, (15, 16): 30}) == [Action.NORTH, Action.NORTH_WEST], "it knows of no other"
+    late = watched_forest(Team(n_agents=2, roles=("scout",), radio=Radio(delay=1)))
+    assert told(late, at, fires={(3, 2): 5, (15, 16): 30}) == [Action.NORTH, Action.NORTH_WEST], "nothing has come yet"
+    found = told(late, at, fires={(3, 2): 10, (15, 16): 30}, heard_at=[[15, 16], [9, 16]])
+    assert found == [Action.NORTH, Action.NORTH_WEST], "the other was there when it spoke"
 
 
 def test_a_follower_that_knows_of_no_fire_searches_and_one_that_could_put_it_out_does_not():

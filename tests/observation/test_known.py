@@ -104,6 +104,27 @@ def test_a_view_shows_what_is_known_and_how_fresh_it_is():
     assert view[1, 0].sum() == 0, "the other has not heard of it"
 
 
+@pytest.mark.parametrize("centred", [True, False], ids=["centred", "whole map"])
+def test_team_mates_are_shown_where_they_were_when_they_sent_what_arrives_late(centred):
+    """On a map of 16 x 16, whose picture has blocks of two cells; the second agent goes from (4, 4) to (8, 4)."""
+    world = limited(Sight(radius=1), radio=Radio(delay=1))
+    flies = world.team.table(torch.device("cpu")).flies
+    state = draw(" ".join(["T" * 16] * 16), team=world.team, at=[(6, 4), (4, 4)])
+    state = world.sensing.begun(world.team.radio.begun(state, flies), world.team)
+    preset = Surroundings(channels=CHANNELS, centred=centred)
+    first = shown(preset, state, world)
+    mate = CHANNELS.index("other_ugv")
+    assert not first["view"][0, 0, mate].any() and not first["picture"][0, 0, 2].any(), "nothing has arrived yet"
+    gone = state.vehicles.position.clone()
+    gone[0, 1] = torch.tensor([8, 4])
+    state = state.replace(step=state.step + 1, vehicles=state.vehicles.replace(position=gone))
+    state = world.sensing.updated(world.team.radio.sent(state, flies, ~state.done), world.team, ~state.done)
+    now = shown(preset, state, world)
+    assert now["view"][0, 0, mate].nonzero().tolist() == [[3, 5]], "two cells north of the middle, which is (5, 5)"
+    block = [[6, 7]] if centred else [[2, 2]]  # the block north of its own, which is (3, 2) of the map's 8 x 8
+    assert now["picture"][0, 0, 2].nonzero().tolist() == block
+
+
 def test_the_picture_pools_what_is_known():
     sight = Sight(radius=1)
     drawing = " ".join(["T" * 16] * 7 + ["TTTTTTTTTTTTaaTT"] * 2 + ["T" * 16] * 7)
