@@ -382,7 +382,7 @@ def test_what_was_sent_is_what_was_observed_so_many_steps_ago(make_small_env, ob
     env = late_env(make_small_env, observation=observation)
     check_env_specs(env)
     now, observed, heard = env.reset(), [[] for _ in range(3)], False
-    for _ in range(20):
+    for turn in range(20):
         seen, sent = now["agents", "observation"].clone(), now["agents", "sent"].clone()
         for world, step in enumerate(env.world_state.step.tolist()):
             observed[world] = [*observed[world], seen[world]] if step else [seen[world]]  # an episode begins with none
@@ -391,7 +391,11 @@ def test_what_was_sent_is_what_was_observed_so_many_steps_ago(make_small_env, ob
             hears = now["agents", "radio"][world, ..., 0]
             assert step >= 2 or not hears.any()
             heard |= bool(hears.any())
-        _, now = env.step_and_maybe_reset(now.set(("agents", "action"), torch.randint(0, 9, (3, 2))))
+        step, now = env.step_and_maybe_reset(now.set(("agents", "action"), torch.randint(0, 9, (3, 2))))
+        for world in step["next", "done"][:, 0].nonzero()[:, 0].tolist():  # its next episode has begun in its place
+            assert (step["next", "agents", "sent"][world] == observed[world][-2]).all()
+        if turn == 3:  # so that worlds end at different times
+            now = env.reset(now.set("_reset", torch.tensor([[False], [True], [False]])))
     assert heard and (env._episodes >= 3).all(), "several episodes of each"
 
 
