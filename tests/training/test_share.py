@@ -96,6 +96,8 @@ def test_a_network_for_several_kinds_reads_whole_what_any_of_them_can_fill():
     ground, air, hills = shape("default"), shape("hetero"), shape("default", "landscape.relief=200.0")
     assert differing(ground, air) is None and differing(ground, shape("default", "team.n_agents=7")) is None
     assert differing(ground, shape("default", "observation.radius=3")) == "observation view"
+    prompt, late = (shape("default", "team.radio.carries=graph", f"team.radio.delay={each}") for each in (0, 2))
+    assert differing(prompt, late) == "team.radio.delay" and joint([late, late]).is_late
     assert joint([ground, ground]) == ground
     both = joint([ground, air, hills])
     for name in ("view", "picture"):
