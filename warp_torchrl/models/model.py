@@ -2,18 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import ClassVar, Literal
 
-from tensordict.nn import TensorDictModule, TensorDictModuleBase, TensorDictSequential
+from tensordict.nn import TensorDictModule, TensorDictModuleBase
 from torch import nn
 
 from warp_torchrl.models.canonical import (
     CanonicalBatch,
-    Canonicalise,
-    CanonicaliseAction,
-    CanonicaliseState,
-    Restore,
 )
+from warp_torchrl.models.inputs import Inputs
 from warp_torchrl.models.memory import RecurrentActor, RecurrentNetwork
 from warp_torchrl.models.messages import TalkingNetwork
 from warp_torchrl.models.networks import (
@@ -24,28 +21,20 @@ from warp_torchrl.models.networks import (
     LinearEncoder,
     Network,
 )
-from warp_torchrl.models.packing import Packings
 from warp_torchrl.models.signature import (
-    ACTION_ONE_HOT,
     ACTION_VALUE,
     AGENCY,
-    CANONICAL_ACTION_ONE_HOT,
     CANONICAL_STATE,
     LOGITS,
-    ORIENTATION,
     RADIO,
     ROLE,
-    SENT_ORIENTATION,
     STATE,
     STATE_ACTION_VALUE,
     VALUE,
     Entry,
     Key,
     Signature,
-    canonical_key,
-    observation_key,
 )
-from warp_torchrl.symmetry import TIME_LEFT, Vector
 from warp_torchrl.validation import check_fields
 
 _ACTIVATIONS = {"tanh": nn.Tanh, "relu": nn.ReLU}
@@ -140,7 +129,7 @@ class Mlp:
     @property
     def state_key(self) -> str:
         """Return the key of the state as these networks read it."""
-        return CANONICAL_STATE if self._is_canonical else STATE
+        return CANONICAL_STATE if self.symmetry == "canonical" else STATE
 
     def canonical_batch(
         self, signature: Signature, state: bool = True, restored: bool = False, packed: bool = False
@@ -153,22 +142,23 @@ class Mlp:
             restored: Whether they learn from actions as they are on the map.
             packed: Whether to leave out the planes that the world cannot fill.
         """
-        packings = self._packings(signature) if packed else None
-        if not self._is_canonical:
-            return CanonicalBatch(None, packings=packings)
-        return CanonicalBatch(
-            Canonicalise(signature.observation, self._is_late(signature)),
-            CanonicaliseState(signature.state) if state else None,
-            () if restored else signature.actions,
-            packings,
-        )
+        return self._inputs(signature).batch(state, restored, self._packs and packed)
 
-    def _packings(self, signature: Signature) -> Packings:
-        """Return what packs the entries that these networks read packed or whole."""
-        entries: dict[Any, Entry] = {self._key(name): entry for name, entry in signature.observation.items()}
-        if self._is_late(signature):
-            entries |= {self._key(name, sent=True): entry for name, entry in signature.observation.items()}
-        return Packings({**entries, self.state_key: signature.state})
+    _packs: ClassVar[bool] = True
+    """Whether they can leave planes out."""
+
+    def _inputs(self, signature: Signature) -> Inputs:
+        """Return what these networks read.
+
+        Raises:
+            ValueError: If messages come late in several rounds.
+        """
+        is_late = self.talks and signature.is_late
+        if is_late and self.message_rounds > 1:
+            raise ValueError(
+                f"model.message_rounds must be 1 where messages come late (team.radio.delay), got {self.message_rounds}"
+            )
+        return Inputs(signature, is_canonical=self.symmetry == "canonical", is_late=is_late)
 
     def _of_agents(
         self,
@@ -196,16 +186,17 @@ class Mlp:
             memory: Units that it remembers by.
             talks: Whether agents exchange messages.
         """
+        inputs = self._inputs(signature)
         names = _read(list(signature.observation), central and not judges)
-        entries, keys = [signature.observation[name] for name in names], [self._key(name) for name in names]
+        entries, keys = [signature.observation[name] for name in names], [inputs.key(name) for name in names]
         if judges:
             entries.append(Entry((signature.n_actions,), "float32"))
-            keys.append(CANONICAL_ACTION_ONE_HOT if self._is_canonical else ACTION_ONE_HOT)
+            keys.append(inputs.action_key)
         action = len(keys) - 1 if judges else None
         if central:
             joint = [Entry((signature.n_agents * signature.n_actions,), "float32")] if judges else []
             entries = [signature.state, *joint, *entries]
-        is_late = talks and self._is_late(signature)
+        is_late = talks and inputs.is_late
         network = self._shared(
             signature, lambda: self._network(entries, hidden, out, head_gain, memory, talks, is_late)
         )
@@ -213,60 +204,18 @@ class Mlp:
             keys.append(_INDEX[self.sharing])
         module: TensorDictModuleBase
         if memory:
-            keys += [ORIENTATION] if self._is_canonical else []
-            module = RecurrentActor(network, keys, out, memory, self._clock(signature))
+            clock = inputs.clock()
+            if clock is None:
+                raise ValueError(f"model.memory must be 0 where observations have no clock, got {memory}")
+            module = RecurrentActor(network, [*keys, *inputs.turned()], out, memory, clock)
         elif central:
             central_network = Central(network, signature.state, action)
-            module = TensorDictModule(central_network, in_keys=[self.state_key, *keys], out_keys=[key])
+            module = TensorDictModule(central_network, in_keys=[inputs.state_key, *keys], out_keys=[key])
         else:
             if talks:
-                keys = [RADIO, *self._observed(names), *(self._observed(names, sent=True) if is_late else [])]
+                keys = [RADIO, *inputs.observed(names), *(inputs.observed(names, sent=True) if is_late else [])]
             module = TensorDictModule(network, in_keys=keys, out_keys=[key])
-        return self._sequence(signature, module, central, judges, is_late) if self._is_canonical else module
-
-    @property
-    def _is_canonical(self) -> bool:
-        return self.symmetry == "canonical"
-
-    def _key(self, name: str, sent: bool = False) -> Key:
-        return canonical_key(name, sent) if self._is_canonical else observation_key(name, sent)
-
-    def _observed(self, names: list[str], sent: bool = False) -> list[Key]:
-        """Return the keys of entries of the observation, or of what was sent, and of their orientation."""
-        turned = [SENT_ORIENTATION if sent else ORIENTATION] if self._is_canonical else []
-        return [*(self._key(name, sent) for name in names), *turned]
-
-    def _is_late(self, signature: Signature) -> bool:
-        """Return whether actors are told messages, and those come late.
-
-        Raises:
-            ValueError: If they are of several rounds.
-        """
-        is_late = self.talks and signature.is_late
-        if is_late and self.message_rounds > 1:
-            raise ValueError(
-                f"model.message_rounds must be 1 where messages come late (team.radio.delay), got {self.message_rounds}"
-            )
-        return is_late
-
-    def _sequence(
-        self, signature: Signature, module: TensorDictModuleBase, central: bool, judges: bool, is_late: bool
-    ) -> TensorDictSequential:
-        """Return the sequence that makes what a module reads, and restores what it says of actions."""
-        before: list[TensorDictModuleBase] = [Canonicalise(signature.observation, is_late)]
-        if central:
-            before.append(CanonicaliseState(signature.state))
-        if judges:
-            before.append(CanonicaliseAction(signature.actions))
-        of_actions = [key for key in module.out_keys if key in (LOGITS, ACTION_VALUE)]
-        return TensorDictSequential(*before, module, *(Restore(key, signature.actions) for key in of_actions))
-
-    def _clock(self, signature: Signature) -> tuple[Key, int]:
-        """Return the key of the entry that tells the time left, and its place there."""
-        for name, entry in signature.observation.items():
-            if isinstance(entry.symmetry, Vector) and TIME_LEFT in entry.symmetry.names:
-                return self._key(name), entry.symmetry.names.index(TIME_LEFT)
-        raise ValueError(f"model.memory must be 0 where observations have no clock, got {self.memory}")
+        return inputs.around(module, state=central, action=judges, sent=is_late)
 
     def _shared(
         self, signature: Signature, make: Callable[[], Network | RecurrentNetwork | TalkingNetwork]
@@ -323,16 +272,13 @@ class Cnn(Mlp):
     dtype: Literal["auto", "float32", "bfloat16"] = "float32"
     channels: tuple[int, ...] = (16, 16)
     kernel_size: int = 3
+    _packs: ClassVar[bool] = False  # convolutions read whole planes
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_sizes("channels", self.channels)
         if not (1 <= self.kernel_size <= 15 and self.kernel_size % 2):
             raise ValueError(f"kernel_size must be odd and in 1..15, got {self.kernel_size}")
-
-    def _packings(self, signature: Signature) -> Packings:
-        """Return what packs nothing: convolutions read whole planes."""
-        return Packings({})
 
     def _encoder(self, entries: list[Entry], size: int) -> ConvolutionalEncoder:
         return ConvolutionalEncoder(

@@ -1,0 +1,108 @@
+"""What networks read of an observation and a state: as they are, or in canonical orientation, at once or late."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from tensordict.nn import TensorDictModuleBase, TensorDictSequential
+
+from warp_torchrl.models.canonical import (
+    CanonicalBatch,
+    Canonicalise,
+    CanonicaliseAction,
+    CanonicaliseState,
+    Restore,
+)
+from warp_torchrl.models.packing import Packings
+from warp_torchrl.models.signature import (
+    ACTION_ONE_HOT,
+    ACTION_VALUE,
+    CANONICAL_ACTION_ONE_HOT,
+    CANONICAL_STATE,
+    LOGITS,
+    ORIENTATION,
+    SENT_ORIENTATION,
+    STATE,
+    Entry,
+    Key,
+    Signature,
+    canonical_key,
+    observation_key,
+)
+from warp_torchrl.symmetry import TIME_LEFT, Vector
+
+
+class Inputs:
+    """Where the networks of a team find what they read, and what makes it.
+
+    Args:
+        signature: What they fit.
+        is_canonical: Whether they read it in canonical orientation.
+        is_late: Whether they read what was observed when messages were sent that arrive now.
+    """
+
+    def __init__(self, signature: Signature, is_canonical: bool, is_late: bool) -> None:
+        self.signature, self.is_canonical, self.is_late = signature, is_canonical, is_late
+        self.state_key = CANONICAL_STATE if is_canonical else STATE
+        """Of the state."""
+        self.action_key: Key = CANONICAL_ACTION_ONE_HOT if is_canonical else ACTION_ONE_HOT
+        """Of the action that is judged."""
+
+    def key(self, name: str, sent: bool = False) -> Key:
+        """Return the key of an entry of the observation, or of what was observed when messages were sent."""
+        return canonical_key(name, sent) if self.is_canonical else observation_key(name, sent)
+
+    def turned(self, sent: bool = False) -> list[Key]:
+        """Return the key of the orientation of what is read; none where it is read as it is."""
+        return [SENT_ORIENTATION if sent else ORIENTATION] if self.is_canonical else []
+
+    def observed(self, names: Sequence[str], sent: bool = False) -> list[Key]:
+        """Return the keys of entries and of their orientation."""
+        return [*(self.key(name, sent) for name in names), *self.turned(sent)]
+
+    def clock(self) -> tuple[Key, int] | None:
+        """Return the key of the entry that tells the time left, and its place there; None where none does."""
+        for name, entry in self.signature.observation.items():
+            if isinstance(entry.symmetry, Vector) and TIME_LEFT in entry.symmetry.names:
+                return self.key(name), entry.symmetry.names.index(TIME_LEFT)
+        return None
+
+    def batch(self, state: bool, restored: bool, packed: bool) -> CanonicalBatch:
+        """Return what makes the batches that are learned from.
+
+        Args:
+            state: Whether the state is read.
+            restored: Whether actions are read as they are on the map.
+            packed: Whether planes that the world cannot fill are left out.
+        """
+        shape, packings = self.signature, self._packings() if packed else None
+        if not self.is_canonical:
+            return CanonicalBatch(None, packings=packings)
+        return CanonicalBatch(
+            Canonicalise(shape.observation, self.is_late),
+            CanonicaliseState(shape.state) if state else None,
+            () if restored else shape.actions,
+            packings,
+        )
+
+    def _packings(self) -> Packings:
+        observed, times = self.signature.observation, (False, True) if self.is_late else (False,)
+        entries: dict[Any, Entry] = {self.key(name, sent): each for name, each in observed.items() for sent in times}
+        return Packings({**entries, self.state_key: self.signature.state})
+
+    def around(self, module: TensorDictModuleBase, state: bool, action: bool, sent: bool) -> TensorDictModuleBase:
+        """Return a module with what makes its inputs before it, and what restores the order of actions after it.
+
+        Args:
+            module: Reads by these keys.
+            state: Whether it reads the state.
+            action: Whether it reads an action.
+            sent: Whether it reads what was observed when messages were sent.
+        """
+        if not self.is_canonical:
+            return module
+        shape = self.signature
+        before: list[TensorDictModuleBase] = [Canonicalise(shape.observation, sent)]
+        before += [CanonicaliseState(shape.state)] if state else []
+        before += [CanonicaliseAction(shape.actions)] if action else []
+        of_actions = [key for key in module.out_keys if key in (LOGITS, ACTION_VALUE)]
+        return TensorDictSequential(*before, module, *(Restore(key, shape.actions) for key in of_actions))
