@@ -7,6 +7,7 @@ of the fire what their agents know or see; the others see every cell, which no l
 from warp_torchrl.heuristics.base import Heuristic, idle_action
 from warp_torchrl.heuristics.clockwise import Clockwise
 from warp_torchrl.heuristics.coordinated import Coordinated
+from warp_torchrl.heuristics.dispatch import Dispatch
 from warp_torchrl.heuristics.following import Follower
 from warp_torchrl.heuristics.own_land import OwnLand
 from warp_torchrl.heuristics.reactive import Greedy, Local, NoOp, Random
@@ -19,6 +20,7 @@ HEURISTICS: dict[str, type[Heuristic]] = {
     "local": Local,
     "greedy": Greedy,
     "coordinated": Coordinated,
+    "dispatch": Dispatch,
     "ring": Ring,
     "mixed": Mixed,
     "oldest": Oldest,
@@ -33,6 +35,7 @@ __all__ = [
     "HEURISTICS",
     "Clockwise",
     "Coordinated",
+    "Dispatch",
     "Follower",
     "Greedy",
     "Heuristic",

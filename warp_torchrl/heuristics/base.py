@@ -160,24 +160,37 @@ def move_towards(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
     return way.masked_fill(~team.open_moves(state), float(FAR)).argmin(dim=-1)
 
 
+def target_or_base(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
+    """Return the given targets, but the base for aircraft whose charge runs out, with two steps to spare.
+
+    int64 [B, A, 2].
+    """
+    vehicles = state.vehicles
+    if vehicles.battery is None:
+        return target
+    table, base = env.world.team.table(target.device), vehicles.base[:, None]
+    away = (vehicles.position - base).abs().amax(dim=-1)
+    turns_back = table.flies & (vehicles.battery <= away / table.stride + 2.0)
+    return torch.where(turns_back[..., None], base, target)
+
+
 def target_or_supply(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
     """Return the given targets, but the nearest lake or the base for agents whom water or charge runs out.
 
-    int64 [B, A, 2]; aircraft turn back to the base with two steps to spare.
+    int64 [B, A, 2].
     """
-    team, vehicles = env.world.team, state.vehicles
-    if vehicles.battery is not None:
-        table, base = team.table(target.device), vehicles.base[:, None]
-        away = (vehicles.position - base).abs().amax(dim=-1)
-        turns_back = table.flies & (vehicles.battery <= away / table.stride + 2.0)
-        target = torch.where(turns_back[..., None], base, target)
-    if not team.tank:
+    target = target_or_base(state, env, target)
+    if not env.world.team.tank:
         return target
-    water = state.landscape.cover == Cover.LAKE
-    base = state.vehicles.base[:, 0] * water.shape[2] + state.vehicles.base[:, 1]
-    water = water.flatten(1).scatter(1, base[:, None], True).view_as(water)
+    water = mark_base(state, state.landscape.cover == Cover.LAKE)
     _, index = nearest(state.vehicles.position, water)
     return torch.where((state.vehicles.tank == 0)[..., None], place(index, state), target)
+
+
+def mark_base(state: WorldState, mask: Tensor) -> Tensor:
+    """Return marked cells, bool [B, H, W], with the base of each world among them."""
+    base = state.vehicles.base[:, 0] * mask.shape[2] + state.vehicles.base[:, 1]
+    return mask.flatten(1).scatter(1, base[:, None], True).view_as(mask)
 
 
 def claim_cells(state: WorldState, cells: Tensor, value: Tensor, spacing: int, discount: float, taken: float) -> Tensor:
@@ -194,7 +207,20 @@ def claim_cells(state: WorldState, cells: Tensor, value: Tensor, spacing: int, d
         discount: Amount by which it lowers them [cells of distance].
         taken: Further amount for the assigned cell itself [cells of distance].
     """
-    gain = value - chebyshev_distance(state, cells)
+    return match_cells(state, cells, value - chebyshev_distance(state, cells), spacing, discount, taken)
+
+
+def match_cells(state: WorldState, cells: Tensor, gain: Tensor, spacing: int, discount: float, taken: float) -> Tensor:
+    """Return what ``claim_cells`` does, int64 [B, A, 2], of each agent's gain by each cell.
+
+    Args:
+        state: The worlds.
+        cells: Flat indices of the candidate cells, int64 [B, K].
+        gain: Value less distance [cells of distance], float32 [B, A, K]; -inf excludes a cell. It is overwritten.
+        spacing: See ``claim_cells``.
+        discount: See ``claim_cells``.
+        taken: See ``claim_cells``.
+    """
     worlds, agents, count = gain.shape
     place_of = place(cells, state)
     claim = state.vehicles.position.clone()

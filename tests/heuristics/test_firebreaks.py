@@ -1,0 +1,70 @@
+"""Firebreaks by hand, on grass in calm air."""
+
+import pytest
+import torch
+
+from warp_torchrl.heuristics.firebreaks import cells_to_clear, pace_of_fire
+
+from .drawing import scene
+
+MEADOW = "TTTTTTTTT " * 4 + "TTTTaTTTT" + " TTTTTTTTT" * 4
+
+
+def square(distance: int) -> torch.Tensor:
+    """The ring about the middle of the meadow."""
+    away = (torch.arange(9) - 4).abs()
+    return torch.maximum(away[:, None], away) == distance
+
+
+def planned(env, state) -> torch.Tensor:
+    return cells_to_clear(state, env.world, torch.tensor([True] * env.n_agents), effort=2.0)[0]
+
+
+def test_the_pace_is_the_mean_chance_of_the_trees_beside_the_fire() -> None:
+    env, state = scene(MEADOW, at=[(4, 3)])
+    # Four at distance 1 ignite for certain, four at sqrt(2) with 1 / sqrt(2).
+    assert pace_of_fire(state, env.world).tolist() == pytest.approx([(4 + 4 / 2**0.5) / 8])
+
+
+@pytest.mark.parametrize(
+    ("agents", "step", "distance"),
+    [
+        (4, 0, 1),  # 2 x 8 / 4 = 4 steps; fire comes after 5
+        (3, 0, 2),  # 2 x 8 / 3 = 5.3, too late; 2 x 16 / 3 = 10.7, and fire comes after 5 (1 / 0.854 + 1) = 10.9
+        (3, 1, 4),  # a step less is left: 0.3 too late at 3, and at 4 21.3 of 21.6
+        (2, 0, 9),  # 2 x 8 d / 2 steps are too many for each: nothing is cleared
+    ],
+)
+def test_the_ring_is_the_first_that_is_closed_in_time(agents: int, step: int, distance: int) -> None:
+    env, state = scene(MEADOW, at=[(4, 3)] * agents)
+    state = state.replace(step=torch.full_like(state.step, step))
+    assert torch.equal(planned(env, state), square(distance))
+
+
+def test_the_way_to_the_ring_takes_time() -> None:
+    # Of four, one has 4 moves to the fire: 3 and 4 of 5 steps at 1, 2 and 8 of 10.9 at 2.
+    env, state = scene(MEADOW, at=[(4, 3)] * 3 + [(0, 0)])
+    assert torch.equal(planned(env, state), square(2))
+
+
+def test_a_later_state_goes_on_with_what_was_cleared() -> None:
+    env, state = scene(MEADOW, at=[(4, 3)] * 3)
+    done = square(2)
+    done[:, 3:] = False  # five cells in the west; 2 x 11 / 3 = 7.3 steps for the others, of 8.9 that are left
+    cells = state.cells.masked_fill(done, 0)
+    after = state.replace(cells=cells, firebreak=state.firebreak | done, step=torch.full_like(state.step, 2))
+    assert torch.equal(planned(env, after), square(2) & ~done)
+
+
+def test_trees_too_young_to_burn_and_lakes_are_left() -> None:
+    drawing = "TTTTTTT TT1~TTT TTTTTTT TTTaTTT TTTTTTT TTTTTTT TTTTTTT"
+    env, state = scene(drawing, at=[(3, 2)] * 8)
+    ring = planned(env, state)
+    assert ring.sum() == 8 and not ring[1, 2:4].any()
+    env, state = scene(drawing.replace("TT1~TTT TTTTTTT", "TTTTTTT TT1~TTT"), at=[(3, 2)] * 8)
+    assert planned(env, state).sum() == 6
+
+
+def test_nothing_is_cleared_about_a_fire_that_is_shut_in() -> None:
+    env, state = scene("TTTTT T###T T#a#T T###T TTTTT", at=[(0, 0)])
+    assert not planned(env, state).any()

@@ -1,0 +1,125 @@
+"""The baseline that sends agents by the ways that they can go."""
+
+import math
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.heuristics.base import (
+    chebyshev_distance,
+    extinguish_or,
+    idle_action,
+    list_cells,
+    mark_base,
+    match_cells,
+    place,
+    target_or_base,
+)
+from warp_torchrl.heuristics.coordinated import Coordinated
+from warp_torchrl.heuristics.firebreaks import cells_to_clear
+from warp_torchrl.world.abilities import Extinguish, Situation, own_cell, places
+from warp_torchrl.world.fast.detours import moves_around, moves_from
+from warp_torchrl.world.fast.distances import FAR
+from warp_torchrl.world.geometry import offsets
+from warp_torchrl.world.role import ROLES
+from warp_torchrl.world.state import Action, Cover, WorldState, is_burning
+from warp_torchrl.world.team import is_second
+
+_LAST = 4096.0
+"""By how much less cells are worth to agents that cannot extinguish: they choose after the others."""
+
+
+class Dispatch(Coordinated):
+    """Assigns the fire front as ``Coordinated`` does, but by the moves that agents need, around lakes and fire.
+
+    Where team-mates would extinguish one cell in the same step, the first does so and the others go on. Agents with
+    empty tanks claim no fire: they go where the way to water, and from there to the fire, is shortest. Agents that can
+    clear and never extinguish, as in teams without water, shut the fire in with firebreaks (``cells_to_clear``). Agents
+    that have nothing to go to wait.
+    """
+
+    effort = 2.0  # steps for each cell of a firebreak: move, clear
+
+    def choose(self, state: WorldState, mask: Tensor) -> Tensor:
+        """Return the actions, int64 [B, A]."""
+        clears = self._clears()
+        if not any(clears):
+            return self._attack(state, mask)
+        who = torch.tensor(clears, device=mask.device)
+        clear = self._clear(state, mask, who)
+        return clear if all(clears) else torch.where(who, clear, self._attack(state, mask))
+
+    def _clears(self) -> list[bool]:
+        """Return which agents clear firebreaks."""
+        team = self.env.world.team
+        kinds = [ROLES[role].abilities for role in team.agent_roles]
+        return ["clear" in each and (team.tank == 0 or "extinguish" not in each) for each in kinds]
+
+    def _attack(self, state: WorldState, mask: Tensor) -> Tensor:
+        """Return the actions of agents that extinguish, int64 [B, A]."""
+        world, tank = self.env.world, state.vehicles.tank
+        table = world.team.table(mask.device)
+        value, front = self.value(state)
+        cells, valid = list_cells(front)
+        gain = value.flatten(1).gather(1, cells)[:, None] - self._distance(state, cells)
+        gain = gain - _LAST * ~table.can["extinguish"][:, None]
+        gain = gain.masked_fill(~valid[:, None] | (tank == 0)[..., None], -math.inf)
+        claims = match_cells(state, cells, gain, spacing=3, discount=6.0, taken=1000.0)
+        move = self._move(state, mask, self._target_or_water(state, claims, front))
+        nearby, _ = Extinguish.nearby_fire(Situation(state, table, 1.0, world.fire.last_spreading))
+        second = is_second(nearby, mask[..., Action.EXTINGUISH])
+        return torch.where(second, move, extinguish_or(move, mask))
+
+    def _clear(self, state: WorldState, mask: Tensor, who: Tensor) -> Tensor:
+        """Return the actions of agents that clear firebreaks, int64 [B, A]; ``who`` does, bool [A]."""
+        todo = cells_to_clear(state, self.env.world, who, self.effort)
+        cells, valid = list_cells(todo)
+        gain = (-self._distance(state, cells)).masked_fill(~(valid[:, None] & who[:, None]), -math.inf)
+        claims = match_cells(state, cells, gain, spacing=1, discount=2.0, taken=1000.0)
+        own = own_cell(state)
+        here = todo.flatten(1).gather(1, own) & mask[..., Action.CLEAR]
+        move = self._move(state, mask, claims)
+        return torch.where(here & ~is_second(own, here), int(Action.CLEAR), move)
+
+    def _open(self, state: WorldState) -> Tensor:
+        """Return where each agent can go now, bool [B, A, H, W]: not into lakes or fire, unless it flies."""
+        is_open = ~((state.cover == int(Cover.LAKE)) | is_burning(state.cells))
+        return is_open[:, None] | self.env.world.team.table(is_open.device).flies[:, None, None]
+
+    def _distance(self, state: WorldState, cells: Tensor) -> Tensor:
+        """Return the steps from each agent to cells [B, K], float32 [B, A, K]; more than ``FAR`` where no way leads."""
+        moves = moves_around(own_cell(state), self._open(state), cells[:, None])
+        steps = moves / self.env.world.team.table(cells.device).stride[:, None]
+        return torch.where(moves == FAR, FAR + chebyshev_distance(state, cells), steps)
+
+    def _target_or_water(self, state: WorldState, target: Tensor, front: Tensor) -> Tensor:
+        """Return the given targets, but water for agents whose tank is empty, or the base where charge runs out.
+
+        int64 [B, A, 2].
+        """
+        target = target_or_base(state, self.env, target)
+        if not self.env.world.team.tank:
+            return target
+        water, valid = list_cells(mark_base(state, state.cover == int(Cover.LAKE)))
+        is_open = ~((state.cover == int(Cover.LAKE)) | is_burning(state.cells))
+        way = self._distance(state, water) + moves_from(front, is_open, water)[:, None]
+        nearest = way.masked_fill_(~valid[:, None], math.inf).argmin(dim=-1)
+        is_empty = (state.vehicles.tank == 0)[..., None]
+        return torch.where(is_empty, place(water.gather(1, nearest), state), target)
+
+    def _move(self, state: WorldState, mask: Tensor, target: Tensor) -> Tensor:
+        """Return the first move of a shortest way to each agent's target, int64 [B, A]; at the target, wait.
+
+        Of ways that are as short, the one whose first move leads nearest to the target, by rows and columns together.
+        """
+        team = self.env.world.team
+        step = offsets(mask.device) * team.table(mask.device).stride[:, None, None]
+        reached, _ = places(state, step)
+        goal = target[..., 0] * state.cells.shape[2] + target[..., 1]
+        gap = (state.vehicles.position[:, :, None] + step - target[:, :, None]).abs().to(torch.float32)
+        moves = moves_around(goal, self._open(state), reached)
+        way = torch.where(moves == FAR, FAR + gap.amax(dim=-1), moves) + 0.01 * gap.sum(dim=-1)
+        can = team.open_moves(state)
+        move = way.masked_fill_(~can, math.inf).argmin(dim=-1)
+        waits = (goal == own_cell(state)) & ~is_burning(state.cells.flatten(1).gather(1, goal))
+        return torch.where(waits | ~can.any(dim=-1), idle_action(mask, team), move)

@@ -1,0 +1,67 @@
+"""Where teams without water cut firebreaks, by the present state alone."""
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.world.fast.distances import distance_to_nearest
+from warp_torchrl.world.geometry import grow
+from warp_torchrl.world.state import WorldState, is_tree
+from warp_torchrl.world.world import World
+
+_THREATENED = 0.01
+"""Probability to ignite in a tick from which a tree counts as next to the fire: lightning alone stays below it."""
+_SLOWEST = 1e-3
+"""Of the fire's pace [cells a tick]."""
+
+
+def cells_to_clear(state: WorldState, world: World, clears: Tensor, effort: float) -> Tensor:
+    """Return the trees to be cleared, bool [B, H, W]: those to which fire has the same way, the shortest in time.
+
+    Fire goes over trees that can burn, around firebreaks, lakes and young trees, to its eight neighbours. The trees to
+    which it has d cells to go shut it in. Of these rings the first is taken that a team can finish before fire comes,
+
+        way + effort n_d / agents <= ((d - 1) / pace + 1) S - steps since the last tick
+
+    What was cleared is part of a ring and takes no time, so that a later state goes on with it. Rings that lie off the
+    map have no trees: a team that can finish no other clears nothing.
+
+    Args:
+        state: The worlds.
+        world: Their rules; S is its steps to a tick.
+        clears: Which agents clear, bool [A], one at least.
+        effort: Steps that one agent takes for a cell of the ring.
+    """
+    away = _way_of_fire(state, world)
+    distance = torch.arange(1, max(away.shape[1:]), device=away.device)
+    count = torch.zeros(len(away), len(distance) + 2, device=away.device)
+    count.scatter_add_(1, away.flatten(1), (away > 0).flatten(1).to(count.dtype))
+    burning = world.fire.spreads(state)
+    farthest = distance_to_nearest(state.vehicles.position[:, clears], burning).amax(dim=1)
+    way = (farthest[:, None] - distance).clamp(min=0)
+    needed = way + effort * count[:, 1:-1] / clears.sum()
+    steps = world.steps_per_tick
+    left = ((distance - 1) / pace_of_fire(state, world)[:, None] + 1.0) * steps - (state.step % steps)[:, None]
+    first = (needed <= left).to(torch.uint8).argmax(dim=1)
+    return (away == distance[first][:, None, None]) & (away > 0)
+
+
+def pace_of_fire(state: WorldState, world: World) -> Tensor:
+    """Return how far the fire is expected to go, float32 [B] [cells a tick]: the mean chance of the trees beside it."""
+    chance = world.forecast(state).ignition_probability.flatten(1)
+    beside = chance > _THREATENED
+    return ((chance * beside).sum(dim=1) / beside.sum(dim=1).clamp(min=1)).clamp(min=_SLOWEST)
+
+
+def _way_of_fire(state: WorldState, world: World) -> Tensor:
+    """Return the cells that fire has to go to each tree that it can reach, int64 [B, H, W], else 0.
+
+    Ways are followed for as many cells as the map's longer side has.
+    """
+    youngest = 1 if world.fire.growth else world.fire.youngest_fuel
+    fuel = is_tree(state.cells) & (state.cells >= youngest) & (state.alpha > 0.0)
+    reached = world.fire.spreads(state)
+    away = torch.zeros(reached.shape, dtype=torch.int64, device=reached.device)
+    for _ in range(max(reached.shape[1:])):
+        away += ~reached
+        reached = reached | (grow(reached) & fuel)
+    return away * (reached & fuel)
