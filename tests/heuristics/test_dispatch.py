@@ -27,15 +27,20 @@ def test_agents_go_around_lakes() -> None:
     env, state = scene(WALL, at=[(1, 2)])
     assert chosen(env, state) == ["SOUTH"]
     assert chosen(env, state, "coordinated") == ["NORTH"], "as near to the fire as the south, and a dead end"
-    env, state = scene(" ".join(row[::-1] for row in WALL.split()), at=[(1, 4)])
-    assert chosen(env, state) == mirrored(["SOUTH"])
-    flying, above = scene(WALL, at=[(1, 2)], roles=("uav",))
-    assert chosen(flying, above) == ["EAST"]
+
+
+def test_aircraft_fly_over_them() -> None:
+    drawing = "TT~~~~~TT TT~~~~~Ta TT~~~~~TT TTTTTTTTT TTTTTTTTT"
+    for roles, move in ((("uav",), "EAST"), (("ugv",), "SOUTH")):
+        env, state = scene(drawing, at=[(1, 1)], roles=roles)
+        assert chosen(env, state) == [move]
+        env, state = scene(" ".join(row[::-1] for row in drawing.split()), at=[(1, 7)], roles=roles)
+        assert chosen(env, state) == mirrored([move])
 
 
 def test_the_nearest_fire_is_that_with_the_shortest_way() -> None:
-    # Three moves to the fire in the north, but five around the lake; four to the one in the south.
-    env, state = scene("TTaTT ~~~~T TTTTT TTTTT TTTTT TTTTT TaTTT", at=[(2, 1)])
+    # The fire in the north is two cells away, and five moves around the lake; that in the south four.
+    env, state = scene("TTTTT TTaTT ~~~~T TTTTT TTTTT TTTTT TTTTT TaTTT", at=[(3, 1)])
     assert chosen(env, state) == ["SOUTH"]
 
 
@@ -44,6 +49,12 @@ def test_of_two_agents_beside_one_fire_the_first_extinguishes_and_the_second_goe
     assert chosen(env, state)[0] == "EXTINGUISH" and chosen(env, state)[1].endswith("EAST")
     env, state = scene("aTTTTTTa" + MEADOW, at=[(0, 1), (0, 6)])
     assert chosen(env, state) == ["EXTINGUISH", "EXTINGUISH"]
+
+
+def test_who_stands_in_a_fire_that_another_puts_out_leaves_it() -> None:
+    env, state = scene("aTTTTTTT" + MEADOW, at=[(0, 0), (0, 0)])
+    acts = chosen(env, state)
+    assert acts[0] == "EXTINGUISH" and Action[acts[1]] < 8
 
 
 def test_two_agents_go_to_two_fires() -> None:
@@ -101,16 +112,17 @@ def test_aircraft_without_water_stay_away() -> None:
 def test_it_decides_for_a_world_as_it_does_for_it_alone(scenario: str) -> None:
     env = make_env(scenario, n_worlds=6)
     policy, now = HEURISTICS["dispatch"](env), env.reset()
-    for step in range(24):
-        state, mask = env.world_state, env.world.possible_actions(env.world_state)
-        now = policy(now)
-        actions = now["agents", "action"]
-        if step % 8 == 0:
-            alone = [policy.choose(state[at : at + 1], mask[at : at + 1]) for at in range(6)]
+    for _ in range(3):
+        state = env.world_state
+        for each in (state, with_tanks(state, 0, *[5] * (env.n_agents - 1))) if env.world.team.tank else (state,):
+            mask = env.world.possible_actions(each)
+            actions = policy.choose(each, mask)
+            alone = [policy.choose(each[at : at + 1], mask[at : at + 1]) for at in range(6)]
             assert torch.equal(actions, torch.cat(alone))
             with unread():
-                assert torch.equal(policy.choose(state, mask), actions)
-        now = env.step(now)["next"]
+                assert torch.equal(policy.choose(each, mask), actions)
+        for _ in range(8):
+            now = env.step(policy(now))["next"]
 
 
 def test_it_can_be_a_teacher() -> None:

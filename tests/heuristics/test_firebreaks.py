@@ -63,6 +63,31 @@ def test_trees_too_young_to_burn_and_lakes_are_left() -> None:
     assert ring.sum() == 8 and not ring[1, 2:4].any()
     env, state = scene(drawing.replace("TT1~TTT TTTTTTT", "TTTTTTT TT1~TTT"), at=[(3, 2)] * 8)
     assert planned(env, state).sum() == 6
+    env, state = scene(drawing.replace("TT1~TTT TTTTTTT", "TTTTTTT TT1~TTT"), at=[(3, 2)] * 8, growth=True)
+    assert planned(env, state).sum() == 7, "it may grow until the fire comes"
+
+
+def test_trees_on_ground_that_does_not_burn_are_left() -> None:
+    env, state = scene(MEADOW, at=[(4, 3)] * 4)
+    alpha = state.alpha.clone()
+    alpha[0, 3, 3:6] = 0.0
+    ring = planned(env, state.replace(ground=state.ground.replace(alpha=alpha)))
+    assert ring.sum() == 5 and not ring[3].any()
+
+
+def test_what_lies_behind_a_lake_needs_no_firebreak() -> None:
+    # 2 x 5 and 2 x 9 steps of one agent are too late at 1 and 2; 2 x 6 at 3 are not, of 5 (2 / 0.88 + 1) = 16.3.
+    env, state = scene("TTT~TTT TTT~TTT TTT~TTT TTa~TTT TTT~TTT TTT~TTT TTT~TTT", at=[(3, 1)])
+    shut_in = torch.zeros(7, 7, dtype=torch.bool)
+    shut_in[[0, 6], :3] = True
+    assert torch.equal(planned(env, state), shut_in)
+
+
+def test_who_does_not_clear_counts_neither_as_a_worker_nor_on_the_way() -> None:
+    env, state = scene(MEADOW, at=[(4, 3)] * 4 + [(0, 0)] * 4)
+    clears = torch.arange(8) < 4
+    assert torch.equal(cells_to_clear(state, env.world, clears, effort=2.0)[0], square(1))
+    assert torch.equal(cells_to_clear(state, env.world, clears.roll(1), effort=2.0)[0], square(2))
 
 
 def test_nothing_is_cleared_about_a_fire_that_is_shut_in() -> None:

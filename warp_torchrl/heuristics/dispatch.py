@@ -87,10 +87,12 @@ class Dispatch(Coordinated):
         return is_open[:, None] | self.env.world.team.table(is_open.device).flies[:, None, None]
 
     def _distance(self, state: WorldState, cells: Tensor) -> Tensor:
-        """Return the steps from each agent to cells [B, K], float32 [B, A, K]; more than ``FAR`` where no way leads."""
+        """Return the way of each agent to cells [B, K], float32 [B, A, K] [cells]; ``FAR`` and more where none leads.
+
+        Aircraft, whose moves are longer, have no advantage by it: they would claim what others are at already.
+        """
         moves = moves_around(own_cell(state), self._open(state), cells[:, None])
-        steps = moves / self.env.world.team.table(cells.device).stride[:, None]
-        return torch.where(moves == FAR, FAR + chebyshev_distance(state, cells), steps)
+        return torch.where(moves == FAR, FAR + chebyshev_distance(state, cells), moves)
 
     def _target_or_water(self, state: WorldState, target: Tensor, front: Tensor) -> Tensor:
         """Return the given targets, but water for agents whose tank is empty, or the base where charge runs out.
@@ -117,9 +119,9 @@ class Dispatch(Coordinated):
         reached, _ = places(state, step)
         goal = target[..., 0] * state.cells.shape[2] + target[..., 1]
         gap = (state.vehicles.position[:, :, None] + step - target[:, :, None]).abs().to(torch.float32)
-        moves = moves_around(goal, self._open(state), reached)
-        way = torch.where(moves == FAR, FAR + gap.amax(dim=-1), moves) + 0.01 * gap.sum(dim=-1)
         can = team.open_moves(state)
+        moves = moves_around(goal, self._open(state), torch.where(can, reached, goal[..., None]))  # open moves alone
+        way = torch.where(moves == FAR, FAR + gap.amax(dim=-1), moves) + 0.01 * gap.sum(dim=-1)
         move = way.masked_fill_(~can, math.inf).argmin(dim=-1)
         waits = (goal == own_cell(state)) & ~is_burning(state.cells.flatten(1).gather(1, goal))
         return torch.where(waits | ~can.any(dim=-1), idle_action(mask, team), move)

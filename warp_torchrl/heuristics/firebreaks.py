@@ -42,7 +42,7 @@ def cells_to_clear(state: WorldState, world: World, clears: Tensor, effort: floa
     steps = world.steps_per_tick
     left = ((distance - 1) / pace_of_fire(state, world)[:, None] + 1.0) * steps - (state.step % steps)[:, None]
     first = (needed <= left).to(torch.uint8).argmax(dim=1)
-    return (away == distance[first][:, None, None]) & (away > 0)
+    return away == distance[first][:, None, None]
 
 
 def pace_of_fire(state: WorldState, world: World) -> Tensor:
