@@ -123,7 +123,7 @@ def test_nothing_of_the_stopwatch_stays(tmp_path):
     learner = training.learner
     owners = (training.env, learner, learner.explore, learner.loss, learner.optimizer, torch.nn.utils)
     before = [{name: id(value) for name, value in vars(owner).items()} for owner in owners]
-    rows = training_shares(training, iter(training.collection), 1)
+    rows = training_shares(training, training.batches(), 1)
     training.close()
     assert all(row["seconds"] > 0.0 for row in rows)
     for owner, old in zip(owners, before, strict=True):

@@ -71,7 +71,7 @@ def test_evaluation_plays_the_scenario_whatever_is_learned(tmp_path):
     plain = tiny(tmp_path / "without", *overrides)
     plain.learner.loss.load_state_dict(training.learner.loss.state_dict())
     plain.frames = plain.last_batch = 64
-    assert numbers(tmp_path / "with", "evaluation/saved")[-1] == plain._evaluate()
+    assert numbers(tmp_path / "with", "evaluation/saved")[-1] == plain._evaluate()["evaluation/saved"]
     assert plain.env.world == training.run_config.make_env(1, 0).world
 
 

@@ -34,12 +34,12 @@ class Stopwatch:
         self._last = now
 
 
-def training_shares(training: Training, batches: Iterator[TensorDictBase], count: int) -> list[dict[str, Any]]:
+def training_shares(training: Training, batches: Iterator[list[TensorDictBase]], count: int) -> list[dict[str, Any]]:
     """Measure where the time of some batches goes.
 
     Args:
         training: The run; it learns from the batches.
-        batches: Its collector's.
+        batches: Its own, one of each kind of worlds at a time.
         count: Batches to measure.
 
     Returns:
@@ -48,9 +48,9 @@ def training_shares(training: Training, batches: Iterator[TensorDictBase], count
     """
     with _watched(training, clock(training.env.device.type)) as watch:
         for _ in range(count):
-            batch = next(batches)
+            found = next(batches)
             watch.lap("collector")
-            training._learn(batch)
+            training._learn(found)
             training.go_on()
             watch.lap("other")
     total = sum(watch.seconds.values())

@@ -64,6 +64,7 @@ PRESETS = {
     "local": Local(),
     "paper": Paper(),
 }
+SLOW = {"near": pytest.mark.slow}
 SIZE = 16
 ACTIONS = tuple(action.name.lower() for action in Action)
 
@@ -152,7 +153,7 @@ def in_both(preset, turn):
     return here, there, sees
 
 
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=SLOW.get(name, ())) for name in PRESETS])
 @pytest.mark.parametrize("turn", TURNS, ids=str)
 def test_a_turned_world_looks_the_same(name, turn):
     here, there, sees = in_both(PRESETS[name], turn)
