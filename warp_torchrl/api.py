@@ -6,7 +6,7 @@ from pathlib import Path
 
 import torch
 
-from warp_torchrl.config.building import build_components
+from warp_torchrl.config.components import build_components
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import build
 from warp_torchrl.config.groups import ENVIRONMENT

@@ -7,7 +7,7 @@ import torch
 from tensordict import TensorDictBase
 from torchrl.envs.utils import set_exploration_type
 
-from warp_torchrl.config.building import build_components
+from warp_torchrl.config.components import build_components
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.groups import ENVIRONMENT
 from warp_torchrl.config.saved_config import environment_record

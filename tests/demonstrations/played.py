@@ -2,7 +2,7 @@
 
 import torch
 
-from warp_torchrl.config.building import build_components
+from warp_torchrl.config.components import build_components
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.groups import ENVIRONMENT
 from warp_torchrl.config.saved_config import environment_record

@@ -1,6 +1,6 @@
 """Building a run's configuration: every component made and checked from plain values."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields
 from functools import partial
@@ -8,14 +8,14 @@ from typing import Any
 
 from warp_torchrl.collection.imitation import Imitation
 from warp_torchrl.config.checkpoint_config import CheckpointConfig
+from warp_torchrl.config.components import build_components, chosen
 from warp_torchrl.config.composed_kinds import kinds_of_worlds
-from warp_torchrl.config.construction import ConfigError, build, construct
+from warp_torchrl.config.construction import ConfigError, construct
 from warp_torchrl.config.evaluation_config import EvaluationConfig
 from warp_torchrl.config.groups import COMMAND_KEYS, COMPONENTS, WORLD_KEYS
 from warp_torchrl.config.levels import level_worlds
 from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.nearest import did_you_mean
-from warp_torchrl.world.world import World
 
 
 def run_config(config: Mapping[str, Any]) -> RunConfig:
@@ -37,7 +37,7 @@ def run_config(config: Mapping[str, Any]) -> RunConfig:
     built |= {name: construct(kind, config.get(name, {}), name) for name, kind in parts.items()}
     built["make_levels"] = partial(level_worlds, config, built, WORLD_KEYS)
     built["make_kinds"] = partial(kinds_of_worlds, config, teacher=built["imitation"].teacher)
-    values = _chosen(RunConfig, {**config, **built})
+    values = chosen(RunConfig, {**config, **built})
     _check_together(config)
     made = construct(RunConfig, values, "")
     with _in_section("algorithm"):
@@ -58,32 +58,6 @@ def _in_section(section: str) -> Iterator[None]:
         yield
     except ValueError as error:
         raise ConfigError(f"{section}.{error}") from None
-
-
-def build_components(config: Mapping[str, Any], names: Sequence[str] = COMPONENTS) -> dict[str, Any]:
-    """Build components of a composed configuration, and the ``world`` of those that make one.
-
-    Args:
-        config: As plain values.
-        names: Which; those of the world must be among them.
-
-    Raises:
-        ConfigError: With key, value and rule.
-    """
-    first = ("model",) if "model" in names else ()  # whose messages are the team's: mistakes are told of the model
-    built = {name: build(config[name], name) for name in dict.fromkeys((*first, *names))}
-    world = construct(World, _chosen(World, {**config, **built}), "")
-    if "reward" in built:
-        try:
-            built["reward"].check_world(world)
-        except ValueError as error:
-            raise ConfigError(str(error)) from None
-    return {**built, "world": world}
-
-
-def _chosen(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return those values that are fields of a dataclass."""
-    return {each.name: values[each.name] for each in fields(kind) if each.name in values}
 
 
 def _check_together(config: Mapping[str, Any]) -> None:

@@ -5,9 +5,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from warp_torchrl.collection.imitation import TEACHERS
+from warp_torchrl.config.components import build_components
 from warp_torchrl.config.compose import OPTION, compose_config, plain
-from warp_torchrl.config.construction import ConfigError, build, construct
-from warp_torchrl.config.groups import COMPONENTS, WORLD_KEYS
+from warp_torchrl.config.construction import ConfigError, construct
+from warp_torchrl.config.groups import OF_WORLDS, WORLD_KEYS
 from warp_torchrl.config.kinds import KindOfWorld
 from warp_torchrl.dotted import dotted
 from warp_torchrl.mixture import Kind, Mixture
@@ -58,6 +59,5 @@ def _world(config: Mapping[str, Any], kind: Kind) -> World:
     overrides = [f"{key}={_written(value)}" for key, value in dotted(kind.over).items()]
     values = plain(compose_config("train", [f"scenario={kind.scenario}", *overrides]))
     values["team"]["radio"]["carries"] = config["team"]["radio"]["carries"]
-    groups = [name for name in WORLD_KEYS if name in COMPONENTS]
-    parts = {**values, **{name: build(values[name], name) for name in groups}}
-    return construct(World, {name: parts[name] for name in WORLD_KEYS if name != "scenario"}, "")
+    world: World = build_components(values, OF_WORLDS)["world"]
+    return world

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import torch
 from tensordict import TensorDictBase
 
-from warp_torchrl.config.building import build_components
+from warp_torchrl.config.components import build_components
 from warp_torchrl.config.compose import plain
 from warp_torchrl.config.groups import ENVIRONMENT
 from warp_torchrl.config.saved_config import restore

@@ -10,7 +10,7 @@ from typing import Any
 
 from torch import Tensor
 
-from warp_torchrl.config.building import build_components
+from warp_torchrl.config.components import build_components
 from warp_torchrl.config.groups import ENVIRONMENT
 from warp_torchrl.config.saved_config import environment_record
 from warp_torchrl.config.seeds import FIRST_EVALUATED

@@ -7,7 +7,7 @@ from typing import NoReturn
 from tensordict import TensorDictBase
 from torch import Tensor
 
-from warp_torchrl.config.building import build_components
+from warp_torchrl.config.components import build_components
 from warp_torchrl.config.compose import plain
 from warp_torchrl.config.groups import ENVIRONMENT
 from warp_torchrl.config.saved_config import restore
