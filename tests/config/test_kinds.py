@@ -37,6 +37,12 @@ def test_a_kind_has_what_the_radio_of_the_run_carries():
     assert [kind.world.team.radio.carries for kind in plan.kinds] == ["graph", "graph"]
 
 
+def test_a_key_of_a_kind_that_its_file_leaves_out_can_be_given():
+    plan = planned("mixture=all", "mixture.kinds.windy.share=3", "mixture.kinds.windy.over.horizon=9", "n_worlds=64")
+    windy = next(kind for kind in plan.kinds if kind.name == "windy")
+    assert (windy.share, windy.world.horizon, windy.world.wind.speed) == (3.0, 9, 10.0)
+
+
 def test_all_has_kinds_that_one_team_can_play():
     plan = planned("mixture=all", "n_worlds=64", "imitation.teacher=coordinated")
     plan.check_training()
@@ -55,6 +61,7 @@ def test_without_a_mixture_there_is_one_kind():
         ([], "mixture.kinds must be two or more, got none: 'mixture.kinds={default:{},water:{share:2}}' names two"),
         (["mixture.kinds={default:{}}"], "mixture.kinds must be two or more, got default"),
         (["mixture.kinds={default:{},watr:{}}"], "mixture.kinds.watr: scenario must be one of .*did you mean water"),
+        (["mixture=all", "mixture.kinds.watr.share=2"], "mixture.kinds.watr: scenario must be .*did you mean water"),
         (["mixture.kinds={default:{},water:{shares:2}}"], "mixture.kinds.water.shares is not a key.*did you mean"),
         (["mixture.kinds={default:{},water:{share:0}}"], "mixture.kinds.water.share must be in"),
         (

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 from warp_torchrl.api import load_policy, make_env
-from warp_torchrl.benchmark.tasks import FIRST_SEED, GENERAL
+from warp_torchrl.benchmark.tasks import FIRST_SEED, GENERAL, SCENARIOS, interval_cell
 from warp_torchrl.evaluation.play import play, play_heuristics
 from warp_torchrl.evaluation.statistics import compare, summarise
 
@@ -23,10 +23,7 @@ class Place(NamedTuple):
     overrides: tuple[str, ...] = ()
 
 
-SCENARIOS = tuple(
-    Place(name, name)
-    for name in ("skirmish", "single", "default", "large", "water", "hetero", "hazard", "shift", "ring", "lightning")
-)
+OURS = tuple(Place(name, name) for name in SCENARIOS if not name.startswith("paper"))
 TEAMS = tuple(Place(f"default, {n} vehicles", "default", (f"team.n_agents={n}",)) for n in (1, 2, 3, 6, 12, 16))
 MAPS = tuple(
     Place(f"default, {side} x {side} cells", "default", (f"landscape.size={side}",)) for side in (16, 24, 48, 96, 192)
@@ -41,7 +38,7 @@ def on_ground(folder: str) -> tuple[Place, ...]:
     return (Place("landfire", "landfire", (path,)), Place("landfire, fire=rate", "landfire", (path, "fire=rate")))
 
 
-PLACES = {"scenarios": SCENARIOS, "teams": TEAMS, "maps": MAPS, "winds": WINDS, "giant": GIANT}
+PLACES = {"scenarios": OURS, "teams": TEAMS, "maps": MAPS, "winds": WINDS, "giant": GIANT}
 """Groups of places; those on real ground need a folder."""
 
 
@@ -86,15 +83,10 @@ def generalist_table(rows: Sequence[dict[str, Any]]) -> str:
     for row in rows:
         low, high = (100 * bound for bound in row["difference"]["ci95"])
         lines.append(
-            f"| {row['place']} | {_interval(row['policy'])} | {row['baseline']} | {_interval(row['best'])} | "
+            f"| {row['place']} | {interval_cell(row['policy'])} | {row['baseline']} | {interval_cell(row['best'])} | "
             f"{100 * row['difference']['saved_difference']:+.1f} ({low:+.1f} .. {high:+.1f}) |"
         )
     ahead = sum(row["difference"]["ci95"][0] > 0.0 for row in rows)
     behind = sum(row["difference"]["ci95"][1] < 0.0 for row in rows)
     told = f"Ahead of the best baseline, intervals apart, on {ahead} of {len(rows)} places, and behind it on {behind}."
     return "\n".join([*lines, "", told])
-
-
-def _interval(found: dict[str, Any]) -> str:
-    low, high = (100 * bound for bound in found["ci95"])
-    return f"{100 * found['mean']:.1f} ({low:.1f} .. {high:.1f})"

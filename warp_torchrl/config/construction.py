@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from inspect import isabstract
-from typing import Any, get_type_hints
+from typing import Any, get_origin, get_type_hints
 
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.validation import fit
@@ -59,6 +59,11 @@ def component(target: object) -> type | None:
     except ImportError:
         return None
     return found if isinstance(found, type) and is_dataclass(found) else None
+
+
+def free_mappings(kind: type) -> set[str]:
+    """Return the fields of a dataclass that are mappings of any keys."""
+    return {name for name, hint in get_type_hints(kind).items() if get_origin(hint) is Mapping}
 
 
 def construct(kind: type, values: Mapping[str, Any], where: str) -> Any:

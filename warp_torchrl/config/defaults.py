@@ -13,7 +13,7 @@ from hydra._internal.sources_registry import SourcesRegistry
 from hydra.plugins.config_source import ConfigResult
 from omegaconf import DictConfig, OmegaConf
 
-from warp_torchrl.config.construction import component
+from warp_torchrl.config.construction import component, free_mappings
 from warp_torchrl.config.groups import COMPONENTS
 from warp_torchrl.config.prediction_options import PredictionOptions
 from warp_torchrl.config.run_config import RunConfig
@@ -53,12 +53,17 @@ class FileConfigSource(file_config_source.FileConfigSource):
 
 
 def _open_mappings(node: DictConfig) -> None:
-    """Let an override put keys of its own into fields that are empty mappings: ``reward.terms.front=0.1``."""
+    """Let an override put keys of its own into fields that are mappings of any keys: ``reward.terms.front=0.1``."""
+    kind = component(node.get("_target_"))
+    mappings = set() if kind is None else free_mappings(kind)
     keys = [key for key in node if isinstance(key, str) and not OmegaConf.is_missing(node, key)]
-    for part in (node[key] for key in keys if not OmegaConf.is_interpolation(node, key)):
+    for key in (each for each in keys if not OmegaConf.is_interpolation(node, each)):
+        part = node[key]
         if isinstance(part, DictConfig):
-            OmegaConf.set_struct(part, None if part else False)
-            _open_mappings(part)
+            is_open = key in mappings or not part
+            OmegaConf.set_struct(part, False if is_open else None)
+            if not is_open:
+                _open_mappings(part)
 
 
 def _left_out(config_path: str, node: DictConfig) -> dict[str, Any]:

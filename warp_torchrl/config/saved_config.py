@@ -11,7 +11,7 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from warp_torchrl.config.compose import OPTION, compose_config, conf_folder, option_of, plain, without_targets
-from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.config.construction import ConfigError, component, free_mappings
 from warp_torchrl.config.groups import COMPONENTS, ENVIRONMENT, WORLD_KEYS
 from warp_torchrl.config.renamed import renamed_overrides
 from warp_torchrl.dotted import dotted
@@ -75,7 +75,7 @@ def restore(record: SavedConfig, overrides: Sequence[str] = ()) -> DictConfig:
         touched += WORLD_KEYS
     choices = [f"{group}={option}" for group, option in record.choices.items() if group not in touched]
     config = compose_config("train", [*choices, *overrides])
-    recorded = dotted(record.values)
+    recorded = _recorded(record, config, touched)
     groups = {*record.values, "processes"}
     before = {
         key: value
@@ -85,7 +85,7 @@ def restore(record: SavedConfig, overrides: Sequence[str] = ()) -> DictConfig:
     for path, value in {**before, **recorded}.items():
         if "${" in str(value):  # what is recorded was resolved: this one was put there to read what is ours
             raise ConfigError(f"{path} in the run folder must be a plain value, got {value!r}")
-        is_touched = any(path == key or path.startswith(f"{key}.") for key in touched)
+        is_touched = any(path == key or _is_in(path, key) for key in touched)
         if is_touched and value not in _OF_NETWORKS.get(path, ()):
             continue
         try:
@@ -93,6 +93,26 @@ def restore(record: SavedConfig, overrides: Sequence[str] = ()) -> DictConfig:
         except OmegaConfBaseException:
             raise ConfigError(f"{path} in the run folder is not a key of this version's configuration") from None
     return config
+
+
+def _recorded(record: SavedConfig, config: DictConfig, touched: Sequence[str]) -> dict[str, Any]:
+    """Return the values of a record by dotted key; a mapping of any keys is one value, unless a key in it is touched.
+
+    So it has the keys that it had, and no others that our files have.
+    """
+    whole: dict[str, Any] = {}
+    for group in (each for each in COMPONENTS if isinstance(record.values.get(each), Mapping)):
+        kind, values = component(config[group]["_target_"]), record.values[group]
+        for name in sorted(free_mappings(kind) & values.keys()) if kind is not None else ():
+            whole[f"{group}.{name}"] = values[name]
+    whole = {path: value for path, value in whole.items() if not any(_is_in(key, path) for key in touched)}
+    leaves = dotted(record.values).items()
+    return {**{key: value for key, value in leaves if not any(_is_in(key, path) for path in whole)}, **whole}
+
+
+def _is_in(key: str, path: str) -> bool:
+    """Return whether a key names something in what a path names."""
+    return key.startswith(f"{path}.")
 
 
 def world_overrides(values: Mapping[str, Any]) -> list[str]:

@@ -8,11 +8,10 @@ from tensordict import TensorDictBase
 
 from warp_torchrl import parallel
 from warp_torchrl.config.run_config import RunConfig
-from warp_torchrl.config.seeds import first_world_seed
 from warp_torchrl.curriculum import Curriculum, Standing
 from warp_torchrl.curriculum.standing import episodes_by_level
 from warp_torchrl.env import LeveledEnv, WildfireEnv
-from warp_torchrl.evaluation.play import play_heuristics
+from warp_torchrl.training.standard import reached
 
 log = logging.getLogger("warp_torchrl")
 
@@ -78,11 +77,7 @@ def _baseline(plan: RunConfig) -> tuple[float, ...]:
     if plan.curriculum.asks_for is None:
         return ()
     name, count = plan.curriculum.asks_for
-    first, reached = first_world_seed(plan.seed), []
-    for world in plan.levels:
-        parts = {"observation": plan.observation, "reward": plan.reward, "device": plan.device}
-        env = WildfireEnv(world, n_worlds=count, seed=first, **parts)
-        reached.append(float(play_heuristics(env, first, (name,))[name][plan.curriculum.measure].mean()))
-    told = ", ".join(f"{value:.3f}" for value in reached)
+    found = reached(plan, plan.levels, name, count, plan.curriculum.measure)
+    told = ", ".join(f"{value:.3f}" for value in found)
     log.info("curriculum: %s reaches %s of %s, level by level", name, told, plan.curriculum.measure)
-    return tuple(reached)
+    return tuple(found)

@@ -5,9 +5,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from warp_torchrl.config.run_config import RunConfig
-from warp_torchrl.config.seeds import first_world_seed
-from warp_torchrl.evaluation.play import play_heuristics
 from warp_torchrl.mixture import Mixture, weights
+from warp_torchrl.training.standard import reached
 
 log = logging.getLogger("warp_torchrl")
 
@@ -60,11 +59,8 @@ def weighing(plan: RunConfig, shares: Sequence[float]) -> Weighing | None:
     """Return how a run weighs its kinds, for which the baseline plays first; None where their shares stand."""
     if not isinstance(plan.mixture, Mixture) or plan.mixture.weigh == "share":
         return None
-    first, name, reached = first_world_seed(plan.seed), plan.mixture.baseline, []
-    for kind in plan.kinds:
-        env = plan.make_env(plan.mixture.worlds, first, world=kind.world)
-        reached.append(float(play_heuristics(env, first, (name,))[name]["saved"].mean()))
-    names = [kind.name for kind in plan.kinds]
-    told = ", ".join(f"{kind} {value:.3f}" for kind, value in zip(names, reached, strict=True))
-    log.info("mixture: %s saves of each kind: %s", name, told)
-    return Weighing(plan.mixture, names, shares, reached)
+    names, baseline = [kind.name for kind in plan.kinds], plan.mixture.baseline
+    found = reached(plan, [kind.world for kind in plan.kinds], baseline, plan.mixture.worlds, "saved")
+    told = ", ".join(f"{name} {value:.3f}" for name, value in zip(names, found, strict=True))
+    log.info("mixture: %s saves of each kind: %s", baseline, told)
+    return Weighing(plan.mixture, names, shares, found)

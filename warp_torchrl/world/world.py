@@ -181,7 +181,7 @@ class World:
         for _ in range(self.ignition.head_start):
             spreads = (state.cells >= FIRST_FIRE) & (state.cells < EMBER)
             state = self._tick(state, spreads.flatten(1).any(dim=1))
-        state = self.team.radio.begun(self.agencies.begun(state, self.team), self._flies(state))
+        state = self.team.radio.begun(self.agencies.begun(state, self.team), self.team.table(state.cells.device).flies)
         state = self.sensing.begun(state, self.team)
         index = state.vehicles.position[..., 0] * self.size[1] + state.vehicles.position[..., 1]
         is_crowded = (ground.cover.flatten(1).gather(1, index) == int(Cover.LAKE)).any()
@@ -207,7 +207,7 @@ class World:
         after = self._tick(after, ticks_now)
         counts_after = count_trees(after)
         after = self.agencies.updated(self._advance_clock(after, counts_after, running), running)
-        after = self.team.radio.sent(after, self._flies(after), running)
+        after = self.team.radio.sent(after, self.team.table(after.cells.device).flies, running)
         return Transition(
             before=state,
             result=result,
@@ -238,10 +238,6 @@ class World:
         if self.steps_per_tick == 1:
             return advance(state, self.fire, self.air, ticks_now)
         return road.advance_rows(state, ticks_now, lambda rows, ticks: advance(rows, self.fire, self.air, ticks))
-
-    def _flies(self, state: WorldState) -> Tensor:
-        """Return which agents fly, bool [A]."""
-        return self.team.table(state.cells.device).flies
 
     def _advance_clock(self, state: WorldState, counts: TreeCounts, running: Tensor) -> WorldState:
         step = state.step + running
