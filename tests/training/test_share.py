@@ -1,5 +1,7 @@
 """Several kinds of worlds in one training: their seeds, weights, gradients and columns."""
 
+import re
+
 import pytest
 import torch
 
@@ -64,9 +66,12 @@ def test_every_sample_of_every_kind_is_learned_from_once_a_pass(tmp_path):
     assert counts == [[16], [32], [16]]  # of 8 steps of 2, 4 and 2 worlds, in minibatches of 64 steps of all
 
 
-def test_columns_tell_what_each_kind_saves(tmp_path):
+def test_columns_tell_what_each_kind_saves(tmp_path, caplog):
     training = tiny(tmp_path, *THREE, "total_frames=128", "evaluation.interval=128", "evaluation.episodes=2")
-    training.train()
+    with caplog.at_level("INFO", logger="warp_torchrl"):
+        training.train()
+    (told,) = [each.message for each in caplog.records if "of each kind" in each.message]
+    assert re.fullmatch(rf"on training fires, {training.mode}, .*: one 0\.\d+, two 0\.\d+, large 0\.\d+", told)
     found = rows(tmp_path)[-1]
     saved = [float(found[f"mixture/saved_{name}"]) for name in ("one", "two", "large")]
     assert float(found["world/saved"]) == pytest.approx(0.25 * saved[0] + 0.5 * saved[1] + 0.25 * saved[2])

@@ -18,12 +18,12 @@ def cells_to_clear(state: WorldState, world: World, clears: Tensor, effort: floa
     """Return the trees to be cleared, bool [B, H, W]: those to which fire has the same way, the shortest in time.
 
     Fire goes over trees that can burn, around firebreaks, lakes and young trees, to its eight neighbours. The trees to
-    which it has d cells to go shut it in. Of these rings the first is taken that a team can finish before fire comes,
+    which it has d cells to go shut it in. The team takes the smallest such ring that it can finish in time:
 
         way + effort n_d / agents <= ((d - 1) / pace + 1) S - steps since the last tick
 
-    What was cleared is part of a ring and takes no time, so that a later state goes on with it. Rings that lie off the
-    map have no trees: a team that can finish no other clears nothing.
+    n_d trees are in the ring. What was cleared is part of it and takes no time, so a later state goes on with it. A ring
+    off the map has no trees, so a team that can finish no other clears nothing.
 
     Args:
         state: The worlds.

@@ -180,13 +180,17 @@ class Training(Learning):
         chosen = self.run_config.evaluation.mode
         if chosen != "best":
             return chosen
-        first = first_world_seed(self.run_config.seed)
-        reached = dict.fromkeys(MODES, 0.0)
-        for kind in self.run_config.kinds:
+        first, kinds = first_world_seed(self.run_config.seed), self.run_config.kinds
+        reached: dict[str, list[float]] = {mode: [] for mode in MODES}
+        for kind in kinds:
             env = self.run_config.make_env(min(self.run_config.evaluation.episodes, WORLDS), first, world=kind.world)
-            for mode in MODES:
-                reached[mode] += float(play(env, self.learner.policy, first, mode)[goal(env.world)].mean())
-        return max(reached, key=reached.__getitem__)
+            for mode, values in reached.items():
+                values.append(float(play(env, self.learner.policy, first, mode)[goal(env.world)].mean()))
+        better = max(reached, key=lambda mode: sum(reached[mode]))
+        if len(kinds) > 1:
+            told = ", ".join(f"{kind.name} {value:.3f}" for kind, value in zip(kinds, reached[better], strict=True))
+            log.info("on training fires, %s, the team saves of each kind: %s", better, told)
+        return better
 
     def save(self) -> Path | None:
         """Write a checkpoint and return its folder; every process must call it at once, and the first one writes."""
