@@ -22,8 +22,8 @@ def cells_to_clear(state: WorldState, world: World, clears: Tensor, effort: floa
 
         way + effort n_d / agents <= ((d - 1) / pace + 1) S - steps since the last tick
 
-    n_d trees are in the ring. What was cleared is part of it and takes no time, so a later state goes on with it. A ring
-    off the map has no trees, so a team that can finish no other clears nothing.
+    n_d trees are in the ring. What was cleared is part of it and takes no time, so a later state goes on with it. A
+    ring off the map has no trees, so a team that can finish no other clears nothing.
 
     Args:
         state: The worlds.

@@ -11,7 +11,7 @@ from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.curriculum import Curriculum, Standing
 from warp_torchrl.curriculum.standing import episodes_by_level
 from warp_torchrl.env import LeveledEnv, WildfireEnv
-from warp_torchrl.training.standard import reached
+from warp_torchrl.training.baseline import reached
 
 log = logging.getLogger("warp_torchrl")
 

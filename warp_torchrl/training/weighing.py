@@ -6,7 +6,7 @@ from typing import Any
 
 from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.mixture import Mixture, weights
-from warp_torchrl.training.standard import reached
+from warp_torchrl.training.baseline import reached
 
 log = logging.getLogger("warp_torchrl")
 
