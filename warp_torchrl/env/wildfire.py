@@ -13,6 +13,7 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from warp_torchrl.device import reads_freely
+from warp_torchrl.env.layout import checked_action, packed
 from warp_torchrl.env.recorded import RecordedStep
 from warp_torchrl.env.render import render
 from warp_torchrl.env.reset_cache import ResetCache, Start
@@ -298,7 +299,8 @@ class WildfireEnv(EnvBase):
         return (worlds, counts, self._pack(worlds, observed, torch.zeros(len(seeds), device=self.device))), faults
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
-        action = self._checked(tensordict.get(("agents", "action"), None))
+        shape, limit = (*self.batch_size, self.n_agents), self.world.team.n_actions if self.validate else None
+        action = checked_action(tensordict.get(("agents", "action"), None), shape, self.device, limit)
         transition, observed, reward = self._advance(self.world_state, self.tree_counts, action)
         self._worlds = transition.after, transition.counts_after
         self._episode_reward = self._episode_reward + reward.mean(1)[:, 0]
@@ -336,23 +338,6 @@ class WildfireEnv(EnvBase):
             seed = int(torch.empty((), dtype=torch.int64).random_(2**31))
         self.set_seeds(range(seed, seed + self.batch_size[0]))
 
-    def _checked(self, action: Tensor | None) -> Tensor:
-        shape = (*self.batch_size, self.n_agents)
-        if action is None:
-            raise ValueError('("agents", "action") must be given: an int64 tensor of shape [worlds, agents]')
-        if action.dtype != torch.int64 or tuple(action.shape) != shape:
-            raise ValueError(
-                f'("agents", "action") must be int64 of shape {list(shape)}, got {action.dtype} {list(action.shape)}'
-            )
-        if action.device != self.device:
-            raise ValueError(f'("agents", "action") must be on {self.device}, got {action.device}')
-        if self.validate and not ((action >= 0) & (action < self.world.team.n_actions)).all():
-            raise ValueError(
-                f'("agents", "action") must be in 0..{self.world.team.n_actions - 1}, '
-                f"got {int(action.min())}..{int(action.max())}"
-            )
-        return action
-
     def _enter(self, state: WorldState | None) -> None:
         """Replace the worlds and count their trees."""
         self._worlds = None if state is None else (state, count_trees(state))
@@ -363,29 +348,4 @@ class WildfireEnv(EnvBase):
         return self._pack(self.world_state, observed, self._episode_reward)
 
     def _pack(self, state: WorldState, observed: Observations, episode_reward: Tensor) -> TensorDict:
-        """Pack observations, masks and metrics into TorchRL's layout."""
-        batch, device = state.batch_size, self.device  # without a device a tensordict copies those that it holds
-        team = [*batch, self.n_agents]
-
-        def of_team(entries: dict[str, Tensor]) -> Tensor | TensorDict:
-            return entries[""] if "" in entries else TensorDict(entries, batch_size=team, device=device)
-
-        views = of_team(observed.entries)
-        roles = self.world.team.table(self.device).index.repeat(*batch, 1)
-        agents = {"observation": views, "action_mask": observed.action_mask, "role": roles}
-        agents |= {} if observed.radio is None else {"radio": observed.radio}
-        agents |= {} if state.vehicles.serves is None else {"agency": state.vehicles.serves.clone()}
-        agents |= {"sent": of_team(sent)} if (sent := self.world.team.radio.shown(state)) else {}
-        info = observed.metrics | {"episode_reward": episode_reward, "episode_length": state.step.to(torch.float32)}
-        return TensorDict(
-            {
-                "agents": TensorDict(agents, batch_size=team, device=device),
-                "state": observed.state,
-                "info": TensorDict({name: value[:, None] for name, value in info.items()}, batch, device=device),
-                "done": state.done[:, None],
-                "terminated": state.terminated[:, None].clone(),
-                "truncated": state.truncated[:, None].clone(),
-            },
-            batch_size=batch,
-            device=device,
-        )
+        return packed(self.world, state, observed, episode_reward)

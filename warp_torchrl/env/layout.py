@@ -1,0 +1,73 @@
+"""TorchRL's layout of what an environment is given and gives: actions checked, observations packed."""
+
+import torch
+from tensordict import TensorDict
+from torch import Tensor
+
+from warp_torchrl.env.scene import Observations
+from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.world import World
+
+
+def checked_action(
+    action: Tensor | None, shape: tuple[int, ...], device: torch.device | None, limit: int | None
+) -> Tensor:
+    """Return the team's actions.
+
+    Args:
+        action: As they were given.
+        shape: [B, A].
+        device: Where the worlds live.
+        limit: Number of actions; None does not read whether they are in range.
+
+    Raises:
+        ValueError: If they are missing, out of range, or of another shape, type or device.
+    """
+    if action is None:
+        raise ValueError('("agents", "action") must be given: an int64 tensor of shape [worlds, agents]')
+    if action.dtype != torch.int64 or tuple(action.shape) != shape:
+        raise ValueError(
+            f'("agents", "action") must be int64 of shape {list(shape)}, got {action.dtype} {list(action.shape)}'
+        )
+    if action.device != device:
+        raise ValueError(f'("agents", "action") must be on {device}, got {action.device}')
+    if limit is not None and not ((action >= 0) & (action < limit)).all():
+        raise ValueError(
+            f'("agents", "action") must be in 0..{limit - 1}, got {int(action.min())}..{int(action.max())}'
+        )
+    return action
+
+
+def packed(world: World, state: WorldState, observed: Observations, episode_reward: Tensor) -> TensorDict:
+    """Return what is observed of worlds as a tensordict [B], without rewards.
+
+    Args:
+        world: Their rules.
+        state: The worlds.
+        observed: Of them.
+        episode_reward: Of their episodes so far, float32 [B].
+    """
+    batch, device = state.batch_size, state.cells.device  # without a device a tensordict copies those that it holds
+    team = [*batch, world.team.n_agents]
+
+    def of_team(entries: dict[str, Tensor]) -> Tensor | TensorDict:
+        return entries[""] if "" in entries else TensorDict(entries, batch_size=team, device=device)
+
+    roles = world.team.table(device).index.repeat(*batch, 1)
+    agents = {"observation": of_team(observed.entries), "action_mask": observed.action_mask, "role": roles}
+    agents |= {} if observed.radio is None else {"radio": observed.radio}
+    agents |= {} if state.vehicles.serves is None else {"agency": state.vehicles.serves.clone()}
+    agents |= {"sent": of_team(sent)} if (sent := world.team.radio.shown(state)) else {}
+    info = observed.metrics | {"episode_reward": episode_reward, "episode_length": state.step.to(torch.float32)}
+    return TensorDict(
+        {
+            "agents": TensorDict(agents, batch_size=team, device=device),
+            "state": observed.state,
+            "info": TensorDict({name: value[:, None] for name, value in info.items()}, batch, device=device),
+            "done": state.done[:, None],
+            "terminated": state.terminated[:, None].clone(),
+            "truncated": state.truncated[:, None].clone(),
+        },
+        batch_size=batch,
+        device=device,
+    )
