@@ -1,8 +1,10 @@
-"""The floors: what may import what."""
+"""The floors: what may import what. Each rule is asked of all files in one test, which names those that break it."""
 
 import ast
 import re
 import sys
+from collections.abc import Callable, Iterable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -17,87 +19,113 @@ GROUND = ("content", "device", "dotted", "nearest", "symmetry", "validation")
 """What knows nothing of ours but each other, and every floor may use."""
 FIRE_SCIENCE = ("rates", "weather")
 """What the world is built on: equations of fire and weather, which know torch alone."""
-READS_STATE = [
-    *(each for each in MODULES if each.split("/")[0] in ("observation", "reward")),
-    *("env/metrics", "env/render", "evaluation/behaviour"),
-]
+FENCE = "world/fast"
+"""Where alone words of compilers stand."""
 
 
-def named(module: str) -> set[str]:
+def of_rooms(*rooms: str) -> list[str]:
+    """The modules of some folders, or files, at the root."""
+    found = [module for module in MODULES if module.split("/")[0] in rooms]
+    assert found, f"no module is in {rooms}"
+    return found
+
+
+WORLD = of_rooms("world")
+READS_STATE = [*of_rooms("observation", "reward"), "env/metrics", "env/render", "evaluation/behaviour"]
+
+
+def breaks(modules: Iterable[str], rule: Callable[[str], bool]) -> list[str]:
+    """The modules that do not keep a rule."""
+    return [module for module in modules if not rule(module)]
+
+
+@cache
+def tree(module: str) -> tuple[ast.AST, ...]:
+    return tuple(ast.walk(ast.parse(source(module))))
+
+
+@cache
+def source(module: str) -> str:
+    return FILES[module].read_text()
+
+
+@cache
+def named(module: str) -> frozenset[str]:
     """Every module that a file imports."""
     found = set()
-    for node in ast.walk(ast.parse(FILES[module].read_text())):
+    for node in tree(module):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
-    return found
+    return frozenset(found)
 
 
-def imports(module: str) -> set[str]:
-    """The same, ours without the package's name and with slashes."""
-    return {name.removeprefix("warp_torchrl.").replace(".", "/") for name in named(module)}
+@cache
+def roots(module: str) -> frozenset[str]:
+    """The first names of what a file imports, of ours without the package's name."""
+    return frozenset(name.removeprefix("warp_torchrl.").split(".")[0] for name in named(module))
 
 
-def ours(module: str) -> set[str]:
+@cache
+def ours(module: str) -> frozenset[str]:
     own = (name for name in named(module) if name.startswith("warp_torchrl."))  # Python has a module logging too
-    return {name.removeprefix("warp_torchrl.").replace(".", "/") for name in own} & set(MODULES)
+    return frozenset({name.removeprefix("warp_torchrl.").replace(".", "/") for name in own} & set(MODULES))
 
 
-@pytest.mark.parametrize("module", [name for name in MODULES if name.startswith("world/")])
-def test_the_world_knows_torch_and_itself(module):
-    assert all(name.split("/")[0] in ("world", *FIRE_SCIENCE) or name in GROUND for name in ours(module))
-    foreign = {name.split("/")[0] for name in imports(module)}
-    assert not foreign & {"tensordict", "torchrl", "hydra", "omegaconf", "gymnasium", "pettingzoo", "wandb"}
+def knows_only(module: str, *rooms: str) -> bool:
+    """Whether what a file imports of ours is in some rooms, is one of some files, or is of the ground."""
+    return all(name.split("/")[0] in rooms or name in rooms or name in GROUND for name in ours(module))
 
 
-@pytest.mark.parametrize("module", [name for name in MODULES if name.split("/")[0] in FIRE_SCIENCE])
-def test_fire_science_knows_torch_and_itself(module):
-    assert all(name.split("/")[0] in FIRE_SCIENCE or name in GROUND for name in ours(module))
-    foreign = {name.split("/")[0] for name in imports(module)}
-    assert foreign - set(GROUND) - set(FIRE_SCIENCE) <= sys.stdlib_module_names | {"torch", "numpy", "rasterio"}
+def test_the_world_knows_torch_and_itself():
+    foreign = {"tensordict", "torchrl", "hydra", "omegaconf", "gymnasium", "pettingzoo", "wandb"}
+    assert not breaks(WORLD, lambda module: knows_only(module, "world", *FIRE_SCIENCE))
+    assert not breaks(WORLD, lambda module: not roots(module) & foreign)
 
 
-@pytest.mark.parametrize("module", GROUND)
-def test_the_ground_floor_knows_the_standard_library_and_what_a_device_is(module):
-    assert all(name in GROUND for name in ours(module))
-    outside = {name.split("/")[0] for name in imports(module)} - set(GROUND)
-    assert outside <= sys.stdlib_module_names | ({"torch"} if module == "device" else set())
+def test_fire_science_knows_torch_and_itself():
+    known = sys.stdlib_module_names | {"torch", "numpy", "rasterio", *GROUND, *FIRE_SCIENCE}
+    assert not breaks(of_rooms(*FIRE_SCIENCE), lambda module: knows_only(module, *FIRE_SCIENCE))
+    assert not breaks(of_rooms(*FIRE_SCIENCE), lambda module: roots(module) <= known)
 
 
-@pytest.mark.parametrize("module", READS_STATE)
-def test_what_reads_the_state_knows_only_the_world(module):
-    own = module.split("/")[0]
-    known = {"world", *GROUND, *({own} if own in ("observation", "reward") else ())}
-    assert all(name.split("/")[0] in known for name in ours(module))
-    assert "torchrl" not in {name.split("/")[0] for name in imports(module)}
+def test_the_ground_floor_knows_the_standard_library_and_what_a_device_is():
+    known = sys.stdlib_module_names | set(GROUND)
+    assert not breaks(GROUND, knows_only)
+    assert not breaks(GROUND, lambda module: roots(module) <= known | ({"torch"} if module == "device" else set()))
 
 
-@pytest.mark.parametrize("module", [name for name in MODULES if name.startswith("world/")] + READS_STATE)
-def test_tensors_are_compared_with_numbers_and_not_with_members_of_enumerations(module):
+def test_what_reads_the_state_knows_only_the_world():
+    assert not breaks(
+        READS_STATE, lambda module: knows_only(module, "world", *({module.split("/")[0]} & {"observation", "reward"}))
+    )
+    assert not breaks(READS_STATE, lambda module: "torchrl" not in roots(module))
+
+
+def test_tensors_are_compared_with_numbers_and_not_with_members_of_enumerations():
     # Inside a function that torch compiles such a comparison is False, without a word.
-    for node in ast.walk(ast.parse(FILES[module].read_text())):
-        if isinstance(node, ast.Compare):
-            members = [each for each in (node.left, *node.comparators) if isinstance(each, ast.Attribute)]
-            owners = {each.value.id for each in members if isinstance(each.value, ast.Name)}
-            assert not owners & {"Cover", "Action", "Stream"}, f"line {node.lineno}"
+    def compared_with(module: str) -> set[str]:
+        each = [node for node in tree(module) if isinstance(node, ast.Compare)]
+        members = [side for node in each for side in (node.left, *node.comparators) if isinstance(side, ast.Attribute)]
+        return {member.value.id for member in members if isinstance(member.value, ast.Name)}
+
+    assert not breaks(WORLD + READS_STATE, lambda module: not compared_with(module) & {"Cover", "Action", "Stream"})
 
 
-@pytest.mark.parametrize("module", [name for name in MODULES if name.split("/")[0] in ("models", "algorithms")])
-def test_learning_knows_specs_and_not_the_world(module):
-    known = ("models", "algorithms", "parallel", *GROUND)
-    assert all(name.split("/")[0] in known for name in ours(module))
+def test_learning_knows_specs_and_not_the_world():
+    learning = of_rooms("models", "algorithms")
+    assert not breaks(learning, lambda module: knows_only(module, "models", "algorithms", "parallel"))
 
 
-@pytest.mark.parametrize("module", [each for each in MODULES if each.split("/")[0] == "env"])
-def test_the_environment_knows_no_learning(module):
-    assert all(name.split("/")[0] in ("env", "world", "observation", "reward", *GROUND) for name in ours(module))
+def test_the_environment_knows_no_learning():
+    assert not breaks(of_rooms("env"), lambda module: knows_only(module, "env", "world", "observation", "reward"))
 
 
-@pytest.mark.parametrize("module", [each for each in MODULES if each.split("/")[0] == "maps"])
-def test_maps_know_the_ground_and_neither_teams_nor_learning(module):
-    known = ("maps", "drawing", "runs/disk", "world", *GROUND)
-    assert all(name in known or name.split("/")[0] in known for name in ours(module) - {"runs"})
+def test_maps_know_the_ground_and_neither_teams_nor_learning():
+    maps = of_rooms("maps")
+    assert not breaks(maps, lambda module: knows_only(module, "maps", "drawing", "runs", "world"))
+    assert not breaks(maps, lambda module: ours(module) & set(of_rooms("runs")) <= {"runs", "runs/disk"})
 
 
 def test_rooms_stand_one_on_another():
@@ -111,54 +139,50 @@ def test_rooms_stand_one_on_another():
     assert not above, "these import each other in a circle"
 
 
-@pytest.mark.parametrize("module", MODULES)
-def test_adapters_are_views_that_nothing_needs(module):
-    if module.split("/")[0] == "adapters":
-        assert all(name.split("/")[0] in ("adapters", "api", "config", "env") for name in ours(module)), (
-            "no physics in adapters"
-        )
-    else:
-        assert "adapters" not in {name.split("/")[0] for name in imports(module)}
+def test_adapters_are_views_that_nothing_needs():
+    adapters = of_rooms("adapters")
+    others = [module for module in MODULES if module not in adapters]
     knows = ("__init__", "benchmark/numpy_env")  # which registers the adapters; the peer that speed is compared with
-    if module.split("/")[0] != "adapters" and module not in knows:
-        assert "pettingzoo" not in {name.split("/")[0] for name in imports(module)}
+    assert not breaks(adapters, lambda module: knows_only(module, "adapters", "api", "config", "env")), "no physics"
+    assert not breaks(others, lambda module: "adapters" not in roots(module))
+    assert not breaks(others, lambda module: "pettingzoo" not in roots(module) or module in knows)
 
 
-COMMANDS = ("commands/checks", "commands/command", "commands/sweep")
+@pytest.mark.parametrize(
+    "libraries, places",
+    [
+        (
+            {"hydra", "omegaconf"},
+            {
+                *("config/compose", "config/defaults", "config/grammar", "config/saved_config", "config/space"),
+                *("commands/checks", "commands/command", "commands/sweep"),
+            },
+        ),
+        (
+            {"rasterio"},
+            {
+                *("world/terrain/layer", "world/terrain/vector", "maps/geotiff", "maps/perimeter"),
+                *("weather/convergence", "calibration/observed"),
+            },
+        ),
+    ],
+    ids=["hydra: where configuration is composed", "rasterio: where maps are read, placed and written"],
+)
+def test_a_library_is_imported_at_its_places_alone(libraries, places):
+    assert set(breaks(MODULES, lambda module: not roots(module) & libraries)) == places
 
 
-@pytest.mark.parametrize("module", MODULES)
-def test_hydra_appears_only_where_configuration_is_composed(module):
-    if module not in (
-        "config/compose",
-        "config/defaults",
-        "config/grammar",
-        "config/saved_config",
-        "config/space",
-        *COMMANDS,
-    ):
-        assert not {name.split("/")[0] for name in imports(module)} & {"hydra", "omegaconf"}
+def test_nothing_reads_pickles():
+    def is_safe(module: str) -> bool:
+        text = source(module)
+        return (
+            "weights_only=False" not in text
+            and "allow_pickle=True" not in text
+            and "pickle" not in roots(module)
+            and text.count("torch.load(") == text.count("weights_only=True, map_location")
+        )
 
-
-@pytest.mark.parametrize("module", MODULES)
-def test_rasterio_is_imported_where_maps_are_read_placed_and_written(module):
-    if module not in (
-        "world/terrain/layer",
-        "world/terrain/vector",
-        "maps/geotiff",
-        "maps/perimeter",
-        "weather/convergence",
-        "calibration/observed",
-    ):
-        assert "rasterio" not in {name.split("/")[0] for name in imports(module)}
-
-
-@pytest.mark.parametrize("module", MODULES)
-def test_nothing_reads_pickles(module):
-    source = FILES[module].read_text()
-    assert "weights_only=False" not in source and "allow_pickle=True" not in source
-    assert "pickle" not in {name.split("/")[0] for name in imports(module)}
-    assert source.count("torch.load(") == source.count("weights_only=True, map_location")
+    assert not breaks(MODULES, is_safe)
 
 
 def is_page(module: str) -> bool:
@@ -167,43 +191,40 @@ def is_page(module: str) -> bool:
     return module in own or module.startswith("live/panel")
 
 
-@pytest.mark.parametrize("module", MODULES)
-def test_viser_is_imported_where_the_live_page_is_put_together(module):
-    if not is_page(module):
-        assert "viser" not in {name.split("/")[0] for name in imports(module)}
-        if module.split("/")[0] == "live" and module != "live/__main__":
-            assert not {each for each in ours(module) if is_page(each)}
+def test_viser_is_imported_where_the_live_page_is_put_together():
+    others = [module for module in MODULES if not is_page(module)]
+    beside = [module for module in others if module.split("/")[0] == "live" and module != "live/__main__"]
+    assert not breaks(others, lambda module: "viser" not in roots(module))
+    assert not breaks(beside, lambda module: not any(is_page(each) for each in ours(module)))
 
 
-FENCE = "world/fast"
-"""Where alone words of compilers stand."""
+def test_compilers_are_spoken_of_behind_the_fence_alone():
+    before = [module for module in MODULES if not module.startswith(FENCE)]
+    assert not breaks(before, lambda module: not re.search(r"is_compiling|torch\.library|torch\.ops", source(module)))
+    schema = re.compile(r'"\(.*Tensor.*\) -> ')
+    assert not breaks(before, lambda module: not schema.search(source(module))), "a schema of an operator"
 
 
-@pytest.mark.parametrize("module", [each for each in MODULES if not each.startswith(FENCE)])
-def test_compilers_are_spoken_of_behind_the_fence_alone(module):
-    source = FILES[module].read_text()
-    assert "is_compiling" not in source and "torch.library" not in source and "torch.ops" not in source
-    assert not re.search(r'"\(.*Tensor.*\) -> ', source), "a schema of an operator"
+def test_the_page_of_the_law_takes_no_fast_road():
+    page = ("world/law", "world/fire")
+    assert len(source("world/law").splitlines()) < 150
+    assert not breaks(page, lambda module: not any(each.startswith(FENCE) for each in ours(module)))
 
 
-@pytest.mark.parametrize("module", ["world/law", "world/fire"])
-def test_the_page_of_the_law_takes_no_fast_road(module):
-    assert len(FILES["world/law"].read_text().splitlines()) < 150
-    assert not {each for each in ours(module) if each.startswith(FENCE)}
-
-
-COMPONENTS = [
-    each for each in MODULES if each.split("/")[0] in ("world", "observation", "reward", "models", "algorithms")
-]
-
-
-@pytest.mark.parametrize("module", [*COMPONENTS, "runs/checkpoint"])
-def test_fields_are_those_of_frozen_dataclasses(module):
+def test_fields_are_those_of_frozen_dataclasses():
     # But for batches of tensors, which steps fill in, and learners, which hold what they train.
     mutable = {"world/batch", "world/packets", "world/state", "world/burn", "algorithms/learner"}
-    for node in ast.walk(ast.parse(FILES[module].read_text())):
-        if isinstance(node, ast.ClassDef) and any(isinstance(each, ast.AnnAssign) for each in node.body):
-            made = [ast.unparse(each) for each in node.decorator_list if ast.unparse(each).startswith("dataclass(")]
-            plain = {ast.unparse(each) for each in node.bases} & {"NamedTuple", "Protocol", "TypedDict"}
-            assert plain or made, f"{node.name} has fields and is no dataclass"
-            assert plain or module in mutable or "frozen=True" in made[0], f"{node.name} can be changed"
+
+    def unsound(module: str) -> list[str]:
+        found = []
+        for node in tree(module):
+            if isinstance(node, ast.ClassDef) and any(isinstance(each, ast.AnnAssign) for each in node.body):
+                made = [ast.unparse(each) for each in node.decorator_list]
+                made = [each for each in made if each.startswith("dataclass(")]
+                plain = {ast.unparse(each) for each in node.bases} & {"NamedTuple", "Protocol", "TypedDict"}
+                if not plain and not (made and (module in mutable or "frozen=True" in made[0])):
+                    found.append(f"{module}: {node.name} has fields and is no frozen dataclass")
+        return found
+
+    components = [*of_rooms("world", "observation", "reward", "models", "algorithms"), "runs/checkpoint"]
+    assert not [fault for module in components for fault in unsound(module)]
