@@ -137,6 +137,7 @@ def test_the_figure_is_drawn(sweep, tmp_path):
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGPIPE"), reason="no pipes that are closed under a writer")
+@pytest.mark.slow
 def test_a_reader_that_has_seen_enough_gets_no_traceback(sweep):
     command = [sys.executable, "-u", "-m", "warp_torchrl.summary", str(sweep)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:

@@ -45,7 +45,13 @@ def test_the_contract_s_algorithms_are_there():
     assert set(NAMES) >= {"mappo", "ippo", "ppo", "a2c", *REPLAYS}
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow) if name in ("ppo", "ippo", "vdn", "maddpg") else name
+        for name in NAMES
+    ],
+)
 def test_a_few_hundred_updates_raise_the_return_of_a_bandit(make_small_env, name):
     """Reward 1 for one action that is always open, the end after each step: what is paid must come to be done."""
     env = make_small_env(16, small_world(horizon=400))

@@ -20,7 +20,7 @@ NAMES = ["rate_gain", "wind_gain"]
     "method",
     [
         pytest.param(Gradients(prior_weight=1e-4, softness=0.1, steps=4), marks=pytest.mark.slow),
-        Evolution(generations=10, prior_weight=1e-4),
+        pytest.param(Evolution(generations=10, prior_weight=1e-4), marks=pytest.mark.slow),
     ],
     ids=["g", "e"],
 )

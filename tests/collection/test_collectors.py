@@ -94,6 +94,7 @@ def test_a_worker_that_dies_is_named_and_what_was_learnt_is_saved(tmp_path):
     assert newest(tmp_path)[0].training()["collection"] == {"played": 12}
 
 
+@pytest.mark.slow
 def test_a_resumed_run_meets_new_fires(tmp_path, here):
     run = training(tmp_path, "collector=process", "collector.workers=1", "seed=1234")
     run.collection.load_state_dict({"played": 12})

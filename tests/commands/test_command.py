@@ -303,6 +303,7 @@ def weights_and_numbers(run):
 CONSTANT = ("algorithm.learning_rate_end=1.0", "algorithm.entropy_coeff_end=0.005")
 
 
+@pytest.mark.slow
 def test_a_finished_run_is_trained_longer_and_goes_on_to_the_new_total(run_here, tmp_path, monkeypatch):
     """Killed on the way and in the evaluation; where nothing changes over a training it equals one that never ended."""
     own = (*SHORT[:-1], *CONSTANT)

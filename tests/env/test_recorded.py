@@ -11,18 +11,21 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.recorded import RecordedStep
 from warp_torchrl.reward import Time
 
-SCENARIOS = [
+BRIEFLY = [
     ["scenario=skirmish"],
-    ["scenario=lightning", "wind=wandering"],
-    ["scenario=default", "observation=paper", "landscape.relief=200", "fire=paper"],
     ["scenario=hazard", "reward=adaptive"],
-    ["scenario=hetero", "reward=collaborative"],
-    ["scenario=smoke", "team.radio.carries=both", "team.radio.range=6", "team.radio.loss=0.1"],
     ["scenario=smoke", "team.radio.carries=both", "team.radio.delay=2", "team.radio.loss=0.1"],
     ["scenario=haksar", "team.tank=3", "team.approach=true", "observation=at_fire", "reward=round_fire"],
-    ["scenario=front", "team.flight.battery=9", "team.flight.drift=0.05"],
     ["scenario=agencies", "agencies.own=1", "agencies.lending=need", "agencies.term=3"],
 ]
+AT_LENGTH = [
+    ["scenario=lightning", "wind=wandering"],
+    ["scenario=default", "observation=paper", "landscape.relief=200", "fire=paper"],
+    ["scenario=hetero", "reward=collaborative"],
+    ["scenario=smoke", "team.radio.carries=both", "team.radio.range=6", "team.radio.loss=0.1"],
+    ["scenario=front", "team.flight.battery=9", "team.flight.drift=0.05"],
+]
+SCENARIOS = [*BRIEFLY, *(pytest.param(each, marks=pytest.mark.slow) for each in AT_LENGTH)]
 
 
 def one_hot(codes, count):

@@ -28,7 +28,7 @@ def alike(one, other):
 
 
 @pytest.mark.parametrize("name", [name for name in HEURISTICS if not HEURISTICS[name].is_stateful])
-@pytest.mark.parametrize("watch", [False, True], ids=["", "watched"])
+@pytest.mark.parametrize("watch", [pytest.param(False, marks=pytest.mark.slow), True], ids=["", "watched"])
 def test_a_heuristic_plays_as_step_by_step(name, watch, monkeypatch):
     env = WildfireEnv(small_world(team=Team(n_agents=2, roles=("ugv", "uav"))), n_worlds=9)
     policy = HEURISTICS[name](env)

@@ -40,7 +40,7 @@ def test_what_messages_tell_is_read_from_them_and_what_they_do_not_tell_is_not()
     assert _share([nothing, nothing], "it") != _share([nothing, nothing], "it"), "not a number"
 
 
-@pytest.mark.parametrize("delay", [0, 3])
+@pytest.mark.parametrize("delay", [pytest.param(0, marks=pytest.mark.slow), 3])
 def test_a_row_for_each_thing_of_the_worlds_that_judge(make_small_env, delay):
     env, policy = made(make_small_env, delay=delay)
     found = {each.what: each for each in probe(policy, env, 7)}

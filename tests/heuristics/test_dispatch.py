@@ -108,7 +108,10 @@ def test_aircraft_without_water_stay_away() -> None:
     assert chosen(env, state) == ["STAY"]
 
 
-@pytest.mark.parametrize("scenario", ["default", "water", "hetero", "ring", "scouts"])
+@pytest.mark.parametrize(
+    "scenario",
+    [*(pytest.param(name, marks=pytest.mark.slow) for name in ("default", "hetero", "scouts")), "water", "ring"],
+)
 def test_it_decides_for_a_world_as_it_does_for_it_alone(scenario: str) -> None:
     env = make_env(scenario, n_worlds=6)
     policy, now = HEURISTICS["dispatch"](env), env.reset()

@@ -63,7 +63,7 @@ def test_help_names_the_keys(capsys):
     assert "beside=NAME" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_it_prints_its_address_serves_and_ends_cleanly(number):
     pytest.importorskip("viser", reason="needs the extra live")
     command = [sys.executable, "-m", "warp_torchrl.live", "policy=noop", "port=0", "landscape.size=12"]

@@ -147,7 +147,7 @@ def test_whoever_acts_elsewhere_remembers_then_what_it_did_before(make_env):
 @pytest.mark.parametrize(
     "kind", [partial(Ppo, epochs=2), pytest.param(A2c, marks=pytest.mark.slow)], ids=["ppo", "a2c"]
 )
-@pytest.mark.parametrize("memory", [16, 0])
+@pytest.mark.parametrize("memory", [16, pytest.param(0, marks=pytest.mark.slow)])
 def test_what_was_shown_at_first_is_learnt_to_matter_later_by_those_who_remember(make_small_env, kind, memory):
     """A cue in the first step, paid for in the third; without a memory half of the guesses are wrong.
 

@@ -6,6 +6,7 @@ import torch
 from warp_torchrl import parallel
 
 
+@pytest.mark.slow
 def test_a_process_that_ends_before_it_is_there_is_told_at_once():
     threads = torch.get_num_threads()
     with (

@@ -66,7 +66,10 @@ def test_an_interval_is_passed_by_the_batch_that_reaches_its_multiple(interval, 
     assert passes(interval, frames, batch) is expected
 
 
-@pytest.mark.parametrize("name", ["mappo", "dqn", "all that moves"])
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param("mappo", marks=pytest.mark.slow), pytest.param("dqn", marks=pytest.mark.slow), "all that moves"],
+)
 def test_saves_by_the_clock_change_nothing(tmp_path, name):
     """A run that saves whenever it can ends as one that never does, and so does one that goes on from such a save."""
     own = [*TINIER, *RUNS[name], "checkpoint.interval=1000000", "checkpoint.keep=2"]

@@ -112,7 +112,7 @@ def test_a_network_for_several_kinds_reads_whole_what_any_of_them_can_fill():
     assert both.observation["view"].content != ground.observation["view"].content
 
 
-@pytest.mark.parametrize("index", [0, 1])
+@pytest.mark.parametrize("index", [pytest.param(0, marks=pytest.mark.slow), 1])
 def test_actors_remember_each_kind_apart(tmp_path, index):
     kinds = "mixture.kinds={one:{scenario:skirmish},two:{scenario:skirmish}}"
 

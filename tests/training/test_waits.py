@@ -24,10 +24,12 @@ def training(folder, *overrides):
     "overrides",
     [
         [],
-        ["algorithm=ippo", "wind=wandering"],
+        pytest.param(["algorithm=ippo", "wind=wandering"], marks=pytest.mark.slow),
         ["scenario=lightning", "reward.normalise=true"],
-        ["fire=paper", "landscape.relief=200", "observation=paper", "model.symmetry=none"],
-        ["experiment=skirmish"],
+        pytest.param(
+            ["fire=paper", "landscape.relief=200", "observation=paper", "model.symmetry=none"], marks=pytest.mark.slow
+        ),
+        pytest.param(["experiment=skirmish"], marks=pytest.mark.slow),
         ["algorithm=a2c", "fire=hazard"],
     ],
     ids=" ".join,
