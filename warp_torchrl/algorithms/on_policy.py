@@ -19,7 +19,6 @@ from warp_torchrl.models import (
     VALUE,
     Mlp,
     Recollection,
-    RecollectionApart,
     RemembersApart,
     Signature,
     arithmetic_of,
@@ -97,7 +96,6 @@ class OnPolicy(Algorithm):
             loss.entropy_coeff.fill_(falling(self.entropy_coeff, self.entropy_coeff_end, progress))
             return {"train/learning_rate": self.rate_at(progress, optimizer), **self.constants()}
 
-        memory = Recollection(policy)
         batch = self._held(loss, env, model, frames_per_batch, shape, share)
         return Learner(
             policy=policy,
@@ -112,8 +110,8 @@ class OnPolicy(Algorithm):
             samples=batch.samples,
             after_step=lambda sample: None,
             schedule=schedule,
-            keeps={"memory": memory} if memory.actors else {},
-            batches_grow=not memory.actors,
+            keeps={"memory": Recollection(policy)} if model.memory else {},
+            batches_grow=not model.memory,
         )
 
     def beside(
@@ -134,7 +132,7 @@ class OnPolicy(Algorithm):
         if not model.memory:
             return made
         explore = RemembersApart(learner.policy)
-        return replace(made, explore=explore, keeps={"memory": RecollectionApart(explore)})
+        return replace(made, explore=explore, keeps={"memory": Recollection(explore)})
 
     def _held(
         self, loss: LossModule, env: EnvBase, model: Mlp, frames: int, shape: Signature, share: float

@@ -6,7 +6,6 @@ They know the shapes of what they read, and how it turns with the map, from a ``
 from warp_torchrl.models.canonical import CanonicalBatch, over_canonical
 from warp_torchrl.models.memory import (
     Recollection,
-    RecollectionApart,
     RecurrentActor,
     RemembersApart,
     memory_apart,
@@ -70,7 +69,6 @@ __all__ = [
     "Entry",
     "Mlp",
     "Recollection",
-    "RecollectionApart",
     "RecurrentActor",
     "RemembersApart",
     "Signature",

@@ -124,8 +124,8 @@ class RecurrentActor(TensorDictModuleBase):
         return self.remembered
 
 
-class Recollection:
-    """What a checkpoint keeps of the memory of actors, besides their weights.
+class Memories:
+    """What the recurrent actors of a policy remember, float32 [B, A, M] each.
 
     Args:
         policy: Of which they are a part; none need be.
@@ -134,14 +134,15 @@ class Recollection:
     def __init__(self, policy: nn.Module) -> None:
         self.actors = recurrent_actors(policy)
 
-    def state_dict(self) -> dict[str, Tensor]:
-        """Return the memory of each."""
-        return {str(index): actor.remembered.clone() for index, actor in enumerate(self.actors)}
+    @property
+    def remembered(self) -> list[Tensor]:
+        """The memory of each."""
+        return [actor.remembered for actor in self.actors]
 
-    def load_state_dict(self, state_dict: Mapping[str, Tensor]) -> None:
-        """Remember it."""
-        for index, actor in enumerate(self.actors):
-            actor.remembered = state_dict[str(index)].to(next(actor.parameters()).device)
+    @remembered.setter
+    def remembered(self, memories: Sequence[Tensor]) -> None:
+        for actor, memory in zip(self.actors, memories, strict=True):
+            actor.remembered = memory
 
 
 class RemembersApart(TensorDictModuleBase):
@@ -154,41 +155,36 @@ class RemembersApart(TensorDictModuleBase):
     def __init__(self, policy: TensorDictModuleBase) -> None:
         super().__init__()
         self.in_keys, self.out_keys = policy.in_keys, policy.out_keys
-        self.policy, self._actors = policy, recurrent_actors(policy)
-        self.remembered = [torch.zeros_like(actor.remembered) for actor in self._actors]
+        self.policy, self._actors = policy, Memories(policy)
+        self.remembered = [torch.zeros_like(memory) for memory in self._actors.remembered]
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write what the policy does."""
-        others = [actor.remembered for actor in self._actors]
-        self._remember(self.remembered)
+        others, self._actors.remembered = self._actors.remembered, self.remembered
         out = self.policy(tensordict)
-        self.remembered = [actor.remembered for actor in self._actors]
-        self._remember(others)
+        self.remembered, self._actors.remembered = self._actors.remembered, others
         return out
 
-    def _remember(self, memories: Sequence[Tensor]) -> None:
-        for actor, memory in zip(self._actors, memories, strict=True):
-            actor.remembered = memory
 
-
-class RecollectionApart:
-    """What a checkpoint keeps of the memory of a policy that remembers apart.
+class Recollection:
+    """What a checkpoint keeps of the memory of a policy, besides its weights.
 
     Args:
-        policy: The policy.
+        policy: Some parts of which may remember, or that remembers apart.
     """
 
-    def __init__(self, policy: RemembersApart) -> None:
-        self.policy = policy
+    def __init__(self, policy: nn.Module) -> None:
+        self._policy = policy
+        self._memories = policy if isinstance(policy, RemembersApart) else Memories(policy)
 
     def state_dict(self) -> dict[str, Tensor]:
         """Return the memory of each actor."""
-        return {str(index): memory.clone() for index, memory in enumerate(self.policy.remembered)}
+        return {str(index): memory.clone() for index, memory in enumerate(self._memories.remembered)}
 
     def load_state_dict(self, state_dict: Mapping[str, Tensor]) -> None:
         """Remember it."""
-        device = next(self.policy.parameters()).device
-        self.policy.remembered = [memory.to(device) for memory in state_dict.values()]
+        memories = (state_dict[str(index)] for index in range(len(state_dict)))
+        self._memories.remembered = [memory.to(next(self._policy.parameters()).device) for memory in memories]
 
 
 def recurrent_actors(policy: nn.Module) -> list[RecurrentActor]:
