@@ -18,7 +18,7 @@ TWO = {"scenarios": (Place("skirmish", "skirmish"), Place("windy", "skirmish", (
 
 def test_a_row_is_the_policy_beside_the_best_baseline_on_the_same_fires(capsys, monkeypatch):
     monkeypatch.setattr(command, "PLACES", TWO)
-    monkeypatch.setattr("warp_torchrl.benchmark.generalist.GENERAL", ("noop", "coordinated"))
+    monkeypatch.setattr("warp_torchrl.benchmark.generalist.RIVALS", ("noop", "coordinated"))
     command.main(["generalist", "--policy", "skirmish", "--episodes", "4", "--json", "--set", *SMALL])
     rows = json.loads(capsys.readouterr().out)["generalist"]
     assert [row["place"] for row in rows] == ["skirmish", "windy"]

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 from warp_torchrl.api import load_policy, make_env
-from warp_torchrl.benchmark.tasks import FIRST_SEED, GENERAL, SCENARIOS, interval_cell
+from warp_torchrl.benchmark.tasks import FIRST_SEED, SCENARIOS, interval_cell
 from warp_torchrl.evaluation.play import play, play_heuristics
 from warp_torchrl.evaluation.statistics import compare, summarise
 
@@ -40,6 +40,8 @@ def on_ground(folder: str) -> tuple[Place, ...]:
 
 PLACES = {"scenarios": OURS, "teams": TEAMS, "maps": MAPS, "winds": WINDS, "giant": GIANT}
 """Groups of places; those on real ground need a folder."""
+RIVALS = ("local", "greedy", "coordinated", "dispatch", "ring", "mixed")
+"""The baselines for teams that see the fire; the others search for it, watch it, or share a land."""
 
 
 def generalise(
@@ -58,7 +60,7 @@ def generalise(
     for place in places:
         changes = [*policy.overrides, *place.overrides, *overrides]
         env = make_env(place.scenario, n_worlds=episodes, seed=FIRST_SEED, device=device, overrides=changes)
-        saved = {name: found["saved"] for name, found in play_heuristics(env, FIRST_SEED, GENERAL).items()}
+        saved = {name: found["saved"] for name, found in play_heuristics(env, FIRST_SEED, RIVALS).items()}
         best = max(saved, key=lambda name: float(saved[name].mean()))
         own = play(env, policy.fitted(env), FIRST_SEED, policy.mode)["saved"]
         yield {
