@@ -7,6 +7,7 @@ from torch import Tensor
 from torch.nn.functional import one_hot
 
 from warp_torchrl.observation.rules import RULES, rules
+from warp_torchrl.observation.water import WATER, way_to_water
 from warp_torchrl.symmetry import LAST, TIME_LEFT, Part, Vector
 from warp_torchrl.world.flight import wind_at
 from warp_torchrl.world.role import PAPER_ROLES
@@ -32,22 +33,29 @@ WIND_SCALE = 20.0
 """Wind that an observation shows as 1 [m/s]."""
 
 
-def own_entries(world: World, identity: bool = False, rules: bool = False) -> Vector:
+def own_entries(world: World, identity: bool = False, rules: bool = False, water: bool = False) -> Vector:
     """Return the entries of ``self``, by name and as they turn with the map.
 
     They are ``SELF``, the identity if it is shown, then the team's roles and actions beside the paper's, then the
-    battery if it runs down, then the agency that the vehicle serves, one-hot, if there are several, then the rules if
-    they are told.
+    battery if it runs down, then the agency that the vehicle serves, one-hot, if there are several, then the rules and
+    the way to water if they are told.
     """
     team = world.team
     roles = tuple(f"role_{role}" for role in team.role_names[len(PAPER_ROLES) :])
     actions = tuple(f"{LAST}{action}" for action in team.further_actions)
     battery = () if team.flight.battery is None else ("battery",)
     further = [Part("scalar", names) for names in (roles, actions, battery, world.agencies.names) if names]
-    return Vector((*SELF.parts, *([IDENTITY] if identity else []), *further, *([RULES] if rules else [])))
+    told = (*([RULES] if rules else []), *(WATER if water else []))
+    return Vector((*SELF.parts, *([IDENTITY] if identity else []), *further, *told))
 
 
-def own_vector(state: WorldState, world: World, shows_identity: bool = False, tells_rules: bool = False) -> Tensor:
+def own_vector(
+    state: WorldState,
+    world: World,
+    shows_identity: bool = False,
+    tells_rules: bool = False,
+    tells_water: bool = False,
+) -> Tensor:
     """Return what each agent knows of itself, float32 [B, A, F], see ``own_entries``."""
     height, width = state.cells.shape[1:]
     vehicles = state.vehicles
@@ -79,6 +87,8 @@ def own_vector(state: WorldState, world: World, shows_identity: bool = False, te
         parts.append(one_hot(vehicles.serves, len(world.agencies.names)))
     if tells_rules:
         parts.append(rules(world, row.device).expand(*shape, -1))
+    if tells_water:
+        parts.append(way_to_water(state, world))
     return torch.cat(parts, dim=-1)
 
 

@@ -60,7 +60,9 @@ class Local:
         radius: r [cells].
         identity: Whether ``self`` ends with the agent's place in its team, see ``identity``: agents that stand together
             and see the same can then part.
-        rules: Whether ``self`` ends with the rules of the world, see ``rules``: one policy can then play by several.
+        rules: Whether ``self`` tells the rules of the world, see ``rules``: one policy can then play by several.
+        water: Whether ``self`` tells the way to the nearest water, see ``way_to_water``: else agents whose tanks are
+            empty know of lakes within their view alone.
         channels: Names of the view's channels, in order.
 
     Raises:
@@ -70,6 +72,7 @@ class Local:
     radius: int = 5
     identity: bool = True
     rules: bool = False
+    water: bool = False
     channels: tuple[str, ...] = DEFAULT
 
     def __post_init__(self) -> None:
@@ -79,7 +82,10 @@ class Local:
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
         side, highs = 2 * self.radius + 1, tuple(CHANNELS[name].high for name in self.channels)
-        own, content = own_entries(world, self.identity, self.rules), self._told(view_content(self.channels, world))
+        own, content = (
+            own_entries(world, self.identity, self.rules, self.water),
+            self._told(view_content(self.channels, world)),
+        )
         symmetry = view_symmetry(self.channels)
         return {
             "view": Space((len(highs), side, side), torch.uint8, 0, highs, self.channels, symmetry, content),
@@ -88,7 +94,7 @@ class Local:
 
     def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
         """Return ``view`` uint8 [B, A, C, V, V] and ``self`` float32 [B, A, F]."""
-        own = own_vector(state, world, self.identity, self.rules)
+        own = own_vector(state, world, self.identity, self.rules, self.water)
         return {"view": egocentric_view(state, world, forecast, self.radius, self.channels), "self": own}
 
     def _told(self, content: tuple[Content, ...]) -> tuple[Content, ...]:
