@@ -14,8 +14,8 @@ import numpy as np
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.state import OLDEST, Cover, Landscape
-from warp_torchrl.world.terrain.crop import Crop
+from warp_torchrl.world.state import OLDEST, Cover
+from warp_torchrl.world.terrain.crop import Crop, Cropped
 from warp_torchrl.world.terrain.landscape import TALLEST, map_size
 from warp_torchrl.world.terrain.layer import LARGEST_MAP
 
@@ -41,7 +41,7 @@ _REAL = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Array:
+class Array(Cropped):
     """A landscape that the user has: cover, and optionally elevation, tree age, fuel and canopy.
 
     Two are equal where their layers, window and cell size are, wherever the layers come from.
@@ -88,7 +88,6 @@ class Array:
     column: int | None = None
     min_fuel: float = 0.5
     cell_size: float = 30.0
-    _crop: Crop = field(init=False, repr=False, compare=False)
     _digest: str = field(init=False, repr=False)  # of the layers: arrays cannot be compared by ==
 
     def __post_init__(self) -> None:
@@ -115,29 +114,6 @@ class Array:
         object.__setattr__(self, "size", size)
         object.__setattr__(self, "_crop", Crop(**layers, size=size, row=row, column=column, min_fuel=self.min_fuel))
         object.__setattr__(self, "_digest", _digest(layers))
-
-    def __call__(self, key: Tensor) -> Landscape:
-        """Return the landscape of each world's window, batch size [B]."""
-        return self._crop(key)
-
-    @property
-    def is_flat(self) -> bool:
-        """Return whether there is no elevation."""
-        return self._crop.elevation is None
-
-    @property
-    def extent(self) -> tuple[int, int]:
-        """Return (rows, columns) of the whole array."""
-        return self._crop.extent
-
-    @property
-    def corner(self) -> tuple[int, int] | None:
-        """Return (row, column) of the window that every world has; None where it is drawn."""
-        return self._crop.corner
-
-    def reach(self) -> np.ndarray:
-        """Return where a world may lie, bool [rows, columns]."""
-        return self._crop.reach()
 
 
 def read_npz(path: str | PathLike[str], names: tuple[str, ...]) -> dict[str, np.ndarray]:

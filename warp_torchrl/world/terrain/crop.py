@@ -158,6 +158,36 @@ class Crop:
         return row, column
 
 
+@dataclass(frozen=True, kw_only=True)
+class Cropped:
+    """A landscape whose worlds are windows of one map; the component that reads the map makes the ``Crop``."""
+
+    _crop: Crop = field(init=False, repr=False, compare=False)
+
+    def __call__(self, key: Tensor) -> Landscape:
+        """Return the landscape of each world's window, with its ``corner`` in the map, batch size [B]."""
+        return self._crop(key)
+
+    @property
+    def is_flat(self) -> bool:
+        """Return whether there is no elevation."""
+        return self._crop.elevation is None
+
+    @property
+    def extent(self) -> tuple[int, int]:
+        """Return (rows, columns) of the whole map."""
+        return self._crop.extent
+
+    @property
+    def corner(self) -> tuple[int, int] | None:
+        """Return (row, column) of the window that every world has; None where it is drawn."""
+        return self._crop.corner
+
+    def reach(self) -> np.ndarray:
+        """Return where a world may lie, bool [rows, columns]."""
+        return self._crop.reach()
+
+
 def whereabouts(unknown: np.ndarray, inside: np.ndarray | None = None) -> str:
     """Return in words where cells are not known, bool [rows, columns], of those inside; nothing where all are."""
     lies = unknown if inside is None else unknown & inside

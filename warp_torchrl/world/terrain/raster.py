@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from torch import Tensor
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.state import OLDEST, Landscape
-from warp_torchrl.world.terrain.crop import Crop
+from warp_torchrl.world.state import OLDEST
+from warp_torchrl.world.terrain.crop import Crop, Cropped
 from warp_torchrl.world.terrain.fuel import NO_DATA, code_table, to_cover
 from warp_torchrl.world.terrain.grid import Grid, check_grid
 from warp_torchrl.world.terrain.landscape import map_size
@@ -34,7 +33,7 @@ _log = logging.getLogger("warp_torchrl")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Raster:
+class Raster(Cropped):
     """Real ground: the cover from a fuel or land-cover layer and the elevation, read once and cropped from one grid.
 
     A layer is a GeoTIFF (.tif, .tiff) or an ESRI ASCII grid (.asc) with one band. The grid is the fuel layer's, which
@@ -103,7 +102,6 @@ class Raster:
     column: int | None = None
     min_fuel: float = 0.5
     _grid: Grid = field(init=False, repr=False, compare=False)
-    _crop: Crop = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         check_fields(
@@ -128,33 +126,10 @@ class Raster:
         )
         object.__setattr__(self, "_crop", crop)
 
-    def __call__(self, key: Tensor) -> Landscape:
-        """Return the landscape of each world's window, with its ``corner`` in ``grid``, batch size [B]."""
-        return self._crop(key)
-
     @property
     def grid(self) -> Grid:
         """Return the grid in force, of which every world is a window."""
         return self._grid
-
-    @property
-    def is_flat(self) -> bool:
-        """Return whether there is no elevation."""
-        return self._crop.elevation is None
-
-    @property
-    def extent(self) -> tuple[int, int]:
-        """Return (rows, columns) of the grid."""
-        return self._crop.extent
-
-    @property
-    def corner(self) -> tuple[int, int] | None:
-        """Return (row, column) of the window that every world has; None where it is drawn."""
-        return self._crop.corner
-
-    def reach(self) -> np.ndarray:
-        """Return where a world may lie, bool [rows, columns]."""
-        return self._crop.reach()
 
     @property
     def cell_size(self) -> float:
