@@ -4,10 +4,12 @@ import json
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from warp_torchrl import load_policy, make_env
 from warp_torchrl.benchmark import __main__ as command
 from warp_torchrl.benchmark.generalist import PLACES, Place, generalist_table, on_ground
+from warp_torchrl.benchmark.generalist_figure import draw_generalist
 from warp_torchrl.config.compose import compose_config
 from warp_torchrl.evaluation.play import play, play_heuristics
 from warp_torchrl.evaluation.statistics import compare, summarise
@@ -31,20 +33,29 @@ def test_a_row_is_the_policy_beside_the_best_baseline_on_the_same_fires(capsys, 
         assert row["baseline"] == best
         assert row["policy"]["mean"] == pytest.approx(own.mean())
         assert row["difference"]["saved_difference"] == pytest.approx((own - others[best]["saved"]).mean())
+        to_reference = (own - others["coordinated"]["saved"]).mean()
+        assert row["to_reference"]["saved_difference"] == pytest.approx(to_reference)
+        assert row["reference"]["mean"] == pytest.approx(others["coordinated"]["saved"].mean())
     assert rows[0]["policy"] != rows[1]["policy"]
 
 
 def test_the_table_counts_where_the_policy_is_surely_ahead_and_behind():
     saved = np.linspace(0.5, 0.7, 20)
+    lower = saved - 0.15
 
     def row(place, own):
-        found = {"policy": summarise(own), "baseline": "ring", "best": summarise(saved)}
-        return {"place": place, "episodes": 20, **found, "difference": compare(own, saved)}
+        found = {"policy": summarise(own), "baseline": "ring", "best": summarise(saved), "reference": summarise(lower)}
+        differences = {"difference": compare(own, saved), "to_reference": compare(own, lower)}
+        return {"place": place, "episodes": 20, **found, **differences}
 
     noise = np.where(np.arange(20) % 2, 0.1, -0.1)
     text = generalist_table([row("a", saved + 0.1), row("b", saved - 0.2), row("c", saved + noise)])
     assert "| a | 70.0 (" in text and "| ring | 60.0 (" in text and "| +10.0 (+10.0 .. +10.0) |" in text
-    assert text.endswith("Ahead of the best baseline, intervals apart, on 1 of 3 places, and behind it on 1.")
+    assert "| +10.0 (+10.0 .. +10.0) | +25.0 (+25.0 .. +25.0) |" in text
+    assert text.endswith(
+        "Of 3 places ahead of the best baseline, intervals apart, on 1, and behind it on 1; "
+        "of `coordinated` on 2, and behind it on 1."
+    )
 
 
 @pytest.mark.parametrize(
@@ -52,6 +63,26 @@ def test_the_table_counts_where_the_policy_is_surely_ahead_and_behind():
 )
 def test_every_place_is_one_of_ours(place):
     compose_config("train", [f"scenario={place.scenario}", *place.overrides])
+
+
+def test_the_figure_has_a_row_for_each_place(tmp_path):
+    pytest.importorskip("matplotlib", reason="needs the extra figures")
+
+    def drawn(*saved):
+        known = {"episodes": 9, "baseline": "ring", "best": summarise(np.array([0.1, 0.2]))}
+        means = [summarise(np.linspace(mean - 0.05, mean + 0.05, 9)) for mean in saved]
+        rows = [{"place": f"place {index}", "policy": mean, **known} for index, mean in enumerate(means)]
+        draw_generalist(rows, tmp_path / "figure.png")
+        return np.asarray(Image.open(tmp_path / "figure.png").convert("RGB"))
+
+    def of_policy(picture):
+        return np.argwhere(np.abs(picture[:, :, :3].astype(int) - (0, 114, 178)).max(2) < 30)
+
+    one, two = drawn(0.8), drawn(0.8, 0.4)
+    assert two.shape[0] > one.shape[0]
+    places = of_policy(two)
+    upper, lower = np.split(places, np.flatnonzero(np.diff(places[:, 0]) > 8)[:1] + 1)
+    assert upper[:, 1].mean() > lower[:, 1].mean() + 100, "what saves more is drawn farther to the right"
 
 
 def test_places_on_real_ground_need_a_folder(capsys):

@@ -18,6 +18,7 @@ import torch
 from warp_torchrl.benchmark.environments import LARGE, environment_speed, rate_table
 from warp_torchrl.benchmark.fires import ellipse_errors, fire_table, law_times
 from warp_torchrl.benchmark.generalist import PLACES, generalise, generalist_table, on_ground
+from warp_torchrl.benchmark.generalist_figure import draw_generalist
 from warp_torchrl.benchmark.gpu import SMALL, Size, measure_gpu
 from warp_torchrl.benchmark.growth_figure import draw_growth
 from warp_torchrl.benchmark.machine import header, machine, peak_memory
@@ -109,7 +110,10 @@ def _generalist(options: Namespace) -> dict[str, Rows]:
         needs = ", which needs --ground" if unknown[0] == "ground" else ""
         raise ConfigError(f"places must be of {', '.join(groups)}, got {unknown[0]}{needs}")
     places = [place for name in options.places or groups for place in groups[name]]
-    return {"generalist": list(generalise(options.policy, places, options.device, options.episodes, options.set))}
+    rows = list(generalise(options.policy, places, options.device, options.episodes, options.set))
+    if options.plot is not None:
+        draw_generalist(rows, options.plot)
+    return {"generalist": rows}
 
 
 def _fires(options: Namespace) -> dict[str, Rows]:
@@ -159,7 +163,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--worlds", type=int, help=f"{_WORLDS} by default, or the experiment's")
     parser.add_argument("--repeats", type=int, default=7, help="times that each speed is measured")
     parser.add_argument("--no-compile", action="store_true", help="for tick and env: leave what is compiled out")
-    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="for scaling: draw it too")
+    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="for scaling or generalist: draw it too")
     parser.add_argument("--episodes", type=int, default=EPISODES)
     parser.add_argument("--policy", default="default", help="for generalist: a run folder, or a shipped policy")
     parser.add_argument("--places", nargs="+", metavar="GROUP", help=f"for generalist: {', '.join(PLACES)}, ground")

@@ -1,6 +1,6 @@
 """One policy on every kind of fire, beside the best baseline of each."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from warp_torchrl.api import load_policy, make_env
@@ -42,12 +42,14 @@ PLACES = {"scenarios": OURS, "teams": TEAMS, "maps": MAPS, "winds": WINDS, "gian
 """Groups of places; those on real ground need a folder."""
 RIVALS = ("local", "greedy", "coordinated", "dispatch", "ring", "mixed")
 """The baselines for teams that see the fire; the others search for it, watch it, or share a land."""
+REFERENCE = "coordinated"
+"""The baseline that every row tells of."""
 
 
 def generalise(
     path: str, places: Sequence[Place], device: str, episodes: int, overrides: Sequence[str] = ()
 ) -> Iterator[dict[str, Any]]:
-    """Yield a row for each place: what the policy saves, what the best baseline does, and the paired difference.
+    """Yield a row for each place: what the policy, the best baseline and ``REFERENCE`` save, and paired differences.
 
     Args:
         path: Of a policy, or the name of a shipped one.
@@ -70,25 +72,37 @@ def generalise(
             "baseline": best,
             "best": summarise(saved[best]),
             "difference": compare(own, saved[best]),
+            "reference": summarise(saved[REFERENCE]),
+            "to_reference": compare(own, saved[REFERENCE]),
         }
 
 
 def generalist_table(rows: Sequence[dict[str, Any]]) -> str:
-    """Return the rows as a Markdown table, and on how many places the policy beats the best baseline."""
+    """Return the rows as a Markdown table, and on how many places the policy beats the baselines."""
     lines = [
-        f"Trees saved, %, and 95 % intervals over {rows[0]['episodes']} fires, seeds from {FIRST_SEED}; the difference "
-        "is paired by fire",
+        f"Trees saved, %, and 95 % intervals over {rows[0]['episodes']} fires, seeds from {FIRST_SEED}; differences "
+        "are paired by fire",
         "",
-        "| where | policy | best baseline | | difference |",
-        "|---|---|---|---|---|",
+        f"| where | policy | best baseline | | difference | to `{REFERENCE}` |",
+        "|---|---|---|---|---|---|",
     ]
-    for row in rows:
-        low, high = (100 * bound for bound in row["difference"]["ci95"])
-        lines.append(
-            f"| {row['place']} | {interval_cell(row['policy'])} | {row['baseline']} | {interval_cell(row['best'])} | "
-            f"{100 * row['difference']['saved_difference']:+.1f} ({low:+.1f} .. {high:+.1f}) |"
-        )
-    ahead = sum(row["difference"]["ci95"][0] > 0.0 for row in rows)
-    behind = sum(row["difference"]["ci95"][1] < 0.0 for row in rows)
-    told = f"Ahead of the best baseline, intervals apart, on {ahead} of {len(rows)} places, and behind it on {behind}."
+    lines += [
+        f"| {row['place']} | {interval_cell(row['policy'])} | {row['baseline']} | {interval_cell(row['best'])} | "
+        f"{_told(row['difference'])} | {_told(row['to_reference'])} |"
+        for row in rows
+    ]
+    best, reference = (
+        f"on {_count(rows, key, 1)}, and behind it on {_count(rows, key, -1)}" for key in ("difference", "to_reference")
+    )
+    told = f"Of {len(rows)} places ahead of the best baseline, intervals apart, {best}; of `{REFERENCE}` {reference}."
     return "\n".join([*lines, "", told])
+
+
+def _told(difference: Mapping[str, Any]) -> str:
+    low, high = (100 * bound for bound in difference["ci95"])
+    return f"{100 * difference['saved_difference']:+.1f} ({low:+.1f} .. {high:+.1f})"
+
+
+def _count(rows: Sequence[Mapping[str, Any]], key: str, sign: int) -> int:
+    """Return on how many places a difference has a sign that its interval does not doubt."""
+    return sum(min(sign * bound for bound in row[key]["ci95"]) > 0.0 for row in rows)
