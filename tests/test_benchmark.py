@@ -211,6 +211,15 @@ def test_it_calibrates_tasks(capsys):
     assert "| skirmish |" in out and "torchrl" in out
 
 
+def test_it_pairs_the_last_heuristic_with_the_others(capsys):
+    asked = ["tasks", "--policies", "noop", "coordinated", "--episodes", "3", *TINY]
+    assert "| scenario | fires | noop | coordinated | coordinated - noop | noop [s] |" in output(capsys, *asked)
+    row = json.loads(output(capsys, *asked, "--json"))["pairs"][0]
+    gap = row["coordinated"]["mean"] - row["noop"]["mean"]
+    assert row["differences"]["noop"]["saved_difference"] == pytest.approx(gap) and gap > 0.0
+    assert set(row["differences"]) == {"noop"} and min(row["seconds"].values()) > 0.0
+
+
 def test_it_ranks_the_rewards(capsys):
     main(["rewards", "--scenario", "skirmish", "--episodes", "4", "--set", "landscape.size=12", "horizon=30"])
     out = capsys.readouterr().out

@@ -29,6 +29,8 @@ from warp_torchrl.benchmark.tasks import (
     SCENARIOS,
     calibrate,
     mean_returns,
+    pair,
+    pair_table,
     rank_rewards,
     reward_table,
     task_table,
@@ -37,6 +39,7 @@ from warp_torchrl.benchmark.ticks import tick_cost, tick_table
 from warp_torchrl.benchmark.trainings import training_speed
 from warp_torchrl.commands.allocation import keep_freed_memory
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.runs.checkpoint import CheckpointError
 
 Rows = list[dict[str, Any]]
@@ -95,6 +98,9 @@ def _scaling(options: Namespace) -> dict[str, Rows]:
 
 def _tasks(options: Namespace) -> dict[str, Rows]:
     names = options.scenario or SCENARIOS
+    if options.policies is not None:
+        pairs = [pair(name, options.device, options.episodes, options.policies, options.set) for name in names]
+        return {"pairs": pairs}
     return {"tasks": [calibrate(name, options.device, options.episodes, options.set) for name in names]}
 
 
@@ -142,6 +148,7 @@ _TABLES = {
     "profile": share_table,
     "scaling": growth_table,
     "tasks": task_table,
+    "pairs": pair_table,
     "rewards": reward_table,
     "generalist": generalist_table,
     "fires": fire_table,
@@ -165,6 +172,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--no-compile", action="store_true", help="for tick and env: leave what is compiled out")
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="for scaling or generalist: draw it too")
     parser.add_argument("--episodes", type=int, default=EPISODES)
+    parser.add_argument(
+        "--policies", nargs="+", choices=HEURISTICS, metavar="NAME", help="for tasks: these heuristics, the last paired"
+    )
     parser.add_argument("--policy", default="default", help="for generalist: a run folder, or a shipped policy")
     parser.add_argument("--places", nargs="+", metavar="GROUP", help=f"for generalist: {', '.join(PLACES)}, ground")
     parser.add_argument("--ground", metavar="FOLDER", help="for generalist: rasters, for places on real ground")

@@ -12,6 +12,7 @@ from warp_torchrl.heuristics.following import Follower
 from warp_torchrl.heuristics.own_land import OwnLand
 from warp_torchrl.heuristics.reactive import Greedy, Local, NoOp, Random
 from warp_torchrl.heuristics.ring import Mixed, Ring
+from warp_torchrl.heuristics.rollout import Rollout
 from warp_torchrl.heuristics.searching import Lawnmower, Oldest, Searching
 
 HEURISTICS: dict[str, type[Heuristic]] = {
@@ -28,6 +29,7 @@ HEURISTICS: dict[str, type[Heuristic]] = {
     "follower": Follower,
     "clockwise": Clockwise,
     "own_land": OwnLand,
+    "rollout": Rollout,
 }
 """Heuristic policies by name."""
 
@@ -47,6 +49,7 @@ __all__ = [
     "OwnLand",
     "Random",
     "Ring",
+    "Rollout",
     "Searching",
     "idle_action",
 ]

@@ -41,6 +41,7 @@ class Stream(IntEnum):
     SMOKE = 19
     DRIFT = 20
     LANDS = 21
+    IMAGINED = 22
 
 
 def world_key(seed: Tensor, episode: Tensor | int = 0) -> Tensor:
@@ -54,6 +55,21 @@ def world_key(seed: Tensor, episode: Tensor | int = 0) -> Tensor:
         int64 [B].
     """
     return splitmix64(splitmix64(seed * 2 + 1) + torch.as_tensor(episode, device=seed.device) * _GOLDEN)
+
+
+def imagined_keys(key: Tensor, step: Tensor, count: int) -> Tensor:
+    """Return keys of worlds that are imagined at a step of true ones, whose draws they do not share.
+
+    Args:
+        key: World keys, int64 [B].
+        step: Agent steps, int32 [B].
+        count: Keys for each world; more begin with the same ones.
+
+    Returns:
+        int64 [B, count].
+    """
+    word = splitmix64(_counted(key, step, Stream.IMAGINED))
+    return splitmix64(word[:, None] + torch.arange(count, device=key.device) * _GOLDEN)
 
 
 def uniform(key: Tensor, tick: Tensor | int, stream: Stream, shape: tuple[int, ...]) -> Tensor:
@@ -107,6 +123,10 @@ def uniform_among(key: Tensor, tick: Tensor | int, stream: Stream, world: Tensor
 
 def _key_words(key: Tensor, tick: Tensor | int, stream: Stream) -> tuple[Tensor, Tensor]:
     """Return the two words that a world's draws are hashed with, int32 [B] each."""
-    counter = torch.zeros_like(key).add_(tick).mul_(64).add_(int(stream))
-    word = splitmix64(key + counter * _GOLDEN)
+    word = splitmix64(_counted(key, tick, stream))
     return word.to(torch.int32), (word >> 32).to(torch.int32)
+
+
+def _counted(key: Tensor, tick: Tensor | int, stream: Stream) -> Tensor:
+    counter = torch.zeros_like(key).add_(tick).mul_(64).add_(int(stream))
+    return key + counter * _GOLDEN

@@ -202,10 +202,16 @@ class WorldState(Batch):
     watching: Watching | None = None  # None where all is seen
     lands: Lands | None = None  # None where there is but one agency
     packets: Packets | None = None  # None where packets arrive in the step in which they are sent
+    origin: Tensor | None = None  # int64 [B], key of what began with the episode, in imagined worlds; None: ``key``
 
     def what_changes(self) -> dict[str, Tensor]:
         """Return all tensors by name but those that follow from others, of which they can be made again."""
         return {name: leaf for name, leaf in self.leaves().items() if name not in _FOLLOWS}
+
+    @property
+    def episode_key(self) -> Tensor:
+        """Return the key of what began with the episode, int64 [B]: the true one in worlds that are imagined too."""
+        return self.key if self.origin is None else self.origin
 
     @property
     def landscape(self) -> Landscape:

@@ -94,7 +94,7 @@ class Weather(Wind):
 
     def after_tick(self, state: WorldState) -> Tensor:
         """Return the wind of each world after its tick number ``state.tick``, float32 [B, 2, 1, 1] [m/s]."""
-        return self._wind.to(state.key.device)[self._row(state.key, state.tick)][:, :, None, None]
+        return self._wind.to(state.key.device)[self._row(state.episode_key, state.tick)][:, :, None, None]
 
     def moisture(self, key: Tensor, tick: Tensor) -> Tensor:
         """See ``Wind``; NaN where the table tells nothing."""

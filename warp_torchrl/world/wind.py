@@ -198,7 +198,7 @@ class Wandering(Wind):
         fresh = math.sqrt(-math.expm1(-2.0 / self.memory))
         gust = fresh * _normals(state.key, state.tick)
         u, v = state.wind[:, 0, 0, 0], state.wind[:, 1, 0, 0]
-        mean = _angle(state.key, self.direction)
+        mean = _angle(state.episode_key, self.direction)
         turn = _angle_between(mean.cos(), mean.sin(), u, v)
         speed = self.speed + (torch.hypot(u, v) - self.speed) * kept + self.speed_deviation * gust[:, 0]
         turn = turn * kept + math.radians(self.direction_deviation) * gust[:, 1]

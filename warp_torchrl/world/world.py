@@ -303,7 +303,7 @@ def advance(state: WorldState, fire: Automaton, wind: Wind, ticks_now: Tensor) -
     if not wind.changes:
         return after
     now = torch.where(ticks_now[:, None, None, None], wind.after_tick(after), state.wind)
-    return in_wind(after, fire, now, wind.moisture(after.key, after.tick))
+    return in_wind(after, fire, now, wind.moisture(after.episode_key, after.tick))
 
 
 def in_wind(state: WorldState, fire: Automaton, wind: Tensor, moisture: Tensor | None = None) -> WorldState:

@@ -1,0 +1,139 @@
+"""The planner: it plays each choice in imagined fires before it chooses."""
+
+from typing import ClassVar
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.env import WildfireEnv
+from warp_torchrl.heuristics.base import Heuristic
+from warp_torchrl.heuristics.coordinated import Coordinated
+from warp_torchrl.world.imagined import imagined, rules_in_sight
+from warp_torchrl.world.random import imagined_keys
+from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.world import World
+
+_PART = 8
+"""Imagined worlds go on without those that have ended when these are one in so many: to move the others takes time."""
+
+
+class Rollout(Heuristic):
+    """Improves a base policy by simulation: the rollout algorithm, agent by agent.
+
+    Agents decide one after the other. Each considers all actions that its mask allows, while those before it do what
+    they chose and those after it act by the base policy. An action is played in imagined worlds, the same ``samples``
+    futures for each action, for ``horizon`` steps: after the first all agents act by the base policy. Its gain is the
+    trees that stand in the end less those that stand if the agent, too, acts by the base policy. An action is chosen
+    over that of the base policy if its mean gain is more than ``errors`` standard errors above 0, by the most.
+
+    Actions race: all are played in the first futures, and those without a gain by then are dropped before the next.
+
+    References: Tesauro and Galperin, "On-line policy improvement using Monte-Carlo search", NIPS 1996; Bertsekas,
+    "Multiagent rollout algorithms and reinforcement learning", IEEE/CAA J. Autom. Sinica 2021.
+
+    Args:
+        env: The environment whose state it reads.
+    """
+
+    base: ClassVar[type[Heuristic]] = Coordinated
+    """The base policy; it may read the state alone."""
+    horizon: ClassVar[int] = 32  # steps
+    samples: ClassVar[int] = 8  # imagined futures
+    laps: ClassVar[tuple[int, ...]] = (4, 8)
+    """Futures that have been played when actions without a gain are dropped; the last is ``samples``."""
+    errors: ClassVar[float] = 1.0
+    cells: ClassVar[int] = 2**21
+    """Of the worlds that are imagined at once; memory is bounded by it."""
+
+    def __init__(self, env: WildfireEnv) -> None:
+        super().__init__(env)
+        self.policy = self.base(env)
+
+    def choose(self, state: WorldState, mask: Tensor) -> Tensor:
+        """Return the actions, int64 [B, A]."""
+        action = self.policy.choose(state, mask)
+        going = (~state.done).nonzero()[:, 0]
+        if not len(going):
+            return action
+        return action.index_copy(0, going, self._plan(state[going], mask[going], action[going]))
+
+    def _plan(self, state: WorldState, mask: Tensor, action: Tensor) -> Tensor:
+        """Return better actions than those of the base policy, int64 [B, A], where there are."""
+        keys = imagined_keys(state.key, state.step, self.samples)
+        saved = self._imagine(state, torch.arange(len(action), device=action.device), action, keys)
+        for agent in range(action.shape[1]):  # one after the other: each knows what those before it chose
+            action, saved = self._improve(state, mask[:, agent], action, saved, keys, agent)
+        return action
+
+    def _improve(
+        self, state: WorldState, mask: Tensor, action: Tensor, saved: Tensor, keys: Tensor, agent: int
+    ) -> tuple[Tensor, Tensor]:
+        """Return the actions with a better one of an agent, and the trees that they save, as ``saved`` [B, samples]."""
+        own = action[:, agent]
+        row, option = mask.scatter(1, own[:, None], False).nonzero().unbind(dim=1)
+        tried = action[row].index_copy(1, own.new_tensor([agent]), option[:, None])
+        gain = saved.new_zeros(len(row), self.samples)
+        left = torch.arange(len(row), device=row.device)
+        for begin, end in zip((0, *self.laps), self.laps, strict=False):
+            if not len(left):
+                break
+            which = row[left]
+            futures = self._imagine(state, which, tried[left], keys[:, begin:end])
+            gain[left, begin:end] = futures - saved[which, begin:end]
+            left = left[gain[left, :end].sum(dim=1) > 0]
+        best = torch.zeros(mask.shape, dtype=torch.float64, device=mask.device)
+        best[row[left], option[left]] = self._sure_gain(gain[left])
+        gains = saved.new_zeros(*mask.shape, self.samples)
+        gains[row, option] = gain
+        found = best.max(dim=1)
+        chosen = torch.where(found.values > 0.0, found.indices, own)
+        index = chosen[:, None, None].expand(-1, 1, self.samples)
+        action = action.index_copy(1, own.new_tensor([agent]), chosen[:, None])
+        return action, saved + gains.gather(1, index)[:, 0]
+
+    def _sure_gain(self, gain: Tensor) -> Tensor:
+        """Return mean gains less ``errors`` standard errors, float64 [n], of gains int32 [n, samples].
+
+        Sums are of whole numbers, so that they are the same in any batch.
+        """
+        count, total, squares = self.samples, gain.sum(dim=1), gain.to(torch.int64).square().sum(dim=1)
+        variance = (squares * count - total.square()).to(torch.float64) / (count * max(count - 1, 1))
+        return total.to(torch.float64) / count - self.errors * (variance / count).sqrt()
+
+    def _imagine(self, state: WorldState, row: Tensor, action: Tensor, keys: Tensor) -> Tensor:
+        """Return the trees that stand after ``horizon`` steps, int32 [n, S].
+
+        Args:
+            state: The worlds.
+            row: Which of them each action is tried in, int64 [n].
+            action: Of the first step, int64 [n, A].
+            keys: Of the futures, int64 [B, S].
+        """
+        world, count = rules_in_sight(self.env.world), keys.shape[1]
+        saved = []
+        for at in torch.arange(len(row) * count, device=row.device).split(self._at_once(state)):
+            tried, future = at // count, at % count
+            own = row[tried]
+            saved.append(self._play(world, imagined(state[own], keys[own, future]), action[tried]))
+        return torch.cat(saved).view(-1, count)
+
+    def _at_once(self, state: WorldState) -> int:
+        """Return how many worlds are imagined at once."""
+        return max(1, self.cells // state.cells[0].numel())
+
+    def _play(self, world: World, state: WorldState, action: Tensor) -> Tensor:
+        """Return the trees that stand in each world after ``horizon`` steps, of which the first is given, int32 [n]."""
+        rows = torch.arange(len(action), device=action.device)
+        saved, counts = torch.zeros_like(state.step), None
+        for step in range(self.horizon):
+            if step:
+                action = self.policy.choose(state, world.possible_actions(state))
+            made = world.step(state, action, counts)
+            state, counts = made.after, made.counts_after
+            saved[rows] = counts.preserved + counts.extinguished
+            going = (~state.done).nonzero()[:, 0]
+            if not len(going):
+                break
+            if len(going) * _PART < len(rows) * (_PART - 1):
+                state, counts, rows = state[going], counts[going], rows[going]
+        return saved
