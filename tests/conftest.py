@@ -12,6 +12,7 @@ from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain, without_targets
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.heuristics import Rollout
 from warp_torchrl.training.loop import Training
 from warp_torchrl.world.ignition import Ignition
 from warp_torchrl.world.team import Team
@@ -67,6 +68,13 @@ def small_world(**changes):
         "horizon": 40,
     }
     return World(**{**parts, **changes})
+
+
+@pytest.fixture(autouse=True)
+def _short_look_ahead(monkeypatch):
+    """Let the planner look ahead for three steps, so that tests of all heuristics stay quick."""
+    monkeypatch.setattr(Rollout, "horizon", 3)
+    monkeypatch.setattr(Rollout, "samples", 2)
 
 
 @pytest.fixture

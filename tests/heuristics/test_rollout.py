@@ -22,7 +22,7 @@ TWO_FIRES = "a..aTTTT ....TTTT ....TTTT ....TTTT"
 class Quick(Rollout):
     """The planner with a short look ahead."""
 
-    horizon, samples, laps = 6, 4, (2, 4)
+    horizon, samples = 6, 4
 
 
 class ByDispatch(Quick):
@@ -152,7 +152,7 @@ def test_imagined_draws_differ_between_steps() -> None:
 )
 def test_it_plays_in_every_kind_of_world(scenario: str, overrides: tuple[str, ...]) -> None:
     class Short(Rollout):
-        base, horizon, samples, laps = Dispatch, 2, 2, (2,)
+        base, horizon, samples = Dispatch, 2, 2
 
     env = make_env(scenario, n_worlds=2, overrides=["landscape.size=16", *overrides])
     policy, now = Short(env), env.reset()

@@ -26,7 +26,7 @@ class Rollout(Heuristic):
     trees that stand in the end less those that stand if the agent, too, acts by the base policy. An action is chosen
     over that of the base policy if its mean gain is more than ``errors`` standard errors above 0, by the most.
 
-    Actions race: all are played in the first futures, and those without a gain by then are dropped before the next.
+    All are played in the first half of the futures, and only those with a gain there in the second.
 
     References: Tesauro and Galperin, "On-line policy improvement using Monte-Carlo search", NIPS 1996; Bertsekas,
     "Multiagent rollout algorithms and reinforcement learning", IEEE/CAA J. Autom. Sinica 2021.
@@ -38,10 +38,8 @@ class Rollout(Heuristic):
     base: ClassVar[type[Heuristic]] = Coordinated
     """The base policy; it may read the state alone."""
     horizon: ClassVar[int] = 32  # steps
-    samples: ClassVar[int] = 8  # imagined futures
-    laps: ClassVar[tuple[int, ...]] = (4, 8)
-    """Futures that have been played when actions without a gain are dropped; the last is ``samples``."""
-    errors: ClassVar[float] = 1.0
+    samples: ClassVar[int] = 8  # imagined futures, at least 2
+    errors: ClassVar[float] = 1.0  # standard errors that a gain must exceed
     cells: ClassVar[int] = 2**21
     """Of the worlds that are imagined at once; memory is bounded by it."""
 
@@ -74,7 +72,8 @@ class Rollout(Heuristic):
         tried = action[row].index_copy(1, own.new_tensor([agent]), option[:, None])
         gain = saved.new_zeros(len(row), self.samples)
         left = torch.arange(len(row), device=row.device)
-        for begin, end in zip((0, *self.laps), self.laps, strict=False):
+        half = self.samples // 2
+        for begin, end in ((0, half), (half, self.samples)):
             if not len(left):
                 break
             which = row[left]
@@ -97,7 +96,7 @@ class Rollout(Heuristic):
         Sums are of whole numbers, so that they are the same in any batch.
         """
         count, total, squares = self.samples, gain.sum(dim=1), gain.to(torch.int64).square().sum(dim=1)
-        variance = (squares * count - total.square()).to(torch.float64) / (count * max(count - 1, 1))
+        variance = (squares * count - total.square()).to(torch.float64) / (count * (count - 1))
         return total.to(torch.float64) / count - self.errors * (variance / count).sqrt()
 
     def _imagine(self, state: WorldState, row: Tensor, action: Tensor, keys: Tensor) -> Tensor:
@@ -125,7 +124,7 @@ class Rollout(Heuristic):
         """Return the trees that stand in each world after ``horizon`` steps, of which the first is given, int32 [n]."""
         rows = torch.arange(len(action), device=action.device)
         saved, counts = torch.zeros_like(state.step), None
-        for step in range(self.horizon):
+        for step in range(self.horizon):  # over time alone: all worlds that are imagined are one batch
             if step:
                 action = self.policy.choose(state, world.possible_actions(state))
             made = world.step(state, action, counts)
