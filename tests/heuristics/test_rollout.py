@@ -32,9 +32,9 @@ class ByDispatch(Quick):
 
 
 class InParts(Quick):
-    """The same with five worlds at once."""
+    """The same with 20 worlds at once."""
 
-    cells = 5 * 16 * 16
+    cells = 20 * 16 * 16
 
 
 def plan(env: WildfireEnv, state: WorldState, kind: type[Rollout] = Quick) -> Tensor:
