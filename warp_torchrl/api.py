@@ -66,14 +66,15 @@ def make_env(
     )
 
 
-def load_policy(path: str | Path, mode: str = "best") -> TrainedPolicy:
+def load_policy(path: str | Path = "generalist", mode: str = "best") -> TrainedPolicy:
     """Load a trained decentralised policy, which reads observation and mask and writes the action.
 
     It reads only the manifest, the configuration and the policy's parameters, and verifies them first.
 
     Args:
-        path: A run folder (its newest sound checkpoint), a checkpoint folder, or the name of a shipped policy:
-            ``default``, ``single`` or ``skirmish``, unless a folder has that name.
+        path: A run folder (its newest sound checkpoint), a checkpoint folder, or the name of a shipped policy, unless a
+            folder has that name: ``generalist``, which plays every scenario in which a team sees the fire, or
+            ``default``, ``single`` or ``skirmish``, each trained for the scenario of its name.
         mode: ``sampled``, ``deterministic``, or ``best``: the better of the two on training seeds.
 
     Returns:

@@ -26,7 +26,7 @@ def composed(given):
     return plain(compose_config("train", [each for each in given if not each.startswith(("imitation", "hydra"))]))
 
 
-@pytest.mark.parametrize("policy", ["default", "single", "skirmish"])
+@pytest.mark.parametrize("policy", ["default", "generalist", "single", "skirmish"])
 @pytest.mark.parametrize("overrides", [(), ("scenario=large", "team.n_agents=3", "seed=5")])
 def test_the_policy_s_own_configuration_is_trained_in_the_scenario_that_is_played(policy, overrides):
     record = NamedPolicy(policy).checkpoint.record()
@@ -46,7 +46,7 @@ def test_a_training_may_start_from_the_run_of_which_it_is_made(trained):
     check_start(run_config(values), found)
 
 
-@pytest.mark.parametrize("policy", ["default", "single", "skirmish"])
+@pytest.mark.parametrize("policy", ["default", "generalist", "single", "skirmish"])
 def test_the_shipped_policies_may_be_trained_too(policy):
     found = NamedPolicy(policy).checkpoint
     values = composed(arguments(policy, found.record(), (), PEOPLE, RUN, 200))
@@ -66,13 +66,15 @@ def test_what_is_of_another_machine_is_not_asked_for():
     values = {**old.values, "device": "cuda:7", "processes": 8, "compile": True, "total_frames": 10**12}
     choices = {**old.choices, "collector": "process", "logger": "wandb"}
     values["collector"] = {"steps": 16, "workers": 4}
-    choices["curriculum"] = "success"
+    choices["curriculum"], choices["mixture"] = "success", "several"
+    values["mixture"] = {"kinds": {"water": {"share": 2}}, "floor": 0.5}
     values["curriculum"] = {"over": {"steps_per_tick": [9, 4]}, "low": 0.1}
     made = composed(arguments("skirmish", SavedConfig(choices=choices, values=values), (), PEOPLE, RUN, 10))
     assert (made["device"], made["compile"], made["total_frames"]) == ("cpu", False, 10)
     assert "InProcess" in made["collector"]["_target_"] and made["collector"]["steps"] == 16
     assert "CsvOnly" in made["logger"]["_target_"]
     assert "NoCurriculum" in made["curriculum"]["_target_"], "a trained policy goes on in the scenario that is played"
+    assert made["mixture"] == plain(compose_config("train", []))["mixture"], "and in no other"
     assert made["imitation"]["teacher"] is None, "people teach now"
 
 

@@ -175,7 +175,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--policies", nargs="+", choices=HEURISTICS, metavar="NAME", help="for tasks: these heuristics, the last paired"
     )
-    parser.add_argument("--policy", default="default", help="for generalist: a run folder, or a shipped policy")
+    parser.add_argument("--policy", default="generalist", help="for generalist: a run folder, or a shipped policy")
     parser.add_argument("--places", nargs="+", metavar="GROUP", help=f"for generalist: {', '.join(PLACES)}, ground")
     parser.add_argument("--ground", metavar="FOLDER", help="for generalist: rasters, for places on real ground")
     parser.add_argument("--fires", type=int, default=1000, help="for fires: how many of each law")

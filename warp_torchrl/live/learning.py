@@ -26,7 +26,7 @@ GENTLY = 0.2
 """By how much the learning rate of the policy's training is multiplied: a skilled team loses less to a new critic."""
 _LEFT_TO_THE_PAGE = (
     *("start_from", "resume", "total_frames", "debug", "experiment", "imitation", "checkpoint", "evaluation"),
-    *("device", "processes", "compile", "graph", "logger", "curriculum"),
+    *("device", "processes", "compile", "graph", "logger", "curriculum", "mixture"),
 )
 _EPISODES = 64  # of the evaluation at the end
 _PLAIN = re.compile(r"[A-Za-z_./][A-Za-z0-9_./-]*")
@@ -171,7 +171,7 @@ def _configuration(record: SavedConfig, overrides: Sequence[str]) -> list[str]:
     touched = {each.partition("=")[0].lstrip("+~") for each in overrides}
     if "scenario" in touched:
         touched |= set(WORLD_KEYS)
-    chosen = record.choices | {"collector": "direct", "curriculum": "none", "logger": "csv"}
+    chosen = record.choices | {"collector": "direct", "curriculum": "none", "logger": "csv", "mixture": "none"}
     given = [*(f"{group}={option}" for group, option in chosen.items() if group not in touched), *overrides]
     usual = dotted(plain(compose_config("train", given)))
     wanted = dotted(plain(restore(record, overrides))).items()

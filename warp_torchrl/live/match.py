@@ -42,7 +42,7 @@ class Setting:
         ValueError: If a value is out of its range.
     """
 
-    policy: str = "default"
+    policy: str = "generalist"
     beside: str | None = None
     seed: int = FIRST_EVALUATED
     overrides: tuple[str, ...] = ()
