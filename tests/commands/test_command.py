@@ -618,7 +618,11 @@ MISTAKES = [
     (("train.py", "hydra/launcher=jobli"), 2, "hydra/launcher must be one of basic"),
     (("train.py", "resume=default"), 4, "default is not a run folder"),
     (("train.py", "start_from=default"), 4, "was trained by another algorithm or other networks"),
-    (("evaluate.py", "checkpoint=skirmsh"), 4, "policies default, single, skirmish: did you mean skirmish?"),
+    (
+        ("evaluate.py", "checkpoint=skirmsh"),
+        4,
+        "default, generalist, single, skirmish: did you mean skirmish?",
+    ),
     (("evaluate.py", "checkpoint=nowhere"), 4, "nowhere"),
 ]
 

@@ -140,15 +140,20 @@ def test_a_further_role_has_a_channel_of_its_own_in_the_state() -> None:
 def test_a_shipped_policy_plays_beside_roles_and_actions_that_it_does_not_know(name: str) -> None:
     policy = load_policy(name, mode="deterministic")
     crew = "team.roles=[ugv,sprinkler,ugv]"
-    there = make_env(name, n_worlds=4, overrides=policy.overrides)
-    here = make_env(name, n_worlds=4, overrides=[*policy.overrides, crew])
+    scenario = "default" if name == "generalist" else name
+    there = make_env(scenario, n_worlds=4, overrides=policy.overrides)
+    here = make_env(scenario, n_worlds=4, overrides=[*policy.overrides, crew])
     now = there.reset()
     assert torch.equal(policy.fitted(there)(now.clone())[ACTION], policy(now.clone())[ACTION])
     alike, wide = now, here.reset()
-    own = wide[(*OBSERVATION, "self")]
-    wide[(*OBSERVATION, "self")] = torch.cat((alike[(*OBSERVATION, "self")], own[..., -4:]), dim=-1)
-    wide[(*OBSERVATION, "view")] = alike[(*OBSERVATION, "view")]
-    wide[(*OBSERVATION, "picture")] = alike[(*OBSERVATION, "picture")]
+    names = {env: env.channel_names["self"] for env in (there, here)}
+    further = [place for place, name in enumerate(names[here]) if name not in names[there]]
+    assert len(further) == 4
+    known = [place for place in range(len(names[here])) if place not in further]
+    assert [names[here][place] for place in known] == list(names[there])
+    wide[(*OBSERVATION, "self")][..., known] = alike[(*OBSERVATION, "self")]
+    for entry in set(there.channel_names) - {"self"}:
+        wide[(*OBSERVATION, entry)] = alike[(*OBSERVATION, entry)]
     wide["agents", "action_mask"][..., :11] = alike["agents", "action_mask"]
     assert torch.equal(policy.fitted(here)(wide)[ACTION], policy(alike)[ACTION])
     assert (here.rollout(20, policy.fitted(here), break_when_any_done=False)[ACTION] < 11).all()
