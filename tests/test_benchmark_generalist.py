@@ -93,6 +93,13 @@ def test_places_on_real_ground_need_a_folder(capsys):
         assert told in capsys.readouterr().err
 
 
+def test_what_is_wrong_is_told_before_anything_is_played(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr("warp_torchrl.benchmark.generalist.play_heuristics", lambda *given: pytest.fail("it played"))
+    with pytest.raises(SystemExit, match="2"):
+        command.main(["generalist", "--places", "giant", "ground", "--ground", str(tmp_path)])
+    assert f"landscape.fuel must name one file in {tmp_path}" in capsys.readouterr().err
+
+
 def test_a_policy_that_is_none_is_one_line(capsys):
     with pytest.raises(SystemExit, match="2"):
         command.main(["generalist", "--policy", "nowhere", "--places", "giant"])

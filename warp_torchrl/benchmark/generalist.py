@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 from warp_torchrl.api import load_policy, make_env
 from warp_torchrl.benchmark.tasks import FIRST_SEED, SCENARIOS, interval_cell
+from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation.play import play, play_heuristics
 from warp_torchrl.evaluation.statistics import compare, summarise
 
@@ -59,9 +60,15 @@ def generalise(
         overrides: Further ones in all places.
     """
     policy = load_policy(path).to(device)
-    for place in places:
+
+    def at(place: Place, n_worlds: int) -> WildfireEnv:
         changes = [*policy.overrides, *place.overrides, *overrides]
-        env = make_env(place.scenario, n_worlds=episodes, seed=FIRST_SEED, device=device, overrides=changes)
+        return make_env(place.scenario, n_worlds=n_worlds, seed=FIRST_SEED, device=device, overrides=changes)
+
+    for place in places:
+        policy.fitted(at(place, n_worlds=1))  # what is wrong is told before anything is played
+    for place in places:
+        env = at(place, episodes)
         saved = {name: found["saved"] for name, found in play_heuristics(env, FIRST_SEED, RIVALS).items()}
         best = max(saved, key=lambda name: float(saved[name].mean()))
         own = play(env, policy.fitted(env), FIRST_SEED, policy.mode)["saved"]
