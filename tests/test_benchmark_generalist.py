@@ -86,7 +86,7 @@ def test_the_figure_has_a_row_for_each_place(tmp_path):
 
 
 def test_places_on_real_ground_need_a_folder(capsys):
-    assert [place.overrides[0] for place in on_ground("a b")] == ["landscape.path='a b'"] * 2
+    assert on_ground("a b") == tuple(Place(name, name, ("landscape.path='a b'",)) for name in ("landfire", "wildland"))
     for group, told in (("ground", "got ground, which needs --ground"), ("tems", "got tems")):
         with pytest.raises(SystemExit, match="2"):
             command.main(["generalist", "--places", group])

@@ -36,7 +36,7 @@ GIANT = (Place("giant", "giant"),)
 def on_ground(folder: str) -> tuple[Place, ...]:
     """Return the places on the real ground of a folder: under law ``paper``, and in metres and minutes."""
     path = f"landscape.path='{folder}'"
-    return (Place("landfire", "landfire", (path,)), Place("landfire, fire=rate", "landfire", (path, "fire=rate")))
+    return (Place("landfire", "landfire", (path,)), Place("wildland", "wildland", (path,)))
 
 
 PLACES = {"scenarios": OURS, "teams": TEAMS, "maps": MAPS, "winds": WINDS, "giant": GIANT}
@@ -66,7 +66,8 @@ def generalise(
         return make_env(place.scenario, n_worlds=n_worlds, seed=FIRST_SEED, device=device, overrides=changes)
 
     for place in places:
-        policy.fitted(at(place, n_worlds=1))  # what is wrong is told before anything is played
+        env = at(place, n_worlds=1)  # what is wrong is told before anything is played
+        policy.fitted(env)(env.reset())
     for place in places:
         env = at(place, episodes)
         saved = {name: found["saved"] for name, found in play_heuristics(env, FIRST_SEED, RIVALS).items()}
