@@ -6,7 +6,8 @@ import torch
 from tests.conftest import small_world
 from warp_torchrl.api import make_env
 from warp_torchrl.models import signature
-from warp_torchrl.observation.water import WATER, way_to_water, where_tanks_fill
+from warp_torchrl.observation.water import WATER, way_to_water
+from warp_torchrl.world.supply import where_tanks_fill
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.array import Array
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from warp_torchrl.api import load_policy, make_env
-from warp_torchrl.benchmark.tasks import FIRST_SEED, SCENARIOS, interval_cell
+from warp_torchrl.benchmark.tasks import FIRST_SEED, SCENARIOS, difference_cell, interval_cell
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation.play import play, play_heuristics
 from warp_torchrl.evaluation.statistics import compare, summarise
@@ -96,7 +96,7 @@ def generalist_table(rows: Sequence[dict[str, Any]]) -> str:
     ]
     lines += [
         f"| {row['place']} | {interval_cell(row['policy'])} | {row['baseline']} | {interval_cell(row['best'])} | "
-        f"{_told(row['difference'])} | {_told(row['to_reference'])} |"
+        f"{difference_cell(row['difference'])} | {difference_cell(row['to_reference'])} |"
         for row in rows
     ]
     best, reference = (
@@ -104,11 +104,6 @@ def generalist_table(rows: Sequence[dict[str, Any]]) -> str:
     )
     told = f"Of {len(rows)} places ahead of the best baseline, intervals apart, {best}; of `{REFERENCE}` {reference}."
     return "\n".join([*lines, "", told])
-
-
-def _told(difference: Mapping[str, Any]) -> str:
-    low, high = (100 * bound for bound in difference["ci95"])
-    return f"{100 * difference['saved_difference']:+.1f} ({low:+.1f} .. {high:+.1f})"
 
 
 def _count(rows: Sequence[Mapping[str, Any]], key: str, sign: int) -> int:

@@ -1,6 +1,6 @@
 """Calibration of scenarios by the baselines, and ranking of the baselines by each reward."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import combinations
 from typing import Any
@@ -141,8 +141,7 @@ def pair_table(rows: list[dict[str, Any]]) -> str:
     for row in rows:
         cells = [row["scenario"], str(row["episodes"]), *(interval_cell(row[name]) for name in policies)]
         for found in row["differences"].values():
-            low, high = (100 * bound for bound in found["ci95"])
-            cells.append(f"{100 * found['saved_difference']:+.1f} ({low:+.1f} .. {high:+.1f})")
+            cells.append(difference_cell(found))
         cells += [f"{row['seconds'][name]:.2g}" for name in policies]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
@@ -152,6 +151,12 @@ def interval_cell(found: dict[str, Any]) -> str:
     """Return a mean of trees saved with its 95 % interval, in %, as a cell of a table."""
     low, high = (100 * bound for bound in found["ci95"])
     return f"{100 * found['mean']:.1f} ({low:.1f} .. {high:.1f})"
+
+
+def difference_cell(found: Mapping[str, Any]) -> str:
+    """Return a paired difference of trees saved with its 95 % interval, in points, as a cell of a table."""
+    low, high = (100 * bound for bound in found["ci95"])
+    return f"{100 * found['saved_difference']:+.1f} ({low:+.1f} .. {high:+.1f})"
 
 
 def reward_table(rows: list[dict[str, Any]]) -> str:

@@ -15,6 +15,7 @@ from warp_torchrl.world.geometry import offsets
 from warp_torchrl.world.random import Stream, uniform, uniform_at
 from warp_torchrl.world.sensing import known_codes
 from warp_torchrl.world.state import FIRST_FIRE, Action, Cover, WorldState, is_burning
+from warp_torchrl.world.supply import mark_base
 from warp_torchrl.world.team import Team
 
 
@@ -185,12 +186,6 @@ def target_or_supply(state: WorldState, env: WildfireEnv, target: Tensor) -> Ten
     water = mark_base(state, state.landscape.cover == Cover.LAKE)
     _, index = nearest(state.vehicles.position, water)
     return torch.where((state.vehicles.tank == 0)[..., None], place(index, state), target)
-
-
-def mark_base(state: WorldState, mask: Tensor) -> Tensor:
-    """Return marked cells, bool [B, H, W], with the base of each world among them."""
-    base = state.vehicles.base[:, 0] * mask.shape[2] + state.vehicles.base[:, 1]
-    return mask.flatten(1).scatter(1, base[:, None], True).view_as(mask)
 
 
 def claim_cells(state: WorldState, cells: Tensor, value: Tensor, spacing: int, discount: float, taken: float) -> Tensor:

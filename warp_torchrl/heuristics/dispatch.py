@@ -10,7 +10,6 @@ from warp_torchrl.heuristics.base import (
     extinguish_or,
     idle_action,
     list_cells,
-    mark_base,
     match_cells,
     place,
     target_or_base,
@@ -23,6 +22,7 @@ from warp_torchrl.world.fast.distances import FAR
 from warp_torchrl.world.geometry import offsets
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.state import Action, Cover, WorldState, is_burning
+from warp_torchrl.world.supply import mark_base
 from warp_torchrl.world.team import is_second
 
 _LAST = 4096.0
@@ -83,8 +83,7 @@ class Dispatch(Coordinated):
 
     def _open(self, state: WorldState) -> Tensor:
         """Return where each agent can go now, bool [B, A, H, W]: not into lakes or fire, unless it flies."""
-        is_open = ~((state.cover == int(Cover.LAKE)) | is_burning(state.cells))
-        return is_open[:, None] | self.env.world.team.table(is_open.device).flies[:, None, None]
+        return _is_open(state)[:, None] | self.env.world.team.table(state.cells.device).flies[:, None, None]
 
     def _distance(self, state: WorldState, cells: Tensor) -> Tensor:
         """Return the way of each agent to cells [B, K], float32 [B, A, K] [cells]; ``FAR`` and more where none leads.
@@ -103,8 +102,7 @@ class Dispatch(Coordinated):
         if not self.env.world.team.tank:
             return target
         water, valid = list_cells(mark_base(state, state.cover == int(Cover.LAKE)))
-        is_open = ~((state.cover == int(Cover.LAKE)) | is_burning(state.cells))
-        way = self._distance(state, water) + moves_from(front, is_open, water)[:, None]
+        way = self._distance(state, water) + moves_from(front, _is_open(state), water)[:, None]
         nearest = way.masked_fill_(~valid[:, None], math.inf).argmin(dim=-1)
         is_empty = (state.vehicles.tank == 0)[..., None]
         return torch.where(is_empty, place(water.gather(1, nearest), state), target)
@@ -125,3 +123,8 @@ class Dispatch(Coordinated):
         move = way.masked_fill_(~can, math.inf).argmin(dim=-1)
         waits = (goal == own_cell(state)) & ~is_burning(state.cells.flatten(1).gather(1, goal))
         return torch.where(waits | ~can.any(dim=-1), idle_action(mask, team), move)
+
+
+def _is_open(state: WorldState) -> Tensor:
+    """Return the cells that vehicles on the ground can go to now, bool [B, H, W]: not lakes, and not fire."""
+    return ~((state.cover == int(Cover.LAKE)) | is_burning(state.cells))

@@ -58,7 +58,7 @@ class Local:
 
     Attributes:
         radius: r [cells].
-        identity: Whether ``self`` ends with the agent's place in its team, see ``identity``: agents that stand together
+        identity: Whether ``self`` tells the agent's place in its team, see ``identity``: agents that stand together
             and see the same can then part.
         rules: Whether ``self`` tells the rules of the world, see ``rules``: one policy can then play by several.
         water: Whether ``self`` tells the way to the nearest water, see ``way_to_water``: else agents whose tanks are

@@ -6,8 +6,8 @@ from torch import Tensor
 from warp_torchrl.symmetry import Part
 from warp_torchrl.world.fast.constants import counting
 from warp_torchrl.world.fast.distances import chebyshev_distance
-from warp_torchrl.world.geometry import grow
-from warp_torchrl.world.state import Cover, WorldState
+from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.supply import where_tanks_fill
 from warp_torchrl.world.world import World
 
 WATER = (Part("vector", ("water_east", "water_north")), Part("scalar", ("water_distance",)))
@@ -35,11 +35,3 @@ def way_to_water(state: WorldState, world: World) -> Tensor:
     steps = least.to(torch.float32)
     gap = torch.stack((column - place[..., 1], place[..., 0] - row), dim=-1) / steps.clamp(min=1.0)[..., None]
     return torch.cat((gap, (steps / _SCALE).clamp(max=3.0)[..., None]), dim=-1)
-
-
-def where_tanks_fill(state: WorldState) -> Tensor:
-    """Return the cells where a tank fills, bool [B, H, W]: lakes, those beside one, and the base."""
-    fills = grow(state.cover == int(Cover.LAKE))
-    row, column = state.vehicles.base.unbind(-1)
-    worlds = torch.arange(len(row), device=row.device)
-    return fills.index_put((worlds, row, column), torch.ones_like(row, dtype=torch.bool))
