@@ -83,7 +83,7 @@ def test_the_nearest_fire_is_the_one_that_a_search_of_the_whole_map_finds():
     env = make_env("default", n_worlds=6)
     env.reset()
     state = env.world_state
-    fire = can_be_put_out(state, env)
+    fire = can_be_put_out(state, env.world)
     fire[3] = False
     distance, index = nearest_fire(state, fire)
     everywhere = chebyshev_distance(state.vehicles.position, fire).flatten(2)

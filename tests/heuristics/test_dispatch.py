@@ -4,10 +4,9 @@ import pytest
 import torch
 
 from warp_torchrl import make_env
-from warp_torchrl.collection.imitation import TEACHERS
 from warp_torchrl.device import unread
 from warp_torchrl.evaluation.play import play
-from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.heuristics import HEURISTICS, TEACHERS
 from warp_torchrl.world.state import Action
 
 from .drawing import chosen, scene, with_tanks

@@ -6,13 +6,11 @@ from warp_torchrl.algorithms.algorithm import Algorithm
 from warp_torchrl.algorithms.dqn import Dqn
 from warp_torchrl.algorithms.on_policy import OnPolicy
 from warp_torchrl.collection.collectors import InProcess, MultiProcess
-from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.heuristics import TEACHERS
 from warp_torchrl.models import Mlp
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.validation import check_fields
 
-TEACHERS = tuple(name for name, heuristic in HEURISTICS.items() if not heuristic.is_stateful)
-"""Heuristics that can be teachers: their action depends on the state alone."""
 CLONING_LOSS, CLONING_COLUMN = "loss_bc", "train/cloning_loss"
 """The term of the loss, the sum of the teacher's and the people's where there are both, and its column."""
 

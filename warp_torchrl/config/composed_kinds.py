@@ -4,13 +4,13 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from warp_torchrl.collection.imitation import TEACHERS
 from warp_torchrl.config.components import build_components
 from warp_torchrl.config.compose import OPTION, compose_config, plain
 from warp_torchrl.config.construction import ConfigError, construct
 from warp_torchrl.config.groups import OF_WORLDS, WORLD_KEYS
 from warp_torchrl.config.kinds import KindOfWorld
 from warp_torchrl.dotted import dotted
+from warp_torchrl.heuristics import TEACHERS
 from warp_torchrl.mixture import Kind, Mixture
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.world.world import World

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from warp_torchrl.collection.imitation import TEACHERS
+from warp_torchrl.heuristics import TEACHERS
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.validation import check_fields
 

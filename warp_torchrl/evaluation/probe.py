@@ -97,7 +97,7 @@ def _joined(parts: list[_Heard]) -> _Heard:
 
 def _known(state: WorldState, env: WildfireEnv) -> dict[str, Tensor]:
     """Return what each agent knows and might tell, float32 [B, A] each; NaN where it knows of no fire."""
-    knows, index = nearest_marked(state, known_fire(state, env))
+    knows, index = nearest_marked(state, known_fire(state, env.world))
     fire = place(index, state).to(torch.float32).masked_fill(~knows[..., None], torch.nan)
     offset = fire - state.vehicles.position
     row, column = state.vehicles.position.to(torch.float32).unbind(-1)

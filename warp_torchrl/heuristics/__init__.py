@@ -4,7 +4,7 @@ They read the state through the environment. ``local``, ``oldest``, ``lawnmower`
 of the fire what their agents know or see; the others see every cell, which no learned policy does.
 """
 
-from warp_torchrl.heuristics.base import Heuristic, idle_action
+from warp_torchrl.heuristics.base import Heuristic, Worlds, idle_action
 from warp_torchrl.heuristics.clockwise import Clockwise
 from warp_torchrl.heuristics.coordinated import Coordinated
 from warp_torchrl.heuristics.dispatch import Dispatch
@@ -32,9 +32,12 @@ HEURISTICS: dict[str, type[Heuristic]] = {
     "rollout": Rollout,
 }
 """Heuristic policies by name."""
+TEACHERS = tuple(name for name, heuristic in HEURISTICS.items() if not heuristic.is_stateful)
+"""Those whose action depends on the state alone: they can teach, guide, and give orders."""
 
 __all__ = [
     "HEURISTICS",
+    "TEACHERS",
     "Clockwise",
     "Coordinated",
     "Dispatch",
@@ -51,5 +54,6 @@ __all__ = [
     "Ring",
     "Rollout",
     "Searching",
+    "Worlds",
     "idle_action",
 ]

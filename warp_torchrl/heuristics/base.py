@@ -1,7 +1,7 @@
 """Base class and shared functions of the heuristics."""
 
 import math
-from typing import ClassVar
+from typing import ClassVar, Protocol
 
 import torch
 from tensordict import TensorDictBase
@@ -9,7 +9,6 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
 from warp_torchrl.device import reads_freely
-from warp_torchrl.env import WildfireEnv
 from warp_torchrl.world.fast.distances import FAR, nearest
 from warp_torchrl.world.geometry import offsets
 from warp_torchrl.world.random import Stream, uniform, uniform_at
@@ -17,13 +16,26 @@ from warp_torchrl.world.sensing import known_codes
 from warp_torchrl.world.state import FIRST_FIRE, Action, Cover, WorldState, is_burning
 from warp_torchrl.world.supply import mark_base
 from warp_torchrl.world.team import Team
+from warp_torchrl.world.world import World
+
+
+class Worlds(Protocol):
+    """What a heuristic reads of an environment."""
+
+    @property
+    def world(self) -> World:
+        """Return the rules."""
+
+    @property
+    def world_state(self) -> WorldState:
+        """Return the worlds as they are now."""
 
 
 class Heuristic(TensorDictModuleBase):
     """A heuristic policy for one environment.
 
     Args:
-        env: The environment whose state it reads.
+        env: The environment whose rules and worlds it reads.
     """
 
     in_keys = [("agents", "action_mask")]  # noqa: RUF012
@@ -31,18 +43,23 @@ class Heuristic(TensorDictModuleBase):
     is_stateful: ClassVar[bool] = False
     """Whether its actions depend on more than the current state."""
 
-    def __init__(self, env: WildfireEnv) -> None:
+    def __init__(self, env: Worlds) -> None:
         super().__init__()
         self._env = (env,)  # in a tuple, so that the environment does not become a submodule
 
     @property
-    def env(self) -> WildfireEnv:
+    def env(self) -> Worlds:
         """Return the environment."""
         return self._env[0]
 
+    @property
+    def world(self) -> World:
+        """Return the environment's rules."""
+        return self.env.world
+
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write the team's actions, int64 [B, A]."""
-        state, world = self.env.world_state, self.env.world
+        state, world = self.env.world_state, self.world
         shown = tensordict.get(("agents", "action_mask"))
         action = self.choose(state, shown if world.action_masking else world.possible_actions(state))
         return tensordict.set(("agents", "action"), action)
@@ -62,9 +79,9 @@ def idle_action(mask: Tensor, team: Team) -> Tensor:
     return mask.to(torch.uint8).argmin(dim=-1)
 
 
-def can_be_put_out(state: WorldState, env: WildfireEnv) -> Tensor:
+def can_be_put_out(state: WorldState, world: World) -> Tensor:
     """Return the burning cells that an agent can extinguish, bool [B, H, W]."""
-    return is_burning(state.cells) & (state.cells <= env.world.fire.last_spreading)
+    return is_burning(state.cells) & (state.cells <= world.fire.last_spreading)
 
 
 def list_cells(mask: Tensor) -> tuple[Tensor, Tensor]:
@@ -106,12 +123,12 @@ def nearest_fire(state: WorldState, fire: Tensor) -> tuple[Tensor, Tensor]:
     return best.values.floor(), cells.gather(1, best.indices)
 
 
-def known_fire(state: WorldState, env: WildfireEnv) -> Tensor:
+def known_fire(state: WorldState, world: World) -> Tensor:
     """Return the burning cells that each agent knows of and could extinguish, bool [B, A, H, W]."""
     if state.knowledge is None:
-        return can_be_put_out(state, env)[:, None].expand(-1, state.vehicles.position.shape[1], -1, -1)
+        return can_be_put_out(state, world)[:, None].expand(-1, state.vehicles.position.shape[1], -1, -1)
     codes = known_codes(state)
-    return (codes >= FIRST_FIRE) & (codes <= env.world.fire.last_spreading)
+    return (codes >= FIRST_FIRE) & (codes <= world.fire.last_spreading)
 
 
 def distance_to_cells(state: WorldState) -> Tensor:
@@ -146,12 +163,12 @@ def place(index: Tensor, state: WorldState) -> Tensor:
     return torch.stack((index // width, index % width), dim=-1)
 
 
-def move_towards(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
+def move_towards(state: WorldState, world: World, target: Tensor) -> Tensor:
     """Return the move that brings each agent closest to its target, int64 [B, A].
 
     Reversing costs one cell of distance, so that agents follow a lake's shore instead of oscillating.
     """
-    vehicles, team = state.vehicles, env.world.team
+    vehicles, team = state.vehicles, world.team
     reached = vehicles.position[:, :, None] + offsets(target.device) * team.table(target.device).stride[:, None, None]
     gap = (reached - target[:, :, None]).abs().to(torch.float32)
     way = gap.amax(-1) + 0.01 * gap.sum(-1)
@@ -161,7 +178,7 @@ def move_towards(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
     return way.masked_fill(~team.open_moves(state), float(FAR)).argmin(dim=-1)
 
 
-def target_or_base(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
+def target_or_base(state: WorldState, world: World, target: Tensor) -> Tensor:
     """Return the given targets, but the base for aircraft whose charge runs out, with two steps to spare.
 
     int64 [B, A, 2].
@@ -169,19 +186,19 @@ def target_or_base(state: WorldState, env: WildfireEnv, target: Tensor) -> Tenso
     vehicles = state.vehicles
     if vehicles.battery is None:
         return target
-    table, base = env.world.team.table(target.device), vehicles.base[:, None]
+    table, base = world.team.table(target.device), vehicles.base[:, None]
     away = (vehicles.position - base).abs().amax(dim=-1)
     turns_back = table.flies & (vehicles.battery <= away / table.stride + 2.0)
     return torch.where(turns_back[..., None], base, target)
 
 
-def target_or_supply(state: WorldState, env: WildfireEnv, target: Tensor) -> Tensor:
+def target_or_supply(state: WorldState, world: World, target: Tensor) -> Tensor:
     """Return the given targets, but the nearest lake or the base for agents whom water or charge runs out.
 
     int64 [B, A, 2].
     """
-    target = target_or_base(state, env, target)
-    if not env.world.team.tank:
+    target = target_or_base(state, world, target)
+    if not world.team.tank:
         return target
     water = mark_base(state, state.landscape.cover == Cover.LAKE)
     _, index = nearest(state.vehicles.position, water)

@@ -30,7 +30,7 @@ class Clockwise(Heuristic):
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
-        team = self.env.world.team
+        team = self.world.team
         turn = self._round_the_fire(state)
         mate = nearest_mate(state)
         at = state.vehicles.position
@@ -67,7 +67,7 @@ class Clockwise(Heuristic):
     def _on_map(self, state: WorldState, way: Tensor, mask: Tensor, idle: Tensor) -> Tensor:
         """Return moves as they are where they are open, else along the border, else none, int64 [B, A]."""
         height, width = state.cells.shape[1:]
-        stride = self.env.world.team.table(way.device).stride[:, None]
+        stride = self.world.team.table(way.device).stride[:, None]
         at, toward = state.vehicles.position, offsets(way.device)
         row, column = (at + toward[way.clamp(0, 7)] * stride).unbind(-1)
         inside = torch.stack((row.clamp(0, height - 1), column.clamp(0, width - 1)), dim=-1)

@@ -30,12 +30,12 @@ class Coordinated(Heuristic):
         cells, valid = list_cells(front)
         worth = value.flatten(1).gather(1, cells).masked_fill_(~valid, -math.inf)
         claims = claim_cells(state, cells, worth[:, None], spacing=3, discount=6.0, taken=1000.0)
-        return extinguish_or(move_towards(state, self.env, target_or_supply(state, self.env, claims)), mask)
+        return extinguish_or(move_towards(state, self.world, target_or_supply(state, self.world, claims)), mask)
 
     def value(self, state: WorldState) -> tuple[Tensor, Tensor]:
         """Return each cell's value [cells of distance], float32 [B, H, W], and the fire front, bool [B, H, W]."""
-        fire = can_be_put_out(state, self.env)
-        threat = self.env.world.forecast(state).fire_risk()
+        fire = can_be_put_out(state, self.world)
+        threat = self.world.forecast(state).fire_risk()
         front = fire & (threat > 0.01)
         front = torch.where(front.flatten(1).any(1)[:, None, None], front, fire)
         return self.risk_weight * threat, front

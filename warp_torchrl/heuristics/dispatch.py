@@ -51,13 +51,13 @@ class Dispatch(Coordinated):
 
     def _clears(self) -> list[bool]:
         """Return which agents clear firebreaks."""
-        team = self.env.world.team
+        team = self.world.team
         kinds = [ROLES[role].abilities for role in team.agent_roles]
         return ["clear" in each and (team.tank == 0 or "extinguish" not in each) for each in kinds]
 
     def _attack(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions of agents that extinguish, int64 [B, A]."""
-        world, tank = self.env.world, state.vehicles.tank
+        world, tank = self.world, state.vehicles.tank
         table = world.team.table(mask.device)
         value, front = self.value(state)
         cells, valid = list_cells(front)
@@ -72,7 +72,7 @@ class Dispatch(Coordinated):
 
     def _clear(self, state: WorldState, mask: Tensor, who: Tensor) -> Tensor:
         """Return the actions of agents that clear firebreaks, int64 [B, A]; ``who`` does, bool [A]."""
-        todo = cells_to_clear(state, self.env.world, who, self.effort)
+        todo = cells_to_clear(state, self.world, who, self.effort)
         cells, valid = list_cells(todo)
         gain = (-self._distance(state, cells)).masked_fill(~(valid[:, None] & who[:, None]), -math.inf)
         claims = match_cells(state, cells, gain, spacing=1, discount=2.0, taken=1000.0)
@@ -83,7 +83,7 @@ class Dispatch(Coordinated):
 
     def _open(self, state: WorldState) -> Tensor:
         """Return where each agent can go now, bool [B, A, H, W]: not into lakes or fire, unless it flies."""
-        return _is_open(state)[:, None] | self.env.world.team.table(state.cells.device).flies[:, None, None]
+        return _is_open(state)[:, None] | self.world.team.table(state.cells.device).flies[:, None, None]
 
     def _distance(self, state: WorldState, cells: Tensor) -> Tensor:
         """Return the way of each agent to cells [B, K], float32 [B, A, K] [cells]; ``FAR`` and more where none leads.
@@ -98,8 +98,8 @@ class Dispatch(Coordinated):
 
         int64 [B, A, 2].
         """
-        target = target_or_base(state, self.env, target)
-        if not self.env.world.team.tank:
+        target = target_or_base(state, self.world, target)
+        if not self.world.team.tank:
             return target
         water, valid = list_cells(mark_base(state, state.cover == int(Cover.LAKE)))
         way = self._distance(state, water) + moves_from(front, _is_open(state), water)[:, None]
@@ -112,7 +112,7 @@ class Dispatch(Coordinated):
 
         Of ways that are as short, the one whose first move leads nearest to the target, by rows and columns together.
         """
-        team = self.env.world.team
+        team = self.world.team
         step = offsets(mask.device) * team.table(mask.device).stride[:, None, None]
         reached, _ = places(state, step)
         goal = target[..., 0] * state.cells.shape[2] + target[..., 1]

@@ -34,20 +34,20 @@ class Follower(Oldest):
         """Return the actions, int64 [B, A]."""
         found, cell = self._oldest_of_front(state)
         target = torch.where(found[..., None], cell, self.search(state))
-        move = move_towards(state, self.env, target_or_supply(state, self.env, target))
-        return torch.where(mask.gather(-1, move[..., None])[..., 0], move, idle_action(mask, self.env.world.team))
+        move = move_towards(state, self.world, target_or_supply(state, self.world, target))
+        return torch.where(mask.gather(-1, move[..., None])[..., 0], move, idle_action(mask, self.world.team))
 
     def _oldest_of_front(self, state: WorldState) -> tuple[Tensor, Tensor]:
         """Return whether each agent has a cell of the front to go to, bool [B, A], and which, int64 [B, A, 2]."""
         agents, (height, width) = state.vehicles.position.shape[1], state.cells.shape[1:]
-        device, team = state.cells.device, self.env.world.team
+        device, team = state.cells.device, self.world.team
         codes = state.cells[:, None].expand(-1, agents, -1, -1) if state.knowledge is None else known_codes(state)
         front = spreading_front(codes, state.alpha[:, None])
         since = 0 if state.knowledge is None else steps_since(state.knowledge, state.step)
         away = distance_to_cells(state)
         draw = uniform(state.key, 0, Stream.POLICY, (agents, height, width))
         score = since - away / team.table(device).stride[:, None, None] + draw
-        known, place_of_others = self.env.world.sensing.knows_where(state, team)
+        known, place_of_others = self.world.sensing.knows_where(state, team)
         theirs = distance_from(place_of_others, state)
         nearest = torch.where(known[..., None, None], theirs, height + width).amin(dim=2)
         score = score - _ANOTHERS * (nearest < away)

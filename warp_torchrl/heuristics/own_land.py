@@ -32,6 +32,6 @@ class OwnLand(Coordinated):
         own = own_land(state).flatten(2).gather(2, cells[:, None].expand(-1, mask.shape[1], -1)) & valid[:, None]
         worth = value.flatten(1).gather(1, cells)[:, None].expand(own.shape).masked_fill(~own, -math.inf)
         claims = claim_cells(state, cells, worth, spacing=3, discount=6.0, taken=1000.0)
-        move = move_towards(state, self.env, target_or_supply(state, self.env, claims))
-        waits = idle_action(mask, self.env.world.team)
+        move = move_towards(state, self.world, target_or_supply(state, self.world, claims))
+        waits = idle_action(mask, self.world.team)
         return extinguish_or(torch.where(own.any(dim=-1), move, waits), mask)

@@ -25,7 +25,7 @@ class NoOp(Heuristic):
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
-        return idle_action(mask, self.env.world.team)
+        return idle_action(mask, self.world.team)
 
 
 class Random(Heuristic):
@@ -50,14 +50,14 @@ class Local(Heuristic):
         """Return the actions, int64 [B, A]."""
         sees, index = self._fire_in_sight(state)
         target = torch.where(sees[..., None], place(index, state), self._waypoint(state))
-        return extinguish_or(move_towards(state, self.env, target_or_supply(state, self.env, target)), mask)
+        return extinguish_or(move_towards(state, self.world, target_or_supply(state, self.world, target)), mask)
 
     def _fire_in_sight(self, state: WorldState) -> tuple[Tensor, Tensor]:
         """Return whether each agent sees fire, bool [B, A], and the flat index of the nearest."""
-        world = self.env.world
+        world = self.world
         if world.sensing.is_limited:
-            return nearest_marked(state, known_fire(state, self.env) & in_reach(state, world.sensing.reach(world.team)))
-        distance, index = nearest_fire(state, can_be_put_out(state, self.env))
+            return nearest_marked(state, known_fire(state, world) & in_reach(state, world.sensing.reach(world.team)))
+        distance, index = nearest_fire(state, can_be_put_out(state, world))
         return distance <= self.radius, index
 
     def _waypoint(self, state: WorldState) -> Tensor:
@@ -78,6 +78,6 @@ class Greedy(Heuristic):
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
-        _, index = nearest_fire(state, can_be_put_out(state, self.env))
-        target = target_or_supply(state, self.env, place(index, state))
-        return extinguish_or(move_towards(state, self.env, target), mask)
+        _, index = nearest_fire(state, can_be_put_out(state, self.world))
+        target = target_or_supply(state, self.world, place(index, state))
+        return extinguish_or(move_towards(state, self.world, target), mask)

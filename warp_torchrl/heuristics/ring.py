@@ -5,8 +5,14 @@ import math
 import torch
 from torch import Tensor
 
-from warp_torchrl.env import WildfireEnv
-from warp_torchrl.heuristics.base import claim_cells, extinguish_or, list_cells, move_towards, target_or_supply
+from warp_torchrl.heuristics.base import (
+    Worlds,
+    claim_cells,
+    extinguish_or,
+    list_cells,
+    move_towards,
+    target_or_supply,
+)
 from warp_torchrl.heuristics.coordinated import Coordinated
 from warp_torchrl.world.fast.distances import distance_to_nearest
 from warp_torchrl.world.geometry import grow
@@ -23,14 +29,14 @@ class Ring(Coordinated):
     pace = 1.0  # speed of a fire front [cells per tick of the paper]
     effort = 2.0  # steps for each cell of the ring: move, clear
 
-    def __init__(self, env: WildfireEnv) -> None:
+    def __init__(self, env: Worlds) -> None:
         super().__init__(env)
         self._plan = torch.zeros(0, dtype=torch.bool)  # [B, H, W], the ring; empty before the first step
         self._inside = torch.zeros(0, dtype=torch.bool)  # [B, H, W], what it encloses
 
     def line_builders(self, state: WorldState) -> Tensor:
         """Return the agents that clear the ring, bool [A]."""
-        return self.env.world.team.table(state.cells.device).can["clear"]
+        return self.world.team.table(state.cells.device).can["clear"]
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
@@ -43,9 +49,9 @@ class Ring(Coordinated):
         unbroken = torch.zeros_like(worth).masked_fill_(~(todo.flatten(1).gather(1, cells) & valid), -math.inf)
         worth = torch.where(builds[..., None], unbroken[:, None], worth[:, None])
         claims = claim_cells(state, cells, worth, spacing=1, discount=2.0, taken=1000.0)
-        attack = extinguish_or(move_towards(state, self.env, target_or_supply(state, self.env, claims)), mask)
+        attack = extinguish_or(move_towards(state, self.world, target_or_supply(state, self.world, claims)), mask)
         there = (claims == state.vehicles.position).all(dim=-1) & mask[..., Action.CLEAR]
-        build = torch.where(there, int(Action.CLEAR), move_towards(state, self.env, claims))
+        build = torch.where(there, int(Action.CLEAR), move_towards(state, self.world, claims))
         return torch.where(builds, build, attack)
 
     def _update_plan(self, state: WorldState) -> None:
@@ -60,7 +66,7 @@ class Ring(Coordinated):
 
     def _plan_ring(self, state: WorldState, burning: Tensor) -> tuple[Tensor, Tensor]:
         """Return the smallest ring that can be closed in time, and the cells inside; both empty if there is none."""
-        world = self.env.world
+        world = self.world
         reach = max(burning.shape[1:]) // 2
         away = torch.full(burning.shape, reach, device=burning.device)  # cells to the fire, ``reach`` at most
         fire = burning

@@ -5,8 +5,7 @@ from typing import ClassVar
 import torch
 from torch import Tensor
 
-from warp_torchrl.env import WildfireEnv
-from warp_torchrl.heuristics.base import Heuristic
+from warp_torchrl.heuristics.base import Heuristic, Worlds
 from warp_torchrl.heuristics.coordinated import Coordinated
 from warp_torchrl.world.imagined import imagined, rules_in_sight
 from warp_torchrl.world.random import imagined_keys
@@ -43,7 +42,7 @@ class Rollout(Heuristic):
     cells: ClassVar[int] = 2**21
     """Of the worlds that are imagined at once; memory is bounded by it."""
 
-    def __init__(self, env: WildfireEnv) -> None:
+    def __init__(self, env: Worlds) -> None:
         super().__init__(env)
         self.policy = self.base(env)
 
@@ -108,7 +107,7 @@ class Rollout(Heuristic):
             action: Of the first step, int64 [n, A].
             keys: Of the futures, int64 [B, S].
         """
-        world, count = rules_in_sight(self.env.world), keys.shape[1]
+        world, count = rules_in_sight(self.world), keys.shape[1]
         saved = []
         for at in torch.arange(len(row) * count, device=row.device).split(self._at_once(state)):
             tried, future = at // count, at % count

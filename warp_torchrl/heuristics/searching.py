@@ -31,11 +31,11 @@ class Searching(Heuristic):
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
-        team = self.env.world.team
-        fire = known_fire(state, self.env) & team.table(mask.device).can["extinguish"][:, None, None]
+        team = self.world.team
+        fire = known_fire(state, self.world) & team.table(mask.device).can["extinguish"][:, None, None]
         found, index = nearest_marked(state, fire)
         target = torch.where(found[..., None], place(index, state), self.search(state))
-        return extinguish_or(move_towards(state, self.env, target_or_supply(state, self.env, target)), mask)
+        return extinguish_or(move_towards(state, self.world, target_or_supply(state, self.world, target)), mask)
 
     @abstractmethod
     def search(self, state: WorldState) -> Tensor:
@@ -72,8 +72,8 @@ class Lawnmower(Searching):
     def search(self, state: WorldState) -> Tensor:
         """Return the point of its lanes where each agent should be by now, int64 [B, A, 2]."""
         (height, width), agents = state.cells.shape[1:], state.vehicles.position.shape[1]
-        device, team = state.cells.device, self.env.world.team
-        sees = torch.tensor(self.env.world.sensing.reach(team), device=device)
+        device, team = state.cells.device, self.world.team
+        sees = torch.tensor(self.world.sensing.reach(team), device=device)
         edge = torch.arange(agents + 1, device=device) * width // agents
         first, last = edge[:-1], edge[1:] - 1
         lane = (2 * sees + 1).clamp(max=height)

@@ -14,7 +14,15 @@ from warp_torchrl.observation.coarse import (
     state_symmetry,
 )
 from warp_torchrl.observation.own import SELF_SIZE, WIND_SCALE, own_vector
-from warp_torchrl.observation.presets import Local, Observation, Paper, Space, Surroundings, former_symmetry
+from warp_torchrl.observation.presets import (
+    Local,
+    Observation,
+    Paper,
+    Space,
+    Surroundings,
+    former_symmetry,
+    gives_orders,
+)
 from warp_torchrl.observation.view import egocentric_view
 
 __all__ = [
@@ -38,6 +46,7 @@ __all__ = [
     "channel",
     "egocentric_view",
     "former_symmetry",
+    "gives_orders",
     "own_vector",
     "picture",
     "state_content",

@@ -1,27 +1,30 @@
 """What an agent knows of itself."""
 
 import math
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 from torch.nn.functional import one_hot
 
+from warp_torchrl.observation.orders import orders
 from warp_torchrl.observation.rules import RULES, rules
 from warp_torchrl.observation.water import WATER, way_to_water
-from warp_torchrl.symmetry import LAST, TIME_LEFT, Part, Vector
+from warp_torchrl.symmetry import LAST, ORDER, TIME_LEFT, Part, Vector
 from warp_torchrl.world.flight import wind_at
 from warp_torchrl.world.role import PAPER_ROLES
 from warp_torchrl.world.state import Action, WorldState
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.world import World
 
+_ACTIONS = tuple(action.name.lower() for action in Action)
 SELF = Vector(
     (
         Part("place", ("row", "column")),
         Part("scalar", (TIME_LEFT,)),
         Part("vector", ("wind_east", "wind_north")),
         Part("scalar", ("steps_to_tick", "tank", "has_tank", "may_refill", *(f"role_{role}" for role in PAPER_ROLES))),
-        Part("actions", tuple(f"{LAST}{action.name.lower()}" for action in Action)),
+        Part("actions", tuple(f"{LAST}{name}" for name in _ACTIONS)),
     )
 )
 """Entries of ``self`` in every team; role and last action are one-hot, the latter zeros before the first."""
@@ -33,36 +36,50 @@ WIND_SCALE = 20.0
 """Wind that an observation shows as 1 [m/s]."""
 
 
-def own_entries(world: World, identity: bool = False, rules: bool = False, water: bool = False) -> Vector:
+@dataclass(frozen=True, kw_only=True)
+class Told:
+    """What ``self`` tells beside what it tells every agent.
+
+    Attributes:
+        identity: The agent's place in its team, see ``identity``.
+        rules: The rules of the world, see ``rules``.
+        water: The way to water, see ``way_to_water``.
+        orders: What a dispatcher would have the agent do, see ``orders``, by the dispatcher's name; None has none.
+    """
+
+    identity: bool = False
+    rules: bool = False
+    water: bool = False
+    orders: str | None = None
+
+
+def own_entries(world: World, told: Told = Told()) -> Vector:
     """Return the entries of ``self``, by name and as they turn with the map.
 
-    They are ``SELF``, the identity if it is shown, then the team's roles and actions beside the paper's, then the
-    battery if it runs down, then the agency that the vehicle serves, one-hot, if there are several, then the rules and
-    the way to water if they are told.
+    They are ``SELF``, the identity if it is told, then the team's roles and actions beside the paper's, then the
+    battery if it runs down, then the agency that the vehicle serves, one-hot, if there are several, then the rules, the
+    way to water and the order, one-hot, if they are told.
     """
     team = world.team
     roles = tuple(f"role_{role}" for role in team.role_names[len(PAPER_ROLES) :])
     actions = tuple(f"{LAST}{action}" for action in team.further_actions)
     battery = () if team.flight.battery is None else ("battery",)
-    further = [Part("scalar", names) for names in (roles, actions, battery, world.agencies.names) if names]
-    told = (*([RULES] if rules else []), *(WATER if water else []))
-    return Vector((*SELF.parts, *([IDENTITY] if identity else []), *further, *told))
+    parts = [*SELF.parts, *([IDENTITY] if told.identity else [])]
+    parts += [Part("scalar", names) for names in (roles, actions, battery, world.agencies.names) if names]
+    parts += [*([RULES] if told.rules else []), *(WATER if told.water else [])]
+    if told.orders is not None:
+        parts.append(Part("actions", tuple(f"{ORDER}{name}" for name in (*_ACTIONS, *team.further_actions))))
+    return Vector(tuple(parts))
 
 
-def own_vector(
-    state: WorldState,
-    world: World,
-    shows_identity: bool = False,
-    tells_rules: bool = False,
-    tells_water: bool = False,
-) -> Tensor:
+def own_vector(state: WorldState, world: World, told: Told = Told()) -> Tensor:
     """Return what each agent knows of itself, float32 [B, A, F], see ``own_entries``."""
     height, width = state.cells.shape[1:]
     vehicles = state.vehicles
     row, column = vehicles.position.to(torch.float32).unbind(-1)
     shape, team = row.shape, world.team
     roles = one_hot(team.table(row.device).index, len(team.role_names)).expand(*shape, -1)
-    last = _last_action(vehicles.last_action, team)
+    last = _one_hot_action(vehicles.last_action, team)
     full = world.team.tank or 1
     wind = (wind_at(state) / WIND_SCALE).clamp(-3.0, 3.0)
     columns = [
@@ -77,7 +94,7 @@ def own_vector(
         (vehicles.position == vehicles.base[:, None]).all(-1).to(torch.float32),
     ]
     parts = [torch.stack(columns, dim=-1), roles[..., : len(PAPER_ROLES)], last[..., : len(Action)]]
-    if shows_identity:
+    if told.identity:
         parts.append(identity(shape[1], row.device).expand(*shape, -1))
     if team.role_names != PAPER_ROLES or team.further_actions:
         parts += [roles[..., len(PAPER_ROLES) :], last[..., len(Action) :]]
@@ -85,10 +102,12 @@ def own_vector(
         parts.append((vehicles.battery / team.flight.battery)[..., None])
     if vehicles.serves is not None:
         parts.append(one_hot(vehicles.serves, len(world.agencies.names)))
-    if tells_rules:
+    if told.rules:
         parts.append(rules(world, row.device).expand(*shape, -1))
-    if tells_water:
+    if told.water:
         parts.append(way_to_water(state, world))
+    if told.orders is not None:
+        parts.append(_one_hot_action(orders(state, world, told.orders), team))
     return torch.cat(parts, dim=-1)
 
 
@@ -111,8 +130,8 @@ def steps_to_tick(state: WorldState, world: World) -> Tensor:
     return 1.0 - (state.step % world.steps_per_tick) / world.steps_per_tick
 
 
-def _last_action(code: Tensor, team: Team) -> Tensor:
-    """Return the last action, one-hot, int64 [B, A, 11 + the team's further ones]; zeros before the first."""
+def _one_hot_action(code: Tensor, team: Team) -> Tensor:
+    """Return actions int64 [B, A] one-hot, int64 [B, A, 11 + the team's further ones]; zeros for -1, which is none."""
     further = len(team.further_actions)
     if further and not team.allow_stay:
         code = code + (code >= int(Action.STAY))  # the place of stay is kept

@@ -11,6 +11,8 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.content import Content
+from warp_torchrl.heuristics import TEACHERS
+from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.observation.channels import CHANNELS, DEFAULT, FIRE, ages, check_channels, stages
 from warp_torchrl.observation.coarse import (
     PICTURE_SIDE,
@@ -21,7 +23,7 @@ from warp_torchrl.observation.coarse import (
     picture_names,
     picture_symmetry,
 )
-from warp_torchrl.observation.own import IDENTITY, SELF, SELF_SIZE, own_entries, own_vector
+from warp_torchrl.observation.own import IDENTITY, SELF, SELF_SIZE, Told, own_entries, own_vector
 from warp_torchrl.observation.view import egocentric_view
 from warp_torchrl.symmetry import Planes, Target, Vector
 from warp_torchrl.validation import check_fields
@@ -63,29 +65,36 @@ class Local:
         rules: Whether ``self`` tells the rules of the world, see ``rules``: one policy can then play by several.
         water: Whether ``self`` tells the way to the nearest water, see ``way_to_water``: else agents whose tanks are
             empty know of lakes within their view alone.
+        orders: Name of a heuristic, one of ``TEACHERS``, that sees all and radios each agent, in ``self``, the action
+            that it would choose for it, see ``orders``: agents may do otherwise; None has no dispatcher.
         channels: Names of the view's channels, in order.
 
     Raises:
-        ValueError: If the radius is not in 1..32, or a channel is unknown.
+        ValueError: If the radius is not in 1..32, or a channel or who gives orders is unknown.
     """
 
     radius: int = 5
     identity: bool = True
     rules: bool = False
     water: bool = False
+    orders: str | None = None
     channels: tuple[str, ...] = DEFAULT
 
     def __post_init__(self) -> None:
         check_fields(self, radius=(1, 32))
         check_channels(self.channels)
+        if self.orders is not None and self.orders not in TEACHERS:
+            hint = did_you_mean(self.orders, TEACHERS)
+            raise ValueError(f"orders must be null or one of {', '.join(TEACHERS)}, got {self.orders}{hint}")
 
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
         side, highs = 2 * self.radius + 1, tuple(CHANNELS[name].high for name in self.channels)
-        own, content = (
-            own_entries(world, self.identity, self.rules, self.water),
-            self._told(view_content(self.channels, world)),
-        )
+        if self.orders is not None and world.sensing.is_limited:
+            raise ValueError(
+                f"observation.orders must be null where sight is limited: a dispatcher sees all, got {self.orders}"
+            )
+        own, content = own_entries(world, self.told), self._contents(view_content(self.channels, world))
         symmetry = view_symmetry(self.channels)
         return {
             "view": Space((len(highs), side, side), torch.uint8, 0, highs, self.channels, symmetry, content),
@@ -94,10 +103,15 @@ class Local:
 
     def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
         """Return ``view`` uint8 [B, A, C, V, V] and ``self`` float32 [B, A, F]."""
-        own = own_vector(state, world, self.identity, self.rules, self.water)
+        own = own_vector(state, world, self.told)
         return {"view": egocentric_view(state, world, forecast, self.radius, self.channels), "self": own}
 
-    def _told(self, content: tuple[Content, ...]) -> tuple[Content, ...]:
+    @property
+    def told(self) -> Told:
+        """Return what ``self`` tells beside what it tells every agent."""
+        return Told(identity=self.identity, rules=self.rules, water=self.water, orders=self.orders)
+
+    def _contents(self, content: tuple[Content, ...]) -> tuple[Content, ...]:
         """Return what is told of channels; nothing for a subclass that shows them in a way of its own."""
         return content if type(self).__call__.__module__ == __name__ else ()
 
@@ -132,7 +146,7 @@ class Surroundings(Local):
         dtype = torch.uint8 if self.centred else torch.float32
         high: float | tuple[float, ...] = picture_highs(world) if self.centred else 1.0
         names = picture_names(world)
-        content = self._told(picture_content(world))
+        content = self._contents(picture_content(world))
         symmetry = picture_symmetry(self.centred, len(names), order=2 if self.near else 1)
         found = {
             **super().spaces(world),
@@ -215,3 +229,8 @@ def former_symmetry(name: str, shape: tuple[int, ...], names: tuple[str, ...]) -
 
 Observation = Surroundings | Local | Paper
 """Any observation preset."""
+
+
+def gives_orders(observation: Observation) -> bool:
+    """Return whether a dispatcher radios orders to those who see this."""
+    return isinstance(observation, Local) and observation.orders is not None
