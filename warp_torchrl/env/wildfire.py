@@ -55,7 +55,7 @@ class WildfireEnv(EnvBase):
 
     Raises:
         ValueError: If ``n_worlds`` is not positive, ``seeds`` are not as many, a seed is out of range, the world lacks
-            what the reward pays for, there is no C++ compiler to compile with, or a step with orders should be recorded.
+            what the reward pays for, there is no C++ compiler to compile with, or steps with orders are recorded.
     """
 
     batch_locked = True
@@ -316,9 +316,7 @@ class WildfireEnv(EnvBase):
         if self._recorded is None:
             return self._scene.step(before, counts, action)
         if self._recorded.scene.reward is not self.reward_function:
-            if graph and gives_orders(self.observation):
-            raise ValueError("graph must be false where a dispatcher gives orders, with observation.orders")
-        self._recorded = RecordedStep(self._scene)
+            self._recorded = RecordedStep(self._scene)
         return self._recorded(before, counts, action)
 
     def _check_compiling(self) -> str | None:
