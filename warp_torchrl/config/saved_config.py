@@ -95,6 +95,15 @@ def restore(record: SavedConfig, overrides: Sequence[str] = ()) -> DictConfig:
     return config
 
 
+def completed(record: SavedConfig) -> SavedConfig:
+    """Return a record with every key of this version: those that came after it have the value that it was run by.
+
+    Raises:
+        ConfigError: If a choice or a value does not fit.
+    """
+    return SavedConfig(choices=record.choices, values=without_targets(plain(restore(record))))
+
+
 def _recorded(record: SavedConfig, config: DictConfig, touched: Sequence[str]) -> dict[str, Any]:
     """Return the values of a record by dotted key; a mapping of any keys is one value, unless a key in it is touched.
 

@@ -9,6 +9,7 @@ from tensordict.nn import TensorDictModuleBase
 from warp_torchrl.api import policy_of
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.run_config import RunConfig
+from warp_torchrl.config.saved_config import completed
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation import cache
 from warp_torchrl.evaluation.maps import described, play_maps, write_maps
@@ -49,7 +50,7 @@ def evaluate_policy(
     episodes = play(env, actor, first, mode, watch=True)
     learner, digest, frames, other_modes, left_out = None, "", None, {}, {}
     if isinstance(found, checkpoints.Checkpoint):
-        learner, digest = method(found.record())
+        learner, digest = method(completed(found.record()))
         frames = found.manifest.frames
         other_modes = {f"trained, {other}": play(env, actor, first, other) for other in MODES if other != mode}
     if plan.evaluation.leave_one_out:

@@ -11,7 +11,10 @@ _NOT_TRAINED_BY = ("seed", "device", "evaluation", "checkpoint")
 
 
 def method(record: SavedConfig) -> tuple[str, str]:
-    """Return a trained policy's name in tables, and a digest of its configuration without the seed."""
+    """Return a trained policy's name in tables, and a digest of its configuration without the seed.
+
+    Runs of several versions are alike by it if their records are ``completed``.
+    """
     names = [record.choices[group] for group in ("algorithm", "reward", "observation")]
     names += [*unusual(record), *teacher_label(record)]
     values = {key: value for key, value in record.values.items() if key not in _NOT_TRAINED_BY}
@@ -24,6 +27,7 @@ _USUAL = {
     ("model", "memory"): 0,
     ("model", "messages"): "none",
     ("observation", "radius"): 5,
+    ("observation", "orders"): None,
     ("reward", "barrier_rule"): "cut_off",
     ("reward", "cooperation"): 0.0,
 }

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from warp_torchrl.config.saved_config import SavedConfig
+from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.config.saved_config import SavedConfig, completed
 from warp_torchrl.evaluation.method import method, teacher_label, unusual
 from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError, newest
 
@@ -131,7 +132,7 @@ def _recorded(found: Checkpoint, record: SavedConfig) -> dict[str, Any]:
             str(record.choices[group]) for group in ("algorithm", "reward", "observation")
         )
         names = (" ".join((algorithm, *unusual(record), *teacher_label(record))), reward, observation)
-        _, digest = method(record)
+        _, digest = method(_completed(record))
         n_agents, seed = record.values["team"]["n_agents"], str(record.values["seed"])
     except (KeyError, TypeError, AttributeError):
         raise ValueError(f"{found.path / 'config.json'} does not hold a run's configuration") from None
@@ -139,6 +140,14 @@ def _recorded(found: Checkpoint, record: SavedConfig) -> dict[str, Any]:
     alike = " ".join((scenario, *names, digest))
     fields = {"names": (*names, scenario), "alike": alike, "mark": digest[:6]}
     return fields | {"scenario": scenario, "n_agents": n_agents, "seed": seed}
+
+
+def _completed(record: SavedConfig) -> SavedConfig:
+    """Return a record with this version's keys, or as it is where it has others."""
+    try:
+        return completed(record)
+    except ConfigError:
+        return record
 
 
 def _not_recorded(folder: Path) -> dict[str, Any]:
