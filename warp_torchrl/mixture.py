@@ -22,7 +22,7 @@ class Kind:
         scenario: One of ``conf/scenario``.
         over: Keys of its worlds that have other values: ``{team: {n_agents: 2}, wind: wandering}``.
         share: Of the worlds, in proportion to the shares of the others.
-        teacher: The heuristic that labels its worlds, in place of ``imitation.teacher``; None takes that one.
+        teacher: Who labels its worlds, in place of ``imitation.teacher``; None takes that one.
 
     Raises:
         ValueError: If the share is out of its range.

@@ -1,14 +1,16 @@
 """The configuration of learning from others: a teacher, people, or both."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from warp_torchrl.algorithms.algorithm import Algorithm
 from warp_torchrl.algorithms.dqn import Dqn
 from warp_torchrl.algorithms.on_policy import OnPolicy
 from warp_torchrl.collection.collectors import InProcess, MultiProcess
-from warp_torchrl.heuristics import TEACHERS
+from warp_torchrl.heuristics import HEURISTICS, TEACHERS
 from warp_torchrl.models import Mlp
 from warp_torchrl.nearest import did_you_mean
+from warp_torchrl.runs.shipped import policy_names
 from warp_torchrl.validation import check_fields
 
 CLONING_LOSS, CLONING_COLUMN = "loss_bc", "train/cloning_loss"
@@ -17,13 +19,14 @@ CLONING_LOSS, CLONING_COLUMN = "loss_bc", "train/cloning_loss"
 
 @dataclass(frozen=True, kw_only=True)
 class Imitation:
-    """Whom a team learns from beside its rewards: a heuristic teacher, people, or both.
+    """Whom a team learns from beside its rewards: a teacher, people, or both.
 
     The two losses add up, each a mean over its own samples, under the same weight. Reports of such a policy should say
     whom it learned from.
 
     Attributes:
-        teacher: One of ``TEACHERS``, which labels what the team visits; None has no teacher.
+        teacher: Labels what the team visits: one of ``TEACHERS``, a shipped policy, a run folder or a checkpoint; None
+            has no teacher.
         demonstrations: Folder of recordings, of which the acts of people are cloned; None clones nobody's.
         minibatch_size: Acts of people in an optimiser step, of all processes.
         weight: Weight of the cloning losses at the start; it falls linearly.
@@ -44,11 +47,11 @@ class Imitation:
 
     def __post_init__(self) -> None:
         check_fields(self, weight=(1e-6, 1e6), until=(1e-6, 1.0), minibatch_size=(1, 1_000_000))
-        for name in ("teacher", "guide"):
-            given = getattr(self, name)
-            if given is not None and given not in TEACHERS:
-                hint = did_you_mean(given, TEACHERS)
-                raise ValueError(f"{name} must be null or one of {', '.join(TEACHERS)}, got {given}{hint}")
+        if self.teacher is not None:
+            check_teacher(self.teacher)
+        if self.guide is not None and self.guide not in TEACHERS:
+            hint = did_you_mean(self.guide, TEACHERS)
+            raise ValueError(f"guide must be null or one of {', '.join(TEACHERS)}, got {self.guide}{hint}")
 
     def weight_at(self, progress: float) -> float:
         """Return the weight at progress in 0..1."""
@@ -82,3 +85,17 @@ class Imitation:
                 "demonstrations must be null where agents talk, since acts are learned one by one: choose "
                 f"model.messages=none or map, got {model.messages}"
             )
+
+
+def check_teacher(name: str) -> None:
+    """Check that there is a teacher of a name: a heuristic, a shipped policy, or a folder.
+
+    Raises:
+        ValueError: If there is none.
+    """
+    shipped = policy_names()
+    if name not in (*TEACHERS, *shipped) and (name in HEURISTICS or not Path(name).is_dir()):
+        known = (*TEACHERS, *shipped)
+        raise ValueError(
+            f"teacher must be null or one of {', '.join(known)}, or a run folder, got {name}{did_you_mean(name, known)}"
+        )

@@ -1,7 +1,7 @@
 """Kickstarting: a behaviour-cloning term in the loss, whose weight falls to 0 during training.
 
-The student acts; a heuristic teacher labels the visited states with its own actions (Schmitt et al., "Kickstarting Deep
-Reinforcement Learning", 2018).
+The student acts; a teacher, a heuristic or a trained policy, labels the visited states with its own actions (Schmitt et
+al., "Kickstarting Deep Reinforcement Learning", 2018).
 """
 
 from dataclasses import replace
@@ -14,9 +14,9 @@ from torch.nn.functional import cross_entropy
 
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.collection.imitation import CLONING_COLUMN, CLONING_LOSS, Imitation
+from warp_torchrl.collection.teachers import Teacher, TrainedTeacher, teacher
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.heuristics import HEURISTICS, Heuristic
-from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, TEACHER_ACTION
+from warp_torchrl.models import ACTION, LOGITS, TEACHER_ACTION
 
 
 def kickstart(learner: Learner, plan: Imitation, env: WildfireEnv) -> Learner:
@@ -26,17 +26,23 @@ def kickstart(learner: Learner, plan: Imitation, env: WildfireEnv) -> Learner:
         learner: A learner whose policy writes logits first.
         plan: Names the teacher, who may see more than the team does.
         env: The training environment.
+
+    Raises:
+        ConfigError: If the teacher is a trained policy that does not fit, remembers or talks.
+        CheckpointError: If a folder holds no sound checkpoint.
     """
     if plan.teacher is None:
         return learner
-    cloning = _KickstartingLoss(plan, learner)
+    cloning, taught_by = _KickstartingLoss(plan, learner), teacher(plan.teacher, env)
+    keeps = {"teacher": taught_by} if isinstance(taught_by, TrainedTeacher) else {}
     return replace(
         learner,
-        explore=_Student(learner.explore, HEURISTICS[plan.teacher](env), cloning),
+        explore=_Student(learner.explore, taught_by, cloning),
         terms=cloning.terms,
         loss_keys=(*learner.loss_keys, CLONING_LOSS),
         columns={**learner.columns, CLONING_LOSS: CLONING_COLUMN},
         schedule=cloning.schedule,
+        keeps={**learner.keeps, **keeps},
     )
 
 
@@ -69,7 +75,7 @@ class _KickstartingLoss:
 class _Student(TensorDictModuleBase):
     """A policy that also writes the teacher's actions while the cloning loss has weight."""
 
-    def __init__(self, policy: TensorDictModuleBase, teacher: Heuristic, cloning: _KickstartingLoss) -> None:
+    def __init__(self, policy: TensorDictModuleBase, teacher: Teacher, cloning: _KickstartingLoss) -> None:
         super().__init__()
         self.in_keys, self.out_keys = policy.in_keys, [*policy.out_keys, TEACHER_ACTION]
         self.policy, self._teacher, self._cloning = policy, teacher, cloning
@@ -79,8 +85,7 @@ class _Student(TensorDictModuleBase):
         out = self.policy(tensordict)
         if not self._cloning.weight:
             return out.set(TEACHER_ACTION, out.get(ACTION))
-        labelled = self._teacher(tensordict.select(ACTION_MASK))
-        return out.set(TEACHER_ACTION, labelled.get(ACTION))
+        return out.set(TEACHER_ACTION, self._teacher.actions(tensordict))
 
 
 def _log_loss(logits: Tensor, action: Tensor) -> Tensor:

@@ -4,15 +4,14 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from warp_torchrl.collection.imitation import check_teacher
 from warp_torchrl.config.components import build_components
 from warp_torchrl.config.compose import OPTION, compose_config, plain
 from warp_torchrl.config.construction import ConfigError, construct
 from warp_torchrl.config.groups import OF_WORLDS, WORLD_KEYS
 from warp_torchrl.config.kinds import KindOfWorld
 from warp_torchrl.dotted import dotted
-from warp_torchrl.heuristics import TEACHERS
 from warp_torchrl.mixture import Kind, Mixture
-from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.world.world import World
 
 
@@ -36,9 +35,11 @@ def kinds_of_worlds(config: Mapping[str, Any], mixture: Mixture, teacher: str | 
         where = f"mixture.kinds.{name}"
         kind = construct(Kind, {"scenario": name, **(node or {})}, where)
         taught_by = kind.teacher or teacher
-        if taught_by is not None and taught_by not in TEACHERS:
-            hint = did_you_mean(taught_by, TEACHERS)
-            raise ConfigError(f"{where}.teacher must be null or one of {', '.join(TEACHERS)}, got {taught_by}{hint}")
+        if taught_by is not None:
+            try:
+                check_teacher(taught_by)
+            except ValueError as error:
+                raise ConfigError(f"{where}.{error}") from None
         try:
             world = _world(config, kind)
         except ConfigError as error:

@@ -21,7 +21,7 @@ class KindOfWorld:
         name: Of the kind.
         world: Its rules.
         share: Of the worlds, in proportion to the shares of the others.
-        teacher: The heuristic that labels its worlds; None for none.
+        teacher: Who labels its worlds; None for none.
     """
 
     name: str

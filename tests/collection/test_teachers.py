@@ -1,0 +1,92 @@
+"""Trained policies that teach."""
+
+import pytest
+import torch
+
+from tests.collection.test_kickstarting import configured, sample_of
+from warp_torchrl.api import load_policy, make_env
+from warp_torchrl.collection.teachers import HeuristicTeacher, TrainedTeacher, teacher
+from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.config.saved_config import SavedConfig
+from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.models import ACTION, ACTION_MASK, TEACHER_ACTION
+from warp_torchrl.training.loop import Training
+
+
+def student(folder, *overrides):
+    return Training(configured("imitation.teacher=skirmish", *overrides), SavedConfig(), folder)
+
+
+def test_a_trained_teacher_judges_by_what_it_was_trained_to_see(tmp_path):
+    training = student(tmp_path, "observation=local", "observation.radius=2")
+    policy = load_policy("skirmish")
+    own = make_env("skirmish", n_worlds=8, overrides=[*policy.overrides, "landscape.size=12", "horizon=20"])
+    now, told = training.env.reset(), set()
+    for _ in range(6):
+        expected = policy(own.set_state(training.env.world_state))[ACTION]
+        training.learner.explore(now)
+        assert torch.equal(now[TEACHER_ACTION], expected)
+        assert not torch.equal(now[ACTION], expected), "the student acts"
+        told |= set(expected.flatten().tolist())
+        now = training.env.step(now)["next"]
+    assert len(told) > 3
+
+
+def test_what_it_says_is_cloned(tmp_path):
+    training = student(tmp_path, "imitation.until=1.0")
+    first = float(training.learner.terms(sample_of(training))["loss_bc"].detach())
+    for batch in training.collection:
+        training._learn([batch])
+        if training.frames >= 320:
+            break
+    assert float(training.learner.terms(sample_of(training))["loss_bc"].detach()) < 0.9 * first
+
+
+def test_a_run_goes_on_with_the_teacher_that_it_had(tmp_path):
+    training = student(tmp_path)
+    kept = training.shares[0].state_dict()
+    training.shares[0].load_state_dict(kept)
+    kept["keeps"]["teacher"]["digest"] = "0" * 64
+    with pytest.raises(ConfigError, match=r"imitation\.teacher has other weights than when this run began"):
+        training.shares[0].load_state_dict(kept)
+
+
+def test_a_run_folder_may_teach_and_a_heuristic_keeps_nothing(weak_run):
+    env = make_env("skirmish", n_worlds=3)
+    shown = env.reset()
+    assert isinstance(teacher(str(weak_run), env), TrainedTeacher)
+    simple, same = teacher("greedy", env), HEURISTICS["greedy"](env)
+    assert isinstance(simple, HeuristicTeacher) and not hasattr(simple, "state_dict")
+    assert torch.equal(simple.actions(shown), same.choose(env.world_state, shown[ACTION_MASK]))
+
+
+KINDS = "mixture.kinds={a:{scenario:single},b:{scenario:skirmish,teacher:nobody}}"
+
+
+@pytest.mark.parametrize(
+    ("overrides", "said"),
+    [
+        (["imitation.teacher=skirmishes"], r"imitation\.teacher must be null or one of .*: did you mean skirmish"),
+        (["mixture=several", KINDS], r"mixture\.kinds\.b\.teacher must be null or one of .*, got nobody"),
+        (["imitation.teacher=null", "imitation.guide=skirmish", "algorithm=dqn"], r"imitation\.guide must be null or"),
+    ],
+)
+def test_a_teacher_that_is_not_there_is_named_in_one_line(overrides, said):
+    with pytest.raises(ConfigError, match=said) as error:
+        _ = configured("imitation.teacher=greedy", *overrides).kinds
+    assert "\n" not in str(error.value)
+
+
+def test_a_teacher_that_remembers_or_does_not_fit_is_refused(tmp_path):
+    folder = tmp_path / "run"
+    folder.mkdir()
+    config = configured("model.memory=8", "total_frames=64", "evaluation.mode=sampled")
+    record = SavedConfig(
+        choices={"algorithm": "mappo", "reward": "efficiency", "observation": "surroundings", "scenario": "skirmish"},
+        values={"model": {"memory": 8, "actor_hidden": [16], "critic_hidden": [16]}, "seed": 0},
+    )
+    Training(config, record, folder).train()
+    with pytest.raises(ConfigError, match=r"imitation\.teacher must neither remember nor talk, and .*run does"):
+        teacher(str(folder), make_env("skirmish", n_worlds=2))
+    with pytest.raises(ConfigError, match="does not fit here"):
+        teacher("skirmish", make_env("skirmish", n_worlds=1, overrides=["team.allow_stay=false"]))
