@@ -9,7 +9,7 @@ from tests.conftest import small_world
 from tests.world.drawing import draw
 from warp_torchrl import load_policy, make_env
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.heuristics import HEURISTICS, TEACHERS
 from warp_torchrl.observation import Local, Paper, Surroundings, central_state, state_names
 from warp_torchrl.observation.channels import DEFAULT
 from warp_torchrl.world.radio import Radio
@@ -19,11 +19,13 @@ from warp_torchrl.world.team import Team
 
 GOLDEN = Path(__file__).parent.parent / "golden" / "0.1.0"
 CHANNELS = (*DEFAULT, "last_seen")
+KNOWING = [name for name in TEACHERS if not HEURISTICS[name].sees_all]
 PRESETS = {
     "centred": Surroundings(channels=CHANNELS),
     "whole map": Surroundings(channels=CHANNELS, centred=False),
     "near": Surroundings(channels=CHANNELS, near=2),
     "local": Local(channels=CHANNELS),
+    **{f"orders by {name}": Local(radius=3, channels=CHANNELS, orders=name) for name in KNOWING},
     "paper": Paper(),
 }
 

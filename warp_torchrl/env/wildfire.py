@@ -86,7 +86,7 @@ class WildfireEnv(EnvBase):
         """Why steps are not compiled where that was asked for; None where they are."""
         self._fuses = fuse and self.why_eager is None
         if graph and gives_orders(self.observation):
-            raise ValueError("graph must be false where a dispatcher gives orders, with observation.orders")
+            raise ValueError("graph must be false with observation.orders")
         self._recorded = RecordedStep(self._scene) if graph else None
         names, roles = self.world.team.agent_names, self.world.team.agent_roles
         self.agent_names, self.action_names = names, self.world.team.action_names
@@ -327,7 +327,7 @@ class WildfireEnv(EnvBase):
         elif self.world.team.radio.delay:
             why = "a step of a team whose packets come late is not compiled"
         elif gives_orders(self.observation):
-            why = "a step in which a dispatcher gives orders is not compiled"
+            why = "a step with orders is not compiled"
         if why is not None:
             _log.info("compile: %s", why)
         return why

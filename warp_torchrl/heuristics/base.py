@@ -42,6 +42,8 @@ class Heuristic(TensorDictModuleBase):
     out_keys = [("agents", "action")]  # noqa: RUF012
     is_stateful: ClassVar[bool] = False
     """Whether its actions depend on more than the current state."""
+    sees_all: ClassVar[bool] = True
+    """Whether it knows of fire, where sight is limited, what its agents do not."""
 
     def __init__(self, env: Worlds) -> None:
         super().__init__()

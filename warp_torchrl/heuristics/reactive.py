@@ -23,6 +23,8 @@ from warp_torchrl.world.state import WorldState
 class NoOp(Heuristic):
     """Stays, or if the team has no such action, chooses one without effect."""
 
+    sees_all = False
+
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
         return idle_action(mask, self.world.team)
@@ -30,6 +32,8 @@ class NoOp(Heuristic):
 
 class Random(Heuristic):
     """Draws uniformly among the actions that would do something; the same seed gives the same draws."""
+
+    sees_all = False
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
@@ -44,6 +48,7 @@ class Local(Heuristic):
     Where sight is limited (``sensing=sight``) its own sight is its radius, with all that hinders it.
     """
 
+    sees_all = False
     radius = 5
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:

@@ -29,6 +29,8 @@ class Searching(Heuristic):
     Agents whose role cannot extinguish always search.
     """
 
+    sees_all = False
+
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
         team = self.world.team

@@ -44,7 +44,7 @@ class Told:
         identity: The agent's place in its team, see ``identity``.
         rules: The rules of the world, see ``rules``.
         water: The way to water, see ``way_to_water``.
-        orders: What a dispatcher would have the agent do, see ``orders``, by the dispatcher's name; None has none.
+        orders: What a heuristic would have the agent do, see ``orders``, by its name; None has none.
     """
 
     identity: bool = False

@@ -11,8 +11,6 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.content import Content
-from warp_torchrl.heuristics import TEACHERS
-from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.observation.channels import CHANNELS, DEFAULT, FIRE, ages, check_channels, stages
 from warp_torchrl.observation.coarse import (
     PICTURE_SIDE,
@@ -23,6 +21,7 @@ from warp_torchrl.observation.coarse import (
     picture_names,
     picture_symmetry,
 )
+from warp_torchrl.observation.orders import check_knows, check_orders
 from warp_torchrl.observation.own import IDENTITY, SELF, SELF_SIZE, Told, own_entries, own_vector
 from warp_torchrl.observation.view import egocentric_view
 from warp_torchrl.symmetry import Planes, Target, Vector
@@ -65,8 +64,8 @@ class Local:
         rules: Whether ``self`` tells the rules of the world, see ``rules``: one policy can then play by several.
         water: Whether ``self`` tells the way to the nearest water, see ``way_to_water``: else agents whose tanks are
             empty know of lakes within their view alone.
-        orders: Name of a heuristic, one of ``TEACHERS``, that sees all and radios each agent, in ``self``, the action
-            that it would choose for it, see ``orders``: agents may do otherwise; None has no dispatcher.
+        orders: Name of a heuristic, one of ``TEACHERS``, that tells each agent, in ``self``, the action that it would
+            choose for it, see ``orders``: agents may do otherwise; None has no orders.
         channels: Names of the view's channels, in order.
 
     Raises:
@@ -83,17 +82,14 @@ class Local:
     def __post_init__(self) -> None:
         check_fields(self, radius=(1, 32))
         check_channels(self.channels)
-        if self.orders is not None and self.orders not in TEACHERS:
-            hint = did_you_mean(self.orders, TEACHERS)
-            raise ValueError(f"orders must be null or one of {', '.join(TEACHERS)}, got {self.orders}{hint}")
+        if self.orders is not None:
+            check_orders(self.orders)
 
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
         side, highs = 2 * self.radius + 1, tuple(CHANNELS[name].high for name in self.channels)
-        if self.orders is not None and world.sensing.is_limited:
-            raise ValueError(
-                f"observation.orders must be null where sight is limited: a dispatcher sees all, got {self.orders}"
-            )
+        if self.orders is not None:
+            check_knows(self.orders, world)
         own, content = own_entries(world, self.told), self._contents(view_content(self.channels, world))
         symmetry = view_symmetry(self.channels)
         return {
@@ -232,5 +228,5 @@ Observation = Surroundings | Local | Paper
 
 
 def gives_orders(observation: Observation) -> bool:
-    """Return whether a dispatcher radios orders to those who see this."""
+    """Return whether those who see this are given orders."""
     return isinstance(observation, Local) and observation.orders is not None
