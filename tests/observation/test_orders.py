@@ -73,8 +73,8 @@ def test_a_team_without_the_action_to_stay_has_its_place_empty():
 
 def test_who_gives_orders_is_checked():
     assert "dispatch" in TEACHERS and "ring" not in TEACHERS
-    with pytest.raises(ValueError, match=r"orders must be null or one of .*, got dispach: did you mean dispatch\?"):
-        Surroundings(orders="dispach")
+    with pytest.raises(ValueError, match=r"orders must be null or one of .*, got dispatcher: did you mean dispatch\?"):
+        Surroundings(orders="dispatcher")
     with pytest.raises(ValueError, match="orders must be null or one of"):
         Surroundings(orders="ring")
     with pytest.raises(
