@@ -12,7 +12,8 @@ from warp_torchrl.config.compose import compose_config, plain, without_targets
 from warp_torchrl.config.saved_config import restore
 from warp_torchrl.evaluation.play import play, play_heuristics
 from warp_torchrl.runs.checkpoint import CheckpointError, export, newest
-from warp_torchrl.runs.shipped import find_policy, policy_names
+from warp_torchrl.runs.shipped import find_policy
+from warp_torchrl.shipped import policy_names
 
 SHIPPED = Path(__file__).parent.parent / "docs" / "policies"
 SCENARIOS = {"default": "default", "generalist": "default", "skirmish": "skirmish", "single": "single"}

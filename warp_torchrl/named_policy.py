@@ -13,7 +13,8 @@ from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.policy import TrainedPolicy
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs.shipped import find_policy, policy_names
+from warp_torchrl.runs.shipped import find_policy
+from warp_torchrl.shipped import policy_names
 
 
 class NamedPolicy:

@@ -14,7 +14,7 @@ from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION, OBSERVATION
 from warp_torchrl.observation import STATE, Surroundings
 from warp_torchrl.observation.own import IDENTITY, SELF
-from warp_torchrl.runs.shipped import policy_names
+from warp_torchrl.shipped import policy_names
 from warp_torchrl.symmetry import ORDER
 from warp_torchrl.world.abilities import ABILITIES, Ability, Deed, Situation, ability
 from warp_torchrl.world.role import ROLES, Role, add_role

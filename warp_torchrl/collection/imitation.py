@@ -10,7 +10,7 @@ from warp_torchrl.collection.collectors import InProcess, MultiProcess
 from warp_torchrl.heuristics import HEURISTICS, TEACHERS
 from warp_torchrl.models import Mlp
 from warp_torchrl.nearest import did_you_mean
-from warp_torchrl.runs.shipped import policy_names
+from warp_torchrl.shipped import policy_names
 from warp_torchrl.validation import check_fields
 
 CLONING_LOSS, CLONING_COLUMN = "loss_bc", "train/cloning_loss"

@@ -1,21 +1,10 @@
-"""The shipped policies, by name."""
+"""The folder of a policy, by its path or a shipped one's name."""
 
 from pathlib import Path
 
 from warp_torchrl.nearest import did_you_mean
-from warp_torchrl.runs.manifest import MANIFEST, CheckpointError
-
-
-def policies_folder() -> Path:
-    """Return the folder of the shipped policies: in the installed package, or in ``docs`` of a checkout."""
-    package = Path(__file__).parents[1]
-    inside = package / "policies"
-    return inside if inside.is_dir() else package.parent / "docs" / "policies"
-
-
-def policy_names() -> list[str]:
-    """Return the names of the shipped policies."""
-    return sorted(manifest.parent.name for manifest in policies_folder().glob(f"*/{MANIFEST}"))
+from warp_torchrl.runs.manifest import CheckpointError
+from warp_torchrl.shipped import policies_folder, policy_names
 
 
 def find_policy(given: str | Path) -> Path:

@@ -16,7 +16,6 @@ from warp_torchrl import parallel
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.collection.cloning import clone
 from warp_torchrl.collection.guidance import guided
-from warp_torchrl.collection.kickstarting import kickstart
 from warp_torchrl.collection.running import Collection
 from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.demonstrations.acts import demonstrations
@@ -26,6 +25,7 @@ from warp_torchrl.runs.checkpoint import Checkpoint
 from warp_torchrl.runs.transfer import actor_parameters, learned_parameters
 from warp_torchrl.training.course import course
 from warp_torchrl.training.finite import FiniteSteps, NumericalFailure
+from warp_torchrl.training.kickstarting import kickstart
 from warp_torchrl.training.progress import TRAIN_COLUMNS, episode_columns
 from warp_torchrl.training.recorded import RecordedUpdate
 from warp_torchrl.training.share import Played, Share, learners, played

@@ -9,7 +9,6 @@ from torch.nn.functional import cross_entropy
 from torchrl.objectives import BCLoss
 
 from warp_torchrl.collection.imitation import Imitation
-from warp_torchrl.collection.kickstarting import kickstart
 from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
@@ -17,6 +16,7 @@ from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.evaluation.method import method
 from warp_torchrl.heuristics import HEURISTICS, TEACHERS
 from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, TEACHER_ACTION, over_canonical
+from warp_torchrl.training.kickstarting import kickstart
 from warp_torchrl.training.loop import Training
 
 TINY = [

@@ -14,9 +14,9 @@ from torch.nn.functional import cross_entropy
 
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.collection.imitation import CLONING_COLUMN, CLONING_LOSS, Imitation
-from warp_torchrl.collection.teachers import Teacher, TrainedTeacher, teacher
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.models import ACTION, LOGITS, TEACHER_ACTION
+from warp_torchrl.training.teachers import Teacher, TrainedTeacher, teacher
 
 
 def kickstart(learner: Learner, plan: Imitation, env: WildfireEnv) -> Learner:

@@ -3,14 +3,14 @@
 import pytest
 import torch
 
-from tests.collection.test_kickstarting import configured, sample_of
+from tests.training.test_kickstarting import configured, sample_of
 from warp_torchrl.api import load_policy, make_env
-from warp_torchrl.collection.teachers import HeuristicTeacher, TrainedTeacher, teacher
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION, ACTION_MASK, TEACHER_ACTION
 from warp_torchrl.training.loop import Training
+from warp_torchrl.training.teachers import HeuristicTeacher, TrainedTeacher, teacher
 
 
 def student(folder, *overrides):
