@@ -98,10 +98,10 @@ def test_the_ground_floor_knows_the_standard_library_and_what_a_device_is():
 
 def test_what_reads_the_state_knows_only_the_world():
     own = {"observation", "reward"}
-    orders = {"observation/orders": ("heuristics",)}  # which know the world alone, and act for each agent
+    advice = {"observation/advice": ("heuristics",)}  # which know the world alone, and act for each agent
     assert not breaks(
         READS_STATE,
-        lambda module: knows_only(module, "world", *({module.split("/")[0]} & own), *orders.get(module, ())),
+        lambda module: knows_only(module, "world", *({module.split("/")[0]} & own), *advice.get(module, ())),
     )
     assert not breaks(of_rooms("heuristics"), lambda module: knows_only(module, "world", "heuristics"))
     assert not breaks(READS_STATE, lambda module: "torchrl" not in roots(module))

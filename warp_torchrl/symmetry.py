@@ -23,8 +23,8 @@ COMPASS = {
 """(row, column) offset of each direction by its name [cells]; rows grow south, columns east."""
 LAST = "last_"
 """Prefix of the names of numbers that tell an action of before."""
-ORDER = "order_"
-"""Prefix of the names of numbers that tell an action that an agent is ordered to do."""
+ADVICE = "advice_"
+"""Prefix of the names of numbers that tell an action that an agent is advised to do."""
 TIME_LEFT = "time_left"
 """Name of the scalar that tells which share of an episode is left; it is 1 at an episode's first step alone."""
 
@@ -75,7 +75,7 @@ class Part(NamedTuple):
     Attributes:
         kind: ``scalar``, which do not change; ``place``, row and column as shares 0..1 of the map's height and width;
             ``vector``, components to the east and to the north; ``actions``, one number for each action or direction,
-            of which those with a name of ``COMPASS``, alone or after ``LAST`` or ``ORDER``, change places.
+            of which those with a name of ``COMPASS``, alone or after ``LAST`` or ``ADVICE``, change places.
         names: Of the numbers, in order.
     """
 

@@ -25,7 +25,7 @@ PRESETS = {
     "whole map": Surroundings(channels=CHANNELS, centred=False),
     "near": Surroundings(channels=CHANNELS, near=2),
     "local": Local(channels=CHANNELS),
-    **{f"orders by {name}": Local(radius=3, channels=CHANNELS, orders=name) for name in KNOWING},
+    **{f"advice by {name}": Local(radius=3, channels=CHANNELS, advice=name) for name in KNOWING},
     "paper": Paper(),
 }
 

@@ -15,7 +15,7 @@ from warp_torchrl.models import ACTION, OBSERVATION
 from warp_torchrl.observation import STATE, Surroundings
 from warp_torchrl.observation.own import IDENTITY, SELF
 from warp_torchrl.shipped import policy_names
-from warp_torchrl.symmetry import ORDER
+from warp_torchrl.symmetry import ADVICE
 from warp_torchrl.world.abilities import ABILITIES, Ability, Deed, Situation, ability
 from warp_torchrl.world.role import ROLES, Role, add_role
 from warp_torchrl.world.team import Team
@@ -149,7 +149,7 @@ def test_a_shipped_policy_plays_beside_roles_and_actions_that_it_does_not_know(n
     alike, wide = now, here.reset()
     names = {env: env.channel_names["self"] for env in (there, here)}
     further = [place for place, name in enumerate(names[here]) if name not in names[there]]
-    assert sum(not names[here][place].startswith(ORDER) for place in further) == 4
+    assert sum(not names[here][place].startswith(ADVICE) for place in further) == 4
     known = [place for place in range(len(names[here])) if place not in further]
     assert [names[here][place] for place in known] == list(names[there])
     wide[(*OBSERVATION, "self")][..., known] = alike[(*OBSERVATION, "self")]

@@ -20,7 +20,7 @@ from warp_torchrl.env.reset_cache import ResetCache, Start
 from warp_torchrl.env.reset_pool import ResetPool
 from warp_torchrl.env.scene import Observations, Scene, Step
 from warp_torchrl.env.specs import make_specs
-from warp_torchrl.observation import Observation, Surroundings, gives_orders, state_content, state_names, state_symmetry
+from warp_torchrl.observation import Observation, Surroundings, is_advised, state_content, state_names, state_symmetry
 from warp_torchrl.reward import Efficiency, Reward
 from warp_torchrl.world.fast.compile import check_compiler
 from warp_torchrl.world.fast.road import why_eager
@@ -55,7 +55,7 @@ class WildfireEnv(EnvBase):
 
     Raises:
         ValueError: If ``n_worlds`` is not positive, ``seeds`` are not as many, a seed is out of range, the world lacks
-            what the reward pays for, there is no C++ compiler to compile with, or steps with orders are recorded.
+            what the reward pays for, there is no C++ compiler to compile with, or steps with advice are recorded.
     """
 
     batch_locked = True
@@ -85,8 +85,8 @@ class WildfireEnv(EnvBase):
         self.why_eager = self._check_compiling() if fuse else None
         """Why steps are not compiled where that was asked for; None where they are."""
         self._fuses = fuse and self.why_eager is None
-        if graph and gives_orders(self.observation):
-            raise ValueError("graph must be false with observation.orders")
+        if graph and is_advised(self.observation):
+            raise ValueError("graph must be false with observation.advice")
         self._recorded = RecordedStep(self._scene) if graph else None
         names, roles = self.world.team.agent_names, self.world.team.agent_roles
         self.agent_names, self.action_names = names, self.world.team.action_names
@@ -326,8 +326,8 @@ class WildfireEnv(EnvBase):
             why = "a step of agents that do not see all is not compiled"
         elif self.world.team.radio.delay:
             why = "a step of a team whose packets come late is not compiled"
-        elif gives_orders(self.observation):
-            why = "a step with orders is not compiled"
+        elif is_advised(self.observation):
+            why = "a step with advice is not compiled"
         if why is not None:
             _log.info("compile: %s", why)
         return why

@@ -27,7 +27,7 @@ _USUAL = {
     ("model", "memory"): 0,
     ("model", "messages"): "none",
     ("observation", "radius"): 5,
-    ("observation", "orders"): None,
+    ("observation", "advice"): None,
     ("reward", "barrier_rule"): "cut_off",
     ("reward", "cooperation"): 0.0,
 }

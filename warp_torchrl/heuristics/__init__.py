@@ -33,7 +33,7 @@ HEURISTICS: dict[str, type[Heuristic]] = {
 }
 """Heuristic policies by name."""
 TEACHERS = tuple(name for name, heuristic in HEURISTICS.items() if not heuristic.is_stateful)
-"""Those whose action depends on the state alone: they can teach, guide, and give orders."""
+"""Those whose action depends on the state alone: they can teach, guide and advise."""
 
 __all__ = [
     "HEURISTICS",

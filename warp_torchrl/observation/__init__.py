@@ -21,7 +21,7 @@ from warp_torchrl.observation.presets import (
     Space,
     Surroundings,
     former_symmetry,
-    gives_orders,
+    is_advised,
 )
 from warp_torchrl.observation.view import egocentric_view
 
@@ -46,7 +46,7 @@ __all__ = [
     "channel",
     "egocentric_view",
     "former_symmetry",
-    "gives_orders",
+    "is_advised",
     "own_vector",
     "picture",
     "state_content",

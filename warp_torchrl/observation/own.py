@@ -7,10 +7,10 @@ import torch
 from torch import Tensor
 from torch.nn.functional import one_hot
 
-from warp_torchrl.observation.orders import orders
+from warp_torchrl.observation.advice import advised_actions
 from warp_torchrl.observation.rules import RULES, rules
 from warp_torchrl.observation.water import WATER, way_to_water
-from warp_torchrl.symmetry import LAST, ORDER, TIME_LEFT, Part, Vector
+from warp_torchrl.symmetry import ADVICE, LAST, TIME_LEFT, Part, Vector
 from warp_torchrl.world.flight import wind_at
 from warp_torchrl.world.role import PAPER_ROLES
 from warp_torchrl.world.state import Action, WorldState
@@ -44,13 +44,13 @@ class Told:
         identity: The agent's place in its team, see ``identity``.
         rules: The rules of the world, see ``rules``.
         water: The way to water, see ``way_to_water``.
-        orders: What a heuristic would have the agent do, see ``orders``, by its name; None has none.
+        advice: What a heuristic would have the agent do, see ``advised_actions``, by its name; None has none.
     """
 
     identity: bool = False
     rules: bool = False
     water: bool = False
-    orders: str | None = None
+    advice: str | None = None
 
 
 def own_entries(world: World, told: Told = Told()) -> Vector:
@@ -58,7 +58,7 @@ def own_entries(world: World, told: Told = Told()) -> Vector:
 
     They are ``SELF``, the identity if it is told, then the team's roles and actions beside the paper's, then the
     battery if it runs down, then the agency that the vehicle serves, one-hot, if there are several, then the rules, the
-    way to water and the order, one-hot, if they are told.
+    way to water and the advised action, one-hot, if they are told.
     """
     team = world.team
     roles = tuple(f"role_{role}" for role in team.role_names[len(PAPER_ROLES) :])
@@ -67,8 +67,8 @@ def own_entries(world: World, told: Told = Told()) -> Vector:
     parts = [*SELF.parts, *([IDENTITY] if told.identity else [])]
     parts += [Part("scalar", names) for names in (roles, actions, battery, world.agencies.names) if names]
     parts += [*([RULES] if told.rules else []), *(WATER if told.water else [])]
-    if told.orders is not None:
-        parts.append(Part("actions", tuple(f"{ORDER}{name}" for name in (*_ACTIONS, *team.further_actions))))
+    if told.advice is not None:
+        parts.append(Part("actions", tuple(f"{ADVICE}{name}" for name in (*_ACTIONS, *team.further_actions))))
     return Vector(tuple(parts))
 
 
@@ -106,8 +106,8 @@ def own_vector(state: WorldState, world: World, told: Told = Told()) -> Tensor:
         parts.append(rules(world, row.device).expand(*shape, -1))
     if told.water:
         parts.append(way_to_water(state, world))
-    if told.orders is not None:
-        parts.append(_one_hot_action(orders(state, world, told.orders), team))
+    if told.advice is not None:
+        parts.append(_one_hot_action(advised_actions(state, world, told.advice), team))
     return torch.cat(parts, dim=-1)
 
 

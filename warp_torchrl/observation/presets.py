@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.content import Content
+from warp_torchrl.observation.advice import check_adviser, check_may_advise
 from warp_torchrl.observation.channels import CHANNELS, DEFAULT, FIRE, ages, check_channels, stages
 from warp_torchrl.observation.coarse import (
     PICTURE_SIDE,
@@ -21,7 +22,6 @@ from warp_torchrl.observation.coarse import (
     picture_names,
     picture_symmetry,
 )
-from warp_torchrl.observation.orders import check_knows, check_orders
 from warp_torchrl.observation.own import IDENTITY, SELF, SELF_SIZE, Told, own_entries, own_vector
 from warp_torchrl.observation.view import egocentric_view
 from warp_torchrl.symmetry import Planes, Target, Vector
@@ -64,32 +64,32 @@ class Local:
         rules: Whether ``self`` tells the rules of the world, see ``rules``: one policy can then play by several.
         water: Whether ``self`` tells the way to the nearest water, see ``way_to_water``: else agents whose tanks are
             empty know of lakes within their view alone.
-        orders: Name of a heuristic, one of ``TEACHERS``, that tells each agent, in ``self``, the action that it would
-            choose for it, see ``orders``: agents may do otherwise; None has no orders.
+        advice: Name of a heuristic, one of ``TEACHERS``, that tells each agent, in ``self``, the action that it would
+            choose for it, see ``advised_actions``: agents may do otherwise; None has no adviser.
         channels: Names of the view's channels, in order.
 
     Raises:
-        ValueError: If the radius is not in 1..32, or a channel or who gives orders is unknown.
+        ValueError: If the radius is not in 1..32, or a channel or the adviser is unknown.
     """
 
     radius: int = 5
     identity: bool = True
     rules: bool = False
     water: bool = False
-    orders: str | None = None
+    advice: str | None = None
     channels: tuple[str, ...] = DEFAULT
 
     def __post_init__(self) -> None:
         check_fields(self, radius=(1, 32))
         check_channels(self.channels)
-        if self.orders is not None:
-            check_orders(self.orders)
+        if self.advice is not None:
+            check_adviser(self.advice)
 
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
         side, highs = 2 * self.radius + 1, tuple(CHANNELS[name].high for name in self.channels)
-        if self.orders is not None:
-            check_knows(self.orders, world)
+        if self.advice is not None:
+            check_may_advise(self.advice, world)
         own, content = own_entries(world, self.told), self._contents(view_content(self.channels, world))
         symmetry = view_symmetry(self.channels)
         return {
@@ -105,7 +105,7 @@ class Local:
     @property
     def told(self) -> Told:
         """Return what ``self`` tells beside what it tells every agent."""
-        return Told(identity=self.identity, rules=self.rules, water=self.water, orders=self.orders)
+        return Told(identity=self.identity, rules=self.rules, water=self.water, advice=self.advice)
 
     def _contents(self, content: tuple[Content, ...]) -> tuple[Content, ...]:
         """Return what is told of channels; nothing for a subclass that shows them in a way of its own."""
@@ -227,6 +227,6 @@ Observation = Surroundings | Local | Paper
 """Any observation preset."""
 
 
-def gives_orders(observation: Observation) -> bool:
-    """Return whether those who see this are given orders."""
-    return isinstance(observation, Local) and observation.orders is not None
+def is_advised(observation: Observation) -> bool:
+    """Return whether those who see this have an adviser."""
+    return isinstance(observation, Local) and observation.advice is not None

@@ -6,7 +6,7 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
-from warp_torchrl.symmetry import COMPASS, LAST, ORDER
+from warp_torchrl.symmetry import ADVICE, COMPASS, LAST
 
 _SYMMETRIES = 8
 
@@ -105,7 +105,7 @@ def _products(into: bool, device: torch.device) -> Tensor:
 @lru_cache(maxsize=32)
 def _actions(names: tuple[str, ...], into: bool, device: torch.device) -> Tensor:
     """Return the index of the action on the map that each action is in each orientation, or back, int64 [8, n]."""
-    compass = [COMPASS.get(name.removeprefix(LAST).removeprefix(ORDER)) for name in names]
+    compass = [COMPASS.get(name.removeprefix(LAST).removeprefix(ADVICE)) for name in names]
     moves = [place for place, offset in enumerate(compass) if offset is not None]
     index = torch.arange(len(names)).repeat(_SYMMETRIES, 1)
     if moves:
