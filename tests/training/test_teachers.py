@@ -10,7 +10,7 @@ from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION, ACTION_MASK, TEACHER_ACTION
 from warp_torchrl.training.loop import Training
-from warp_torchrl.training.teachers import HeuristicTeacher, TrainedTeacher, teacher
+from warp_torchrl.training.teachers import TrainedTeacher, teacher
 
 
 def student(folder, *overrides):
@@ -51,13 +51,13 @@ def test_a_run_goes_on_with_the_teacher_that_it_had(tmp_path):
         training.shares[0].load_state_dict(kept)
 
 
-def test_a_run_folder_may_teach_and_a_heuristic_keeps_nothing(weak_run):
+def test_a_run_folder_may_teach_and_a_heuristic_is_itself(weak_run):
     env = make_env("skirmish", n_worlds=3)
     shown = env.reset()
     assert isinstance(teacher(str(weak_run), env), TrainedTeacher)
-    simple, same = teacher("greedy", env), HEURISTICS["greedy"](env)
-    assert isinstance(simple, HeuristicTeacher) and not hasattr(simple, "state_dict")
-    assert torch.equal(simple.actions(shown), same.choose(env.world_state, shown[ACTION_MASK]))
+    simple = teacher("greedy", env)
+    assert type(simple) is HEURISTICS["greedy"]
+    assert torch.equal(simple(shown.clone())[ACTION], simple.choose(env.world_state, shown[ACTION_MASK]))
 
 
 KINDS = "mixture.kinds={a:{scenario:single},b:{scenario:skirmish,teacher:nobody}}"

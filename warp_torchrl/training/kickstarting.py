@@ -15,8 +15,9 @@ from torch.nn.functional import cross_entropy
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.collection.imitation import CLONING_COLUMN, CLONING_LOSS, Imitation
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.heuristics import Heuristic
 from warp_torchrl.models import ACTION, LOGITS, TEACHER_ACTION
-from warp_torchrl.training.teachers import Teacher, TrainedTeacher, teacher
+from warp_torchrl.training.teachers import TrainedTeacher, teacher
 
 
 def kickstart(learner: Learner, plan: Imitation, env: WildfireEnv) -> Learner:
@@ -75,7 +76,9 @@ class _KickstartingLoss:
 class _Student(TensorDictModuleBase):
     """A policy that also writes the teacher's actions while the cloning loss has weight."""
 
-    def __init__(self, policy: TensorDictModuleBase, teacher: Teacher, cloning: _KickstartingLoss) -> None:
+    def __init__(
+        self, policy: TensorDictModuleBase, teacher: Heuristic | TrainedTeacher, cloning: _KickstartingLoss
+    ) -> None:
         super().__init__()
         self.in_keys, self.out_keys = policy.in_keys, [*policy.out_keys, TEACHER_ACTION]
         self.policy, self._teacher, self._cloning = policy, teacher, cloning
@@ -85,7 +88,8 @@ class _Student(TensorDictModuleBase):
         out = self.policy(tensordict)
         if not self._cloning.weight:
             return out.set(TEACHER_ACTION, out.get(ACTION))
-        return out.set(TEACHER_ACTION, self._teacher.actions(tensordict))
+        labelled = self._teacher(tensordict.select(*self._teacher.in_keys, strict=False))
+        return out.set(TEACHER_ACTION, labelled.get(ACTION))
 
 
 def _log_loss(logits: Tensor, action: Tensor) -> Tensor:

@@ -4,65 +4,52 @@ from collections.abc import Mapping
 from typing import Any
 
 from tensordict import TensorDictBase
-from torch import Tensor, no_grad
+from torch import no_grad
 from torchrl.envs.utils import set_exploration_type
 
+from warp_torchrl.config.compose import plain
 from warp_torchrl.config.construction import ConfigError, build
+from warp_torchrl.config.saved_config import restore
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.models import ACTION, ACTION_MASK, AGENCY, OBSERVATION, ROLE, recurrent_actors
-from warp_torchrl.named_policy import NamedPolicy, fitted_policy
+from warp_torchrl.heuristics import HEURISTICS, Heuristic
+from warp_torchrl.models import ACTION_MASK, AGENCY, OBSERVATION, ROLE, recurrent_actors
+from warp_torchrl.named_policy import fitted_policy
 from warp_torchrl.observation import Observation
 from warp_torchrl.policy import MODES
-
-
-class HeuristicTeacher:
-    """A heuristic that tells what it would do.
-
-    Args:
-        name: One of ``TEACHERS``.
-        env: The training environment, whose worlds it reads.
-    """
-
-    def __init__(self, name: str, env: WildfireEnv) -> None:
-        self._heuristic = HEURISTICS[name](env)
-
-    def actions(self, shown: TensorDictBase) -> Tensor:
-        """Return what it would do, int64 [B, A]."""
-        return self._heuristic(shown.select(ACTION_MASK)).get(ACTION)
+from warp_torchrl.runs import checkpoint as checkpoints
+from warp_torchrl.runs.checkpoint import Checkpoint
+from warp_torchrl.runs.shipped import find_policy
 
 
 class TrainedTeacher:
     """A trained policy that tells what it would do, in its own mode, of worlds that it sees as it was trained to.
 
     Args:
-        named: The policy.
+        found: Its checkpoint.
+        name: By which it was called.
         env: The training environment, whose worlds it looks at.
 
     Raises:
         ConfigError: If it does not fit the worlds, or remembers or talks, so that it cannot judge a state by itself.
     """
 
-    def __init__(self, named: NamedPolicy, env: WildfireEnv) -> None:
-        found = named.checkpoint
-        if found is None:
-            raise ConfigError(f"imitation.teacher must be a trained policy, got {named.name}")
-        self._env, self._digest = env, found.manifest.files["policy.pt"]["sha256"]
-        self._observation: Observation = build(named.config(())["observation"], "observation")
-        worlds = WildfireEnv(env.world, observation=self._observation, n_worlds=1, device=env.device)
-        self._policy = fitted_policy(found, worlds, named.name).to(env.device)
-        if self._policy.talks or recurrent_actors(self._policy):
-            raise ConfigError(f"imitation.teacher must neither remember nor talk, and {named.name} does")
+    in_keys = (ACTION_MASK, ROLE, AGENCY)
 
-    def actions(self, shown: TensorDictBase) -> Tensor:
-        """Return what it would do, int64 [B, A]."""
+    def __init__(self, found: Checkpoint, name: str, env: WildfireEnv) -> None:
+        self._env, self._digest = env, found.manifest.files["policy.pt"]["sha256"]
+        self._observation: Observation = build(plain(restore(found.record()))["observation"], "observation")
+        worlds = WildfireEnv(env.world, observation=self._observation, n_worlds=1, device=env.device)
+        self._policy = fitted_policy(found, worlds, name).to(env.device)
+        if self._policy.talks or recurrent_actors(self._policy):
+            raise ConfigError(f"imitation.teacher must neither remember nor talk, and {name} does")
+
+    def __call__(self, shown: TensorDictBase) -> TensorDictBase:
+        """Write the team's actions, int64 [B, A], as a heuristic does."""
         state, world = self._env.world_state, self._env.world
         with no_grad(), set_exploration_type(MODES[self._policy.mode]):
-            seen = self._observation(state, world, world.forecast(state))
-            given = shown.select(ACTION_MASK, ROLE, AGENCY, strict=False)
-            for name, value in seen.items():
-                given.set((*OBSERVATION, name) if name else OBSERVATION, value)
-            return self._policy(given).get(ACTION)
+            for name, value in self._observation(state, world, world.forecast(state)).items():
+                shown.set((*OBSERVATION, name) if name else OBSERVATION, value)
+            return self._policy(shown)
 
     def state_dict(self) -> dict[str, Any]:
         """Return what tells it from another."""
@@ -78,14 +65,14 @@ class TrainedTeacher:
             raise ConfigError("imitation.teacher has other weights than when this run began: give it the former")
 
 
-Teacher = HeuristicTeacher | TrainedTeacher
-
-
-def teacher(name: str, env: WildfireEnv) -> Teacher:
+def teacher(name: str, env: WildfireEnv) -> Heuristic | TrainedTeacher:
     """Return who teaches, by name: a heuristic, a shipped policy, a run folder or a checkpoint.
 
     Raises:
         ConfigError: See ``TrainedTeacher``.
         CheckpointError: If a folder holds no sound checkpoint.
     """
-    return HeuristicTeacher(name, env) if name in HEURISTICS else TrainedTeacher(NamedPolicy(name), env)
+    if name in HEURISTICS:
+        return HEURISTICS[name](env)
+    found, _ = checkpoints.newest(find_policy(name))
+    return TrainedTeacher(found, name, env)
