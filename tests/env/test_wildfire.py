@@ -11,7 +11,7 @@ from torchrl.envs.utils import check_env_specs
 
 from tests.conftest import small_world
 from warp_torchrl import WildfireEnv, make_env
-from warp_torchrl.env import wildfire
+from warp_torchrl.env import scene
 from warp_torchrl.observation import Local, Paper, Surroundings
 from warp_torchrl.reward import Efficiency
 from warp_torchrl.world.fast import road
@@ -329,7 +329,7 @@ def test_another_reward_may_be_given_to_an_environment(make_small_env):
 
 def test_steps_that_are_not_compiled_are_told_in_one_line(caplog, monkeypatch):
     monkeypatch.setattr(road, "vectors", lambda: "AVX2")
-    monkeypatch.setattr(wildfire, "check_compiler", lambda device: None)
+    monkeypatch.setattr(scene, "check_compiler", lambda device: None)
     with caplog.at_level(logging.INFO, logger="warp_torchrl"):
         few, many = (WildfireEnv(n_worlds=n, fuse=True) for n in (32, 33))
     assert few.why_eager is None
@@ -340,7 +340,7 @@ def test_steps_that_are_not_compiled_are_told_in_one_line(caplog, monkeypatch):
 
 
 def test_steps_of_agents_that_do_not_see_all_are_not_compiled(monkeypatch):
-    monkeypatch.setattr(wildfire, "check_compiler", lambda device: None)
+    monkeypatch.setattr(scene, "check_compiler", lambda device: None)
     env = WildfireEnv(World(sensing=Sight()), n_worlds=1, fuse=True)
     assert "do not see all" in env.why_eager and WildfireEnv(n_worlds=1, fuse=True).why_eager is None
 
@@ -434,6 +434,6 @@ def test_a_changed_world_keeps_what_is_under_way(make_small_env):
 
 
 def test_steps_of_late_packets_are_not_compiled(monkeypatch):
-    monkeypatch.setattr(wildfire, "check_compiler", lambda device: None)
+    monkeypatch.setattr(scene, "check_compiler", lambda device: None)
     env = WildfireEnv(World(team=Team(radio=Radio(delay=1))), n_worlds=1, fuse=True)
     assert "packets come late" in env.why_eager

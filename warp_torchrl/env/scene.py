@@ -3,6 +3,8 @@
 Compiled, it is two functions: one moves the agents, ticks the fire and makes the forecast; the other observes.
 """
 
+import logging
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -10,12 +12,14 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.env.metrics import metrics
-from warp_torchrl.observation import Observation, central_state
+from warp_torchrl.observation import Observation, central_state, is_advised
 from warp_torchrl.reward import Collaborative, Efficiency, Reward, Time
-from warp_torchrl.world.fast.compile import compiled
-from warp_torchrl.world.fast.road import in_bytes, in_flags
+from warp_torchrl.world.fast.compile import check_compiler, compiled
+from warp_torchrl.world.fast.road import in_bytes, in_flags, why_eager
 from warp_torchrl.world.state import ActionResult, Forecast, Transition, TreeCounts, WorldState, count_trees
 from warp_torchrl.world.world import World
+
+_log = logging.getLogger("warp_torchrl")
 
 
 class Observations(NamedTuple):
@@ -95,6 +99,25 @@ class Scene:
         )
         transition = transition.replace(before=before, after=in_flags(after))
         return Step(transition, observed, self.reward(transition) if reward is None else reward)
+
+
+def why_not_compiled(world: World, observation: Observation, device: torch.device, n_worlds: int) -> str | None:
+    """Return why a step is not compiled, and log it; None where it is.
+
+    Raises:
+        ValueError: If there is no C++ compiler to compile with.
+    """
+    check_compiler(device)
+    why = why_eager(world.fire, device, n_worlds * math.prod(world.size))
+    if world.sensing.is_limited:
+        why = "a step of agents that do not see all is not compiled"
+    elif world.team.radio.delay:
+        why = "a step of a team whose packets come late is not compiled"
+    elif is_advised(observation):
+        why = "a step with advice is not compiled"
+    if why is not None:
+        _log.info("compile: %s", why)
+    return why
 
 
 def compiles(reward: Reward) -> bool:

@@ -1,7 +1,5 @@
 """The TorchRL environment: connects world, observation, reward and metrics to ``EnvBase``."""
 
-import logging
-import math
 import secrets
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
@@ -18,18 +16,14 @@ from warp_torchrl.env.recorded import RecordedStep
 from warp_torchrl.env.render import render
 from warp_torchrl.env.reset_cache import ResetCache, Start
 from warp_torchrl.env.reset_pool import ResetPool
-from warp_torchrl.env.scene import Observations, Scene, Step
+from warp_torchrl.env.scene import Observations, Scene, Step, why_not_compiled
 from warp_torchrl.env.specs import make_specs
 from warp_torchrl.observation import Observation, Surroundings, is_advised, state_content, state_names, state_symmetry
 from warp_torchrl.reward import Efficiency, Reward
-from warp_torchrl.world.fast.compile import check_compiler
-from warp_torchrl.world.fast.road import why_eager
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.saved import filled
 from warp_torchrl.world.state import Transition, TreeCounts, WorldState, count_trees
 from warp_torchrl.world.world import World
-
-_log = logging.getLogger("warp_torchrl")
 
 
 class WildfireEnv(EnvBase):
@@ -49,8 +43,8 @@ class WildfireEnv(EnvBase):
         device: Where the worlds live.
         validate: Check on every device that actions are in range, which costs a synchronisation on CUDA; by default
             they are checked on the CPU only.
-        fuse: Compile the step with ``torch.compile`` where that makes it faster, see ``why_eager``; the first steps are
-            then slow.
+        fuse: Compile the step with ``torch.compile`` where that makes it faster, see ``why_not_compiled``; the first
+            steps are then slow.
         graph: Record the step as one CUDA graph. World and observation must then stay as they are.
 
     Raises:
@@ -82,7 +76,7 @@ class WildfireEnv(EnvBase):
         self.reward_function = Efficiency() if reward is None else reward
         self.reward_function.check_world(self.world)
         self.validate = reads_freely(self.device) if validate is None else validate
-        self.why_eager = self._check_compiling() if fuse else None
+        self.why_eager = why_not_compiled(self.world, self.observation, self.device, n_worlds) if fuse else None
         """Why steps are not compiled where that was asked for; None where they are."""
         self._fuses = fuse and self.why_eager is None
         if graph and is_advised(self.observation):
@@ -318,19 +312,6 @@ class WildfireEnv(EnvBase):
         if self._recorded.scene.reward is not self.reward_function:
             self._recorded = RecordedStep(self._scene)
         return self._recorded(before, counts, action)
-
-    def _check_compiling(self) -> str | None:
-        check_compiler(self.device)
-        why = why_eager(self.world.fire, self.device, self.batch_size[0] * math.prod(self.world.size))
-        if self.world.sensing.is_limited:
-            why = "a step of agents that do not see all is not compiled"
-        elif self.world.team.radio.delay:
-            why = "a step of a team whose packets come late is not compiled"
-        elif is_advised(self.observation):
-            why = "a step with advice is not compiled"
-        if why is not None:
-            _log.info("compile: %s", why)
-        return why
 
     @property
     def _scene(self) -> Scene:
