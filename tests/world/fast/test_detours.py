@@ -48,6 +48,18 @@ def test_where_no_way_leads_is_far() -> None:
     assert everywhere([0], is_open)[0, 0].tolist() == [[0, 1, 2, FAR], [1, 1, 2, FAR], [2, 2, 2, FAR]]
 
 
+def test_a_way_of_more_moves_than_twice_both_sides_is_not_found() -> None:
+    # One way to and fro through rows of walls: 60 moves long, of which 2 (9 + 13) = 44 are found.
+    rows = ["x" * 13, "." * 12 + "x", "x" * 13, "x" + "." * 12]
+    is_open = marked(" ".join(rows[row % 4] for row in range(9)))
+    moves = torch.tensor(counted([0], is_open[0])[0]).view(9, 13)
+    assert int(moves[moves < FAR].max()) == 60
+    found = everywhere([0], is_open)
+    assert torch.equal(found[0, 0], torch.where(moves <= 44, moves, FAR))
+    with unread():
+        assert torch.equal(everywhere([0], is_open), found)
+
+
 @pytest.mark.parametrize("agents", [1, 8, 9, 20])
 def test_all_searches_at_once_find_what_one_after_the_other_finds(agents: int) -> None:
     generator = torch.Generator().manual_seed(agents)

@@ -1,4 +1,11 @@
-"""The moves from each agent to cells, around what blocks it: all agents' searches run at once, as the bits of bytes."""
+"""The moves from each agent to cells, around what blocks it: all agents' searches run at once, as the bits of bytes.
+
+Each round of a search adds the neighbours of the cells that it has reached. The maps lie in a row, one behind
+the other, with closed cells behind each of their own rows, so that the neighbours are the whole row, shifted.
+
+In which round a cell was reached is kept in Gray code, bit by bit: from one round to the next one bit alone differs, so
+that a round writes one plane of bits, of all cells that it has not reached.
+"""
 
 import torch
 from torch import Tensor
@@ -8,6 +15,8 @@ from warp_torchrl.world.fast.distances import FAR
 
 _TOGETHER = 8
 """Agents whose searches are the bits of one byte."""
+_ROUNDS = 8
+"""Rounds between two looks at whether a search has ended."""
 
 
 def moves_around(start: Tensor, is_open: Tensor, cells: Tensor) -> Tensor:
@@ -52,24 +61,61 @@ def _counted(start: Tensor, passable: Tensor, cells: Tensor, bit: Tensor) -> Ten
 
     Nothing is read back from a device where that is not free: there the search takes as many rounds as it may.
     """
-    reads, index, touched = reads_freely(start.device), cells.flatten(1), start
-    moves = torch.zeros(1, dtype=torch.int32, device=start.device)
-    for _ in range(2 * sum(start.shape[1:])):
-        missing = (touched.flatten(1).gather(1, index).view_as(cells) & bit) == 0
-        grown = _grown(touched & (passable | start))
-        if reads and (not missing.any() or torch.equal(grown, touched)):
+    worlds, height, width = start.shape
+    reads, most, wide = reads_freely(start.device), 2 * (height + width), width + 1
+    first = torch.arange(worlds, device=start.device)[:, None, None] * (height + 1) * wide
+    index = first + cells + cells // width
+    reached, passable = _in_a_row(start), _in_a_row(passable | start)
+    planes = reached.new_zeros(most.bit_length(), len(reached))
+    grow, turn = _Round(passable, wide), 0
+    while turn < most:
+        turn += 1
+        bit_that_differs = (turn & -turn).bit_length() - 1  # between the codes of this round and the one before
+        planes[bit_that_differs] ^= reached
+        before, reached = reached, grow(reached)
+        if reads and turn % _ROUNDS == 0 and (torch.equal(before, reached) or bool((reached[index] & bit).all())):
             break
-        moves, touched = moves + missing, grown
-    missing = (touched.flatten(1).gather(1, index).view_as(cells) & bit) == 0
-    return torch.where(missing, FAR, moves)
+    moves = _decoded(planes[: turn.bit_length()], index, bit) ^ turn
+    return torch.where((reached[index] & bit) == 0, FAR, moves.to(torch.int32))
 
 
-def _grown(bits: Tensor) -> Tensor:
-    """Return the bits of each cell and its eight neighbours together, uint8 [B, H, W]."""
-    rows = bits.clone()
-    rows[:, 1:] |= bits[:, :-1]
-    rows[:, :-1] |= bits[:, 1:]
-    grown = rows.clone()
-    grown[..., 1:] |= rows[..., :-1]
-    grown[..., :-1] |= rows[..., 1:]
-    return grown
+def _in_a_row(maps: Tensor) -> Tensor:
+    """Return maps uint8 [B, H, W] one behind the other, a zero behind each row and W + 1 behind each map."""
+    worlds, height, width = maps.shape
+    guarded = maps.new_zeros(worlds, height + 1, width + 1)
+    guarded[:, :height, :width] = maps
+    return guarded.flatten()
+
+
+class _Round:
+    """One round of a search, with the memory that all rounds share and views of it: most maps are so small that to make
+    a view takes as long as to compute with it.
+
+    Args:
+        passable: Cells from which the search goes on, maps in a row, uint8 [N].
+        wide: Cells from one row of a map to the next.
+    """
+
+    def __init__(self, passable: Tensor, wide: int) -> None:
+        self.passable = passable
+        source = passable.new_zeros(len(passable) + 2 * (wide + 1))  # with margins for the first and the last cell
+        self.source, self.beside = source[wide + 1 : -wide - 1], (source[:-2], source[1:-1], source[2:])
+        self.rows = torch.empty_like(source[2:])
+        self.around = (self.rows[: -2 * wide], self.rows[wide:-wide], self.rows[2 * wide :])
+
+    def __call__(self, reached: Tensor) -> Tensor:
+        """Return the bits of each cell and of its eight neighbours that are passable, uint8 [N]."""
+        torch.bitwise_and(reached, self.passable, out=self.source)
+        west, here, east = self.beside
+        torch.bitwise_or(west, here, out=self.rows).bitwise_or_(east)
+        north, here, south = self.around
+        return torch.bitwise_or(north, here).bitwise_or_(south)
+
+
+def _decoded(planes: Tensor, index: Tensor, bit: Tensor) -> Tensor:
+    """Return the numbers whose Gray codes stand in planes of bits uint8 [P, N], int16 [B, A, K], at the indices."""
+    above, number = torch.zeros_like(planes[0]), torch.zeros(1, dtype=torch.int16, device=planes.device)
+    for plane in planes.flip(0):
+        above = above ^ plane
+        number = 2 * number + ((above[index] & bit) != 0)
+    return number
