@@ -108,8 +108,14 @@ def list_cells(mask: Tensor) -> tuple[Tensor, Tensor]:
 
 def chebyshev_distance(state: WorldState, cells: Tensor) -> Tensor:
     """Return the Chebyshev distance from each agent to cells [B, K], float32 [B, A, K]."""
-    gap = state.vehicles.position[:, :, None] - place(cells, state)[:, None]
-    return gap.abs().amax(dim=-1).to(torch.float32)
+    row, column = state.vehicles.position.to(torch.float32)[:, :, None].unbind(dim=-1)
+    return _chebyshev(cells[:, None], row, column, state.cells.shape[2])
+
+
+def _chebyshev(cells: Tensor, row: Tensor, column: Tensor, width: int) -> Tensor:
+    """Return the Chebyshev distance of cells, flat indices, to places, rows and columns, float32, by broadcasting."""
+    rows, columns = (cells // width).to(torch.float32), (cells % width).to(torch.float32)
+    return torch.maximum((rows - row).abs_(), (columns - column).abs_())
 
 
 def nearest_fire(state: WorldState, fire: Tensor) -> tuple[Tensor, Tensor]:
@@ -236,16 +242,16 @@ def match_cells(state: WorldState, cells: Tensor, gain: Tensor, spacing: int, di
         taken: See ``claim_cells``.
     """
     worlds, agents, count = gain.shape
-    place_of = place(cells, state)
     claim = state.vehicles.position.clone()
     rows = torch.arange(worlds, device=cells.device)
     for _ in range(agents):
         best = gain.flatten(1).max(dim=1)
         agent, cell = best.indices // count, best.indices % count
-        claimed = place_of[rows, cell]
+        claimed = place(cells[rows, cell], state)
         worth = torch.isfinite(best.values)[:, None]
         claim[rows, agent] = torch.where(worth, claimed, claim[rows, agent])
-        distance = (place_of - claimed[:, None]).abs().amax(dim=-1)
+        row, column = claimed.to(torch.float32)[:, None].unbind(dim=-1)
+        distance = _chebyshev(cells, row, column, state.cells.shape[2])
         gain -= (discount * (distance <= spacing) + taken * (distance == 0))[:, None]
         gain[rows, agent] = -math.inf
     return claim
