@@ -49,7 +49,7 @@ def test_where_no_way_leads_is_far() -> None:
 
 
 def test_a_way_of_more_moves_than_twice_both_sides_is_not_found() -> None:
-    # One way to and fro through rows of walls: 60 moves long, of which 2 (9 + 13) = 44 are found.
+    # One way there and back through rows of walls: 60 moves long, of which 2 (9 + 13) = 44 are found.
     rows = ["x" * 13, "." * 12 + "x", "x" * 13, "x" + "." * 12]
     is_open = marked(" ".join(rows[row % 4] for row in range(9)))
     moves = torch.tensor(counted([0], is_open[0])[0]).view(9, 13)
