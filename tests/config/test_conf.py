@@ -36,11 +36,19 @@ OPTIONS = [(path.parent.name, path.stem) for path in sorted(conf_folder().glob("
 LANDFIRE = Path(__file__).parents[3] / "shared" / "landscapes" / "landfire"
 
 
+def composed(group, option):
+    """Return an option as Hydra composes it, beside options of other groups: one composition for one of each group."""
+    of_group = {each: [name for of, name in OPTIONS if of == each] for each in COMPONENTS}
+    place = of_group[group].index(option)
+    beside = [f"{each}={names[place]}" for each, names in of_group.items() if place < len(names)]
+    return plain(compose_config("train", ["scenario=default", *beside]))[group]
+
+
 @pytest.mark.parametrize(("group", "option"), [each for each in OPTIONS if each[0] in COMPONENTS])
 def test_every_option_builds_and_shows_every_field(group, option):
     if (group, option) == ("collector", "ray"):
         pytest.importorskip("ray", reason="Ray is not installed")
-    node = plain(compose_config("train", [f"{group}={option}"]))[group]
+    node = composed(group, option)
     needs_a_file = {"raster": Raster, "array": Array, "file": IgnitionFile, "gridded": Gridded, "weather": Weather}
     if option in needs_a_file:
         with pytest.raises(ConfigError, match=rf"{group}\.path must name"):
@@ -70,7 +78,7 @@ ONE_FOR_A_CLASS = [
 @pytest.mark.parametrize("option", ONE_FOR_A_CLASS)
 def test_a_class_without_arguments_is_its_option(option):
     ((group, _),) = [each for each in OPTIONS if each[1] == option and each[0] in COMPONENTS]
-    node = plain(compose_config("train", ["scenario=default", f"{group}={option}"]))[group]
+    node = composed(group, option)
     assert component(node["_target_"])() == build(node, group)
 
 

@@ -2,6 +2,7 @@
 
 import itertools
 from dataclasses import replace
+from functools import cache
 
 import pytest
 import torch
@@ -76,10 +77,18 @@ def fighting(observation, n_worlds=6, steps=12, messages="none"):
         landscape=Perlin(size=SIZE), wind=Uniform(speed=7.0, direction=35.0), team=team, horizon=60, steps_per_tick=3
     )
     env = WildfireEnv(world, n_worlds=n_worlds, observation=observation, seed=3)
+    env.set_state(played(world, n_worlds, steps).clone())
+    return env
+
+
+@cache
+def played(world, n_worlds, steps):
+    """Return what a few steps of ``local`` make of worlds."""
+    env = WildfireEnv(world, n_worlds=n_worlds, seed=3)
     now, rule = env.reset(), HEURISTICS["local"](env)
     for _ in range(steps):
         now = env.step(rule(now))["next"]
-    return env
+    return env.world_state
 
 
 def turned_map(plane, rows, columns, swapped):
