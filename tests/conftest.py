@@ -1,5 +1,6 @@
 """Small worlds that the tests of the upper floors share."""
 
+import gc
 import os
 from pathlib import Path
 
@@ -55,6 +56,12 @@ def pytest_collection_modifyitems(items):
         takes_long = item.get_closest_marker("slow") or item.get_closest_marker("stress")
         if item.path.relative_to(TESTS).as_posix() in QUICK and not takes_long:
             item.add_marker(pytest.mark.quick)
+
+
+def pytest_collection_finish():
+    """Have Python no longer look for garbage among what was imported and collected: a fifth of the tests' time."""
+    gc.collect()
+    gc.freeze()
 
 
 def small_world(**changes):
