@@ -1,7 +1,7 @@
 """The moves from each agent to cells, around what blocks it: all agents' searches run at once, as the bits of bytes.
 
-Each round of a search adds the neighbours of the cells that it has reached. The maps lie in a row, one behind
-the other, with closed cells behind each of their own rows, so that the neighbours are the whole row, shifted.
+Each round of a search adds the neighbours of the cells that it has reached. The maps lie in one row
+(``rows``), closed cells behind each row of each, so that the neighbours are the whole row, shifted.
 
 In which round a cell was reached is kept in Gray code, bit by bit: from one round to the next one bit alone differs, so
 that a round writes one plane of bits, of all cells that it has not reached.
@@ -12,6 +12,7 @@ from torch import Tensor
 
 from warp_torchrl.device import reads_freely
 from warp_torchrl.world.fast.distances import FAR
+from warp_torchrl.world.fast.rows import in_a_row
 
 _TOGETHER = 8
 """Agents whose searches are the bits of one byte."""
@@ -65,7 +66,8 @@ def _counted(start: Tensor, passable: Tensor, cells: Tensor, bit: Tensor) -> Ten
     reads, most, wide = reads_freely(start.device), 2 * (height + width), width + 1
     first = torch.arange(worlds, device=start.device)[:, None, None] * (height + 1) * wide
     index = first + cells + cells // width
-    reached, passable = _in_a_row(start), _in_a_row(passable | start)
+    margin = wide + 1
+    reached, passable = (in_a_row(maps)[margin:-margin] for maps in (start, passable | start))
     planes = reached.new_zeros(most.bit_length(), len(reached))
     grow, turn = _Round(passable, wide), 0
     while turn < most:
@@ -77,14 +79,6 @@ def _counted(start: Tensor, passable: Tensor, cells: Tensor, bit: Tensor) -> Ten
             break
     moves = _decoded(planes[: turn.bit_length()], index, bit) ^ turn
     return torch.where((reached[index] & bit) == 0, FAR, moves.to(torch.int32))
-
-
-def _in_a_row(maps: Tensor) -> Tensor:
-    """Return maps uint8 [B, H, W] one behind the other, a zero behind each row and W + 1 behind each map."""
-    worlds, height, width = maps.shape
-    guarded = maps.new_zeros(worlds, height + 1, width + 1)
-    guarded[:, :height, :width] = maps
-    return guarded.flatten()
 
 
 class _Round:

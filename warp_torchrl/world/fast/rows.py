@@ -35,11 +35,11 @@ def probability_from_rows(
         float32 [B, H, W].
     """
     shape, burning = tuple(susceptible.shape), number(spreading)
-    rows = [_in_a_row(to_uint8(byte(spreading)) if is_compiling() else burning)]
+    rows = [in_a_row(to_uint8(byte(spreading)) if is_compiling() else burning)]
     if gain.shape[2:] != (1, 1):
-        rows = [_in_a_row(burning * gain[:, direction]) for direction in range(8)]
+        rows = [in_a_row(burning * gain[:, direction]) for direction in range(8)]
         gain = torch.ones_like(gain[..., :1, :1])
-    target = susceptible if is_compiling() else _shifted(_in_a_row(susceptible), shape, 0)
+    target = susceptible if is_compiling() else _shifted(in_a_row(susceptible), shape, 0)
     total, strength, spare = torch.zeros_like(target), torch.empty_like(target), torch.empty_like(target)
     for direction in directions:
         source = _shifted(rows[direction % len(rows)], shape, -_offset(direction, shape)).to(torch.float32)
@@ -70,7 +70,7 @@ def expected_from_rows(
     shape = tuple(susceptible.shape)
     if gain.shape[2:] != (1, 1) and not is_compiling():
         gain = pad(gain, (0, 1, 0, 1))
-    row = _in_a_row(susceptible)
+    row = in_a_row(susceptible)
     total = torch.zeros_like(_shifted(row, shape, 0))
     strength = torch.empty_like(total)
     for direction in directions:
@@ -89,7 +89,7 @@ def _as_long(maps: Tensor) -> Tensor:
 
 # A compiler would ask of every neighbour anew whether it is on the map, and that one by one.
 @opaque_op("(Tensor maps) -> Tensor", like=_as_long)
-def _in_a_row(maps: Tensor) -> Tensor:
+def in_a_row(maps: Tensor) -> Tensor:
     """Lay [B, H, W] maps out in one row, each with a zero column and row after it and a margin at both ends."""
     worlds, height, width = maps.shape
     margin, row = width + 2, _as_long(maps)
