@@ -45,6 +45,16 @@ def test_it_holds_nothing_of_training_and_says_so(exported):
         found.training()
 
 
+def test_it_does_not_tell_where_its_run_started(run, tmp_path, capsys):
+    (tmp_path / "later").mkdir()
+    training = tiny(tmp_path / "later", "total_frames=64", f"start_from={run}")
+    training.train()
+    main([str(tmp_path / "later"), str(tmp_path / "policy")])
+    records = [newest(tmp_path / each)[0].record() for each in ("later", "policy")]
+    assert [each.values["start_from"] for each in records] == [str(run), None]
+    assert records[0].values | {"start_from": None} == records[1].values and records[0].choices == records[1].choices
+
+
 @pytest.mark.parametrize("name", ["policy.pt", "config.json"])
 def test_it_is_verified(exported, name):
     (exported / name).write_bytes((exported / name).read_bytes()[:-1] + b"?")

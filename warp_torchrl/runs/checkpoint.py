@@ -8,7 +8,7 @@ import fcntl
 import json
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -146,7 +146,7 @@ def save(
                 draft.mkdir()
                 disk.save_tensors(draft / "policy.pt", dict(policy))
                 disk.save_tensors(draft / TRAINING, dict(training))
-                (draft / "config.json").write_text(json.dumps(asdict(record), indent=1), encoding="utf-8")
+                _write_record(draft, record)
                 write_manifest(draft, frames, scenario, signature, mode)
                 _publish(draft, final)
         finally:
@@ -155,10 +155,16 @@ def save(
     return final
 
 
-def export(found: Checkpoint, folder: Path) -> None:
+def export(found: Checkpoint, folder: Path, names_its_origin: bool = False) -> None:
     """Write a checkpoint without its training state into a new folder.
 
+    Args:
+        found: The checkpoint.
+        folder: What to make.
+        names_its_origin: Whether its record keeps the run that it started from, a path that others do not have.
+
     Raises:
+        CheckpointError: If the record cannot be read.
         FileExistsError: If the folder exists.
         OSError: If a write fails.
     """
@@ -171,8 +177,15 @@ def export(found: Checkpoint, folder: Path) -> None:
         for name in manifest.files:
             if name != TRAINING:
                 shutil.copyfile(found.path / name, draft / name)
+        if not names_its_origin:
+            record = found.record()
+            _write_record(draft, replace(record, values={**record.values, "start_from": None}))
         write_manifest(draft, manifest.frames, manifest.scenario, manifest.signature, manifest.mode)
         _publish(draft, folder)
+
+
+def _write_record(folder: Path, record: SavedConfig) -> None:
+    (folder / "config.json").write_text(json.dumps(asdict(record), indent=1), encoding="utf-8")
 
 
 def leave_policy(run: Path) -> None:
@@ -186,7 +199,7 @@ def leave_policy(run: Path) -> None:
     apart, whole = found.path.with_name(".policy.tmp"), found.path.with_name(".whole.tmp")
     for left in (apart, whole):
         shutil.rmtree(left, ignore_errors=True)
-    export(found, apart)
+    export(found, apart, names_its_origin=True)
     found.path.rename(whole)
     apart.rename(found.path)
     disk.sync(found.path.parent)
