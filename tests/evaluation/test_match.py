@@ -30,7 +30,7 @@ def alike(one, other):
 @pytest.mark.parametrize("name", [name for name in HEURISTICS if not HEURISTICS[name].is_stateful])
 @pytest.mark.parametrize("watch", [pytest.param(False, marks=pytest.mark.slow), True], ids=["", "watched"])
 def test_a_heuristic_plays_as_step_by_step(name, watch, monkeypatch):
-    env = WildfireEnv(small_world(team=Team(n_agents=2, roles=("ugv", "uav")), horizon=20), n_worlds=9)
+    env = WildfireEnv(small_world(team=Team(n_agents=2, roles=("ugv", "uav")), horizon=14), n_worlds=9)
     policy = HEURISTICS[name](env)
     assert fits(env, policy)
     quick, state = play(env, policy, 5, watch=watch), env.world_state
@@ -65,7 +65,7 @@ def test_agencies_play_as_step_by_step(monkeypatch):
 
 
 def test_heuristics_play_side_by_side_as_they_do_alone(make_small_env, monkeypatch):
-    env, names = make_small_env(7, small_world(horizon=20)), tuple(HEURISTICS)
+    env, names = make_small_env(7, small_world(horizon=14)), tuple(HEURISTICS)
     abreast = play_module.play_heuristics(env, 5, names)
     monkeypatch.setattr(play_module, "_CELLS_ABREAST", 0)
     monkeypatch.setattr(play_module, "fits", lambda env, policy: False)

@@ -161,10 +161,10 @@ def counts_of_one_tick(fire: Fire, state: WorldState, trials: int) -> Tensor:
 
 
 def test_one_tick_is_distributed_as_the_literal_loop(compared: tuple[Fire, WorldState, LiteralFire]) -> None:
-    # Pearson's chi-square over all cells and outcomes with 1e5 trials each; false alarm 1e-4 a variant. Outcomes
+    # Pearson's chi-square over all cells and outcomes with 5e4 trials each; false alarm 1e-4 a variant. Outcomes
     # that never happen and those that always do are exact.
     fire, state, literal = compared
-    trials = 100_000
+    trials = 50_000
     counts = counts_of_one_tick(fire, state, trials)
     statistic, freedom = 0.0, 0
     for row in range(5):

@@ -37,7 +37,7 @@ WHOLE = {
 WINDS = {"calm": Calm(), "uniform": Uniform(speed=7.0), "wandering": Wandering(), "field": Paper()}
 
 
-def burning(fire: Fire, relief: float, wind: Wind, ticks: int = 9) -> list[WorldState]:
+def burning(fire: Fire, relief: float, wind: Wind, ticks: int = 7) -> list[WorldState]:
     """Return six worlds as they are before each of some ticks, the third of which waits."""
     world = World(landscape=Perlin(size=(11, 13), relief=relief), fire=fire, wind=wind)
     states, ticks_now = [world.reset(torch.arange(6), torch.zeros(6, dtype=torch.int64))], torch.arange(6) != 2
@@ -64,7 +64,7 @@ def test_planes_come_to_what_the_page_does(fire: Fire, relief: float, wind: Wind
         for road in (Page(fire), Planes(fire), fastest(fire, state.cells.device)):
             assert differing(road.tick(state, ticks_now), after) == []
         lit += int((q > 0.0).sum())
-    assert lit > 150
+    assert lit > 100
 
 
 @pytest.mark.parametrize("fire", ALONE.values(), ids=ALONE)
