@@ -166,6 +166,8 @@ def _run(name: str, job: Callable[[DictConfig], None]) -> None:
     logging.raiseExceptions = debug  # a full disk must not print a second error
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra then raises its errors instead of printing them
     keep_freed_memory()
+    if not debug:
+        logging.getLogger("torchrl").setLevel(logging.WARNING)  # it prints a line for each of its buffers
     with exit_on_signal():
         try:
             _check_grammar(arguments)

@@ -109,13 +109,14 @@ def list_cells(mask: Tensor) -> tuple[Tensor, Tensor]:
 def chebyshev_distance(state: WorldState, cells: Tensor) -> Tensor:
     """Return the Chebyshev distance from each agent to cells [B, K], float32 [B, A, K]."""
     row, column = state.vehicles.position.to(torch.float32)[:, :, None].unbind(dim=-1)
-    return _chebyshev(cells[:, None], row, column, state.cells.shape[2])
+    rows, columns = _rows_and_columns(cells, state)
+    return torch.maximum((rows[:, None] - row).abs_(), (columns[:, None] - column).abs_())
 
 
-def _chebyshev(cells: Tensor, row: Tensor, column: Tensor, width: int) -> Tensor:
-    """Return the Chebyshev distance of cells, flat indices, to places, rows and columns, float32, by broadcasting."""
-    rows, columns = (cells // width).to(torch.float32), (cells % width).to(torch.float32)
-    return torch.maximum((rows - row).abs_(), (columns - column).abs_())
+def _rows_and_columns(cells: Tensor, state: WorldState) -> tuple[Tensor, Tensor]:
+    """Return the rows and the columns of flat indices, float32, each in memory of its own, which is fast to read."""
+    width = state.cells.shape[2]
+    return (cells // width).to(torch.float32), (cells % width).to(torch.float32)
 
 
 def nearest_fire(state: WorldState, fire: Tensor) -> tuple[Tensor, Tensor]:
@@ -243,17 +244,17 @@ def match_cells(state: WorldState, cells: Tensor, gain: Tensor, spacing: int, di
     """
     worlds, agents, count = gain.shape
     claim = state.vehicles.position.clone()
-    rows = torch.arange(worlds, device=cells.device)
+    rows, columns = _rows_and_columns(cells, state)
+    world = torch.arange(worlds, device=cells.device)
     for _ in range(agents):
         best = gain.flatten(1).max(dim=1)
-        agent, cell = best.indices // count, best.indices % count
-        claimed = place(cells[rows, cell], state)
+        agent, which = best.indices // count, best.indices % count
         worth = torch.isfinite(best.values)[:, None]
-        claim[rows, agent] = torch.where(worth, claimed, claim[rows, agent])
-        row, column = claimed.to(torch.float32)[:, None].unbind(dim=-1)
-        distance = _chebyshev(cells, row, column, state.cells.shape[2])
+        claim[world, agent] = torch.where(worth, place(cells[world, which], state), claim[world, agent])
+        row, column = rows[world, which][:, None], columns[world, which][:, None]
+        distance = torch.maximum((rows - row).abs_(), (columns - column).abs_())
         gain -= (discount * (distance <= spacing) + taken * (distance == 0))[:, None]
-        gain[rows, agent] = -math.inf
+        gain[world, agent] = -math.inf
     return claim
 
 

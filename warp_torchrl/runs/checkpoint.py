@@ -155,31 +155,29 @@ def save(
     return final
 
 
-def export(found: Checkpoint, folder: Path, names_its_origin: bool = False) -> None:
+def export(found: Checkpoint, folder: Path) -> None:
     """Write a checkpoint without its training state into a new folder.
 
-    Args:
-        found: The checkpoint.
-        folder: What to make.
-        names_its_origin: Whether its record keeps the run that it started from, a path that others do not have.
+    Its record does not tell from which run the training started, a path that others do not have.
 
     Raises:
         CheckpointError: If the record cannot be read.
         FileExistsError: If the folder exists.
         OSError: If a write fails.
     """
+    record = found.record()
+    _write_policy(found, folder, replace(record, values={**record.values, "start_from": None}))
+
+
+def _write_policy(found: Checkpoint, folder: Path, record: SavedConfig) -> None:
     manifest, draft = found.manifest, folder.with_name(f".{folder.name}.tmp")
     if folder.exists():
         raise FileExistsError(f"{folder} exists")
     shutil.rmtree(draft, ignore_errors=True)
     with disk.with_path(draft):
         draft.mkdir(parents=True)
-        for name in manifest.files:
-            if name != TRAINING:
-                shutil.copyfile(found.path / name, draft / name)
-        if not names_its_origin:
-            record = found.record()
-            _write_record(draft, replace(record, values={**record.values, "start_from": None}))
+        shutil.copyfile(found.path / "policy.pt", draft / "policy.pt")
+        _write_record(draft, record)
         write_manifest(draft, manifest.frames, manifest.scenario, manifest.signature, manifest.mode)
         _publish(draft, folder)
 
@@ -199,7 +197,7 @@ def leave_policy(run: Path) -> None:
     apart, whole = found.path.with_name(".policy.tmp"), found.path.with_name(".whole.tmp")
     for left in (apart, whole):
         shutil.rmtree(left, ignore_errors=True)
-    export(found, apart, names_its_origin=True)
+    _write_policy(found, apart, found.record())
     found.path.rename(whole)
     apart.rename(found.path)
     disk.sync(found.path.parent)

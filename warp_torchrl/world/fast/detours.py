@@ -66,12 +66,10 @@ def _counted(start: Tensor, passable: Tensor, cells: Tensor, bit: Tensor) -> Ten
     reads, most, wide = reads_freely(start.device), 2 * (height + width), width + 1
     first = torch.arange(worlds, device=start.device)[:, None, None] * (height + 1) * wide
     index = first + cells + cells // width
-    margin = wide + 1
-    reached, passable = (in_a_row(maps)[margin:-margin] for maps in (start, passable | start))
+    grow = _Round(in_a_row(passable | start), wide)
+    reached = grow.without_margins(in_a_row(start))
     planes = reached.new_zeros(most.bit_length(), len(reached))
-    grow, turn = _Round(passable, wide), 0
-    while turn < most:
-        turn += 1
+    for turn in range(1, most + 1):
         bit_that_differs = (turn & -turn).bit_length() - 1  # between the codes of this round and the one before
         planes[bit_that_differs] ^= reached
         before, reached = reached, grow(reached)
@@ -86,16 +84,20 @@ class _Round:
     a view takes as long as to compute with it.
 
     Args:
-        passable: Cells from which the search goes on, maps in a row, uint8 [N].
+        passable: Cells from which the search goes on, maps in a row with margins, uint8.
         wide: Cells from one row of a map to the next.
     """
 
     def __init__(self, passable: Tensor, wide: int) -> None:
-        self.passable = passable
-        source = passable.new_zeros(len(passable) + 2 * (wide + 1))  # with margins for the first and the last cell
-        self.source, self.beside = source[wide + 1 : -wide - 1], (source[:-2], source[1:-1], source[2:])
+        source, self.margin = torch.zeros_like(passable), wide + 1
+        self.passable, self.source = self.without_margins(passable), self.without_margins(source)
+        self.beside = (source[:-2], source[1:-1], source[2:])
         self.rows = torch.empty_like(source[2:])
         self.around = (self.rows[: -2 * wide], self.rows[wide:-wide], self.rows[2 * wide :])
+
+    def without_margins(self, row: Tensor) -> Tensor:
+        """Return the maps of a row, uint8 [N]."""
+        return row[self.margin : -self.margin]
 
     def __call__(self, reached: Tensor) -> Tensor:
         """Return the bits of each cell and of its eight neighbours that are passable, uint8 [N]."""
