@@ -18,6 +18,7 @@ from warp_torchrl.commands import checks as checks_module
 from warp_torchrl.commands import command as command_module
 from warp_torchrl.commands.command import evaluate, train
 from warp_torchrl.runs import checkpoint
+from warp_torchrl.runs.lock import RunFolderLock
 from warp_torchrl.training.loop import Training
 
 ROOT = Path(__file__).parents[2]
@@ -441,7 +442,7 @@ def test_a_signal_ends_a_sweep(tmp_path, run_here, monkeypatch):
 
 
 def test_a_second_run_in_a_folder_is_refused_and_the_first_goes_on(tmp_path, run_here):
-    lock = checkpoint.RunFolderLock(tmp_path / "run")
+    lock = RunFolderLock(tmp_path / "run")
     code, errors, _ = run_here("train.py", *SHORT)
     lock.release()
     assert code == 3 and "in use" in errors[-1]

@@ -17,7 +17,7 @@ from warp_torchrl.commands.failure import DISK, DONE, IN_USE, MISTAKE
 from warp_torchrl.commands.search import FIRES, check_points, main
 from warp_torchrl.config.compose import compose_config, conf_folder, plain
 from warp_torchrl.config.space import divided
-from warp_torchrl.runs.checkpoint import RunFolderLock
+from warp_torchrl.runs.lock import RunFolderLock
 
 optuna = pytest.importorskip("optuna", reason="needs the extra search")
 

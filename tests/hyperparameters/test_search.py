@@ -17,7 +17,8 @@ from warp_torchrl.config.space import dimension
 from warp_torchrl.hyperparameters.search import Search, best_of, wait_until_free
 from warp_torchrl.hyperparameters.storage import JOURNAL, open_study
 from warp_torchrl.hyperparameters.training import SearchEnded
-from warp_torchrl.runs.checkpoint import RunFolderInUse, RunFolderLock, newest
+from warp_torchrl.runs.checkpoint import newest
+from warp_torchrl.runs.lock import RunFolderInUse, RunFolderLock
 
 SPACE = [dimension("x=interval(0, 1)"), dimension("n=int(interval(1, 9))"), dimension("kind=good,bad")]
 

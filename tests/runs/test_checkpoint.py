@@ -13,7 +13,7 @@ from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.saved_config import SavedConfig, restore
 from warp_torchrl.models import Entry, Signature
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs.checkpoint import CheckpointError, RunFolderInUse, RunFolderLock, newest
+from warp_torchrl.runs.checkpoint import CheckpointError, newest
 from warp_torchrl.symmetry import Planes, to_plain
 
 ACTIONS = tuple(f"action_{code}" for code in range(11))
@@ -271,15 +271,6 @@ def test_what_somebody_else_removes_meanwhile_is_gone_and_no_error(tmp_path, mon
         (tmp_path / "checkpoints" / f".{frames}.tmp").mkdir(parents=True)
         saved(tmp_path, frames, keep=2)
     assert sorted(each.name for each in (tmp_path / "checkpoints").iterdir()) == ["3", "4"]
-
-
-def test_a_run_folder_has_one_writer(tmp_path):
-    run = tmp_path / "runs" / "of today"  # neither is there
-    lock = RunFolderLock(run)
-    with pytest.raises(RunFolderInUse, match="in use"):
-        RunFolderLock(run)
-    lock.release()
-    RunFolderLock(run).release()
 
 
 def test_a_run_that_leaves_its_policy_has_nothing_to_go_on_from(tmp_path):

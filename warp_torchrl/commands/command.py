@@ -29,6 +29,7 @@ from warp_torchrl.evaluation.evaluate import evaluate_policy
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs import disk
 from warp_torchrl.runs.destination import check_free
+from warp_torchrl.runs.lock import RunFolderLock
 from warp_torchrl.runs.resumption import resumption
 from warp_torchrl.runs.shipped import find_policy
 from warp_torchrl.training.loop import Training
@@ -60,7 +61,7 @@ def _train_job(config: DictConfig) -> None:
         return
     resumed = config.resume is not None
     folder = Path(config.resume if resumed else HydraConfig.get().runtime.output_dir)
-    lock = checkpoints.RunFolderLock(folder)
+    lock = RunFolderLock(folder)
     try:
         if resumed:
             _resume(folder, new_total(config, HydraConfig.get().overrides.task))

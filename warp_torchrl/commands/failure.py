@@ -8,8 +8,8 @@ from pathlib import Path
 from warp_torchrl.config.compose import HYDRA_ERRORS, one_line
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.parallel import WorkerDied
-from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.exit_codes import DISK, DONE, IN_USE, MISTAKE, NUMERICAL, UNSOUND
+from warp_torchrl.runs.lock import RunFolderInUse
 from warp_torchrl.runs.sealed import Unsound
 from warp_torchrl.training.finite import NumericalFailure
 from warp_torchrl.training.signals import Stopped
@@ -32,7 +32,7 @@ def _diagnose(error: Exception) -> tuple[int, str]:
     line = " ".join(text.split()) or type(error).__name__
     if isinstance(error, Stopped):
         return 128 + error.number, line
-    if isinstance(error, checkpoints.RunFolderInUse):
+    if isinstance(error, RunFolderInUse):
         return IN_USE, line
     if isinstance(error, Unsound):
         return UNSOUND, line

@@ -26,8 +26,9 @@ from warp_torchrl.config.search_options import SearchOptions
 from warp_torchrl.config.space import Dimension, Value, divided
 from warp_torchrl.hyperparameters.training import SearchEnded, TrainingProcess
 from warp_torchrl.runs import disk
-from warp_torchrl.runs.checkpoint import RunFolderLock, holds_any
+from warp_torchrl.runs.checkpoint import holds_any
 from warp_torchrl.runs.destination import check_free
+from warp_torchrl.runs.lock import RunFolderLock
 from warp_torchrl.training.signals import DeferredSignals, exit_on_signal
 
 if TYPE_CHECKING:

@@ -15,8 +15,9 @@ from warp_torchrl.config.space import Dimension, Value
 from warp_torchrl.hyperparameters.measures import saved_at_the_end, saved_by_share, saved_in_evaluation
 from warp_torchrl.hyperparameters.storage import ask, draw, goes_on
 from warp_torchrl.hyperparameters.training import STOPPED, SearchEnded, Training
-from warp_torchrl.runs.checkpoint import RunFolderInUse, RunFolderLock, holds_any, leave_policy
+from warp_torchrl.runs.checkpoint import holds_any, leave_policy
 from warp_torchrl.runs.exit_codes import DISK, DONE, NUMERICAL
+from warp_torchrl.runs.lock import RunFolderInUse, RunFolderLock
 
 log = logging.getLogger("warp_torchrl")
 

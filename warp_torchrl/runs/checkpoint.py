@@ -4,7 +4,6 @@
 ``weights_only=True``), ``config.json``, and ``manifest.json``, see ``warp_torchrl.runs.manifest``.
 """
 
-import fcntl
 import json
 import shutil
 from collections.abc import Callable, Mapping
@@ -33,18 +32,12 @@ __all__ = [
     "MANIFEST",
     "Checkpoint",
     "CheckpointError",
-    "RunFolderInUse",
-    "RunFolderLock",
     "export",
     "holds_any",
     "leave_policy",
     "newest",
     "save",
 ]
-
-
-class RunFolderInUse(Exception):  # noqa: N818
-    """Another process writes into the run folder."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -235,27 +228,6 @@ def newest(path: Path | str) -> tuple[Checkpoint, list[str]]:
             skipped.append(str(error))
     reason = f": {skipped[0]}" if skipped else f": no folder in {path / 'checkpoints'}"
     raise CheckpointError(f"{path} holds no sound checkpoint{reason}")
-
-
-class RunFolderLock:
-    """Locks a run folder for one process; the operating system releases the lock when the process ends.
-
-    Raises:
-        RunFolderInUse: If another process has the lock.
-    """
-
-    def __init__(self, run: Path) -> None:
-        run.mkdir(parents=True, exist_ok=True)
-        self._file = (run / ".lock").open("w")
-        try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            self._file.close()
-            raise RunFolderInUse(f"{run} is in use: another process trains into it") from None
-
-    def release(self) -> None:
-        """Release the lock."""
-        self._file.close()
 
 
 def _publish(draft: Path, final: Path) -> None:
