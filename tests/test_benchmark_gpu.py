@@ -17,14 +17,15 @@ def test_everything_is_measured_and_written(tmp_path, capsys):
     path = tmp_path / "figures.json"
     main(["gpu", "--device", "cpu", "--file", str(path)])
     found = json.loads(path.read_text())
-    parts = ["equality", "waits", "steps 2", "steps 4", "training eager", "training graph"]
+    parts = ["equality", "starts", "waits", "steps 2", "steps 4", "training eager", "training graph"]
     assert [name for name in found if name not in ("machine", "scenario", "seconds")] == parts
     assert len(capsys.readouterr().out.splitlines()) == len(parts)
     assert found["machine"]["torch"] == torch.__version__ and found["seconds"] > 0.0
     assert found["equality"]["differing"] == {} and max(found["equality"]["furthest"].values()) < 1e-5
+    assert found["starts"] == {"worlds": 8, "differing": {}}
     assert found["waits"]["step"] <= 1 and 0 < found["waits"]["iteration"] <= 3
     assert sum(found["waits"]["places"].values()) == found["waits"]["step"] + found["waits"]["iteration"]
-    for name in parts[2:4]:
+    for name in parts[3:5]:
         assert {"eager", "graph", "tick", "peak_gib"} == set(found[name])
         assert found[name]["tick"]["cells_per_second"] > 0.0
     for row in (found["steps 4"]["graph"], found["training graph"]):
@@ -61,6 +62,17 @@ def test_a_part_that_fails_does_not_take_the_others_along(tmp_path, monkeypatch,
     assert end.value.code == 1 and "a part was not measured" in capsys.readouterr().err
     assert found["waits"]["error"] == "RuntimeError: no such kernel" and "broken" in found["waits"]["traceback"]
     assert found["training eager"]["agent_steps_per_second"] > 0.0
+
+
+def test_a_way_that_fails_does_not_take_the_others_along(tmp_path, monkeypatch):
+    def broken(way, *given):
+        raise RuntimeError("no such kernel")
+
+    monkeypatch.setattr(gpu, "_steps_by", broken)
+    assert not measure_gpu("cpu", tmp_path / "gpu.json", ONE, tell=lambda line: None)
+    found = json.loads((tmp_path / "gpu.json").read_text())["steps 2"]
+    assert found["error"] == found["eager"]["error"] == "RuntimeError: no such kernel"
+    assert found["tick"]["cells_per_second"] > 0.0
 
 
 def test_no_part_begins_late(tmp_path):

@@ -305,12 +305,13 @@ def test_it_renders_every_world(make_small_env):
 def test_cuda_equals_cpu_and_a_step_does_not_synchronise():
     ours, theirs = WildfireEnv(small_world(), n_worlds=4), WildfireEnv(small_world(), n_worlds=4, device="cuda")
     ours.reset(), theirs.reset()
-    stepped(theirs, team_of(theirs).cuda())
+    action = team_of(theirs).cuda()  # a copy to the device waits
+    stepped(theirs, action)
     stepped(ours, team_of(ours))
     torch.cuda.set_sync_debug_mode("error")
     try:
         for _ in range(20):
-            theirs._step(TensorDict({"agents": {"action": team_of(theirs).cuda()}}, batch_size=[4]))
+            theirs._step(TensorDict({"agents": {"action": action}}, batch_size=[4]))
     finally:
         torch.cuda.set_sync_debug_mode("default")
     for _ in range(20):

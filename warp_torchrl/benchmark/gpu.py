@@ -41,6 +41,7 @@ class Size:
         steps: Steps in a repeat.
         repeats: Times that each speed is measured.
         compared: Worlds that are compared with the CPU's, and for how many steps.
+        starts: Worlds whose starts are compared.
         training: Overrides of the recipe.
         ways: Of ``_WAYS``.
         seconds: After so many no further part begins.
@@ -50,6 +51,7 @@ class Size:
     steps: int = 32
     repeats: int = 3
     compared: tuple[int, int] = (256, 128)
+    starts: int = 16384
     training: tuple[str, ...] = ("experiment=gpu",)
     ways: tuple[str, ...] = ("eager", "graph", "compiled")
     seconds: float = 240.0
@@ -60,6 +62,7 @@ SMALL = Size(
     steps=2,
     repeats=1,
     compared=(2, 8),
+    starts=8,
     training=("n_worlds=4", "collector.steps=8", "horizon=8", "model.actor_hidden=[8]", "model.critic_hidden=[8]"),
     ways=("eager", "graph"),
 )
@@ -79,6 +82,7 @@ def measure_gpu(device: str, path: Path, size: Size, tell: Callable[[str], objec
     found: dict[str, Any] = {"machine": _machine(device), "scenario": _SCENARIO}
     parts: dict[str, Callable[[], Any]] = {
         "equality": partial(_equality, device, *size.compared),
+        "starts": partial(_starts, device, size.starts),
         "waits": partial(_waits, device, size.training),
         **{f"steps {n}": partial(_steps, device, n, size) for n in size.worlds},
         **{f"training {way}": partial(_training, device, way, size) for way in size.ways},
@@ -139,6 +143,16 @@ def _equality(device: str, n_worlds: int, steps: int) -> dict[str, Any]:
     return {"worlds": n_worlds, "steps": steps, "differing": differing, "furthest": seen}
 
 
+def _starts(device: str, n_worlds: int) -> dict[str, Any]:
+    """Return in how many of many worlds the device starts otherwise than the CPU, and in what."""
+    here, there = (make_env(_SCENARIO, n_worlds=n_worlds, device=each) for each in ("cpu", device))
+    here.reset()
+    there.reset()
+    mine, its = here.world_state, there.world_state.to("cpu").leaves()
+    unlike = {name: (leaf != its[name]).reshape(n_worlds, -1).any(1) for name, leaf in mine.leaves().items()}
+    return {"worlds": n_worlds, "differing": {name: int(each.sum()) for name, each in unlike.items() if each.any()}}
+
+
 def _furthest(gaps: Any) -> float:
     leaves = gaps.values(True, True) if hasattr(gaps, "batch_size") else [gaps]
     return max(float(leaf.double().abs().max()) for leaf in leaves)
@@ -160,26 +174,39 @@ def _waits(device: str, overrides: tuple[str, ...]) -> dict[str, Any]:
 def _steps(device: str, n_worlds: int, size: Size) -> dict[str, Any]:
     """Return the rates of ticks and, each way, of steps with observations, rewards, metrics and resets."""
     _forget_peak(device)
-    found: dict[str, Any] = {}
-    for way in size.ways:
-        env = make_env(_SCENARIO, n_worlds=n_worlds, device=device, **_WAYS[way])
-        play = random_play(env)
-        play(size.steps)
-        seconds = take_turns({way: partial(play, size.steps)}, size.repeats, device)[way]
-        rates = [n_worlds * env.n_agents * size.steps / each for each in seconds]
-        found[way] = spread("agent_steps_per_second", rates)
+    parts: dict[str, Callable[[], Any]] = {way: partial(_steps_by, way, device, n_worlds, size) for way in size.ways}
+    parts["tick"] = partial(_ticks, device, n_worlds, size)
+    found = {name: _told(part, device) for name, part in parts.items()}
+    failed = [each["error"] for each in found.values() if "error" in each]
+    return found | ({"error": failed[0]} if failed else {}) | {"peak_gib": _peak(device)}
+
+
+def _steps_by(way: str, device: str, n_worlds: int, size: Size) -> dict[str, Any]:
+    env = make_env(_SCENARIO, n_worlds=n_worlds, device=device, **_WAYS[way])
+    play = random_play(env)
+    now = clock(device)
+    start = now()
+    play(size.steps)
+    first = now() - start
+    seconds = take_turns({way: partial(play, size.steps)}, size.repeats, device)[way]
+    rates = [n_worlds * env.n_agents * size.steps / each for each in seconds]
+    return {**spread("agent_steps_per_second", rates), "first_steps_seconds": first}
+
+
+def _ticks(device: str, n_worlds: int, size: Size) -> dict[str, Any]:
+    env = make_env(_SCENARIO, n_worlds=n_worlds, device=device)
+    random_play(env)(size.steps)
     state, world = env.world_state, env.world
     due = torch.ones(n_worlds, dtype=torch.bool, device=device)
     seconds = take_turns({"tick": lambda: advance(state, world.fire, world.air, due)}, size.repeats, device)["tick"]
     cells = state.cells.numel()
-    found["tick"] = spread("cells_per_second", [cells / each for each in seconds])
-    return found | {"peak_gib": _peak(device)}
+    return spread("cells_per_second", [cells / each for each in seconds])
 
 
 def _training(device: str, way: str, size: Size) -> dict[str, Any]:
     """Return the rate at which the recipe collects and learns."""
     _forget_peak(device)
-    extra = [f"{name}=true" for name in _WAYS[way]]
+    extra = [f"{name}={str(name in _WAYS[way]).lower()}" for name in ("graph", "compile")]
     with _trained(device, [*size.training, *extra]) as (training, batches):
         now = clock(device)
         agents = training.env.n_agents * training.frames_per_batch

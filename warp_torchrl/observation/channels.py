@@ -16,7 +16,7 @@ from torch import Tensor
 
 from warp_torchrl.content import Content, Empty, Follows
 from warp_torchrl.validation import check_new_name
-from warp_torchrl.world.fast.bytes import at_least, byte, equal, to_codes, to_int32
+from warp_torchrl.world.fast.bytes import at_least, byte, equal, scatter_add, to_codes, to_int32
 from warp_torchrl.world.fast.squares import Window, window
 from warp_torchrl.world.role import PAPER_ROLES
 from warp_torchrl.world.sensing import freshness, read
@@ -298,5 +298,5 @@ def _others(state: WorldState, world: World, radius: int) -> Tensor:
     is_near &= known
     index = torch.where(is_near, (role * side + row) * side + column, roles * side**2)
     count = torch.zeros(*row.shape[:2], roles * side**2 + 1, dtype=torch.uint8, device=role.device)
-    count = count.scatter_add(2, index, torch.ones_like(index, dtype=torch.uint8))[..., :-1]
+    count = scatter_add(count, index, torch.ones_like(index, dtype=torch.uint8))[..., :-1]
     return count.clamp(max=4).mul_(63).unflatten(-1, (roles, side, side))

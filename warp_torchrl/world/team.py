@@ -11,6 +11,7 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.abilities import ABILITIES, PAPER_ABILITIES, Ability, Deed, Situation, neighbourhood
+from warp_torchrl.world.fast.bytes import scatter_add
 from warp_torchrl.world.flight import Flight, grounded
 from warp_torchrl.world.radio import Radio
 from warp_torchrl.world.role import ROLES, RoleTable, role_names, role_table
@@ -278,7 +279,7 @@ def changed(state: WorldState, target: Tensor, deeds: list[tuple[Tensor, Mapping
         codes = plane.view(torch.uint8).flatten(1)
         old = codes.gather(1, target)
         changes = [credited * (becomes[name] - old) for credited, becomes in deeds if name in becomes]
-        after[name] = codes.scatter_add(1, target, reduce(add, changes)).view_as(plane).view(plane.dtype)
+        after[name] = scatter_add(codes, target, reduce(add, changes)).view_as(plane).view(plane.dtype)
     return state.replace(**after)
 
 

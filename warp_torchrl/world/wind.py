@@ -137,7 +137,7 @@ class Paper(Wind):
         sine: Tensor | float = 0.0
         if self.rotate:
             angle = (uniform(key, 0, Stream.WIND, (1, 1)) * (2.0 * math.pi)).to(torch.float32)
-            cosine, sine = angle.cos(), angle.sin()
+            cosine, sine = _cosine_and_sine(angle)
         x, y = cosine * east + sine * north, cosine * north - sine * east
         u, v = -1.0 - x * x + x + y, (1.0 + x * x - y * y) / 10.0
         return self.scale * torch.stack((cosine * u - sine * v, sine * u + cosine * v), dim=1)
@@ -199,7 +199,7 @@ class Wandering(Wind):
         gust = fresh * _normals(state.key, state.tick)
         u, v = state.wind[:, 0, 0, 0], state.wind[:, 1, 0, 0]
         mean = _angle(state.episode_key, self.direction)
-        turn = _angle_between(mean.cos(), mean.sin(), u, v)
+        turn = _angle_between(*_cosine_and_sine(mean), u, v)
         speed = self.speed + (torch.hypot(u, v) - self.speed) * kept + self.speed_deviation * gust[:, 0]
         turn = turn * kept + math.radians(self.direction_deviation) * gust[:, 1]
         return _vector(self._reflected(speed), mean + turn)
@@ -222,7 +222,13 @@ def _angle(key: Tensor, direction: float | None) -> Tensor:
 
 def _vector(speed: Tensor, angle: Tensor) -> Tensor:
     """Return the wind of a speed [B] [m/s] and an angle [B] [radians], float32 [B, 2, 1, 1] [m/s]."""
-    return (speed * torch.stack((angle.cos(), angle.sin()))).T[:, :, None, None]
+    return (speed * torch.stack(_cosine_and_sine(angle))).T[:, :, None, None]
+
+
+def _cosine_and_sine(angle: Tensor) -> tuple[Tensor, Tensor]:
+    """Return both, float32 of float32, the nearest to their values: a GPU's own float32 ones have other last bits."""
+    exact = angle.to(torch.float64)
+    return exact.cos().to(torch.float32), exact.sin().to(torch.float32)
 
 
 def _angle_between(east: Tensor, north: Tensor, u: Tensor, v: Tensor) -> Tensor:
@@ -238,4 +244,4 @@ def _normals(key: Tensor, tick: Tensor) -> Tensor:
     """Draw two standard normals for each world, float32 [B, 2] (Box and Muller 1958)."""
     first, second = uniform(key, tick, Stream.GUST, (2,)).unbind(dim=1)
     radius, angle = (-2.0 * torch.log1p(-first)).sqrt(), second * (2.0 * math.pi)
-    return torch.stack((radius * angle.cos(), radius * angle.sin()), dim=1)
+    return torch.stack(_cosine_and_sine(angle), dim=1) * radius[:, None]

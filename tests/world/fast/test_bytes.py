@@ -3,6 +3,7 @@
 import pytest
 import torch
 
+from warp_torchrl.world.fast import bytes as fast_bytes
 from warp_torchrl.world.fast.bytes import (
     above,
     at_least,
@@ -13,6 +14,7 @@ from warp_torchrl.world.fast.bytes import (
     counts,
     equal,
     number,
+    scatter_add,
     zero_where,
 )
 
@@ -57,3 +59,13 @@ def test_choices():
     assert torch.equal(number(mask), mask.to(torch.float32))
     assert counts(byte(mask).expand(2, -1, -1))[0].tolist() == [int(mask.sum())] * 2
     assert counts(torch.ones(1, 300, 300, dtype=torch.uint8))[0].item() == 90_000
+
+
+@pytest.mark.parametrize("on_a_compiled_gpu", [False, True])
+def test_sums_at_places_wrap_around(on_a_compiled_gpu, monkeypatch):
+    given, place = torch.tensor([[250, 7, 9]], dtype=torch.uint8), torch.tensor([[0, 0, 2]])
+    if on_a_compiled_gpu:
+        monkeypatch.setattr(fast_bytes, "is_compiling", lambda: True)
+        monkeypatch.setattr(fast_bytes, "_ADDS_BYTES", ())
+    found = scatter_add(given, place, torch.tensor([[5, 4, 255]], dtype=torch.uint8))
+    assert found.tolist() == [[3, 7, 8]] and found.dtype == torch.uint8

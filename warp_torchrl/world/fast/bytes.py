@@ -13,6 +13,8 @@ from torch.compiler import is_compiling
 from warp_torchrl.world.fast.constants import numbers
 
 _WORDS = 128
+_ADDS_BYTES = ("cpu",)
+"""Where compiled code adds bytes at places; on GPUs Inductor asks Triton for it, which does not."""
 
 
 def to_int32(codes: Tensor) -> Tensor:
@@ -120,6 +122,13 @@ def index_put(plane: Tensor, place: Tensor, values: Tensor | int) -> Tensor:
     flat = plane.flatten()
     flat = flat.index_copy_(0, place, values) if isinstance(values, Tensor) else flat.index_fill_(0, place, values)
     return flat.view(plane.shape)
+
+
+def scatter_add(codes: Tensor, index: Tensor, changes: Tensor) -> Tensor:
+    """Return codes, uint8 [..., N], with changes, uint8 [..., K], added modulo 256 at places, int64 [..., K]."""
+    if is_compiling() and codes.device.type not in _ADDS_BYTES:
+        return codes.to(torch.int32).scatter_add(-1, index, changes.to(torch.int32)).to(torch.uint8)
+    return codes.scatter_add(-1, index, changes)
 
 
 def look_up(table: tuple[float, ...], codes: Tensor) -> Tensor:
