@@ -288,6 +288,20 @@ def test_a_yaml_file_that_sets_a_part_of_a_component_leaves_the_rest_as_it_is(na
     assert merged == team
 
 
+def test_a_file_that_changes_is_read_again_and_else_once(tmp_path, monkeypatch):
+    shutil.copytree(conf_folder(), tmp_path / "conf")
+    monkeypatch.setattr("warp_torchrl.config.compose.conf_folder", lambda: tmp_path / "conf")
+    read, load = [], OmegaConf.load
+    monkeypatch.setattr(OmegaConf, "load", lambda file: read.append(Path(file.name)) or load(file))
+    mine = (tmp_path / "conf/wind/mine.yaml").resolve()
+    for speed in (1.0, 2.0):
+        OmegaConf.save({"_target_": "warp_torchrl.world.wind.Uniform", "speed": speed}, mine)
+        for seed in (1, 2):
+            config = compose_config("train", ["wind=mine", f"seed={seed}"])
+            assert config.wind.speed == speed and "direction" in config.wind
+    assert read.count(mine) == 2
+
+
 def test_components_are_made_of_plain_parts():
     node = {"_target_": "warp_torchrl.world.team.Team", "radio": {"carries": "graph"}}
     assert build(node, "team") == Team(radio=Radio(carries="graph"))

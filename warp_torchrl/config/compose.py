@@ -121,7 +121,7 @@ def _known_keys(name: str, overrides: Sequence[str]) -> list[str]:
     return []
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def _composed(folder: Path, last_change: int, name: str, overrides: tuple[str, ...]) -> DictConfig:
     """Return a composed configuration, which takes Hydra a fifth of a second: once for each state of the files."""
     GlobalHydra.instance().clear()

@@ -5,8 +5,10 @@ filled in. So ``--cfg job`` shows every value, every field can be overridden, an
 """
 
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import MISSING, fields, is_dataclass
-from typing import Any, cast
+from pathlib import Path
+from typing import Any, ClassVar, cast
 
 from hydra._internal.core_plugins import file_config_source
 from hydra._internal.sources_registry import SourcesRegistry
@@ -40,10 +42,24 @@ def _plain(value: Any) -> Any:
 
 
 class FileConfigSource(file_config_source.FileConfigSource):
-    """Hydra's source of yaml files, which fills in the fields that a file leaves out."""
+    """Hydra's source of yaml files, which fills in the fields that a file leaves out.
+
+    It reads and fills each state of a file once: of the time to compose a configuration that was a third.
+    """
+
+    _filled: ClassVar[dict[tuple[Path, int], ConfigResult]] = {}
 
     def load_config(self, config_path: str) -> ConfigResult:
         """Return the content of a yaml file, a command's or an option of a group, with every field of its class."""
+        path = Path(self.path, config_path).with_suffix(".yaml")
+        if not path.is_file():
+            return super().load_config(config_path)  # and says that there is none
+        state = path, path.stat().st_mtime_ns
+        if state not in self._filled:
+            self._filled[state] = self._read(config_path)
+        return deepcopy(self._filled[state])
+
+    def _read(self, config_path: str) -> ConfigResult:
         result = super().load_config(config_path)
         if isinstance(result.config, DictConfig):
             filled = OmegaConf.merge(_left_out(config_path, result.config), result.config)
