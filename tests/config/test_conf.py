@@ -302,6 +302,16 @@ def test_a_file_that_changes_is_read_again_and_else_once(tmp_path, monkeypatch):
     assert read.count(mine) == 2
 
 
+def test_a_name_with_a_dot_is_the_name_of_its_own_file(tmp_path, monkeypatch):
+    shutil.copytree(conf_folder(), tmp_path / "conf")
+    monkeypatch.setattr("warp_torchrl.config.compose.conf_folder", lambda: tmp_path / "conf")
+    for seed, name in ((1, "mine"), (2, "mine.v2")):
+        text = f"# @package _global_\nseed: {seed}\n"
+        (tmp_path / "conf/experiment" / f"{name}.yaml").write_text(text)
+    seeds = [compose_config("train", [f"experiment={name}"]).seed for name in ("mine", "mine.v2", "mine")]
+    assert seeds == [1, 2, 1]
+
+
 def test_components_are_made_of_plain_parts():
     node = {"_target_": "warp_torchrl.world.team.Team", "radio": {"carries": "graph"}}
     assert build(node, "team") == Team(radio=Radio(carries="graph"))

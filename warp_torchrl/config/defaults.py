@@ -51,7 +51,7 @@ class FileConfigSource(file_config_source.FileConfigSource):
 
     def load_config(self, config_path: str) -> ConfigResult:
         """Return the content of a yaml file, a command's or an option of a group, with every field of its class."""
-        path = Path(self.path, config_path).with_suffix(".yaml")
+        path = Path(self.path, self._normalize_file_name(config_path))
         if not path.is_file():
             return super().load_config(config_path)  # and says that there is none
         state = path, path.stat().st_mtime_ns
