@@ -8,7 +8,7 @@ from PIL import Image
 
 from warp_torchrl import load_policy, make_env
 from warp_torchrl.benchmark import __main__ as command
-from warp_torchrl.benchmark.generalist import PLACES, Place, generalist_table, on_ground
+from warp_torchrl.benchmark.generalist import PLACES, Place, generalist_table, on_ground, table_line
 from warp_torchrl.benchmark.generalist_figure import draw_generalist
 from warp_torchrl.config.compose import compose_config
 from warp_torchrl.evaluation.play import play, play_heuristics
@@ -22,8 +22,10 @@ def test_a_row_is_the_policy_beside_the_best_baseline_on_the_same_fires(capsys, 
     monkeypatch.setattr(command, "PLACES", TWO)
     monkeypatch.setattr("warp_torchrl.benchmark.generalist.RIVALS", ("noop", "coordinated"))
     command.main(["generalist", "--policy", "skirmish", "--episodes", "4", "--json", "--set", *SMALL])
-    rows = json.loads(capsys.readouterr().out)["generalist"]
+    printed = capsys.readouterr()
+    rows = json.loads(printed.out)["generalist"]
     assert [row["place"] for row in rows] == ["skirmish", "windy"]
+    assert printed.err.splitlines() == [table_line(row) for row in rows]  # each as soon as it is played
     policy = load_policy("skirmish")
     for row, more in zip(rows, ((), ("wind.speed=9",)), strict=True):
         env = make_env("skirmish", n_worlds=4, seed=1_000_000, overrides=[*policy.overrides, *more, *SMALL])

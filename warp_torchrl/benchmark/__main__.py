@@ -7,6 +7,7 @@ other. Alone, gpu measures all that a card is asked, in under five minutes, and 
 import argparse
 import json
 import logging
+import sys
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
@@ -17,7 +18,7 @@ import torch
 
 from warp_torchrl.benchmark.environments import LARGE, environment_speed, rate_table
 from warp_torchrl.benchmark.fires import ellipse_errors, fire_table, law_times
-from warp_torchrl.benchmark.generalist import PLACES, generalise, generalist_table, on_ground
+from warp_torchrl.benchmark.generalist import PLACES, generalise, generalist_table, on_ground, table_line
 from warp_torchrl.benchmark.generalist_figure import draw_generalist
 from warp_torchrl.benchmark.gpu import SMALL, Size, measure_gpu
 from warp_torchrl.benchmark.growth_figure import draw_growth
@@ -116,7 +117,10 @@ def _generalist(options: Namespace) -> dict[str, Rows]:
         needs = ", which needs --ground" if unknown[0] == "ground" else ""
         raise ConfigError(f"places must be of {', '.join(groups)}, got {unknown[0]}{needs}")
     places = [place for name in options.places or groups for place in groups[name]]
-    rows = list(generalise(options.policy, places, options.device, options.episodes, options.set))
+    rows = []
+    for row in generalise(options.policy, places, options.device, options.episodes, options.set):
+        rows.append(row)
+        print(table_line(row), file=sys.stderr, flush=True)  # large maps take minutes each: what was played is not lost
     if options.plot is not None:
         draw_generalist(rows, options.plot)
     return {"generalist": rows}

@@ -94,16 +94,20 @@ def generalist_table(rows: Sequence[dict[str, Any]]) -> str:
         f"| where | policy | best baseline | | difference | to `{REFERENCE}` |",
         "|---|---|---|---|---|---|",
     ]
-    lines += [
-        f"| {row['place']} | {interval_cell(row['policy'])} | {row['baseline']} | {interval_cell(row['best'])} | "
-        f"{difference_cell(row['difference'])} | {difference_cell(row['to_reference'])} |"
-        for row in rows
-    ]
+    lines += [table_line(row) for row in rows]
     best, reference = (
         f"on {_count(rows, key, 1)}, and behind it on {_count(rows, key, -1)}" for key in ("difference", "to_reference")
     )
     told = f"Of {len(rows)} places ahead of the best baseline, intervals apart, {best}; of `{REFERENCE}` {reference}."
     return "\n".join([*lines, "", told])
+
+
+def table_line(row: Mapping[str, Any]) -> str:
+    """Return a row as a line of the table."""
+    return (
+        f"| {row['place']} | {interval_cell(row['policy'])} | {row['baseline']} | {interval_cell(row['best'])} | "
+        f"{difference_cell(row['difference'])} | {difference_cell(row['to_reference'])} |"
+    )
 
 
 def _count(rows: Sequence[Mapping[str, Any]], key: str, sign: int) -> int:
