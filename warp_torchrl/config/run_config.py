@@ -245,5 +245,7 @@ def _check_device(name: str) -> None:
         raise ValueError(f"device must be cpu, cuda or cuda:<number>, got {name}") from None
     if device.type not in ("cpu", "cuda"):
         raise ValueError(f"device must be cpu, cuda or cuda:<number>, got {name}")
-    if device.type == "cuda" and (device.index or 0) >= torch.cuda.device_count():
-        raise ValueError(f"device must be one of this machine's {torch.cuda.device_count()} CUDA devices, got {name}")
+    count = torch.cuda.device_count()
+    if device.type == "cuda" and (device.index or 0) >= count:
+        hint = "" if count else "; torch finds none here: choose device=cpu graph=false"
+        raise ValueError(f"device must be one of this machine's {count} CUDA devices, got {name}{hint}")
