@@ -164,7 +164,9 @@ def test_every_scenario_is_a_run(scenario):
 def test_every_experiment_is_a_run(experiment):
     values = plain(compose_config("train", [f"experiment={experiment}"]))
     if values["device"] == "cuda" and not torch.cuda.is_available():
-        with pytest.raises(ConfigError, match="device must be one of this machine's 0 CUDA devices.*choose device=cpu"):
+        with pytest.raises(
+            ConfigError, match=r"device must be one of this machine's 0 CUDA devices.*choose device=cpu"
+        ):
             run_config(values)
         values["device"] = "cpu"
     plan = run_config(values)

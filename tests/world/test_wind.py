@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.random import world_key
+from warp_torchrl.world.random import Stream, uniform, world_key
 from warp_torchrl.world.wind import Calm, Paper, Uniform, Wandering, constant_wind
 from warp_torchrl.world.world import advance, in_wind
 
@@ -21,6 +21,12 @@ def keys(worlds: int) -> Tensor:
 
 def test_calm_is_no_wind() -> None:
     assert Calm()(keys(3), (5, 7)).tolist() == torch.zeros(3, 2, 1, 1).tolist()
+
+
+def test_components_are_the_nearest_float32_ones_whatever_device_computes_them() -> None:
+    angles = (uniform(keys(4096), 0, Stream.WIND, (1,))[:, 0] * (2.0 * math.pi)).tolist()
+    expected = torch.tensor([[math.cos(angle), math.sin(angle)] for angle in angles], dtype=torch.float32)
+    assert torch.equal(Uniform(speed=1.0)(keys(4096), (5, 7))[..., 0, 0], expected)
 
 
 @pytest.mark.parametrize(
