@@ -3,6 +3,7 @@
 Each part is written when it is done; what fails is told in its place, so that the others are not lost.
 """
 
+import gc
 import json
 import tempfile
 import time
@@ -234,6 +235,7 @@ def _trained(device: str, overrides: list[str]) -> Iterator[tuple[Training, Iter
 
 
 def _forget_peak(device: str) -> None:
+    gc.collect()  # what the part before has left would count
     if device != "cpu":
         torch.cuda.empty_cache()
         torch.cuda.reset_peak_memory_stats(device)
