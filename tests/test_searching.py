@@ -9,7 +9,8 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS, Lawnmower, Oldest
 from warp_torchrl.world.geometry import DIRECTIONS
 from warp_torchrl.world.radio import Radio
-from warp_torchrl.world.sensing import Sight, freshness, in_reach, known_codes
+from warp_torchrl.world.records import freshness, known_codes
+from warp_torchrl.world.sensing import Sight, in_reach
 from warp_torchrl.world.state import Action
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.array import Array

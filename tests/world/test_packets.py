@@ -9,7 +9,8 @@ from tests.world.test_sensing import known
 from warp_torchrl.world.batch import concatenated
 from warp_torchrl.world.packets import Named, Packets, moved_up
 from warp_torchrl.world.radio import Radio
-from warp_torchrl.world.sensing import Sight, freshness
+from warp_torchrl.world.records import freshness
+from warp_torchrl.world.sensing import Sight
 from warp_torchrl.world.state import Action
 from warp_torchrl.world.team import Team
 

@@ -8,7 +8,8 @@ import torch
 from tests.conftest import small_world
 from tests.world.drawing import CELLS, draw
 from warp_torchrl.world.radio import Radio
-from warp_torchrl.world.sensing import Full, Sight, freshness, known_codes, others_in_sight, smoke
+from warp_torchrl.world.records import freshness, known_codes
+from warp_torchrl.world.sensing import Full, Sight, others_in_sight
 from warp_torchrl.world.state import EMBER, FIRST_FIRE, Action
 from warp_torchrl.world.team import Team
 
@@ -115,21 +116,6 @@ def test_errors_come_with_their_chance_and_are_each_agents_own():
     assert abs(alarms - 0.1) < 0.012  # 11 200 draws: 4.2 standard deviations
     assert (codes[:, 0] != codes[:, 1]).any()
     assert torch.equal(started(sight, drawing=burning, worlds=2, at=((3, 3), (3, 3))).knowledge, state.knowledge[:2])
-
-
-@pytest.mark.parametrize(
-    ("wind", "expected"),
-    [
-        ((0.0, 0.0), [[0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 0]]),
-        ((9.0, 0.0), [[0, 0, 0, 0], [0, 1, 1 / 2, 1 / 3], [0, 0, 0, 0]]),  # to the east
-        ((0.0, 2.0), [[0, 1 / 2, 0, 0], [0, 1, 0, 0], [0, 0, 0, 0]]),  # to the north
-        ((-1.0, -1.0), [[0, 0, 0, 0], [0, 1, 0, 0], [1 / 2 + 1 / 3, 0, 0, 0]]),
-    ],
-)
-def test_smoke_drifts_downwind_and_thins(wind, expected):
-    state = draw("TTTT TaTT TTTT", wind=wind)
-    # To the south-west, 0.7 and 1.4 cells down and across both are the diagonal neighbour.
-    assert smoke(state, 2)[0].tolist() == [pytest.approx(row) for row in expected]
 
 
 def test_smoke_hides_cells_by_the_law_of_beer_and_lambert():

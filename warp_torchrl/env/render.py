@@ -12,8 +12,8 @@ from PIL import Image, ImageDraw, ImageFont
 from torch import Tensor
 from torch.nn.functional import interpolate
 
+from warp_torchrl.world.records import freshness
 from warp_torchrl.world.role import ROLES
-from warp_torchrl.world.sensing import freshness
 from warp_torchrl.world.state import EMPTY, FIRST_FIRE, OLDEST, Cover, WorldState, count_trees, is_burning
 
 # The fire front, 11..13, is lighter than any ground; 14 stays 16 units of CIE Lab off without the red or green cone.

@@ -12,7 +12,7 @@ from warp_torchrl.device import reads_freely
 from warp_torchrl.world.fast.distances import FAR, nearest
 from warp_torchrl.world.geometry import offsets
 from warp_torchrl.world.random import Stream, uniform, uniform_at
-from warp_torchrl.world.sensing import known_codes
+from warp_torchrl.world.records import known_codes
 from warp_torchrl.world.state import FIRST_FIRE, Action, Cover, WorldState, is_burning
 from warp_torchrl.world.supply import mark_base
 from warp_torchrl.world.team import Team

@@ -14,7 +14,7 @@ from warp_torchrl.heuristics.base import (
 from warp_torchrl.heuristics.searching import Oldest
 from warp_torchrl.world.front import spreading_front
 from warp_torchrl.world.random import Stream, uniform
-from warp_torchrl.world.sensing import known_codes, steps_since
+from warp_torchrl.world.records import known_codes, steps_since
 from warp_torchrl.world.state import WorldState
 
 _ANOTHERS = 1e6

@@ -19,7 +19,7 @@ from warp_torchrl.heuristics.base import (
     target_or_supply,
 )
 from warp_torchrl.world.random import Stream, uniform
-from warp_torchrl.world.sensing import freshness
+from warp_torchrl.world.records import freshness
 from warp_torchrl.world.state import WorldState
 
 

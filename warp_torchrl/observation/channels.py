@@ -18,8 +18,8 @@ from warp_torchrl.content import Content, Empty, Follows
 from warp_torchrl.validation import check_new_name
 from warp_torchrl.world.fast.bytes import at_least, byte, equal, scatter_add, to_codes, to_int32
 from warp_torchrl.world.fast.squares import Window, window
+from warp_torchrl.world.records import freshness, read
 from warp_torchrl.world.role import PAPER_ROLES
-from warp_torchrl.world.sensing import freshness, read
 from warp_torchrl.world.state import FIRST_FIRE, Forecast, WorldState, is_burning, is_tree
 from warp_torchrl.world.world import World
 

@@ -11,8 +11,8 @@ from warp_torchrl.symmetry import Planes, Target, TeamPlanes
 from warp_torchrl.world.agencies import land_of_each
 from warp_torchrl.world.fast.blocks import block_means
 from warp_torchrl.world.fast.squares import window
+from warp_torchrl.world.records import freshness, known_codes
 from warp_torchrl.world.role import PAPER_ROLES
-from warp_torchrl.world.sensing import freshness, known_codes
 from warp_torchrl.world.state import FIRST_FIRE, OLDEST, Forecast, WorldState, is_burning
 from warp_torchrl.world.world import World
 

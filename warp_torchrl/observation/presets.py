@@ -27,7 +27,7 @@ from warp_torchrl.observation.view import egocentric_view
 from warp_torchrl.symmetry import Planes, Target, Vector
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.fast.squares import window
-from warp_torchrl.world.sensing import read
+from warp_torchrl.world.records import read
 from warp_torchrl.world.state import Forecast, WorldState
 from warp_torchrl.world.world import World
 

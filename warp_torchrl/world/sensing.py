@@ -1,9 +1,4 @@
-"""What agents know of the fire: all of it, or what they and those that they hear have seen.
-
-What an agent knows is a map of records, one a cell: what the cell was when it was last seen, and when that was,
-``(1 + step) * 64 + 32 firebreak + 16 ash + code``. A cell that it never saw has the step -1 and the code that the map
-showed before the fire. Of two records of a cell the larger is the newer one.
-"""
+"""What agents know of the fire: all of it, or what they and those that they hear have seen."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -14,16 +9,15 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.random import Stream, uniform
+from warp_torchrl.world.records import kept, kinds, recorded
 from warp_torchrl.world.role import ROLES
+from warp_torchrl.world.smoke import smoke
 from warp_torchrl.world.state import FIRST_FIRE, Watching, WorldState, is_burning, is_tree
 from warp_torchrl.world.team import Team
-from warp_torchrl.world.watching import Records, at_start, counted, unwatched
+from warp_torchrl.world.watching import at_start, counted, newest_of, unwatched
 
-_CODES, _ASH, _FIREBREAK, _KINDS = 16, 16, 32, 64
 _EVERYWHERE = 1 << 20
 """A sight that no map limits [cells]."""
-HALF_FRESH = 16.0
-"""Steps after which what was seen is half as fresh as what is seen now."""
 
 
 class Sensing(ABC):
@@ -153,8 +147,7 @@ class Sight(Sensing):
 
     def updated(self, state: WorldState, team: Team, running: Tensor) -> WorldState:
         """Return the worlds with what the agents see now, and are told."""
-        known = _known(state)
-        record = ((state.step + 1)[:, None, None, None] * _KINDS + self._taken_for(state)).to(torch.int32)
+        known, record = kept(state), recorded(self._taken_for(state), state.step)
         sees, watching = self._sees(state, team), _watching(state)
         knows, itself = torch.where(sees, record, known), watching.itself | sees
         if team.radio.sends_maps:
@@ -163,7 +156,7 @@ class Sight(Sensing):
             knows = torch.maximum(knows, told)
         goes_on = running[:, None, None, None]
         knows, itself = torch.where(goes_on, knows, known), torch.where(goes_on, itself, watching.itself)
-        after = counted(state, watching, itself, _newest(known, knows, itself, state.step), self.recent)
+        after = counted(state, watching, itself, newest_of(known, knows, itself, state.step), self.recent)
         return state.replace(knowledge=knows, watching=_where(running, after, watching))
 
     def _sees(self, state: WorldState, team: Team) -> Tensor:
@@ -177,14 +170,13 @@ class Sight(Sensing):
 
     def _taken_for(self, state: WorldState) -> Tensor:
         """Return what each agent takes each cell for if it sees it, uint8 [B, 1 or A, H, W]."""
-        ash, firebreak = (state.cells == 0) & state.burned, state.firebreak
-        kinds = (state.cells + ash * _ASH + firebreak * _FIREBREAK)[:, None]
+        kind = kinds(state)[:, None]
         if self.miss == 0.0 and self.false_alarm == 0.0:
-            return kinds
+            return kind
         agents = state.vehicles.position.shape[1]
         draws = uniform(state.key, state.step, Stream.SENSING, (agents, *state.cells.shape[1:]))
         burns, stands = is_burning(state.cells)[:, None], is_tree(state.cells)[:, None]
-        taken = torch.where(burns & (draws < self.miss), state.age[:, None], kinds)
+        taken = torch.where(burns & (draws < self.miss), state.age[:, None], kind)
         return torch.where(stands & (draws < self.false_alarm), FIRST_FIRE, taken)
 
 
@@ -221,70 +213,6 @@ def others_in_sight(state: WorldState, reach: list[int]) -> Tensor:
     return (apart <= far) & ~torch.eye(len(reach), dtype=torch.bool, device=position.device)
 
 
-def smoke(state: WorldState, length: int) -> Tensor:
-    """Return the smoke at each cell, float32 [B, H, W]: sum over k = 0..length of burning(k cells upwind) / (1 + k).
-
-    The wind is the map's mean, and upwind one of the cells nearest to its line; in calm air smoke stays where it is.
-
-    Args:
-        state: The worlds.
-        length: How far smoke drifts [cells].
-    """
-    height, width = state.cells.shape[1:]
-    east, north = state.wind.mean(dim=(2, 3)).unbind(1)
-    speed = (east.square() + north.square()).sqrt()
-    way = torch.stack((-north, east), dim=-1) / speed.clamp(min=1e-6)[:, None]  # rows grow south
-    steps = torch.arange(length + 1, device=speed.device)
-    back = (way[:, None] * steps[:, None]).round().to(torch.int64)  # [B, K, 2]
-    row = torch.arange(height, device=speed.device) - back[..., 0, None]
-    column = torch.arange(width, device=speed.device) - back[..., 1, None]
-    on_map = ((row >= 0) & (row < height))[..., :, None] & ((column >= 0) & (column < width))[..., None, :]
-    index = row.clamp(0, height - 1)[..., :, None] * width + column.clamp(0, width - 1)[..., None, :]
-    burns = is_burning(state.cells).to(torch.float32).flatten(1)
-    upwind = burns.gather(1, index.flatten(1)).view_as(index) * on_map
-    weight = 1.0 / (1.0 + steps)
-    drifts = (speed > 1e-6)[:, None] | (steps == 0)
-    return (upwind * (weight * drifts)[..., None, None]).sum(dim=1)
-
-
-def known_codes(state: WorldState) -> Tensor:
-    """Return the code that each agent knows of each cell, int32 [B, A, H, W]."""
-    return _known(state) % _CODES
-
-
-def read(record: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-    """Return the code that records tell, uint8, and whether the cell was ash, and a firebreak, bool; of their shape."""
-    kind = (record % _KINDS).to(torch.uint8)
-    return kind % _CODES, (kind & _ASH) > 0, kind >= _FIREBREAK
-
-
-def freshness(record: Tensor, step: Tensor) -> Tensor:
-    """Return how fresh records are, h / (h + steps since) with h = 16; 0 of what was never seen. float32.
-
-    Args:
-        record: int32 [B, A, ...].
-        step: The worlds' steps, int32 [B].
-    """
-    return torch.where(record >= _KINDS, HALF_FRESH / (HALF_FRESH + steps_since(record, step)), 0.0)
-
-
-def steps_since(record: Tensor, step: Tensor) -> Tensor:
-    """Return how old records are [steps], int32; step + 1 of what was never seen. The arguments are ``freshness``'s."""
-    return step.view(-1, *[1] * (record.ndim - 1)) + 1 - record // _KINDS
-
-
-def _newest(before: Tensor, records: Tensor, itself: Tensor, step: Tensor) -> Records:
-    """Return what the team's newest records tell; before a step and after it, int32 [B, A, H, W]."""
-    newest = records.amax(dim=1)
-    return Records(
-        burns=newest % _CODES >= FIRST_FIRE,
-        burned_before=before.amax(dim=1) % _CODES >= FIRST_FIRE,
-        since=steps_since(newest, step),
-        fresh=freshness(newest, step),
-        holders=itself & (records == newest[:, None]),
-    )
-
-
 def _where(running: Tensor, after: Watching, before: Watching) -> Watching:
     """Return what was watched, after a step in the worlds that go on, bool [B], and else before it."""
     old = before.leaves()
@@ -300,9 +228,3 @@ def _watching(state: WorldState) -> Watching:
     if state.watching is None:
         raise ValueError("what the team of these worlds watched is not counted: let its sensing begin them")
     return state.watching
-
-
-def _known(state: WorldState) -> Tensor:
-    if state.knowledge is None:
-        raise ValueError("agents of these worlds know nothing of their own: sensing is full")
-    return state.knowledge

@@ -6,11 +6,12 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.front import spreading_front
-from warp_torchrl.world.state import Watching, WorldState, is_burning
+from warp_torchrl.world.records import codes, freshness, steps_since
+from warp_torchrl.world.state import FIRST_FIRE, Watching, WorldState, is_burning
 
 
 @dataclass(frozen=True, eq=False)
-class Records:
+class Newest:
     """What the newest record of each cell of any agent of the team tells."""
 
     burns: Tensor  # bool [B,H,W], that it burns
@@ -42,7 +43,26 @@ def at_start(watching: Watching) -> Watching:
     return watching.replace(**{name: torch.zeros_like(getattr(watching, name)) for name in sums})
 
 
-def counted(state: WorldState, before: Watching, itself: Tensor, newest: Records, recent: int) -> Watching:
+def newest_of(before: Tensor, records: Tensor, itself: Tensor, step: Tensor) -> Newest:
+    """Return what the team's newest records tell after a step.
+
+    Args:
+        before: The agents' records before it, int32 [B, A, H, W].
+        records: The same after it.
+        itself: Of ``Watching``, after it.
+        step: The worlds' steps after it, int32 [B].
+    """
+    newest = records.amax(dim=1)
+    return Newest(
+        burns=codes(newest) >= FIRST_FIRE,
+        burned_before=codes(before.amax(dim=1)) >= FIRST_FIRE,
+        since=steps_since(newest, step),
+        fresh=freshness(newest, step),
+        holders=itself & (records == newest[:, None]),
+    )
+
+
+def counted(state: WorldState, before: Watching, itself: Tensor, newest: Newest, recent: int) -> Watching:
     """Return what teams have watched after a step.
 
     The team watches a cell of the front that it saw burn at most ``recent`` steps ago. The agents that hold the newest
