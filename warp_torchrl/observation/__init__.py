@@ -1,6 +1,6 @@
 """What the agents see, and what the central critic sees."""
 
-from warp_torchrl.observation.channels import CHANNELS, DEFAULT, ELEVATION_SCALE, Look, channel
+from warp_torchrl.observation.channels import CHANNELS, DEFAULT, ELEVATION_SCALE, channel
 from warp_torchrl.observation.coarse import (
     PICTURE,
     PICTURE_SIDE,
@@ -13,6 +13,7 @@ from warp_torchrl.observation.coarse import (
     state_names,
     state_symmetry,
 )
+from warp_torchrl.observation.look import Look
 from warp_torchrl.observation.own import SELF_SIZE, WIND_SCALE, own_vector
 from warp_torchrl.observation.presets import (
     Local,

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 from torch import Tensor
 
-from warp_torchrl.observation.channels import CHANNELS, look_at
+from warp_torchrl.observation.channels import CHANNELS
+from warp_torchrl.observation.look import look_at
 from warp_torchrl.world.fast.squares import stacked
 from warp_torchrl.world.state import Forecast, WorldState
 from warp_torchrl.world.world import World
