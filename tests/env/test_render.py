@@ -11,7 +11,8 @@ from warp_torchrl.world.ignition import Ignition
 from warp_torchrl.world.state import Cover, Lands, Landscape, WorldState
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
-from warp_torchrl.world.world import World, in_wind, initial_state
+from warp_torchrl.world.tick import in_wind, initial_state
+from warp_torchrl.world.world import World
 
 UGV, UAV = torch.tensor([0]), torch.tensor([1])
 

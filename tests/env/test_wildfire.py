@@ -21,8 +21,9 @@ from warp_torchrl.world.sensing import Sight
 from warp_torchrl.world.state import Action, count_trees
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
+from warp_torchrl.world.tick import in_wind
 from warp_torchrl.world.wind import Paper as PaperWind
-from warp_torchrl.world.world import World, in_wind
+from warp_torchrl.world.world import World
 
 STAY = int(Action.STAY)
 

@@ -10,7 +10,7 @@ from tests.reward.drawing import CLEAR, EXTINGUISH, STAY, drawn
 from warp_torchrl.evaluation.behaviour import Behaviour, divided, mutual_information
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.state import is_burning
-from warp_torchrl.world.world import in_wind
+from warp_torchrl.world.tick import in_wind
 
 
 def test_mutual_information_by_hand():

@@ -19,8 +19,8 @@ from warp_torchrl.observation import (
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.landscape import Perlin
+from warp_torchrl.world.tick import in_wind
 from warp_torchrl.world.wind import Uniform
-from warp_torchrl.world.world import in_wind
 
 
 def drawn(cells, positions, *, elevation=None, roles=("ugv",), wind=None, cover=3):

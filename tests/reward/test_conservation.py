@@ -12,7 +12,7 @@ from warp_torchrl.world.batch import concatenated
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.state import count_trees
 from warp_torchrl.world.terrain.landscape import Perlin
-from warp_torchrl.world.world import in_wind
+from warp_torchrl.world.tick import in_wind
 
 from .drawing import CLEAR, EXTINGUISH, FIELD, STAY, drawn, earned
 

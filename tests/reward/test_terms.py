@@ -5,7 +5,7 @@ import torch
 
 from warp_torchrl.reward import Adaptive
 from warp_torchrl.reward.terms import TERMS, term
-from warp_torchrl.world.world import in_wind
+from warp_torchrl.world.tick import in_wind
 
 from .drawing import EAST, EXTINGUISH, FIELD, STAY, drawn, earned
 

@@ -15,7 +15,7 @@ from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.state import Cover, Landscape, WorldState
 from warp_torchrl.world.team import Team
-from warp_torchrl.world.world import initial_state
+from warp_torchrl.world.tick import initial_state
 
 CELLS = ".123456789Tabcde"
 GROUND = "~wgfb"

@@ -11,8 +11,9 @@ from warp_torchrl.world.random import world_key
 from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
+from warp_torchrl.world.tick import advance
 from warp_torchrl.world.wind import Paper, Uniform, Wandering, Wind
-from warp_torchrl.world.world import World, advance
+from warp_torchrl.world.world import World
 
 from .drawing import draw, drawn, tiled
 

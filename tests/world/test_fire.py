@@ -13,9 +13,9 @@ from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.hazard import HazardFire
 from warp_torchrl.world.random import Stream, uniform, world_key
 from warp_torchrl.world.state import WorldState, is_burning
+from warp_torchrl.world.tick import in_wind
 from warp_torchrl.world.wind import Paper, Wind
 from warp_torchrl.world.wind_and_slope import slope_factor
-from warp_torchrl.world.world import in_wind
 
 from .drawing import draw, drawn, tiled
 from .literal_fire import LiteralFire

@@ -12,7 +12,8 @@ from warp_torchrl.world.random import world_key
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.landscape import Perlin
-from warp_torchrl.world.world import World, advance, in_wind
+from warp_torchrl.world.tick import advance, in_wind
+from warp_torchrl.world.world import World
 
 from .drawing import draw
 

@@ -10,8 +10,9 @@ from warp_torchrl.world.intervention import can_be_lit, cleared, ignited
 from warp_torchrl.world.rate import RateFire
 from warp_torchrl.world.state import Landscape, count_trees
 from warp_torchrl.world.team import Team
+from warp_torchrl.world.tick import advance
 from warp_torchrl.world.wind import Calm
-from warp_torchrl.world.world import World, advance
+from warp_torchrl.world.world import World
 
 MAP = """
     51.

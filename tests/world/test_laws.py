@@ -14,9 +14,9 @@ from warp_torchrl.world.burn import burn, start_burning, trace
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.hazard import HazardFire
 from warp_torchrl.world.state import WorldState, is_burning
+from warp_torchrl.world.tick import in_wind
 from warp_torchrl.world.wind import Uniform, constant_wind
 from warp_torchrl.world.wind_and_slope import length_to_breadth
-from warp_torchrl.world.world import in_wind
 
 CALM = Uniform(speed=0.0)
 SLOW = pytest.mark.slow

@@ -11,9 +11,10 @@ from warp_torchrl.world.random import world_key
 from warp_torchrl.world.rate import RateFire
 from warp_torchrl.world.state import Landscape, WorldState
 from warp_torchrl.world.terrain.landscape import Perlin
+from warp_torchrl.world.tick import advance, in_wind
 from warp_torchrl.world.travel import NEVER
 from warp_torchrl.world.wind import Calm, Uniform
-from warp_torchrl.world.world import World, advance, in_wind
+from warp_torchrl.world.world import World
 
 C2 = 2
 EVERY = torch.ones(1, dtype=torch.bool)

@@ -8,8 +8,8 @@ from torch import Tensor
 
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.random import Stream, uniform, world_key
+from warp_torchrl.world.tick import advance, in_wind
 from warp_torchrl.world.wind import Calm, Paper, Uniform, Wandering, constant_wind
-from warp_torchrl.world.world import advance, in_wind
 
 from .drawing import draw
 

@@ -15,8 +15,9 @@ from warp_torchrl.world.state import Cover, WorldState, count_trees, is_burning,
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.landscape import Perlin
+from warp_torchrl.world.tick import advance, in_wind
 from warp_torchrl.world.wind import Calm, Paper, Uniform, Wandering
-from warp_torchrl.world.world import _CELLS_AT_ONCE, World, advance, in_wind
+from warp_torchrl.world.world import _CELLS_AT_ONCE, World
 
 from .drawing import differing, draw, drawn
 

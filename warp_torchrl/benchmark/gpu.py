@@ -27,7 +27,7 @@ from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.device import unread
 from warp_torchrl.training.loop import Training
-from warp_torchrl.world.world import advance
+from warp_torchrl.world.tick import advance
 
 _SCENARIO = "skirmish"
 _WAYS: dict[str, dict[str, Any]] = {"eager": {}, "graph": {"graph": True}, "compiled": {"compile": True}}

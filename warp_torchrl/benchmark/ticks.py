@@ -15,7 +15,8 @@ from warp_torchrl.world.fast.compile import check_compiler, compiled
 from warp_torchrl.world.fast.road import in_bytes
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.state import WorldState
-from warp_torchrl.world.world import World, advance
+from warp_torchrl.world.tick import advance
+from warp_torchrl.world.world import World
 
 _TICKS = 10  # in a repeat, and before
 _NUMPY_WORLDS = 16  # NumPy ticks one world after the other, so a few are enough

@@ -10,8 +10,8 @@ from torch import Tensor
 
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.world.intervention import cleared, ignited
+from warp_torchrl.world.tick import in_wind
 from warp_torchrl.world.wind import constant_wind
-from warp_torchrl.world.world import in_wind
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,8 +10,8 @@ from warp_torchrl.world.batch import Batch
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.state import Landscape, WorldState, is_burning
 from warp_torchrl.world.team import Team
+from warp_torchrl.world.tick import advance, in_wind, initial_state
 from warp_torchrl.world.wind import Wind
-from warp_torchrl.world.world import advance, in_wind, initial_state
 
 
 @dataclass(eq=False, repr=False)

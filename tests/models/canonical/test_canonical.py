@@ -53,8 +53,8 @@ from warp_torchrl.world.radio import Radio
 from warp_torchrl.world.state import Action
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
+from warp_torchrl.world.tick import in_wind
 from warp_torchrl.world.wind import Uniform
-from warp_torchrl.world.world import in_wind
 
 TURNS = list(itertools.product((1, -1), (1, -1), (False, True)))
 """Whether rows, then columns, are mirrored, and whether they change places after that."""

@@ -6,7 +6,8 @@ from warp_torchrl.world.fast.edge import AtEdge, places
 from warp_torchrl.world.fast.table import bit_of
 from warp_torchrl.world.fire import Fire
 from warp_torchrl.world.terrain.landscape import Perlin
-from warp_torchrl.world.world import World, advance
+from warp_torchrl.world.tick import advance
+from warp_torchrl.world.world import World
 
 from ..drawing import differing, draw
 

@@ -16,8 +16,9 @@ from warp_torchrl.world.hazard import HazardFire
 from warp_torchrl.world.random import Stream, uniform, uniform_among
 from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.terrain.landscape import Perlin
+from warp_torchrl.world.tick import advance
 from warp_torchrl.world.wind import Calm, Paper, Uniform, Wandering, Wind
-from warp_torchrl.world.world import World, advance
+from warp_torchrl.world.world import World
 
 from ..drawing import differing
 

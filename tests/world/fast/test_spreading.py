@@ -9,8 +9,8 @@ from warp_torchrl.world.rate import RateFire
 from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
+from warp_torchrl.world.tick import in_wind, initial_state
 from warp_torchrl.world.travel import NEVER
-from warp_torchrl.world.world import in_wind, initial_state
 
 FIRE = RateFire(model="fbp", minutes_per_tick=2.0, cell_deviation=0.3, residence=1e4)
 WINDS = torch.tensor([[2.0, 3.0], [-4.0, 1.0], [0.0, -5.0]])
