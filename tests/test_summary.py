@@ -30,8 +30,8 @@ def sweep(tmp_path):
 
 def test_runs_that_were_trained_alike_are_gathered(sweep):
     mappo, local, other = gather(sweep)
-    assert mappo.policy == "mappo" and mappo.saved.shape == (2, 3)
-    assert local.saved.tolist() == [[0.5, 0.5, 0.6]] and local.success.tolist() == [[0.0, 0.0, 1.0]]
+    assert mappo.policy == "mappo" and mappo.value.shape == (2, 3)
+    assert local.value.tolist() == [[0.5, 0.5, 0.6]] and local.success.tolist() == [[0.0, 0.0, 1.0]]
     assert other.scenario == "other"
 
 
@@ -42,9 +42,9 @@ def test_baselines_are_those_of_any_evaluation_that_holds_them(sweep, key):
     content = json.loads(path.read_text()) | {key: {"noop": held, "local": held}}
     path.write_text(json.dumps(content))
     entries = {(entry.scenario, entry.policy): entry for entry in gather(sweep)}
-    assert entries["tiny", "noop"].saved.tolist() == [[0.2, 0.3, 0.4]]
+    assert entries["tiny", "noop"].value.tolist() == [[0.2, 0.3, 0.4]]
     assert entries["tiny", "noop"].success.tolist() == [[0.0, 0.0, 1.0]] and ("other", "noop") not in entries
-    assert entries["tiny", "local"].saved.tolist() == [[0.5, 0.5, 0.6]], "its own evaluation comes first"
+    assert entries["tiny", "local"].value.tolist() == [[0.5, 0.5, 0.6]], "its own evaluation comes first"
 
 
 def test_baselines_that_met_other_worlds_are_left_out(sweep):
@@ -112,6 +112,23 @@ def test_other_metrics_are_shown_where_they_were_evaluated(sweep, capsys):
     with pytest.raises(SystemExit):
         main([str(sweep), "--show", "divisoin"])
     assert "divisoin is not evaluated; saved, success, division are" in capsys.readouterr().err
+
+
+def test_teams_that_watch_are_compared_by_what_they_watch_in_a_table_of_their_own(sweep, capsys):
+    write(sweep / "5", "dqn", [0.3, 0.3, 0.3], scenario="front")
+    path = sweep / "5" / "evaluation.json"
+    content = json.loads(path.read_text())
+    for episode, watched in zip(content["episodes"], (0.6, 0.7, 0.8), strict=True):
+        episode["watched"] = watched
+    held = {"follower": {"saved": [0.3] * 3, "success": [0.0] * 3, "watched": [0.5, 0.5, 0.8]}}
+    path.write_text(json.dumps(content | {"goal": "watched", "baseline_episodes": held}))
+    main([str(sweep), "--against", "follower"])
+    of_trees, of_fronts = capsys.readouterr().out.split("\n\n")
+    assert "saved %" in of_trees and "front" not in of_trees
+    header, _, first, second = of_fronts.splitlines()
+    assert "watched %" in header and first.split("|")[1:6] == [" front ", " dqn ", " 1 ", " 3 ", " 70.0 "]
+    assert "| +10.0 |" in first and first.endswith("| 83 % |"), "better on two of three, and equal on one"
+    assert second.split("|")[2] == " follower " and "| 60.0 |" in second
 
 
 def test_folders_without_evaluations_are_refused(tmp_path, capsys):

@@ -26,10 +26,11 @@ class Entry(NamedTuple):
 
     scenario: str
     policy: str
-    saved: np.ndarray  # [runs, n]
+    value: np.ndarray  # of the goal, [runs, n]
     success: np.ndarray  # [runs, n]
     seeds: tuple[int, ...]
     metrics: Mapping[str, np.ndarray] = {}  # by name, [runs, n], NaN where an episode has none; empty for baselines
+    goal: str = "saved"  # what policies are compared by there
 
 
 def gather(*folders: Path) -> list[Entry]:
@@ -47,10 +48,11 @@ def gather(*folders: Path) -> list[Entry]:
         Entry(
             scenario,
             f"{method} {configuration[:6]}" if (scenario, method) in several else method,
-            _of_episodes(runs, "saved"),
+            _of_episodes(runs, _goal(runs[0])),
             _of_episodes(runs, "success"),
             seeds,
             {name: _of_episodes(runs, name) for name in runs[0]["episodes"][0] if name != "seed"},
+            _goal(runs[0]),
         )
         for (scenario, method, configuration, seeds), runs in found.items()
     ]
@@ -61,18 +63,23 @@ def _baselines(found: Mapping[_Key, Sequence[Mapping[str, Any]]]) -> list[Entry]
 
     A baseline whose episodes differ between evaluations played in different worlds, and is left out.
     """
-    held: dict[tuple[str, str, tuple[int, ...]], list[Mapping[str, Any]]] = {}
+    held: dict[tuple[str, str, str, tuple[int, ...]], list[Mapping[str, Any]]] = {}
     for (scenario, _, _, seeds), runs in found.items():
         for run in runs:
             former = run.get("yardstick_episodes", {})  # the key in earlier evaluations
             for name, episodes in run.get("baseline_episodes", former).items():
                 if (scenario, name, "", seeds) not in found:
-                    held.setdefault((scenario, name, seeds), []).append(episodes)
+                    held.setdefault((scenario, name, _goal(run), seeds), []).append(episodes)
     return [
-        Entry(scenario, name, np.array([episodes[0]["saved"]]), np.array([episodes[0]["success"]]), seeds)
-        for (scenario, name, seeds), episodes in held.items()
+        Entry(scenario, name, np.array([episodes[0][goal]]), np.array([episodes[0]["success"]]), seeds, goal=goal)
+        for (scenario, name, goal, seeds), episodes in held.items()
         if all(each == episodes[0] for each in episodes)
     ]
+
+
+def _goal(run: Mapping[str, Any]) -> str:
+    """Return what policies are compared by in an evaluation; earlier ones did not tell."""
+    return str(run.get("goal", "saved"))
 
 
 def _of_episodes(runs: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
@@ -87,33 +94,41 @@ def _differ(found: Mapping[_Key, Any], scenario: str, method: str) -> bool:
 def table(entries: Sequence[Entry], against: str | None = None) -> str:
     """Return a Markdown table of the entries, best first in each scenario, each compared with one policy.
 
+    Scenarios where policies are compared by something else than the trees saved have a table of their own.
+
     Args:
         entries: Policies on scenarios.
         against: The policy to compare with; by default, or if a scenario lacks it, the best one.
     """
+    goals = sorted({entry.goal for entry in entries})  # saved first
+    return "\n\n".join(_table(goal, [entry for entry in entries if entry.goal == goal], against) for goal in goals)
+
+
+def _table(goal: str, entries: Sequence[Entry], against: str | None) -> str:
+    """Return the table of the scenarios of one goal."""
     lines = [
-        f"| scenario | policy | runs | fires | saved % | 95 % | iqm % | success % | to {against or 'the best'} | 95 % "
+        f"| scenario | policy | runs | fires | {goal} % | 95 % | iqm % | success % | to {against or 'the best'} | 95 % "
         "| better on |",
         "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for group in _by_scenario(entries):
         other = next((entry for entry in group if entry.policy == against), group[0])
         for entry in group:
-            saved = summarise(entry.saved)
+            found = summarise(entry.value)
             cells = [
                 entry.scenario,
                 entry.policy,
-                str(len(entry.saved)),
-                str(entry.saved.shape[1]),
-                f"{100 * saved['mean']:.1f}",
-                _range(saved["ci95"]),
-                f"{100 * saved['iqm']:.1f}",
+                str(len(entry.value)),
+                str(entry.value.shape[1]),
+                f"{100 * found['mean']:.1f}",
+                _range(found["ci95"]),
+                f"{100 * found['iqm']:.1f}",
                 f"{100 * entry.success.mean():.1f}",
             ]
             if entry is other or entry.seeds != other.seeds:
                 cells += ["-", "-", "-"]
             else:
-                gap = compare(entry.saved, other.saved)
+                gap = compare(entry.value, other.value)
                 cells += [
                     f"{100 * gap['saved_difference']:+.1f}",
                     _range(gap["ci95"], "+"),
@@ -135,7 +150,7 @@ def metrics_table(entries: Sequence[Entry], names: Sequence[str]) -> str:
             raise ValueError(f"{name} is not evaluated; {', '.join(known)} are")
     lines = ["| scenario | policy | runs | fires | " + " | ".join(names) + " |", "|---" * (4 + len(names)) + "|"]
     for entry in (entry for group in _by_scenario(entries) for entry in group if entry.metrics):
-        runs, fires = entry.saved.shape
+        runs, fires = entry.value.shape
         means = (_mean_of_known(entry.metrics.get(name)) for name in names)
         lines.append(f"| {entry.scenario} | {entry.policy} | {runs} | {fires} | " + " | ".join(means) + " |")
     return "\n".join(lines)
@@ -147,7 +162,7 @@ def _mean_of_known(values: np.ndarray | None) -> str:
 
 
 def draw(entries: Sequence[Entry], path: Path) -> None:
-    """Draw the trees saved with their intervals, and the performance profile of each policy.
+    """Draw the trees saved, or the front watched, with their intervals, and the performance profile of each policy.
 
     Raises:
         ImportError: If Matplotlib is not installed.
@@ -167,16 +182,19 @@ def draw(entries: Sequence[Entry], path: Path) -> None:
         for (bars, profile), group in zip(axes, groups, strict=True):
             _draw_bars(bars, group, styles)
             for entry in group:
-                shares = 100.0 * performance_profile(entry.saved, LEVELS)
+                shares = 100.0 * performance_profile(entry.value, LEVELS)
                 profile.plot(100.0 * LEVELS, shares, label=entry.policy, linewidth=1.4, **styles[entry.policy])
             profile.set(xlim=(0, 100), ylim=(0, 102), ylabel="fires, %")
-        axes[-1, 0].set_xlabel("forest saved: mean, 95 % interval, %")
-        axes[-1, 1].set_xlabel("forest saved on so many fires, at least, %")
+            goal = _WORDS[group[0].goal]
+            if group is groups[-1] or any(goal != _WORDS[each[0].goal] for each in groups):
+                bars.set_xlabel(f"{goal}: mean, 95 % interval, %")
+                profile.set_xlabel(f"{goal} on so many fires, at least, %")
         handles = {h.get_label(): h for row in axes for h in row[1].get_lines()}
         figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=columns, frameon=False)
         figure.savefig(path, metadata={"Software": None})
 
 
+_WORDS = {"saved": "forest saved", "watched": "front watched"}
 _LABEL_WIDTH, _LEGEND_WIDTH = 32, 130  # characters in a line
 _ROOM_BESIDE = 87.0  # longer bars have their number inside
 
@@ -192,8 +210,8 @@ def _label(entry: Entry) -> str:
 
 def _draw_bars(axes: Any, group: Sequence[Entry], styles: Mapping[str, Mapping[str, Any]]) -> None:
     for row, entry in enumerate(reversed(group)):
-        saved = summarise(entry.saved)
-        mean, (low, high) = 100 * saved["mean"], (100 * bound for bound in saved["ci95"])
+        found = summarise(entry.value)
+        mean, (low, high) = 100 * found["mean"], (100 * bound for bound in found["ci95"])
         axes.barh(row, mean, height=0.7, color=styles[entry.policy]["color"], alpha=0.75)
         axes.errorbar(mean, row, xerr=[[mean - low], [high - mean]], color="#222222", capsize=2.5, linewidth=1.0)
         place, side = (high + 1.5, "left") if high < _ROOM_BESIDE else (low - 1.5, "right")
@@ -214,7 +232,7 @@ def _by_scenario(entries: Sequence[Entry]) -> list[list[Entry]]:
     """Return the entries of each scenario, the best first."""
     scenarios = dict.fromkeys(entry.scenario for entry in entries)
     groups = [[entry for entry in entries if entry.scenario == scenario] for scenario in scenarios]
-    return [sorted(group, key=lambda entry: -entry.saved.mean()) for group in groups]
+    return [sorted(group, key=lambda entry: -entry.value.mean()) for group in groups]
 
 
 def _range(bounds: Sequence[float], sign: str = "") -> str:

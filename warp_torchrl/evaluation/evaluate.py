@@ -12,6 +12,7 @@ from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.config.saved_config import completed
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation import cache
+from warp_torchrl.evaluation.goal import goal
 from warp_torchrl.evaluation.maps import described, play_maps, write_maps
 from warp_torchrl.evaluation.method import method
 from warp_torchrl.evaluation.picture import KINDS, Kind, record_episode
@@ -59,7 +60,18 @@ def evaluate_policy(
             for index, agent in enumerate(env.agent_names)
         }
     content = report(
-        plan.scenario, name, first, episodes, others, other_modes, left_out, learner, digest, worlds, frames
+        plan.scenario,
+        name,
+        first,
+        episodes,
+        others,
+        other_modes,
+        left_out,
+        learner,
+        digest,
+        worlds,
+        frames,
+        goal(plan.world),
     )
     if map_fires is not None:
         log.info("playing %d fires on one ground for the maps, without the team and with it", map_fires)

@@ -9,6 +9,7 @@ import numpy as np
 
 from warp_torchrl.env.metrics import SAVED_BY
 from warp_torchrl.evaluation.behaviour import BEHAVIOUR
+from warp_torchrl.evaluation.goal import Goal
 from warp_torchrl.evaluation.play import Episodes
 from warp_torchrl.evaluation.statistics import compare, summarise
 from warp_torchrl.runs import disk
@@ -28,6 +29,7 @@ def report(
     configuration: str = "",
     world_overrides: Sequence[str] = (),
     frames: int | None = None,
+    goal: Goal = "saved",
 ) -> dict[str, Any]:
     """Return the content of ``evaluation.json``.
 
@@ -43,6 +45,7 @@ def report(
         configuration: Digest that distinguishes policies of one method.
         world_overrides: Overrides by which the worlds differ from the scenario.
         frames: World steps of training; None for a heuristic.
+        goal: What policies of the team are compared by.
     """
     if "noop" in others:
         episodes = episodes | {"averted": episodes["saved"] - others["noop"]["saved"]}
@@ -59,13 +62,15 @@ def report(
         "method": policy if method is None else method,
         "configuration": configuration,
         "frames": frames,
+        "goal": goal,
         "seeds": seeds,
         "metrics": _summaries(episodes),
         "episodes": rows,
         "versus": {name: compare(episodes["saved"], other["saved"]) for name, other in others.items()},
         "baselines": {name: _summaries(other) for name, other in others.items()},
         "baseline_episodes": {
-            name: {metric: other[metric].tolist() for metric in ("saved", "success")} for name, other in others.items()
+            name: {metric: other[metric].tolist() for metric in dict.fromkeys(("saved", "success", goal))}
+            for name, other in others.items()
         },
         "other_modes": {name: _summaries(other) for name, other in (other_modes or {}).items()},
         "watching": {name: _compare_watching(episodes, other) for name, other in others.items() if "watched" in other},
