@@ -4,6 +4,7 @@ They know the shapes of what they read, and how it turns with the map, from a ``
 """
 
 from warp_torchrl.models.canonical import CanonicalBatch, over_canonical
+from warp_torchrl.models.cnn import Cnn
 from warp_torchrl.models.memory import (
     Recollection,
     RecurrentActor,
@@ -11,7 +12,7 @@ from warp_torchrl.models.memory import (
     memory_apart,
     recurrent_actors,
 )
-from warp_torchrl.models.model import Cnn, Mlp
+from warp_torchrl.models.model import Mlp
 from warp_torchrl.models.networks import arithmetic_of
 from warp_torchrl.models.signature import (
     ACTION,

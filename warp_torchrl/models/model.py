@@ -7,9 +7,7 @@ from typing import ClassVar, Literal
 from tensordict.nn import TensorDictModule, TensorDictModuleBase
 from torch import nn
 
-from warp_torchrl.models.canonical import (
-    CanonicalBatch,
-)
+from warp_torchrl.models.canonical import CanonicalBatch
 from warp_torchrl.models.inputs import Inputs
 from warp_torchrl.models.memory import RecurrentActor, RecurrentNetwork
 from warp_torchrl.models.messages import TalkingNetwork
@@ -37,7 +35,8 @@ from warp_torchrl.models.signature import (
 )
 from warp_torchrl.validation import check_fields
 
-_ACTIVATIONS = {"tanh": nn.Tanh, "relu": nn.ReLU}
+ACTIVATIONS = {"tanh": nn.Tanh, "relu": nn.ReLU}
+"""Functions between layers, by name."""
 _INDEX = {"role": ROLE, "agency": AGENCY}
 """Where the index is by which an agent's network is chosen."""
 
@@ -246,7 +245,7 @@ class Mlp:
         talks: bool,
         is_late: bool,
     ) -> Network | RecurrentNetwork | TalkingNetwork:
-        encoder, activation = self._encoder(entries, hidden[0]), _ACTIVATIONS[self.activation]
+        encoder, activation = self._encoder(entries, hidden[0]), ACTIVATIONS[self.activation]
         network = Network(encoder, tuple(hidden), out, activation, head_gain, self.dtype)
         if talks:
             return TalkingNetwork(network, hidden[0], self.message_size, self.message_rounds, is_late)
@@ -254,36 +253,6 @@ class Mlp:
 
     def _encoder(self, entries: list[Entry], size: int) -> LinearEncoder | ConvolutionalEncoder:
         return LinearEncoder(entries, size)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Cnn(Mlp):
-    """Convolutions over what is a picture (the view, the map pooled to 8 x 8, the state), then as ``Mlp``.
-
-    Attributes:
-        channels: Output channels of each convolution.
-        kernel_size: Of each, odd.
-
-    Raises:
-        ValueError: If a size is out of range or the kernel is even.
-    """
-
-    activation: Literal["tanh", "relu"] = "relu"
-    dtype: Literal["auto", "float32", "bfloat16"] = "float32"
-    channels: tuple[int, ...] = (16, 16)
-    kernel_size: int = 3
-    _packs: ClassVar[bool] = False  # convolutions read whole planes
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_sizes("channels", self.channels)
-        if not (1 <= self.kernel_size <= 15 and self.kernel_size % 2):
-            raise ValueError(f"kernel_size must be odd and in 1..15, got {self.kernel_size}")
-
-    def _encoder(self, entries: list[Entry], size: int) -> ConvolutionalEncoder:
-        return ConvolutionalEncoder(
-            entries, size, tuple(self.channels), self.kernel_size, _ACTIVATIONS[self.activation]
-        )
 
 
 def _read(names: list[str], has_state: bool) -> list[str]:
