@@ -22,6 +22,8 @@ from warp_torchrl.evaluation.method import method
         (["observation=paper", "imitation.teacher=local"], "mappo efficiency paper taught by local"),
         (["imitation.demonstrations=people"], "mappo efficiency surroundings taught by people"),
         (["reward=agency", "reward.cooperation=-1"], "mappo agency surroundings cooperation=-1"),
+        (["reward=agency", "reward.cooperation=-1.0"], "mappo agency surroundings cooperation=-1"),
+        (["reward=agency", "reward.cooperation=0.25"], "mappo agency surroundings cooperation=0.25"),
         (["model.messages=graph"], "mappo efficiency surroundings messages=graph"),
         (
             ["imitation.teacher=local", "imitation.demonstrations=people"],

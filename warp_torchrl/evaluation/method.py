@@ -39,7 +39,12 @@ def unusual(record: SavedConfig) -> list[str]:
     """Return a policy's unusual settings, as overrides."""
     usual = _USUAL | ({("observation", "radius"): _PAPERS_RADIUS} if record.choices["observation"] == "paper" else {})
     found = {(group, key): record.values.get(group, {}).get(key) for group, key in usual}
-    return [f"{key[1]}={value}" for key, value in found.items() if value is not None and value != usual[key]]
+    return [f"{key[1]}={_written(value)}" for key, value in found.items() if value is not None and value != usual[key]]
+
+
+def _written(value: Any) -> str:
+    """Return a value as text, 1 and 1.0 alike."""
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def teacher_label(record: SavedConfig) -> list[str]:
