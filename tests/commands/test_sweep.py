@@ -25,6 +25,7 @@ from warp_torchrl.evaluation.method import method
         (["reward=agency", "reward.cooperation=-1.0"], "mappo agency surroundings cooperation=-1"),
         (["reward=agency", "reward.cooperation=0.25"], "mappo agency surroundings cooperation=0.25"),
         (["model.messages=graph"], "mappo efficiency surroundings messages=graph"),
+        (["curriculum=success"], "mappo efficiency surroundings curriculum=success"),
         (
             ["imitation.teacher=local", "imitation.demonstrations=people"],
             "mappo efficiency surroundings taught by local and people",
@@ -33,7 +34,7 @@ from warp_torchrl.evaluation.method import method
 )
 def test_a_policy_is_called_by_what_is_unusual(overrides, named):
     chosen = dict(each.split("=") for each in overrides)
-    usual = {"algorithm": "mappo", "reward": "efficiency", "observation": "surroundings"}
+    usual = {"algorithm": "mappo", "reward": "efficiency", "observation": "surroundings", "curriculum": "none"}
     choices = {group: chosen.get(group, option) for group, option in usual.items()}
     record = SavedConfig(choices=choices, values=plain(compose_config("train", overrides)))
     assert method(record)[0] == named
