@@ -45,6 +45,7 @@ def test_kinds_of_cells():
         burned=torch.tensor([[[False, True, True]]]),  # what burned and stands again is no ash
         firebreak=torch.tensor([[[True, False, False]]]),
     )
+    assert kinds(state).dtype == torch.uint8
     assert kinds(state).tolist() == [[[int(state.cells[0, 0, 0]) + 32, int(state.cells[0, 0, 1]), 16]]]
 
 

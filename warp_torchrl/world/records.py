@@ -7,6 +7,7 @@ and the code that the map showed before the fire. Of two records of a cell the l
 import torch
 from torch import Tensor
 
+from warp_torchrl.world.fast.bytes import byte
 from warp_torchrl.world.state import WorldState
 
 _CODE, _ASH, _FIREBREAK, _KIND, _STEP = 15, 16, 32, 63, 6
@@ -18,7 +19,7 @@ HALF_FRESH = 16.0
 def kinds(state: WorldState) -> Tensor:
     """Return what each cell is now, uint8 [B, H, W]: the bits of a record below the step's."""
     ash = (state.cells == 0) & state.burned
-    return state.cells + ash * _ASH + state.firebreak * _FIREBREAK
+    return state.cells + byte(ash) * _ASH + byte(state.firebreak) * _FIREBREAK
 
 
 def recorded(kind: Tensor, step: Tensor) -> Tensor:

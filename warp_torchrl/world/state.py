@@ -198,7 +198,7 @@ class WorldState(Batch):
     terminated: Tensor  # bool [B], no cell burns any more
     truncated: Tensor  # bool [B], the horizon was reached
     arrivals: Arrivals | None = None  # None but under law ``rate``
-    knowledge: Tensor | None = None  # int32 [B,A,H,W], records of ``world.sensing``; None where all is seen
+    knowledge: Tensor | None = None  # int32 [B,A,H,W], records of ``world.records``; None where all is seen
     watching: Watching | None = None  # None where all is seen
     lands: Lands | None = None  # None where there is but one agency
     packets: Packets | None = None  # None where packets arrive in the step in which they are sent
