@@ -128,9 +128,9 @@ def _table(goal: str, entries: Sequence[Entry], against: str | None) -> str:
             if entry is other or entry.seeds != other.seeds:
                 cells += ["-", "-", "-"]
             else:
-                gap = compare(entry.value, other.value)
+                gap = compare(entry.value, other.value, goal)
                 cells += [
-                    f"{100 * gap['saved_difference']:+.1f}",
+                    f"{100 * gap[f'{goal}_difference']:+.1f}",
                     _range(gap["ci95"], "+"),
                     f"{100 * gap['probability_of_improvement']:.0f} %",
                 ]

@@ -65,13 +65,13 @@ def evaluate_policy(
         first,
         episodes,
         others,
-        other_modes,
-        left_out,
-        learner,
-        digest,
-        worlds,
-        frames,
-        goal(plan.world),
+        other_modes=other_modes,
+        left_out=left_out,
+        method=learner,
+        configuration=digest,
+        world_overrides=worlds,
+        frames=frames,
+        goal=goal(plan.world),
     )
     if map_fires is not None:
         log.info("playing %d fires on one ground for the maps, without the team and with it", map_fires)

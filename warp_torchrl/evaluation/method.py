@@ -16,7 +16,7 @@ def method(record: SavedConfig) -> tuple[str, str]:
     Runs of several versions are alike by it if their records are ``completed``.
     """
     names = [record.choices[group] for group in ("algorithm", "reward", "observation")]
-    names += [*unusual(record), *_curriculum(record), *teacher_label(record)]
+    names += [*unusual(record), *teacher_label(record)]
     values = {key: value for key, value in record.values.items() if key not in _NOT_TRAINED_BY}
     return " ".join(names), sha256(json.dumps(_with_floats(values), sort_keys=True).encode()).hexdigest()
 
@@ -36,21 +36,18 @@ _PAPERS_RADIUS = 3
 
 
 def unusual(record: SavedConfig) -> list[str]:
-    """Return a policy's unusual settings, as overrides."""
+    """Return a policy's unusual settings, and its curriculum if it had one, as overrides."""
     usual = _USUAL | ({("observation", "radius"): _PAPERS_RADIUS} if record.choices["observation"] == "paper" else {})
     found = {(group, key): record.values.get(group, {}).get(key) for group, key in usual}
-    return [f"{key[1]}={_written(value)}" for key, value in found.items() if value is not None and value != usual[key]]
+    settings = {key: value for (group, key), value in found.items() if value not in (None, usual[group, key])}
+    curriculum = record.choices.get("curriculum", "none")
+    settings |= {} if curriculum == "none" else {"curriculum": curriculum}
+    return [f"{key}={_written(value)}" for key, value in settings.items()]
 
 
 def _written(value: Any) -> str:
     """Return a value as text, 1 and 1.0 alike."""
     return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _curriculum(record: SavedConfig) -> list[str]:
-    """Return the curriculum that a policy was trained by, as an override; nothing where there was none."""
-    name = record.choices.get("curriculum", "none")
-    return [] if name == "none" else [f"curriculum={name}"]
 
 
 def teacher_label(record: SavedConfig) -> list[str]:

@@ -73,18 +73,17 @@ def report(
             for name, other in others.items()
         },
         "other_modes": {name: _summaries(other) for name, other in (other_modes or {}).items()},
-        "watching": {name: _compare_watching(episodes, other) for name, other in others.items() if "watched" in other},
+        "watching": {
+            name: compare(episodes["watched"], other["watched"], "watched")
+            for name, other in others.items()
+            if "watched" in other
+        },
         "left_out": {agent: compare(episodes["saved"], other["saved"]) for agent, other in (left_out or {}).items()},
     }
 
 
 def _summaries(episodes: Episodes) -> dict[str, dict[str, Any]]:
     return {name: summarise(values) for name, values in episodes.items()}
-
-
-def _compare_watching(episodes: Episodes, other: Episodes) -> dict[str, Any]:
-    found = compare(episodes["watched"], other["watched"])
-    return {"watched_difference": found.pop("saved_difference"), **found}
 
 
 def _number(value: float) -> float | None:

@@ -50,23 +50,24 @@ def summarise(values: np.ndarray) -> dict[str, Any]:
     }
 
 
-def compare(saved: np.ndarray, other: np.ndarray) -> dict[str, Any]:
-    """Return the difference in trees saved between two policies, paired by world, with 95 % intervals.
+def compare(values: np.ndarray, other: np.ndarray, metric: str = "saved") -> dict[str, Any]:
+    """Return the difference in a metric between two policies, paired by world, with 95 % intervals.
 
     Args:
-        saved: Share of trees saved by the policy, [n] or [runs, n].
-        other: Share of trees saved by the other policy in the same worlds, [n] or [runs, n].
+        values: The metric of the policy, [n] or [runs, n].
+        other: The metric of the other policy in the same worlds, [n] or [runs, n].
+        metric: Its name, by which the difference is called.
 
     Returns:
-        ``saved_difference`` and ``ci95``; ``probability_of_improvement``, the probability that a run of the policy
-        saves more in a world than a run of the other (ties count half), and ``probability_ci95``.
+        ``saved_difference``, or that of the metric, and ``ci95``; ``probability_of_improvement``, the probability that
+        a run of the policy has more in a world than a run of the other (ties count half), and ``probability_ci95``.
     """
-    mine, theirs = np.atleast_2d(saved), np.atleast_2d(other)
+    mine, theirs = np.atleast_2d(values), np.atleast_2d(other)
     difference = mine - theirs.mean(axis=0)
     gap = mine[:, None] - theirs[None]
     better = ((gap > 0.0) + 0.5 * (gap == 0.0)).mean(axis=1)
     return {
-        "saved_difference": float(difference.mean()),
+        f"{metric}_difference": float(difference.mean()),
         "ci95": interval(difference, _mean),
         "probability_of_improvement": float(better.mean()),
         "probability_ci95": interval(better, _mean),

@@ -14,7 +14,7 @@ from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.smoke import smoke
 from warp_torchrl.world.state import FIRST_FIRE, Watching, WorldState, is_burning, is_tree
 from warp_torchrl.world.team import Team
-from warp_torchrl.world.watching import at_start, counted, newest_of, unwatched
+from warp_torchrl.world.watching import at_start, counted, newest_records, unwatched
 
 _EVERYWHERE = 1 << 20
 """A sight that no map limits [cells]."""
@@ -156,7 +156,7 @@ class Sight(Sensing):
             knows = torch.maximum(knows, told)
         goes_on = running[:, None, None, None]
         knows, itself = torch.where(goes_on, knows, known), torch.where(goes_on, itself, watching.itself)
-        after = counted(state, watching, itself, newest_of(known, knows, itself, state.step), self.recent)
+        after = counted(state, watching, itself, newest_records(known, knows, itself, state.step), self.recent)
         return state.replace(knowledge=knows, watching=_where(running, after, watching))
 
     def _sees(self, state: WorldState, team: Team) -> Tensor:

@@ -11,7 +11,7 @@ from warp_torchrl.world.state import FIRST_FIRE, Watching, WorldState, is_burnin
 
 
 @dataclass(frozen=True, eq=False)
-class Newest:
+class NewestRecords:
     """What the newest record of each cell of any agent of the team tells."""
 
     burns: Tensor  # bool [B,H,W], that it burns
@@ -43,7 +43,7 @@ def at_start(watching: Watching) -> Watching:
     return watching.replace(**{name: torch.zeros_like(getattr(watching, name)) for name in sums})
 
 
-def newest_of(before: Tensor, records: Tensor, itself: Tensor, step: Tensor) -> Newest:
+def newest_records(before: Tensor, records: Tensor, itself: Tensor, step: Tensor) -> NewestRecords:
     """Return what the team's newest records tell after a step.
 
     Args:
@@ -53,7 +53,7 @@ def newest_of(before: Tensor, records: Tensor, itself: Tensor, step: Tensor) -> 
         step: The worlds' steps after it, int32 [B].
     """
     newest = records.amax(dim=1)
-    return Newest(
+    return NewestRecords(
         burns=codes(newest) >= FIRST_FIRE,
         burned_before=codes(before.amax(dim=1)) >= FIRST_FIRE,
         since=steps_since(newest, step),
@@ -62,7 +62,7 @@ def newest_of(before: Tensor, records: Tensor, itself: Tensor, step: Tensor) -> 
     )
 
 
-def counted(state: WorldState, before: Watching, itself: Tensor, newest: Newest, recent: int) -> Watching:
+def counted(state: WorldState, before: Watching, itself: Tensor, newest: NewestRecords, recent: int) -> Watching:
     """Return what teams have watched after a step.
 
     The team watches a cell of the front that it saw burn at most ``recent`` steps ago. The agents that hold the newest
