@@ -92,6 +92,12 @@ def test_any_runs_are_compared_with_any_of_them(sweep, capsys):
     assert "| +16.7 |" in first and first.endswith("| 75 % |") and second.endswith("| - | - | - |")
 
 
+def test_a_policy_that_no_run_has_is_told(sweep, capsys):
+    with pytest.raises(SystemExit):
+        main([str(sweep), "--against", "locl"])
+    assert "against must be one of mappo, local, got locl: did you mean local?" in capsys.readouterr().err
+
+
 def test_other_metrics_are_shown_where_they_were_evaluated(sweep, capsys):
     for run, numbers in (("0", [1.0, None, 2.0]), ("1", [0.0, 3.0, None]), ("2", [None, None, None])):
         path = sweep / run / "evaluation.json"

@@ -16,6 +16,7 @@ import numpy as np
 
 from warp_torchrl.evaluation.report import place
 from warp_torchrl.evaluation.statistics import compare, performance_profile, summarise
+from warp_torchrl.nearest import did_you_mean
 
 LEVELS = np.linspace(0.0, 1.0, 101)
 _Key = tuple[str, str, str, tuple[int, ...]]  # scenario, method, configuration, seeds
@@ -99,7 +100,13 @@ def table(entries: Sequence[Entry], against: str | None = None) -> str:
     Args:
         entries: Policies on scenarios.
         against: The policy to compare with; by default, or if a scenario lacks it, the best one.
+
+    Raises:
+        ValueError: If no scenario has the policy to compare with.
     """
+    known = list(dict.fromkeys(entry.policy for entry in entries))
+    if against not in (None, *known):
+        raise ValueError(f"against must be one of {', '.join(known)}, got {against}{did_you_mean(against, known)}")
     goals = sorted({entry.goal for entry in entries})  # saved first
     return "\n\n".join(_table(goal, [entry for entry in entries if entry.goal == goal], against) for goal in goals)
 
