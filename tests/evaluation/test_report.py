@@ -18,12 +18,17 @@ def episodes(watched, *further):
 
 
 def test_what_is_watched_has_a_table_of_its_own():
-    content = report("front", "mine", 7, episodes(0.75, *WATCHING), {"noop": episodes(0.25, *WATCHING)})
+    content = report("front", "mine", 7, episodes(0.75, *WATCHING), {"noop": episodes(0.25, *WATCHING)}, goal="watched")
     assert content["watching"]["noop"]["watched_difference"] == 0.5
     shown = table(content).splitlines()
     assert "mine                        75.0    75.0 .. 75.0     50.0        0.250" in shown
     assert "mine - noop: +50.0 points watched, +50.0 .. +50.0; more on 100 % of fires" in shown
     assert not any("points saved" in line for line in shown), "none can act"
+    acts = table(report("search", "mine", 7, episodes(0.75, *WATCHING), {"noop": episodes(0.25, *WATCHING)}))
+    assert "points saved" in acts and "points watched" in acts and "saved %" not in "".join(shown)
+    lamed = {"scout_1": episodes(0.5, *WATCHING)}
+    alone = report("front", "mine", 7, episodes(0.75, *WATCHING), {}, left_out=lamed, goal="watched")
+    assert "without scout_1          -25.0  -25.0 .. -25.0" in table(alone).splitlines()
     near = {"near_misses": np.full(4, 0.125)}
     flown = report("front", "mine", 7, episodes(0.75, *WATCHING) | near, {"noop": episodes(0.25, *WATCHING) | near})
     assert "mine                        75.0    75.0 .. 75.0     50.0        0.250           12.5" in table(flown)

@@ -78,7 +78,7 @@ def report(
             for name, other in others.items()
             if "watched" in other
         },
-        "left_out": {agent: compare(episodes["saved"], other["saved"]) for agent, other in (left_out or {}).items()},
+        "left_out": {agent: compare(episodes[goal], other[goal], goal) for agent, other in (left_out or {}).items()},
     }
 
 
@@ -91,49 +91,59 @@ def _number(value: float) -> float | None:
 
 
 def table(content: Mapping[str, Any]) -> str:
-    """Return the report as a table for the terminal."""
-    header = (
-        f"{'policy':<22}{'saved %':>8}{'95 % interval':>16}{'iqm %':>8}{'success %':>11}{'control':>9}{'cleared %':>11}"
-    )
-    lines = [f"{place(content)}: {len(content['seeds'])} fires, seeds from {content['seeds'][0]}", header]
+    """Return the report as a table for the terminal; of a team that cannot act, what it watches alone."""
+    lines = [f"{place(content)}: {len(content['seeds'])} fires, seeds from {content['seeds'][0]}"]
     rows = {**content["baselines"], **content["other_modes"], content["policy"]: content["metrics"]}
-    for name, summary in rows.items():
-        saved = summary["saved"]
-        interval = "{:.1f} .. {:.1f}".format(*(100.0 * bound for bound in saved["ci95"]))
-        lines.append(
-            f"{name:<22}{100 * saved['mean']:>8.1f}{interval:>16}{100 * saved['iqm']:>8.1f}"
-            f"{100 * summary['success']['mean']:>11.1f}{summary['control_time']['mean']:>9.2f}"
-            f"{100 * summary['cleared']['mean']:>11.2f}"
-        )
-    for name, difference in content["versus"].items():
-        if name in content.get("watching", {}) and difference["ci95"] == [0.0, 0.0]:
-            continue  # a team that cannot act
-        low, high = (100.0 * bound for bound in difference["ci95"])
-        lines.append(
-            f"{content['policy']} - {name}: {100 * difference['saved_difference']:+.1f} points saved, "
-            f"{low:+.1f} .. {high:+.1f}; more on {100 * difference['probability_of_improvement']:.0f} % of fires"
-        )
-    lines += _watching_lines(content, rows) if content.get("watching") else []
+    if content["goal"] == "saved":
+        lines += [*_saved_lines(rows), *_difference_lines(content["policy"], content["versus"], "saved")]
+    if content["watching"]:
+        lines += [*_watching_lines(rows), *_difference_lines(content["policy"], content["watching"], "watched")]
     lines += _agency_lines(rows, [name for name in content["metrics"] if name.startswith(SAVED_BY)])
-    lines += _behaviour_lines(content)
+    lines += _behaviour_lines(content) if content["goal"] == "saved" else []
+    lines += _left_out_lines(content)
     return "\n".join(lines)
 
 
-def _watching_lines(content: Mapping[str, Any], rows: Mapping[str, Any]) -> list[str]:
+def _saved_lines(rows: Mapping[str, Any]) -> list[str]:
+    """Return what each policy saves, a line for each."""
+    lines = [
+        f"{'policy':<22}{'saved %':>8}{'95 % interval':>16}{'iqm %':>8}{'success %':>11}{'control':>9}{'cleared %':>11}"
+    ]
+    for name, summary in rows.items():
+        saved = summary["saved"]
+        lines.append(
+            f"{name:<22}{100 * saved['mean']:>8.1f}{_interval(saved):>16}{100 * saved['iqm']:>8.1f}"
+            f"{100 * summary['success']['mean']:>11.1f}{summary['control_time']['mean']:>9.2f}"
+            f"{100 * summary['cleared']['mean']:>11.2f}"
+        )
+    return lines
+
+
+def _watching_lines(rows: Mapping[str, Any]) -> list[str]:
+    """Return what each policy watches, a line for each."""
     lines = [
         f"{'policy':<22}{'watched %':>10}{'95 % interval':>16}{'found %':>9}{'uncertainty':>13}{'near misses %':>15}"
     ]
     for name, summary in rows.items():
         watched, near = summary["watched"], summary.get("near_misses")
-        interval = "{:.1f} .. {:.1f}".format(*(100.0 * bound for bound in watched["ci95"]))
         lines.append(
-            f"{name:<22}{100 * watched['mean']:>10.1f}{interval:>16}{100 * summary['found']['mean']:>9.1f}"
+            f"{name:<22}{100 * watched['mean']:>10.1f}{_interval(watched):>16}{100 * summary['found']['mean']:>9.1f}"
             f"{summary['uncertainty']['mean']:>13.3f}" + ("" if near is None else f"{100 * near['mean']:>15.1f}")
         )
-    for name, difference in content["watching"].items():
+    return lines
+
+
+def _interval(summary: Mapping[str, Any]) -> str:
+    return "{:.1f} .. {:.1f}".format(*(100.0 * bound for bound in summary["ci95"]))
+
+
+def _difference_lines(policy: str, differences: Mapping[str, Any], metric: str) -> list[str]:
+    """Return what the policy has more of a metric than each of the others, a line for each."""
+    lines = []
+    for name, difference in differences.items():
         low, high = (100.0 * bound for bound in difference["ci95"])
         lines.append(
-            f"{content['policy']} - {name}: {100 * difference['watched_difference']:+.1f} points watched, "
+            f"{policy} - {name}: {100 * difference[f'{metric}_difference']:+.1f} points {metric}, "
             f"{low:+.1f} .. {high:+.1f}; more on {100 * difference['probability_of_improvement']:.0f} % of fires"
         )
     return lines
@@ -167,9 +177,15 @@ def _behaviour_lines(content: Mapping[str, Any]) -> list[str]:
         if found["mean"] is not None:
             low, high = found["ci95"]
             lines.append(f"{name.replace('_', ' '):<22}{found['mean']:>8.3f}{f'{low:.3f} .. {high:.3f}':>18}")
+    return lines
+
+
+def _left_out_lines(content: Mapping[str, Any]) -> list[str]:
+    """Return what the team reaches without each agent less what it reaches with it, a line for each."""
+    lines, key = [], f"{content['goal']}_difference"
     for agent, loss in content["left_out"].items():
         low, high = (100.0 * bound for bound in loss["ci95"])
-        lines.append(f"without {agent:<14}{-100 * loss['saved_difference']:>+8.1f}{f'{-high:+.1f} .. {-low:+.1f}':>16}")
+        lines.append(f"without {agent:<14}{-100 * loss[key]:>+8.1f}{f'{-high:+.1f} .. {-low:+.1f}':>16}")
     return lines
 
 
