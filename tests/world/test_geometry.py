@@ -12,6 +12,7 @@ from warp_torchrl.world.geometry import (
     flood,
     grow,
     neighbour_in,
+    neighbours,
     unit_vectors,
 )
 
@@ -48,6 +49,13 @@ def test_a_neighbour_is_what_lies_one_cell_on_and_nothing_beyond_the_map() -> No
     plane = torch.arange(1, 7).view(1, 2, 3)
     assert neighbour_in(DIRECTIONS.index((0, 1)), plane).tolist() == [[[2, 3, 0], [5, 6, 0]]]
     assert neighbour_in(DIRECTIONS.index((-1, -1)), plane).tolist() == [[[0, 0, 0], [0, 1, 2]]]
+
+
+def test_the_neighbours_of_all_cells_go_round_clockwise_from_north() -> None:
+    plane = torch.arange(9.0).view(1, 3, 3)
+    around = neighbours(plane, -1.0)
+    assert around[:, 0, 1, 1].tolist() == [1.0, 2.0, 5.0, 8.0, 7.0, 6.0, 3.0, 0.0]
+    assert around[:, 0, 0, 0].tolist() == [-1.0, -1.0, 1.0, 4.0, 3.0, -1.0, -1.0, -1.0], "beyond the map"
 
 
 def test_a_mask_grows_by_one_cell_all_round_and_never_over_the_edge() -> None:

@@ -37,6 +37,15 @@ def neighbour_in(direction: int, plane: Tensor) -> Tensor:
     return pad(plane, (1, 1, 1, 1))[..., 1 + row : 1 + row + height, 1 + column : 1 + column + width]
 
 
+def neighbours(plane: Tensor, beyond: float) -> Tensor:
+    """Return what each cell's neighbours hold, [8, B, H, W]; a number beyond the map."""
+    height, width = plane.shape[-2:]
+    padded = pad(plane, (1, 1, 1, 1), value=beyond)
+    return torch.stack(
+        [padded[..., 1 + row : 1 + row + height, 1 + column : 1 + column + width] for row, column in DIRECTIONS]
+    )
+
+
 def grow(mask: Tensor, radius: int = 1) -> Tensor:
     """Return the cells within a Chebyshev distance ``radius`` of a marked cell, bool [..., H, W]."""
     for _ in range(radius):

@@ -8,12 +8,11 @@ from typing import Any, Literal, Self
 
 import torch
 from torch import Tensor
-from torch.nn.functional import pad
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.automaton import Automaton
 from warp_torchrl.world.fuel_bed import COVER_FUEL, FuelBed, moisture_row
-from warp_torchrl.world.geometry import DIRECTIONS, grow, neighbour_in
+from warp_torchrl.world.geometry import grow, neighbour_in, neighbours
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import (
     FIRST_FIRE,
@@ -26,7 +25,7 @@ from warp_torchrl.world.state import (
     is_tree,
 )
 from warp_torchrl.world.terrain.landscape import LandscapeSource
-from warp_torchrl.world.travel import NEVER, NOWHERE, Metric, Places, arrival, duration, travel
+from warp_torchrl.world.travel import NEVER, NOWHERE, Metric, Places, arrival, rate_from, travel
 from warp_torchrl.world.wind import Wind
 
 TICKS_PER_CELL = 2
@@ -214,7 +213,7 @@ class RateFire(Automaton):
             return reached.gather(1, origin.flatten(1).to(torch.int64)).view(origin.shape)
 
         places = Places(row, column, state.cells.shape[2], time_of)
-        around = _neighbours(times, NEVER), _neighbours(kept.origin, NOWHERE)
+        around = neighbours(times, NEVER), neighbours(kept.origin, NOWHERE)
         minutes, origin = arrival(*around, self._metric(state, state.air), places)
         beside = grow(self.spreads(state)) & self.can_ignite(state) & (minutes < NEVER / 2)
         return Arrivals(torch.where(beside, minutes, NEVER), torch.where(beside, origin, NOWHERE))
@@ -296,13 +295,6 @@ class RateFire(Automaton):
         return torch.where(burning, out, into * fuel)
 
 
-def rate_from(direction: int, metric: Metric) -> Tensor:
-    """Return 1 / F into cells from their neighbours in a direction, float32, shape of the metric's [1/min]."""
-    row, column = DIRECTIONS[direction]
-    east, north = torch.full_like(metric[0], -column), torch.full_like(metric[0], row)
-    return 1.0 / duration(metric, east, north).clamp(min=1e-9)
-
-
 def _of(state: WorldState) -> Arrivals:
     if state.arrivals is None:
         raise ValueError("the worlds must be those of a fire with rates of spread")
@@ -313,15 +305,6 @@ def _log_normal(u: Tensor, variation: float) -> Tensor:
     """Return log-normal factors of median 1 and a coefficient of variation, from uniform draws in [0, 1)."""
     deviation = math.sqrt(math.log1p(variation * variation))
     return torch.exp(deviation * math.sqrt(2.0) * torch.erfinv((2.0 * u - 1.0).clamp(-1.0 + 1e-6, 1.0 - 1e-6)))
-
-
-def _neighbours(plane: Tensor, beyond: float) -> Tensor:
-    """Return what each cell's neighbours hold, [8, B, H, W]."""
-    height, width = plane.shape[-2:]
-    padded = pad(plane, (1, 1, 1, 1), value=beyond)
-    return torch.stack(
-        [padded[..., 1 + row : 1 + row + height, 1 + column : 1 + column + width] for row, column in DIRECTIONS]
-    )
 
 
 def _rows_and_columns(cells: Tensor) -> tuple[Tensor, Tensor]:

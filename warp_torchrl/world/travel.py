@@ -70,6 +70,13 @@ def duration(metric: Metric, east: Tensor, north: Tensor) -> Tensor:
     return slowness * torch.sqrt(east * east + north * north) - drift_east * east - drift_north * north
 
 
+def rate_from(direction: int, metric: Metric) -> Tensor:
+    """Return 1 / F into cells from their neighbours in a direction, float32, shape of the metric's [cells/min]."""
+    row, column = DIRECTIONS[direction]
+    east, north = torch.full_like(metric[0], -column), torch.full_like(metric[0], row)
+    return 1.0 / duration(metric, east, north).clamp(min=1e-9)
+
+
 @dataclass(frozen=True, eq=False)
 class Places:
     """Some cells of maps of one size."""

@@ -14,9 +14,9 @@ from warp_torchrl.world.fast.bytes import byte
 from warp_torchrl.world.fast.edge import places
 from warp_torchrl.world.geometry import DIRECTIONS, grow
 from warp_torchrl.world.random import Stream, uniform
-from warp_torchrl.world.rate import RateFire, rate_from
+from warp_torchrl.world.rate import RateFire
 from warp_torchrl.world.state import Arrivals, WorldState
-from warp_torchrl.world.travel import NEVER, NOWHERE, Metric, Places, arrival
+from warp_torchrl.world.travel import NEVER, NOWHERE, Metric, Places, arrival, rate_from
 
 
 class AtBand:

@@ -12,8 +12,7 @@ from torch import Tensor
 from torch.nn.functional import pad
 
 from warp_torchrl.world.geometry import DIRECTIONS
-from warp_torchrl.world.rate import rate_from
-from warp_torchrl.world.travel import NEVER, NOWHERE, Metric, Places, arrival
+from warp_torchrl.world.travel import NEVER, NOWHERE, Metric, Places, arrival, rate_from
 
 
 @dataclass(frozen=True, eq=False)
