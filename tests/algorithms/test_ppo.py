@@ -131,6 +131,24 @@ def test_the_schedule_falls_linearly(make_small_env):
     assert float(learner.loss.entropy_coeff) == pytest.approx(0.005)
 
 
+def test_the_critic_learns_alone_at_first(make_small_env):
+    env = make_small_env(4)
+    learner = Ppo(critic_first=0.5).build(env, Mlp(actor_hidden=(8,), critic_hidden=(8,)), 32)
+    learner.store(collected(env, learner, 8))
+
+    def moved(progress):
+        learner.schedule(progress)
+        before = {name: each.detach().clone() for name, each in learner.loss.named_parameters()}
+        terms = learner.loss(next(iter(learner.samples())))
+        sum(terms[key] for key in learner.loss_keys).backward()
+        learner.optimizer.step()
+        learner.optimizer.zero_grad()
+        after = learner.loss.named_parameters()
+        return {name.split("_")[0] for name, each in after if not torch.equal(each, before[name])}
+
+    assert [moved(0.0), moved(0.49), moved(0.5)] == [{"critic"}, {"critic"}, {"actor", "critic"}]
+
+
 def test_a_few_updates_raise_the_return_of_a_bandit(make_small_env):
     """Reward 1 for one action and nothing else: the policy must find it in a few dozen updates."""
     env = make_small_env(16, small_world(horizon=400))

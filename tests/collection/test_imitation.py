@@ -13,6 +13,11 @@ def test_the_weight_falls_linearly_to_nothing():
     assert [plan.weight_at(progress) for progress in (0.0, 0.125, 0.25, 0.5, 1.0)] == [2.0, 1.5, 1.0, 0.0, 0.0]
 
 
+def test_a_weight_that_stays():
+    plan = Imitation(weight=2.0, weight_end=1.0, until=0.5)
+    assert [plan.weight_at(progress) for progress in (0.0, 0.125, 0.25, 0.5, 1.0)] == [2.0, 1.75, 1.5, 1.0, 1.0]
+
+
 @pytest.mark.parametrize(
     ("overrides", "said"),
     [

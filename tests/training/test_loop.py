@@ -106,6 +106,7 @@ RUNS = {
     "serves": ["scenario=agencies", "landscape.size=12", "horizon=10", "agencies.own=1", "agencies.lending=need",
                "agencies.term=3", "reward.cooperation=-0.5"],
     "mixes": ["reward.normalise=true", "model.memory=8", "imitation.teacher=local", "imitation.until=0.7",
+              "imitation.weight_end=0.1", "algorithm.critic_first=0.7",
               "algorithm.minibatch_size=32", "mixture=several", "mixture.weigh=left", "mixture.worlds=2",
               "mixture.kinds={one:{scenario:single,over:{horizon:8}},"
               "two:{scenario:skirmish,share:2,teacher:greedy,over:{horizon:10}}}"],

@@ -49,6 +49,8 @@ class OnPolicy(Algorithm):
         entropy_coeff: Weight of the entropy bonus at the start.
         entropy_coeff_end: At the end; it falls linearly.
         critic_coeff: Weight of the value loss.
+        critic_first: Share of the training in which the critic learns alone, and the actor stays as it is: for a team
+            that starts from an exported policy, whose critic is new.
         minibatch_size: World steps in a minibatch of the largest batch (each has one sample an agent), and in
             proportion of a smaller one; where actors remember, in as many whole sequences as fit, one at least.
 
@@ -61,13 +63,13 @@ class OnPolicy(Algorithm):
     entropy_coeff: float = 0.005
     entropy_coeff_end: float = 0.0005
     critic_coeff: float = 1.0
+    critic_first: float = 0.0
     minibatch_size: int = 1024
 
     def check(self, **ranges: tuple[float, float]) -> None:
         """Check the numbers against their ranges, and further fields against ``ranges``."""
-        share = (0.0, 1.0)
-        own = {"lmbda": share, "entropy_coeff": share, "entropy_coeff_end": share, "critic_coeff": (0.0, 100.0)}
-        super().check(minibatch_size=(1, 1_000_000), **own, **ranges)
+        shares = dict.fromkeys(("lmbda", "entropy_coeff", "entropy_coeff_end", "critic_first"), (0.0, 1.0))
+        super().check(minibatch_size=(1, 1_000_000), critic_coeff=(0.0, 100.0), **shares, **ranges)
 
     def policy(self, shape: Signature, model: Mlp) -> ProbabilisticActor:
         """Return the team's decentralised policy: each agent's action from its own observation and mask."""
@@ -94,6 +96,7 @@ class OnPolicy(Algorithm):
 
         def schedule(progress: float) -> dict[str, float]:
             loss.entropy_coeff.fill_(falling(self.entropy_coeff, self.entropy_coeff_end, progress))
+            policy.requires_grad_(progress >= self.critic_first)
             return {"train/learning_rate": self.rate_at(progress, optimizer), **self.constants()}
 
         batch = self._held(loss, env, model, frames_per_batch, shape, share)

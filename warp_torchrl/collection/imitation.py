@@ -30,7 +30,8 @@ class Imitation:
         demonstrations: Folder of recordings, of which the acts of people are cloned; None clones nobody's.
         minibatch_size: Acts of people in an optimiser step, of all processes.
         weight: Weight of the cloning losses at the start; it falls linearly.
-        until: Share of the training after which the weight is 0.
+        weight_end: Weight that stays. A little keeps a team near its teacher where its rewards tell it nothing.
+        until: Share of the training after which the weight is ``weight_end``.
         guide: One of ``TEACHERS``, whose actions ``dqn``, ``vdn`` and ``qmix`` take where they would explore at random;
             None has them explore at random.
 
@@ -42,11 +43,14 @@ class Imitation:
     demonstrations: str | None = None
     minibatch_size: int = 256
     weight: float = 1.0
+    weight_end: float = 0.0
     until: float = 0.3
     guide: str | None = None
 
     def __post_init__(self) -> None:
-        check_fields(self, weight=(1e-6, 1e6), until=(1e-6, 1.0), minibatch_size=(1, 1_000_000))
+        check_fields(
+            self, weight=(1e-6, 1e6), weight_end=(0.0, 1e6), until=(1e-6, 1.0), minibatch_size=(1, 1_000_000)
+        )
         if self.teacher is not None:
             check_teacher(self.teacher)
         if self.guide is not None and self.guide not in TEACHERS:
@@ -55,7 +59,7 @@ class Imitation:
 
     def weight_at(self, progress: float) -> float:
         """Return the weight at progress in 0..1."""
-        return self.weight * max(0.0, 1.0 - progress / self.until)
+        return self.weight_end + (self.weight - self.weight_end) * max(0.0, 1.0 - progress / self.until)
 
     def check_fits(self, algorithm: Algorithm, collector: InProcess, model: Mlp) -> None:
         """Check that the algorithm, the collector and the networks allow whom is learned from.
