@@ -25,9 +25,11 @@ def test_fewer_worlds_than_kinds_are_refused():
         apportioned([1.0, 1.0, 1.0], 2)
 
 
-def test_a_kind_has_a_share():
+def test_a_kind_has_a_share_and_a_teacher_a_weight():
     with pytest.raises(ValueError, match="share must be in"):
         Kind(scenario="water", share=0.0)
+    with pytest.raises(ValueError, match="teacher_weight must be in"):
+        Kind(scenario="water", teacher_weight=-1.0)
 
 
 def test_what_is_left_to_learn_weighs_by_hand():

@@ -23,18 +23,20 @@ class Kind:
         over: Keys of its worlds that have other values: ``{team: {n_agents: 2}, wind: wandering}``.
         share: Of the worlds, in proportion to the shares of the others.
         teacher: Who labels its worlds, in place of ``imitation.teacher``; None takes that one.
+        teacher_weight: By what ``imitation.weight`` and ``weight_end`` are multiplied in its worlds.
 
     Raises:
-        ValueError: If the share is out of its range.
+        ValueError: If the share or the weight is out of its range.
     """
 
     scenario: str
     over: Mapping[str, Any] = field(default_factory=dict)
     share: float = 1.0
     teacher: str | None = None
+    teacher_weight: float = 1.0
 
     def __post_init__(self) -> None:
-        check_fields(self, share=(1e-6, 1e6))
+        check_fields(self, share=(1e-6, 1e6), teacher_weight=(0.0, 1e6))
 
 
 @dataclass(frozen=True, kw_only=True)

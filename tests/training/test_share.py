@@ -129,3 +129,21 @@ def test_actors_remember_each_kind_apart(tmp_path, index):
     assert (alone["agents", "memory"][:, 0] != 0.0).any(), "it remembers its last batch"
     for key in (("agents", "memory"), ("agents", "action")):
         assert torch.equal(alone[key], beside[key])
+
+
+def test_a_kind_s_teacher_may_weigh_more(tmp_path):
+    losses = []
+    for factor in (1, 3):
+        training = tiny(
+            tmp_path,
+            *THREE,
+            f"mixture.kinds.two.teacher_weight={factor}",
+            "imitation.teacher=local",
+            "imitation.weight=0.5",
+        )
+        for share, batch in zip(training.shares, next(training.batches()), strict=True):
+            share.learner.store(batch)
+        samples = [next(iter(share.learner.samples())) for share in training.shares]
+        losses.append([float(a.learner.terms(b)["loss_bc"]) for a, b in zip(training.shares, samples, strict=True)])
+    one, two, large = losses[0]
+    assert losses[1] == pytest.approx([one, 3.0 * two, large], rel=1e-5)

@@ -44,7 +44,8 @@ def kinds_of_worlds(config: Mapping[str, Any], mixture: Mixture, teacher: str | 
             world = _world(config, kind)
         except ConfigError as error:
             raise ConfigError(f"{where}: {error}") from None
-        found.append(KindOfWorld(name=name, world=world, share=kind.share, teacher=taught_by))
+        weight = kind.teacher_weight
+        found.append(KindOfWorld(name=name, world=world, share=kind.share, teacher=taught_by, teacher_weight=weight))
     return found
 
 

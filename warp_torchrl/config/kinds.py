@@ -22,12 +22,14 @@ class KindOfWorld:
         world: Its rules.
         share: Of the worlds, in proportion to the shares of the others.
         teacher: Who labels its worlds; None for none.
+        teacher_weight: By what the weight of the cloning loss is multiplied.
     """
 
     name: str
     world: World
     share: float = 1.0
     teacher: str | None = None
+    teacher_weight: float = 1.0
 
 
 def check_kinds(kinds: Sequence[KindOfWorld], observation: Observation, reward: Reward) -> None:

@@ -20,13 +20,14 @@ from warp_torchrl.models import ACTION, LOGITS, TEACHER_ACTION
 from warp_torchrl.training.teachers import TrainedTeacher, teacher
 
 
-def kickstart(learner: Learner, plan: Imitation, env: WildfireEnv) -> Learner:
+def kickstart(learner: Learner, plan: Imitation, env: WildfireEnv, factor: float = 1.0) -> Learner:
     """Return the learner with the cloning loss and the teacher added; unchanged without a teacher.
 
     Args:
         learner: A learner whose policy writes logits first.
         plan: Names the teacher, who may see more than the team does.
         env: The training environment.
+        factor: By what the plan's weight is multiplied.
 
     Raises:
         ConfigError: If the teacher is a trained policy that does not fit, remembers or talks.
@@ -34,7 +35,7 @@ def kickstart(learner: Learner, plan: Imitation, env: WildfireEnv) -> Learner:
     """
     if plan.teacher is None:
         return learner
-    cloning, taught_by = _KickstartingLoss(plan, learner), teacher(plan.teacher, env)
+    cloning, taught_by = _KickstartingLoss(plan, learner, factor), teacher(plan.teacher, env)
     keeps = {"teacher": taught_by} if isinstance(taught_by, TrainedTeacher) else {}
     return replace(
         learner,
@@ -53,8 +54,8 @@ class _KickstartingLoss:
     It reuses the logits that the learner's loss has just computed on the same sample, and saves a forward pass.
     """
 
-    def __init__(self, plan: Imitation, learner: Learner) -> None:
-        self.plan, self.learner, self.weight = plan, learner, plan.weight
+    def __init__(self, plan: Imitation, learner: Learner, factor: float) -> None:
+        self.plan, self.learner, self.factor, self.weight = plan, learner, factor, factor * plan.weight
         learner.loss.actor_network[0].register_forward_hook(self._keep_logits)
 
     def _keep_logits(self, actor: nn.Module, given: object, said: TensorDictBase) -> None:
@@ -69,7 +70,7 @@ class _KickstartingLoss:
 
     def schedule(self, progress: float) -> dict[str, float]:
         """Set the weight for progress in 0..1, and return the learner's scheduled columns."""
-        self.weight = self.plan.weight_at(progress)
+        self.weight = self.factor * self.plan.weight_at(progress)
         return self.learner.schedule(progress)
 
 

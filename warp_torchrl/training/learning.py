@@ -87,7 +87,7 @@ class Learning:
         """Return a learner that learns from a teacher and people too, where it has them."""
         plan, env = self.run_config, played.env
         whom = replace(plan.imitation, teacher=played.kind.teacher)
-        taught = kickstart(guided(learner, whom, env), whom, env)
+        taught = kickstart(guided(learner, whom, env), whom, env, played.kind.teacher_weight)
         n_networks = env.n_agents if plan.model.sharing == "none" else 1
         seed = _seed_of_process(plan.seed, parallel.rank())
         return clone(taught, whom, demonstrations(plan, env), n_networks, seed)
