@@ -10,8 +10,10 @@ from tests.training.test_loop import tiny
 from warp_torchrl import load_policy
 from warp_torchrl.export import main
 from warp_torchrl.models import ACTION
+from warp_torchrl.models.trust import Trust
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
+from warp_torchrl.runs.shipped import find_policy
 
 
 @pytest.fixture(scope="module")
@@ -86,3 +88,19 @@ def test_a_disk_that_refuses_leaves_nothing(run, tmp_path, monkeypatch):
     with pytest.raises(SystemExit):
         main([str(run), str(tmp_path / "policy")])
     assert not (tmp_path / "policy").exists()
+
+
+def test_its_agents_may_trust_their_adviser_more(tmp_path):
+    main(["generalist", str(tmp_path / "trusting"), "--trust", "0.25"])
+    values = [newest(find_policy(each))[0].record().values for each in (tmp_path / "trusting", "generalist")]
+    assert values[0]["model"] == values[1]["model"] | {"trust": 0.25}
+    (trust,) = (each for each in load_policy(tmp_path / "trusting").modules() if isinstance(each, Trust))
+    assert trust._gain == 2.0
+
+
+def test_trust_without_an_adviser_leaves_no_folder(run, tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        main([str(run), str(tmp_path / "trusting"), "--trust", "0.25"])
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert "model.trust must be 0 where agents are not advised and told the rules" in said
+    assert not (tmp_path / "trusting").exists()

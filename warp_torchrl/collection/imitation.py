@@ -48,9 +48,7 @@ class Imitation:
     guide: str | None = None
 
     def __post_init__(self) -> None:
-        check_fields(
-            self, weight=(1e-6, 1e6), weight_end=(0.0, 1e6), until=(1e-6, 1.0), minibatch_size=(1, 1_000_000)
-        )
+        check_fields(self, weight=(1e-6, 1e6), weight_end=(0.0, 1e6), until=(1e-6, 1.0), minibatch_size=(1, 1_000_000))
         if self.teacher is not None:
             check_teacher(self.teacher)
         if self.guide is not None and self.guide not in TEACHERS:

@@ -28,6 +28,7 @@ from warp_torchrl.models.signature import (
     canonical_key,
     observation_key,
 )
+from warp_torchrl.models.trust import TEAM, Trust
 from warp_torchrl.symmetry import TIME_LEFT, Vector
 
 
@@ -89,7 +90,21 @@ class Inputs:
         entries: dict[Any, Entry] = {self.key(name, sent): each for name, each in observed.items() for sent in times}
         return Packings({**entries, self.state_key: self.signature.state})
 
-    def around(self, module: TensorDictModuleBase, state: bool, action: bool, sent: bool) -> TensorDictModuleBase:
+    def trust(self, trust: float) -> list[TensorDictModuleBase]:
+        """Return what raises the logits of advised actions; nothing where the trust is 0.
+
+        Raises:
+            ValueError: If agents are not advised, or not told the rules.
+        """
+        if not trust:
+            return []
+        observed = self.signature.observation
+        name = next((name for name, each in observed.items() if TEAM in each.names), next(iter(observed)))
+        return [Trust(self.key(name), observed[name], self.signature.actions, trust)]
+
+    def around(
+        self, module: TensorDictModuleBase, state: bool, action: bool, sent: bool, trust: float
+    ) -> TensorDictModuleBase:
         """Return a module with what makes its inputs before it, and what restores the order of actions after it.
 
         Args:
@@ -97,12 +112,14 @@ class Inputs:
             state: Whether it reads the state.
             action: Whether it reads an action.
             sent: Whether it reads what was observed when messages were sent.
+            trust: Of logits, see ``Trust``.
         """
+        trusts = self.trust(trust)
         if not self.is_canonical:
-            return module
+            return TensorDictSequential(module, *trusts) if trusts else module
         shape = self.signature
         before: list[TensorDictModuleBase] = [Canonicalise(shape.observation, sent)]
         before += [CanonicaliseState(shape.state)] if state else []
         before += [CanonicaliseAction(shape.actions)] if action else []
         of_actions = [key for key in module.out_keys if key in (LOGITS, ACTION_VALUE)]
-        return TensorDictSequential(*before, module, *(Restore(key, shape.actions) for key in of_actions))
+        return TensorDictSequential(*before, module, *trusts, *(Restore(key, shape.actions) for key in of_actions))

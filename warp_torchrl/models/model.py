@@ -63,14 +63,16 @@ class Mlp:
         message_size: Numbers of a message, a multiple of 8.
         message_rounds: Messages that each agent sends in a step, each after hearing those before; 1 where messages come
             late (``team.radio.delay``).
+        trust: How much agents trust their adviser, ``observation.advice``: what is added to the logit of the advised
+            action, times log2 of the team's size, see ``Trust``.
         dtype: ``bfloat16`` computes the layers in half precision (weights stay float32), several times faster on
             processors that have it and several times slower on those that have not; ``auto`` takes it where they do.
 
     Raises:
         ValueError: If a size is out of range or there is no hidden layer, if agents that talk have a memory or do not
-            share one network, or, when networks are made, if observations
-            do not say how they turn and should be canonical, or have no clock and should be remembered, or if messages
-            come late in several rounds.
+            share one network, or, when networks are made, if observations do not say how they turn and should be
+            canonical, or have no clock and should be remembered, or tell no advice and should be trusted, if messages
+            come late in several rounds, or if actions have values and advice should be trusted.
     """
 
     sharing: Literal["team", "role", "agency", "none"] = "team"
@@ -82,10 +84,11 @@ class Mlp:
     messages: Literal["none", "map", "graph", "both"] = "none"
     message_size: int = 32
     message_rounds: int = 1
+    trust: float = 0.0
     dtype: Literal["auto", "float32", "bfloat16"] = "auto"
 
     def __post_init__(self) -> None:
-        check_fields(self, memory=(0, 8192), message_size=(8, 8192), message_rounds=(1, 16))
+        check_fields(self, memory=(0, 8192), message_size=(8, 8192), message_rounds=(1, 16), trust=(0.0, 100.0))
         for name in ("actor_hidden", "critic_hidden"):
             check_sizes(name, getattr(self, name))
         if self.memory % 8:
@@ -109,6 +112,8 @@ class Mlp:
 
     def action_value(self, signature: Signature) -> TensorDictModuleBase:
         """Return the module that writes each action's value [..., A, actions] from each agent's own observation."""
+        if self.trust:
+            raise ValueError(f"model.trust must be 0 where actions have values and no chances, got {self.trust}")
         return self._of_agents(signature, self.actor_hidden, signature.n_actions, 0.01, ACTION_VALUE)
 
     def critic(self, signature: Signature, central: bool) -> TensorDictModuleBase:
@@ -214,7 +219,8 @@ class Mlp:
             if talks:
                 keys = [RADIO, *inputs.observed(names), *(inputs.observed(names, sent=True) if is_late else [])]
             module = TensorDictModule(network, in_keys=keys, out_keys=[key])
-        return inputs.around(module, state=central, action=judges, sent=is_late)
+        trust = self.trust if key == LOGITS else 0.0
+        return inputs.around(module, state=central, action=judges, sent=is_late, trust=trust)
 
     def _shared(
         self, signature: Signature, make: Callable[[], Network | RecurrentNetwork | TalkingNetwork]

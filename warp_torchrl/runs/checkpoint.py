@@ -148,10 +148,15 @@ def save(
     return final
 
 
-def export(found: Checkpoint, folder: Path) -> None:
+def export(found: Checkpoint, folder: Path, trust: float | None = None) -> None:
     """Write a checkpoint without its training state into a new folder.
 
     Its record does not tell from which run the training started, a path that others do not have.
+
+    Args:
+        found: The checkpoint.
+        folder: What to make.
+        trust: ``model.trust`` of the policy; None leaves it as it was trained.
 
     Raises:
         CheckpointError: If the record cannot be read.
@@ -159,7 +164,10 @@ def export(found: Checkpoint, folder: Path) -> None:
         OSError: If a write fails.
     """
     record = found.record()
-    _write_policy(found, folder, replace(record, values={**record.values, "start_from": None}))
+    values = {**record.values, "start_from": None}
+    if trust is not None:
+        values["model"] = {**values["model"], "trust": trust}
+    _write_policy(found, folder, replace(record, values=values))
 
 
 def _write_policy(found: Checkpoint, folder: Path, record: SavedConfig) -> None:
