@@ -5,8 +5,13 @@ import torch
 from tensordict import TensorDict
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
+from warp_torchrl.algorithms.dqn import Dqn
 from warp_torchrl.algorithms.ppo import Ppo
+from warp_torchrl.algorithms.sac import Sac
 from warp_torchrl.api import make_env
+from warp_torchrl.config.building import run_config
+from warp_torchrl.config.compose import compose_config, plain
+from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION, LOGITS, Entry, Mlp, over_canonical, signature
 from warp_torchrl.models.trust import Trust
@@ -65,6 +70,13 @@ def test_without_advice_and_rules_it_is_refused(lacking):
 
 
 def test_values_of_actions_are_not_trusted():
-    env = make_env("skirmish", n_worlds=1, overrides=ADVISED)
-    with pytest.raises(ValueError, match=r"^model.trust must be 0 where actions have values"):
-        Mlp(trust=0.5).action_value(signature(env))
+    with pytest.raises(ValueError, match=r"^trust must be 0 where actions have values"):
+        Dqn().check_model(Mlp(trust=0.5))
+    Sac().check_model(Mlp(trust=0.5))
+
+
+def test_a_run_is_refused_before_it_begins():
+    for lacking in ((), ADVISED[:1], ADVISED[1:]):
+        with pytest.raises(ConfigError, match=r"^model.trust must be 0 where agents are not advised"):
+            run_config(plain(compose_config("train", ["model.trust=0.5", *lacking])))
+    run_config(plain(compose_config("train", ["model.trust=0.5", *ADVISED])))

@@ -54,6 +54,16 @@ class Dqn(EpsilonGreedy):
         if self.mixer != "none" and not self.double_q:
             raise ValueError(f"double_q must be true where values are mixed, got false with mixer={self.mixer}")
 
+    def check_model(self, model: Mlp) -> None:
+        """Check what an off-policy algorithm does, and that agents trust no adviser: their actions have no chances.
+
+        Raises:
+            ValueError: If it cannot train the networks.
+        """
+        super().check_model(model)
+        if model.trust:
+            raise ValueError(f"trust must be 0 where actions have values and no chances, got {model.trust}")
+
     def policy(self, shape: Signature, model: Mlp) -> TensorDictSequential:
         """Return the team's decentralised epsilon-greedy policy."""
         return TensorDictSequential(*self._values(shape, model), self.epsilon_greedy(shape, self.epsilon_end))

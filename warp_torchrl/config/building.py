@@ -72,6 +72,12 @@ def _check_together(config: Mapping[str, Any]) -> None:
         raise ConfigError(
             f"model.message_rounds must be 1 where messages come late, team.radio.delay={delay}, got {rounds}"
         )
+    trust, observation = config["model"].get("trust", 0.0), config["observation"]
+    if trust and not (observation.get("advice") and observation.get("rules")):
+        raise ConfigError(
+            "model.trust must be 0 where agents are not advised and told the rules, observation.advice and "
+            f"observation.rules, got {trust}"
+        )
     mixer, cooperation = algorithm.get("mixer", "none"), reward.get("cooperation", 1.0)
     if mixer != "none" and cooperation != 1.0:
         raise ConfigError(

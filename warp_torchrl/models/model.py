@@ -71,8 +71,8 @@ class Mlp:
     Raises:
         ValueError: If a size is out of range or there is no hidden layer, if agents that talk have a memory or do not
             share one network, or, when networks are made, if observations do not say how they turn and should be
-            canonical, or have no clock and should be remembered, or tell no advice and should be trusted, if messages
-            come late in several rounds, or if actions have values and advice should be trusted.
+            canonical, or have no clock and should be remembered, or tell no advice and should be trusted, or if
+            messages come late in several rounds.
     """
 
     sharing: Literal["team", "role", "agency", "none"] = "team"
@@ -112,8 +112,6 @@ class Mlp:
 
     def action_value(self, signature: Signature) -> TensorDictModuleBase:
         """Return the module that writes each action's value [..., A, actions] from each agent's own observation."""
-        if self.trust:
-            raise ValueError(f"model.trust must be 0 where actions have values and no chances, got {self.trust}")
         return self._of_agents(signature, self.actor_hidden, signature.n_actions, 0.01, ACTION_VALUE)
 
     def critic(self, signature: Signature, central: bool) -> TensorDictModuleBase:
