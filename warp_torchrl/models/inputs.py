@@ -90,7 +90,7 @@ class Inputs:
         entries: dict[Any, Entry] = {self.key(name, sent): each for name, each in observed.items() for sent in times}
         return Packings({**entries, self.state_key: self.signature.state})
 
-    def trust(self, trust: float) -> list[TensorDictModuleBase]:
+    def _trusting(self, trust: float) -> list[TensorDictModuleBase]:
         """Return what raises the logits of advised actions; nothing where the trust is 0.
 
         Raises:
@@ -114,7 +114,7 @@ class Inputs:
             sent: Whether it reads what was observed when messages were sent.
             trust: Of logits, see ``Trust``.
         """
-        trusts = self.trust(trust)
+        trusts = self._trusting(trust)
         if not self.is_canonical:
             return TensorDictSequential(module, *trusts) if trusts else module
         shape = self.signature
