@@ -17,6 +17,7 @@ from warp_torchrl.evaluation.method import method
         (["model.symmetry=none", "observation.radius=7"], "mappo efficiency surroundings symmetry=none radius=7"),
         (["observation=local", "observation.radius=3"], "mappo efficiency local radius=3"),
         (["model.memory=64"], "mappo efficiency surroundings memory=64"),
+        (["observation.advice=greedy", "model.trust=0.5"], "mappo efficiency surroundings advice=greedy trust=0.5"),
         (["observation=paper", "observation.radius=5"], "mappo efficiency paper radius=5"),
         (["reward=paper", "reward.barrier_rule=printed"], "mappo paper surroundings barrier_rule=printed"),
         (["observation=paper", "imitation.teacher=local"], "mappo efficiency paper taught by local"),

@@ -28,6 +28,7 @@ _USUAL = {
     ("model", "messages"): "none",
     ("observation", "radius"): 5,
     ("observation", "advice"): None,
+    ("model", "trust"): 0.0,
     ("reward", "barrier_rule"): "cut_off",
     ("reward", "cooperation"): 0.0,
 }
