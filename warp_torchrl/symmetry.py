@@ -25,6 +25,10 @@ LAST = "last_"
 """Prefix of the names of numbers that tell an action of before."""
 ADVICE = "advice_"
 """Prefix of the names of numbers that tell an action that an agent is advised to do."""
+TEAM_SIZE = "rule_team"
+"""Name of the scalar that tells the size of the team, log2(A) / ``LARGEST_TEAM``."""
+LARGEST_TEAM = 8
+"""log2 of the largest team, which ``TEAM_SIZE`` tells as 1."""
 TIME_LEFT = "time_left"
 """Name of the scalar that tells which share of an episode is left; it is 1 at an episode's first step alone."""
 

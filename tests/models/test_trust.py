@@ -13,7 +13,7 @@ from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.models import ACTION, LOGITS, Entry, Mlp, over_canonical, signature
+from warp_torchrl.models import ACTION, LOGITS, Mlp, over_canonical, signature
 from warp_torchrl.models.trust import Trust
 
 ADVISED = ("observation.advice=coordinated", "observation.rules=true")
@@ -25,7 +25,7 @@ def test_the_advised_action_gains_by_the_size_of_the_team():
     told = torch.tensor([[[0.25, 0.0, 1.0], [0.25, 1.0, 0.0]], [[0.0, 0.0, 1.0], [0.125, 0.0, 1.0]]])
     logits = torch.tensor([[[1.0, 2.0]] * 2] * 2)
     shown = TensorDict({"agents": {"logits": logits, "self": told}}, batch_size=2)
-    trust = Trust(("agents", "self"), Entry((3,), "float32", names), ("stay", "north"), 0.5)
+    trust = Trust(("agents", "self"), names, ("stay", "north"), 0.5)
     # log2(A) is 8 x 0.25 = 2 in teams of four, 0 of a single vehicle, 1 in teams of two.
     assert trust(shown)[LOGITS].tolist() == [[[2.0, 2.0], [1.0, 3.0]], [[1.0, 2.0], [1.5, 2.0]]]
 

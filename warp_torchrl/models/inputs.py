@@ -28,7 +28,7 @@ from warp_torchrl.models.signature import (
     canonical_key,
     observation_key,
 )
-from warp_torchrl.models.trust import TEAM, Trust
+from warp_torchrl.models.trust import Trust, told_to_trust
 from warp_torchrl.symmetry import TIME_LEFT, Vector
 
 
@@ -62,9 +62,14 @@ class Inputs:
 
     def clock(self) -> tuple[Key, int] | None:
         """Return the key of the entry that tells the time left, and its place there; None where none does."""
+        found = self._telling([TIME_LEFT])
+        return None if found is None else (found[0], found[1].index(TIME_LEFT))
+
+    def _telling(self, wanted: Sequence[str]) -> tuple[Key, tuple[str, ...]] | None:
+        """Return the key of the vector that tells all numbers of some names, and the names of its numbers, or None."""
         for name, entry in self.signature.observation.items():
-            if isinstance(entry.symmetry, Vector) and TIME_LEFT in entry.symmetry.names:
-                return self.key(name), entry.symmetry.names.index(TIME_LEFT)
+            if isinstance(entry.symmetry, Vector) and set(wanted) <= set(entry.symmetry.names):
+                return self.key(name), entry.symmetry.names
         return None
 
     def batch(self, state: bool, restored: bool, packed: bool) -> CanonicalBatch:
@@ -98,9 +103,14 @@ class Inputs:
         """
         if not trust:
             return []
-        observed = self.signature.observation
-        name = next((name for name, each in observed.items() if TEAM in each.names), next(iter(observed)))
-        return [Trust(self.key(name), observed[name], self.signature.actions, trust)]
+        actions = self.signature.actions
+        found = self._telling(told_to_trust(actions))
+        if found is None:
+            raise ValueError(
+                "model.trust must be 0 where agents are not advised and told the rules, observation.advice and "
+                f"observation.rules, got {trust}"
+            )
+        return [Trust(*found, actions, trust)]
 
     def around(
         self, module: TensorDictModuleBase, state: bool, action: bool, sent: bool, trust: float

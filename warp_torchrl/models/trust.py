@@ -3,11 +3,13 @@
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 
-from warp_torchrl.models.signature import LOGITS, Entry, Key
-from warp_torchrl.symmetry import ADVICE
+from warp_torchrl.models.signature import LOGITS, Key
+from warp_torchrl.symmetry import ADVICE, LARGEST_TEAM, TEAM_SIZE
 
-TEAM = "rule_team"
-"""Name of the number that tells the size of the team, log2(A) / 8."""
+
+def told_to_trust(actions: tuple[str, ...]) -> list[str]:
+    """Return the names of the numbers that ``Trust`` reads: the size of the team, and the advice by action."""
+    return [TEAM_SIZE, *(f"{ADVICE}{action}" for action in actions)]
 
 
 class Trust(TensorDictModuleBase):
@@ -15,30 +17,21 @@ class Trust(TensorDictModuleBase):
 
         logit_a += trust log2(A) [a is advised]
 
-    So an agent does otherwise where its logit of another action is higher by as much. Of a larger team each agent's
-    part in what the team earns is smaller, and what it learned of it more noise.
+    So an agent does otherwise where its logit of another action is higher by as much. In a larger team each agent has a
+    smaller part in what the team earns, and what it learned of that part is noisier.
 
     Args:
-        key: Of the vector that tells the advice and the size of the team.
-        entry: That vector.
+        key: Of the vector that tells what ``told_to_trust`` names.
+        names: Of the numbers of that vector, in order.
         actions: Names of the actions, in the order of the logits.
-        trust: The number.
-
-    Raises:
-        ValueError: If the vector lacks one of them.
+        trust: What is added for each doubling of the team.
     """
 
-    def __init__(self, key: Key, entry: Entry, actions: tuple[str, ...], trust: float) -> None:
+    def __init__(self, key: Key, names: tuple[str, ...], actions: tuple[str, ...], trust: float) -> None:
         super().__init__()
-        wanted = [TEAM, *(f"{ADVICE}{action}" for action in actions)]
-        if not set(wanted) <= set(entry.names):
-            raise ValueError(
-                "model.trust must be 0 where agents are not advised and told the rules, observation.advice and "
-                f"observation.rules, got {trust}"
-            )
         self.in_keys, self.out_keys = [LOGITS, key], [LOGITS]
-        self._team, *self._advice = (entry.names.index(name) for name in wanted)
-        self._gain = 8.0 * trust
+        self._team, *self._advice = (names.index(name) for name in told_to_trust(actions))
+        self._gain = trust * LARGEST_TEAM
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write the logits [..., A, actions] with trust."""

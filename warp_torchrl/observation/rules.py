@@ -5,13 +5,13 @@ import math
 import torch
 from torch import Tensor
 
-from warp_torchrl.symmetry import Part
+from warp_torchrl.symmetry import LARGEST_TEAM, TEAM_SIZE, Part
 from warp_torchrl.world.state import FIRST_FIRE
 from warp_torchrl.world.world import World
 
 RULES = Part(
     "scalar",
-    ("rule_ticks", "rule_burning", "rule_wet", "rule_horizon", "rule_tank", "rule_stride", "rule_team", "rule_map"),
+    ("rule_ticks", "rule_burning", "rule_wet", "rule_horizon", "rule_tank", "rule_stride", TEAM_SIZE, "rule_map"),
 )
 """Entries of ``self`` that tell the rules, see ``rules``."""
 
@@ -32,7 +32,7 @@ def rules(world: World, device: torch.device) -> Tensor:
         "rule_wet": math.log2(1 + fire.wet_for * ticks) / 16,
         "rule_horizon": math.log2(world.horizon) / 16,
         "rule_tank": 0.0 if team.tank is None else 1.0 / (1 + team.tank),
-        "rule_team": math.log2(team.n_agents) / 8,
+        TEAM_SIZE: math.log2(team.n_agents) / LARGEST_TEAM,
         "rule_map": math.log2(max(world.size)) / 16,
     }
     stride = team.table(device).stride * 0.25
