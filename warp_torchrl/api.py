@@ -10,7 +10,7 @@ from warp_torchrl.config.components import build_components
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import build
 from warp_torchrl.config.groups import ENVIRONMENT
-from warp_torchrl.config.saved_config import restore
+from warp_torchrl.config.saved_config import SavedConfig, restore
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.models import RADIO
 from warp_torchrl.policy import TrainedPolicy
@@ -89,11 +89,11 @@ def load_policy(path: str | Path = "generalist", mode: str = "best") -> TrainedP
     return policy_of(found, mode)
 
 
-def policy_of(found: checkpoints.Checkpoint, mode: str = "best") -> TrainedPolicy:
-    """Return the policy of a verified checkpoint; see ``load_policy``."""
+def policy_of(found: checkpoints.Checkpoint, mode: str = "best", record: SavedConfig | None = None) -> TrainedPolicy:
+    """Return the policy of a verified checkpoint, by its record or another one; see ``load_policy``."""
     if mode not in ("best", "sampled", "deterministic"):
         raise ValueError(f"mode must be best, sampled or deterministic, got {mode}")
-    record = found.record()
+    record = found.record() if record is None else record
     config = plain(restore(record))
     algorithm, model = build(config["algorithm"], "algorithm"), build(config["model"], "model")
     weights = found.policy()

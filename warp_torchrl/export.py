@@ -5,11 +5,12 @@ it.
 """
 
 import argparse
-import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 
-from warp_torchrl.api import load_policy
+from warp_torchrl.api import policy_of
+from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.shipped import find_policy
 
@@ -26,26 +27,19 @@ def main(arguments: list[str] | None = None) -> None:
         found, skipped = checkpoints.newest(find_policy(options.run))
         for line in skipped:
             print(f"skipped: {line}", file=sys.stderr)
-        checkpoints.export(found, options.folder, options.trust)
+        record = found.record()
         if options.trust is not None:
-            _check(options.folder)
+            record = _trusting(record, options.trust)
+            policy_of(found, record=record)  # what cannot be trusted is told before anything is written
+        checkpoints.export(found, options.folder, record)
     except (checkpoints.CheckpointError, OSError, ValueError) as error:
         parser.error(" ".join(str(error).split()))
     print(f"{options.folder}: {found.manifest.scenario}, {found.manifest.frames} frames, {found.manifest.mode}")
 
 
-def _check(folder: Path) -> None:
-    """Check that an exported policy can be loaded; else take its folder away.
-
-    Raises:
-        CheckpointError: If it does not fit what it was trained to see.
-        ValueError: If a value is out of its range.
-    """
-    try:
-        load_policy(folder)
-    except (checkpoints.CheckpointError, ValueError):
-        shutil.rmtree(folder)
-        raise
+def _trusting(record: SavedConfig, trust: float) -> SavedConfig:
+    """Return the record of a policy whose agents trust their adviser so much."""
+    return replace(record, values={**record.values, "model": {**record.values["model"], "trust": trust}})
 
 
 if __name__ == "__main__":

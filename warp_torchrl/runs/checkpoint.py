@@ -148,7 +148,7 @@ def save(
     return final
 
 
-def export(found: Checkpoint, folder: Path, trust: float | None = None) -> None:
+def export(found: Checkpoint, folder: Path, record: SavedConfig | None = None) -> None:
     """Write a checkpoint without its training state into a new folder.
 
     Its record does not tell from which run the training started, a path that others do not have.
@@ -156,18 +156,15 @@ def export(found: Checkpoint, folder: Path, trust: float | None = None) -> None:
     Args:
         found: The checkpoint.
         folder: What to make.
-        trust: ``model.trust`` of the policy; None leaves it as it was trained.
+        record: Of its configuration; None takes its own.
 
     Raises:
-        CheckpointError: If the record cannot be read.
+        CheckpointError: If its own record cannot be read.
         FileExistsError: If the folder exists.
         OSError: If a write fails.
     """
-    record = found.record()
-    values = {**record.values, "start_from": None}
-    if trust is not None:
-        values["model"] = {**values["model"], "trust": trust}
-    _write_policy(found, folder, replace(record, values=values))
+    record = found.record() if record is None else record
+    _write_policy(found, folder, replace(record, values={**record.values, "start_from": None}))
 
 
 def _write_policy(found: Checkpoint, folder: Path, record: SavedConfig) -> None:
