@@ -220,6 +220,7 @@ def test_it_pairs_the_last_heuristic_with_the_others(capsys):
     assert set(row["differences"]) == {"noop"} and min(row["seconds"].values()) > 0.0
 
 
+@pytest.mark.slow
 def test_it_ranks_the_rewards(capsys):
     main(["rewards", "--scenario", "skirmish", "--episodes", "4", "--set", "landscape.size=12", "horizon=30"])
     out = capsys.readouterr().out
@@ -242,6 +243,7 @@ def test_fires_of_every_law_are_timed(capsys):
     assert all(float(row["seconds"]) > 0.0 and 0 < int(row["burned %"]) <= 100 for row in rows)
 
 
+@pytest.mark.slow
 def test_ellipses_are_compared_with_what_is_told(capsys):
     main(["ellipses", "--reach", "20"])
     table = [line.split() for line in capsys.readouterr().out.splitlines() if line[:3] in ("1.0", "2.3", "4.6")]

@@ -1,5 +1,6 @@
 """A scripted person corrects a policy."""
 
+import pytest
 import torch
 
 from warp_torchrl.config.seeds import first_world_seed
@@ -72,6 +73,7 @@ def test_a_recording_ends_with_its_own_episode_whatever_the_others_do(weak_run):
         assert steps["next", "done"][-1].all() and not steps["next", "done"][:-1].any()
 
 
+@pytest.mark.slow
 def test_more_episodes_than_are_played_abreast(weak_run, monkeypatch):
     whole = corrected(weak_run, ALWAYS)[1]
     monkeypatch.setattr("warp_torchrl.correction._ABREAST", 2)

@@ -253,6 +253,7 @@ def test_means_over_bins_are_said(tmp_path, matplotlib):
 # The command
 
 
+@pytest.mark.slow
 def test_it_draws_the_same_bytes_twice(tmp_path, capsys, matplotlib):
     runs = [write_run(tmp_path / f"run{seed}", seed, columns={"train__loss": (seed, 1, 2)}) for seed in (0, 1)]
     written = []

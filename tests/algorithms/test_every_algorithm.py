@@ -48,7 +48,7 @@ def test_the_contract_s_algorithms_are_there():
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(name, marks=pytest.mark.slow) if name in ("ppo", "ippo", "vdn", "maddpg") else name
+        pytest.param(name, marks=pytest.mark.slow) if name in ("ppo", "ippo", "vdn", "qmix", "maddpg") else name
         for name in NAMES
     ],
 )

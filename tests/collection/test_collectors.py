@@ -76,6 +76,7 @@ def test_ray_plays_the_same_worlds(tmp_path, here):
     check_like(here, first_batches(tmp_path, "collector=ray", "seed=1234"))
 
 
+@pytest.mark.stress
 def test_a_worker_that_dies_is_named_and_what_was_learnt_is_saved(tmp_path):
     run = training(tmp_path, "collector=process", "collector.workers=1", "total_frames=100_000")
     learn = run._learn

@@ -30,6 +30,7 @@ def pages_asked_for(asked):
     return kept == "True", int(faults)
 
 
+@pytest.mark.slow
 def test_freed_memory_is_used_again():
     kept, few = pages_asked_for(True)
     if not kept:

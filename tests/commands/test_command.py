@@ -334,6 +334,7 @@ def test_a_finished_run_is_trained_longer_and_goes_on_to_the_new_total(run_here,
     assert {name for name, content in contents(run).items() if before[name] != content} == {Path("train.log")}
 
 
+@pytest.mark.stress
 def test_a_run_that_was_stopped_goes_on_to_a_new_total_even_if_killed_at_once(run_here, tmp_path, monkeypatch):
     with monkeypatch.context() as patched:
         patched.setattr(Training, "_learn", signalled(Training._learn, signal.SIGTERM))
@@ -413,7 +414,7 @@ SHORT = [*TINY, "total_frames=64", "evaluation.episodes=2", "evaluation.mode=sam
 @pytest.mark.parametrize(
     ("owner", "name", "when", "number", "frames"),
     [
-        (checkpoint.disk, "save_tensors", 1, signal.SIGTERM, [32]),
+        pytest.param(checkpoint.disk, "save_tensors", 1, signal.SIGTERM, [32], marks=pytest.mark.stress),
         pytest.param(checkpoint, "_drop", 2, signal.SIGUSR1, [32, 64], marks=pytest.mark.stress),
         pytest.param(Training, "_learn", 2, signal.SIGINT, [32, 64], marks=pytest.mark.stress),
         (command_module, "evaluate_policy", 1, signal.SIGINT, [32, 64]),
@@ -434,6 +435,7 @@ def test_a_signal_anywhere_leaves_sound_checkpoints_and_the_way_on(
     assert (tmp_path / "run" / "evaluation.json").exists()
 
 
+@pytest.mark.stress
 def test_a_signal_ends_a_sweep(tmp_path, run_here, monkeypatch):
     monkeypatch.setattr(Training, "_learn", signalled(Training._learn, signal.SIGTERM))
     code, *_ = run_here("train.py", *SHORT[:-1], "-m", "seed=0,1", "hydra.sweep.dir=sweep")

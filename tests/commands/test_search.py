@@ -171,6 +171,7 @@ def test_a_broken_journal_is_told_in_one_line(searched, tmp_path):
     assert code == MISTAKE and errors[-1].startswith("error: search.out: x/journal.log cannot be read")
 
 
+@pytest.mark.stress
 def test_failed_trials_are_named_and_a_full_disk_has_its_exit_code(searched, monkeypatch):
     codes = [1]
     monkeypatch.setattr(

@@ -27,6 +27,7 @@ def decoded(path):
         return film.streams.video[0].codec_context.name, [each.to_image() for each in film.decode(video=0)]
 
 
+@pytest.mark.slow
 def test_a_video_shows_what_the_gif_shows(env, tmp_path):
     pytest.importorskip("av", reason="needs the extra video")
     codec, film = decoded(record(env, tmp_path / "episode.mp4", "mp4"))

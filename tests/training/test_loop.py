@@ -136,14 +136,13 @@ def never_stopped(tmp_path_factory):
 FAST = {
     ("all that moves", 1),
     ("remembers", 3),
-    ("climbs", 1),
     ("regrets", 3),
     ("talks late", 3),
     ("mixes", 3),
     ("grows", 3),
     ("mappo", LAST),
     ("dqn", 1),
-    *((name, 3) for name in ("a2c", "qmix", "sac", "maddpg")),
+    *((name, 3) for name in ("qmix", "sac", "maddpg")),
 }
 
 

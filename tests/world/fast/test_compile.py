@@ -9,6 +9,7 @@ from warp_torchrl import make_env
 from warp_torchrl.world.fast.compile import compiled, opaque_op
 from warp_torchrl.world.fast.road import in_bytes, in_flags
 from warp_torchrl.world.state import count_trees
+from warp_torchrl.world.tick import advance
 
 try:
     get_cpp_compiler()
@@ -27,7 +28,22 @@ AT_LENGTH = [
 ]
 
 
-@pytest.mark.parametrize("overrides", [BRIEFLY, *(pytest.param(each, marks=pytest.mark.slow) for each in AT_LENGTH)])
+def test_a_tick_is_the_same():
+    env = make_env("default", n_worlds=5, overrides=[*SMALL, *BRIEFLY])
+    env.reset()
+    eager, world = env.world_state, env.world
+    fused, begun, each = in_bytes(eager), eager, torch.ones(5, dtype=torch.bool)
+    for _ in range(20):
+        eager = advance(eager, world.fire, world.air, each)
+        fused = compiled(advance)(fused, world.fire, world.air, each)
+        told = in_flags(fused).leaves()
+        for name, value in eager.leaves().items():
+            assert torch.equal(told[name], value) and told[name].dtype == value.dtype, name
+    assert (eager.cells != begun.cells).sum() > 100
+
+
+@pytest.mark.slow  # the first of these takes as long as fifty tests; `.ci/run compile` plays it
+@pytest.mark.parametrize("overrides", [BRIEFLY, *AT_LENGTH])
 def test_worlds_are_the_same(overrides):
     exponentials = "fire=hazard" in overrides or "wind=wandering" in overrides
     eager = make_env("default", n_worlds=5, overrides=[*SMALL, *overrides])
