@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.env.metrics import metrics
-from warp_torchrl.observation import Observation, central_state, is_advised
+from warp_torchrl.observation import Observation, central_state, is_advised, shows_reach
 from warp_torchrl.reward import Collaborative, Efficiency, Reward, Time
 from warp_torchrl.world.fast.compile import check_compiler, compiled
 from warp_torchrl.world.fast.road import in_bytes, in_flags, why_eager
@@ -115,6 +115,8 @@ def why_not_compiled(world: World, observation: Observation, device: torch.devic
         why = "a step of a team whose packets come late is not compiled"
     elif is_advised(observation):
         why = "a step with advice is not compiled"
+    elif shows_reach(observation):
+        why = "a step that tells how soon fire can be where is not compiled"
     if why is not None:
         _log.info("compile: %s", why)
     return why
@@ -152,7 +154,7 @@ def _observe(
         observation(state, world, forecast),
         world.action_mask(state),
         metrics(state, counts, world.horizon),
-        central_state(state, world, forecast),
+        central_state(state, world, forecast, shows_reach(observation)),
         world.team.radio.observed(state, world.team.table(state.cells.device).flies)
         if world.team.radio.sends_vectors
         else None,

@@ -18,7 +18,15 @@ from warp_torchrl.env.reset_cache import ResetCache, Start
 from warp_torchrl.env.reset_pool import ResetPool
 from warp_torchrl.env.scene import Observations, Scene, Step, why_not_compiled
 from warp_torchrl.env.specs import make_specs
-from warp_torchrl.observation import Observation, Surroundings, is_advised, state_content, state_names, state_symmetry
+from warp_torchrl.observation import (
+    Observation,
+    Surroundings,
+    is_advised,
+    shows_reach,
+    state_content,
+    state_names,
+    state_symmetry,
+)
 from warp_torchrl.reward import Efficiency, Reward
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.saved import filled
@@ -79,18 +87,20 @@ class WildfireEnv(EnvBase):
         self.why_eager = why_not_compiled(self.world, self.observation, self.device, n_worlds) if fuse else None
         """Why steps are not compiled where that was asked for; None where they are."""
         self._fuses = fuse and self.why_eager is None
-        if graph and is_advised(self.observation):
-            raise ValueError("graph must be false with observation.advice")
+        for name, searches in (("advice", is_advised), ("reach", shows_reach)):
+            if graph and searches(self.observation):
+                raise ValueError(f"graph must be false with observation.{name}")
         self._recorded = RecordedStep(self._scene) if graph else None
         names, roles = self.world.team.agent_names, self.world.team.agent_roles
         self.agent_names, self.action_names = names, self.world.team.action_names
-        self.role_names, self.state_names = self.world.team.role_names, state_names(self.world)
+        reach = shows_reach(self.observation)
+        self.role_names, self.state_names = self.world.team.role_names, state_names(self.world, reach)
         spaces = self.observation.spaces(self.world)
         self.channel_names = {name: space.names for name, space in spaces.items()}
         self.symmetries = {name: space.symmetry for name, space in spaces.items()}
-        self.state_symmetry = state_symmetry(self.world)
+        self.state_symmetry = state_symmetry(self.world, reach)
         self.contents = {name: space.content for name, space in spaces.items()}
-        self.state_content = state_content(self.world)
+        self.state_content = state_content(self.world, reach)
         self.agency_names = self.world.agencies.names
         self.group_map = {"agents": list(names)}
         self.role_map = {role: [n for n, r in zip(names, roles) if r == role] for role in ROLES if role in roles}

@@ -4,8 +4,8 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.fast.distances import distance_to_nearest
-from warp_torchrl.world.geometry import grow
-from warp_torchrl.world.state import WorldState, is_tree
+from warp_torchrl.world.reach import way_of_fire
+from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.world import World
 
 _THREATENED = 0.01
@@ -17,8 +17,8 @@ _SLOWEST = 1e-3
 def cells_to_clear(state: WorldState, world: World, clears: Tensor, effort: float) -> Tensor:
     """Return the trees to be cleared, bool [B, H, W]: those to which fire has the same way, the shortest in time.
 
-    Fire goes over trees that can burn, around firebreaks, lakes and young trees, to its eight neighbours. The trees to
-    which it has d cells to go shut it in. The team takes the smallest such ring that it can finish in time:
+    The trees to which fire has d cells to go (``way_of_fire``) shut it in. The team takes the smallest such ring that
+    it can finish in time:
 
         way + effort n_d / agents <= ((d - 1) / pace + 1) S - steps since the last tick
 
@@ -31,7 +31,7 @@ def cells_to_clear(state: WorldState, world: World, clears: Tensor, effort: floa
         clears: Which agents clear, bool [A], one at least.
         effort: Steps that one agent takes for a cell of the ring.
     """
-    away = _way_of_fire(state, world)
+    away = way_of_fire(state, world).to(torch.int64)
     distance = torch.arange(1, max(away.shape[1:]), device=away.device)
     count = torch.zeros(len(away), len(distance) + 2, device=away.device)
     count.scatter_add_(1, away.flatten(1), (away > 0).flatten(1).to(count.dtype))
@@ -50,18 +50,3 @@ def pace_of_fire(state: WorldState, world: World) -> Tensor:
     chance = world.forecast(state).ignition_probability.flatten(1)
     beside = chance > _THREATENED
     return ((chance * beside).sum(dim=1) / beside.sum(dim=1).clamp(min=1)).clamp(min=_SLOWEST)
-
-
-def _way_of_fire(state: WorldState, world: World) -> Tensor:
-    """Return the cells that fire has to go to each tree that it can reach, int64 [B, H, W], else 0.
-
-    Ways are followed for as many cells as the map's longer side has.
-    """
-    youngest = 1 if world.fire.growth else world.fire.youngest_fuel
-    fuel = is_tree(state.cells) & (state.cells >= youngest) & (state.alpha > 0.0)
-    reached = world.fire.spreads(state)
-    away = torch.zeros(reached.shape, dtype=torch.int64, device=reached.device)
-    for _ in range(max(reached.shape[1:])):
-        away += ~reached
-        reached = reached | (grow(reached) & fuel)
-    return away * (reached & fuel)

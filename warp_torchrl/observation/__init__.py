@@ -23,6 +23,7 @@ from warp_torchrl.observation.presets import (
     Surroundings,
     former_symmetry,
     is_advised,
+    shows_reach,
 )
 from warp_torchrl.observation.view import egocentric_view
 
@@ -50,6 +51,7 @@ __all__ = [
     "is_advised",
     "own_vector",
     "picture",
+    "shows_reach",
     "state_content",
     "state_names",
     "state_symmetry",

@@ -11,6 +11,7 @@ from warp_torchrl.symmetry import Planes, Target, TeamPlanes
 from warp_torchrl.world.agencies import land_of_each
 from warp_torchrl.world.fast.blocks import block_means
 from warp_torchrl.world.fast.squares import window
+from warp_torchrl.world.reach import way_of_fire
 from warp_torchrl.world.records import freshness, known_codes
 from warp_torchrl.world.role import PAPER_ROLES
 from warp_torchrl.world.state import FIRST_FIRE, OLDEST, Forecast, WorldState, is_burning
@@ -26,6 +27,8 @@ wind to the east and to the north."""
 _FIRST_ROLE = STATE.index(PAPER_ROLES[0])
 KNOWN = ("known_fire", LAST_SEEN)
 """Channels of the critic's ``state`` where sight is limited."""
+REACH = ("fire_reach", "team_reach")
+"""Channels of the critic's ``state`` where ``observation.reach`` asks for them."""
 STATE_SIDE = 16
 STATE_SYMMETRY = TeamPlanes(len(STATE), STATE.index("fire"), (_FIRST_ROLE, len(PAPER_ROLES)))
 """How the state turns with the map in teams of the paper's roles."""
@@ -93,12 +96,12 @@ def centred_picture(state: WorldState, world: World, forecast: Forecast, side: i
     return torch.stack((fire, fuel, mates, fresh, *land), dim=2)
 
 
-def state_names(world: World) -> tuple[str, ...]:
+def state_names(world: World, reach: bool = False) -> tuple[str, ...]:
     """Return the channels of the critic's ``state``: ``STATE``, with the team's further roles beside the paper's.
 
     Where sight is limited it has ``KNOWN`` too: the burning cells that agents know of, and how fresh what they know is,
     both the mean of the agents. Where there are several agencies it has the land of each, and the vehicles that serve
-    it.
+    it. With ``reach`` it has ``REACH``, see ``reach_of_fire_and_team``.
     """
     known = KNOWN if world.sensing.is_limited else ()
     land = [f"{what}_of_{name}" for what in ("land", "vehicles") for name in world.agencies.names]
@@ -108,13 +111,14 @@ def state_names(world: World) -> tuple[str, ...]:
         *STATE[_FIRST_ROLE + len(PAPER_ROLES) : -1],
         *known,
         *land,
+        *(REACH if reach else ()),
         STATE[-1],
     )
 
 
-def state_symmetry(world: World) -> TeamPlanes:
+def state_symmetry(world: World, reach: bool = False) -> TeamPlanes:
     """Return how the state turns with the map."""
-    return TeamPlanes(len(state_names(world)), STATE.index("fire"), (_FIRST_ROLE, len(world.team.role_names)))
+    return TeamPlanes(len(state_names(world, reach)), STATE.index("fire"), (_FIRST_ROLE, len(world.team.role_names)))
 
 
 def picture_content(world: World) -> tuple[Content, ...]:
@@ -123,14 +127,14 @@ def picture_content(world: World) -> tuple[Content, ...]:
     return tuple(alone.get(name) for name in picture_names(world))
 
 
-def state_content(world: World) -> tuple[Content, ...]:
+def state_content(world: World, reach: bool = False) -> tuple[Content, ...]:
     """Return what each channel of the critic's ``state`` can hold."""
     held: dict[str, Content] = {role: Empty() for role in world.team.role_names if role not in world.team.agent_roles}
     held |= {"elevation": Empty()} if world.is_flat else {}
-    return (*(held.get(name) for name in state_names(world)[:-1]), Quarters())
+    return (*(held.get(name) for name in state_names(world, reach)[:-1]), Quarters())
 
 
-def central_state(state: WorldState, world: World, forecast: Forecast) -> Tensor:
+def central_state(state: WorldState, world: World, forecast: Forecast, reach: bool = False) -> Tensor:
     """Return what the central critic sees, float32 [B, C, 16, 16], see ``state_names``, for any map size."""
     worlds, blocks = state.cells.shape[0], (STATE_SIDE, STATE_SIDE)
     maps = is_burning(state.cells), forecast.fuel, forecast.expected_ignitions, forecast.ignition_probability
@@ -147,10 +151,30 @@ def central_state(state: WorldState, world: World, forecast: Forecast) -> Tensor
             _elevation(state.landscape.elevation, agents[:, 0]),
             *_known(state),
             *_lands(state),
+            *(reach_of_fire_and_team(state, world) if reach else ()),
             quarters.reshape(worlds, *blocks),
         ),
         dim=1,
     )
+
+
+def reach_of_fire_and_team(state: WorldState, world: World) -> tuple[Tensor, Tensor]:
+    """Return how soon fire, and how soon the team, can be where, float32 [B, 16, 16] each, in 0..1.
+
+    With m moves to go it is e^(-m / 2b), b the block's side: for fire the mean over the block, m its way to each tree
+    (``way_of_fire``), and nothing where it cannot go, as behind a closed firebreak; for the team m from the nearest
+    vehicle to the middle of the block.
+    """
+    height, width = state.cells.shape[1:]
+    side = max(height, width) / STATE_SIDE
+    away = way_of_fire(state, world)
+    fire = block_means((away > 0) * torch.exp(away / (-2.0 * side)), STATE_SIDE)
+    middle = torch.arange(STATE_SIDE, device=away.device) + 0.5
+    row, column = (state.vehicles.position + 0.5).unbind(-1)
+    down = (middle * (height / STATE_SIDE) - row[..., None]).abs()
+    across = (middle * (width / STATE_SIDE) - column[..., None]).abs()
+    nearest = torch.maximum(down[..., :, None], across[..., None, :]).amin(dim=1)
+    return fire, torch.exp(nearest / (-2.0 * side))
 
 
 def _elevation(elevation: Tensor | None, blocks: Tensor) -> Tensor:

@@ -66,6 +66,8 @@ class Local:
             empty know of lakes within their view alone.
         advice: Name of a heuristic, one of ``TEACHERS``, that tells each agent, in ``self``, the action that it would
             choose for it, see ``advised_actions``: agents may do otherwise; None has no adviser.
+        reach: Whether the central critic's ``state`` tells how soon fire and team can be where, see
+            ``reach_of_fire_and_team``: else it cannot tell a closed firebreak from one that lacks a cell.
         channels: Names of the view's channels, in order.
 
     Raises:
@@ -77,6 +79,7 @@ class Local:
     rules: bool = False
     water: bool = False
     advice: str | None = None
+    reach: bool = False
     channels: tuple[str, ...] = DEFAULT
 
     def __post_init__(self) -> None:
@@ -230,3 +233,8 @@ Observation = Surroundings | Local | Paper
 def is_advised(observation: Observation) -> bool:
     """Return whether those who see this have an adviser."""
     return isinstance(observation, Local) and observation.advice is not None
+
+
+def shows_reach(observation: Observation) -> bool:
+    """Return whether the central critic is told how soon fire and team can be where."""
+    return isinstance(observation, Local) and observation.reach
