@@ -15,6 +15,7 @@ from typing import Any, cast
 
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
+from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf, open_dict
 from omegaconf.errors import OmegaConfBaseException
@@ -33,6 +34,7 @@ GROUPS = ("scenario", "experiment")
 """Groups whose options are no classes."""
 OPTION = re.compile(r"[A-Za-z0-9_]+")
 """What an option may be called."""
+_KEY = re.compile(r"[A-Za-z0-9_.]+")
 
 
 def conf_folder() -> Path:
@@ -123,7 +125,30 @@ def _known_keys(name: str, overrides: Sequence[str]) -> list[str]:
 
 @lru_cache(maxsize=256)
 def _composed(folder: Path, last_change: int, name: str, overrides: tuple[str, ...]) -> DictConfig:
-    """Return a composed configuration, which takes Hydra a fifth of a second: once for each state of the files."""
+    """Return a composed configuration, once for each state of the files.
+
+    Hydra takes a fifth of a second for it, so options are composed once and values set over a copy, as Hydra does.
+    """
+    values = [each for each in overrides if _may_name_a_value(folder, each)]
+    if values:
+        options = tuple(each for each in overrides if each not in values)
+        try:
+            config = deepcopy(_composed(folder, last_change, name, options))
+            for each in OverridesParser.create().parse_overrides(values):
+                OmegaConf.update(config, each.key_or_group, each.value(), merge=True)
+            return config
+        except HYDRA_ERRORS:
+            pass  # several values, or a mistake, of which Hydra says more
+    return _composed_by_hydra(folder, name, overrides)
+
+
+def _may_name_a_value(folder: Path, override: str) -> bool:
+    """Return whether an override gives a key a value, and chooses no option and neither adds nor removes."""
+    key, equals, _ = override.partition("=")
+    return bool(equals and _KEY.fullmatch(key)) and not key.startswith("hydra.") and not (folder / key).is_dir()
+
+
+def _composed_by_hydra(folder: Path, name: str, overrides: Sequence[str]) -> DictConfig:
     GlobalHydra.instance().clear()
     with initialize_config_dir(str(folder), version_base="1.3"):
         return compose(name, overrides=list(overrides))
