@@ -26,15 +26,23 @@ CONSERVATION = [Efficiency, Time, Coverage, Collaborative, Adaptive]
 
 def test_efficiency_pays_a_put_out_tree_and_charges_the_act():
     state, world = drawn(FIELD, [[0, 0], [3, 3]])
-    # Q rises by w_e / N0 = 0.9 / 16; one act costs the team's mean 5e-4, and all of that is the actor's
-    assert earned(Efficiency(), state, world, EXTINGUISH, STAY) == pytest.approx([0.9 / 16 - 1e-3, 0.9 / 16])
-    assert earned(Efficiency(team_share=1.0), state, world, EXTINGUISH, STAY) == pytest.approx([0.9 / 16 - 5e-4] * 2)
+    # Q rises by w_e / N0 = 0.9 / 16; one act costs the team's mean a tenth of a tree, and all of that is the actor's
+    assert earned(Efficiency(), state, world, EXTINGUISH, STAY) == pytest.approx([0.7 / 16, 0.9 / 16])
+    assert earned(Efficiency(team_share=1.0), state, world, EXTINGUISH, STAY) == pytest.approx([0.8 / 16] * 2)
+
+
+def test_an_act_may_cost_a_share_of_the_forest():
+    state, world = drawn(FIELD, [[0, 0], [3, 3]])
+    dear = Efficiency(act=5e-4, act_per="forest")
+    assert earned(dear, state, world, EXTINGUISH, STAY) == pytest.approx([0.9 / 16 - 1e-3, 0.9 / 16])
+    with pytest.raises(ValueError, match="act_per must be forest in reward=agency, got tree"):
+        rewards.Agency(act_per="tree")
 
 
 def test_efficiency_charges_a_cleared_tree():
     state, world = drawn(FIELD, [[0, 0], [3, 3]])
     # a preserved tree (1) becomes a cleared one (-0.5)
-    assert earned(Efficiency(), state, world, STAY, CLEAR) == pytest.approx([-1.5 / 16, -1.5 / 16 - 1e-3])
+    assert earned(Efficiency(), state, world, STAY, CLEAR) == pytest.approx([-1.5 / 16, -1.7 / 16])
 
 
 def test_efficiency_charges_the_tick_that_ignites():
@@ -49,10 +57,10 @@ def test_efficiency_charges_the_tick_that_ignites():
 
 def test_own_share_makes_each_agent_pay_for_its_own_acts():
     state, world = drawn(FIELD, [[0, 0], [3, 3]])
-    first, second = earned(Efficiency(team_share=0.0, act=0.01), state, world, EXTINGUISH, STAY)
-    assert first == pytest.approx(0.9 / 16 - 0.02) and second == pytest.approx(0.9 / 16)
-    mixed = earned(Efficiency(team_share=0.5, act=0.01), state, world, EXTINGUISH, STAY)
-    assert mixed == pytest.approx([0.9 / 16 - 0.015, 0.9 / 16 - 0.005])
+    first, second = earned(Efficiency(team_share=0.0, act=0.2), state, world, EXTINGUISH, STAY)
+    assert first == pytest.approx(0.5 / 16) and second == pytest.approx(0.9 / 16)
+    mixed = earned(Efficiency(team_share=0.5, act=0.2), state, world, EXTINGUISH, STAY)
+    assert mixed == pytest.approx([0.6 / 16, 0.8 / 16])
 
 
 def test_time_charges_every_step_its_share_of_the_horizon():
@@ -165,8 +173,8 @@ def test_each_telescopes_to_its_closed_form(make_small_env, reward):
         now = env.step(env.rand_action(now))["next"]
         total += now["agents", "reward"].mean(1)[:, 0]
     assert now["done"].all()
-    state = env.world_state
-    wanted = component.value(state, count_trees(state)) - start - component.act * state.vehicles.acts.sum(1)
+    state, counts = env.world_state, count_trees(env.world_state)
+    wanted = component.value(state, counts) - start - component.act * state.vehicles.acts.sum(1) / counts.initial
     torch.testing.assert_close(total, wanted, atol=1e-5, rtol=0)
     assert wanted.abs().min() > 1e-3
 

@@ -23,6 +23,7 @@ _BEFORE = {
     "observation.identity": False,
     "observation.centred": False,
     "algorithm.logit_penalty": 0.0,
+    "reward.act_per": "forest",
 }
 """What runs did whose record has none of a key yet."""
 _OF_NETWORKS = {"team.radio.carries": ("graph", "both")}

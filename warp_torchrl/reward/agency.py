@@ -1,6 +1,7 @@
 """What the vehicles of several agencies earn."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import torch
 from torch import Tensor
@@ -25,17 +26,23 @@ class Agency(Conservation):
 
     Attributes:
         cooperation: Weight of the other agencies' forest.
+        act: w_a, cost of an act, a share of the agency's forest.
+        act_per: ``forest``.
 
     Raises:
         ValueError: If a value is out of its range.
     """
 
+    act: float = 5e-4
+    act_per: Literal["tree", "forest"] = "forest"
     cooperation: float = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not -1.0 <= self.cooperation <= 1.0:
             raise ValueError(f"cooperation must be in [-1, 1], got {self.cooperation}")
+        if self.act_per != "forest":
+            raise ValueError(f"act_per must be forest in reward=agency, got {self.act_per}")
         if self.team_share != 0.0:
             raise ValueError(
                 f"team_share must be 0 in reward=agency, where cooperation says what is shared, got {self.team_share}"

@@ -37,7 +37,9 @@ class Conservation(Reward):
         extinguished: w_e, weight of each tree that was extinguished and stands.
         cleared: w_c, weight of each cleared tree.
         burned: w_b, weight of each tree that burned to ash.
-        act: w_a, cost of each extinguish or clear action [1].
+        act: w_a, cost of each extinguish or clear action, as a weight of what ``act_per`` says.
+        act_per: ``tree``, of one initial tree, as the other weights are; ``forest``, of all N0 together: on a larger
+            map an act then costs more trees, and a team that does not know yet what it can save learns to do nothing.
     """
 
     team_share: float = 0.0
@@ -47,7 +49,8 @@ class Conservation(Reward):
     extinguished: float = 0.9
     cleared: float = 0.5
     burned: float = 1.0
-    act: float = 5e-4
+    act: float = 0.1
+    act_per: Literal["tree", "forest"] = "tree"
 
     def own(self, transition: Transition) -> Tensor:
         """Return each agent's reward before sharing and shaping, float32 [B, A]."""
@@ -55,7 +58,11 @@ class Conservation(Reward):
         gained = self.value(after, transition.counts_after) - self.value(before, transition.counts_before)
         gained = gained + self.bonus(transition)
         acts = after.vehicles.acts - before.vehicles.acts
-        return gained[:, None] - self.act * acts.shape[1] * acts
+        return gained[:, None] - self.cost_of_an_act(transition.counts_before) * acts.shape[1] * acts
+
+    def cost_of_an_act(self, counts: TreeCounts) -> Tensor | float:
+        """Return what an act takes from R, float32 [B, 1], or one number for all worlds."""
+        return self.act / counts.initial[:, None] if self.act_per == "tree" else self.act
 
     def worth(self, counts: TreeCounts) -> Tensor:
         """Return Q, float32 [B]."""
@@ -80,7 +87,7 @@ class Conservation(Reward):
 class Efficiency(Conservation):
     """Conservation reward 1: preserve and save trees with few actions.
 
-    R = Q - w_a A_total      (WARP-CA, eq. of the action efficiency)
+    R = Q - w_a A_total / N0      (WARP-CA, eq. of the action efficiency)
     """
 
 
@@ -88,7 +95,7 @@ class Efficiency(Conservation):
 class Time(Conservation):
     """Conservation reward 2: also save time.
 
-        R = Q - zeta T_total / T_max - w_a A_total
+        R = Q - zeta T_total / T_max - w_a A_total / N0
 
     The paper prints -zeta / T_total, which rewards slow teams and contradicts its text. ``rule: printed`` pays that
     term once, at the end.
