@@ -323,7 +323,7 @@ def test_cuda_equals_cpu_and_a_step_does_not_synchronise():
 def test_another_reward_may_be_given_to_an_environment(make_small_env):
     env = make_small_env(2)
     env.reset()
-    env.reward_function = Efficiency(act=1000.0)
+    env.reward_function = Efficiency(act=1000.0, act_per="forest")
     acting = torch.full((2, env.n_agents), int(Action.EXTINGUISH))
     reward = env.step(env.full_done_spec.zero().set(("agents", "action"), acting))["next", "agents", "reward"]
     assert (reward < -900.0).all()
