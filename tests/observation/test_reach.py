@@ -63,4 +63,4 @@ def test_a_step_with_it_is_neither_recorded_nor_compiled() -> None:
     with pytest.raises(ValueError, match=r"graph must be false with observation\.reach"):
         WildfireEnv(small_world(), n_worlds=2, seed=0, observation=REACHING, graph=True)
     env = WildfireEnv(n_worlds=256, observation=REACHING, fuse=True)
-    assert env.why_eager == "a step that tells how soon fire can be where is not compiled"
+    assert env.why_eager == "a step with reach is not compiled"

@@ -71,8 +71,16 @@ def test_a_step_is_paid_by_whom_a_vehicle_served_in_it():
 
 def test_an_act_costs_as_often_as_vehicles_serve_the_agency():
     state, world = parted([[0, 1], [3, 3], [3, 2]], [0, 1, 1])
-    own = earned(replace(PLAIN, act=0.01), state, world, EXTINGUISH, CLEAR, STAY)
+    own = earned(replace(PLAIN, act=0.01, act_per="forest"), state, world, EXTINGUISH, CLEAR, STAY)
     assert own == pytest.approx([0.9 / 8 - 0.01, -1.5 / 8 - 0.02, -1.5 / 8])
+
+
+def test_an_act_costs_a_share_of_a_tree_or_of_the_agency_s_land():
+    state, world = parted([[0, 1], [3, 3]], [0, 1])
+    own = earned(replace(PLAIN, act=0.2), state, world, EXTINGUISH, CLEAR)
+    assert own == pytest.approx([0.7 / 8, -1.7 / 8])
+    bare = state.replace(lands=state.lands.replace(worth=torch.tensor([[8.0, 0.0]])))
+    assert earned(replace(PLAIN, act=0.2), bare, world, EXTINGUISH, CLEAR) == pytest.approx([0.7 / 8, 0.0])
 
 
 def test_of_two_agencies_that_share_each_earns_the_sum_and_of_two_at_odds_they_sum_to_nothing():

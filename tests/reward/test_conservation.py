@@ -35,8 +35,6 @@ def test_an_act_may_cost_a_share_of_the_forest():
     state, world = drawn(FIELD, [[0, 0], [3, 3]])
     dear = Efficiency(act=5e-4, act_per="forest")
     assert earned(dear, state, world, EXTINGUISH, STAY) == pytest.approx([0.9 / 16 - 1e-3, 0.9 / 16])
-    with pytest.raises(ValueError, match="act_per must be forest in reward=agency, got tree"):
-        rewards.Agency(act_per="tree")
 
 
 def test_efficiency_charges_a_cleared_tree():

@@ -95,7 +95,8 @@ class NumpyTeam:
         """
         rule = self.reward
         value, potential = self._worth(), 0.0 if terminated else self._distance()
-        gained = value - self._value - rule.act * acts + rule.shaping * (rule.gamma * potential - self._potential)
+        cost = rule.act / self.world.n_initial if rule.act_per == "tree" else rule.act
+        gained = value - self._value - cost * acts + rule.shaping * (rule.gamma * potential - self._potential)
         self._value, self._potential = value, potential
         return float(rule.scale * gained)
 

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.env.metrics import metrics
-from warp_torchrl.observation import Observation, central_state, is_advised, shows_reach
+from warp_torchrl.observation import Observation, central_state, searched_for, shows_reach
 from warp_torchrl.reward import Collaborative, Efficiency, Reward, Time
 from warp_torchrl.world.fast.compile import check_compiler, compiled
 from warp_torchrl.world.fast.road import in_bytes, in_flags, why_eager
@@ -113,10 +113,8 @@ def why_not_compiled(world: World, observation: Observation, device: torch.devic
         why = "a step of agents that do not see all is not compiled"
     elif world.team.radio.delay:
         why = "a step of a team whose packets come late is not compiled"
-    elif is_advised(observation):
-        why = "a step with advice is not compiled"
-    elif shows_reach(observation):
-        why = "a step that tells how soon fire can be where is not compiled"
+    elif (key := searched_for(observation)) is not None:
+        why = f"a step with {key} is not compiled"
     if why is not None:
         _log.info("compile: %s", why)
     return why

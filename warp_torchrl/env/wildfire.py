@@ -21,7 +21,7 @@ from warp_torchrl.env.specs import make_specs
 from warp_torchrl.observation import (
     Observation,
     Surroundings,
-    is_advised,
+    searched_for,
     shows_reach,
     state_content,
     state_names,
@@ -87,9 +87,8 @@ class WildfireEnv(EnvBase):
         self.why_eager = why_not_compiled(self.world, self.observation, self.device, n_worlds) if fuse else None
         """Why steps are not compiled where that was asked for; None where they are."""
         self._fuses = fuse and self.why_eager is None
-        for name, searches in (("advice", is_advised), ("reach", shows_reach)):
-            if graph and searches(self.observation):
-                raise ValueError(f"graph must be false with observation.{name}")
+        if graph and (key := searched_for(self.observation)) is not None:
+            raise ValueError(f"graph must be false with observation.{key}")
         self._recorded = RecordedStep(self._scene) if graph else None
         names, roles = self.world.team.agent_names, self.world.team.agent_roles
         self.agent_names, self.action_names = names, self.world.team.action_names

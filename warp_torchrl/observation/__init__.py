@@ -22,7 +22,7 @@ from warp_torchrl.observation.presets import (
     Space,
     Surroundings,
     former_symmetry,
-    is_advised,
+    searched_for,
     shows_reach,
 )
 from warp_torchrl.observation.view import egocentric_view
@@ -48,9 +48,9 @@ __all__ = [
     "channel",
     "egocentric_view",
     "former_symmetry",
-    "is_advised",
     "own_vector",
     "picture",
+    "searched_for",
     "shows_reach",
     "state_content",
     "state_names",

@@ -230,9 +230,11 @@ Observation = Surroundings | Local | Paper
 """Any observation preset."""
 
 
-def is_advised(observation: Observation) -> bool:
-    """Return whether those who see this have an adviser."""
-    return isinstance(observation, Local) and observation.advice is not None
+def searched_for(observation: Observation) -> str | None:
+    """Return the key of what the map is searched for in every step, which is neither compiled nor recorded; or None."""
+    if not isinstance(observation, Local):
+        return None
+    return "advice" if observation.advice is not None else "reach" if observation.reach else None
 
 
 def shows_reach(observation: Observation) -> bool:

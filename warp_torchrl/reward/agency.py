@@ -1,7 +1,6 @@
 """What the vehicles of several agencies earn."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import torch
 from torch import Tensor
@@ -18,31 +17,26 @@ class Agency(Conservation):
     """Pays each vehicle for the forest of the agency that it serves, and for that of others as far as they cooperate.
 
         Q_k = (w_p T_p + w_e T_e - w_c T_c - w_b T_b) / N0
-        own_i = dQ_k + cooperation x (mean of dQ_j over the other agencies) - w_a A_k a_i
+        own_i = dQ_k + cooperation x (mean of dQ_j over the other agencies) - c_k A_k a_i
 
     Q_k is the value of the forest on the land of agency k, each tree by its worth. Vehicle i served agency k in the
-    step, A_k vehicles did, and a_i is 1 for an act. With ``cooperation`` 1 two agencies earn the same, the sum of both.
-    With 0 each is for itself. With -1 what one gains the other loses: a zero-sum game but for acts and shaping.
+    step, A_k vehicles did, a_i is 1 for an act, and c_k is w_a / N0, N0 the worth of k's trees. With ``cooperation`` 1
+    two agencies earn the same, the sum of both. With 0 each is for itself. With -1 what one gains the other loses: a
+    zero-sum game but for acts and shaping.
 
     Attributes:
         cooperation: Weight of the other agencies' forest.
-        act: w_a, cost of an act, a share of the agency's forest.
-        act_per: ``forest``.
 
     Raises:
         ValueError: If a value is out of its range.
     """
 
-    act: float = 5e-4
-    act_per: Literal["tree", "forest"] = "forest"
     cooperation: float = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not -1.0 <= self.cooperation <= 1.0:
             raise ValueError(f"cooperation must be in [-1, 1], got {self.cooperation}")
-        if self.act_per != "forest":
-            raise ValueError(f"act_per must be forest in reward=agency, got {self.act_per}")
         if self.team_share != 0.0:
             raise ValueError(
                 f"team_share must be 0 in reward=agency, where cooperation says what is shared, got {self.team_share}"
@@ -67,7 +61,8 @@ class Agency(Conservation):
         earned = gained + self.cooperation * others
         vehicles = one_hot(serves, agencies).sum(dim=1)
         acts = after.vehicles.acts - before.vehicles.acts
-        return earned.gather(1, serves) - self.act * vehicles.gather(1, serves) * acts
+        cost = self.cost_of_an_act(torch.where(lands.worth > 0.0, lands.worth, torch.inf).gather(1, serves))
+        return earned.gather(1, serves) - cost * vehicles.gather(1, serves) * acts
 
     def worth_by_agency(self, state: WorldState) -> Tensor:
         """Return Q_k, float32 [B, K]; 0 where an agency has no tree."""

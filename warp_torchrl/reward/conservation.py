@@ -2,9 +2,10 @@
 
     Q = (w_p T_p + w_e T_e - w_c T_c - w_b T_b) / N0      (WARP-CA, conservation metric)
 
-is the value of the forest. Each reward computes a value R from Q and the team's acts, and pays its difference, r_t =
-R(t) - R(t-1), so that the return of an episode is R(end) - R(start). All agents share the value of the trees; each
-agent pays A times for its own acts, so that the team's mean is R.
+is the value of the forest, and A_total counts extinguish and clear, each of which costs c = w_a / N0. Each reward
+computes a value R from them, and pays its difference, r_t = R(t) - R(t-1), so that the return of an episode is
+R(end) - R(start). All agents share the value of the trees; each agent pays A times for its own acts, so that the team's
+mean is R.
 """
 
 from collections.abc import Mapping
@@ -37,9 +38,9 @@ class Conservation(Reward):
         extinguished: w_e, weight of each tree that was extinguished and stands.
         cleared: w_c, weight of each cleared tree.
         burned: w_b, weight of each tree that burned to ash.
-        act: w_a, cost of each extinguish or clear action, as a weight of what ``act_per`` says.
-        act_per: ``tree``, of one initial tree, as the other weights are; ``forest``, of all N0 together: on a larger
-            map an act then costs more trees, and a team that does not know yet what it can save learns to do nothing.
+        act: w_a, cost of each extinguish or clear action [``act_per``].
+        act_per: ``tree``, c = w_a / N0, by which an act costs as many trees on any map; ``forest``, c = w_a, by which
+            it costs more trees on a larger one, and teams that do not know yet what they can save learn to do nothing.
     """
 
     team_share: float = 0.0
@@ -58,11 +59,11 @@ class Conservation(Reward):
         gained = self.value(after, transition.counts_after) - self.value(before, transition.counts_before)
         gained = gained + self.bonus(transition)
         acts = after.vehicles.acts - before.vehicles.acts
-        return gained[:, None] - self.cost_of_an_act(transition.counts_before) * acts.shape[1] * acts
+        return gained[:, None] - self.cost_of_an_act(transition.counts_before.initial[:, None]) * acts.shape[1] * acts
 
-    def cost_of_an_act(self, counts: TreeCounts) -> Tensor | float:
-        """Return what an act takes from R, float32 [B, 1], or one number for all worlds."""
-        return self.act / counts.initial[:, None] if self.act_per == "tree" else self.act
+    def cost_of_an_act(self, initial: Tensor) -> Tensor | float:
+        """Return c where there were so many initial trees, float32 of the same shape; one number where it is w_a."""
+        return self.act / initial if self.act_per == "tree" else self.act
 
     def worth(self, counts: TreeCounts) -> Tensor:
         """Return Q, float32 [B]."""
@@ -87,7 +88,7 @@ class Conservation(Reward):
 class Efficiency(Conservation):
     """Conservation reward 1: preserve and save trees with few actions.
 
-    R = Q - w_a A_total / N0      (WARP-CA, eq. of the action efficiency)
+    R = Q - c A_total      (WARP-CA, eq. of the action efficiency)
     """
 
 
@@ -95,7 +96,7 @@ class Efficiency(Conservation):
 class Time(Conservation):
     """Conservation reward 2: also save time.
 
-        R = Q - zeta T_total / T_max - w_a A_total / N0
+        R = Q - zeta T_total / T_max - c A_total
 
     The paper prints -zeta / T_total, which rewards slow teams and contradicts its text. ``rule: printed`` pays that
     term once, at the end.
@@ -128,7 +129,7 @@ class Time(Conservation):
 class Coverage(Conservation):
     """Conservation reward 3: also protect every block of the map.
 
-        R = Q + sum over blocks of omega a_block [under 5 % of the block's trees burn or have burned] - w_a A_total
+        R = Q + sum over blocks of omega a_block [under 5 % of the block's trees burn or have burned] - c A_total
 
     Attributes:
         omega: Weight of each block.
@@ -157,7 +158,7 @@ class Coverage(Conservation):
 class Collaborative(Conservation):
     """Conservation reward 4: also act together.
 
-        R = eta max(Q, 0) + min(Q, 0) - w_a A_total,   eta = 1 + bonus x share of agents with a useful act lately
+        R = eta max(Q, 0) + min(Q, 0) - c A_total,   eta = 1 + bonus x share of agents with a useful act lately
 
     eta multiplies only positive Q, so that idling never reduces a loss; with ``rule: printed`` it multiplies all of Q.
 
@@ -185,7 +186,7 @@ class Collaborative(Conservation):
 class Adaptive(Conservation):
     """Conservation reward 5: also act where the fire spreads.
 
-        R = Q + theta_1 r_1 + theta_2 r_2 + theta_3 r_3 + sum of further theta_i r_i - w_a A_total
+        R = Q + theta_1 r_1 + theta_2 r_2 + theta_3 r_3 + sum of further theta_i r_i - c A_total
 
     r_1: trees put out for the first time on the downwind half of the fire, a share of N0. r_2: drop since the start
     in the trees within ``reach`` cells of fire, a share of N0. r_3: share of rays from the fire's centre to the border
