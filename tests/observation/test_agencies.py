@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from tests.conftest import small_world
-from warp_torchrl.observation import Local, Surroundings, central_state, state_names, state_symmetry
+from warp_torchrl.observation import CriticState, Local, Surroundings
 from warp_torchrl.observation.channels import DEFAULT, OWN_LAND
 from warp_torchrl.world.agencies import SeveralAgencies
 from warp_torchrl.world.team import Team
@@ -57,14 +57,14 @@ def test_a_vehicle_knows_whom_it_serves():
 
 def test_the_critic_sees_lands_and_who_serves_them():
     world, state = worlds()
-    names = state_names(world)
-    planes = dict(zip(names, central_state(state, world, world.forecast(state)).unbind(1), strict=True))
+    shown = CriticState(world)
+    planes = dict(zip(shown.names, shown(state, world.forecast(state)).unbind(1), strict=True))
     assert torch.equal(planes["land_of_agency_0"], (state.lands.owner == 0).float())
     assert torch.equal(planes["land_of_agency_0"] + planes["land_of_agency_1"], torch.ones(4, 16, 16))
     row, column = state.vehicles.position[0, 2].tolist()
     assert planes["vehicles_of_agency_1"][0, row, column] == 1.0
     assert planes["vehicles_of_agency_0"].sum() == planes["vehicles_of_agency_1"].sum() == 8.0
-    assert state_symmetry(world).fits((len(names), 16, 16))
+    assert shown.symmetry.fits(shown.shape) and shown.shape == (len(shown.names), 16, 16)
 
 
 def test_worlds_of_one_agency_show_no_land():
@@ -72,7 +72,7 @@ def test_worlds_of_one_agency_show_no_land():
     state = world.reset(torch.arange(2), torch.zeros(2, dtype=torch.int64))
     assert not shown(Local(channels=CHANNELS), state, world)["view"][:, :, -1].any()
     assert OWN_LAND not in Surroundings().spaces(world)["picture"].names
-    assert not any("agency" in name for name in state_names(world))
+    assert not any("agency" in name for name in CriticState(world).names)
 
 
 @pytest.mark.parametrize("centred", [True, False])

@@ -10,7 +10,7 @@ from tests.world.drawing import draw
 from warp_torchrl import load_policy, make_env
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS, TEACHERS
-from warp_torchrl.observation import Local, Paper, Surroundings, central_state, state_names
+from warp_torchrl.observation import CriticState, Local, Paper, Surroundings
 from warp_torchrl.observation.channels import DEFAULT
 from warp_torchrl.world.radio import Radio
 from warp_torchrl.world.sensing import Full, Sight, in_reach
@@ -145,11 +145,11 @@ def test_the_picture_pools_what_is_known():
 
 def test_the_critic_sees_the_fire_and_what_agents_know_of_it():
     state, world = drawn(Sight(radius=1), " ".join(["T" * 16] * 15 + ["T" * 14 + "aa"]), [(15, 15), (0, 0)])
-    planes = dict(zip(state_names(world), central_state(state, world, world.forecast(state))[0]))
+    planes = dict(zip(CriticState(world).names, CriticState(world)(state, world.forecast(state))[0]))
     assert planes["fire"][15, 14:].tolist() == [1.0, 1.0]
     assert planes["known_fire"][15, 14:].tolist() == [0.5, 0.5], "one of two agents"
     assert planes["last_seen"][15, 14].item() == 0.5 and planes["last_seen"][8, 8] == 0.0
-    assert "known_fire" not in state_names(small_world())
+    assert "known_fire" not in CriticState(small_world()).names
 
 
 def test_threat_is_not_told_of_what_may_not_be_known():

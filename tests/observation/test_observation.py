@@ -8,10 +8,10 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.observation import (
     DEFAULT,
     STATE,
+    CriticState,
     Local,
     Paper,
     Surroundings,
-    central_state,
     egocentric_view,
     own_vector,
     picture,
@@ -147,7 +147,7 @@ def test_the_picture_pools_the_whole_map():
 
 def test_the_critic_sees_every_agent_and_the_clock():
     state, world = drawn([[5] * 16] * 16, [[8, 8], [0, 15], [3, 4]], roles=("ugv", "ugv", "uav"))
-    seen = central_state(state, world, world.forecast(state))[0]
+    seen = CriticState(world)(state, world.forecast(state))[0]
     assert seen[STATE.index("ugv")].nonzero().tolist() == [[0, 15], [8, 8]]
     assert seen[STATE.index("uav")].nonzero().tolist() == [[3, 4]]
     clock = seen[STATE.index("clock_and_wind")]
@@ -161,7 +161,7 @@ def test_the_critic_sees_where_fire_is_about_to_grow():
     cells = torch.full((16, 16), 5)
     cells[4, 6], cells[10, 10] = 11, 15
     state, world = drawn(cells.tolist(), [[0, 0]], wind=Uniform(speed=0.0))
-    seen = dict(zip(STATE, central_state(state, world, world.forecast(state))[0], strict=True))
+    seen = dict(zip(STATE, CriticState(world)(state, world.forecast(state))[0], strict=True))
     assert seen["fire"].nonzero().tolist() == [[4, 6], [10, 10]]
     assert seen["front"].nonzero().tolist() == [[4, 6]] and seen["front"][4, 6] == 1.0, "an ember spreads no more"
     assert seen["threat"][4, 7] == pytest.approx(0.8) and seen["threat"][5, 7] == pytest.approx(0.8 / 2**0.5)

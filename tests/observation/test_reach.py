@@ -7,7 +7,7 @@ import torch
 
 from tests.conftest import small_world
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.observation import STATE, Local, central_state, state_names
+from warp_torchrl.observation import STATE, CriticState, Local
 
 from .test_observation import drawn
 
@@ -15,8 +15,8 @@ REACHING = Local(radius=2, reach=True)
 
 
 def planes(state, world) -> dict[str, torch.Tensor]:
-    seen = central_state(state, world, world.forecast(state), reach=True)[0]
-    return dict(zip(state_names(world, reach=True), seen, strict=True))
+    shown = CriticState(world, reach=True)
+    return dict(zip(shown.names, shown(state, world.forecast(state))[0], strict=True))
 
 
 def test_it_tells_how_soon_fire_can_be_where_and_that_a_closed_ring_holds_it() -> None:

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.env.metrics import metrics
-from warp_torchrl.observation import Observation, central_state, searched_for, shows_reach
+from warp_torchrl.observation import Observation, critic_state, searched_for
 from warp_torchrl.reward import Collaborative, Efficiency, Reward, Time
 from warp_torchrl.world.fast.compile import check_compiler, compiled
 from warp_torchrl.world.fast.road import in_bytes, in_flags, why_eager
@@ -152,7 +152,7 @@ def _observe(
         observation(state, world, forecast),
         world.action_mask(state),
         metrics(state, counts, world.horizon),
-        central_state(state, world, forecast, shows_reach(observation)),
+        critic_state(observation, world)(state, forecast),
         world.team.radio.observed(state, world.team.table(state.cells.device).flies)
         if world.team.radio.sends_vectors
         else None,

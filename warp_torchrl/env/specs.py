@@ -6,7 +6,7 @@ import torch
 from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 
 from warp_torchrl.env.metrics import FLYING, METRICS, SAVED_BY, WATCHING
-from warp_torchrl.observation import STATE_SIDE, Observation, Space, shows_reach, state_names
+from warp_torchrl.observation import Observation, Space, critic_state
 from warp_torchrl.world.world import World
 
 EPISODE_METRICS = (*METRICS, "episode_reward", "episode_length")
@@ -55,8 +55,7 @@ def make_specs(world: World, observation: Observation, n_worlds: int, device: to
             seen["agents", "sent"] = seen["agents", "observation"].clone()
     if agencies := len(world.agencies.names):
         seen["agents", "agency"] = Categorical(agencies, shape=team, dtype=torch.int64, device=device)
-    planes = len(state_names(world, shows_reach(observation)))
-    seen["state"] = Bounded(-3.0, 256.0, shape=(*batch, planes, STATE_SIDE, STATE_SIDE), device=device)
+    seen["state"] = Bounded(-3.0, 256.0, shape=(*batch, *critic_state(observation, world).shape), device=device)
     seen["info"] = Composite(
         {name: Unbounded(shape=(*batch, 1), device=device) for name in episode_metrics(world)},
         shape=batch,

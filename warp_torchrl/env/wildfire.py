@@ -18,15 +18,7 @@ from warp_torchrl.env.reset_cache import ResetCache, Start
 from warp_torchrl.env.reset_pool import ResetPool
 from warp_torchrl.env.scene import Observations, Scene, Step, why_not_compiled
 from warp_torchrl.env.specs import make_specs
-from warp_torchrl.observation import (
-    Observation,
-    Surroundings,
-    searched_for,
-    shows_reach,
-    state_content,
-    state_names,
-    state_symmetry,
-)
+from warp_torchrl.observation import Observation, Surroundings, critic_state, searched_for
 from warp_torchrl.reward import Efficiency, Reward
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.saved import filled
@@ -92,14 +84,13 @@ class WildfireEnv(EnvBase):
         self._recorded = RecordedStep(self._scene) if graph else None
         names, roles = self.world.team.agent_names, self.world.team.agent_roles
         self.agent_names, self.action_names = names, self.world.team.action_names
-        reach = shows_reach(self.observation)
-        self.role_names, self.state_names = self.world.team.role_names, state_names(self.world, reach)
+        self.role_names = self.world.team.role_names
         spaces = self.observation.spaces(self.world)
         self.channel_names = {name: space.names for name, space in spaces.items()}
         self.symmetries = {name: space.symmetry for name, space in spaces.items()}
-        self.state_symmetry = state_symmetry(self.world, reach)
         self.contents = {name: space.content for name, space in spaces.items()}
-        self.state_content = state_content(self.world, reach)
+        shown = critic_state(self.observation, self.world)
+        self.state_names, self.state_symmetry, self.state_content = shown.names, shown.symmetry, shown.content
         self.agency_names = self.world.agencies.names
         self.group_map = {"agents": list(names)}
         self.role_map = {role: [n for n, r in zip(names, roles) if r == role] for role in ROLES if role in roles}

@@ -1,18 +1,8 @@
 """What the agents see, and what the central critic sees."""
 
 from warp_torchrl.observation.channels import CHANNELS, DEFAULT, ELEVATION_SCALE, channel
-from warp_torchrl.observation.coarse import (
-    PICTURE,
-    PICTURE_SIDE,
-    STATE,
-    STATE_SIDE,
-    STATE_SYMMETRY,
-    central_state,
-    picture,
-    state_content,
-    state_names,
-    state_symmetry,
-)
+from warp_torchrl.observation.coarse_picture import PICTURE, PICTURE_SIDE, picture
+from warp_torchrl.observation.critic_state import STATE, STATE_SIDE, STATE_SYMMETRY, CriticState
 from warp_torchrl.observation.look import Look
 from warp_torchrl.observation.own import SELF_SIZE, WIND_SCALE, own_vector
 from warp_torchrl.observation.presets import (
@@ -21,9 +11,9 @@ from warp_torchrl.observation.presets import (
     Paper,
     Space,
     Surroundings,
+    critic_state,
     former_symmetry,
     searched_for,
-    shows_reach,
 )
 from warp_torchrl.observation.view import egocentric_view
 
@@ -38,21 +28,18 @@ __all__ = [
     "STATE_SIDE",
     "STATE_SYMMETRY",
     "WIND_SCALE",
+    "CriticState",
     "Local",
     "Look",
     "Observation",
     "Paper",
     "Space",
     "Surroundings",
-    "central_state",
     "channel",
+    "critic_state",
     "egocentric_view",
     "former_symmetry",
     "own_vector",
     "picture",
     "searched_for",
-    "shows_reach",
-    "state_content",
-    "state_names",
-    "state_symmetry",
 ]

@@ -13,7 +13,7 @@ from torch import Tensor
 from warp_torchrl.content import Content
 from warp_torchrl.observation.advice import check_adviser, check_may_advise
 from warp_torchrl.observation.channels import CHANNELS, DEFAULT, FIRE, ages, check_channels, stages
-from warp_torchrl.observation.coarse import (
+from warp_torchrl.observation.coarse_picture import (
     PICTURE_SIDE,
     centred_picture,
     picture,
@@ -22,6 +22,7 @@ from warp_torchrl.observation.coarse import (
     picture_names,
     picture_symmetry,
 )
+from warp_torchrl.observation.critic_state import CriticState
 from warp_torchrl.observation.own import IDENTITY, SELF, SELF_SIZE, Told, own_entries, own_vector
 from warp_torchrl.observation.view import egocentric_view
 from warp_torchrl.symmetry import Planes, Target, Vector
@@ -67,7 +68,7 @@ class Local:
         advice: Name of a heuristic, one of ``TEACHERS``, that tells each agent, in ``self``, the action that it would
             choose for it, see ``advised_actions``: agents may do otherwise; None has no adviser.
         reach: Whether the central critic's ``state`` tells how soon fire and team can be where, see
-            ``reach_of_fire_and_team``: else it cannot tell a closed firebreak from one that lacks a cell.
+            ``critic_state.reach_of_fire_and_team``: else it cannot tell a closed firebreak from one that lacks a cell.
         channels: Names of the view's channels, in order.
 
     Raises:
@@ -237,6 +238,6 @@ def searched_for(observation: Observation) -> str | None:
     return "advice" if observation.advice is not None else "reach" if observation.reach else None
 
 
-def shows_reach(observation: Observation) -> bool:
-    """Return whether the central critic is told how soon fire and team can be where."""
-    return isinstance(observation, Local) and observation.reach
+def critic_state(observation: Observation, world: World) -> CriticState:
+    """Return what the central critic sees of worlds where agents see this."""
+    return CriticState(world, reach=isinstance(observation, Local) and observation.reach)
