@@ -13,6 +13,7 @@ from warp_torchrl.config.groups import ENVIRONMENT
 from warp_torchrl.config.saved_config import SavedConfig, restore
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.models import RADIO
+from warp_torchrl.observation import OF_CRITIC
 from warp_torchrl.policy import TrainedPolicy
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs import former
@@ -104,7 +105,7 @@ def policy_of(found: checkpoints.Checkpoint, mode: str = "best", record: SavedCo
         reason = " ".join(str(error).split())
         raise checkpoints.CheckpointError(f"{found.path} is of another architecture: {reason}") from None
     chosen = (found.manifest.mode or "sampled") if mode == "best" else mode
-    seen = {name: value for name, value in config["observation"].items() if name != "_target_"}
+    seen = {name: value for name, value in config["observation"].items() if name not in ("_target_", *OF_CRITIC)}
     overrides = [f"observation={name}" for group, name in record.choices.items() if group == "observation"]
     overrides += [f"observation.{name}={json.dumps(value)}" for name, value in seen.items()]
     overrides += [f"team.radio.carries={record.values['team']['radio']['carries']}"] if RADIO in policy.in_keys else []

@@ -45,8 +45,8 @@ class TrainedPolicy(TensorDictModuleBase):
         module: Reads observation and mask, writes the action.
         mode: ``sampled`` or ``deterministic``.
         trained: Inputs and outputs that it was trained with.
-        overrides: Give any environment the observation that the policy was trained with:
-            ``make_env("large", overrides=policy.overrides)``.
+        overrides: Give any environment the observation that the policy was trained with, but for what the critic
+            alone reads: ``make_env("large", overrides=policy.overrides)``.
         shown: What the environment shows that it acts in; None, what it was trained to see.
     """
 

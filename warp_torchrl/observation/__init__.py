@@ -6,6 +6,7 @@ from warp_torchrl.observation.critic_state import STATE, STATE_SIDE, STATE_SYMME
 from warp_torchrl.observation.look import Look
 from warp_torchrl.observation.own import SELF_SIZE, WIND_SCALE, own_vector
 from warp_torchrl.observation.presets import (
+    OF_CRITIC,
     Local,
     Observation,
     Paper,
@@ -21,6 +22,7 @@ __all__ = [
     "CHANNELS",
     "DEFAULT",
     "ELEVATION_SCALE",
+    "OF_CRITIC",
     "PICTURE",
     "PICTURE_SIDE",
     "SELF_SIZE",

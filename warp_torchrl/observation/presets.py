@@ -238,6 +238,10 @@ def searched_for(observation: Observation) -> str | None:
     return "advice" if observation.advice is not None else "reach" if observation.reach else None
 
 
+OF_CRITIC = ("reach",)
+"""Keys of presets that tell the central critic and no agent."""
+
+
 def critic_state(observation: Observation, world: World) -> CriticState:
     """Return what the central critic sees of worlds where agents see this."""
     return CriticState(world, reach=isinstance(observation, Local) and observation.reach)
