@@ -28,6 +28,7 @@ AT_LENGTH = [
 ]
 
 
+@pytest.mark.slow
 def test_a_tick_is_the_same():
     env = make_env("default", n_worlds=5, overrides=[*SMALL, *BRIEFLY])
     env.reset()
@@ -42,7 +43,7 @@ def test_a_tick_is_the_same():
     assert (eager.cells != begun.cells).sum() > 100
 
 
-@pytest.mark.slow  # the first of these takes as long as fifty tests; `.ci/run compile` plays it
+@pytest.mark.slow  # they take as long as fifty others to compile; `.ci/run compile` plays the first
 @pytest.mark.parametrize("overrides", [BRIEFLY, *AT_LENGTH])
 def test_worlds_are_the_same(overrides):
     exponentials = "fire=hazard" in overrides or "wind=wandering" in overrides
