@@ -98,6 +98,23 @@ def test_its_agents_may_trust_their_adviser_more(tmp_path):
     assert trust._gain == 2.0
 
 
+def test_it_may_be_the_mean_of_several(run, tmp_path):
+    (tmp_path / "other").mkdir()
+    tiny(tmp_path / "other", "total_frames=64", "seed=1").train()
+    main([str(run), str(tmp_path / "mean"), "--average", str(tmp_path / "other")])
+    mean, ours, theirs = (newest(each)[0].policy() for each in (tmp_path / "mean", run, tmp_path / "other"))
+    assert all(torch.allclose(mean[name], (ours[name] + theirs[name]) / 2) for name in ours)
+    assert any(not torch.equal(ours[name], theirs[name]) for name in ours)
+    assert load_policy(tmp_path / "mean").mode == load_policy(run).mode
+
+
+def test_policies_of_other_networks_have_no_mean(run, tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        main([str(run), str(tmp_path / "mean"), "--average", "skirmish"])
+    assert "skirmish is of another architecture than" in capsys.readouterr().err.splitlines()[-1]
+    assert not (tmp_path / "mean").exists()
+
+
 def test_trust_without_an_adviser_leaves_no_folder(run, tmp_path, capsys):
     with pytest.raises(SystemExit):
         main([str(run), str(tmp_path / "trusting"), "--trust", "0.25"])

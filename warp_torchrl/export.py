@@ -2,15 +2,22 @@
 
 The folder holds a checkpoint without its training state. It can be evaluated, loaded and shipped; no run resumes from
 it.
+
+``--average OTHER`` gives it the mean of the parameters of both. Of a training and of what it started from, that is
+often better than either (Wortsman et al. 2022, "Model soups"): docs/skill.md.
 """
 
 import argparse
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import torch
+
 from warp_torchrl.api import policy_of
 from warp_torchrl.config.saved_config import SavedConfig
+from warp_torchrl.models import Signature
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.shipped import find_policy
 
@@ -22,6 +29,8 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("run", metavar="RUN", help=told)
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="what to make")
     parser.add_argument("--trust", type=float, help="how much its agents trust their adviser from now on, model.trust")
+    told = "others with the same networks, given as RUN is: it is the mean of all, weighed alike"
+    parser.add_argument("--average", nargs="+", default=[], metavar="OTHER", help=told)
     options = parser.parse_args(arguments)
     try:
         found, skipped = checkpoints.newest(find_policy(options.run))
@@ -31,10 +40,36 @@ def main(arguments: list[str] | None = None) -> None:
         if options.trust is not None:
             record = _trusting(record, options.trust)
             policy_of(found, record=record)  # what cannot be trusted is told before anything is written
-        checkpoints.export(found, options.folder, record)
+        mean = _mean([found, *(checkpoints.newest(find_policy(each))[0] for each in options.average)])
+        checkpoints.export(found, options.folder, record, mean if options.average else None)
     except (checkpoints.CheckpointError, OSError, ValueError) as error:
         parser.error(" ".join(str(error).split()))
     print(f"{options.folder}: {found.manifest.scenario}, {found.manifest.frames} frames, {found.manifest.mode}")
+
+
+def _mean(found: Sequence[checkpoints.Checkpoint]) -> dict[str, torch.Tensor]:
+    """Return the mean of the parameters of policies.
+
+    Raises:
+        CheckpointError: If they differ in what they read, in what they write, or in their networks.
+    """
+    each = [checkpoint.policy() for checkpoint in found]
+    shapes = [{name: value.shape for name, value in policy.items()} for policy in each]
+    read = [_read(checkpoint.manifest.signature, found[0].manifest.signature) for checkpoint in found]
+    for other, told, seen in zip(found, shapes, read):
+        if told != shapes[0] or seen != read[0]:
+            raise checkpoints.CheckpointError(f"{other.path} is of another architecture than {found[0].path}")
+    return {name: _mean_of([policy[name] for policy in each]) for name in each[0]}
+
+
+def _read(signature: Signature, other: Signature) -> Signature:
+    """Return what agents read and write, with another one's state and team, which their networks do not know."""
+    return signature.bare()._replace(state=other.state.bare(), n_agents=other.n_agents)
+
+
+def _mean_of(values: Sequence[torch.Tensor]) -> torch.Tensor:
+    """Return the mean of tensors; of what is not of floating point, the first."""
+    return torch.stack(list(values)).mean(dim=0) if values[0].is_floating_point() else values[0]
 
 
 def _trusting(record: SavedConfig, trust: float) -> SavedConfig:

@@ -148,7 +148,12 @@ def save(
     return final
 
 
-def export(found: Checkpoint, folder: Path, record: SavedConfig | None = None) -> None:
+def export(
+    found: Checkpoint,
+    folder: Path,
+    record: SavedConfig | None = None,
+    policy: Mapping[str, torch.Tensor] | None = None,
+) -> None:
     """Write a checkpoint without its training state into a new folder.
 
     Its record does not tell from which run the training started, a path that others do not have.
@@ -157,6 +162,7 @@ def export(found: Checkpoint, folder: Path, record: SavedConfig | None = None) -
         found: The checkpoint.
         folder: What to make.
         record: Of its configuration; None takes its own.
+        policy: The policy's parameters; None takes its own.
 
     Raises:
         CheckpointError: If its own record cannot be read.
@@ -164,17 +170,22 @@ def export(found: Checkpoint, folder: Path, record: SavedConfig | None = None) -
         OSError: If a write fails.
     """
     record = found.record() if record is None else record
-    _write_policy(found, folder, replace(record, values={**record.values, "start_from": None}))
+    _write_policy(found, folder, replace(record, values={**record.values, "start_from": None}), policy)
 
 
-def _write_policy(found: Checkpoint, folder: Path, record: SavedConfig) -> None:
+def _write_policy(
+    found: Checkpoint, folder: Path, record: SavedConfig, policy: Mapping[str, torch.Tensor] | None = None
+) -> None:
     manifest, draft = found.manifest, folder.with_name(f".{folder.name}.tmp")
     if folder.exists():
         raise FileExistsError(f"{folder} exists")
     shutil.rmtree(draft, ignore_errors=True)
     with disk.with_path(draft):
         draft.mkdir(parents=True)
-        shutil.copyfile(found.path / "policy.pt", draft / "policy.pt")
+        if policy is None:
+            shutil.copyfile(found.path / "policy.pt", draft / "policy.pt")
+        else:
+            disk.save_tensors(draft / "policy.pt", dict(policy))
         _write_record(draft, record)
         write_manifest(draft, manifest.frames, manifest.scenario, manifest.signature, manifest.mode)
         _publish(draft, folder)
