@@ -98,6 +98,13 @@ def test_its_agents_may_trust_their_adviser_more(tmp_path):
     assert trust._gain == 2.0
 
 
+def test_how_it_acts_may_be_told(run, tmp_path):
+    modes = ("sampled", "deterministic")
+    for mode in modes:
+        main([str(run), str(tmp_path / mode), "--mode", mode])
+    assert tuple(load_policy(tmp_path / mode).mode for mode in modes) == modes
+
+
 def test_it_may_be_the_mean_of_several(run, tmp_path):
     (tmp_path / "other").mkdir()
     tiny(tmp_path / "other", "total_frames=64", "seed=1").train()

@@ -19,9 +19,9 @@ from warp_torchrl.shipped import policy_names
 SHIPPED = Path(__file__).parent.parent / "docs" / "policies"
 SCENARIOS = {"default": "default", "generalist": "default", "skirmish": "skirmish", "single": "single"}
 """The scenario in which each is evaluated where nothing else is asked."""
-LAST = {"generalist": "generalist_finetune"}
+LAST = {"generalist": "generalist_further"}
 """The experiment by which one was trained last, where that is not the one of its name."""
-EXPORTED_WITH = {"generalist": ["model.trust=0.5"]}
+EXPORTED_WITH = {"generalist": ["model.trust=1.0"]}
 """What a policy was given when it was exported."""
 
 

@@ -29,6 +29,8 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("run", metavar="RUN", help=told)
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="what to make")
     parser.add_argument("--trust", type=float, help="how much its agents trust their adviser from now on, model.trust")
+    told = "how it acts from now on; else as was found at its training's end"
+    parser.add_argument("--mode", choices=("sampled", "deterministic"), help=told)
     told = "others with the same networks, given as RUN is: it is the mean of all, weighed alike"
     parser.add_argument("--average", nargs="+", default=[], metavar="OTHER", help=told)
     options = parser.parse_args(arguments)
@@ -40,6 +42,8 @@ def main(arguments: list[str] | None = None) -> None:
         if options.trust is not None:
             record = _trusting(record, options.trust)
             policy_of(found, record=record)  # what cannot be trusted is told before anything is written
+        if options.mode is not None:
+            found = replace(found, manifest=replace(found.manifest, mode=options.mode))
         mean = _mean([found, *(checkpoints.newest(find_policy(each))[0] for each in options.average)])
         checkpoints.export(found, options.folder, record, mean if options.average else None)
     except (checkpoints.CheckpointError, OSError, ValueError) as error:
