@@ -2,7 +2,7 @@
 
 from warp_torchrl.observation.channels import CHANNELS, DEFAULT, ELEVATION_SCALE, channel
 from warp_torchrl.observation.coarse_picture import PICTURE, PICTURE_SIDE, picture
-from warp_torchrl.observation.critic_state import STATE, STATE_SIDE, STATE_SYMMETRY, CriticState
+from warp_torchrl.observation.critic import STATE, STATE_SIDE, STATE_SYMMETRY, CriticState
 from warp_torchrl.observation.look import Look
 from warp_torchrl.observation.own import SELF_SIZE, WIND_SCALE, own_vector
 from warp_torchrl.observation.presets import (

@@ -22,7 +22,7 @@ from warp_torchrl.observation.coarse_picture import (
     picture_names,
     picture_symmetry,
 )
-from warp_torchrl.observation.critic_state import CriticState
+from warp_torchrl.observation.critic import CriticState
 from warp_torchrl.observation.own import IDENTITY, SELF, SELF_SIZE, Told, own_entries, own_vector
 from warp_torchrl.observation.view import egocentric_view
 from warp_torchrl.symmetry import Planes, Target, Vector
@@ -68,7 +68,7 @@ class Local:
         advice: Name of a heuristic, one of ``TEACHERS``, that tells each agent, in ``self``, the action that it would
             choose for it, see ``advised_actions``: agents may do otherwise; None has no adviser.
         reach: Whether the central critic's ``state`` tells how soon fire and team can be where, see
-            ``critic_state.reach_of_fire_and_team``: else it cannot tell a closed firebreak from one that lacks a cell.
+            ``critic.reach_of_fire_and_team``: else it cannot tell a closed firebreak from one that lacks a cell.
         channels: Names of the view's channels, in order.
 
     Raises:
