@@ -107,7 +107,7 @@ def match(make_match, trained):
 
 
 def until(holds):
-    end = time.monotonic() + 60.0
+    end = time.monotonic() + 180.0
     while not holds():
         assert time.monotonic() < end, "it took too long"
         time.sleep(0.02)
