@@ -8,7 +8,6 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # the tests run side by side; rea
 
 import pytest
 import torch
-from hydra._internal.hydra import Hydra
 
 from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain, without_targets
@@ -98,17 +97,6 @@ def make_small_env():
 @pytest.fixture(autouse=True, scope="session")
 def _no_files_at_home(tmp_path_factory):
     os.environ["XDG_CACHE_HOME"] = str(tmp_path_factory.mktemp("cache"))
-
-
-@pytest.fixture(autouse=True)
-def _composed_once(monkeypatch):
-    """Spare commands the composition by which Hydra looks for ``hydra.mode``, half of a short command's time."""
-    look = Hydra.get_mode
-
-    def get_mode(hydra, config_name, overrides):
-        return look(hydra, config_name, overrides) if any("hydra.mode" in each for each in overrides) else None
-
-    monkeypatch.setattr(Hydra, "get_mode", get_mode)
 
 
 @pytest.fixture(autouse=True)

@@ -9,7 +9,7 @@ often better than either (Wortsman et al. 2022, "Model soups"): docs/skill.md.
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +17,6 @@ import torch
 
 from warp_torchrl.api import policy_of
 from warp_torchrl.config.saved_config import SavedConfig
-from warp_torchrl.models import Signature
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.shipped import find_policy
 
@@ -44,8 +43,8 @@ def main(arguments: list[str] | None = None) -> None:
             policy_of(found, record=record)  # what cannot be trusted is told before anything is written
         if options.mode is not None:
             found = replace(found, manifest=replace(found.manifest, mode=options.mode))
-        mean = _mean([found, *(checkpoints.newest(find_policy(each))[0] for each in options.average)])
-        checkpoints.export(found, options.folder, record, mean if options.average else None)
+        others = [checkpoints.newest(find_policy(each))[0] for each in options.average]
+        checkpoints.export(found, options.folder, record, _mean([found, *others]) if others else None)
     except (checkpoints.CheckpointError, OSError, ValueError) as error:
         parser.error(" ".join(str(error).split()))
     print(f"{options.folder}: {found.manifest.scenario}, {found.manifest.frames} frames, {found.manifest.mode}")
@@ -57,23 +56,18 @@ def _mean(found: Sequence[checkpoints.Checkpoint]) -> dict[str, torch.Tensor]:
     Raises:
         CheckpointError: If they differ in what they read, in what they write, or in their networks.
     """
-    each = [checkpoint.policy() for checkpoint in found]
-    shapes = [{name: value.shape for name, value in policy.items()} for policy in each]
-    read = [_read(checkpoint.manifest.signature, found[0].manifest.signature) for checkpoint in found]
-    for other, told, seen in zip(found, shapes, read):
-        if told != shapes[0] or seen != read[0]:
-            raise checkpoints.CheckpointError(f"{other.path} is of another architecture than {found[0].path}")
-    return {name: _mean_of([policy[name] for policy in each]) for name in each[0]}
+    policies = [each.policy() for each in found]
+    for checkpoint, policy in zip(found, policies):
+        if _fits(checkpoint, policy) != _fits(found[0], policies[0]):
+            raise checkpoints.CheckpointError(f"{checkpoint.path} is of another architecture than {found[0].path}")
+    return {name: torch.stack([policy[name] for policy in policies]).mean(dim=0) for name in policies[0]}
 
 
-def _read(signature: Signature, other: Signature) -> Signature:
-    """Return what agents read and write, with another one's state and team, which their networks do not know."""
-    return signature.bare()._replace(state=other.state.bare(), n_agents=other.n_agents)
-
-
-def _mean_of(values: Sequence[torch.Tensor]) -> torch.Tensor:
-    """Return the mean of tensors; of what is not of floating point, the first."""
-    return torch.stack(list(values)).mean(dim=0) if values[0].is_floating_point() else values[0]
+def _fits(found: checkpoints.Checkpoint, policy: Mapping[str, torch.Tensor]) -> tuple[object, ...]:
+    """Return what policies must share to have a mean: what agents read and may do, and the shapes of their networks."""
+    signature = found.manifest.signature.bare()
+    shapes = {name: value.shape for name, value in policy.items()}
+    return signature.observation, signature.actions, signature.roles, signature.agencies, signature.is_late, shapes
 
 
 def _trusting(record: SavedConfig, trust: float) -> SavedConfig:

@@ -36,4 +36,4 @@ def test_a_mistake_is_found_in_what_hydra_composed(composed, monkeypatch, tmp_pa
     with pytest.raises(SystemExit) as ended:
         command()
     assert ended.value.code == 2 and told in capsys.readouterr().err
-    assert len(composed) == 1 and not folder.exists()
+    assert len(composed) == 2 and not folder.exists()  # Hydra does so twice: first to learn whether this is a sweep
