@@ -59,7 +59,8 @@ def _mean(found: Sequence[checkpoints.Checkpoint]) -> dict[str, torch.Tensor]:
     policies = [each.policy() for each in found]
     for checkpoint, policy in zip(found, policies):
         if _fits(checkpoint, policy) != _fits(found[0], policies[0]):
-            raise checkpoints.CheckpointError(f"{checkpoint.path} is of another architecture than {found[0].path}")
+            told = f"{checkpoint.path} is of another architecture than {found[0].path}"
+            raise checkpoints.CheckpointError(f"{told}: average a run with what it started from, or with its like")
     return {name: torch.stack([policy[name] for policy in policies]).mean(dim=0) for name in policies[0]}
 
 
