@@ -32,7 +32,7 @@ def test_a_row_is_the_policy_beside_the_best_baseline_on_the_same_fires(capsys, 
         own = play(env, policy, 1_000_000, policy.mode)["saved"]
         others = play_heuristics(env, 1_000_000, ("noop", "coordinated"))
         best = max(others, key=lambda name: others[name]["saved"].mean())
-        assert row["baseline"] == best
+        assert row["rival"] == best
         assert row["policy"]["mean"] == pytest.approx(own.mean())
         assert row["difference"]["saved_difference"] == pytest.approx((own - others[best]["saved"]).mean())
         to_reference = (own - others["coordinated"]["saved"]).mean()
@@ -41,12 +41,29 @@ def test_a_row_is_the_policy_beside_the_best_baseline_on_the_same_fires(capsys, 
     assert rows[0]["policy"] != rows[1]["policy"]
 
 
+def test_a_specialist_is_played_with_what_it_sees_on_the_same_fires(capsys, monkeypatch):
+    monkeypatch.setattr(command, "PLACES", {"specialists": (Place("skirmish", "skirmish", rival="single"),)})
+    command.main(["generalist", "--policy", "skirmish", "--episodes", "4", "--json", "--set", *SMALL])
+    (row,) = json.loads(capsys.readouterr().out)["generalist"]
+
+    def saved(name):
+        policy = load_policy(name)
+        env = make_env("skirmish", n_worlds=4, seed=1_000_000, overrides=[*policy.overrides, *SMALL])
+        return play(env, policy.fitted(env), 1_000_000, policy.mode)["saved"]
+
+    own, theirs = saved("skirmish"), saved("single")
+    assert row["rival"] == "specialist single"
+    assert row["beside"]["mean"] == pytest.approx(theirs.mean())
+    assert row["difference"]["saved_difference"] == pytest.approx((own - theirs).mean())
+    assert row["difference"]["saved_difference"] != 0.0
+
+
 def test_the_table_counts_where_the_policy_is_surely_ahead_and_behind():
     saved = np.linspace(0.5, 0.7, 20)
     lower = saved - 0.15
 
     def row(place, own):
-        found = {"policy": summarise(own), "baseline": "ring", "best": summarise(saved), "reference": summarise(lower)}
+        found = {"policy": summarise(own), "rival": "ring", "beside": summarise(saved), "reference": summarise(lower)}
         differences = {"difference": compare(own, saved), "to_reference": compare(own, lower)}
         return {"place": place, "episodes": 20, **found, **differences}
 
@@ -55,7 +72,7 @@ def test_the_table_counts_where_the_policy_is_surely_ahead_and_behind():
     assert "| a | 70.0 (" in text and "| ring | 60.0 (" in text and "| +10.0 (+10.0 .. +10.0) |" in text
     assert "| +10.0 (+10.0 .. +10.0) | +25.0 (+25.0 .. +25.0) |" in text
     assert text.endswith(
-        "Of 3 places ahead of the best baseline, intervals apart, on 1, and behind it on 1; "
+        "Of 3 places ahead of the rival, intervals apart, on 1, and behind it on 1; "
         "of `coordinated` on 2, and behind it on 1."
     )
 
@@ -71,7 +88,7 @@ def test_the_figure_has_a_row_for_each_place(tmp_path):
     pytest.importorskip("matplotlib", reason="needs the extra figures")
 
     def drawn(*saved):
-        known = {"episodes": 9, "baseline": "ring", "best": summarise(np.array([0.1, 0.2]))}
+        known = {"episodes": 9, "rival": "ring", "beside": summarise(np.array([0.1, 0.2]))}
         means = [summarise(np.linspace(mean - 0.05, mean + 0.05, 9)) for mean in saved]
         rows = [{"place": f"place {index}", "policy": mean, **known} for index, mean in enumerate(means)]
         draw_generalist(rows, tmp_path / "figure.png")

@@ -1,13 +1,16 @@
-"""One policy on every kind of fire, beside the best baseline of each."""
+"""One policy on every kind of fire, beside the best baseline of each, or a policy that knows that kind alone."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from warp_torchrl.api import load_policy, make_env
 from warp_torchrl.benchmark.tasks import FIRST_SEED, SCENARIOS, difference_cell, interval_cell
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation.play import play, play_heuristics
 from warp_torchrl.evaluation.statistics import compare, summarise
+from warp_torchrl.policy import TrainedPolicy
 
 
 class Place(NamedTuple):
@@ -17,11 +20,13 @@ class Place(NamedTuple):
         name: Of its row.
         scenario: One of ``conf/scenario``.
         overrides: In the command line's grammar.
+        rival: Name of a shipped policy that is played beside it; None takes the best baseline.
     """
 
     name: str
     scenario: str
     overrides: tuple[str, ...] = ()
+    rival: str | None = None
 
 
 OURS = tuple(Place(name, name) for name in SCENARIOS if not name.startswith("paper"))
@@ -31,6 +36,7 @@ MAPS = tuple(
 )
 WINDS = tuple(Place(f"default, {speed} m/s", "default", (f"wind.speed={speed}",)) for speed in (0, 2, 8, 12))
 GIANT = (Place("giant", "giant"),)
+SPECIALISTS = tuple(Place(name, name, rival=name) for name in ("skirmish", "single", "default"))
 
 
 def on_ground(folder: str) -> tuple[Place, ...]:
@@ -39,7 +45,7 @@ def on_ground(folder: str) -> tuple[Place, ...]:
     return (Place("landfire", "landfire", (path,)), Place("wildland", "wildland", (path,)))
 
 
-PLACES = {"scenarios": OURS, "teams": TEAMS, "maps": MAPS, "winds": WINDS, "giant": GIANT}
+PLACES = {"scenarios": OURS, "teams": TEAMS, "maps": MAPS, "winds": WINDS, "giant": GIANT, "specialists": SPECIALISTS}
 """Groups of places; those on real ground need a folder."""
 RIVALS = ("local", "greedy", "coordinated", "dispatch", "ring", "mixed")
 """The baselines for teams that see the fire; the others search for it, watch it, or share a land."""
@@ -50,7 +56,9 @@ REFERENCE = "coordinated"
 def generalise(
     path: str, places: Sequence[Place], device: str, episodes: int, overrides: Sequence[str] = ()
 ) -> Iterator[dict[str, Any]]:
-    """Yield a row for each place: what the policy, the best baseline and ``REFERENCE`` save, and paired differences.
+    """Yield a row for each place: what the policy, its rival and ``REFERENCE`` save, and paired differences.
+
+    The rival is the best baseline, or the policy that the place names.
 
     Args:
         path: Of a policy, or the name of a shipped one.
@@ -61,51 +69,61 @@ def generalise(
     """
     policy = load_policy(path).to(device)
 
-    def at(place: Place, n_worlds: int) -> WildfireEnv:
-        changes = [*policy.overrides, *place.overrides, *overrides]
+    def at(place: Place, shown: TrainedPolicy, n_worlds: int) -> WildfireEnv:
+        changes = [*shown.overrides, *place.overrides, *overrides]
         return make_env(place.scenario, n_worlds=n_worlds, seed=FIRST_SEED, device=device, overrides=changes)
 
     for place in places:
-        env = at(place, n_worlds=1)  # what is wrong is told before anything is played
+        env = at(place, policy, n_worlds=1)  # what is wrong is told before anything is played
         policy.fitted(env)(env.reset())
     for place in places:
-        env = at(place, episodes)
-        saved = {name: found["saved"] for name, found in play_heuristics(env, FIRST_SEED, RIVALS).items()}
-        best = max(saved, key=lambda name: float(saved[name].mean()))
-        own = play(env, policy.fitted(env), FIRST_SEED, policy.mode)["saved"]
+        env = at(place, policy, episodes)
+        own = _saved(env, policy)
+        names = RIVALS if place.rival is None else (REFERENCE,)
+        saved = {name: found["saved"] for name, found in play_heuristics(env, FIRST_SEED, names).items()}
+        if place.rival is None:
+            rival = max(saved, key=lambda name: float(saved[name].mean()))
+        else:
+            rival, specialist = f"specialist {place.rival}", load_policy(place.rival).to(device)
+            saved[rival] = _saved(at(place, specialist, episodes), specialist)
         yield {
             "place": place.name,
             "episodes": episodes,
             "policy": summarise(own),
-            "baseline": best,
-            "best": summarise(saved[best]),
-            "difference": compare(own, saved[best]),
+            "rival": rival,
+            "beside": summarise(saved[rival]),
+            "difference": compare(own, saved[rival]),
             "reference": summarise(saved[REFERENCE]),
             "to_reference": compare(own, saved[REFERENCE]),
         }
 
 
+def _saved(env: WildfireEnv, policy: TrainedPolicy) -> np.ndarray:
+    """Return what a policy saves of each fire, float64 [worlds]."""
+    return play(env, policy.fitted(env), FIRST_SEED, policy.mode)["saved"]
+
+
 def generalist_table(rows: Sequence[dict[str, Any]]) -> str:
-    """Return the rows as a Markdown table, and on how many places the policy beats the baselines."""
+    """Return the rows as a Markdown table, and on how many places the policy beats its rivals."""
     lines = [
         f"Trees saved, %, and 95 % intervals over {rows[0]['episodes']} fires, seeds from {FIRST_SEED}; differences "
         "are paired by fire",
         "",
-        f"| where | policy | best baseline | | difference | to `{REFERENCE}` |",
+        f"| where | policy | rival | | difference | to `{REFERENCE}` |",
         "|---|---|---|---|---|---|",
     ]
     lines += [table_line(row) for row in rows]
-    best, reference = (
+    rival, reference = (
         f"on {_count(rows, key, 1)}, and behind it on {_count(rows, key, -1)}" for key in ("difference", "to_reference")
     )
-    told = f"Of {len(rows)} places ahead of the best baseline, intervals apart, {best}; of `{REFERENCE}` {reference}."
+    told = f"Of {len(rows)} places ahead of the rival, intervals apart, {rival}; of `{REFERENCE}` {reference}."
     return "\n".join([*lines, "", told])
 
 
 def table_line(row: Mapping[str, Any]) -> str:
     """Return a row as a line of the table."""
     return (
-        f"| {row['place']} | {interval_cell(row['policy'])} | {row['baseline']} | {interval_cell(row['best'])} | "
+        f"| {row['place']} | {interval_cell(row['policy'])} | {row['rival']} | {interval_cell(row['beside'])} | "
         f"{difference_cell(row['difference'])} | {difference_cell(row['to_reference'])} |"
     )
 

@@ -1,4 +1,4 @@
-"""The figure of a policy on every kind of fire, beside the best baseline of each."""
+"""The figure of a policy on every kind of fire, beside its rival on each."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -6,12 +6,12 @@ from typing import Any
 
 from warp_torchrl.drawing import BLUE, GRID, ORANGE, SOFT, save, sheet, style
 
-_DRAWN = {"policy": ("policy", BLUE, -0.15), "best": ("best baseline, named on the right", ORANGE, 0.15)}
+_DRAWN = {"policy": ("policy", BLUE, -0.15), "beside": ("rival, named on the right", ORANGE, 0.15)}
 """Label, colour and offset [rows] of what is drawn of a row."""
 
 
 def draw_generalist(rows: Sequence[dict[str, Any]], path: Path) -> None:
-    """Draw what the policy and the best baseline save of each kind of fire, with 95 % intervals.
+    """Draw what the policy and its rival save of each kind of fire, with 95 % intervals.
 
     Args:
         rows: What ``generalise`` yields.
@@ -41,7 +41,7 @@ def draw_generalist(rows: Sequence[dict[str, Any]], path: Path) -> None:
             )
         for place, row in enumerate(rows):
             beside = {"textcoords": "offset points", "va": "center", "fontsize": 7.0, "color": SOFT}
-            panel.annotate(row["baseline"], (1.0, place), (4, 0), xycoords=("axes fraction", "data"), **beside)
+            panel.annotate(row["rival"], (1.0, place), (4, 0), xycoords=("axes fraction", "data"), **beside)
         panel.set_yticks(range(len(rows)), [row["place"] for row in rows])
         panel.set_ylim(len(rows) - 0.4, -0.6)
         panel.set_xlabel("trees saved [%]")
