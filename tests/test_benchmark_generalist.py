@@ -58,6 +58,13 @@ def test_a_specialist_is_played_with_what_it_sees_on_the_same_fires(capsys, monk
     assert row["difference"]["saved_difference"] != 0.0
 
 
+def test_one_row_of_a_group_is_played_alone(capsys, monkeypatch):
+    monkeypatch.setattr(command, "PLACES", TWO)
+    monkeypatch.setattr("warp_torchrl.benchmark.generalist.RIVALS", ("coordinated",))
+    command.main(["generalist", "--policy", "skirmish", "--places", "windy", "--episodes", "2", "--set", *SMALL])
+    assert "| windy |" in (told := capsys.readouterr().out) and "| skirmish |" not in told
+
+
 def test_the_table_counts_where_the_policy_is_surely_ahead_and_behind():
     saved = np.linspace(0.5, 0.7, 20)
     lower = saved - 0.15
@@ -106,7 +113,7 @@ def test_the_figure_has_a_row_for_each_place(tmp_path):
 
 def test_places_on_real_ground_need_a_folder(capsys):
     assert on_ground("a b") == tuple(Place(name, name, ("landscape.path='a b'",)) for name in ("landfire", "wildland"))
-    for group, told in (("ground", "got ground, which needs --ground"), ("tems", "got tems")):
+    for group, told in (("ground", "got ground, which needs --ground"), ("tems", "got tems: did you mean teams?")):
         with pytest.raises(SystemExit, match="2"):
             command.main(["generalist", "--places", group])
         assert told in capsys.readouterr().err

@@ -41,6 +41,7 @@ from warp_torchrl.benchmark.trainings import training_speed
 from warp_torchrl.commands.allocation import keep_freed_memory
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.runs.checkpoint import CheckpointError
 
 Rows = list[dict[str, Any]]
@@ -112,11 +113,12 @@ def _rewards(options: Namespace) -> dict[str, Rows]:
 
 def _generalist(options: Namespace) -> dict[str, Rows]:
     groups = PLACES if options.ground is None else {**PLACES, "ground": on_ground(options.ground)}
-    unknown = [name for name in options.places or () if name not in groups]
+    known = {place.name: (place,) for group in groups.values() for place in group if place.rival is None} | groups
+    unknown = [name for name in options.places or () if name not in known]
     if unknown:
-        needs = ", which needs --ground" if unknown[0] == "ground" else ""
-        raise ConfigError(f"places must be of {', '.join(groups)}, got {unknown[0]}{needs}")
-    places = [place for name in options.places or groups for place in groups[name]]
+        needs = ", which needs --ground" if unknown[0] == "ground" else did_you_mean(unknown[0], known)
+        raise ConfigError(f"places must be of {', '.join(groups)}, or one row of these, got {unknown[0]}{needs}")
+    places = [place for name in options.places or groups for place in known[name]]
     rows = []
     for row in generalise(options.policy, places, options.device, options.episodes, options.set):
         rows.append(row)
@@ -180,7 +182,9 @@ def _parser() -> argparse.ArgumentParser:
         "--policies", nargs="+", choices=HEURISTICS, metavar="NAME", help="for tasks: these heuristics, the last paired"
     )
     parser.add_argument("--policy", default="generalist", help="for generalist: a run folder, or a shipped policy")
-    parser.add_argument("--places", nargs="+", metavar="GROUP", help=f"for generalist: {', '.join(PLACES)}, ground")
+    parser.add_argument(
+        "--places", nargs="+", metavar="GROUP", help=f"for generalist: {', '.join(PLACES)}, ground, or one row"
+    )
     parser.add_argument("--ground", metavar="FOLDER", help="for generalist: rasters, for places on real ground")
     parser.add_argument("--fires", type=int, default=1000, help="for fires: how many of each law")
     parser.add_argument("--reach", type=int, default=60, help="for ellipses: cells that the heads go")
