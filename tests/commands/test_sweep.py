@@ -18,6 +18,8 @@ from warp_torchrl.evaluation.method import method
         (["observation=local", "observation.radius=3"], "mappo efficiency local radius=3"),
         (["model.memory=64"], "mappo efficiency surroundings memory=64"),
         (["observation.advice=greedy", "model.trust=0.5"], "mappo efficiency surroundings advice=greedy trust=0.5"),
+        (["observation.rules=true", "observation.near=4"], "mappo efficiency surroundings near=4 rules=true"),
+        (["mixture=all", "observation.water=true"], "mappo efficiency surroundings water=true mixture=all"),
         (["observation=paper", "observation.radius=5"], "mappo efficiency paper radius=5"),
         (["reward=paper", "reward.barrier_rule=printed"], "mappo paper surroundings barrier_rule=printed"),
         (["observation=paper", "imitation.teacher=local"], "mappo efficiency paper taught by local"),
@@ -36,6 +38,7 @@ from warp_torchrl.evaluation.method import method
 def test_a_policy_is_called_by_what_is_unusual(overrides, named):
     chosen = dict(each.split("=") for each in overrides)
     usual = {"algorithm": "mappo", "reward": "efficiency", "observation": "surroundings", "curriculum": "none"}
+    usual |= {"mixture": "none"}
     choices = {group: chosen.get(group, option) for group, option in usual.items()}
     record = SavedConfig(choices=choices, values=plain(compose_config("train", overrides)))
     assert method(record)[0] == named

@@ -28,6 +28,9 @@ _USUAL = {
     ("model", "messages"): "none",
     ("observation", "radius"): 5,
     ("observation", "advice"): None,
+    ("observation", "near"): 0,
+    ("observation", "rules"): False,
+    ("observation", "water"): False,
     ("model", "trust"): 0.0,
     ("reward", "barrier_rule"): "cut_off",
     ("reward", "cooperation"): 0.0,
@@ -37,17 +40,19 @@ _PAPERS_RADIUS = 3
 
 
 def unusual(record: SavedConfig) -> list[str]:
-    """Return a policy's unusual settings, and its curriculum if it had one, as overrides."""
+    """Return a policy's unusual settings, and the curriculum and the mixture if it had one, as overrides."""
     usual = _USUAL | ({("observation", "radius"): _PAPERS_RADIUS} if record.choices["observation"] == "paper" else {})
     found = {(group, key): record.values.get(group, {}).get(key) for group, key in usual}
     settings = {key: value for (group, key), value in found.items() if value not in (None, usual[group, key])}
-    curriculum = record.choices.get("curriculum", "none")
-    settings |= {} if curriculum == "none" else {"curriculum": curriculum}
+    groups = {group: record.choices.get(group, "none") for group in ("curriculum", "mixture")}
+    settings |= {group: choice for group, choice in groups.items() if choice != "none"}
     return [f"{key}={_written(value)}" for key, value in settings.items()]
 
 
 def _written(value: Any) -> str:
-    """Return a value as text, 1 and 1.0 alike."""
+    """Return a value as in an override, 1 and 1.0 alike."""
+    if isinstance(value, bool):
+        return str(value).lower()
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
