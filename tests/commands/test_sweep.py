@@ -37,8 +37,8 @@ from warp_torchrl.evaluation.method import method
 )
 def test_a_policy_is_called_by_what_is_unusual(overrides, named):
     chosen = dict(each.split("=") for each in overrides)
-    usual = {"algorithm": "mappo", "reward": "efficiency", "observation": "surroundings", "curriculum": "none"}
-    usual |= {"mixture": "none"}
+    usual = {"algorithm": "mappo", "reward": "efficiency", "observation": "surroundings"}
+    usual |= dict.fromkeys(("curriculum", "mixture"), "none")
     choices = {group: chosen.get(group, option) for group, option in usual.items()}
     record = SavedConfig(choices=choices, values=plain(compose_config("train", overrides)))
     assert method(record)[0] == named
