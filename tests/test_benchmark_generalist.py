@@ -58,6 +58,30 @@ def test_a_specialist_is_played_with_what_it_sees_on_the_same_fires(capsys, monk
     assert row["difference"]["saved_difference"] != 0.0
 
 
+@pytest.mark.parametrize("rival", [None, "single"])
+def test_fires_that_do_not_fit_into_one_batch_play_in_parts(capsys, monkeypatch, rival):
+    def rows(cells):
+        monkeypatch.setattr("warp_torchrl.benchmark.generalist._CELLS", cells)
+        command.main(["generalist", "--policy", "skirmish", "--episodes", "5", "--json", "--set", *SMALL])
+        return json.loads(capsys.readouterr().out)["generalist"]
+
+    made = []
+
+    def making(*given, n_worlds, **more):
+        made.append(n_worlds)
+        return make_env(*given, n_worlds=n_worlds, **more)
+
+    monkeypatch.setattr(command, "PLACES", {"scenarios": (Place("skirmish", "skirmish", rival=rival),)})
+    monkeypatch.setattr("warp_torchrl.benchmark.generalist.RIVALS", ("noop", "coordinated"))
+    monkeypatch.setattr("warp_torchrl.benchmark.generalist.make_env", making)
+    at_once = rows(5 * 12 * 12)
+    assert max(made) == 5
+    made.clear()
+    assert rows(2 * 12 * 12) == at_once
+    assert max(made) == 2
+    assert rows(1) == at_once  # a map that is larger than a batch plays alone
+
+
 def test_one_row_of_a_group_is_played_alone(capsys, monkeypatch):
     monkeypatch.setattr(command, "PLACES", TWO)
     monkeypatch.setattr("warp_torchrl.benchmark.generalist.RIVALS", ("coordinated",))

@@ -52,13 +52,17 @@ RIVALS = ("local", "greedy", "coordinated", "dispatch", "ring", "mixed")
 REFERENCE = "coordinated"
 """The baseline that every row tells of."""
 
+_CELLS = 2**20
+"""Of the worlds that play in one batch: 64 of ``giant`` take 9 GiB."""
+
 
 def generalise(
     path: str, places: Sequence[Place], device: str, episodes: int, overrides: Sequence[str] = ()
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for each place: what the policy, its rival and ``REFERENCE`` save, and paired differences.
 
-    The rival is the best baseline, or the policy that the place names.
+    The rival is the best baseline, or the policy that the place names. The fires of large maps play in parts, one after
+    the other, so that they fit into the memory.
 
     Args:
         path: Of a policy, or the name of a shipped one.
@@ -68,39 +72,58 @@ def generalise(
         overrides: Further ones in all places.
     """
     policy = load_policy(path).to(device)
+    rivals = {place.rival: load_policy(place.rival).to(device) for place in places if place.rival is not None}
 
-    def at(place: Place, shown: TrainedPolicy, n_worlds: int) -> WildfireEnv:
+    def at(place: Place, shown: TrainedPolicy, first: int, count: int) -> WildfireEnv:
         changes = [*shown.overrides, *place.overrides, *overrides]
-        return make_env(place.scenario, n_worlds=n_worlds, seed=FIRST_SEED, device=device, overrides=changes)
+        return make_env(place.scenario, n_worlds=count, seed=first, device=device, overrides=changes)
 
-    for place in places:
-        env = at(place, policy, n_worlds=1)  # what is wrong is told before anything is played
-        policy.fitted(env)(env.reset())
-    for place in places:
-        env = at(place, policy, episodes)
-        own = _saved(env, policy)
+    def saved(place: Place, shown: TrainedPolicy, part: tuple[int, int]) -> np.ndarray:
+        env = at(place, shown, *part)
+        return play(env, shown.fitted(env), part[0], shown.mode)["saved"]
+
+    def baselines(place: Place, part: tuple[int, int]) -> dict[str, np.ndarray]:
         names = RIVALS if place.rival is None else (REFERENCE,)
-        saved = {name: found["saved"] for name, found in play_heuristics(env, FIRST_SEED, names).items()}
+        found = play_heuristics(at(place, policy, *part), part[0], names)
+        return {name: episodes["saved"] for name, episodes in found.items()}
+
+    sizes = []
+    for place in places:
+        env = at(place, policy, FIRST_SEED, count=1)  # what is wrong is told before anything is played
+        policy.fitted(env)(env.reset())
+        sizes.append(env.world.size)
+    for place, size in zip(places, sizes):
+        parts = _parts(episodes, size)
+        own = np.concatenate([saved(place, policy, part) for part in parts])
+        others = _joined([baselines(place, part) for part in parts])
+        reference = others[REFERENCE]
         if place.rival is None:
-            rival = max(saved, key=lambda name: float(saved[name].mean()))
+            rival = max(others, key=lambda name: float(others[name].mean()))
+            beside = others[rival]
         else:
-            rival, specialist = f"specialist {place.rival}", load_policy(place.rival).to(device)
-            saved[rival] = _saved(at(place, specialist, episodes), specialist)
+            rival = f"specialist {place.rival}"
+            beside = np.concatenate([saved(place, rivals[place.rival], part) for part in parts])
         yield {
             "place": place.name,
             "episodes": episodes,
             "policy": summarise(own),
             "rival": rival,
-            "beside": summarise(saved[rival]),
-            "difference": compare(own, saved[rival]),
-            "reference": summarise(saved[REFERENCE]),
-            "to_reference": compare(own, saved[REFERENCE]),
+            "beside": summarise(beside),
+            "difference": compare(own, beside),
+            "reference": summarise(reference),
+            "to_reference": compare(own, reference),
         }
 
 
-def _saved(env: WildfireEnv, policy: TrainedPolicy) -> np.ndarray:
-    """Return what a policy saves of each fire, float64 [worlds]."""
-    return play(env, policy.fitted(env), FIRST_SEED, policy.mode)["saved"]
+def _parts(episodes: int, size: tuple[int, int]) -> list[tuple[int, int]]:
+    """Return the first seed and the number of the fires that play in one batch, on maps of a size [cells]."""
+    most = max(1, _CELLS // (size[0] * size[1]))
+    return [(FIRST_SEED + start, min(most, episodes - start)) for start in range(0, episodes, most)]
+
+
+def _joined(parts: Sequence[Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """Return the fires of all parts, by name."""
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def generalist_table(rows: Sequence[dict[str, Any]]) -> str:
