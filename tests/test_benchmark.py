@@ -49,6 +49,14 @@ def test_a_mistake_is_told_in_one_line(capsys, what, mistake):
     assert len(told) == 1 and told[0].startswith("error: ")
 
 
+def test_worlds_that_cannot_start_are_told_in_one_line(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["tasks", "--scenario", "skirmish", "--episodes", "2", "--set", "landscape.levels=[1,1,1]"])
+    assert end.value.code == 2
+    told = capsys.readouterr().err
+    assert told == "error: landscape: a map has no tree that can burn, so there is no fire to start\n"
+
+
 @pytest.mark.slow
 def test_the_tick_is_compiled_too(capsys):
     assert "\ncompiled " in output(capsys, "tick", *TINY)

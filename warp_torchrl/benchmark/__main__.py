@@ -224,7 +224,7 @@ def main(arguments: list[str] | None = None) -> None:
     for each in options.what or ["env", "train"]:
         try:
             sections = _MEASURES[each](options)
-        except (ConfigError, CheckpointError) as error:
+        except (ValueError, CheckpointError) as error:
             parser.exit(2, f"error: {error}\n")
         found |= sections
         for name, rows in sections.items() if not options.json else ():

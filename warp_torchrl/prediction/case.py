@@ -11,7 +11,6 @@ from warp_torchrl.maps.geotiff import local_grid
 from warp_torchrl.prediction.files import Place
 from warp_torchrl.weather.convergence import grid_convergence
 from warp_torchrl.weather.table import WeatherTable, minutes_until, read_weather
-from warp_torchrl.world.fuel_bed import COVER_FUEL
 from warp_torchrl.world.ignition_file import read_ignition
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.rate import RateFire
@@ -41,9 +40,7 @@ def read_case(source: LandscapeSource, fire: RateFire, options: PredictionOption
         ValueError: If a file cannot be read or does not fit.
     """
     ground = source(world_key(torch.tensor([options.seed])))
-    if getattr(source, "table", None) == "worldcover":  # its codes are no fuel models
-        ground = ground.replace(fuel=None)
-    _check_fuel(source, fire)
+    fire.bed.check(source)
     cell_size: float = getattr(source, "cell_size", 30.0) if options.cell_size is None else options.cell_size
     height, width = ground.cover.shape[1:]
     grid = getattr(source, "grid", None)
@@ -77,10 +74,3 @@ def _convergence(place: Place, size: tuple[int, int]) -> float:
     row, column = place.corner[0] + size[0] / 2.0, place.corner[1] + size[1] / 2.0
     a, b, left, d, e, top = grid.transform[:6]
     return grid_convergence(grid.crs.to_wkt(), left + a * column + b * row, top + d * column + e * row)
-
-
-def _check_fuel(source: LandscapeSource, fire: RateFire) -> None:
-    """Refuse fuel codes of another model than the law's."""
-    table = getattr(source, "table", None)
-    if isinstance(table, str) and table in COVER_FUEL and table != fire.model:
-        raise ValueError(f"fire.model must be that of landscape.table, {table}, got {fire.model}")

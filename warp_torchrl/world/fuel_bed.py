@@ -69,6 +69,16 @@ class FuelBed:
         """Return the fuel models by code; None for the Canadian system, which has equations for each."""
         return read_model(dict(self.fuel_models) or self.model)
 
+    def check(self, landscape: LandscapeSource) -> None:
+        """Refuse landscapes whose fuel codes are of another model.
+
+        Raises:
+            ValueError: If their ``table`` is another of ``COVER_FUEL``.
+        """
+        table = getattr(landscape, "table", None)
+        if isinstance(table, str) and table in COVER_FUEL and table != self.model and not self.fuel_models:
+            raise ValueError(f"fire.model must be that of landscape.table, {table}, got {self.model}")
+
     def fuel(self, landscape: Landscape) -> Tensor:
         """Return the fuel codes of landscapes, int16 [B, H, W]."""
         if landscape.fuel is not None:

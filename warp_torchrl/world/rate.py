@@ -125,7 +125,12 @@ class RateFire(Automaton):
         )
 
     def over(self, landscape: LandscapeSource, wind: Wind, cell_size: float) -> Self:
-        """Return the automaton with the minutes of a tick that the fastest fire of some worlds asks for."""
+        """Return the automaton with the minutes of a tick that the fastest fire of some worlds asks for.
+
+        Raises:
+            ValueError: If the fuel codes of the landscape are of another model.
+        """
+        self.bed.check(landscape)
         if self.minutes_per_tick is not None:
             return self
         fastest = self.bed.fastest(landscape, wind, cell_size, moisture_row(self.moisture))

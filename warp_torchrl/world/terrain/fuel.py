@@ -64,6 +64,8 @@ O-1b 32 is grassland; water 102 lake; what is no fuel, not known or urban, 0, 99
 
 TABLES = {"fbfm13": FBFM13, "fbfm40": FBFM40, "fbp": FBP, "worldcover": WORLDCOVER}
 """The presets by name."""
+LAND_COVER = ("worldcover",)
+"""Those whose codes are classes of land cover, and no fuel models: laws of rates of spread go by the cover there."""
 NO_FUEL = 99
 """Fuel code of cells that are not known: no fuel in FBFM13, FBFM40 and FBP alike."""
 NO_DATA = -9999

@@ -13,7 +13,7 @@ import numpy as np
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.state import OLDEST
 from warp_torchrl.world.terrain.crop import Crop, Cropped
-from warp_torchrl.world.terrain.fuel import NO_DATA, code_table, to_cover
+from warp_torchrl.world.terrain.fuel import LAND_COVER, NO_DATA, code_table, to_cover
 from warp_torchrl.world.terrain.grid import Grid, check_grid
 from warp_torchrl.world.terrain.landscape import map_size
 from warp_torchrl.world.terrain.layer import fill, find_layer, read_grid, read_layer, regrid, resample_layer
@@ -151,7 +151,9 @@ class Raster(Cropped):
     ) -> dict[str, Any]:
         """Return the planes of the map, and where it is known, by their names in ``Crop``."""
         cover = to_cover(layers["fuel"], known["fuel"], table)
-        planes: dict[str, Any] = {"cover": cover, "fuel": to_fuel(layers["fuel"], known["fuel"])}
+        planes: dict[str, Any] = {"cover": cover}
+        if self.table not in LAND_COVER:
+            planes["fuel"] = to_fuel(layers["fuel"], known["fuel"])
         if "elevation" in layers:
             metres = to_metres(layers["elevation"], known["elevation"])
             planes["elevation"] = metres if self.nodata == "refuse" else fill(metres, known["elevation"])
