@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 from warp_torchrl.config.grammar import check_overrides
 from warp_torchrl.config.seeds import FIRST_EVALUATED
 from warp_torchrl.drawing import save, style
-from warp_torchrl.gallery import reached, saved_at
+from warp_torchrl.gallery import kinds, reached, saved_at
 from warp_torchrl.gallery.curves import curve_figures, lines_of
 from warp_torchrl.gallery.episode import photograph
 from warp_torchrl.gallery.fires import fire_plain, fire_terrain_wind
@@ -86,6 +86,7 @@ def _curves(arguments: Sequence[str]) -> None:
     lines = lines_of([_named(given) for given in options.runs])
     tables = [reached.table(lines, options.reach)] if options.reach else []
     tables += [saved_at.table(lines, options.at)] if options.at else []  # refuses steps that a run has not made
+    tables += [kinds.table(lines)] if options.kinds else []
     for name, draw in curve_figures(lines).items():
         _draw_one(name, draw, options.out)
     print(*tables, sep="\n\n", end="\n" if tables else "")
@@ -178,6 +179,12 @@ def _curves_parser() -> argparse.ArgumentParser:
         metavar="STEPS,...",
         help="print the forest saved in training by these world steps, each the mean over the twentieth of the run "
         "before it, the median of world steps a second, and minutes",
+    )
+    parser.add_argument(
+        "--kinds",
+        action="store_true",
+        help="print the forest saved in the last evaluation in training, of a mixture by kind, and the differences to "
+        "the first runs, seed by seed",
     )
     return parser
 
