@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.test_gallery_curves import the_one_line, write_run
+from tests.test_gallery_curves import the_one_line, write_metrics, write_run
 from warp_torchrl.gallery.__main__ import main
 from warp_torchrl.gallery.kinds import last_evaluation
 from warp_torchrl.gallery.runs import read_run
@@ -40,6 +40,15 @@ def test_runs_are_compared_with_the_first_of_their_seed(tmp_path, capsys):
         "| other (2 seeds) | 70.0 | 65.0 | 75.0 | +30.0, -10.0 |",
         "| alone | 25.0 | - | - |  |",
     ]
+
+
+def test_runs_whose_seed_is_not_known_are_compared_with_none(tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    for name in ("first", "other"):
+        write_metrics(tmp_path / name, evaluation__saved=[None, 0.5, None])
+    given = [f"{name}={tmp_path / name}" for name in ("first", "other")]
+    assert main(["curves", *given, "--kinds", "--out", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.splitlines()[-2:] == ["| first | 50.0 |  |", "| other | 50.0 |  |"]
 
 
 def test_a_run_that_was_not_evaluated_is_told_before_anything_is_drawn(tmp_path, capsys):

@@ -49,8 +49,10 @@ def table(lines: Sequence[Line]) -> str:
     return "\n".join(f"| {' | '.join(row)} |" for row in rows)
 
 
-def _by_seed(line: Line, runs: Sequence[Mapping[str, float]]) -> dict[str | None, float]:
-    return {run.seed: shares["all"] for run, shares in zip(line.runs, runs, strict=True)}
+def _by_seed(line: Line, runs: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """Return what runs save of all kinds, by their seeds; not of those whose seed is not recorded."""
+    pairs = zip(line.runs, runs, strict=True)
+    return {run.seed: shares["all"] for run, shares in pairs if run.seed is not None}
 
 
 def _mean(runs: Sequence[Mapping[str, float]], name: str) -> str:
