@@ -137,7 +137,7 @@ class Radio:
         return self._under_way(state).arriving("links") if self.delay else self.heard(state, flies)
 
     def places(self, state: WorldState) -> Tensor:
-        """Return where agents were when they sent what arrives now, int64 [B, A, 2] [cells]."""
+        """Return where agents were when they sent what arrives now, int64 [B, A, 2], in cells."""
         return self._under_way(state).arriving("places") if self.delay else state.vehicles.position
 
     def observed(self, state: WorldState, flies: Tensor) -> Tensor:
