@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import torch
 
 from warp_torchrl.api import load_policy, make_env
 from warp_torchrl.benchmark.tasks import FIRST_SEED, SCENARIOS, difference_cell, interval_cell
@@ -53,7 +54,7 @@ REFERENCE = "coordinated"
 """The baseline that every row tells of."""
 
 _CELLS = 2**20
-"""Of the worlds that play in one batch: 64 of ``giant`` take 9 GiB."""
+"""Of the worlds that play at once: 64 of ``giant`` take 9 GiB."""
 
 
 def generalise(
@@ -61,8 +62,8 @@ def generalise(
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for each place: what the policy, its rival and ``REFERENCE`` save, and paired differences.
 
-    The rival is the best baseline, or the policy that the place names. The fires of large maps play in parts, one after
-    the other, so that they fit into the memory.
+    The rival is the best baseline, or the policy that the place names. The fires of large maps play in several
+    batches, which fit into the memory.
 
     Args:
         path: Of a policy, or the name of a shipped one.
@@ -72,58 +73,66 @@ def generalise(
         overrides: Further ones in all places.
     """
     policy = load_policy(path).to(device)
-    rivals = {place.rival: load_policy(place.rival).to(device) for place in places if place.rival is not None}
-
-    def at(place: Place, shown: TrainedPolicy, first: int, count: int) -> WildfireEnv:
-        changes = [*shown.overrides, *place.overrides, *overrides]
-        return make_env(place.scenario, n_worlds=count, seed=first, device=device, overrides=changes)
-
-    def saved(place: Place, shown: TrainedPolicy, part: tuple[int, int]) -> np.ndarray:
-        env = at(place, shown, *part)
-        return play(env, shown.fitted(env), part[0], shown.mode)["saved"]
-
-    def baselines(place: Place, part: tuple[int, int]) -> dict[str, np.ndarray]:
-        names = RIVALS if place.rival is None else (REFERENCE,)
-        found = play_heuristics(at(place, policy, *part), part[0], names)
-        return {name: episodes["saved"] for name, episodes in found.items()}
-
-    sizes = []
-    for place in places:
-        env = at(place, policy, FIRST_SEED, count=1)  # what is wrong is told before anything is played
+    places = [place._replace(overrides=(*place.overrides, *overrides)) for place in places]
+    for place in places:  # what is wrong is told before anything is played
+        env = _env(place, policy, FIRST_SEED, n_worlds=1)
         policy.fitted(env)(env.reset())
-        sizes.append(env.world.size)
-    for place, size in zip(places, sizes):
-        parts = _parts(episodes, size)
-        own = np.concatenate([saved(place, policy, part) for part in parts])
-        others = _joined([baselines(place, part) for part in parts])
-        reference = others[REFERENCE]
-        if place.rival is None:
-            rival = max(others, key=lambda name: float(others[name].mean()))
-            beside = others[rival]
-        else:
-            rival = f"specialist {place.rival}"
-            beside = np.concatenate([saved(place, rivals[place.rival], part) for part in parts])
-        yield {
-            "place": place.name,
-            "episodes": episodes,
-            "policy": summarise(own),
-            "rival": rival,
-            "beside": summarise(beside),
-            "difference": compare(own, beside),
-            "reference": summarise(reference),
-            "to_reference": compare(own, reference),
-        }
+    for place in places:
+        yield _row(place, policy, episodes)
 
 
-def _parts(episodes: int, size: tuple[int, int]) -> list[tuple[int, int]]:
-    """Return the first seed and the number of the fires that play in one batch, on maps of a size [cells]."""
-    most = max(1, _CELLS // (size[0] * size[1]))
-    return [(FIRST_SEED + start, min(most, episodes - start)) for start in range(0, episodes, most)]
+def _row(place: Place, policy: TrainedPolicy, episodes: int) -> dict[str, Any]:
+    names = RIVALS if place.rival is None else (REFERENCE,)
+    saved = _saved_by_baselines(place, policy, names, episodes)
+    if place.rival is None:
+        rival = max(saved, key=lambda name: float(saved[name].mean()))
+    else:
+        rival = f"specialist {place.rival}"
+        saved[rival] = _saved(place, load_policy(place.rival).to(_device(policy)), episodes)
+    own = _saved(place, policy, episodes)
+    return {
+        "place": place.name,
+        "episodes": episodes,
+        "policy": summarise(own),
+        "rival": rival,
+        "beside": summarise(saved[rival]),
+        "difference": compare(own, saved[rival]),
+        "reference": summarise(saved[REFERENCE]),
+        "to_reference": compare(own, saved[REFERENCE]),
+    }
 
 
-def _joined(parts: Sequence[Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
-    """Return the fires of all parts, by name."""
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+def _env(place: Place, policy: TrainedPolicy, first_seed: int, n_worlds: int) -> WildfireEnv:
+    """Return the worlds of a place, in which a policy sees what it was trained on."""
+    changes = [*policy.overrides, *place.overrides]
+    return make_env(place.scenario, n_worlds=n_worlds, seed=first_seed, device=_device(policy), overrides=changes)
+
+
+def _device(policy: TrainedPolicy) -> torch.device:
+    return next(policy.parameters()).device
+
+
+def _batches(place: Place, policy: TrainedPolicy, episodes: int) -> Iterator[tuple[WildfireEnv, int]]:
+    """Yield worlds that play at once, and the seed of their first, until there are so many fires."""
+    height, width = _env(place, policy, FIRST_SEED, n_worlds=1).world.size
+    most = max(1, _CELLS // (height * width))
+    for start in range(0, episodes, most):
+        first_seed = FIRST_SEED + start
+        yield _env(place, policy, first_seed, min(most, episodes - start)), first_seed
+
+
+def _saved(place: Place, policy: TrainedPolicy, episodes: int) -> np.ndarray:
+    """Return what a policy saves of each fire, float64 [episodes]."""
+    batches = _batches(place, policy, episodes)
+    return np.concatenate([play(env, policy.fitted(env), first, policy.mode)["saved"] for env, first in batches])
+
+
+def _saved_by_baselines(
+    place: Place, policy: TrainedPolicy, names: Sequence[str], episodes: int
+) -> dict[str, np.ndarray]:
+    """Return what baselines save of each fire, float64 [episodes] by name."""
+    parts = [play_heuristics(env, first, names) for env, first in _batches(place, policy, episodes)]
+    return {name: np.concatenate([part[name]["saved"] for part in parts]) for name in names}
 
 
 def generalist_table(rows: Sequence[dict[str, Any]]) -> str:
