@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from warp_torchrl.gallery.curves import Line
+from warp_torchrl.gallery.markdown import markdown
 from warp_torchrl.gallery.runs import Run
 
 EVALUATED = "evaluation/saved"
@@ -39,14 +40,12 @@ def table(lines: Sequence[Line]) -> str:
     """
     found = [[last_evaluation(run) for run in line.runs] for line in lines]
     names = list(dict.fromkeys(name for runs in found for shares in runs for name in shares))
-    rows = [["saved in evaluation, %", *names, "more than the first, seed by seed"]]
-    rows.append(["---"] * len(rows[0]))
-    first = _by_seed(lines[0], found[0])
+    first, rows = _by_seed(lines[0], found[0]), []
     for line, runs in zip(lines, found, strict=True):
         own = _by_seed(line, runs)
         gaps = [f"{100.0 * (own[seed] - first[seed]):+.1f}" for seed in first if seed in own and line is not lines[0]]
         rows.append([line.label, *(_mean(runs, name) for name in names), ", ".join(gaps)])
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    return markdown(["saved in evaluation, %", *names, "more than the first, seed by seed"], rows)
 
 
 def _by_seed(line: Line, runs: Sequence[Mapping[str, float]]) -> dict[str, float]:

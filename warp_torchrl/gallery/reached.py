@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from warp_torchrl.gallery.curves import Line
+from warp_torchrl.gallery.markdown import markdown
 from warp_torchrl.gallery.runs import FRAMES, SAVED, SECONDS, Run
 
 WINDOW = 0.05
@@ -36,11 +37,11 @@ def table(lines: Sequence[Line], levels: Sequence[float]) -> str:
 
     Several runs have the lowest and the highest of each.
     """
-    rows = [["runs", *(f"to {level:g} %" for level in levels)], ["---"] * (1 + len(levels))]
+    rows = []
     for line in lines:
         found = [[reached(run, level / 100.0) for run in line.runs] for level in levels]
         rows.append([line.label, *map(_cell, found)])
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    return markdown(["runs", *(f"to {level:g} %" for level in levels)], rows)
 
 
 def _cell(found: Sequence[tuple[float, float] | None]) -> str:

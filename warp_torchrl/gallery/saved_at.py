@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from warp_torchrl.gallery.curves import Line
+from warp_torchrl.gallery.markdown import markdown
 from warp_torchrl.gallery.runs import FPS, FRAMES, SAVED, SECONDS, Run
 
 WINDOW = 0.05
@@ -55,13 +56,13 @@ def table(lines: Sequence[Line], steps: Sequence[float]) -> str:
     Raises:
         ValueError: If a run has no ``world/saved``, or ends before one of the steps.
     """
-    rows = [["saved in training, %", *(f"{step / 1000:g} k" for step in steps), "steps/s", "minutes"]]
-    rows.append(["---"] * len(rows[0]))
+    rows = []
     for line in lines:
         shares = [[100.0 * saved_at(run, step) for run in line.runs] for step in steps]
         speeds, took = [speed(run) for run in line.runs], [minutes(run) for run in line.runs]
         rows.append([line.label, *(_cell(each, 1) for each in shares), _cell(speeds, 0), _cell(took, 1)])
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    heading = ["saved in training, %", *(f"{step / 1000:g} k" for step in steps), "steps/s", "minutes"]
+    return markdown(heading, rows)
 
 
 def _cell(values: Sequence[float], digits: int) -> str:
