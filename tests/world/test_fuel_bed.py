@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from tests.world.rasters import write
+from tests.world.rasters import keys, write
 from warp_torchrl.world.rate import RateFire
 from warp_torchrl.world.state import is_burning
 from warp_torchrl.world.terrain.raster import Raster
@@ -32,7 +32,7 @@ def test_codes_of_another_model_are_refused(tmp_path, table, model):
 @pytest.mark.parametrize("model", MODELS)
 def test_land_cover_burns_as_the_fuels_of_its_cover_do(tmp_path, model):
     ground = raster(tmp_path, np.where(np.arange(12) < 6, 30, 50), "worldcover")  # grassland, built-up
-    one = ground(torch.arange(1)[:, None])
+    one = ground(keys(1))
     law = RateFire(model=model)
     assert one.fuel is None
     flammability = law.flammability(one)[0]
