@@ -5,6 +5,7 @@ from pathlib import Path
 from warp_torchrl.config.construction import ConfigError
 
 _OF_HYDRA = (".hydra", "multirun.yaml")  # Hydra writes these, and logs, before the evaluation
+_LEFT = (".lock", ".draft-")  # of a process that was killed before it had written anything
 _NAMED = 3
 
 
@@ -19,11 +20,11 @@ def check_free(folder: Path, key: str) -> None:
         ConfigError: If the folder holds anything else.
     """
     there = [each.name for each in folder.iterdir()] if folder.is_dir() else []
-    held = [name for name in there if name not in _OF_HYDRA and not name.endswith(".log")]
+    held = [name for name in there if not (name in _OF_HYDRA or name.endswith(".log") or name.startswith(_LEFT))]
     if held:
         raise ConfigError(
-            f"{key}: {folder} holds {_described(held)}; take another folder, or overwrite=true, which replaces what an "
-            f"evaluation writes"
+            f"{key}: {folder} holds {_described(held)}; take another folder, or overwrite=true, which replaces what "
+            f"this command writes"
         )
 
 

@@ -1,6 +1,7 @@
 """Durable, atomic writes; their errors name the path."""
 
 import os
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -28,7 +29,7 @@ def replace(path: Path, content: str | bytes) -> None:
     Raises:
         OSError: If the write fails, with the path; the old file stays.
     """
-    draft = path.with_name(f".{path.name}.tmp")
+    draft = path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}.tmp")  # two may write the same file
     try:
         with with_path(path):
             draft.write_bytes(content.encode() if isinstance(content, str) else content)
