@@ -183,10 +183,30 @@ def test_nothing_reads_pickles():
             "weights_only=False" not in text
             and "allow_pickle=True" not in text
             and "pickle" not in roots(module)
+            and "_object" not in called(module)  # collectives of torch.distributed, which unpickle what they receive
             and text.count("torch.load(") == text.count("weights_only=True, map_location")
         )
 
     assert not breaks(MODULES, is_safe)
+
+
+def called(module: str) -> str:
+    """Every attribute and function that a file names, one a line."""
+    return "\n".join(
+        node.attr if isinstance(node, ast.Attribute) else node.id
+        for node in tree(module)
+        if isinstance(node, ast.Attribute | ast.Name)
+    )
+
+
+def test_nothing_of_ours_listens_but_the_live_page():
+    """Processes of a machine inherit their sockets; ``torchrun`` has its own store, and the page a token."""
+    opens = ("TCPStore", "create_server", "bind", "listen", "multiprocessing.connection", "socketserver", "http.server")
+    others = [module for module in MODULES if module.split("/")[0] != "live"]
+    assert not breaks(others, lambda module: not {*called(module).split(), *named(module)} & {*opens})
+    assert not breaks(
+        MODULES, lambda module: "init_process_group" not in called(module) or module.startswith("parallel/")
+    )
 
 
 def is_page(module: str) -> bool:

@@ -5,11 +5,12 @@ from queue import Empty
 
 import pytest
 import torch
-from torch import distributed as dist
 from torchrl.modules import PopArtValueNorm
 
 from warp_torchrl import parallel
 from warp_torchrl.algorithms.ppo import SharedValueNorm
+from warp_torchrl.parallel import group
+from warp_torchrl.parallel.sockets import Sockets, pairs
 from warp_torchrl.training.reward_scale import RewardScale
 
 BATCH = torch.arange(24.0).reshape(6, 2, 2, 1).sin()  # [B, T, A, 1]; each of two processes has half
@@ -32,7 +33,7 @@ def talk(rank):
         "rank": parallel.rank(),
         "sum": parallel.sum_(torch.tensor([1.0 + rank])).tolist(),
         "means": [each.tolist() for each in several],
-        "shared": parallel.share({"from": rank}),
+        "shared": parallel.share({"from": rank, "of": (own,)})["of"][0].tolist(),
         "gathered": parallel.gather(rank),
         "standardised": [each.tolist() for each in parallel.standardised([own, 2.0 * own[:1]], dim=-2)],
         "norm": [each.item() for each in norm.buffers()],
@@ -40,34 +41,30 @@ def talk(rank):
     }
 
 
-def other(rank, port, answers):
+def other(rank, end, answers):
     torch.set_num_threads(1)
-    store = dist.TCPStore("127.0.0.1", port, 2, is_master=rank == 0)
-    dist.init_process_group("gloo", store=store, rank=rank, world_size=2)
+    group.enter(Sockets(rank, 2, [end]))
     answers.put((rank, talk(rank)))
     parallel.gather(None)  # so that neither ends before the other has heard it
 
 
 @pytest.fixture(scope="module")
 def said():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("GLOO_SOCKET_IFNAME", "lo")
-        context = multiprocessing.get_context("spawn")
-        answers, store = context.Queue(), dist.TCPStore("127.0.0.1", 0, 1, is_master=True, wait_for_workers=False)
-        port = store.port
-        del store
-        both = [context.Process(target=other, args=(rank, port, answers), daemon=True) for rank in range(2)]
-        for each in both:
-            each.start()
-        found = {}
-        try:
-            while len(found) < 2:
-                key, value = answers.get(timeout=60)
-                found[key] = value
-        except Empty:
-            pytest.fail("the processes did not answer")
-        for each in both:
-            each.join(30)
+    context = multiprocessing.get_context("spawn")
+    answers, ((first,), (second,)) = context.Queue(), pairs(1)
+    both = [context.Process(target=other, args=(rank, end, answers)) for rank, end in enumerate((first, second))]
+    for each in both:
+        each.daemon = True
+        each.start()
+    found = {}
+    try:
+        while len(found) < 2:
+            key, value = answers.get(timeout=60)
+            found[key] = value
+    except Empty:
+        pytest.fail("the processes did not answer")
+    for each in both:
+        each.join(30)
     return [found[rank] for rank in range(2)]
 
 
@@ -82,7 +79,7 @@ def test_sums_and_means_are_of_both(said):
 
 
 def test_the_first_shares_and_gathers(said):
-    assert [each["shared"] for each in said] == [{"from": 0}, {"from": 0}]
+    assert [each["shared"] for each in said] == 2 * [part_of(BATCH, 0).tolist()]
     assert [each["gathered"] for each in said] == [[0, 1], []]
 
 

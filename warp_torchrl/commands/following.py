@@ -30,7 +30,8 @@ def follow(values: dict[str, Any]) -> None:
     What stops the run is told by the first one.
     """
     keep_freed_memory()
-    logging.getLogger("warp_torchrl").setLevel(logging.ERROR)
+    for name in ("warp_torchrl", "torchrl"):
+        logging.getLogger(name).setLevel(logging.ERROR)
     if torch.device(values["device"]).type == "cuda":
         place = int(os.environ.get("LOCAL_RANK", parallel.rank()))
         values = {**values, "device": f"cuda:{place % torch.cuda.device_count()}"}

@@ -1,12 +1,12 @@
 """A training as a process of its own, which ends when the search does, or the live page that started it."""
 
-import os
 import signal
 import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
+
+from warp_torchrl.parallel.parent import SECONDS_TO_SAVE, command, environment
 
 MODULE = "warp_torchrl.commands.trial"
 """What the process runs."""
@@ -46,8 +46,8 @@ class Training(Protocol):
 class TrainingProcess:
     """A training in a run folder.
 
-    Its group is its own, so that a terminal's Ctrl-C reaches it through the search alone, and it watches its standard
-    input, which closes when the search ends, however that ends: it saves then, and ends too.
+    Its group is its own, so that a terminal's Ctrl-C reaches it through the search alone. When the search ends, however
+    that ends, it saves and ends too.
 
     Args:
         overrides: As for ``train.py``.
@@ -60,11 +60,11 @@ class TrainingProcess:
         self._errors = folder / _STDERR
         with self._errors.open("wb") as errors:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", MODULE, *overrides],
-                stdin=subprocess.PIPE,
+                command(MODULE, overrides, SECONDS_TO_SAVE),
+                stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,  # its log is in its folder
                 stderr=errors,
-                env=os.environ | ({} if threads is None else {"OMP_NUM_THREADS": str(threads)}),
+                env=environment() | ({} if threads is None else {"OMP_NUM_THREADS": str(threads)}),
                 start_new_session=True,
             )
 

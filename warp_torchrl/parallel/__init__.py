@@ -1,11 +1,14 @@
 """Processes that learn together: how they start, and what they tell each other."""
 
 from warp_torchrl.parallel.group import WorkerDied, gather, mean_, rank, share, size, standardised, sum_
-from warp_torchrl.parallel.launch import automatic, follow, is_torchrun, join, processes, torchrun_rank
+from warp_torchrl.parallel.launch import automatic, follow, join, processes
+from warp_torchrl.parallel.parent import end_with
+from warp_torchrl.parallel.torchrun import is_torchrun, torchrun_rank
 
 __all__ = [
     "WorkerDied",
     "automatic",
+    "end_with",
     "follow",
     "gather",
     "is_torchrun",

@@ -1,15 +1,16 @@
-"""What the processes of a run tell each other: collective operations of ``torch.distributed``.
+"""What the processes of a run tell each other: sums, means and values.
 
 A run of one process has no group, and then these functions do nothing. Every process must call them in the same order.
 """
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, Protocol, TypeVar
 
 import torch
 from torch import Tensor
-from torch import distributed as dist
+
+from warp_torchrl.parallel.messages import packed, unpacked
 
 Given = ParamSpec("Given")
 Told = TypeVar("Told")
@@ -19,14 +20,59 @@ class WorkerDied(Exception):  # noqa: N818
     """A process that works for this run ended unexpectedly."""
 
 
+class Group(Protocol):
+    """The processes of a run, and what they talk by.
+
+    Attributes:
+        rank: Number of this process; process 0 writes the run folder.
+        size: Number of all.
+    """
+
+    rank: int
+    size: int
+
+    def sum_(self, tensor: Tensor) -> None:
+        """Replace a tensor by its sum over the processes."""
+        ...
+
+    def broadcast(self, message: memoryview | None) -> memoryview:
+        """Return the first process's message in every process; the others give none."""
+        ...
+
+    def gather(self, message: memoryview) -> list[memoryview]:
+        """Return the messages of all processes in the first one, and nothing in the others."""
+        ...
+
+    def close(self) -> None:
+        """Leave it."""
+        ...
+
+
+_group: Group | None = None
+
+
+def enter(group: Group) -> None:
+    """Let this process be one of a group."""
+    global _group
+    _group = group
+
+
+def leave() -> None:
+    """Let this process be alone again."""
+    global _group
+    left, _group = _group, None
+    if left is not None:
+        left.close()
+
+
 def size() -> int:
     """Return the number of processes that learn together."""
-    return dist.get_world_size() if dist.is_available() and dist.is_initialized() else 1
+    return 1 if _group is None else _group.size
 
 
 def rank() -> int:
     """Return this process's number; process 0 writes the run folder."""
-    return dist.get_rank() if size() > 1 else 0
+    return 0 if _group is None else _group.rank
 
 
 def _collective(operation: Callable[Given, Told]) -> Callable[Given, Told]:
@@ -36,7 +82,7 @@ def _collective(operation: Callable[Given, Told]) -> Callable[Given, Told]:
     def told(*args: Given.args, **kwargs: Given.kwargs) -> Told:
         try:
             return operation(*args, **kwargs)
-        except RuntimeError as error:
+        except (RuntimeError, OSError) as error:
             raise WorkerDied(f"a process of the run has ended: {next(iter(str(error).splitlines()), '')}") from error
 
     return told
@@ -45,20 +91,20 @@ def _collective(operation: Callable[Given, Told]) -> Callable[Given, Told]:
 @_collective
 def sum_(tensor: Tensor) -> Tensor:
     """Replace a tensor by its sum over the processes, in place, and return it."""
-    if size() > 1:
-        dist.all_reduce(tensor)
+    if _group is not None:
+        _group.sum_(tensor)
     return tensor
 
 
 @_collective
 def mean_(tensors: Iterable[Tensor]) -> None:
     """Replace tensors of one type by their means over the processes, in place, with one message for all."""
-    if size() == 1:
+    if _group is None:
         return
     several = list(tensors)
     flat = torch.cat([each.reshape(-1) for each in several])
-    dist.all_reduce(flat)
-    flat /= size()
+    _group.sum_(flat)
+    flat /= _group.size
     for each, part in zip(several, flat.split([each.numel() for each in several]), strict=True):
         each.copy_(part.view_as(each))
 
@@ -66,21 +112,21 @@ def mean_(tensors: Iterable[Tensor]) -> None:
 @_collective
 def share(value: Any) -> Any:
     """Return process 0's value in every process."""
-    if size() == 1:
+    if _group is None:
         return value
-    held = [value if rank() == 0 else None]
-    dist.broadcast_object_list(held)
-    return held[0]
+    if _group.rank:
+        return unpacked(_group.broadcast(None))
+    _group.broadcast(packed(value))
+    return value
 
 
 @_collective
 def gather(value: Any) -> list[Any]:
     """Return the values of all processes in process 0, and nothing in the others."""
-    if size() == 1:
+    if _group is None:
         return [value]
-    held = [None] * size() if rank() == 0 else None
-    dist.gather_object(value, held)
-    return held or []
+    found = _group.gather(packed(value))
+    return [value, *map(unpacked, found[1:])] if found else []
 
 
 def standardised(parts: Sequence[Tensor], dim: int) -> list[Tensor]:

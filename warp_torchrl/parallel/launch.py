@@ -1,41 +1,26 @@
 """The start and the end of the processes that learn together, on this machine or under ``torchrun``."""
 
 import os
-import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from datetime import timedelta
 from typing import Any
 
 import torch
-from torch import distributed as dist
-from torch.distributed import TCPStore  # type: ignore[attr-defined]  # torch does not say that it exports it
 
 from warp_torchrl.parallel import group
 from warp_torchrl.parallel.group import WorkerDied
+from warp_torchrl.parallel.parent import command, environment
+from warp_torchrl.parallel.sockets import Sockets, inherited, pairs
+from warp_torchrl.parallel.torchrun import Torchrun, is_torchrun
 
 Work = Callable[[dict[str, Any]], None]
 """What a process does that is not the first; called with the run's configuration."""
 FEWEST_WORLDS = 64
 """Worlds that ``auto`` gives a process at least: with fewer a step costs hardly less, and each has some 0.6 GiB."""
-_WAIT = timedelta(days=1)  # a process that has ended is noticed at once; others may wait for an evaluation
 _SECONDS_TO_END = 10.0
 _SECONDS_TO_BREAK = 2.0  # in which a process whose connection has broken off may still be ending
-_SECONDS_BETWEEN_LOOKS = 0.05
-_HOST = "127.0.0.1"
-
-
-def is_torchrun() -> bool:
-    """Return whether ``torchrun`` has started this process."""
-    return "TORCHELASTIC_RUN_ID" in os.environ
-
-
-def torchrun_rank() -> int:
-    """Return the number that ``torchrun`` has given this process; 0 without it."""
-    return int(os.environ["RANK"]) if is_torchrun() else 0
 
 
 def automatic(n_worlds: int, device: torch.device) -> int:
@@ -66,98 +51,71 @@ def processes(count: int, values: Mapping[str, Any], module: str) -> Iterator[No
     if count == 1:
         yield
         return
-    threads, others = torch.get_num_threads(), _start(count, module)
+    threads, seconds = torch.get_num_threads(), 0.0
+    others = _start(count, module)
     try:
+        group.gather(None)  # they are there
+        seconds = _SECONDS_TO_END
         group.share(dict(values))
         yield
     except WorkerDied as error:
         raise WorkerDied(_ended(others) or str(error)) from error
     finally:
-        dist.destroy_process_group()
+        group.leave()
         torch.set_num_threads(threads)
-        _end(others)
+        _end(others, seconds)
 
 
 def _start(count: int, module: str) -> list[subprocess.Popen[bytes]]:
-    """Start the other processes, join the group and share the threads."""
+    """Start the other processes, each with its share of the threads, and enter the group."""
     if is_torchrun():
-        dist.init_process_group(_backend(), timeout=_WAIT)
+        group.enter(Torchrun())
         return []
-    store = TCPStore(_HOST, 0, count, is_master=True, wait_for_workers=False)
     threads = max(1, torch.get_num_threads() // count)
-    environment = {
-        **os.environ,
-        "PYTHONPATH": os.pathsep.join(path for path in sys.path if path),
-        "PYTHONWARNINGS": "ignore:resource_tracker",  # of what a killed process leaves: the last line is the error's
-    }
-    others = [
-        subprocess.Popen([sys.executable, "-m", module, *map(str, (rank, count, store.port, threads))], env=environment)
-        for rank in range(1, count)
-    ]
-    try:
-        _wait_for(others, store)
-    except BaseException:
-        _end(others, seconds=0.0)
-        raise
+    own, given = pairs(count - 1)
+    others = [_other(module, rank, count, threads, end.fileno()) for rank, end in enumerate(given, start=1)]
+    for end in given:
+        end.close()
     torch.set_num_threads(threads)
-    dist.init_process_group(_backend(), store=store, rank=0, world_size=count, timeout=_WAIT)
+    group.enter(Sockets(0, count, own))
     return others
 
 
-def _wait_for(others: Sequence[subprocess.Popen[bytes]], store: TCPStore) -> None:
-    """Wait until the other processes are there.
-
-    Raises:
-        WorkerDied: If one ends before.
-    """
-    while not store.check([_there(rank) for rank in range(1, len(others) + 1)]):
-        if any(each.poll() is not None for each in others):
-            raise WorkerDied(_ended(others))
-        time.sleep(_SECONDS_BETWEEN_LOOKS)
-
-
-def _there(rank: int) -> str:
-    """Return the key of the store by which a process says that it is there."""
-    return f"there/{rank}"
+def _other(module: str, rank: int, count: int, threads: int, end: int) -> subprocess.Popen[bytes]:
+    """Start another process, which inherits its end of a pair of sockets."""
+    return subprocess.Popen(
+        command(module, [str(each) for each in (rank, count, threads, end)]),
+        env=environment() | {"PYTHONWARNINGS": "ignore:resource_tracker"},  # the last line is the error's
+        pass_fds=(end,),
+    )
 
 
 def join(arguments: Sequence[str], work: Work) -> None:
     """Run in a process that ``processes`` has started.
 
     Args:
-        arguments: Its number, that of all processes, the first one's port, and the threads that it may use.
+        arguments: Its number, that of all processes, the threads that it may use, and its end of a pair of sockets.
         work: What it does.
     """
-    for each in (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1):  # a terminal sends them to all: the first one decides
-        signal.signal(each, signal.SIG_IGN)
-    rank, count, port, threads = map(int, arguments)
+    rank, count, threads, end = map(int, arguments)
     torch.set_num_threads(threads)
-    try:
-        store = TCPStore(_HOST, port, count, is_master=False)
-        store.set(_there(rank), "")
-        dist.init_process_group(_backend(), store=store, rank=rank, world_size=count, timeout=_WAIT)
-    except RuntimeError:  # the first process has ended
-        sys.exit(1)
+    group.enter(Sockets(rank, count, [inherited(end)]))
     _follow(work)
 
 
 def follow(work: Work) -> None:
     """Run in a process that ``torchrun`` has started, and which is not the first."""
-    dist.init_process_group(_backend(), timeout=_WAIT)
+    group.enter(Torchrun())
     _follow(work)
 
 
 def _follow(work: Work) -> None:
     try:
+        group.gather(None)  # it is there
         work(group.share(None))
-        dist.destroy_process_group()
+        group.leave()
     except WorkerDied:  # the first process has ended, and has told why
         sys.exit(1)
-
-
-def _backend() -> str:
-    """Return what the processes talk by: Gloo between CPUs, NCCL between GPUs."""
-    return "cpu:gloo,cuda:nccl" if torch.cuda.is_available() else "gloo"
 
 
 def _ended(others: Sequence[subprocess.Popen[bytes]]) -> str:
@@ -179,7 +137,7 @@ def _code_of(process: subprocess.Popen[bytes], seconds: float) -> int | None:
         return None
 
 
-def _end(others: Sequence[subprocess.Popen[bytes]], seconds: float = _SECONDS_TO_END) -> None:
+def _end(others: Sequence[subprocess.Popen[bytes]], seconds: float) -> None:
     for each in others:
         if _code_of(each, seconds) is None:
             each.kill()

@@ -1,0 +1,64 @@
+"""The end of a process with the one that started it, however that ended: no worker outlives its run.
+
+``python -P parent.py PID SECONDS MODULE [ARGUMENT ...]`` runs a module like ``python -m``, and watches before it imports
+anything: imports take seconds, and whoever started it may be killed in them. So this file needs nothing of ours.
+"""
+
+import os
+import runpy
+import signal
+import sys
+import threading
+import time
+from collections.abc import Sequence
+
+SECONDS_BETWEEN_LOOKS = 0.25
+SECONDS_TO_SAVE = 20.0
+"""What a training has to save in when whoever started it has ended."""
+_LEFT_TO_THE_PARENT = ("SIGINT", "SIGTERM", "SIGHUP", "SIGUSR1", "SIGUSR2")  # a terminal or a queue sends them to all
+
+
+def command(module: str, arguments: Sequence[str], seconds_to_save: float = 0.0) -> list[str]:
+    """Return the command line that runs a module in a process which ends with this one, see ``end_with``."""
+    return [sys.executable, "-P", __file__, str(os.getpid()), str(seconds_to_save), module, *arguments]
+
+
+def environment() -> dict[str, str]:
+    """Return this process's environment, with the folders from which such a process imports as this one does."""
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+
+
+def end_with(parent: int, seconds_to_save: float = 0.0) -> None:
+    """Let this process end when its parent has.
+
+    Args:
+        parent: Its number: a process whose parent has ended gets another one.
+        seconds_to_save: In which it may end by itself, asked by SIGTERM; 0 ends it at once.
+    """
+    if os.getppid() == parent:
+        threading.Thread(target=_watch, args=(parent, seconds_to_save), name="parent", daemon=True).start()
+    else:  # it has ended before this process could look
+        os._exit(128 + signal.SIGTERM)
+
+
+def _watch(parent: int, seconds_to_save: float) -> None:
+    while os.getppid() == parent:
+        time.sleep(SECONDS_BETWEEN_LOOKS)
+    if seconds_to_save:
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(seconds_to_save)
+    os._exit(128 + signal.SIGTERM)
+
+
+def _run(parent: int, seconds_to_save: float, module: str, arguments: Sequence[str]) -> None:
+    """Run a module; signals are for the parent to obey where this process has nothing to save."""
+    end_with(parent, seconds_to_save)
+    if not seconds_to_save:
+        for name in _LEFT_TO_THE_PARENT:
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    sys.argv = [module, *arguments]
+    runpy.run_module(module, run_name="__main__", alter_sys=True)
+
+
+if __name__ == "__main__":
+    _run(int(sys.argv[1]), float(sys.argv[2]), sys.argv[3], sys.argv[4:])
