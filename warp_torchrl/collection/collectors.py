@@ -1,13 +1,15 @@
 """Where batches are collected, by TorchRL's collectors: in this process, in several, or on a Ray cluster."""
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 import torch
 from torchrl.collectors import BaseCollector, Collector
 
+from warp_torchrl import parallel
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.collection.running import Collection, InProcessCollection, MultiProcessCollection
 from warp_torchrl.env import WildfireEnv
@@ -92,6 +94,8 @@ class MultiProcess(InProcess):
     """
 
     workers: int = 2
+    starts_processes: ClassVar[bool] = True
+    """Whether the workers are processes that this one starts, and which end with it."""
 
     def __post_init__(self) -> None:
         self.check(workers=(1, 1024))
@@ -112,7 +116,8 @@ class MultiProcess(InProcess):
         frames = self.segment * env.batch_size[0]
 
         def start(first_episode: int) -> BaseCollector:
-            makers = [partial(_worlds, make_env, share, each, first_episode) for each in starts]
+            parent = os.getpid() if self.starts_processes else None
+            makers = [partial(_worlds, make_env, share, each, first_episode, parent) for each in starts]
             return Collector(
                 makers,
                 learner.explore,
@@ -146,6 +151,7 @@ class Ray(MultiProcess):
     address: str | None = None
     cpus: float = 1.0
     gpus: float = 0.0
+    starts_processes: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         self.check(workers=(1, 1024), cpus=(0.0, 1e4), gpus=(0.0, 64.0))
@@ -164,8 +170,13 @@ class Ray(MultiProcess):
         return {"backend": "ray", "backend_options": options}
 
 
-def _worlds(make_env: MakeEnv, count: int, seed: int, first_episode: int) -> WildfireEnv:
-    """Return a worker's environment, and seed the worker's generator for sampled actions."""
+def _worlds(make_env: MakeEnv, count: int, seed: int, first_episode: int, parent: int | None) -> WildfireEnv:
+    """Return a worker's environment, and seed the worker's generator for sampled actions.
+
+    A worker in the middle of a batch would go on with it when its parent has ended, so it watches that.
+    """
+    if parent is not None:
+        parallel.end_with(parent)
     torch.manual_seed((seed + 2**40 * first_episode) % 2**64)
     env = make_env(count, seed)
     env.set_seeds(range(seed, seed + count), first_episode)

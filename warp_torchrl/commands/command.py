@@ -195,6 +195,8 @@ def _start_hydra(name: str, job: Callable[[DictConfig], None], arguments: list[s
             job(config)
         except Exception as error:
             code, line = fail(error, debug)
+            if parallel.is_orphaned():
+                os._exit(code)  # the sweep has ended, and so does its worker
             if HydraConfig.get().mode != RunMode.MULTIRUN or isinstance(error, Stopped):
                 sys.exit(code)
             save_failure(code, line)  # the other jobs go on

@@ -1,9 +1,11 @@
 """Sweeps: list the jobs of a command line, keep their failures, and summarise the results."""
 
 import json
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any, ClassVar
@@ -13,10 +15,11 @@ from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.experimental.callback import Callback
 from omegaconf import DictConfig
 
-from warp_torchrl import summary
+from warp_torchrl import parallel, summary
 from warp_torchrl.config.construction import ConfigError
 
 FAILURE = "failed.json"
+_JOBLIB = "hydra_joblib_launcher"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,12 +92,23 @@ class SweepSummary(Callback):
     def on_multirun_start(self, config: DictConfig, **kwargs: Any) -> None:
         """Keep the sweep's folder: a launcher that gives up never calls ``on_multirun_end``."""
         SweepSummary.folder = Path(str(config.hydra.sweep.dir))
+        if _JOBLIB in str(config.hydra.launcher._target_):
+            _let_workers_end_with_us()
 
     def on_multirun_end(self, config: DictConfig, **kwargs: Any) -> None:
         """Write ``summary.md`` and ``summary.png`` into the sweep's folder, and print the table."""
         failed = _write_summary(Path(str(config.hydra.sweep.dir)))
         SweepSummary.exit_code = failed[0].code if failed else 0
         SweepSummary.folder = None
+
+
+def _let_workers_end_with_us() -> None:
+    """Let joblib's workers watch this process: by themselves they work on, and wait for minutes for more."""
+    from joblib import register_parallel_backend
+    from joblib._parallel_backends import LokyBackend
+
+    watch = {"initializer": parallel.end_with, "initargs": (os.getpid(), parallel.SECONDS_TO_SAVE)}
+    register_parallel_backend("loky", partial(LokyBackend, **watch))
 
 
 def summarise_unfinished() -> None:

@@ -1,7 +1,8 @@
 """The end of a process with the one that started it, however that ended: no worker outlives its run.
 
-``python -P parent.py PID SECONDS MODULE [ARGUMENT ...]`` runs a module like ``python -m``, and watches before it imports
-anything: imports take seconds, and whoever started it may be killed in them. So this file needs nothing of ours.
+``python -P parent.py PID SECONDS MODULE [ARGUMENT ...]`` runs a module as ``python -m`` does, and watches before it
+imports anything: imports take seconds, and whoever started it may be killed in them. So this file needs nothing
+of ours.
 """
 
 import os
@@ -16,6 +17,8 @@ SECONDS_BETWEEN_LOOKS = 0.25
 SECONDS_TO_SAVE = 20.0
 """What a training has to save in when whoever started it has ended."""
 _LEFT_TO_THE_PARENT = ("SIGINT", "SIGTERM", "SIGHUP", "SIGUSR1", "SIGUSR2")  # a terminal or a queue sends them to all
+
+_parent: int | None = None
 
 
 def command(module: str, arguments: Sequence[str], seconds_to_save: float = 0.0) -> list[str]:
@@ -35,10 +38,17 @@ def end_with(parent: int, seconds_to_save: float = 0.0) -> None:
         parent: Its number: a process whose parent has ended gets another one.
         seconds_to_save: In which it may end by itself, asked by SIGTERM; 0 ends it at once.
     """
+    global _parent
+    _parent = parent
     if os.getppid() == parent:
         threading.Thread(target=_watch, args=(parent, seconds_to_save), name="parent", daemon=True).start()
     else:  # it has ended before this process could look
         os._exit(128 + signal.SIGTERM)
+
+
+def is_orphaned() -> bool:
+    """Return whether the parent with which this process ends has ended."""
+    return _parent is not None and os.getppid() != _parent
 
 
 def _watch(parent: int, seconds_to_save: float) -> None:
