@@ -2,6 +2,11 @@
 
 import os
 
+from warp_torchrl.interruption import end_on_signal, is_command
+
+if is_command():  # the imports below take seconds
+    end_on_signal()
+
 # GNU OpenMP's waiting threads spin for milliseconds by default. On a busy machine a step of small tensors then took 30
 # times as long; a short spin avoids this and costs almost nothing on an idle one. torch reads the variable when it is
 # first imported; a value set by the user stays.

@@ -16,11 +16,13 @@ from pathlib import Path
 import torch
 
 from warp_torchrl.api import policy_of
+from warp_torchrl.commands.program import one_line_end
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.shipped import find_policy
 
 
+@one_line_end()
 def main(arguments: list[str] | None = None) -> None:
     """Export the policy of the run or checkpoint that the command line names."""
     parser = argparse.ArgumentParser(prog="python -m warp_torchrl.export", description=__doc__)

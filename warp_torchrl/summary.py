@@ -17,6 +17,7 @@ import numpy as np
 from warp_torchrl.evaluation.report import place
 from warp_torchrl.evaluation.statistics import compare, performance_profile, summarise
 from warp_torchrl.nearest import did_you_mean
+from warp_torchrl.training.signals import exit_on_signal
 
 LEVELS = np.linspace(0.0, 1.0, 101)
 _Key = tuple[str, str, str, tuple[int, ...]]  # scenario, method, configuration, seeds
@@ -247,6 +248,7 @@ def _range(bounds: Sequence[float], sign: str = "") -> str:
     return f"{low:{sign}.1f} .. {high:{sign}.1f}"
 
 
+@exit_on_signal()
 def main(arguments: list[str] | None = None) -> None:
     """Print the table of the given runs, and draw the figure if asked to."""
     parser = argparse.ArgumentParser(prog="python -m warp_torchrl.summary", description=__doc__)

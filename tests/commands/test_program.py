@@ -1,8 +1,16 @@
-"""What the commands begin and end with."""
+"""Entry and exit of the commands."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
-from warp_torchrl.commands.program import run_program
+from tests.stress.processes import ROOT, wait_for
+from warp_torchrl.commands.program import one_line_end, run_program
 from warp_torchrl.config.construction import ConfigError
 
 
@@ -22,3 +30,47 @@ def test_a_mistake_is_one_line_and_an_exit_code(capsys):
 
     assert run_program(["seed=1"], "", do) == 2
     assert capsys.readouterr().err == "error: seed=1 is wrong, and this says why\n"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_is_one_line_and_an_exit_code_whatever_a_library_makes_of_it(number, capfd):
+    def do(given):
+        try:
+            os.kill(os.getpid(), number)
+        finally:
+            raise RuntimeError("Converting a tensordict to boolean value is not permitted")  # as its `with` does
+
+    assert run_program([], "", do) == 128 + number
+    assert capfd.readouterr().err == f"error: stopped by signal {number.name}\n"
+    with pytest.raises(SystemExit) as end, one_line_end():
+        do([])
+    assert end.value.code == 128 + number and capfd.readouterr().err.count("\n") == 1
+
+
+def test_an_error_of_a_command_with_flags_is_one_line_and_an_exit_code(capsys):
+    with pytest.raises(SystemExit) as end, one_line_end():
+        raise ConfigError("this is\nwrong")
+    assert end.value.code == 2 and capsys.readouterr().err == "error: this is wrong\n"
+
+
+def catches(process, number):
+    """Whether a process has a handler of a signal: Python has none of SIGTERM, ours is the first."""
+    caught = re.search(r"SigCgt:\s*(\w+)", Path(f"/proc/{process.pid}/status").read_text())
+    return bool(int(caught[1], 16) >> (number - 1) & 1)
+
+
+@pytest.mark.parametrize("program", [["-m", "warp_torchrl.predict"], [str(ROOT / "train.py"), "total_frames=64"]])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_command_that_still_imports_ends_with_one_line(tmp_path, program, number):
+    process = subprocess.Popen(
+        [sys.executable, *program],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    wait_for(lambda: catches(process, signal.SIGTERM), process)
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=30)
+    assert (process.returncode, errors) == (128 + number, f"error: stopped by signal {number.name}\n")
+    assert not list(tmp_path.iterdir())

@@ -39,6 +39,7 @@ from warp_torchrl.benchmark.tasks import (
 from warp_torchrl.benchmark.ticks import tick_cost, tick_table
 from warp_torchrl.benchmark.trainings import training_speed
 from warp_torchrl.commands.allocation import keep_freed_memory
+from warp_torchrl.commands.program import one_line_end
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.nearest import did_you_mean
@@ -205,6 +206,7 @@ def _gpu(parser: argparse.ArgumentParser, options: Namespace) -> None:
         parser.exit(1, f"error: a part was not measured, see {options.file}\n")
 
 
+@one_line_end()
 def main(arguments: list[str] | None = None) -> None:
     """Measure what the command line asks for, and print it."""
     parser = _parser()

@@ -4,22 +4,29 @@ import errno
 import sys
 import traceback
 from pathlib import Path
+from signal import Signals
 
 from warp_torchrl.config.compose import HYDRA_ERRORS, one_line
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.interruption import SIGNALED
 from warp_torchrl.parallel import WorkerDied
 from warp_torchrl.runs.exit_codes import DISK, DONE, IN_USE, MISTAKE, NUMERICAL, UNSOUND
 from warp_torchrl.runs.lock import RunFolderInUse
 from warp_torchrl.runs.sealed import Unsound
 from warp_torchrl.training.finite import NumericalFailure
-from warp_torchrl.training.signals import Stopped
+from warp_torchrl.training.signals import Stopped, left_by
 
 __all__ = ["DISK", "DONE", "IN_USE", "MISTAKE", "NUMERICAL", "UNSOUND", "fail"]
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 
 
 def fail(error: Exception, debug: bool) -> tuple[int, str]:
-    """Print the error as the last line of stderr; return the exit code and the line."""
+    """Print the error as the last line of stderr; return the exit code and the line.
+
+    An error that a signal has brought about is told as the signal was, and no line follows that one's.
+    """
+    if left_by():
+        return SIGNALED + left_by(), f"stopped by signal {Signals(left_by()).name}"
     if debug:
         traceback.print_exc()
     code, line = _diagnose(error)
@@ -31,7 +38,7 @@ def _diagnose(error: Exception) -> tuple[int, str]:
     text = one_line(error) if isinstance(error, HYDRA_ERRORS) else str(error)
     line = " ".join(text.split()) or type(error).__name__
     if isinstance(error, Stopped):
-        return 128 + error.number, line
+        return SIGNALED + error.number, line
     if isinstance(error, RunFolderInUse):
         return IN_USE, line
     if isinstance(error, Unsound):

@@ -1,13 +1,15 @@
-"""What the commands beside train and evaluate begin and end with."""
+"""Entry and exit of the commands beside train and evaluate."""
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 from warp_torchrl.commands.failure import DONE, fail
+from warp_torchrl.training.signals import exit_on_signal
 
 
 def run_program(arguments: Sequence[str] | None, about: str, do: Callable[[list[str]], int | None]) -> int:
-    """Run a command, and return its exit code; an error is told in one line.
+    """Run a command, and return its exit code; an error is told in one line, and a signal ends the process with one.
 
     Args:
         arguments: Of the command line; None takes the program's own.
@@ -19,6 +21,20 @@ def run_program(arguments: Sequence[str] | None, about: str, do: Callable[[list[
         print(about)
         return DONE
     try:
-        return do(given) or DONE
+        with exit_on_signal():
+            return do(given) or DONE
     except Exception as error:
         return fail(error, "debug=true" in given)[0]
+
+
+@contextmanager
+def one_line_end() -> Iterator[None]:
+    """End the process with one line and an exit code where an error or a signal ends this context.
+
+    For commands that read their arguments by ``argparse``.
+    """
+    try:
+        with exit_on_signal():
+            yield
+    except Exception as error:
+        sys.exit(fail(error, debug=False)[0])

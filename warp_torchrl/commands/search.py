@@ -29,7 +29,7 @@ from warp_torchrl.runs import disk
 from warp_torchrl.runs.checkpoint import holds_any
 from warp_torchrl.runs.destination import check_free
 from warp_torchrl.runs.lock import RunFolderLock
-from warp_torchrl.training.signals import DeferredSignals, exit_on_signal
+from warp_torchrl.training.signals import DeferredSignals
 
 if TYPE_CHECKING:
     import optuna
@@ -52,13 +52,12 @@ _MAY_CHANGE = ("trials", "jobs", "out")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Search what the command line asks for, and return the exit code."""
     about = f"{USAGE}\n\n{SearchOptions.__doc__}\nEvery other KEY as for train.py; several values are searched."
-    return run_program(arguments, about, _run_until_a_signal)
+    return run_program(arguments, about, _run_to_its_end)
 
 
-def _run_until_a_signal(arguments: Sequence[str]) -> int:
+def _run_to_its_end(arguments: Sequence[str]) -> int:
     try:
-        with exit_on_signal():
-            return _run(renamed_overrides(arguments))
+        return _run(renamed_overrides(arguments))
     except SearchEnded as error:
         print(f"error: {error}", file=sys.stderr, flush=True)
         return error.code

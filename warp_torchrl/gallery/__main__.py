@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from warp_torchrl.commands.program import one_line_end
 from warp_torchrl.config.grammar import check_overrides
 from warp_torchrl.config.seeds import FIRST_EVALUATED
 from warp_torchrl.drawing import save, style
@@ -51,6 +52,7 @@ _EPISODE = "episode [--policy NAME] [--seed SEED] [--steps FIRST:LAST:EVERY] [--
 _CURVES = "curves [NAME=]RUN [[NAME=]RUN ...] [--out FOLDER]"
 
 
+@one_line_end()
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw what the command line asks for, a line for each figure, and return the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)

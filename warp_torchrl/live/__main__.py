@@ -1,11 +1,9 @@
 """Shows a team fighting a fire on a local page: ``python -m warp_torchrl.live``. It needs the extra ``live``."""
 
 import importlib.util
-import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from types import FrameType
 
 from warp_torchrl.commands.program import run_program
 from warp_torchrl.config.construction import ConfigError, construct
@@ -33,13 +31,9 @@ def _serve(arguments: Sequence[str]) -> None:
     from warp_torchrl.live.page import Address, Page
 
     address = construct(Address, where, "")
-    signal.signal(signal.SIGTERM, _interrupt)
     with Page(setting, address, recordings) as page:
         print(f"{page.url} shows {setting.policy}; Ctrl-C ends it", flush=True)
-        try:
-            page.play()
-        except KeyboardInterrupt:
-            print("\nstopped", flush=True)
+        page.play()
 
 
 def _read(arguments: Sequence[str]) -> tuple[Setting, dict[str, object], Path]:
@@ -55,10 +49,6 @@ def _read(arguments: Sequence[str]) -> tuple[Setting, dict[str, object], Path]:
     if recordings.exists() and not recordings.is_dir():
         raise ConfigError(f"recordings must be a folder, got the file {recordings}")
     return setting, {key: value for key, value in values.items() if key in _WHERE}, recordings
-
-
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    raise KeyboardInterrupt
 
 
 if __name__ == "__main__":

@@ -2,14 +2,18 @@
 
 import os
 import signal
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
-_STDERR = 2
-_WATCHED = (signal.SIGTERM, signal.SIGINT, signal.SIGUSR1)
+from warp_torchrl.interruption import SIGNALED, tell
+
+_WATCHED = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGUSR1, signal.SIGUSR2)
+_OF_SUBMITIT = "SUBMITIT_PREEMPT_SIGNAL"  # names the signal that submitit warns by, without SIG; USR2 if it is not set
+_SECONDS_TO_END = 60.0  # in which a command cleans up; a library may have caught what should have ended it
 
 
 class Stopped(Exception):  # noqa: N818
@@ -50,6 +54,7 @@ class DeferredSignals:
 @contextmanager
 def exit_on_signal() -> Iterator[None]:
     """Within this context a signal ends the process with one line and the signal's exit code."""
+    _left.number = 0
     before = _watch(_leave)
     try:
         yield
@@ -57,19 +62,51 @@ def exit_on_signal() -> Iterator[None]:
         _restore(before)
 
 
+def left_by() -> int:
+    """Return the number of the signal that ends this command; 0 if none does.
+
+    What a signal raises in the middle of a library's work may come out of it as another error.
+    """
+    return _left.number
+
+
+class _Left:
+    """The signal that ends the command, and the clock that ends it where it does not by itself."""
+
+    number = 0
+    clock: threading.Timer | None = None
+
+
+_left = _Left()
+
+
 def _leave(number: int, frame: FrameType | None) -> None:
-    # os.write and not print: the signal may have interrupted a print.
-    os.write(_STDERR, f"error: stopped by signal {signal.Signals(number).name}\n".encode())
-    raise SystemExit(128 + number)
+    tell(number)
+    _left.number = number
+    if _left.clock is None:
+        _left.clock = threading.Timer(_SECONDS_TO_END, os._exit, (SIGNALED + number,))
+        _left.clock.daemon = True
+        _left.clock.start()
+    raise SystemExit(SIGNALED + number)
+
+
+def watched() -> tuple[int, ...]:
+    """Return the signals that stop a run: those of terminals and queues, but for SIGHUP where ``nohup`` ignores it."""
+    warning = getattr(signal, f"SIG{os.environ.get(_OF_SUBMITIT, '')}", None)
+    numbers = dict.fromkeys([*_WATCHED, *([warning] if isinstance(warning, signal.Signals) else [])])
+    return tuple(each for each in numbers if each != signal.SIGHUP or signal.getsignal(each) != signal.SIG_IGN)
 
 
 def _watch(handler: Callable[[int, FrameType | None], None]) -> dict[int, Any]:
     try:
-        return {number: signal.signal(number, handler) for number in _WATCHED}
+        return {number: signal.signal(number, handler) for number in watched()}
     except ValueError:  # Python allows signal handlers in the main thread only
         return {}
 
 
 def _restore(handlers: Mapping[int, Any]) -> None:
     for number, handler in handlers.items():
-        signal.signal(number, handler)
+        signal.signal(number, signal.SIG_DFL if handler is None else handler)  # None: it was not Python's
+    if _left.clock is not None:
+        _left.clock.cancel()
+        _left.clock = None
