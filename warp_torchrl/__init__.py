@@ -3,9 +3,12 @@
 import os
 
 from warp_torchrl.interruption import end_on_signal, is_command
+from warp_torchrl.parent import end_with_binder
 
 if is_command():  # the imports below take seconds
     end_on_signal()
+else:
+    end_with_binder()
 
 # GNU OpenMP's waiting threads spin for milliseconds by default. On a busy machine a step of small tensors then took 30
 # times as long; a short spin avoids this and costs almost nothing on an idle one. torch reads the variable when it is

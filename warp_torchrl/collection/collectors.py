@@ -9,10 +9,10 @@ from typing import Any, ClassVar
 import torch
 from torchrl.collectors import BaseCollector, Collector
 
-from warp_torchrl import parallel
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.collection.running import Collection, InProcessCollection, MultiProcessCollection
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.parent import bind_workers, end_with
 from warp_torchrl.validation import check_fields
 
 MakeEnv = Callable[[int, int], WildfireEnv]
@@ -116,7 +116,10 @@ class MultiProcess(InProcess):
         frames = self.segment * env.batch_size[0]
 
         def start(first_episode: int) -> BaseCollector:
-            parent = os.getpid() if self.starts_processes else None
+            parent = None
+            if self.starts_processes:
+                parent = os.getpid()
+                bind_workers()
             makers = [partial(_worlds, make_env, share, each, first_episode, parent) for each in starts]
             return Collector(
                 makers,
@@ -176,7 +179,7 @@ def _worlds(make_env: MakeEnv, count: int, seed: int, first_episode: int, parent
     A worker in the middle of a batch would go on with it when its parent has ended, so it watches that.
     """
     if parent is not None:
-        parallel.end_with(parent)
+        end_with(parent)
     torch.manual_seed((seed + 2**40 * first_episode) % 2**64)
     env = make_env(count, seed)
     env.set_seeds(range(seed, seed + count), first_episode)

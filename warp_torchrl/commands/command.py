@@ -26,6 +26,7 @@ from warp_torchrl.config.groups import COMPONENTS
 from warp_torchrl.config.renamed import renamed_overrides
 from warp_torchrl.config.saved_config import SavedConfig, restore, world_overrides
 from warp_torchrl.evaluation.evaluate import evaluate_policy
+from warp_torchrl.parent import is_orphaned
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs import disk
 from warp_torchrl.runs.destination import check_free
@@ -195,7 +196,7 @@ def _start_hydra(name: str, job: Callable[[DictConfig], None], arguments: list[s
             job(config)
         except Exception as error:
             code, line = fail(error, debug)
-            if parallel.is_orphaned():
+            if is_orphaned():
                 os._exit(code)  # the sweep has ended, and so does its worker
             if HydraConfig.get().mode != RunMode.MULTIRUN or isinstance(error, Stopped):
                 sys.exit(code)

@@ -15,8 +15,9 @@ from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.experimental.callback import Callback
 from omegaconf import DictConfig
 
-from warp_torchrl import parallel, summary
+from warp_torchrl import summary
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.parent import SECONDS_TO_SAVE, bind_workers, end_with
 
 FAILURE = "failed.json"
 _JOBLIB = "hydra_joblib_launcher"
@@ -107,7 +108,8 @@ def _let_workers_end_with_us() -> None:
     from joblib import register_parallel_backend
     from joblib._parallel_backends import LokyBackend
 
-    watch = {"initializer": parallel.end_with, "initargs": (os.getpid(), parallel.SECONDS_TO_SAVE)}
+    bind_workers(SECONDS_TO_SAVE)
+    watch = {"initializer": end_with, "initargs": (os.getpid(), SECONDS_TO_SAVE)}  # where it has ended before
     register_parallel_backend("loky", partial(LokyBackend, **watch))
 
 

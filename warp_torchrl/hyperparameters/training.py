@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
-from warp_torchrl.parallel.parent import SECONDS_TO_SAVE, command, environment
+from warp_torchrl.parent import SECONDS_TO_SAVE, command, environment
 
 MODULE = "warp_torchrl.commands.trial"
 """What the process runs."""

@@ -11,9 +11,9 @@ import torch
 
 from warp_torchrl.parallel import group
 from warp_torchrl.parallel.group import WorkerDied
-from warp_torchrl.parallel.parent import command, environment
 from warp_torchrl.parallel.sockets import Sockets, inherited, pairs
 from warp_torchrl.parallel.torchrun import Torchrun, is_torchrun
+from warp_torchrl.parent import command, environment
 
 Work = Callable[[dict[str, Any]], None]
 """What a process does that is not the first; called with the run's configuration."""

@@ -18,6 +18,7 @@ SECONDS_TO_SAVE = 20.0
 """What a training has to save in when whoever started it has ended."""
 _LEFT_TO_THE_PARENT = ("SIGINT", "SIGTERM", "SIGHUP", "SIGUSR1", "SIGUSR2")  # a terminal or a queue sends them to all
 
+_BOUND = "WARP_TORCHRL_PARENT"
 _parent: int | None = None
 
 
@@ -39,11 +40,23 @@ def end_with(parent: int, seconds_to_save: float = 0.0) -> None:
         seconds_to_save: In which it may end by itself, asked by SIGTERM; 0 ends it at once.
     """
     global _parent
-    _parent = parent
-    if os.getppid() == parent:
-        threading.Thread(target=_watch, args=(parent, seconds_to_save), name="parent", daemon=True).start()
-    else:  # it has ended before this process could look
+    is_watched, _parent = _parent == parent, parent
+    if os.getppid() != parent:  # it has ended before this process could look
         os._exit(128 + signal.SIGTERM)
+    if not is_watched:
+        threading.Thread(target=_watch, args=(parent, seconds_to_save), name="parent", daemon=True).start()
+
+
+def bind_workers(seconds_to_save: float = 0.0) -> None:
+    """Let processes that a library starts for this one end with it, from their import of this package on."""
+    os.environ[_BOUND] = f"{os.getpid()} {seconds_to_save}"
+
+
+def end_with_binder() -> None:
+    """Let this process end with its parent, if that has called ``bind_workers``."""
+    parent, _, seconds_to_save = os.environ.get(_BOUND, "").partition(" ")
+    if parent == str(os.getppid()):
+        end_with(int(parent), float(seconds_to_save))
 
 
 def is_orphaned() -> bool:

@@ -11,7 +11,7 @@ import pytest
 
 from tests.stress.processes import alive
 
-PARENT = importlib.util.find_spec("warp_torchrl.parallel.parent").origin
+PARENT = importlib.util.find_spec("warp_torchrl.parent").origin
 STARTER = f"""
 import os, runpy, subprocess, sys, time
 command = runpy.run_path({PARENT!r})["command"]
