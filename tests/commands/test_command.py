@@ -420,6 +420,38 @@ def test_a_run_stopped_by_a_signal_resumes_to_what_it_would_have_been(trained, r
 SHORT = [*TINY, "total_frames=64", "evaluation.episodes=2", "evaluation.mode=sampled", "hydra.run.dir=run"]
 
 
+def test_the_same_command_line_goes_on_with_a_run_that_a_queue_has_stopped(run_here, tmp_path, monkeypatch):
+    frames = lambda: checkpoint.newest(tmp_path / "run")[0].manifest.frames  # noqa: E731
+    with monkeypatch.context() as patched:
+        patched.setattr(Training, "_learn", signalled(Training._learn, signal.SIGUSR2))
+        assert run_here("train.py", *SHORT)[0] == 128 + signal.SIGUSR2
+    assert frames() == 32
+    for other in ("algorithm.gamma=0.9", "total_frames=96"):
+        code, errors, _ = run_here("train.py", *SHORT, other)
+        assert code == 2 and "holds a run already; go on with resume=" in errors[-1] and frames() == 32
+    assert run_here("train.py", *SHORT, "debug=true")[0] == 0 and frames() == 64
+    assert len((tmp_path / "run" / "metrics.csv").read_text().splitlines()) == 3
+    assert run_here("train.py", *SHORT)[0] == 2, "it has come to its end"
+
+
+def test_a_run_that_was_stopped_before_it_saved_begins_anew(run_here, tmp_path, monkeypatch):
+    with monkeypatch.context() as patched:
+        patched.setattr(Training, "train", lambda training: os.kill(os.getpid(), signal.SIGTERM))
+        assert run_here("train.py", *SHORT)[0] == 143
+        patched.setattr(Training, "train", lambda training: sys.exit(9))
+        assert run_here("train.py", *SHORT)[0] == 9
+
+
+def test_a_sweep_that_is_started_again_leaves_what_has_come_to_its_end(trained, run_here, tmp_path):
+    shutil.copytree(trained[0], tmp_path / "sweep" / "0")
+    before = contents(tmp_path / "sweep" / "0")
+    assert run_here("train.py", "-m", *TINY, "hydra.sweep.dir=sweep")[0] == 0
+    now = contents(tmp_path / "sweep" / "0")
+    assert {name for name in now if before[name] != now[name]} == {Path("train.log")}
+    code, errors, _ = run_here("train.py", "-m", *TINY, "seed=1", "hydra.sweep.dir=sweep")
+    assert code == 2 and "holds a run already" in errors[-1]
+
+
 @pytest.mark.parametrize(
     ("owner", "name", "when", "number", "frames"),
     [

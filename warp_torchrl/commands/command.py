@@ -17,6 +17,7 @@ from warp_torchrl.commands.allocation import keep_freed_memory
 from warp_torchrl.commands.checks import map_fires, new_total, of_worlds, picture, without_checkpoint
 from warp_torchrl.commands.failure import fail
 from warp_torchrl.commands.following import FOLLOWING, folder_of_its_own, follow
+from warp_torchrl.commands.queue import queued
 from warp_torchrl.commands.sweep import SweepSummary, remove_failure, save_failure, summarise_unfinished
 from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import HYDRA_ERRORS, conf_folder, explain, option_of, plain, without_targets
@@ -31,7 +32,7 @@ from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs import disk
 from warp_torchrl.runs.destination import check_free
 from warp_torchrl.runs.lock import RunFolderLock
-from warp_torchrl.runs.resumption import resumption
+from warp_torchrl.runs.resumption import Resumption, is_run_of, resumption
 from warp_torchrl.runs.shipped import find_policy
 from warp_torchrl.training.loop import Training
 from warp_torchrl.training.signals import Stopped, exit_on_signal
@@ -74,7 +75,8 @@ def _train_job(config: DictConfig) -> None:
 
 def _start(folder: Path, config: DictConfig) -> None:
     if checkpoints.holds_any(folder):
-        raise ConfigError(f"hydra.run.dir: {folder} holds a run already; go on with resume={folder}, or take another")
+        _go_on(folder, config)
+        return
     if (folder / "evaluation.json").exists():
         raise ConfigError(f"hydra.run.dir: {folder} holds an evaluation, which training would replace; take another")
     config.processes = run_config(plain(config)).n_processes()
@@ -88,8 +90,23 @@ def _start(folder: Path, config: DictConfig) -> None:
     _evaluate(training, world_overrides(plain(config)))
 
 
+def _go_on(folder: Path, config: DictConfig) -> None:
+    """Resume the run of this very configuration: a queue that has stopped a job gives it the same command line again.
+
+    Raises:
+        ConfigError: If the folder holds another run, or this one has come to its end and is no job of a sweep.
+    """
+    run = resumption(folder) if is_run_of(folder, OmegaConf.to_yaml(config, resolve=True)) else None
+    if run is None or (run.is_finished and HydraConfig.get().mode != RunMode.MULTIRUN):
+        raise ConfigError(f"hydra.run.dir: {folder} holds a run already; go on with resume={folder}, or take another")
+    _resume_from(folder, run)
+
+
 def _resume(folder: Path, total_frames: Any) -> None:
-    run = resumption(folder, total_frames)
+    _resume_from(folder, resumption(folder, total_frames))
+
+
+def _resume_from(folder: Path, run: Resumption) -> None:
     _say_skipped(run.skipped)
     if run.is_finished:
         log.info("%s is finished; total_frames=MORE trains it longer", folder)
@@ -191,16 +208,19 @@ def _start_hydra(name: str, job: Callable[[DictConfig], None], arguments: list[s
     sys.argv[1:] = sorted(arguments, key=lambda each: each not in _MULTIRUN)  # Hydra wants -m before the overrides
 
     def guarded(config: DictConfig) -> None:
-        try:
-            remove_failure()
-            job(config)
-        except Exception as error:
-            code, line = fail(error, debug)
-            if is_orphaned():
-                os._exit(code)  # the sweep has ended, and so does its worker
-            if HydraConfig.get().mode != RunMode.MULTIRUN or isinstance(error, Stopped):
-                sys.exit(code)
-            save_failure(code, line)  # the other jobs go on
+        with queued() as queue:
+            try:
+                remove_failure()
+                job(config)
+            except Exception as error:
+                code, line = fail(queue.explain(error), debug)
+                if is_orphaned():
+                    os._exit(code)  # the sweep has ended, and so does its worker
+                queue.start_again(error)
+                was_stopped = isinstance(error, Stopped) and error.number != queue.number
+                if HydraConfig.get().mode != RunMode.MULTIRUN or was_stopped:
+                    sys.exit(code)
+                save_failure(code, line)  # the other jobs go on
 
     try:
         hydra.main(version_base="1.3", config_path=str(conf_folder()), config_name=name)(guarded)()

@@ -106,7 +106,7 @@ def inherited(number: int) -> socket.socket:
 
 def _bytes_of(tensor: Tensor) -> memoryview:
     """Return the bytes of a contiguous tensor on the CPU, not a copy of them."""
-    return memoryview(tensor.reshape(-1).view(torch.uint8).numpy())
+    return tensor.reshape(-1).view(torch.uint8).numpy().data
 
 
 def _send(end: socket.socket, message: memoryview) -> None:

@@ -83,6 +83,24 @@ def resumption(folder: Path, total_frames: Any = None) -> Resumption:
     )
 
 
+def is_run_of(folder: Path, config: str) -> bool:
+    """Return whether a folder holds the run that a configuration begins: all values are the same, ``debug`` aside.
+
+    ``processes=auto`` is what the run was begun with: a queue may start it again where there are other cores.
+
+    Args:
+        folder: The run folder.
+        config: What would be written into its ``config.yaml``.
+
+    Raises:
+        ConfigError: If its ``config.yaml`` cannot be read.
+    """
+    held, asked = read_config(folder / "config.yaml"), renamed_values(yaml.safe_load(config))
+    aside = ("resume", "debug", *(["processes"] if asked["processes"] == "auto" else []))
+    held, asked = ({key: value for key, value in each.items() if key not in aside} for each in (held, asked))
+    return held == asked
+
+
 def _evaluated(path: Path) -> int | None:
     """Return the frames of the policy in a run's ``evaluation.json``; None if there is no evaluation."""
     try:

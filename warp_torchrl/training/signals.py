@@ -92,9 +92,18 @@ def _leave(number: int, frame: FrameType | None) -> None:
 
 def watched() -> tuple[int, ...]:
     """Return the signals that stop a run: those of terminals and queues, but for SIGHUP where ``nohup`` ignores it."""
-    warning = getattr(signal, f"SIG{os.environ.get(_OF_SUBMITIT, '')}", None)
-    numbers = dict.fromkeys([*_WATCHED, *([warning] if isinstance(warning, signal.Signals) else [])])
+    numbers = dict.fromkeys([*_WATCHED, *filter(None, [_warning()])])
     return tuple(each for each in numbers if each != signal.SIGHUP or signal.getsignal(each) != signal.SIG_IGN)
+
+
+def warning_of_submitit() -> int:
+    """Return the signal that submitit warns this process by; 0 if submitit has not started it."""
+    return _warning() if "SUBMITIT_EXECUTOR" in os.environ else 0
+
+
+def _warning() -> int:
+    found = getattr(signal, f"SIG{os.environ.get(_OF_SUBMITIT, 'USR2')}", None)
+    return found if isinstance(found, signal.Signals) else 0
 
 
 def _watch(handler: Callable[[int, FrameType | None], None]) -> dict[int, Any]:
