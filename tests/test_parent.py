@@ -10,6 +10,7 @@ import time
 import pytest
 
 from tests.stress.processes import alive
+from warp_torchrl.parent import bind_workers, end_with_binder, is_orphaned
 
 PARENT = importlib.util.find_spec("warp_torchrl.parent").origin
 STARTER = f"""
@@ -55,6 +56,41 @@ def test_a_process_whose_parent_has_ended_does_not_begin(tmp_path):
     command = [sys.executable, "-P", PARENT, str(gone.pid), "0", "job"]
     done = subprocess.run(command, cwd=tmp_path, env={"PYTHONPATH": str(tmp_path)})
     assert done.returncode == 128 + signal.SIGTERM and not (tmp_path / "begun").exists()
+
+
+IMPORTS = f"""
+import os, runpy, subprocess, sys
+parent = runpy.run_path({PARENT!r})
+if sys.argv[1:] == ["begin"]:
+    parent["bind_workers"]()
+    subprocess.Popen([sys.executable, __file__, "worker"])
+    os.kill(os.getpid(), 9) if os.environ.get("AT_ONCE") else __import__("time").sleep(600)
+if os.environ.get("AT_ONCE"):
+    __import__("time").sleep(0.5)  # until its parent has ended
+parent["end_with_binder"]()
+open("begun", "w").close()
+__import__("time").sleep(600)
+"""
+
+
+@pytest.mark.parametrize("at_once", ["", "yes"])
+def test_a_worker_that_a_library_starts_ends_with_its_parent_even_if_that_has_ended_before(tmp_path, at_once):
+    (tmp_path / "job.py").write_text(IMPORTS)
+    command = [sys.executable, "job.py", "begin"]
+    starter = subprocess.Popen(command, cwd=tmp_path, env={"AT_ONCE": at_once}, start_new_session=True)
+    if not at_once:
+        assert wait_for((tmp_path / "begun").exists)
+        starter.kill()
+    starter.wait()
+    assert wait_for(lambda: not alive(starter.pid), 5.0)
+    assert (tmp_path / "begun").exists() == (not at_once)
+
+
+def test_other_processes_that_inherit_the_environment_go_on(monkeypatch):
+    monkeypatch.setenv("WARP_TORCHRL_PARENT", "")  # so that it is taken back
+    bind_workers()
+    end_with_binder()
+    assert not is_orphaned()
 
 
 def test_the_first_process_obeys_signals_for_those_that_have_nothing_to_save(tmp_path):

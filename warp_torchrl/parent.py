@@ -53,10 +53,21 @@ def bind_workers(seconds_to_save: float = 0.0) -> None:
 
 
 def end_with_binder() -> None:
-    """Let this process end with its parent, if that has called ``bind_workers``."""
-    parent, _, seconds_to_save = os.environ.get(_BOUND, "").partition(" ")
-    if parent == str(os.getppid()):
-        end_with(int(parent), float(seconds_to_save))
+    """Let this process end with its parent, if that has called ``bind_workers``, or now, if it has ended already."""
+    bound, _, seconds_to_save = os.environ.get(_BOUND, "").partition(" ")
+    parent = int(bound) if bound.isdigit() else None
+    if parent is not None and (parent == os.getppid() or not _exists(parent)):
+        end_with(parent, float(seconds_to_save))
+
+
+def _exists(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:  # another user's, which has got its number
+        return True
+    return True
 
 
 def is_orphaned() -> bool:

@@ -96,6 +96,53 @@ def test_trackers_get_the_names_and_values_of_metrics_csv(tmp_path):
     assert [(each.step, each.value) for each in found.Scalars("world/saved")] == [(64, 0.5)]
 
 
+def test_a_resumed_run_goes_on_in_its_own_events_with_one_point_a_step(tmp_path):
+    events = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
+    run = tmp_path / "run"
+    for begin, frames in ((0, range(1, 8)), (4, range(5, 10))):  # killed after 7, resumed from 4
+        tracker = Tensorboard().open(run, begin, 7 if begin else 0)
+        for each in frames:
+            tracker.log({"world/saved": begin + each / 10}, each)
+        tracker.close()
+        run = run.rename(tmp_path / "renamed")
+    (folder,) = {path.parent for path in run.rglob("*tfevents*")}
+    found = events.EventAccumulator(str(folder)).Reload().Scalars("world/saved")
+    assert [each.step for each in found] == list(range(1, 10))
+    assert [round(each.value, 1) for each in found] == [0.1, 0.2, 0.3, 0.4, 4.5, 4.6, 4.7, 4.8, 4.9]
+
+
+def test_a_resumed_run_is_one_run_of_wandb_with_one_point_a_step(tmp_path, monkeypatch):
+    class Logger:
+        def __init__(self):
+            self.steps = []
+            made.append(self)
+
+        def log_scalar(self, name, value, step):
+            self.steps.append(step)
+
+    made, given = [], []
+    monkeypatch.setattr(
+        "warp_torchrl.runs.logging.get_logger",
+        lambda *names, wandb_kwargs: given.append(wandb_kwargs["id"]) or Logger(),
+    )
+    for begin, told, frames in ((0, 0, range(1, 8)), (4, 7, range(5, 10)), (0, 0, range(1, 3))):
+        tracker = Wandb().open(tmp_path, begin, told)
+        for each in frames:
+            tracker.log({"world/saved": 0.5}, each)
+    assert [each.steps for each in made] == [[1, 2, 3, 4, 5, 6, 7], [8, 9], [1, 2]]
+    assert given[0] == given[1] != given[2], "a run that begins anew is another one"
+    (tmp_path / "wandb_id").write_text("../../else")
+    Wandb().open(tmp_path, 4, 7)
+    assert given[3] not in ("../../else", given[2]) and given[3].isalnum()
+
+
+def test_what_is_cut_is_told_to_trackers(tmp_path):
+    path = tmp_path / "metrics.csv"
+    path.write_text("time/frames,a\n32,1\n64,2\n96,3\n12")  # a crash has cut the last row
+    assert MetricsFile(path, keep_rows=1).cut_at == 96
+    assert MetricsFile(path, keep_rows=1).cut_at == 0
+
+
 def test_wandb_gets_the_names_of_metrics_csv(tmp_path, monkeypatch):
     monkeypatch.delenv("WANDB_API_KEY", raising=False)
     tracker = Wandb().open(tmp_path)

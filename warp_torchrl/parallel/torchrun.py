@@ -43,7 +43,7 @@ class Torchrun:
         dist.broadcast(head, 0)
         held = _empty(head) if message is None else _tensor(message)
         dist.broadcast(held, 0)
-        return memoryview(held.numpy()) if message is None else message
+        return held.numpy().data if message is None else message
 
     def gather(self, message: memoryview) -> list[memoryview]:
         """Return the messages of all processes in the first one, and nothing in the others."""
@@ -64,7 +64,7 @@ def _received(rank: int) -> memoryview:
     dist.recv(head, rank)
     held = _empty(head)
     dist.recv(held, rank)
-    return memoryview(held.numpy())
+    return held.numpy().data
 
 
 def _tensor(message: bytes | memoryview) -> Tensor:

@@ -4,11 +4,14 @@ import csv
 import io
 import logging
 import os
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Literal, Protocol
+from secrets import token_hex
+from typing import Any, Literal, Protocol
 
 from torchrl.record.loggers import get_logger
 
@@ -16,6 +19,11 @@ from warp_torchrl.runs import disk
 from warp_torchrl.validation import check_fields
 
 log = logging.getLogger("warp_torchrl")
+FRAMES = "time/frames"
+"""The column that says after how many frames a row was written."""
+_ID = "wandb_id"  # a file of the run folder
+_DIGITS = 8
+_GIVEN = re.compile(rf"[0-9a-z]{{{_DIGITS}}}")
 
 
 class MetricsFile:
@@ -28,6 +36,9 @@ class MetricsFile:
         path: The file.
         keep_rows: Rows to keep on resume; the others were written after the checkpoint.
 
+    Attributes:
+        cut_at: Frames of the last of those others; 0 if there are none.
+
     Raises:
         ValueError: If the file has fewer rows.
     """
@@ -35,6 +46,7 @@ class MetricsFile:
     def __init__(self, path: Path, keep_rows: int = 0) -> None:
         self.path = path
         self.rows = keep_rows
+        self.cut_at = 0
         self._columns: list[str] | None = None
         self._is_resumed = keep_rows > 0
         if keep_rows:
@@ -72,12 +84,20 @@ class MetricsFile:
         if self.path.exists():
             with self.path.open(newline="", encoding="utf-8", errors="replace") as file:  # a crash may cut the last row
                 lines = list(islice(csv.reader(file), rows + 1))
+                self.cut_at = _last_frames(lines[:1], csv.reader(file))
         if len(lines) <= rows:
             raise ValueError(f"{self.path} must hold the {rows} rows of the checkpoint, got {max(len(lines) - 1, 0)}")
         kept = io.StringIO(newline="")
         csv.writer(kept).writerows(lines)
         disk.replace(self.path, kept.getvalue())
         return lines[0]
+
+
+def _last_frames(header: Sequence[Sequence[str]], rows: Iterable[Sequence[str]]) -> int:
+    """Return the frames of the last row that is written to its end; 0 if there is none."""
+    whole = [row for row in rows if header and len(row) == len(header[0])]
+    place = header[0].index(FRAMES) if whole and FRAMES in header[0] else None
+    return 0 if place is None or not whole[-1][place].isdigit() else int(whole[-1][place])
 
 
 class Tracker(Protocol):
@@ -101,18 +121,36 @@ class _Silent:
 
 
 class _TorchRlTracker:
-    """One of TorchRL's loggers; its first error ends the tracking, never the training."""
+    """One of TorchRL's loggers; its first error ends the tracking, never the training.
 
-    def __init__(self, name: str, run: Path, **options: object) -> None:
-        self._name = name
+    Args:
+        name: TorchRL's name of it.
+        run: The run folder.
+        title: What the run is called; None takes the folder's name.
+        told: Frames up to which it has its rows already.
+        begin: What is done with it at first.
+        options: TorchRL's.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        run: Path,
+        title: str | None = None,
+        told: int = 0,
+        begin: Callable[[Any], None] = lambda logger: None,
+        **options: object,
+    ) -> None:
+        self._name, self._told = name, told
         try:
-            self._logger = get_logger(name, str(run), run.name, **options)
+            self._logger = get_logger(name, str(run), title or run.name, **options)
+            begin(self._logger)
         except Exception as error:
             self._fail(error)
 
     def log(self, row: Mapping[str, float | None], frames: int) -> None:
         """Send a row, with the column names of ``metrics.csv``."""
-        if self._logger is None:
+        if self._logger is None or frames <= self._told:
             return
         try:
             for name, value in row.items():
@@ -141,14 +179,14 @@ class _TorchRlTracker:
 class CsvOnly:
     """No tracker; a run always writes ``metrics.csv``."""
 
-    def open(self, run: Path) -> Tracker:
-        """Return a tracker for a run folder."""
+    def open(self, run: Path, frames: int = 0, told: int = 0) -> Tracker:
+        """Return a tracker for a run folder, see ``Tensorboard.open``."""
         return _Silent()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Wandb:
-    """Weights & Biases.
+    """Weights & Biases. A resumed run goes on in its own run there, whose number is kept in the run folder.
 
     Attributes:
         project: Name of the project.
@@ -163,19 +201,53 @@ class Wandb:
     def __post_init__(self) -> None:
         check_fields(self)
 
-    def open(self, run: Path) -> Tracker:
-        """Return a tracker for a run folder."""
+    def open(self, run: Path, frames: int = 0, told: int = 0) -> Tracker:
+        """Return a tracker for a run folder, see ``Tensorboard.open``: rows that it has are not sent again."""
         os.environ.setdefault("WANDB_SILENT", "true")
         sweep = run.resolve().parent
         group = self.group or (sweep.name if (sweep / "multirun.yaml").exists() else None)
-        options = {"offline": self.mode == "offline", "project": self.project, "group": group}
-        return _TorchRlTracker("wandb", run, wandb_kwargs=options)
+        number = _own_id(run / _ID, is_new=not frames)
+        options = {"offline": self.mode == "offline", "project": self.project, "group": group, "id": number}
+        return _TorchRlTracker("wandb", run, told=told, wandb_kwargs=options)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Tensorboard:
     """TensorBoard; needs the extra ``tensorboard``."""
 
-    def open(self, run: Path) -> Tracker:
-        """Return a tracker for a run folder."""
-        return _TorchRlTracker("tensorboard", run)
+    def open(self, run: Path, frames: int = 0, told: int = 0) -> Tracker:
+        """Return a tracker for a run folder.
+
+        Args:
+            run: The folder.
+            frames: Of the checkpoint from which the run goes on; 0 for a new one.
+            told: Frames of the last row that the run wrote before that; 0 if none is after the checkpoint.
+        """
+        before = sorted(path.parent.name for path in run.glob("*/*tfevents*"))
+
+        def begin(logger: Any) -> None:
+            if before:
+                _drop_after(frames, logger.experiment)
+
+        return _TorchRlTracker("tensorboard", run, before[0] if before else None, begin=begin)
+
+
+def _drop_after(frames: int, writer: Any) -> None:
+    """Let TensorBoard leave out the points that earlier files of a folder have after so many frames."""
+    from tensorboard.compat.proto.event_pb2 import Event, SessionLog
+
+    start = SessionLog(status=SessionLog.START)
+    writer.file_writer.add_event(Event(step=frames + 1, session_log=start))
+
+
+def _own_id(path: Path, is_new: bool) -> str:
+    """Return the number of a run in the tracker: of a resumed one that which its folder holds, else a new one."""
+    if path.is_file() and not is_new:
+        with path.open("rb") as file:
+            held = file.read(_DIGITS + 1).decode("ascii", errors="replace")
+        if _GIVEN.fullmatch(held):
+            return held
+    made = token_hex(_DIGITS // 2)
+    with suppress(OSError):  # a tracker never ends a training
+        disk.replace(path, made)
+    return made

@@ -63,7 +63,7 @@ class Training(Learning):
             WorkerDied: If a worker or another process ended; the run has saved.
         """
         with DeferredSignals() as signals:
-            tracker = self.run_config.logger.open(self.run) if self.is_first else None
+            tracker = self._open_tracker() if self.is_first else None
             try:
                 self.join()
                 with self._bar() as bar:
@@ -83,6 +83,9 @@ class Training(Learning):
                     tracker.close()  # after the last save: a slow server may delay it
             if signals.received:
                 raise Stopped(signals.received, self.run)
+
+    def _open_tracker(self) -> Tracker:
+        return self.run_config.logger.open(self.run, self.frames, self.metrics.cut_at)
 
     def _bar(self) -> AbstractContextManager[tqdm | None]:
         """Return the progress bar of the first process: it has a semaphore, which a killed process would leave."""
