@@ -15,7 +15,18 @@ FILES = {
     for path in PACKAGE.rglob("*.py")
 }
 MODULES = sorted(FILES)
-GROUND = ("content", "device", "dotted", "foreign", "interruption", "nearest", "parent", "symmetry", "validation")
+GROUND = (
+    "content",
+    "device",
+    "dotted",
+    "flags",
+    "foreign",
+    "interruption",
+    "nearest",
+    "parent",
+    "symmetry",
+    "validation",
+)
 """What knows nothing of ours but each other, and every floor may use."""
 FIRE_SCIENCE = ("rates", "weather")
 """What the world is built on: equations of fire and weather, which know torch alone."""

@@ -7,7 +7,6 @@ it.
 often better than either (Wortsman et al. 2022, "Model soups"): docs/skill.md.
 """
 
-import argparse
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -18,6 +17,7 @@ import torch
 from warp_torchrl.api import policy_of
 from warp_torchrl.commands.program import one_line_end
 from warp_torchrl.config.saved_config import SavedConfig
+from warp_torchrl.flags import FlagParser
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.shipped import find_policy
 
@@ -25,7 +25,7 @@ from warp_torchrl.runs.shipped import find_policy
 @one_line_end()
 def main(arguments: list[str] | None = None) -> None:
     """Export the policy of the run or checkpoint that the command line names."""
-    parser = argparse.ArgumentParser(prog="python -m warp_torchrl.export", description=__doc__)
+    parser = FlagParser(prog="python -m warp_torchrl.export", description=__doc__)
     told = "a run folder (its newest sound checkpoint), one of them, or the name of a shipped policy"
     parser.add_argument("run", metavar="RUN", help=told)
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="what to make")

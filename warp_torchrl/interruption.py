@@ -3,7 +3,6 @@
 Imports take seconds, in which nothing is there to be saved.
 """
 
-import multiprocessing
 import os
 import signal
 import sys
@@ -36,12 +35,12 @@ def _end(number: int, frame: FrameType | None) -> None:
 
 def is_command() -> bool:
     """Return whether this process runs one of our commands, and is not the worker of one."""
-    if multiprocessing.parent_process() is not None or threading.current_thread() is not threading.main_thread():
+    if threading.current_thread() is not threading.main_thread() or not sys.argv:
         return False
-    if sys.argv[:1] == ["-m"]:  # while Python looks for the module
-        module = sys.orig_argv[sys.orig_argv.index("-m") + 1 :][:1]
-        return bool(module) and module[0].partition(".")[0] == __package__
-    program = Path(sys.argv[0] if sys.argv else "")
-    return program.name in _INSTALLED or program.resolve() in [
-        Path(__file__).parents[1] / script for script in _SCRIPTS
-    ]
+    if sys.argv[0] == "-m":  # while Python looks for the module
+        module = sys.orig_argv[sys.orig_argv.index("-m") + 1]
+        return module.partition(".")[0] == __package__
+    program = Path(sys.argv[0])
+    was_started = sys.argv[0] in sys.orig_argv  # of a worker they are the interpreter's, and argv is its parent's
+    ours = [Path(__file__).parents[1] / script for script in _SCRIPTS]
+    return was_started and (program.name in _INSTALLED or program.resolve() in ours)

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from warp_torchrl.api import policy_of
+from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.saved_config import restore
@@ -47,8 +48,11 @@ class NamedPolicy:
             ConfigError: If an override does not fit, in one line.
         """
         if self.checkpoint is None:
-            return plain(compose_config("train", overrides))
-        return plain(restore(self.checkpoint.record(), overrides))
+            values = plain(compose_config("train", overrides))
+        else:
+            values = plain(restore(self.checkpoint.record(), overrides))
+        run_config(values)  # so that every key is checked, whoever reads it
+        return values
 
 
 def fitted_policy(found: checkpoints.Checkpoint, env: WildfireEnv, name: str) -> TrainedPolicy:

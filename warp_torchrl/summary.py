@@ -3,7 +3,6 @@
 A sweep writes both at its end; ``python -m warp_torchrl.summary FOLDER ...`` makes them for any runs.
 """
 
-import argparse
 import json
 import math
 import signal
@@ -16,6 +15,7 @@ import numpy as np
 
 from warp_torchrl.evaluation.report import place
 from warp_torchrl.evaluation.statistics import compare, performance_profile, summarise
+from warp_torchrl.flags import FlagParser
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.training.signals import exit_on_signal
 
@@ -251,7 +251,7 @@ def _range(bounds: Sequence[float], sign: str = "") -> str:
 @exit_on_signal()
 def main(arguments: list[str] | None = None) -> None:
     """Print the table of the given runs, and draw the figure if asked to."""
-    parser = argparse.ArgumentParser(prog="python -m warp_torchrl.summary", description=__doc__)
+    parser = FlagParser(prog="python -m warp_torchrl.summary", description=__doc__)
     parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER", help="runs, or folders of runs")
     parser.add_argument("--against", metavar="POLICY", help="compare with this policy instead of the best")
     parser.add_argument("--show", nargs="+", metavar="METRIC", help="means of these, of what evaluation.json holds")

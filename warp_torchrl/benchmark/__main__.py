@@ -41,6 +41,7 @@ from warp_torchrl.benchmark.trainings import training_speed
 from warp_torchrl.commands.allocation import keep_freed_memory
 from warp_torchrl.commands.program import one_line_end
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.flags import FlagParser
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.runs.checkpoint import CheckpointError
@@ -164,7 +165,7 @@ _TABLES = {
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m warp_torchrl.benchmark", description=__doc__)
+    parser = FlagParser(prog="python -m warp_torchrl.benchmark", description=__doc__)
     parser.add_argument("what", nargs="*", choices=[[], *_MEASURES, "gpu"], help="env and train by default")
     parser.add_argument(
         "--scenario",

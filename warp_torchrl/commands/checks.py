@@ -3,10 +3,12 @@
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import fields
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, cast
 
+from hydra.conf import HydraConf
 from hydra.core.global_hydra import GlobalHydra
 from hydra.experimental.callback import Callback
 from omegaconf import DictConfig, OmegaConf
@@ -72,6 +74,11 @@ def _check(name: str | None, config: DictConfig) -> None:
     overrides = list(config.hydra.overrides.task)
     check_choices(overrides)
     values = plain(OmegaConf.masked_copy(config, [str(key) for key in config if key != "hydra"]))
+    unknown = [str(key) for key in config.hydra if key not in {each.name for each in fields(HydraConf)}]
+    if unknown:
+        raise ConfigError(f"hydra.{unknown[0]} is not a key of the configuration")
+    if not isinstance(values["debug"], bool):
+        raise ConfigError(f"debug must be true or false, got {values['debug']!r}")
     (_check_evaluation if name == "evaluate" else check_training)(values, overrides)
 
 

@@ -53,11 +53,23 @@ def compose_config(name: str, overrides: Sequence[str] = ()) -> DictConfig:
     overrides = renamed_overrides(overrides)
     check_choices(overrides)
     config = _compose(name, overrides)
+    if any(each.startswith("+") for each in overrides):
+        _check_keys(config, name)
     try:
         OmegaConf.resolve(config)
     except OmegaConfBaseException as error:
         raise ConfigError(one_line(error)) from None
     return config
+
+
+def _check_keys(config: DictConfig, name: str) -> None:
+    """Check that a configuration has no key that ``conf/<name>.yaml`` has not: ``+key`` adds whatever one likes."""
+    folder = conf_folder()
+    known = [str(key) for key in _composed(folder, _last_change(folder), name, ())]
+    for key in map(str, config):
+        if key not in known:
+            has = f"it has {', '.join(sorted(known))}"
+            raise ConfigError(f"{key} is not a key of the configuration; {has}{did_you_mean(key, known)}")
 
 
 def choices(overrides: Sequence[str]) -> dict[str, str]:

@@ -19,6 +19,7 @@ from warp_torchrl.commands.program import one_line_end
 from warp_torchrl.config.grammar import check_overrides
 from warp_torchrl.config.seeds import FIRST_EVALUATED
 from warp_torchrl.drawing import save, style
+from warp_torchrl.flags import FlagParser
 from warp_torchrl.gallery import kinds, reached, saved_at
 from warp_torchrl.gallery.curves import curve_figures, lines_of
 from warp_torchrl.gallery.episode import photograph
@@ -151,7 +152,7 @@ def _named(given: str) -> tuple[str, Path]:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m warp_torchrl.gallery", description=" ".join(__doc__.split()))
+    parser = FlagParser(prog="python -m warp_torchrl.gallery", description=" ".join(__doc__.split()))
     parser.add_argument("figures", nargs="*", metavar="FIGURE", help="all by default; --list names them")
     parser.add_argument("--list", action="store_true", help="print what there is to draw")
     parser.add_argument("--out", type=Path, default=Path("docs/figures"), metavar="FOLDER", help="%(default)s")
@@ -164,7 +165,7 @@ def _curves_parser() -> argparse.ArgumentParser:
         "Draws the learning curves of runs: curves_single.png of those with one agent, curves_multi.png of the others, "
         "curves_saved.png of all. Runs that differ in their seed alone are one line, with a band."
     )
-    parser = argparse.ArgumentParser(prog="python -m warp_torchrl.gallery curves", description=about)
+    parser = FlagParser(prog="python -m warp_torchrl.gallery curves", description=about)
     parser.add_argument(
         "runs", nargs="*", metavar="[NAME=]RUN", help="folder of a run, or of a sweep, and what to call its runs"
     )
@@ -196,7 +197,7 @@ def _episode_parser() -> argparse.ArgumentParser:
         "Plays an episode and photographs it in Chromium: of one step episode.png, of several episode.webp. Overrides "
         "are those of train.py."
     )
-    parser = argparse.ArgumentParser(prog="python -m warp_torchrl.gallery episode", description=about)
+    parser = FlagParser(prog="python -m warp_torchrl.gallery episode", description=about)
     parser.add_argument("overrides", nargs="*", metavar="KEY=VALUE", help="of the scenario, landscape.relief=120")
     parser.add_argument("--policy", default="default", metavar="NAME", help="baseline, shipped policy or run folder")
     parser.add_argument("--seed", type=int, default=FIRST_EVALUATED, help="of the fire, %(default)s by default")

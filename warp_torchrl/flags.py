@@ -1,0 +1,14 @@
+"""Flags of the commands that read their command line by ``argparse``: a mistake is one line, as everywhere."""
+
+import argparse
+from typing import NoReturn
+
+MISTAKE = 2
+
+
+class FlagParser(argparse.ArgumentParser):
+    """A parser that tells a mistake in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """End the process with the line and the exit code of a mistake."""
+        self.exit(MISTAKE, f"error: {message}\n")
