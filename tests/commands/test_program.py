@@ -12,6 +12,7 @@ import pytest
 from tests.stress.processes import ROOT, wait_for
 from warp_torchrl.commands.program import one_line_end, run_program
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.interruption import is_command
 
 
 def test_help_is_printed_and_nothing_is_done(capsys):
@@ -74,3 +75,16 @@ def test_a_command_that_still_imports_ends_with_one_line(tmp_path, program, numb
     _, errors = process.communicate(timeout=30)
     assert (process.returncode, errors) == (128 + number, f"error: stopped by signal {number.name}\n")
     assert not list(tmp_path.iterdir())
+
+
+def test_the_worker_of_a_command_is_no_command(monkeypatch):
+    train = str(ROOT / "train.py")
+    monkeypatch.setattr(sys, "argv", [train, "seed=1"])
+    monkeypatch.setattr(sys, "orig_argv", ["python", train, "seed=1"])
+    assert is_command()
+    monkeypatch.setattr(sys, "orig_argv", ["python", "-c", "from multiprocessing.spawn import ...", "--fork"])
+    assert not is_command()
+    monkeypatch.setattr(sys, "argv", ["-m", "seed=1"])
+    for module, is_ours in (("warp_torchrl.live", True), ("warp_torchrl_else", False), ("pytest", False)):
+        monkeypatch.setattr(sys, "orig_argv", ["python", "-m", module, "seed=1"])
+        assert is_command() == is_ours

@@ -74,12 +74,19 @@ def _check(name: str | None, config: DictConfig) -> None:
     overrides = list(config.hydra.overrides.task)
     check_choices(overrides)
     values = plain(OmegaConf.masked_copy(config, [str(key) for key in config if key != "hydra"]))
-    unknown = [str(key) for key in config.hydra if key not in {each.name for each in fields(HydraConf)}]
-    if unknown:
-        raise ConfigError(f"hydra.{unknown[0]} is not a key of the configuration")
+    _check_hydra(list(config.hydra.overrides.hydra))
     if not isinstance(values["debug"], bool):
         raise ConfigError(f"debug must be true or false, got {values['debug']!r}")
     (_check_evaluation if name == "evaluate" else check_training)(values, overrides)
+
+
+def _check_hydra(overrides: Sequence[str]) -> None:
+    """Check that overrides of Hydra's own part name keys that it has: ``+hydra.key`` adds whatever one likes."""
+    known = [f"hydra.{each.name}" for each in fields(HydraConf)]
+    for override in overrides:
+        key = ".".join(override.lstrip("+~").partition("=")[0].split(".")[:2])
+        if key.startswith("hydra.") and key not in known:
+            raise ConfigError(f"{key} is not a key of the configuration{did_you_mean(key, known)}")
 
 
 def check_training(values: Mapping[str, Any], overrides: Sequence[str]) -> None:

@@ -65,11 +65,14 @@ def compose_config(name: str, overrides: Sequence[str] = ()) -> DictConfig:
 def _check_keys(config: DictConfig, name: str) -> None:
     """Check that a configuration has no key that ``conf/<name>.yaml`` has not: ``+key`` adds whatever one likes."""
     folder = conf_folder()
-    known = [str(key) for key in _composed(folder, _last_change(folder), name, ())]
-    for key in map(str, config):
+    plainly = _composed(folder, _last_change(folder), name, ())
+    known = sorted(map(str, plainly))
+    for key, value in ((str(key), value) for key, value in config.items_ex(resolve=False)):
         if key not in known:
-            has = f"it has {', '.join(sorted(known))}"
-            raise ConfigError(f"{key} is not a key of the configuration; {has}{did_you_mean(key, known)}")
+            hint = did_you_mean(key, known)
+            raise ConfigError(f"{key} is not a key of the configuration; it has {', '.join(known)}{hint}")
+        if OmegaConf.is_dict(value) and not OmegaConf.is_dict(plainly._get_node(key)):
+            raise ConfigError(f"{key} must be a value, got {OmegaConf.to_container(value)}")
 
 
 def choices(overrides: Sequence[str]) -> dict[str, str]:
