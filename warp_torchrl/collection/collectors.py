@@ -165,8 +165,9 @@ class Ray(MultiProcess):
 
     def backend(self) -> dict[str, Any]:
         """Return the backend and its options for TorchRL's collector."""
+        here = {"_node_ip_address": "127.0.0.1"} if self.address is None else {}  # a Ray of its own listens here alone
         options = {
-            "ray_init_config": {"address": self.address, "log_to_driver": False},
+            "ray_init_config": {"address": self.address, "log_to_driver": False, **here},
             "remote_configs": {"num_cpus": self.cpus, "num_gpus": self.gpus},
             "collector_kwargs": {"auto_register_policy_transforms": False},
         }

@@ -27,7 +27,7 @@ from warp_torchrl.config.groups import COMPONENTS
 from warp_torchrl.config.renamed import renamed_overrides
 from warp_torchrl.config.saved_config import SavedConfig, restore, world_overrides
 from warp_torchrl.evaluation.evaluate import evaluate_policy
-from warp_torchrl.parent import is_orphaned
+from warp_torchrl.parent import SECONDS_TO_SAVE, end_with, is_orphaned
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs import disk
 from warp_torchrl.runs.destination import check_free
@@ -187,6 +187,8 @@ def _run(name: str, job: Callable[[DictConfig], None]) -> None:
     keep_freed_memory()
     if not debug:
         logging.getLogger("torchrl").setLevel(logging.WARNING)  # it prints a line for each of its buffers
+    if parallel.is_torchrun():
+        end_with(os.getppid(), SECONDS_TO_SAVE)
     with exit_on_signal():
         try:
             _check_grammar(arguments)
