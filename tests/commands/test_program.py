@@ -1,15 +1,13 @@
 """Entry and exit of the commands."""
 
 import os
-import re
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-from tests.stress.processes import ROOT, wait_for
+from tests.stress.processes import ROOT, catches, wait_for
 from warp_torchrl.commands.program import one_line_end, run_program
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.interruption import is_command
@@ -52,12 +50,6 @@ def test_an_error_of_a_command_with_flags_is_one_line_and_an_exit_code(capsys):
     with pytest.raises(SystemExit) as end, one_line_end():
         raise ConfigError("this is\nwrong")
     assert end.value.code == 2 and capsys.readouterr().err == "error: this is wrong\n"
-
-
-def catches(process, number):
-    """Whether a process has a handler of a signal: Python has none of SIGTERM, ours is the first."""
-    caught = re.search(r"SigCgt:\s*(\w+)", Path(f"/proc/{process.pid}/status").read_text())
-    return bool(int(caught[1], 16) >> (number - 1) & 1)
 
 
 @pytest.mark.parametrize("program", [["-m", "warp_torchrl.predict"], [str(ROOT / "train.py"), "total_frames=64"]])

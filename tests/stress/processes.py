@@ -1,6 +1,7 @@
 """Tiny trainings in processes of their own, to be signalled, killed and watched."""
 
 import os
+import re
 import subprocess
 import sys
 import time
@@ -66,3 +67,9 @@ def rows(run: Path) -> int:
     """Return how many rows ``metrics.csv`` has."""
     path = run / "metrics.csv"
     return max(len(path.read_text(errors="replace").splitlines()) - 1, 0) if path.exists() else 0
+
+
+def catches(process: subprocess.Popen, number: int) -> bool:
+    """Return whether a process has a handler of a signal: of SIGTERM Python has none, and our commands have one."""
+    caught = re.search(r"SigCgt:\s*(\w+)", Path(f"/proc/{process.pid}/status").read_text())
+    return bool(int(caught[1], 16) >> (number - 1) & 1)

@@ -1,11 +1,15 @@
 """Signals to real processes: exit codes, seconds to the exit, nothing left behind."""
 
+import os
+import random
 import signal
+import subprocess
+import sys
 import time
 
 import pytest
 
-from tests.stress.processes import TINY, alive, finish, rows, start, wait_for
+from tests.stress.processes import ROOT, TINY, alive, catches, finish, rows, start, wait_for
 from warp_torchrl.runs.checkpoint import newest
 
 pytestmark = pytest.mark.stress
@@ -32,7 +36,11 @@ def wait_until_alone(session):
 
 
 @pytest.mark.parametrize("collector", COLLECTORS)
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGUSR1], ids=lambda each: each.name)
+@pytest.mark.parametrize(
+    "number",
+    [signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGUSR1, signal.SIGUSR2],
+    ids=lambda each: each.name,
+)
 def test_a_signal_in_training(tmp_path, number, collector, capfd):
     process = start(tmp_path, *LONG, *COLLECTORS[collector])
     wait_for(lambda: rows(tmp_path / "run") > 5, process)
@@ -83,3 +91,38 @@ def test_a_killed_run_leaves_no_workers_and_lets_go_of_its_folder(tmp_path, capf
     wait_for(lambda: "resumed" in (tmp_path / "run" / "train.log").read_text(), again)
     again.send_signal(signal.SIGTERM)
     ended(again, tmp_path, signal.SIGTERM)
+
+
+COMMANDS = {
+    "evaluate": ["evaluate.py", "policy=local", "scenario=skirmish", "evaluation.episodes=4000", "hydra.run.dir=seen"],
+    "correct": ["-m", "warp_torchrl.correct", "policy=skirmish", "out=people", "episodes=1000"],
+    "live": ["-m", "warp_torchrl.live", "policy=local", "scenario=skirmish", "port=0"],
+    "search": ["-m", "warp_torchrl.search", "search=ppo", "scenario=skirmish", "search.out=found"],
+    "benchmark": ["-m", "warp_torchrl.benchmark", "env", "--repeats", "99"],
+    "gallery": ["-m", "warp_torchrl.gallery", "--out", "figures"],
+    "processes": ["train.py", *LONG, "processes=2"],
+}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_signal_at_any_moment_of_any_command_is_one_line(tmp_path, name):
+    draws = random.Random(name)
+    for number in (signal.SIGINT, signal.SIGTERM) * 2:
+        folder = tmp_path / str(len(list(tmp_path.iterdir())))
+        folder.mkdir()
+        first, *given = COMMANDS[name]
+        program = [first, given.pop(0)] if first == "-m" else [str(ROOT / first)]
+        with (folder / "stderr").open("w") as errors:
+            process = subprocess.Popen(
+                [sys.executable, *program, *given],
+                cwd=folder,
+                env={**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)},
+                stdout=subprocess.DEVNULL,
+                stderr=errors,
+                start_new_session=True,
+            )
+        wait_for(lambda caught=process: catches(caught, signal.SIGTERM), process)
+        time.sleep(draws.uniform(0.0, 20.0))
+        process.send_signal(number)
+        ended(process, folder, number)
+        assert "Traceback" not in (folder / "stderr").read_text()
