@@ -26,7 +26,8 @@ from warp_torchrl.runs.manifest import (
     read_manifest,
     write_manifest,
 )
-from warp_torchrl.runs.sealed import first_line, read_json
+from warp_torchrl.runs.sealed import Unsound, first_line, read_json
+from warp_torchrl.runs.tensors import check_finite
 
 __all__ = [
     "MANIFEST",
@@ -62,11 +63,11 @@ class Checkpoint:
         return SavedConfig(choices=choices, values=renamed_values(values))
 
     def policy(self) -> dict[str, torch.Tensor]:
-        """Return the policy's parameters."""
+        """Return the policy's parameters, all of them finite."""
         return self._load("policy.pt")
 
     def training(self) -> dict[str, Any]:
-        """Return the training state, for a resume."""
+        """Return the training state, for a resume; all its numbers are finite."""
         self.check_goes_on()
         return self._load(TRAINING)
 
@@ -85,10 +86,16 @@ class Checkpoint:
             raise CheckpointError(f"{self.path} holds a policy alone: it acts, and nothing goes on from it")
 
     def _load(self, name: str) -> dict[str, Any]:
-        try:
-            return torch.load(self.path / name, weights_only=True, map_location="cpu")
-        except Exception as error:
-            raise CheckpointError(f"{self.path / name} cannot be read: {first_line(error)}") from None
+        path = self.path / name
+        with of_a_checkpoint():
+            try:
+                content = torch.load(path, weights_only=True, map_location="cpu")
+                check_finite(path, content)
+            except Unsound:
+                raise
+            except Exception as error:
+                raise CheckpointError(f"{path} cannot be read: {first_line(error)}") from None
+        return content
 
 
 def save(

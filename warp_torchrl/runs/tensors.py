@@ -1,0 +1,44 @@
+"""Tensors that a file holds: none of their numbers may be NaN or infinite."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from torch import Tensor
+
+from warp_torchrl.runs.sealed import Unsound
+
+
+def check_finite(path: Path, content: Any) -> None:
+    """Check that all numbers that a file holds are finite.
+
+    Args:
+        path: The file.
+        content: Tensors and plain values, in nested mappings and sequences.
+
+    Raises:
+        Unsound: If one is not; the message names the file and the first such tensor.
+    """
+    for name, value in numbers(content):
+        if (found := not_finite(value)) is not None:
+            raise Unsound(f"{path} must hold finite numbers alone, and {name} holds {found:g}")
+
+
+def not_finite(value: Tensor | float) -> float | None:
+    """Return a number of a tensor, or a number itself, that is NaN or infinite; None where all are finite."""
+    if not isinstance(value, Tensor):
+        return None if math.isfinite(value) else value
+    if not value.is_floating_point() or not value.numel():
+        return None
+    ends = value.detach().aminmax()  # NaN if any number is; unlike a mask it takes no memory
+    return next((end for end in map(float, ends) if not math.isfinite(end)), None)
+
+
+def numbers(content: Any, prefix: str = "") -> Iterator[tuple[str, Tensor | float]]:
+    """Yield each tensor and each plain floating-point number of nested mappings and sequences, by its name."""
+    if isinstance(content, Tensor | float):
+        yield prefix or "it", content
+    elif isinstance(content, dict | list | tuple):
+        for name, each in content.items() if isinstance(content, dict) else enumerate(content):
+            yield from numbers(each, f"{prefix}.{name}" if prefix else str(name))
