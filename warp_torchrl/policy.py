@@ -30,6 +30,7 @@ from warp_torchrl.models.canonical import Canonicalise
 from warp_torchrl.models.fitting import fitted
 from warp_torchrl.models.networks import AgentNetworks
 from warp_torchrl.models.signature import observation_key
+from warp_torchrl.modes import apart
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.state import Action
 
@@ -92,12 +93,14 @@ class TrainedPolicy(TensorDictModuleBase):
         """Return whether its agents exchange messages."""
         return RADIO in self.in_keys
 
+    @apart
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write the team's actions, int64 [B, A]."""
         own = set_exploration_type(MODES[self.mode]) if exploration_type() is None else nullcontext()
         with own:
             return tensordict.update(self.module(tensordict.copy()).select(*self.out_keys, strict=False))
 
+    @apart
     def probabilities(self, acted: TensorDictBase) -> Tensor | None:
         """Return how likely each action was; None of a policy that acts by values.
 
@@ -126,10 +129,10 @@ class NumpyPolicy:
     Each agent's action depends on its own observation and mask alone, so it takes one agent, a team, or a batch of
     worlds. A policy whose agents talk (``model.messages``) needs the whole team, in the order of ``possible_agents``,
     and infos, which tell whom each hears, and what each observed when it sent what comes late. A policy with a network
-    for each agent (``sharing: none``) needs the whole team likewise. A policy with a network for each role
-    (``sharing: role``) reads the role from the agent's name (``bulldozer_0``), or from its ``self`` if it has no name;
-    one with a network for each agency (``sharing: agency``) reads the agency from ``self``. A recurrent policy
-    (``memory``) keeps a hidden state for each name; agents without names need a ``numpy_policy()`` each.
+    for each agent (``sharing: none``) needs the whole team likewise. A policy with a network for each role (``sharing:
+    role``) reads the role from the agent's name (``bulldozer_0``), or from its ``status`` if it has no name; one with a
+    network for each agency (``sharing: agency``) reads the agency from ``status``. A recurrent policy (``memory``)
+    keeps a hidden state for each name; agents without names need a ``numpy_policy()`` each.
 
     Args:
         policy: Acts in its own mode; sampled actions use torch's generator.
@@ -219,9 +222,9 @@ class NumpyPolicy:
         if self._policy.talks:
             read |= self._of_radio(who, info)
         if self._by_role:
-            read[ROLE] = np.full(mask.shape[:-1], self._role(name, entries.get("self")))
+            read[ROLE] = np.full(mask.shape[:-1], self._role(name, entries.get("status")))
         if self._by_agency:
-            read[AGENCY] = self._agency(entries.get("self"))
+            read[AGENCY] = self._agency(entries.get("status"))
         return read
 
     def _of_radio(self, who: str, info: Mapping[str, Any]) -> dict[Any, np.ndarray]:
@@ -259,7 +262,7 @@ class NumpyPolicy:
         return torch.stack([each if each.shape == nothing.shape else nothing for each in known], dim=-2)
 
     def _role(self, name: str, own: np.ndarray | None) -> int:
-        """Return the index of an agent's role, from its name or else from its ``self``."""
+        """Return the index of an agent's role, from its name or else from its ``status``."""
         kind = name.rpartition("_")[0]
         if kind in self._role_index:
             return self._role_index[kind]
@@ -268,13 +271,13 @@ class NumpyPolicy:
                 f"this policy has a network for each role: observations must be in a dict by agent, such as "
                 f"{{'{next(iter(self._role_index))}_0': ...}}, got {name or 'one without a name'}"
             )
-        told = self._entries["self"].names
+        told = self._entries["status"].names
         columns = [told.index(f"role_{role}") for role in self._policy.shown.roles]
         return int(np.asarray(own)[..., columns].reshape(-1, len(columns))[0].argmax())
 
     def _agency(self, own: np.ndarray | None) -> np.ndarray:
-        """Return the index of the agency that an agent serves, int64 [] or [B], from its ``self``."""
+        """Return the index of the agency that an agent serves, int64 [] or [B], from its ``status``."""
         if own is None:
             raise ValueError("this policy has a network for each agency: observations must have self, which tells it")
-        told = self._entries["self"].names
+        told = self._entries["status"].names
         return np.asarray(own)[..., [told.index(name) for name in self._policy.shown.agencies]].argmax(-1)

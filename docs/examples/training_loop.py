@@ -11,7 +11,7 @@ from torchrl.objectives.multiagent import MAPPOLoss
 
 from warp_torchrl import make_env
 
-SEEN = [("agents", "observation", name) for name in ("view", "self", "picture")]
+SEEN = [("agents", "observation", name) for name in ("view", "status", "picture")]
 NAMES = ("action", "sample_log_prob", "reward", "value", "advantage", "value_target")
 LOGITS, MASK = ("agents", "logits"), ("agents", "action_mask")
 KEYS = {name: ("agents", name) for name in NAMES}

@@ -74,7 +74,7 @@ def test_the_flat_layout_is_one_vector_beside_the_mask(observation):
         assert (vector["action_mask"] == mask).all() and "action_mask" not in others["bulldozer_1"]
         if observation == "surroundings":
             bytes_as_shares = {name: one[name].ravel() / np.float32(255) for name in ("picture", "view")}
-            joined = np.concatenate([bytes_as_shares["picture"], one["self"], bytes_as_shares["view"]])
+            joined = np.concatenate([bytes_as_shares["picture"], one["status"], bytes_as_shares["view"]])
             assert (vector["observation"] == joined).all() and space["observation"].high.max() == 3.0
         seen, _, _, _, infos = named.step(idle(named))
         vectors, _, _, _, others = flat.step(idle(flat))

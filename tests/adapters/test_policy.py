@@ -151,20 +151,20 @@ def test_mistakes_are_told_in_one_line():
     flat, infos = parallel_env("hetero", observation="paper").reset()
     one, vector = seen["uav_0"], parallel_env("hetero", layout="flat").reset()[0]["uav_0"]
     for call, message in [
-        (lambda: policy.numpy_policy()({"view": one["view"]}), "must have action_mask, picture, self, got view"),
+        (lambda: policy.numpy_policy()({"view": one["view"]}), "must have action_mask, picture, status, got view"),
         (
-            lambda: policy.numpy_policy()({**one, "self": one["self"][:5]}),
-            r"self must be float32 of shape \[26\], got .* \[5\]",
+            lambda: policy.numpy_policy()({**one, "status": one["status"][:5]}),
+            r"status must be float32 of shape \[26\], got .* \[5\]",
         ),
         (lambda: policy.numpy_policy()({**one, "view": one["view"] / 255}), "view must be uint8 of shape .* float64"),
-        (lambda: policy.numpy_policy()(flat["uav_0"]), "observation must be a dict of picture, self, view"),
+        (lambda: policy.numpy_policy()(flat["uav_0"]), "observation must be a dict of picture, status, view"),
         (
             lambda: policy.numpy_policy()({"uav_0": {**vector, "observation": vector["observation"][1:]}}),
             r"observation of uav_0 must be float32 of shape \[..., 2032\], got float32 \[2031\]",
         ),
         (
             lambda: policy.numpy_policy()({"observation": vector["observation"]}),
-            "observation must have action_mask, got observation, picture, self, view",
+            "observation must have action_mask, got observation, picture, status, view",
         ),
         (lambda: of_paper.numpy_policy()(flat), "info of .* must have action_mask"),
         (lambda: of_paper.numpy_policy()(flat["uav_0"], infos["uav_0"]), "a network for each role"),

@@ -120,7 +120,7 @@ def test_an_agent_acts_on_what_it_sees_and_on_nothing_else(make_small_env, name,
     assert "state" not in policy.in_keys
     other = now.clone()
     other["state"] = torch.rand_like(other["state"])
-    for key in ("view", "self", "picture"):
+    for key in ("view", "status", "picture"):
         entry = other[(*OBSERVATION, key)]
         entry[:, 1:] = (255 - entry[:, 1:]) if entry.dtype == torch.uint8 else torch.rand_like(entry[:, 1:])
     other[ACTION_MASK][:, 1:, :8] ^= True

@@ -82,7 +82,7 @@ def test_other_recordings_have_another_digest(recording, tmp_path):
 @pytest.mark.parametrize(
     ("recorded", "run", "said"),
     [
-        ([], ["observation=paper"], "other observation entries .*: with picture, self, view and without a single"),
+        ([], ["observation=paper"], "other observation entries .*: with picture, status, view and without a single"),
         (
             ["observation.radius=3"],
             [],

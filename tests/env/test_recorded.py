@@ -55,7 +55,7 @@ def test_recorded_worlds_are_those_of_steps(overrides):
 
 @pytest.mark.parametrize("overrides", SCENARIOS, ids=" ".join)
 def test_no_size_in_a_step_depends_on_a_result(overrides, monkeypatch):
-    for module in ("own", "critic"):  # a CPU alone looks at the codes, and refuses those out of range
+    for module in ("status", "critic"):  # a CPU alone looks at the codes, and refuses those out of range
         monkeypatch.setattr(f"warp_torchrl.observation.{module}.one_hot", one_hot)
     with unread():
         env = env_of(overrides)

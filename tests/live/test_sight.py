@@ -34,8 +34,8 @@ def test_a_channel_is_dark_where_it_shows_its_least_and_bright_where_it_shows_it
 
 def test_numbers_have_their_names(side):
     told = sight.numbers(side, 1)
-    seen = sight.entries(side, 1)["self"]
-    assert list(told) == list(side.env.channel_names["self"]) and np.allclose(list(told.values()), seen)
+    seen = sight.entries(side, 1)["status"]
+    assert list(told) == list(side.env.channel_names["status"]) and np.allclose(list(told.values()), seen)
     assert told["time_left"] == 1.0
 
 

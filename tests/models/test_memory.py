@@ -41,7 +41,7 @@ MODELS = {
     "none": Mlp(**SMALL, sharing="none"),
     "cnn": Cnn(**SMALL, channels=(4,)),
 }
-OWN = (*OBSERVATION, "self")
+OWN = (*OBSERVATION, "status")
 
 
 def lively(module):
@@ -212,7 +212,7 @@ def test_numpy_agents_remember_by_name(make_env):
         seen = {
             name: {
                 "action_mask": batch[ACTION_MASK][0, step, index].numpy(),
-                **{key: batch[(*OBSERVATION, key)][0, step, index].numpy() for key in ("view", "self", "picture")},
+                **{key: batch[(*OBSERVATION, key)][0, step, index].numpy() for key in ("view", "status", "picture")},
             }
             for index, name in enumerate(env.agent_names)
         }

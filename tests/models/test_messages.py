@@ -33,7 +33,7 @@ MODELS = {
     "two rounds": Mlp(**SMALL, message_rounds=2),
     "cnn": Cnn(**SMALL, channels=(4,)),
 }
-OWN = (*OBSERVATION, "self")
+OWN = (*OBSERVATION, "status")
 
 
 @pytest.fixture
@@ -213,7 +213,7 @@ def make_late_env(make_small_env):
 
 
 LATE = {name: model for name, model in MODELS.items() if model.message_rounds == 1}
-SENT_SELF = (*SENT, "self")
+SENT_STATUS = (*SENT, "status")
 
 
 def after_steps(env, steps):
@@ -255,7 +255,7 @@ def test_a_team_that_has_stood_still_hears_late_what_it_hears_at_once(make_late_
     assert all(torch.equal(one, other) for one, other in zip(ours.parameters(), theirs.parameters(), strict=True))
     assert torch.equal(ours(now.clone())[LOGITS], theirs(now.exclude(SENT))[LOGITS])
     changed = now.clone()
-    changed[SENT_SELF] += 0.5
+    changed[SENT_STATUS] += 0.5
     assert not torch.equal(ours(changed)[LOGITS], ours(now)[LOGITS])
 
 
@@ -265,7 +265,7 @@ class Twitches(Surroundings):
 
     def __call__(self, state, world, forecast):
         shown = super().__call__(state, world, forecast)
-        shown["self"][:, 0] += 0.5 * (state.step == 1)[:, None]
+        shown["status"][:, 0] += 0.5 * (state.step == 1)[:, None]
         return shown
 
 

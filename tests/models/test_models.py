@@ -55,7 +55,7 @@ def test_a_central_critic_sees_the_state_and_what_each_agent_sees(make_small_env
         other["state"] = other["state"] + 1.0
         assert (critic(other)[VALUE] != before).all() if central else (critic(other)[VALUE] == before).all()
         other = now.clone()
-        other[(*OBSERVATION, "self")][:, 1] += 1.0
+        other[(*OBSERVATION, "status")][:, 1] += 1.0
         assert (critic(other)[VALUE][:, 0] == before[:, 0]).all() and (critic(other)[VALUE][:, 1] != before[:, 1]).all()
 
 
@@ -80,7 +80,7 @@ def test_an_actor_sees_only_its_own_observation(make_small_env):
     env = make_small_env(3)
     actor, now = Mlp().actor(signature(env)), env.reset()
     before = actor(now.clone())[LOGITS]
-    for name in ("view", "self", "picture"):
+    for name in ("view", "status", "picture"):
         now[(*OBSERVATION, name)][:, 1] = torch.ones_like(now[(*OBSERVATION, name)][:, 1])
     now["state"] = torch.randn_like(now["state"])
     after = actor(now)[LOGITS]

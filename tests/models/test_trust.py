@@ -24,8 +24,8 @@ def test_the_advised_action_gains_by_the_size_of_the_team():
     names = ("rule_team", "advice_north", "advice_stay")
     told = torch.tensor([[[0.25, 0.0, 1.0], [0.25, 1.0, 0.0]], [[0.0, 0.0, 1.0], [0.125, 0.0, 1.0]]])
     logits = torch.tensor([[[1.0, 2.0]] * 2] * 2)
-    shown = TensorDict({"agents": {"logits": logits, "self": told}}, batch_size=2)
-    trust = Trust(("agents", "self"), names, ("stay", "north"), 0.5)
+    shown = TensorDict({"agents": {"logits": logits, "status": told}}, batch_size=2)
+    trust = Trust(("agents", "status"), names, ("stay", "north"), 0.5)
     # log2(A) is 8 x 0.25 = 2 in teams of four, 0 of a single vehicle, 1 in teams of two.
     assert trust(shown)[LOGITS].tolist() == [[[2.0, 2.0], [1.0, 3.0]], [[1.0, 2.0], [1.5, 2.0]]]
 

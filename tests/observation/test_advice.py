@@ -27,7 +27,7 @@ def test_advice_is_what_the_adviser_would_have_the_agent_do(scenario, adviser):
     policy, shown, acts = HEURISTICS[adviser](env), env.reset(), set()
     for _ in range(25):
         action = policy(shown.clone())["agents", "action"]
-        advised = shown["agents", "observation", "self"][..., -len(Action) :]
+        advised = shown["agents", "observation", "status"][..., -len(Action) :]
         assert torch.equal(advised.argmax(dim=-1), action) and torch.equal(advised.sum(dim=-1), torch.ones(6, 4))
         acts |= set(action.flatten().tolist())
         shown = env.step_and_maybe_reset(env.rand_action(shown))[1]
@@ -39,7 +39,7 @@ def test_a_team_that_takes_advice_saves_what_its_adviser_saves():
     other = make_env("skirmish", n_worlds=6, overrides=["horizon=48"])
     policy, led, alone = HEURISTICS["dispatch"](other), env.reset(), other.reset()
     for _ in range(48):
-        advised = led["agents", "observation", "self"][..., -len(Action) :].argmax(dim=-1)
+        advised = led["agents", "observation", "status"][..., -len(Action) :].argmax(dim=-1)
         led = env.step(led.set(("agents", "action"), advised))["next"]
         alone = other.step(policy(alone))["next"]
     assert torch.equal(led["info", "saved"], alone["info", "saved"]) and (led["info", "saved"] > 0.5).any()
@@ -47,7 +47,7 @@ def test_a_team_that_takes_advice_saves_what_its_adviser_saves():
 
 def test_advice_comes_last_by_name_and_on_request_alone():
     def told_of(*overrides):
-        return signature(make_env("water", n_worlds=1, overrides=[*overrides])).observation["self"]
+        return signature(make_env("water", n_worlds=1, overrides=[*overrides])).observation["status"]
 
     rules = ("observation.rules=true", "observation.water=true")
     assert told_of("observation.advice=greedy").names == (*told_of().names, *NAMES)
@@ -56,7 +56,7 @@ def test_advice_comes_last_by_name_and_on_request_alone():
 
 def test_an_advised_move_turns_with_the_map():
     """On a map turned by a quarter to the right, what led north leads east."""
-    part = signature(env_of("default", "dispatch", n_worlds=1)).observation["self"].symmetry.parts[-1]
+    part = signature(env_of("default", "dispatch", n_worlds=1)).observation["status"].symmetry.parts[-1]
     assert part.kind == "actions" and part.names == NAMES
     advised = torch.eye(len(NAMES))
     ways = Orientation(torch.arange(8)[:, None].expand(-1, len(NAMES)))
@@ -67,7 +67,7 @@ def test_an_advised_move_turns_with_the_map():
 
 def test_a_team_without_the_action_to_stay_has_its_place_empty():
     env = env_of("skirmish", "dispatch", "team.allow_stay=false")
-    advised = env.reset()["agents", "observation", "self"][..., -len(Action) :]
+    advised = env.reset()["agents", "observation", "status"][..., -len(Action) :]
     assert advised.shape[-1] == len(Action) and not advised[..., Action.STAY].any() and (advised.sum(dim=-1) == 1).all()
 
 

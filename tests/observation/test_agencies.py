@@ -50,8 +50,8 @@ def test_the_picture_tells_the_share_of_each_block():
 
 def test_a_vehicle_knows_whom_it_serves():
     world, state = worlds(own=1)
-    own = shown(Local(), state, world)["self"]
-    assert Local().spaces(world)["self"].names[-2:] == ("agency_0", "agency_1")
+    own = shown(Local(), state, world)["status"]
+    assert Local().spaces(world)["status"].names[-2:] == ("agency_0", "agency_1")
     assert own[0, :, -2:].tolist() == [[1, 0], [0, 1], [1, 0], [0, 1]]
 
 

@@ -83,7 +83,7 @@ def test_a_world_that_shows_all_shows_the_same_fire_to_who_sees_all():
     for _ in range(8):
         ours["agents", "action"] = theirs["agents", "action"] = torch.randint(0, 11, (3, 2))
         ours, theirs = first.step(ours)["next"], second.step(theirs)["next"]
-        for name in ("view", "self"):
+        for name in ("view", "status"):
             assert torch.equal(ours["agents", "observation", name], theirs["agents", "observation", name])
         picture = ours["agents", "observation", "picture"]
         assert torch.equal(picture[:, :, :3], theirs["agents", "observation", "picture"])
@@ -164,13 +164,13 @@ def test_threat_is_not_told_of_what_may_not_be_known():
 def test_a_battery_is_shown_where_it_runs_down():
     plain = make_env("scouts", n_worlds=2)
     env = make_env("scouts", n_worlds=2, overrides=["team.flight.battery=10"])
-    names = env.channel_names["self"]
-    assert names == (*plain.channel_names["self"], "battery")
+    names = env.channel_names["status"]
+    assert names == (*plain.channel_names["status"], "battery")
     now = env.reset()
     policy = HEURISTICS["oldest"](env)
     for _ in range(3):
         now = env.step(policy(now))["next"]
-    shown = now["agents", "observation", "self"][..., -1]
+    shown = now["agents", "observation", "status"][..., -1]
     assert torch.equal(shown, env.world_state.vehicles.battery / 10.0)
     assert shown[0].tolist() == pytest.approx([0.7, 1.0, 0.7, 1.0])  # scouts fly, bulldozers do not
 

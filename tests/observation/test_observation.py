@@ -13,8 +13,8 @@ from warp_torchrl.observation import (
     Paper,
     Surroundings,
     egocentric_view,
-    own_vector,
     picture,
+    status_vector,
 )
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.terrain.array import Array
@@ -113,7 +113,7 @@ def test_elevation_is_relative_to_the_agent():
 
 def test_an_agent_knows_its_place_the_time_and_the_wind():
     state, world = drawn([[5] * 5] * 5, [[4, 0]])
-    row, column, time_left, east, north, to_tick, tank, has_tank = own_vector(state, world)[0, 0, :8].tolist()
+    row, column, time_left, east, north, to_tick, tank, has_tank = status_vector(state, world)[0, 0, :8].tolist()
     assert (row, column, time_left, to_tick) == (1.0, 0.0, 1.0, 1.0)
     assert (east, north) == pytest.approx((0.5, 0.0), abs=1e-6)  # 10 of 20 m/s
     assert (tank, has_tank) == (1.0, 0.0)
@@ -124,14 +124,14 @@ def test_an_agent_knows_the_wind_of_its_own_cell():
     row, column = torch.meshgrid(torch.arange(5.0), torch.arange(6.0), indexing="ij")
     state, world = drawn([[5] * 6] * 5, [[4, 0], [1, 5], [2, 3]])
     state = in_wind(state, world.fire, torch.stack((column, 2.0 * row))[None])
-    wind = own_vector(state, world)[0, :, 3:5] * 20.0
+    wind = status_vector(state, world)[0, :, 3:5] * 20.0
     torch.testing.assert_close(wind, torch.tensor([[0.0, 8.0], [5.0, 2.0], [3.0, 4.0]]))
 
 
 def test_the_last_action_is_remembered():
     state, world = drawn([[5] * 5] * 5, [[4, 0]])
-    before = own_vector(state, world)[0, 0, -11:]
-    after = own_vector(world.step(state, torch.tensor([[8]])).after, world)[0, 0, -11:]
+    before = status_vector(state, world)[0, 0, -11:]
+    after = status_vector(world.step(state, torch.tensor([[8]])).after, world)[0, 0, -11:]
     assert before.sum() == 0 and after.tolist() == [0] * 8 + [1, 0, 0]
 
 
@@ -222,10 +222,10 @@ def test_a_radius_out_of_range_is_refused(preset, radius):
 def test_agents_know_their_place_in_the_team_where_asked(preset):
     state, world = drawn([[5] * 6] * 6, [[2, 2], [2, 2], [2, 2], [2, 2]])
     without, told = (preset(radius=1, identity=asked) for asked in (False, True))
-    assert told.spaces(world)["self"].shape == (without.spaces(world)["self"].shape[0] + 4,)
-    own = told(state, world, world.forecast(state))["self"]
-    assert own.shape == (1, 4, *told.spaces(world)["self"].shape)
-    assert torch.equal(own[..., :-4], without(state, world, world.forecast(state))["self"])
+    assert told.spaces(world)["status"].shape == (without.spaces(world)["status"].shape[0] + 4,)
+    own = told(state, world, world.forecast(state))["status"]
+    assert own.shape == (1, 4, *told.spaces(world)["status"].shape)
+    assert torch.equal(own[..., :-4], without(state, world, world.forecast(state))["status"])
     half = 0.5**0.5  # places 1/8, 3/8, 5/8 and 7/8 of a turn
     by_hand = [[half, half, 0.0, 1.0], [-half, half, 0.0, -1.0], [-half, -half, 0.0, 1.0], [half, -half, 0.0, -1.0]]
     torch.testing.assert_close(own[0, :, -4:], torch.tensor(by_hand), atol=1e-6, rtol=0.0)

@@ -13,7 +13,7 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION, OBSERVATION
 from warp_torchrl.observation import STATE, Surroundings
-from warp_torchrl.observation.own import IDENTITY, SELF
+from warp_torchrl.observation.status import IDENTITY, STATUS
 from warp_torchrl.shipped import policy_names
 from warp_torchrl.symmetry import ADVICE
 from warp_torchrl.world.abilities import ABILITIES, Ability, Deed, Situation, ability
@@ -110,9 +110,9 @@ def test_two_deeds_at_one_tree_are_one() -> None:
 def test_a_team_s_own_roles_and_actions_come_last_in_self(allow_stay: bool) -> None:
     crew = team(3, allow_stay=allow_stay)
     env = WildfireEnv(small_world(team=crew), observation=Surroundings(identity=True), n_worlds=2)
-    names = env.channel_names["self"]
+    names = env.channel_names["status"]
     assert names == (
-        *SELF.names,
+        *STATUS.names,
         *IDENTITY.names,
         "role_sprinkler",
         "last_sprinkle",
@@ -120,10 +120,10 @@ def test_a_team_s_own_roles_and_actions_come_last_in_self(allow_stay: bool) -> N
         "last_jump_back",
     )
     now = env.reset()
-    assert now[(*OBSERVATION, "self")][..., names.index("role_sprinkler")].tolist() == [[0.0, 1.0, 0.0]] * 2
+    assert now[(*OBSERVATION, "status")][..., names.index("role_sprinkler")].tolist() == [[0.0, 1.0, 0.0]] * 2
     for action, name in enumerate(crew.action_names):
         now[ACTION] = torch.full((2, 3), action)
-        own = env.step(now)["next"][(*OBSERVATION, "self")]
+        own = env.step(now)["next"][(*OBSERVATION, "status")]
         last = [each for each in names if each.startswith("last_")]
         assert (own[..., names.index(f"last_{name}")] == 1.0).all()
         assert (own[..., [names.index(each) for each in last]].sum(-1) == 1.0).all()
@@ -147,13 +147,13 @@ def test_a_shipped_policy_plays_beside_roles_and_actions_that_it_does_not_know(n
     now = there.reset()
     assert torch.equal(policy.fitted(there)(now.clone())[ACTION], policy(now.clone())[ACTION])
     alike, wide = now, here.reset()
-    names = {env: env.channel_names["self"] for env in (there, here)}
+    names = {env: env.channel_names["status"] for env in (there, here)}
     further = [place for place, name in enumerate(names[here]) if name not in names[there]]
     assert sum(not names[here][place].startswith(ADVICE) for place in further) == 4
     known = [place for place in range(len(names[here])) if place not in further]
     assert [names[here][place] for place in known] == list(names[there])
-    wide[(*OBSERVATION, "self")][..., known] = alike[(*OBSERVATION, "self")]
-    for entry in set(there.channel_names) - {"self"}:
+    wide[(*OBSERVATION, "status")][..., known] = alike[(*OBSERVATION, "status")]
+    for entry in set(there.channel_names) - {"status"}:
         wide[(*OBSERVATION, entry)] = alike[(*OBSERVATION, entry)]
     wide["agents", "action_mask"][..., :11] = alike["agents", "action_mask"]
     assert torch.equal(policy.fitted(here)(wide)[ACTION], policy(alike)[ACTION])

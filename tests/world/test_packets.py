@@ -46,11 +46,11 @@ def test_steps_move_up_where_worlds_go_on():
 
 def test_tensors_of_any_names_are_a_batch():
     packets = Packets(
-        torch.zeros(2, 1, 3, 3), torch.zeros(2, 1, 3, 2), shown=Named({"": torch.arange(2), "self": torch.arange(2)})
+        torch.zeros(2, 1, 3, 3), torch.zeros(2, 1, 3, 2), shown=Named({"": torch.arange(2), "status": torch.arange(2)})
     )
-    assert [*packets.leaves()] == ["links", "places", "shown.", "shown.self"]
+    assert [*packets.leaves()] == ["links", "places", "shown.", "shown.status"]
     both = concatenated([packets, packets])[torch.tensor([1, 2])]
-    assert both.shown.tensors["self"].tolist() == [1, 0] and both.links.shape == (2, 1, 3, 3)
+    assert both.shown.tensors["status"].tolist() == [1, 0] and both.links.shape == (2, 1, 3, 3)
 
 
 def test_a_packet_reaches_those_that_heard_its_sender_when_it_was_sent():

@@ -20,7 +20,7 @@ Observation = np.ndarray | dict[str, np.ndarray]
 class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
     """One world, whose team acts at once (the paper's name for it).
 
-    An agent's observation is a flat ``Dict`` of ``view`` uint8 [C, V, V], ``self`` float32 [F], ``picture`` uint8
+    An agent's observation is a flat ``Dict`` of ``view`` uint8 [C, V, V], ``status`` float32 [F], ``picture`` uint8
     [3, 15, 15] (preset ``surroundings``) and ``action_mask`` int8 [actions]; in preset ``paper`` one ``Box``, float32
     [3 (2 r + 1)^2], with ``action_mask`` in ``infos[agent]``. Infos hold the world's metrics. All agents end together,
     and ``agents`` is then empty.

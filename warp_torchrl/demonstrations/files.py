@@ -22,6 +22,7 @@ from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.demonstrations.events import Event
 from warp_torchrl.demonstrations.recording import MOVER, PROPOSED, Mover, Recording
 from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION
+from warp_torchrl.observation import renamed
 from warp_torchrl.runs import disk
 from warp_torchrl.runs.sealed import Unsound, check_files, check_seal, described, read_json, sealed
 
@@ -157,7 +158,7 @@ def _steps(folder: Path, entries: dict[str, Any], count: int, agents: int, liste
         shape, dtype = tuple(_whole(side, _MOST_STEPS) for side in entry["shape"]), _DTYPES[entry["dtype"]]
         if shape[:1] != (count,) or path.stat().st_size != torch.Size(shape).numel() * dtype.itemsize:
             raise ValueError(f"entry {name} of shape {list(shape)} does not fit its file")
-        steps[parts] = MemoryMappedTensor.from_filename(path, dtype, torch.Size(shape))
+        steps[tuple(map(renamed, parts))] = MemoryMappedTensor.from_filename(path, dtype, torch.Size(shape))
     for key in (OBSERVATION, OBSERVATION[:1], ("next", *OBSERVATION[:1])):
         if isinstance(steps.get(key, None), TensorDictBase):
             steps[key].batch_size = torch.Size([count, agents])

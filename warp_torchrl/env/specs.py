@@ -1,8 +1,12 @@
 """TorchRL specs of the environment: shape, dtype and range of every input and output."""
 
+import inspect
+from collections.abc import Iterable
+from keyword import iskeyword
 from typing import NamedTuple
 
 import torch
+from tensordict import TensorDict
 from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 
 from warp_torchrl.env.metrics import FLYING, METRICS, SAVED_BY, WATCHING
@@ -12,6 +16,8 @@ from warp_torchrl.world.world import World
 EPISODE_METRICS = (*METRICS, "episode_reward", "episode_length")
 """Entries of ``info`` of every world: the metrics, the team's mean return so far, and the steps so far."""
 _FLAGS = ("done", "terminated", "truncated")
+_TAKEN = {name for kind in (Composite, TensorDict) for name in inspect.signature(kind.__init__).parameters}
+"""Names of parameters, which no entry can have: TorchRL passes entries as keywords."""
 
 
 class Specs(NamedTuple):
@@ -30,8 +36,24 @@ def episode_metrics(world: World) -> tuple[str, ...]:
     return (*EPISODE_METRICS, *watching, *flying, *(SAVED_BY + name for name in world.agencies.names))
 
 
+def check_names(names: Iterable[str]) -> None:
+    """Check that entries can have these names; "" is the one entry of an observation that is a single tensor.
+
+    Raises:
+        ValueError: If one is no identifier, or a word of Python or a parameter of TorchRL's specs.
+    """
+    for name in names:
+        if name and (not name.isidentifier() or iskeyword(name) or name in _TAKEN):
+            taken = ", ".join(sorted(_TAKEN))
+            raise ValueError(f"observation entries must be named by identifiers, and none of {taken}, got {name!r}")
+
+
 def make_specs(world: World, observation: Observation, n_worlds: int, device: torch.device) -> Specs:
-    """Return the specs of ``n_worlds`` worlds; the team's entries are nested under ``agents``."""
+    """Return the specs of ``n_worlds`` worlds; the team's entries are nested under ``agents``.
+
+    Raises:
+        ValueError: If an entry of the observation cannot have its name.
+    """
     batch, team = (n_worlds,), (n_worlds, world.team.n_agents)
     n_actions = world.team.n_actions
 
@@ -42,7 +64,9 @@ def make_specs(world: World, observation: Observation, n_worlds: int, device: to
     def of_team(**entries: object) -> Composite:
         return Composite(agents=Composite(**entries, shape=team, device=device), shape=batch, device=device)
 
-    spaces = {name: entry(space) for name, space in observation.spaces(world).items()}
+    shown = observation.spaces(world)
+    check_names(shown)
+    spaces = {name: entry(space) for name, space in shown.items()}
     seen = of_team(
         observation=spaces[""] if "" in spaces else Composite(spaces, shape=team, device=device),
         action_mask=Binary(n_actions, shape=(*team, n_actions), dtype=torch.bool, device=device),

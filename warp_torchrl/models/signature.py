@@ -45,7 +45,7 @@ def observation_key(name: str, sent: bool = False) -> Key:
 def canonical_key(name: str, sent: bool = False) -> Key:
     """Return the key of the same entry in canonical orientation.
 
-    They are not nested: TorchRL 0.14 moves no spec that has an entry ``self`` to a device.
+    They are not nested: replay memories hold them by these names.
     """
     (team, whole), tail = CANONICAL, f"_{name}" if name else ""
     return (team, f"{whole}_sent{tail}" if sent else whole + tail)

@@ -3,8 +3,8 @@
 from warp_torchrl.observation.channels import CHANNELS, DEFAULT, ELEVATION_SCALE, channel
 from warp_torchrl.observation.coarse_picture import PICTURE, PICTURE_SIDE, picture
 from warp_torchrl.observation.critic import STATE, STATE_SIDE, STATE_SYMMETRY, CriticState
+from warp_torchrl.observation.former import renamed, with_renamed
 from warp_torchrl.observation.look import Look
-from warp_torchrl.observation.own import SELF_SIZE, WIND_SCALE, own_vector
 from warp_torchrl.observation.presets import (
     OF_CRITIC,
     Local,
@@ -16,6 +16,7 @@ from warp_torchrl.observation.presets import (
     former_symmetry,
     searched_for,
 )
+from warp_torchrl.observation.status import STATUS_SIZE, WIND_SCALE, status_vector
 from warp_torchrl.observation.view import egocentric_view
 
 __all__ = [
@@ -25,10 +26,10 @@ __all__ = [
     "OF_CRITIC",
     "PICTURE",
     "PICTURE_SIDE",
-    "SELF_SIZE",
     "STATE",
     "STATE_SIDE",
     "STATE_SYMMETRY",
+    "STATUS_SIZE",
     "WIND_SCALE",
     "CriticState",
     "Local",
@@ -41,7 +42,9 @@ __all__ = [
     "critic_state",
     "egocentric_view",
     "former_symmetry",
-    "own_vector",
     "picture",
+    "renamed",
     "searched_for",
+    "status_vector",
+    "with_renamed",
 ]

@@ -20,7 +20,7 @@ class _Given(NamedTuple):
     """Worlds that a heuristic reads, without an environment."""
 
     world: World
-    world_state: WorldState
+    shared_state: WorldState
 
 
 def advised_actions(state: WorldState, world: World, adviser: str) -> Tensor:

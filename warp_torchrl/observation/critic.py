@@ -9,7 +9,7 @@ from torch.nn.functional import one_hot
 from warp_torchrl.content import Content, Empty, Quarters
 from warp_torchrl.observation.blocks import block_of
 from warp_torchrl.observation.channels import ELEVATION_SCALE, LAST_SEEN
-from warp_torchrl.observation.own import WIND_SCALE, steps_to_tick, time_left
+from warp_torchrl.observation.status import WIND_SCALE, steps_to_tick, time_left
 from warp_torchrl.symmetry import TeamPlanes
 from warp_torchrl.world.agencies import land_of_each
 from warp_torchrl.world.fast.blocks import block_means

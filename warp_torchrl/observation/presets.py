@@ -23,7 +23,7 @@ from warp_torchrl.observation.coarse_picture import (
     picture_symmetry,
 )
 from warp_torchrl.observation.critic import CriticState
-from warp_torchrl.observation.own import IDENTITY, SELF, SELF_SIZE, Told, own_entries, own_vector
+from warp_torchrl.observation.status import IDENTITY, STATUS, STATUS_SIZE, Told, status_entries, status_vector
 from warp_torchrl.observation.view import egocentric_view
 from warp_torchrl.symmetry import Planes, Target, Vector
 from warp_torchrl.validation import check_fields
@@ -56,16 +56,16 @@ class Local:
     """What an agent sees of its own surroundings, and nothing else.
 
     ``view`` is the square of 2 r + 1 cells about the agent, north up, uint8, in channels that are chosen by name from
-    ``observation.channels.CHANNELS``. ``self`` is what it knows of itself, see ``own_entries``.
+    ``observation.channels.CHANNELS``. ``status`` is what it knows of itself, see ``status_entries``.
 
     Attributes:
         radius: r [cells].
-        identity: Whether ``self`` tells the agent's place in its team, see ``identity``: agents that stand together
+        identity: Whether ``status`` tells the agent's place in its team, see ``identity``: agents that stand together
             and see the same can then part.
-        rules: Whether ``self`` tells the rules of the world, see ``rules``: one policy can then play by several.
-        water: Whether ``self`` tells the way to the nearest water, see ``way_to_water``: else agents whose tanks are
+        rules: Whether ``status`` tells the rules of the world, see ``rules``: one policy can then play by several.
+        water: Whether ``status`` tells the way to the nearest water, see ``way_to_water``: else agents whose tanks are
             empty know of lakes within their view alone.
-        advice: Name of a heuristic, one of ``TEACHERS``, that tells each agent, in ``self``, the action that it would
+        advice: Name of a heuristic, one of ``TEACHERS``, that tells each agent, in ``status``, the action that it would
             choose for it, see ``advised_actions``: agents may do otherwise; None has no adviser.
         reach: Whether the central critic's ``state`` tells how soon fire and team can be where, see
             ``critic.reach_of_fire_and_team``: else it cannot tell a closed firebreak from one that lacks a cell.
@@ -94,21 +94,21 @@ class Local:
         side, highs = 2 * self.radius + 1, tuple(CHANNELS[name].high for name in self.channels)
         if self.advice is not None:
             check_may_advise(self.advice, world)
-        own, content = own_entries(world, self.told), self._contents(view_content(self.channels, world))
+        own, content = status_entries(world, self.told), self._contents(view_content(self.channels, world))
         symmetry = view_symmetry(self.channels)
         return {
             "view": Space((len(highs), side, side), torch.uint8, 0, highs, self.channels, symmetry, content),
-            "self": Space((len(own.names),), torch.float32, -3.0, 3.0, own.names, own),
+            "status": Space((len(own.names),), torch.float32, -3.0, 3.0, own.names, own),
         }
 
     def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
-        """Return ``view`` uint8 [B, A, C, V, V] and ``self`` float32 [B, A, F]."""
-        own = own_vector(state, world, self.told)
-        return {"view": egocentric_view(state, world, forecast, self.radius, self.channels), "self": own}
+        """Return ``view`` uint8 [B, A, C, V, V] and ``status`` float32 [B, A, F]."""
+        own = status_vector(state, world, self.told)
+        return {"view": egocentric_view(state, world, forecast, self.radius, self.channels), "status": own}
 
     @property
     def told(self) -> Told:
-        """Return what ``self`` tells beside what it tells every agent."""
+        """Return what ``status`` tells beside what it tells every agent."""
         return Told(identity=self.identity, rules=self.rules, water=self.water, advice=self.advice)
 
     def _contents(self, content: tuple[Content, ...]) -> tuple[Content, ...]:
@@ -159,7 +159,7 @@ class Surroundings(Local):
         return found
 
     def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
-        """Return ``view``, ``self`` and ``picture``: uint8 [B, A, C, 15, 15]; of the map, float32 [B, A, C, 8, 8].
+        """Return ``view``, ``status`` and ``picture``: uint8 [B, A, C, 15, 15]; of the map, float32 [B, A, C, 8, 8].
 
         And ``near`` if it is shown, uint8 [B, A, C, 15, 15].
         """
@@ -220,7 +220,7 @@ def former_symmetry(name: str, shape: tuple[int, ...], names: tuple[str, ...]) -
     of_presets: dict[str, Planes | Vector] = {
         "": PAPER_SYMMETRY,
         "view": view_symmetry(names),
-        "self": SELF if shape == (SELF_SIZE,) else Vector((*SELF.parts, IDENTITY)),
+        "status": STATUS if shape == (STATUS_SIZE,) else Vector((*STATUS.parts, IDENTITY)),
         "picture": picture_symmetry(centred=shape[-1] != PICTURE_SIDE),
     }
     found = of_presets.get(name)

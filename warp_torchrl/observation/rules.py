@@ -13,7 +13,7 @@ RULES = Part(
     "scalar",
     ("rule_ticks", "rule_burning", "rule_wet", "rule_horizon", "rule_tank", "rule_stride", TEAM_SIZE, "rule_map"),
 )
-"""Entries of ``self`` that tell the rules, see ``rules``."""
+"""Entries of ``status`` that tell the rules, see ``rules``."""
 
 
 def rules(world: World, device: torch.device) -> Tensor:

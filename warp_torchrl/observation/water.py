@@ -11,7 +11,7 @@ from warp_torchrl.world.supply import where_tanks_fill
 from warp_torchrl.world.world import World
 
 WATER = (Part("vector", ("water_east", "water_north")), Part("scalar", ("water_distance",)))
-"""Entries of ``self`` that tell the way to water, see ``way_to_water``."""
+"""Entries of ``status`` that tell the way to water, see ``way_to_water``."""
 _SCALE = 32.0
 """Distance that is shown as 1 [cells]."""
 

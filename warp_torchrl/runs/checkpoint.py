@@ -16,6 +16,7 @@ import torch
 from warp_torchrl.config.renamed import renamed_values
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.models import Signature
+from warp_torchrl.observation import with_renamed
 from warp_torchrl.runs import disk
 from warp_torchrl.runs.manifest import (
     MANIFEST,
@@ -89,7 +90,7 @@ class Checkpoint:
         path = self.path / name
         with of_a_checkpoint():
             try:
-                content = torch.load(path, weights_only=True, map_location="cpu")
+                content = with_renamed(torch.load(path, weights_only=True, map_location="cpu"))
                 check_finite(path, content)
             except Unsound:
                 raise

@@ -12,8 +12,8 @@ import torch
 import torchrl
 
 from warp_torchrl.models import Entry, Signature
-from warp_torchrl.observation import DEFAULT, PICTURE, STATE, STATE_SYMMETRY, former_symmetry
-from warp_torchrl.observation.own import IDENTITY, SELF
+from warp_torchrl.observation import DEFAULT, PICTURE, STATE, STATE_SYMMETRY, former_symmetry, renamed
+from warp_torchrl.observation.status import IDENTITY, STATUS
 from warp_torchrl.runs.sealed import Files, Unsound, check_files, check_seal, described, read_json, sealed
 from warp_torchrl.symmetry import Symmetry, from_plain, to_plain
 from warp_torchrl.world.role import PAPER_ROLES
@@ -29,7 +29,7 @@ _FILES = ("policy.pt", TRAINING, "config.json")
 _FORMER_NAMES = {
     "view": (DEFAULT,),
     "picture": (PICTURE,),
-    "self": (SELF.names, (*SELF.names, *IDENTITY.names)),
+    "status": (STATUS.names, (*STATUS.names, *IDENTITY.names)),
     "state": (STATE,),
 }
 _FORMER_ACTIONS = tuple(action.name.lower() for action in Action)
@@ -151,9 +151,8 @@ def _signature_from_json(content: dict[str, Any]) -> Signature:
             raise ValueError(f"{symmetry} is not of shape {shape}")
         return Entry(shape, str(node["dtype"]), told, symmetry)
 
-    observation = {
-        str(name): entry(name, node, partial(former_symmetry, name)) for name, node in content["observation"].items()
-    }
+    observed = {renamed(str(name)): node for name, node in content["observation"].items()}
+    observation = {name: entry(name, node, partial(former_symmetry, name)) for name, node in observed.items()}
     state = entry("state", content["state"], lambda shape, _: STATE_SYMMETRY if STATE_SYMMETRY.fits(shape) else None)
     actions = tuple(str(name) for name in content.get("actions", _FORMER_ACTIONS[: int(content["n_actions"])]))
     roles = tuple(str(name) for name in content.get("roles", PAPER_ROLES))

@@ -44,7 +44,7 @@ from warp_torchrl.models.canonical import (
     turned,
 )
 from warp_torchrl.models.fitting import fitted
-from warp_torchrl.observation import DEFAULT, SELF_SIZE, STATE_SYMMETRY, Local, Paper, Surroundings
+from warp_torchrl.observation import DEFAULT, STATE_SYMMETRY, STATUS_SIZE, Local, Paper, Surroundings
 from warp_torchrl.policy import TrainedPolicy
 from warp_torchrl.symmetry import Part, Planes, Target, Vector
 from warp_torchrl.world.fire import Fire
@@ -321,7 +321,7 @@ def test_transitions_of_former_runs_are_kept_as_those_of_now():
     learner.store(batch.clone())
     kept, former = learner.keeps["replay"].buffer[:], learner.keeps["replay"].buffer[:].clone()
     for part, seen in ((former, batch.reshape(-1)), (former["next"], batch["next"].reshape(-1))):
-        for name in ("view", "self", "picture"):
+        for name in ("view", "status", "picture"):
             part.set((*OBSERVATION, name), seen[(*OBSERVATION, name)])
             del part["agents", f"canonical_{name}"]
         part.set("state", seen["state"])
@@ -369,11 +369,11 @@ def test_every_entry_of_a_preset_says_how_it_turns(name):
     ("changed", "rule"),
     [
         ({"view": None}, r"does not say in its Space how it turns with the map, as view of shape \[11, 11, 11\]"),
-        ({"self": None}, r"does not say in its Space how it turns with the map, as self"),
+        ({"status": None}, r"does not say in its Space how it turns with the map, as status"),
         ({"view": Planes(11), "picture": Planes(3)}, "no entry shows a target, such as fire"),
-        ({"self": Vector((Part("scalar", tuple("abc")),))}, "no entry tells an agent's place"),
+        ({"status": Vector((Part("scalar", tuple("abc")),))}, "no entry tells an agent's place"),
     ],
-    ids=["view", "self", "no target", "no place"],
+    ids=["view", "status", "no target", "no place"],
 )
 def test_observations_that_do_not_say_how_they_turn_are_read_as_they_are(make_small_env, changed, rule):
     shape = signature(make_small_env(2, observation=PRESETS["whole map"]))  # whose places are of the map
@@ -494,7 +494,7 @@ def test_a_tie_is_a_tie_in_any_batch():
     declared = symmetries(PRESETS["whole map"])
     entries = {
         "picture": picture,
-        "self": torch.full((1000, 1, SELF_SIZE), 3.5 / 8),
+        "status": torch.full((1000, 1, STATUS_SIZE), 3.5 / 8),
         "view": torch.zeros(1000, 1, len(DEFAULT), 11, 11, dtype=torch.uint8),
     }
     for n_worlds in (1, 7, 1000):

@@ -18,7 +18,7 @@ from warp_torchrl.world.team import Team
 from warp_torchrl.world.world import World
 
 _ACTIONS = tuple(action.name.lower() for action in Action)
-SELF = Vector(
+STATUS = Vector(
     (
         Part("place", ("row", "column")),
         Part("scalar", (TIME_LEFT,)),
@@ -27,18 +27,18 @@ SELF = Vector(
         Part("actions", tuple(f"{LAST}{name}" for name in _ACTIONS)),
     )
 )
-"""Entries of ``self`` in every team; role and last action are one-hot, the latter zeros before the first."""
-SELF_SIZE = len(SELF.names)
+"""Entries of ``status`` in every team; role and last action are one-hot, the latter zeros before the first."""
+STATUS_SIZE = len(STATUS.names)
 """How many they are."""
 IDENTITY = Part("scalar", ("identity_cos_1", "identity_sin_1", "identity_cos_2", "identity_sin_2"))
-"""Entries of ``self`` that tell an agent from its team-mates, see ``identity``."""
+"""Entries of ``status`` that tell an agent from its team-mates, see ``identity``."""
 WIND_SCALE = 20.0
 """Wind that an observation shows as 1 [m/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Told:
-    """What ``self`` tells beside what it tells every agent.
+    """What ``status`` tells beside what it tells every agent.
 
     Attributes:
         identity: The agent's place in its team, see ``identity``.
@@ -53,10 +53,10 @@ class Told:
     advice: str | None = None
 
 
-def own_entries(world: World, told: Told = Told()) -> Vector:
-    """Return the entries of ``self``, by name and as they turn with the map.
+def status_entries(world: World, told: Told = Told()) -> Vector:
+    """Return the entries of ``status``, by name and as they turn with the map.
 
-    They are ``SELF``, the identity if it is told, then the team's roles and actions beside the paper's, then the
+    They are ``STATUS``, the identity if it is told, then the team's roles and actions beside the paper's, then the
     battery if it runs down, then the agency that the vehicle serves, one-hot, if there are several, then the rules, the
     way to water and the advised action, one-hot, if they are told.
     """
@@ -64,7 +64,7 @@ def own_entries(world: World, told: Told = Told()) -> Vector:
     roles = tuple(f"role_{role}" for role in team.role_names[len(PAPER_ROLES) :])
     actions = tuple(f"{LAST}{action}" for action in team.further_actions)
     battery = () if team.flight.battery is None else ("battery",)
-    parts = [*SELF.parts, *([IDENTITY] if told.identity else [])]
+    parts = [*STATUS.parts, *([IDENTITY] if told.identity else [])]
     parts += [Part("scalar", names) for names in (roles, actions, battery, world.agencies.names) if names]
     parts += [*([RULES] if told.rules else []), *(WATER if told.water else [])]
     if told.advice is not None:
@@ -72,8 +72,8 @@ def own_entries(world: World, told: Told = Told()) -> Vector:
     return Vector(tuple(parts))
 
 
-def own_vector(state: WorldState, world: World, told: Told = Told()) -> Tensor:
-    """Return what each agent knows of itself, float32 [B, A, F], see ``own_entries``."""
+def status_vector(state: WorldState, world: World, told: Told = Told()) -> Tensor:
+    """Return what each agent knows of itself, float32 [B, A, F], see ``status_entries``."""
     height, width = state.cells.shape[1:]
     vehicles = state.vehicles
     row, column = vehicles.position.to(torch.float32).unbind(-1)
