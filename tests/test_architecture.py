@@ -22,6 +22,7 @@ GROUND = (
     "flags",
     "foreign",
     "interruption",
+    "modes",
     "nearest",
     "parent",
     "symmetry",
@@ -101,10 +102,11 @@ def test_fire_science_knows_torch_and_itself():
     assert not breaks(of_rooms(*FIRE_SCIENCE), lambda module: roots(module) <= known)
 
 
-def test_the_ground_floor_knows_the_standard_library_and_what_a_device_is():
+def test_the_ground_floor_knows_the_standard_library_and_what_devices_and_modes_are():
     known = sys.stdlib_module_names | set(GROUND)
     assert not breaks(GROUND, knows_only)
-    assert not breaks(GROUND, lambda module: roots(module) <= known | ({"torch"} if module == "device" else set()))
+    torch = {"device": {"torch"}, "modes": {"torch"}}
+    assert not breaks(GROUND, lambda module: roots(module) <= known | torch.get(module, set()))
 
 
 def test_what_reads_the_state_knows_only_the_world():
@@ -234,7 +236,7 @@ def test_viser_is_imported_where_the_live_page_is_put_together():
 
 
 def test_compilers_are_spoken_of_behind_the_fence_alone():
-    before = [module for module in MODULES if not module.startswith(FENCE)]
+    before = [module for module in MODULES if not module.startswith(FENCE) and module != "modes"]  # one is a mode
     assert not breaks(before, lambda module: not re.search(r"is_compiling|torch\.library|torch\.ops", source(module)))
     schema = re.compile(r'"\(.*Tensor.*\) -> ')
     assert not breaks(before, lambda module: not schema.search(source(module))), "a schema of an operator"

@@ -13,6 +13,7 @@ from warp_torchrl.config.groups import ENVIRONMENT
 from warp_torchrl.config.saved_config import SavedConfig, restore
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.models import RADIO
+from warp_torchrl.modes import apart
 from warp_torchrl.observation import OF_CRITIC
 from warp_torchrl.policy import TrainedPolicy
 from warp_torchrl.runs import checkpoint as checkpoints
@@ -20,6 +21,7 @@ from warp_torchrl.runs import former
 from warp_torchrl.runs.shipped import find_policy
 
 
+@apart
 def make_env(
     scenario: str = "default",
     *,
@@ -90,6 +92,7 @@ def load_policy(path: str | Path = "generalist", mode: str = "best") -> TrainedP
     return policy_of(found, mode)
 
 
+@apart
 def policy_of(found: checkpoints.Checkpoint, mode: str = "best", record: SavedConfig | None = None) -> TrainedPolicy:
     """Return the policy of a verified checkpoint, by its record or another one; see ``load_policy``."""
     if mode not in ("best", "sampled", "deterministic"):

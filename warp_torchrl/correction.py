@@ -122,7 +122,7 @@ class Correction:
             torch.manual_seed(first)
             env.set_seeds(seeds)
             shown = env.reset()
-            while not bool(env.world_state.done.all()):
+            while not bool(env.shared_state.done.all()):
                 row, shown = self._step(shown, people)
                 open_recording.rows.append(row)
         steps, saved = open_recording.steps(), env.tree_counts.saved()
@@ -141,7 +141,7 @@ class Correction:
         if chances is None:
             raise ConfigError(f"policy must tell how sure it is, and {self.session.policy} acts by values")
         advice = self.baseline(shown.select(ACTION_MASK))[ACTION]
-        possible = env.world.possible_actions(env.world_state)
+        possible = env.world.possible_actions(env.shared_state)
         idle = idle_action(possible, env.world.team)
         action, mover = proposed.clone(), torch.full_like(proposed, Mover.POLICY, dtype=torch.uint8)
         for world, person in enumerate(people):

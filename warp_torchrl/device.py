@@ -17,6 +17,11 @@ def reads_freely(device: torch.device) -> bool:
     return device.type == "cpu" and not _unread
 
 
+def is_same(one: torch.device, other: torch.device | None) -> bool:
+    """Return whether two devices are one: of a CPU torch tells no index, whatever it was given."""
+    return one == other or (one.type == "cpu" and other is not None and other.type == "cpu")
+
+
 @contextmanager
 def unread() -> Iterator[None]:
     """Compute on a CPU as on a GPU, without reading back: for tests and measurements where there is no GPU."""

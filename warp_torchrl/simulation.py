@@ -9,6 +9,7 @@ from torch import Tensor
 
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import build
+from warp_torchrl.modes import apart
 from warp_torchrl.weather.table import WeatherTable, read_weather
 from warp_torchrl.world.automaton import Automaton
 from warp_torchrl.world.burn import FireHistory, burn, start_burning, trace
@@ -18,6 +19,7 @@ from warp_torchrl.world.weather import Weather
 from warp_torchrl.world.wind import Wind, constant_wind
 
 
+@apart
 def simulate(
     cells: Tensor,
     cover: Tensor,
@@ -62,6 +64,7 @@ def simulate(
     return burn(state, automaton, air, ticks).cells
 
 
+@apart
 def fire_history(
     cells: Tensor,
     cover: Tensor,

@@ -139,7 +139,7 @@ def _equality(device: str, n_worlds: int, steps: int) -> dict[str, Any]:
         for name in seen:
             mine, its = first["next", "agents", name], second["next", "agents", name].to("cpu")
             seen[name] = max(seen[name], _furthest(mine - its if name == "reward" else (mine.double() - its.double())))
-    mine, its = here.world_state.what_changes(), there.world_state.to("cpu").what_changes()
+    mine, its = here.shared_state.what_changes(), there.shared_state.to("cpu").what_changes()
     differing = {name: int((leaf != its[name]).sum()) for name, leaf in mine.items() if (leaf != its[name]).any()}
     return {"worlds": n_worlds, "steps": steps, "differing": differing, "furthest": seen}
 
@@ -149,7 +149,7 @@ def _starts(device: str, n_worlds: int) -> dict[str, Any]:
     here, there = (make_env(_SCENARIO, n_worlds=n_worlds, device=each) for each in ("cpu", device))
     here.reset()
     there.reset()
-    mine, its = here.world_state, there.world_state.to("cpu").leaves()
+    mine, its = here.shared_state, there.shared_state.to("cpu").leaves()
     unlike = {name: (leaf != its[name]).reshape(n_worlds, -1).any(1) for name, leaf in mine.leaves().items()}
     return {"worlds": n_worlds, "differing": {name: int(each.sum()) for name, each in unlike.items() if each.any()}}
 
@@ -197,7 +197,7 @@ def _steps_by(way: str, device: str, n_worlds: int, size: Size) -> dict[str, Any
 def _ticks(device: str, n_worlds: int, size: Size) -> dict[str, Any]:
     env = make_env(_SCENARIO, n_worlds=n_worlds, device=device)
     random_play(env)(size.steps)
-    state, world = env.world_state, env.world
+    state, world = env.shared_state, env.world
     due = torch.ones(n_worlds, dtype=torch.bool, device=device)
     seconds = take_turns({"tick": lambda: advance(state, world.fire, world.air, due)}, size.repeats, device)["tick"]
     cells = state.cells.numel()

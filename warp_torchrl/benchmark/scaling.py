@@ -66,7 +66,7 @@ def growth_table(rows: list[dict[str, Any]]) -> str:
 def _step_cost(scenario: str, n_worlds: int, device: str, overrides: Sequence[str], repeats: int) -> dict[str, Any]:
     env = make_env(scenario, n_worlds=n_worlds, device=device, overrides=overrides)
     shown = env.step(env.rand_action(env.reset()))["next"]
-    held = _bytes(env.world_state.leaves().values()) + _bytes(shown.values(True, True))
+    held = _bytes(env.shared_state.leaves().values()) + _bytes(shown.values(True, True))
     memory = {
         "kib_per_world": held / n_worlds / 1024,
         "peak_gib": peak_memory(),  # before the timing, which keeps a copy of the worlds
@@ -88,7 +88,7 @@ def _step_cost(scenario: str, n_worlds: int, device: str, overrides: Sequence[st
 def _first_steps(env: "WildfireEnv", device: str, repeats: int) -> list[float]:
     """Return the time of a step [s], as often as asked, after steps that do not count."""
     now, seconds = clock(device), []
-    start = env.world_state.clone()  # one step old
+    start = env.shared_state.clone()  # one step old
     for _ in range(repeats + 1):
         shown = env.set_state(start)
         begin = now()

@@ -44,7 +44,7 @@ def tick_cost(
     env = make_env(scenario, n_worlds=n_worlds, device=device, overrides=overrides)
     env.reset()
     world = env.world
-    state = burn(env.world_state, world.fire, world.air, _TICKS)
+    state = burn(env.shared_state, world.fire, world.air, _TICKS)
     height, width = world.size
     contenders, cells, skipped = {"eager": _ours(world, state, fuse=False)}, {"eager": n_worlds}, []
     if compiled:

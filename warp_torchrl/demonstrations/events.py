@@ -57,24 +57,24 @@ def at_cell(env: WildfireEnv, row: float, column: float) -> Tensor:
     height, width = env.world.size
     if not (0 <= row < height and 0 <= column < width):
         raise ValueError(f"cell {row:g}, {column:g} is not on the map of {height} x {width} cells")
-    here = torch.zeros_like(env.world_state.cells, dtype=torch.bool)
+    here = torch.zeros_like(env.shared_state.cells, dtype=torch.bool)
     here[:, int(row), int(column)] = True
     return here
 
 
 def _ignite(env: WildfireEnv, row: float, column: float) -> TensorDictBase:
-    return env.set_state(ignited(env.world_state, env.world.fire, at_cell(env, row, column)))
+    return env.set_state(ignited(env.shared_state, env.world.fire, at_cell(env, row, column)))
 
 
 def _clear(env: WildfireEnv, row: float, column: float) -> TensorDictBase:
-    return env.set_state(cleared(env.world_state, at_cell(env, row, column)))
+    return env.set_state(cleared(env.shared_state, at_cell(env, row, column)))
 
 
 def _blow(env: WildfireEnv, speed: float, direction: float) -> TensorDictBase:
     turn = math.radians(direction)
     u, v = speed * math.cos(turn), speed * math.sin(turn)
     env.world = replace(env.world, wind=constant_wind(u, v))
-    return env.set_state(in_wind(env.world_state, env.world.fire, torch.tensor([u, v]).view(1, 2, 1, 1)))
+    return env.set_state(in_wind(env.shared_state, env.world.fire, torch.tensor([u, v]).view(1, 2, 1, 1)))
 
 
 KINDS: Mapping[str, Callable[[WildfireEnv, float, float], TensorDictBase]] = {

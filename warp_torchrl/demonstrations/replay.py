@@ -44,7 +44,7 @@ class Replay:
             Unsound: If an agent sees, may do or earns other than was recorded.
         """
         for _ in self.shown():
-            yield self.env.world_state
+            yield self.env.shared_state
 
     def shown(self) -> Iterator[TensorDictBase]:
         """Play, and yield what the environment shows at its start and after every step, batch size [1].

@@ -4,6 +4,7 @@ import torch
 from tensordict import TensorDict
 from torch import Tensor
 
+from warp_torchrl.device import is_same
 from warp_torchrl.env.scene import Observations
 from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.world import World
@@ -29,7 +30,7 @@ def checked_action(
         raise ValueError(
             f'("agents", "action") must be int64 of shape {list(shape)}, got {action.dtype} {list(action.shape)}'
         )
-    if action.device != device:
+    if not is_same(action.device, device):
         raise ValueError(f'("agents", "action") must be on {device}, got {action.device}')
     if limit is not None and not ((action >= 0) & (action < limit)).all():
         raise ValueError(
@@ -58,7 +59,8 @@ def packed(world: World, state: WorldState, observed: Observations, episode_rewa
     agents |= {} if observed.radio is None else {"radio": observed.radio}
     agents |= {} if state.vehicles.serves is None else {"agency": state.vehicles.serves.clone()}
     agents |= {"sent": of_team(sent)} if (sent := world.team.radio.shown(state)) else {}
-    info = observed.metrics | {"episode_reward": episode_reward, "episode_length": state.step.to(torch.float32)}
+    paid = episode_reward.clone()  # the environment adds to its own
+    info = observed.metrics | {"episode_reward": paid, "episode_length": state.step.to(torch.float32)}
     return TensorDict(
         {
             "agents": TensorDict(agents, batch_size=team, device=device),

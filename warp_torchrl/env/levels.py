@@ -1,7 +1,7 @@
 """Worlds of several rules in one batch: each episode is of one of several levels."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Self
 
 import torch
 from tensordict import TensorDict, TensorDictBase
@@ -11,6 +11,7 @@ from torchrl.data import Categorical
 from warp_torchrl.env.reset_cache import ResetCache, Start
 from warp_torchrl.env.scene import Observations, Scene, Step
 from warp_torchrl.env.wildfire import WildfireEnv
+from warp_torchrl.modes import apart
 from warp_torchrl.world.batch import Batch, concatenated
 from warp_torchrl.world.random import Stream, uniform, world_key
 from warp_torchrl.world.saved import filled
@@ -33,6 +34,7 @@ class LeveledEnv(WildfireEnv):
         options: Of ``WildfireEnv``, but for ``fuse`` and ``graph``.
     """
 
+    @apart
     def __init__(self, levels: Sequence[World], **options: Any) -> None:
         super().__init__(levels[-1], **options)
         self.levels = tuple(levels)
@@ -40,12 +42,22 @@ class LeveledEnv(WildfireEnv):
         """The level of each world's episode, int64 [B]."""
         self._upto = torch.ones(len(levels), dtype=torch.float64, device=self.device)
         self.draw_by([0.0] * (len(levels) - 1) + [1.0])
-        # On a GPU too: a step divides the worlds by their levels, and so waits anyway.
-        self._resets: ResetCache = ResetCache(self._sound_start)
         spec = self.observation_spec.clone()
         spec[LEVEL] = Categorical(len(levels), shape=(*self.batch_size, 1), dtype=torch.int64, device=self.device)
         self.observation_spec = spec
 
+    def _no_resets(self) -> ResetCache:
+        """Return a cache, on a GPU too: a step divides the worlds by their levels, and so waits anyway."""
+        return ResetCache(self._sound_start)
+
+    @apart
+    def to(self, device: torch.device | str) -> Self:
+        """Move the environment to a device, see ``WildfireEnv.to``; levels and chances move with it."""
+        super().to(device)
+        self.level, self._upto = self.level.to(self.device), self._upto.to(self.device)
+        return self
+
+    @apart
     def draw_by(self, chances: Sequence[float]) -> None:
         """Let episodes that start from now on draw their levels by these chances [L], which add up to 1."""
         upto = torch.tensor(chances, dtype=torch.float64, device=self.device).cumsum(0)
@@ -65,6 +77,7 @@ class LeveledEnv(WildfireEnv):
         state["level"] = self.level.clone()
         return state
 
+    @apart
     def load_state_dict(self, state_dict: Mapping[str, Any], strict: bool = True, **kwargs: object) -> None:
         """Restore what ``state_dict`` returned, all or nothing.
 
@@ -83,16 +96,17 @@ class LeveledEnv(WildfireEnv):
         self.level = level
 
     def _restored(self, state_dict: Mapping[str, Any]) -> WorldState:
-        like, *_ = self._sound_start(self.seeds, self._episodes)
+        like, *_ = self._sound_start(self._drawn_seeds(), self._episodes)
         state = filled(like, state_dict["worlds"])
         return self._by_level(state_dict["level"], lambda scene, rows: scene.world.restored(state[rows]))
 
+    @apart
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
         mask = None if tensordict is None else tensordict.get("_reset", None)
         if mask is not None and self._worlds is not None and not mask.all():
             return super()._reset(tensordict, **kwargs)
         self._resets.clear()
-        state, counts, seen = self._sound_start(self.seeds, self._episodes)
+        state, counts, seen = self._sound_start(self._drawn_seeds(), self._episodes)
         self._worlds, self.level = (state, counts), seen[LEVEL][:, 0].clone()
         self._episodes = self._episodes + 1
         self._episode_reward = torch.zeros_like(self._episode_reward)
@@ -116,9 +130,10 @@ class LeveledEnv(WildfireEnv):
 
     def _observe(self) -> TensorDict:
         def observe(scene: Scene, rows: Tensor) -> Observations:
-            return scene.observe(self.world_state[rows], self.tree_counts[rows])
+            return scene.observe(state[rows], counts[rows])
 
-        seen = self._pack(self.world_state, self._by_level(self.level, observe), self._episode_reward)
+        state, counts = self._current()
+        seen = self._pack(state, self._by_level(self.level, observe), self._episode_reward)
         return seen.set(LEVEL, self.level[:, None].clone())
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:

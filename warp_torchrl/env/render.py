@@ -12,6 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 from torch import Tensor
 from torch.nn.functional import interpolate
 
+from warp_torchrl.modes import kept
 from warp_torchrl.world.records import freshness
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.state import EMPTY, FIRST_FIRE, OLDEST, Cover, WorldState, count_trees, is_burning
@@ -155,7 +156,7 @@ def _with_borders(image: Tensor, owner: Tensor) -> Tensor:
     return torch.where(border[..., None], torch.tensor(_INK, dtype=torch.uint8, device=image.device), image)
 
 
-@lru_cache(maxsize=8)
+@kept(8)
 def _colour_table(device: torch.device) -> Tensor:
     """Return the colours of dry, of wet, and of cells in fog: trees by cover and age, fire, ash, firebreak.
 

@@ -26,7 +26,7 @@ class ResetCache:
     def __init__(self, make: Callable[[Tensor, Tensor], Start]) -> None:
         self._make = make
         self._next: Start | None = None
-        self._made = torch.zeros(0, dtype=torch.bool)
+        self._made: Tensor  # which worlds have their start, bool [B]; set with the first
 
     def clear(self) -> None:
         """Drop all starts: the worlds get other seeds or episodes."""

@@ -45,8 +45,9 @@ class ResetPool:
     ) -> None:
         self._make, self._check, self._steps, self._ready = make, check, steps, ready
         self._starts: Start | None = None  # [ready x B]: episode e of world b at (e % ready) x B + b
-        self._until = self._waited = torch.zeros(0, dtype=torch.int64)  # episodes with a start; worlds that had none
-        self._faults = torch.zeros(2, dtype=torch.bool)
+        self._until: Tensor  # episodes up to which there are starts, int64 [B]; these three are set where starts begin
+        self._waited: Tensor  # worlds that had none, int64 []
+        self._faults: Tensor  # of the filling before, bool [2]
         self._since = 0
 
     def clear(self) -> None:

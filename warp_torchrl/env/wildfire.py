@@ -3,7 +3,7 @@
 import secrets
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import torch
 from tensordict import TensorDict, TensorDictBase
@@ -18,12 +18,21 @@ from warp_torchrl.env.reset_cache import ResetCache, Start
 from warp_torchrl.env.reset_pool import ResetPool
 from warp_torchrl.env.scene import Observations, Scene, Step, why_not_compiled
 from warp_torchrl.env.specs import make_specs
-from warp_torchrl.observation import Observation, Surroundings, critic_state, searched_for
+from warp_torchrl.modes import apart
+from warp_torchrl.observation import Observation, Surroundings, critic_state, searched_for, with_renamed
 from warp_torchrl.reward import Efficiency, Reward
 from warp_torchrl.world.role import ROLES
 from warp_torchrl.world.saved import filled
 from warp_torchrl.world.state import Transition, TreeCounts, WorldState, count_trees
 from warp_torchrl.world.world import World
+
+
+class _Asked(NamedTuple):
+    """How an environment was asked to compute its steps, see ``WildfireEnv``."""
+
+    validate: bool | None
+    fuse: bool
+    graph: bool
 
 
 class WildfireEnv(EnvBase):
@@ -54,6 +63,7 @@ class WildfireEnv(EnvBase):
 
     batch_locked = True
 
+    @apart
     def __init__(
         self,
         world: World | None = None,
@@ -75,13 +85,10 @@ class WildfireEnv(EnvBase):
         self.observation = Surroundings() if observation is None else observation
         self.reward_function = Efficiency() if reward is None else reward
         self.reward_function.check_world(self.world)
-        self.validate = reads_freely(self.device) if validate is None else validate
-        self.why_eager = why_not_compiled(self.world, self.observation, self.device, n_worlds) if fuse else None
-        """Why steps are not compiled where that was asked for; None where they are."""
-        self._fuses = fuse and self.why_eager is None
         if graph and (key := searched_for(self.observation)) is not None:
             raise ValueError(f"graph must be false with observation.{key}")
-        self._recorded = RecordedStep(self._scene) if graph else None
+        self._asked = _Asked(validate, fuse, graph)
+        self._settle()
         names, roles = self.world.team.agent_names, self.world.team.agent_roles
         self.agent_names, self.action_names = names, self.world.team.action_names
         self.role_names = self.world.team.role_names
@@ -95,9 +102,6 @@ class WildfireEnv(EnvBase):
         self.group_map = {"agents": list(names)}
         self.role_map = {role: [n for n, r in zip(names, roles) if r == role] for role in ROLES if role in roles}
         self._worlds: tuple[WorldState, TreeCounts] | None = None  # and the counts of their trees
-        self._resets: ResetCache | ResetPool = ResetCache(self._sound_start)
-        if not reads_freely(self.device):
-            self._resets = ResetPool(self._start, self.world.check)
         self.watcher: Callable[[Transition], None] | None = None
         """Called with the transition of every step, to measure behaviour."""
         self._episode_reward = torch.zeros(n_worlds, device=self.device)
@@ -111,7 +115,45 @@ class WildfireEnv(EnvBase):
         self.observation_spec, self.action_spec = specs.observation, specs.action
         self.reward_spec, self.done_spec = specs.reward, specs.done
 
+    def _settle(self) -> None:
+        """Set what depends on the device: how actions are checked, steps are computed, and starts are kept ready."""
+        asked = self._asked
+        self.validate = reads_freely(self.device) if asked.validate is None else asked.validate
+        self.why_eager = (
+            why_not_compiled(self.world, self.observation, self.device, self.batch_size[0]) if asked.fuse else None
+        )
+        """Why steps are not compiled where that was asked for; None where they are."""
+        self._fuses = asked.fuse and self.why_eager is None
+        self._recorded = RecordedStep(self._scene) if asked.graph else None
+        self._resets = self._no_resets()
+
+    def _no_resets(self) -> ResetCache | ResetPool:
+        """Return where starts are kept ready, empty."""
+        if reads_freely(self.device):
+            return ResetCache(self._sound_start)
+        return ResetPool(self._start, self.world.check)
+
     # Interface for users
+
+    @apart
+    def to(self, device: torch.device | str) -> Self:
+        """Move the environment to a device, in the middle of its episodes too, and return it.
+
+        Specs, seeds, episodes, worlds and returns move. What lies ready for resets is made anew there: it follows from
+        the seeds and the episodes.
+        """
+        before = self.device
+        super().to(device)
+        if self.device == before:
+            return self
+        self.empty_cache()
+        self._episodes, self._episode_reward = self._episodes.to(self.device), self._episode_reward.to(self.device)
+        self._seeds = None if self._seeds is None else self._seeds.to(self.device)
+        if self._worlds is not None:
+            state, counts = self._worlds
+            self._worlds = state.to(self.device), counts.to(self.device)
+        self._settle()
+        return self
 
     @property
     def n_agents(self) -> int:
@@ -121,6 +163,10 @@ class WildfireEnv(EnvBase):
     @property
     def seeds(self) -> Tensor:
         """Return each world's seed, int64 [B]; draw them now if none were given."""
+        return self._drawn_seeds().clone()
+
+    @apart
+    def _drawn_seeds(self) -> Tensor:
         if self._seeds is None:
             first = 2**31 + secrets.randbelow(2**31)  # the seeds below are for training and evaluation
             self._seeds = torch.arange(first, first + self.batch_size[0], device=self.device)
@@ -128,7 +174,18 @@ class WildfireEnv(EnvBase):
 
     @property
     def world_state(self) -> WorldState:
-        """Return the current worlds; clone them to keep them.
+        """Return the current worlds, a copy: to write to it changes nothing.
+
+        Raises:
+            RuntimeError: Before the first reset.
+        """
+        return self.shared_state.clone()
+
+    @property
+    def shared_state(self) -> WorldState:
+        """Return the current worlds themselves, for those who read them at every step and never write.
+
+        A reset of some worlds changes them in their place.
 
         Raises:
             RuntimeError: Before the first reset.
@@ -137,22 +194,24 @@ class WildfireEnv(EnvBase):
 
     @property
     def tree_counts(self) -> TreeCounts:
-        """Return the counts of the worlds' trees as they are now, by what became of them.
+        """Return the counts of the worlds' trees as they are now, by what became of them, a copy.
 
         Raises:
             RuntimeError: Before the first reset.
         """
-        return self._current()[1]
+        return self._current()[1].clone()
 
     def _current(self) -> tuple[WorldState, TreeCounts]:
         if self._worlds is None:
             raise RuntimeError("the environment has no state yet: call reset() first")
         return self._worlds
 
+    @apart
     def render(self, scale: int = 12) -> Tensor:
         """Draw the worlds, uint8 [B, H * scale, W * scale, 3]."""
-        return render(self.world_state, self.world.team.table(self.device).flies, scale)
+        return render(self.shared_state, self.world.team.table(self.device).flies, scale)
 
+    @apart
     def set_seeds(self, seeds: Sequence[int], first_episode: int = 0) -> None:
         """Set the seed of each world from the next reset on.
 
@@ -171,6 +230,7 @@ class WildfireEnv(EnvBase):
         self._episodes = torch.full_like(self._episodes, first_episode)
         self._resets.clear()
 
+    @apart
     def set_state(self, state: WorldState) -> TensorDictBase:
         """Replace the worlds, and return their tensordict as a reset would.
 
@@ -187,7 +247,7 @@ class WildfireEnv(EnvBase):
 
     def state_dict(self, *args: object, **kwargs: object) -> OrderedDict[str, Any]:
         """Return the environment's state: seeds, episodes, worlds and returns."""
-        worlds = {} if self._worlds is None else self.world_state.what_changes()
+        worlds = {} if self._worlds is None else self.shared_state.what_changes()
         return OrderedDict(  # as a module's is: TorchRL's EnvCreator looks into these alone
             seeds=self.seeds.clone(),
             episodes=self._episodes.clone(),
@@ -195,6 +255,7 @@ class WildfireEnv(EnvBase):
             worlds=OrderedDict((name, value.clone()) for name, value in worlds.items()),
         )
 
+    @apart
     def load_state_dict(self, state_dict: Mapping[str, Any], strict: bool = True, **kwargs: object) -> None:
         """Restore what ``state_dict`` returned, all or nothing.
 
@@ -205,6 +266,7 @@ class WildfireEnv(EnvBase):
         Raises:
             ValueError: If an entry is missing or of another shape or type.
         """
+        state_dict = with_renamed(state_dict)
         missing = [name for name in ("seeds", "episodes", "episode_reward", "worlds") if name not in state_dict]
         if missing and strict:
             raise ValueError(f"state_dict must have {', '.join(missing)}, got {', '.join(state_dict) or 'nothing'}")
@@ -222,19 +284,20 @@ class WildfireEnv(EnvBase):
 
     def _restored(self, state_dict: Mapping[str, Any]) -> WorldState:
         """Return the worlds of a ``state_dict``."""
-        like, *_ = self._sound_start(self.seeds, self._episodes)
+        like, *_ = self._sound_start(self._drawn_seeds(), self._episodes)
         return self.world.restored(filled(like, state_dict["worlds"]))
 
     # Interface for TorchRL
 
+    @apart
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
         mask = None if tensordict is None else tensordict.get("_reset", None)
         if isinstance(self._resets, ResetPool) and mask is not None and self._worlds is not None:
-            self._resets.fill(self.seeds, self._episodes)
+            self._resets.fill(self._drawn_seeds(), self._episodes)
             return self._masked_reset(self._resets, mask.flatten(), self._observe())
         if mask is None or self._worlds is None or mask.all():
             self._resets.clear()
-            state, counts, seen = self._sound_start(self.seeds, self._episodes)
+            state, counts, seen = self._sound_start(self._drawn_seeds(), self._episodes)
             self._worlds = state, counts
             self._episodes = self._episodes + 1
             self._episode_reward = torch.zeros_like(self._episode_reward)
@@ -246,6 +309,7 @@ class WildfireEnv(EnvBase):
         )
         return seen[rows]  # TorchRL reads those of the worlds that were reset
 
+    @apart
     def maybe_reset(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Reset the worlds that have ended; equal to TorchRL's, but it writes their rows only."""
         done = tensordict.get("done", None)
@@ -269,7 +333,8 @@ class WildfireEnv(EnvBase):
         """Start the next episode of some worlds, and return their tensordict."""
         if isinstance(self._resets, ResetPool):
             raise TypeError("worlds on a device that is not read start by a mask")
-        self.world_state[index], self.tree_counts[index], seen = self._resets.pop(index, self.seeds, self._episodes)
+        state, counts = self._current()
+        state[index], counts[index], seen = self._resets.pop(index, self._drawn_seeds(), self._episodes)
         self._episodes = self._episodes.index_add(0, index, torch.ones_like(index))
         self._episode_reward = self._episode_reward.index_fill(0, index, 0.0)
         return seen
@@ -283,7 +348,7 @@ class WildfireEnv(EnvBase):
     def _masked_reset(self, pool: ResetPool, ended: Tensor, seen: TensorDictBase) -> TensorDictBase:
         """Start the next episode of the worlds that ended, bool [B], without asking which; return all worlds' rows."""
         now = *self._current(), seen
-        (state, counts, out), started = pool.take(ended, now, self.seeds, self._episodes)
+        (state, counts, out), started = pool.take(ended, now, self._drawn_seeds(), self._episodes)
         self._worlds = state, counts
         self._episodes = self._episodes + started
         self._episode_reward = self._episode_reward.masked_fill(started, 0.0)
@@ -294,10 +359,11 @@ class WildfireEnv(EnvBase):
         worlds, counts, observed, faults = self._scene.start(seeds, episodes)
         return (worlds, counts, self._pack(worlds, observed, torch.zeros(len(seeds), device=self.device))), faults
 
+    @apart
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         shape, limit = (*self.batch_size, self.n_agents), self.world.team.n_actions if self.validate else None
         action = checked_action(tensordict.get(("agents", "action"), None), shape, self.device, limit)
-        transition, observed, reward = self._advance(self.world_state, self.tree_counts, action)
+        transition, observed, reward = self._advance(*self._current(), action)
         self._worlds = transition.after, transition.counts_after
         self._episode_reward = self._episode_reward + reward.mean(1)[:, 0]
         out = self._pack(transition.after, observed, self._episode_reward)
@@ -329,8 +395,8 @@ class WildfireEnv(EnvBase):
 
     def _observe(self) -> TensorDict:
         """Return observations, mask, central state, flags and metrics of the worlds."""
-        observed = self._scene.observe(self.world_state, self.tree_counts)
-        return self._pack(self.world_state, observed, self._episode_reward)
+        state, counts = self._current()
+        return self._pack(state, self._scene.observe(state, counts), self._episode_reward)
 
     def _pack(self, state: WorldState, observed: Observations, episode_reward: Tensor) -> TensorDict:
         return packed(self.world, state, observed, episode_reward)

@@ -139,7 +139,7 @@ def _play(env: WildfireEnv, policy: TensorDictModuleBase, seed: int, mode: str) 
     """Play one episode in each world."""
     lit = is_burning(env.world.reset(env.seeds, torch.zeros_like(env.seeds)).cells).any(dim=0)
     play(env, policy, seed, mode)
-    state = env.world_state
+    state = env.shared_state
     burned = lost(state)
     return _End(
         burned=burned.sum(dim=0).cpu(),

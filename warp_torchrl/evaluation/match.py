@@ -34,7 +34,7 @@ class Match:
         self, env: WildfireEnv, policies: Sequence[TensorDictModuleBase], watcher: Watcher | None = None
     ) -> None:
         self.env, self.world, self.policies, self.watcher = env, env.world, policies, watcher
-        self.ended, self.state, self.counts = env.world_state.clone(), env.world_state, env.tree_counts
+        self.ended, self.state, self.counts = env.shared_state.clone(), env.shared_state, env.tree_counts
         self.rows = torch.arange(env.batch_size[0], device=env.device)
         self.paid = torch.zeros(env.batch_size[0], device=env.device)
 

@@ -77,7 +77,7 @@ def play(
         torch.manual_seed(first_seed)
         env.set_seed(first_seed, static_seed=True)
         now = env.reset()
-        behaviour = Behaviour(env.world_state) if watch else None
+        behaviour = Behaviour(env.shared_state) if watch else None
         plays = _steps if recorder is not None or not fits(env, policy) else _match
         found = plays(env, policy, now, recorder, behaviour)
     episodes = {name: found[name].double().cpu().numpy() for name in episode_metrics(env.world)}
@@ -109,12 +109,12 @@ def _steps(
     env.watcher = watcher if behaviour is None else behaviour
     for _ in range(env.world.horizon):
         if recorder is not None:
-            recorder.add(env.world_state)
+            recorder.add(env.shared_state)
         now = env.step(policy(now))["next"]
         if now["done"].all():
             break
     if recorder is not None:
-        recorder.add(env.world_state)
+        recorder.add(env.shared_state)
     env.watcher = None
     return {name: now["info", name][:, 0] for name in episode_metrics(env.world)}
 

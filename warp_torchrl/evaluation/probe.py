@@ -78,7 +78,7 @@ def _collect(policy: TrainedPolicy, env: WildfireEnv, first_seed: int) -> tuple[
                 other(now.copy())
             with _listening(policy) as ours:
                 acted = policy(now)
-            known = _known(env.world_state, env)
+            known = _known(env.shared_state, env)
             for place_of, half in enumerate(halves):
                 rows = half & ~now["done"][:, 0]
                 what = {name: value[rows].flatten() for name, value in known.items()}

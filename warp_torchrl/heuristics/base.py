@@ -9,6 +9,7 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
 from warp_torchrl.device import reads_freely
+from warp_torchrl.modes import apart
 from warp_torchrl.world.fast.distances import FAR, nearest
 from warp_torchrl.world.geometry import offsets
 from warp_torchrl.world.random import Stream, uniform, uniform_at
@@ -27,8 +28,8 @@ class Worlds(Protocol):
         """Return the rules."""
 
     @property
-    def world_state(self) -> WorldState:
-        """Return the worlds as they are now."""
+    def shared_state(self) -> WorldState:
+        """Return the worlds as they are now, to be read alone."""
 
 
 class Heuristic(TensorDictModuleBase):
@@ -59,9 +60,10 @@ class Heuristic(TensorDictModuleBase):
         """Return the environment's rules."""
         return self.env.world
 
+    @apart
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write the team's actions, int64 [B, A]."""
-        state, world = self.env.world_state, self.world
+        state, world = self.env.shared_state, self.world
         shown = tensordict.get(("agents", "action_mask"))
         action = self.choose(state, shown if world.action_masking else world.possible_actions(state))
         return tensordict.set(("agents", "action"), action)

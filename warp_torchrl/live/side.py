@@ -56,7 +56,7 @@ class Side:
     @property
     def state(self) -> WorldState:
         """Return the world as it is, batch size [1]."""
-        return self.env.world_state
+        return self.env.shared_state
 
     @property
     def ended(self) -> bool:

@@ -119,9 +119,9 @@ class RecurrentActor(TensorDictModuleBase):
 
     def _before(self, fresh: Tensor) -> Tensor:
         """Return what is remembered of the step before by these agents, float32 [B, A, M]; 0 by others."""
-        if self.remembered.shape[:-1] != fresh.shape or self.remembered.device != fresh.device:
+        if self.remembered.shape[:-1] != fresh.shape:
             return torch.zeros(*fresh.shape, self.size[1], device=fresh.device)
-        return self.remembered
+        return self.remembered.to(fresh.device)  # where a policy was moved, its memory is still where it was
 
 
 class Memories:

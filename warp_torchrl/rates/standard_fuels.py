@@ -7,8 +7,8 @@ does. None of the 13 cures.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
 
+from warp_torchrl.modes import kept
 from warp_torchrl.rates.fuel_models import NO_FUEL, TON_PER_ACRE, FuelModel, FuelTable, fuel_table
 
 NOT_BURNABLE = {"NB1": 91, "NB2": 92, "NB3": 93, "NB8": 98, "NB9": 99}
@@ -86,7 +86,7 @@ _DIGITS = 4
 0.05. Exact conversions move rates by up to 1 % where live fuel is about to stop burning."""
 
 
-@lru_cache(maxsize=1)
+@kept(1)
 def anderson_13() -> FuelTable:
     """Return the 13 fuel models (Anderson 1982), codes 1..13, names FM1..FM13, and what does not burn."""
     models = {code: NO_FUEL for code in NOT_BURNABLE.values()}
@@ -95,7 +95,7 @@ def anderson_13() -> FuelTable:
     return fuel_table(models, {**NOT_BURNABLE, **{f"FM{code}": code for code in _ANDERSON}})
 
 
-@lru_cache(maxsize=1)
+@kept(1)
 def scott_burgan_40() -> FuelTable:
     """Return the 40 fuel models (Scott and Burgan 2005), codes 101..204, names GR1..SB4, and what does not burn."""
     models = {code: NO_FUEL for code in NOT_BURNABLE.values()}

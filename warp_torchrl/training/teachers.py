@@ -45,7 +45,7 @@ class TrainedTeacher:
 
     def __call__(self, shown: TensorDictBase) -> TensorDictBase:
         """Write the team's actions, int64 [B, A], as a heuristic does."""
-        state, world = self._env.world_state, self._env.world
+        state, world = self._env.shared_state, self._env.world
         with no_grad(), set_exploration_type(MODES[self._policy.mode]):
             for name, value in self._observation(state, world, world.forecast(state)).items():
                 shown.set((*OBSERVATION, name) if name else OBSERVATION, value)

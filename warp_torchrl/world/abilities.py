@@ -10,12 +10,12 @@ A module of a user's own adds an ability to the table, and a role that has it (`
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import ClassVar, NamedTuple
 
 import torch
 from torch import Tensor
 
+from warp_torchrl.modes import kept
 from warp_torchrl.validation import check_new_name
 from warp_torchrl.world.geometry import offsets
 from warp_torchrl.world.random import Stream, uniform
@@ -217,6 +217,6 @@ def places(state: WorldState, away: Tensor) -> tuple[Tensor, Tensor]:
     return on_row * width + on_column, (on_row == row) & (on_column == column)
 
 
-@lru_cache(maxsize=8)
+@kept(8)
 def _around(device: torch.device) -> Tensor:
     return torch.tensor(_NEIGHBOURHOOD, device=device)

@@ -1,12 +1,12 @@
 """The paper's automaton: its parameters, and what they make of the law's rules (``warp_torchrl.world.law``)."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Literal
 
 import torch
 from torch import Tensor
 
+from warp_torchrl.modes import kept
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world import law
 from warp_torchrl.world.automaton import Automaton, of_codes
@@ -137,7 +137,7 @@ class Fire(Automaton):
         return self.law.susceptibility(state.alpha) * self.is_fuel(state)
 
 
-@lru_cache(maxsize=8)
+@kept(8)
 def _nearness(device: torch.device) -> Tensor:
     """Return 1 / distance to the neighbour in each direction, float32 [8, 1, 1]."""
     return torch.tensor([1.0 / distance for distance in DISTANCES], device=device)[:, None, None]

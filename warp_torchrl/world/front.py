@@ -1,12 +1,12 @@
 """The shape of a fire: its centre, what is near it, what is downwind, and how far it is shut in."""
 
 import math
-from functools import lru_cache
 
 import torch
 from torch import Tensor
 from torch.nn.functional import avg_pool2d
 
+from warp_torchrl.modes import kept
 from warp_torchrl.world.geometry import grow
 from warp_torchrl.world.state import EMBER, FIRST_FIRE, OLDEST, TreeCounts, WorldState, is_burning, is_tree
 
@@ -110,7 +110,7 @@ def block_shares(mask: Tensor, among: Tensor, side: int = 8) -> Tensor:
     return count(mask & among) / count(among).clamp(min=1.0)
 
 
-@lru_cache(maxsize=16)
+@kept(16)
 def _rays(length: int, device: torch.device) -> Tensor:
     """Return the steps along each ray, a cell's side apart, float32 [rays, length, 2]."""
     angle = torch.arange(RAYS, device=device) * (2.0 * math.pi / RAYS)

@@ -5,11 +5,12 @@ direction ``d`` and ``(d + 4) % 8`` are opposite.
 """
 
 import math
-from functools import lru_cache
 
 import torch
 from torch import Tensor
 from torch.nn.functional import pad
+
+from warp_torchrl.modes import kept
 
 DIRECTIONS = ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1))
 """(row, column) offset of N, NE, E, SE, S, SW, W, NW [cells]."""
@@ -18,7 +19,7 @@ DISTANCES = tuple(math.hypot(row, column) for row, column in DIRECTIONS)
 """Distance to the neighbour in each direction [cells]: 1 along the axes, sqrt(2) along the diagonals."""
 
 
-@lru_cache(maxsize=8)
+@kept(8)
 def offsets(device: torch.device) -> Tensor:
     """Return the (row, column) offset of each direction, int64 [N, 2], kept for the next time [cells]."""
     return torch.tensor(DIRECTIONS, device=device)

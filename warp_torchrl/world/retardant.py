@@ -5,12 +5,12 @@ and is less likely to after the next tick (``warp_torchrl.world.lattice``).
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Literal
 
 import torch
 from torch import Tensor
 
+from warp_torchrl.modes import kept
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.abilities import own_cell
 from warp_torchrl.world.geometry import DIRECTIONS
@@ -183,7 +183,7 @@ def nearest_mate(state: WorldState) -> Tensor:
     return square.masked_fill(alone, 1 << 40).argmin(dim=-1)
 
 
-@lru_cache(maxsize=8)
+@kept(8)
 def _in_order(device: torch.device) -> tuple[Tensor, Tensor]:
     """Return the (east, north) offset of each direction, float32 [8, 2], and what its place is worth, float32 [8]."""
     offsets = torch.tensor([(column, -row) for row, column in DIRECTIONS], dtype=torch.float32, device=device)

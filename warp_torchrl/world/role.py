@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
+
+from warp_torchrl.modes import kept
 
 
 class Role(NamedTuple):
@@ -56,7 +57,7 @@ def role_names(roles: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*PAPER_ROLES, *roles)))
 
 
-@lru_cache(maxsize=64)
+@kept(64)
 def role_table(
     agents: tuple[str, ...], roles: tuple[str, ...], abilities: tuple[str, ...], device: torch.device
 ) -> RoleTable:

@@ -20,11 +20,11 @@ in the order of ``geometry.DIRECTIONS``.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 
 import torch
 from torch import Tensor
 
+from warp_torchrl.modes import kept
 from warp_torchrl.world.geometry import DIRECTIONS
 
 NEVER = 1e9
@@ -203,6 +203,6 @@ def _part(axis: int, like: Tensor) -> Tensor:
     return values.to(torch.float32).view(8, *(1 for _ in like.shape[1:]))
 
 
-@lru_cache(maxsize=32)
+@kept(32)
 def _kept(values: tuple[int, ...], device: torch.device) -> Tensor:
     return torch.tensor(values, dtype=torch.int32, device=device)

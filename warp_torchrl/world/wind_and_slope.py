@@ -5,12 +5,12 @@ the source; the slope is that between the two.
 """
 
 import math
-from functools import lru_cache
 
 import torch
 from torch import Tensor
 from torch.nn.functional import pad
 
+from warp_torchrl.modes import kept
 from warp_torchrl.world.geometry import DIRECTIONS, DISTANCES, unit_vectors
 
 _KM_PER_HOUR = 3.6  # of one m/s; the Canadian system's winds are in km/h
@@ -102,7 +102,7 @@ def _bounded_exp(exponent: Tensor) -> Tensor:
     return torch.exp(exponent.clamp(-40.0, 40.0))
 
 
-@lru_cache(maxsize=8)
+@kept(8)
 def _directions(device: torch.device) -> tuple[Tensor, Tensor]:
     vectors = unit_vectors(device)
     return vectors[:, 0].contiguous(), vectors[:, 1].contiguous()

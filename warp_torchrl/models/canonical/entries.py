@@ -7,12 +7,12 @@ agent's own observation, so that a policy stays decentralised.
 
 import math
 from collections.abc import Mapping
-from functools import lru_cache
 
 import torch
 from torch import Tensor
 
 from warp_torchrl.models.canonical.orientation import Orientation, orientation_to
+from warp_torchrl.modes import kept
 from warp_torchrl.symmetry import Part, Planes, Target, Vector
 
 Symmetries = Mapping[str, Planes | Vector]
@@ -104,7 +104,7 @@ def _planes(entry: Tensor, symmetry: Planes) -> Tensor:
     return entry.unflatten(-1, (symmetry.channels, side, side))
 
 
-@lru_cache(maxsize=16)
+@kept(16)
 def _offsets(side: int, near: float, device: torch.device) -> Tensor:
     """Return how a target at each cell about the middle pulls, whole numbers, float64 [S S, 2]."""
     along = torch.arange(side, dtype=torch.float64) - side // 2

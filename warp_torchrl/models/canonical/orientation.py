@@ -1,11 +1,11 @@
 """The eight symmetries of the square (the dihedral group D4), and what each does to vectors, planes and actions."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import torch
 from torch import Tensor
 
+from warp_torchrl.modes import kept
 from warp_torchrl.symmetry import ADVICE, COMPASS, LAST
 
 _SYMMETRIES = 8
@@ -73,7 +73,7 @@ def orientation_to(offset: Tensor) -> Orientation:
     return Orientation(mirrored[..., 0] * 4 + mirrored[..., 1] * 2 + (size[..., 0] > size[..., 1]))
 
 
-@lru_cache(maxsize=32)
+@kept(32)
 def cells(side: int, device: torch.device) -> Tensor:
     """Return the flat index of the cell that each cell shows in each orientation, int64 [8, S S]."""
     cell = torch.arange(side * side).view(side, side)
@@ -84,14 +84,14 @@ def cells(side: int, device: torch.device) -> Tensor:
     return torch.stack(found).to(device)
 
 
-@lru_cache(maxsize=8)
+@kept(8)
 def _signs(device: torch.device) -> Tensor:
     """Return the sign of rows and columns in each orientation before they change places, int64 [8, 2]."""
     corner = torch.tensor([1, -1])
     return torch.cartesian_prod(corner, corner).repeat_interleave(2, dim=0).to(device)
 
 
-@lru_cache(maxsize=8)
+@kept(8)
 def _products(into: bool, device: torch.device) -> Tensor:
     """Return the orientation that each one of a turned map is of the map itself, or back, int64 [8, 8]."""
     ways = Orientation(torch.arange(_SYMMETRIES)[:, None].expand(-1, 2))
@@ -102,7 +102,7 @@ def _products(into: bool, device: torch.device) -> Tensor:
     return (way if into else way.argsort(-1)).to(device)
 
 
-@lru_cache(maxsize=32)
+@kept(32)
 def _actions(names: tuple[str, ...], into: bool, device: torch.device) -> Tensor:
     """Return the index of the action on the map that each action is in each orientation, or back, int64 [8, n]."""
     compass = [COMPASS.get(name.removeprefix(LAST).removeprefix(ADVICE)) for name in names]

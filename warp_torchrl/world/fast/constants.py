@@ -1,20 +1,19 @@
 """Tensors of plain numbers."""
 
-from functools import lru_cache
-
 import torch
 from torch import Tensor
 
+from warp_torchrl.modes import kept
 from warp_torchrl.world.fast.compile import opaque_op
 
 
-@lru_cache(maxsize=64)
+@kept(64)
 def numbers(values: tuple[float, ...], device: torch.device) -> Tensor:
     """Return some numbers as a tensor, float32 [n], kept for the next time."""
     return torch.tensor(values, dtype=torch.float32, device=device)
 
 
-@lru_cache(maxsize=64)
+@kept(64)
 def whole_numbers(values: tuple[int, ...], device: torch.device) -> Tensor:
     """Return some whole numbers as a tensor, int64 [n], kept for the next time."""
     return torch.tensor(values, dtype=torch.int64, device=device)

@@ -4,12 +4,11 @@ There are 256 patterns of burning neighbours, so a small table holds every chanc
 pattern is a byte with a bit for each neighbour, see ``bit_of``.
 """
 
-from functools import lru_cache
-
 import torch
 from torch import Tensor
 from torch.nn.functional import pad
 
+from warp_torchrl.modes import kept
 from warp_torchrl.world.fast.bytes import byte
 from warp_torchrl.world.fast.constants import numbers
 from warp_torchrl.world.fast.join import in_place
@@ -85,7 +84,7 @@ def bit_of(direction: int) -> int:
     return _TRAVELS.index(direction)
 
 
-@lru_cache(maxsize=8)
+@kept(8)
 def _columns(directions: range, device: torch.device) -> Tensor:
     """Return which column each pattern has where the directions double the columns in turn, int64 [256]."""
     pattern = torch.arange(_PATTERNS)
