@@ -19,6 +19,7 @@ GROUND = (
     "content",
     "device",
     "dotted",
+    "finite",
     "flags",
     "foreign",
     "interruption",
@@ -102,11 +103,11 @@ def test_fire_science_knows_torch_and_itself():
     assert not breaks(of_rooms(*FIRE_SCIENCE), lambda module: roots(module) <= known)
 
 
-def test_the_ground_floor_knows_the_standard_library_and_what_devices_and_modes_are():
+def test_the_ground_floor_knows_the_standard_library_and_torch():
     known = sys.stdlib_module_names | set(GROUND)
     assert not breaks(GROUND, knows_only)
-    torch = {"device": {"torch"}, "modes": {"torch"}}
-    assert not breaks(GROUND, lambda module: roots(module) <= known | torch.get(module, set()))
+    of_tensors = ("device", "finite", "modes")
+    assert not breaks(GROUND, lambda module: roots(module) <= known | ({"torch"} if module in of_tensors else set()))
 
 
 def test_what_reads_the_state_knows_only_the_world():

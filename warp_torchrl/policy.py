@@ -12,10 +12,13 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 from torchrl.envs.utils import ExplorationType, exploration_type, set_exploration_type
 
+from warp_torchrl.device import reads_freely
 from warp_torchrl.env.flat import FLAT, unflattened
+from warp_torchrl.finite import check_scores
 from warp_torchrl.models import (
     ACTION,
     ACTION_MASK,
+    ACTION_VALUE,
     AGENCY,
     LOGITS,
     OBSERVATION,
@@ -37,6 +40,12 @@ from warp_torchrl.world.state import Action
 MODES = {"sampled": ExplorationType.RANDOM, "deterministic": ExplorationType.DETERMINISTIC}
 """TorchRL's exploration type of each mode."""
 AgentObservation = np.ndarray | Mapping[str, np.ndarray]
+
+
+def scores(acted: TensorDictBase) -> Tensor | None:
+    """Return the logits or values by which actions were chosen, float32 [..., actions]; None of other policies."""
+    logits = acted.get(LOGITS, None)
+    return acted.get(ACTION_VALUE, None) if logits is None else logits
 
 
 class TrainedPolicy(TensorDictModuleBase):
@@ -95,10 +104,17 @@ class TrainedPolicy(TensorDictModuleBase):
 
     @apart
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Write the team's actions, int64 [B, A]."""
+        """Write the team's actions, int64 [B, A].
+
+        Raises:
+            NumericalFailure: If what they were chosen by is not finite; a GPU is not asked.
+        """
         own = set_exploration_type(MODES[self.mode]) if exploration_type() is None else nullcontext()
         with own:
-            return tensordict.update(self.module(tensordict.copy()).select(*self.out_keys, strict=False))
+            acted = self.module(tensordict.copy()).select(*self.out_keys, strict=False)
+        if reads_freely(acted[ACTION].device):
+            check_scores(scores(acted))
+        return tensordict.update(acted)
 
     @apart
     def probabilities(self, acted: TensorDictBase) -> Tensor | None:

@@ -1,5 +1,6 @@
 """What all algorithms share: their numbers' ranges, the decentralised actor, and the falling learning rate."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
@@ -73,6 +74,23 @@ def falling(start: float, end: float, progress: float) -> float:
     return start + (end - start) * min(progress, 1.0)
 
 
+class MaskedChoice(MaskedCategorical):
+    """TorchRL's distribution of masked actions, which draws where chances are NaN too.
+
+    A GPU that is asked for such a draw ends the program. Any action is drawn instead, and the logits, which stay as
+    they are, tell: who learns or plays asks whether they are finite.
+    """
+
+    def sample(self, sample_shape: torch.Size | Sequence[int] | None = None) -> Tensor:
+        """Return actions, int64 [...]."""
+        chances = self.probs
+        self.probs = chances.nan_to_num(nan=1.0)
+        try:
+            return super().sample(sample_shape)
+        finally:
+            self.probs = chances
+
+
 def masked_actor(shape: Signature, model: Mlp, **distribution: float | bool) -> ProbabilisticActor:
     """Return a team's decentralised policy: each agent's action drawn from its own observation and mask.
 
@@ -85,7 +103,7 @@ def masked_actor(shape: Signature, model: Mlp, **distribution: float | bool) -> 
         model.actor(shape),
         in_keys={"logits": LOGITS, "mask": ACTION_MASK},
         out_keys=[ACTION],
-        distribution_class=MaskedCategorical,
+        distribution_class=MaskedChoice,
         distribution_kwargs={"use_cross_entropy": False, **distribution},
         return_log_prob=True,
         log_prob_key=LOG_PROB,

@@ -9,8 +9,10 @@ from torch import Tensor
 
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.metrics import metrics
+from warp_torchrl.finite import check_scores
 from warp_torchrl.heuristics import Heuristic
 from warp_torchrl.models import ACTION, ACTION_MASK, AGENCY, OBSERVATION, ROLE
+from warp_torchrl.policy import scores
 from warp_torchrl.world.state import Transition, count_trees
 
 Watcher = Callable[[Transition, Tensor], None]
@@ -62,7 +64,9 @@ class Match:
         A trained policy acts in all worlds, so that its draws are those of a loop over all.
         """
         if not isinstance(self.policies[0], Heuristic):
-            return self.policies[0](shown.copy())[ACTION].index_select(0, self.rows)
+            acted = self.policies[0](shown.copy())
+            check_scores(scores(acted))
+            return acted[ACTION].index_select(0, self.rows)
         mask, share = self.world.possible_actions(self.state), len(self.paid) // len(self.policies)
         last = torch.arange(1, len(self.policies) + 1, device=self.rows.device) * share
         ends = torch.searchsorted(self.rows, last).tolist()

@@ -14,9 +14,10 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.specs import episode_metrics
 from warp_torchrl.evaluation.behaviour import Behaviour
 from warp_torchrl.evaluation.match import Match, fits
+from warp_torchrl.finite import check_scores
 from warp_torchrl.heuristics import HEURISTICS, idle_action
 from warp_torchrl.models import ACTION, ACTION_MASK, memory_apart
-from warp_torchrl.policy import MODES
+from warp_torchrl.policy import MODES, scores
 from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.team import Team
 from warp_torchrl.world.world import World
@@ -72,6 +73,9 @@ def play(
 
     Returns:
         The metrics of each world.
+
+    Raises:
+        NumericalFailure: If what the policy chooses by is not finite.
     """
     with torch.random.fork_rng(), torch.no_grad(), set_exploration_type(MODES[mode]), memory_apart(policy):
         torch.manual_seed(first_seed)
@@ -110,7 +114,9 @@ def _steps(
     for _ in range(env.world.horizon):
         if recorder is not None:
             recorder.add(env.shared_state)
-        now = env.step(policy(now))["next"]
+        acted = policy(now)
+        check_scores(scores(acted))  # here each step reads from the device anyway
+        now = env.step(acted)["next"]
         if now["done"].all():
             break
     if recorder is not None:

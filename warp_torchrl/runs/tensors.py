@@ -1,12 +1,12 @@
 """Tensors that a file holds: none of their numbers may be NaN or infinite."""
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from torch import Tensor
 
+from warp_torchrl.finite import not_finite
 from warp_torchrl.runs.sealed import Unsound
 
 
@@ -23,16 +23,6 @@ def check_finite(path: Path, content: Any) -> None:
     for name, value in numbers(content):
         if (found := not_finite(value)) is not None:
             raise Unsound(f"{path} must hold finite numbers alone, and {name} holds {found:g}")
-
-
-def not_finite(value: Tensor | float) -> float | None:
-    """Return a number of a tensor, or a number itself, that is NaN or infinite; None where all are finite."""
-    if not isinstance(value, Tensor):
-        return None if math.isfinite(value) else value
-    if not value.is_floating_point() or not value.numel():
-        return None
-    ends = value.detach().aminmax()  # NaN if any number is; unlike a mask it takes no memory
-    return next((end for end in map(float, ends) if not math.isfinite(end)), None)
 
 
 def numbers(content: Any, prefix: str = "") -> Iterator[tuple[str, Tensor | float]]:

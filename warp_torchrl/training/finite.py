@@ -6,10 +6,9 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.device import reads_freely
+from warp_torchrl.finite import NumericalFailure
 
-
-class NumericalFailure(Exception):  # noqa: N818
-    """A reward, a loss or a gradient is not finite; the weights were not touched."""
+__all__ = ["FiniteSteps", "NumericalFailure"]
 
 
 class FiniteSteps:

@@ -115,7 +115,7 @@ class Learning:
         if self.weighing is not None:
             row |= self.weighing.columns(row)
         if unsound:
-            raise NumericalFailure(f"after {self.frames} frames a reward is not finite; the last checkpoint stands")
+            raise NumericalFailure(f"after {self.frames} frames {unsound[0]} is not finite; the last checkpoint stands")
         for share, batch in zip(self.shares, batches, strict=True):
             if share.reward_scale is not None:
                 share.reward_scale(batch)

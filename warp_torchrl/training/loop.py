@@ -20,6 +20,7 @@ from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.config.seeds import WORLDS, first_world_seed
 from warp_torchrl.evaluation.goal import goal
 from warp_torchrl.evaluation.play import play
+from warp_torchrl.finite import NumericalFailure, not_finite
 from warp_torchrl.models import signature
 from warp_torchrl.parallel import WorkerDied
 from warp_torchrl.policy import MODES
@@ -203,6 +204,12 @@ class Training(Learning):
         return self._write(self.state_dict() | ({"others": others[1:]} if len(others) > 1 else {}))
 
     def _write(self, training: Mapping[str, Any]) -> Path:
+        policy = self.learner.policy.state_dict()
+        for name, value in policy.items():
+            if not_finite(value) is not None:
+                raise NumericalFailure(
+                    f"after {self.frames} frames {name} is not finite; it is not saved, and the last checkpoint stands"
+                )
         with self.clock.timed():
             self.metrics.sync()
             path = checkpoints.save(
@@ -212,7 +219,7 @@ class Training(Learning):
                 signature=signature(self.env),
                 mode=self.mode,
                 record=self.record,
-                policy=self.learner.policy.state_dict(),
+                policy=policy,
                 training=training,
                 keep=self.run_config.checkpoint.keep,
                 stays=self._is_regular,

@@ -9,8 +9,12 @@ from torch import Tensor
 from warp_torchrl import parallel
 from warp_torchrl.env.metrics import FLYING, SAVED_BY, WATCHING
 from warp_torchrl.env.specs import EPISODE_METRICS
-from warp_torchrl.models import REWARD
+from warp_torchrl.finite import are_unsound
+from warp_torchrl.models import CANONICAL, OBSERVATION, RADIO, REWARD, SENT, STATE, VALUE
+from warp_torchrl.models.signature import Key
 
+NUMBERS = ("a reward", "an observation", "an output of the policy")
+"""What a batch holds that must be finite."""
 TRAIN_COLUMNS = (
     "train/policy_gradient_loss",
     "train/value_loss",
@@ -27,7 +31,7 @@ TRAIN_COLUMNS = (
 
 def episode_columns(
     batches: Sequence[TensorDictBase], kinds: Sequence[str] = ("",)
-) -> tuple[dict[str, float | None], int]:
+) -> tuple[dict[str, float | None], list[str]]:
     """Return what batches [B, T] of all processes hold, read from the device at once.
 
     Args:
@@ -36,31 +40,51 @@ def episode_columns(
 
     Returns:
         The mean metrics of the episodes that ended, None where none ended, and the share of trees saved of each kind if
-        there are several; and how many rewards are not finite.
+        there are several; and which ``NUMBERS`` are not finite.
     """
     info = batches[0]["next", "info"]
     names = [*EPISODE_METRICS, *(name for name in (*WATCHING, *FLYING) if name in info.keys())]
     names += sorted(name for name in info.keys() if name.startswith(SAVED_BY))
     of_kinds = parallel.sum_(torch.stack([_sums(batch, names) for batch in batches])).tolist()
-    unsound, count, *totals = map(sum, zip(*of_kinds, strict=True))
+    *unsound, count = map(sum, zip(*(sums[: len(NUMBERS) + 1] for sums in of_kinds), strict=True))
+    totals = map(sum, zip(*(sums[len(NUMBERS) + 1 :] for sums in of_kinds), strict=True))
     means = {name: total / count if count else None for name, total in zip(names, totals, strict=True)}
     row = {"rollout/ep_rew_mean": means.pop("episode_reward"), "rollout/ep_len_mean": means.pop("episode_length")}
     row |= {f"world/{name}": value for name, value in means.items()}
     if len(kinds) > 1:
-        saved = 2 + names.index("saved")
+        ended = len(NUMBERS)
+        saved = ended + 1 + names.index("saved")
         row |= {
-            f"mixture/saved_{kind}": sums[saved] / sums[1] if sums[1] else None
+            f"mixture/saved_{kind}": sums[saved] / sums[ended] if sums[ended] else None
             for kind, sums in zip(kinds, of_kinds, strict=True)
         }
-    return row, int(unsound)
+    return row, [what for what, count in zip(NUMBERS, unsound, strict=True) if count]
 
 
 def _sums(batch: TensorDictBase, names: Sequence[str]) -> Tensor:
-    """Return how many rewards are not finite, how many episodes ended, and the sums of their metrics, float64."""
+    """Return which ``NUMBERS`` are not finite, how many episodes ended, and the sums of their metrics, float64."""
     done, info = batch["next", "done"][..., 0], batch["next", "info"]
-    unsound = (~batch["next", *REWARD].isfinite()).sum()
-    sums = [unsound, done.sum(), *(torch.where(done, info[name][..., 0], 0.0).sum() for name in names)]
+    sums = [*_unsound(batch), done.sum(), *(torch.where(done, info[name][..., 0], 0.0).sum() for name in names)]
     return torch.stack([each.double() for each in sums])
+
+
+def _unsound(batch: TensorDictBase) -> list[Tensor]:
+    """Return which ``NUMBERS`` of a batch are not finite, bool [] each, without reading them."""
+    held: dict[str, list[Tensor]] = {what: [] for what in NUMBERS}
+    for key, value in batch.items(include_nested=True, leaves_only=True):
+        way = key if isinstance(key, tuple) else (key,)
+        way = way[1:] if way[0] == "next" else way
+        if value.is_floating_point() and way[0] != "info":
+            held[_what(way)].append(value)
+    return [are_unsound(each).to(batch["next", "done"].device) for each in held.values()]
+
+
+def _what(key: Key) -> str:
+    """Return which of ``NUMBERS`` an entry of a batch is."""
+    if key == REWARD:
+        return NUMBERS[0]
+    seen = key[:2] in (OBSERVATION, SENT, RADIO) or key[-1].startswith((STATE, CANONICAL[-1]))
+    return NUMBERS[1] if seen and key != VALUE else NUMBERS[2]
 
 
 def line(row: Mapping[str, float | None], total: int) -> str:

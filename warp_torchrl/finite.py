@@ -1,0 +1,39 @@
+"""Numbers that are not finite: how they are found, and what is raised where learning or acting meets them."""
+
+import math
+from collections.abc import Iterable
+
+import torch
+from torch import Tensor
+
+
+class NumericalFailure(Exception):  # noqa: N818
+    """A number that is shown, earned, learned or acted by is not finite; no weights were touched."""
+
+
+def are_unsound(tensors: Iterable[Tensor]) -> Tensor:
+    """Return whether any number of some tensors of floats is NaN or infinite, bool [], without reading it."""
+    ends = [each.to(torch.float64) for tensor in tensors if tensor.numel() for each in tensor.detach().aminmax()]
+    return ~torch.stack(ends).isfinite().all() if ends else torch.zeros((), dtype=torch.bool)
+
+
+def not_finite(value: Tensor | float) -> float | None:
+    """Return a number of a tensor, or a number itself, that is NaN or infinite; None where all are finite."""
+    if not isinstance(value, Tensor):
+        return None if math.isfinite(value) else value
+    if not value.is_floating_point() or not value.numel():
+        return None
+    ends = value.detach().aminmax()  # NaN if any number is; unlike a mask it takes no memory
+    return next((end for end in map(float, ends) if not math.isfinite(end)), None)
+
+
+def check_scores(scores: Tensor | None) -> None:
+    """Check the logits or values by which actions are chosen; it reads from their device.
+
+    Raises:
+        NumericalFailure: If one is not finite.
+    """
+    if scores is not None and (found := not_finite(scores)) is not None:
+        raise NumericalFailure(
+            f"what the policy says of an action is {found:g}, not finite: its weights or what it is shown are too large"
+        )
