@@ -1,10 +1,12 @@
 """A policy that is handed on acts as it did, is verified, and does not pretend to be a run."""
 
+import re
 import shutil
 
 import pytest
 import torch
 
+from tests.forgery import forge
 from tests.runs.test_checkpoint import SIGNATURE
 from tests.training.test_loop import tiny
 from warp_torchrl import load_policy
@@ -128,3 +130,20 @@ def test_trust_without_an_adviser_leaves_no_folder(run, tmp_path, capsys):
     said = capsys.readouterr().err.splitlines()[-1]
     assert "model.trust must be 0 where agents are not advised and told the rules" in said
     assert not (tmp_path / "trusting").exists()
+
+
+@pytest.mark.parametrize("number", [float("nan"), 3e38])
+def test_numbers_that_are_not_finite_are_not_exported(run, tmp_path, capsys, number):
+    """NaN itself, alone or in a mean; or finite numbers whose mean is not."""
+    shutil.copytree(run, tmp_path / "bad")
+    path = newest(tmp_path / "bad")[0].path
+    policy = {name: torch.full_like(value, number) for name, value in torch.load(path / "policy.pt").items()}
+    torch.save(policy, path / "policy.pt")
+    forge(path)
+    bad, said = str(tmp_path / "bad"), "must hold finite numbers alone" if number != number else "mean of .* not finite"
+    alone = [[bad, str(tmp_path / "out")]] if number != number else []
+    for arguments in (*alone, [bad, str(tmp_path / "out"), "--average", bad]):
+        with pytest.raises(SystemExit) as refused:
+            main(arguments)
+        assert refused.value.code == 4 and re.search(said, capsys.readouterr().err)
+        assert not (tmp_path / "out").exists()

@@ -18,7 +18,9 @@ from warp_torchrl.api import policy_of
 from warp_torchrl.commands.program import one_line_end
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.flags import FlagParser
+from warp_torchrl.finite import not_finite
 from warp_torchrl.runs import checkpoint as checkpoints
+from warp_torchrl.runs.exit_codes import UNSOUND
 from warp_torchrl.runs.shipped import find_policy
 
 
@@ -42,12 +44,14 @@ def main(arguments: list[str] | None = None) -> None:
         record = found.record()
         if options.trust is not None:
             record = _trusting(record, options.trust)
-            policy_of(found, record=record)  # what cannot be trusted is told before anything is written
+        policy_of(found, record=record)  # what cannot act, or be trusted, is told before anything is written
         if options.mode is not None:
             found = replace(found, manifest=replace(found.manifest, mode=options.mode))
         others = [checkpoints.newest(find_policy(each))[0] for each in options.average]
         checkpoints.export(found, options.folder, record, _mean([found, *others]) if others else None)
-    except (checkpoints.CheckpointError, OSError, ValueError) as error:
+    except checkpoints.CheckpointError as error:
+        parser.exit(UNSOUND, f"error: {' '.join(str(error).split())}\n")
+    except (OSError, ValueError) as error:
         parser.error(" ".join(str(error).split()))
     print(f"{options.folder}: {found.manifest.scenario}, {found.manifest.frames} frames, {found.manifest.mode}")
 
@@ -56,14 +60,19 @@ def _mean(found: Sequence[checkpoints.Checkpoint]) -> dict[str, torch.Tensor]:
     """Return the mean of the parameters of policies.
 
     Raises:
-        CheckpointError: If they differ in what they read, in what they write, or in their networks.
+        CheckpointError: If they differ in what they read, in what they write, or in their networks, or if a mean is
+            not finite.
     """
     policies = [each.policy() for each in found]
     for checkpoint, policy in zip(found, policies):
         if _fits(checkpoint, policy) != _fits(found[0], policies[0]):
             told = f"{checkpoint.path} is of another architecture than {found[0].path}"
             raise checkpoints.CheckpointError(f"{told}: average a run with what it started from, or with its like")
-    return {name: torch.stack([policy[name] for policy in policies]).mean(dim=0) for name in policies[0]}
+    mean = {name: torch.stack([policy[name] for policy in policies]).mean(dim=0) for name in policies[0]}
+    for name, value in mean.items():
+        if not_finite(value) is not None:
+            raise checkpoints.CheckpointError(f"the mean of {name} is not finite: its numbers are too large")
+    return mean
 
 
 def _fits(found: checkpoints.Checkpoint, policy: Mapping[str, torch.Tensor]) -> tuple[object, ...]:
