@@ -302,6 +302,7 @@ def test_it_renders_every_world(make_small_env):
     assert env.render(scale=4).shape == (3, 48, 48, 3)
 
 
+@pytest.mark.cuda
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA device")
 def test_cuda_equals_cpu_and_a_step_does_not_synchronise():
     ours, theirs = WildfireEnv(small_world(), n_worlds=4), WildfireEnv(small_world(), n_worlds=4, device="cuda")
