@@ -22,6 +22,7 @@ GROUND = (
     "finite",
     "flags",
     "foreign",
+    "foreign_text",
     "interruption",
     "modes",
     "nearest",

@@ -1,0 +1,50 @@
+"""Text that others wrote: names of folders, policies and vehicles, and the messages of errors about them.
+
+A terminal obeys escape sequences and a browser obeys markup, so neither gets such text as it is.
+"""
+
+import re
+import unicodedata
+
+MOST = 300
+"""Length of a text that is shown in one line, where no other is given [characters]."""
+_READ = 8  # characters for each that is shown
+_SEQUENCE = re.compile(
+    r"(?:\x1b\[|\x9b)[0-?]*[ -/]*[@-~]?"  # ECMA-48 control sequences: colours, movements of the cursor
+    r"|(?:\x1b[\]PX^_]|[\x90\x98\x9d-\x9f])[^\x07\x1b\x9c]*(?:\x07|\x1b\\|\x9c)?"  # strings: titles, links
+    r"|\x1b[ -/]*[0-~]?"
+)
+_HIDDEN = frozenset(("Cc", "Cf", "Cs", "Co", "Cn"))  # controls, bidi overrides, halves of pairs, what has no glyph
+_LINK = re.compile(r"(?<=:)(?=/)|(?<=www)(?=\.)|(?<=@)", re.IGNORECASE)
+_JOINER = "\u2060"
+
+
+def plain_text(value: str, most: int = MOST) -> str:
+    """Return a text as one line that a terminal cannot obey.
+
+    Escape sequences, control characters and characters that turn the direction of writing are taken out, and white
+    space of any kind and length is one space.
+
+    Args:
+        value: The text.
+        most: Length above which the end is left out [characters].
+    """
+    begin = value[: _READ * most]  # a text of megabytes is not read to its end
+    shown = (each for each in _SEQUENCE.sub("", begin) if each.isspace() or unicodedata.category(each) not in _HIDDEN)
+    line = " ".join("".join(shown).split())
+    return line if len(line) <= most and len(begin) == len(value) else f"{line[: max(0, most - 3)]}..."[:most]
+
+
+def escaped_markdown(value: object, most: int = MOST) -> str:
+    """Return the plain text of a value for Markdown, MDX or HTML, in which nothing of it is markup.
+
+    All but letters and digits become character references, which those three read alike; so does a first letter, since
+    a line that begins with ``import`` is a program in MDX. An invisible joiner breaks addresses, of which GitHub's
+    Markdown makes links even where they are references.
+
+    Args:
+        value: Its text is shown.
+        most: Length above which the end is left out [characters].
+    """
+    line = _LINK.sub(_JOINER, plain_text(str(value), most))
+    return "".join(each if at and each.isalnum() else f"&#{ord(each)};" for at, each in enumerate(line))
