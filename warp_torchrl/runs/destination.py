@@ -5,7 +5,9 @@ from pathlib import Path
 from warp_torchrl.config.construction import ConfigError
 
 _OF_HYDRA = (".hydra", "multirun.yaml")  # Hydra writes these, and logs, before the evaluation
-_LEFT = (".lock", ".draft-")  # of a process that was killed before it had written anything
+DRAFT = ".warp_torchrl-draft-"
+"""What names of drafts begin with. A draft that nobody has locked is of a process that was killed."""
+_LEFT = (".lock", DRAFT)  # of a process that was killed before it had written anything
 _NAMED = 3
 
 

@@ -10,11 +10,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from warp_torchrl.runs import disk
-from warp_torchrl.runs.destination import check_free
+from warp_torchrl.runs.destination import DRAFT, check_free
 from warp_torchrl.runs.lock import RunFolderLock
 
-DRAFT = ".draft-"
-"""What names of drafts begin with. A draft that nobody has locked is of a process that was killed."""
+__all__ = ["DRAFT", "draft_in", "output_folder", "publish"]
 _TAKEN = (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR)
 
 
