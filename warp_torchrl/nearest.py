@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from difflib import SequenceMatcher, get_close_matches
 
 _MOST = 2  # names that are offered
+_LONGEST = 200  # characters of a name for which others are looked for
 
 
 def nearest(name: str, known: Iterable[str]) -> list[str]:
@@ -12,6 +13,8 @@ def nearest(name: str, known: Iterable[str]) -> list[str]:
     The last part of a dotted key, ``algorithm.gama``, is first compared within its group, then with equal last parts
     elsewhere; then the whole key with all keys, and at last its last part with all last parts.
     """
+    if len(name) > _LONGEST:
+        return []
     known = list(dict.fromkeys(known))
     group, _, last = name.lower().rpartition(".")
     in_group = {_last(each): [each] for each in known if each.lower().rpartition(".")[0] == group}
