@@ -2,8 +2,11 @@
 
 import io
 import json
+import math
+import os
 import pickle
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 import torch
@@ -14,6 +17,7 @@ from warp_torchrl.config.saved_config import SavedConfig, restore
 from warp_torchrl.models import Entry, Signature
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
+from warp_torchrl.runs.output import DRAFT
 from warp_torchrl.symmetry import Planes, to_plain
 
 ACTIONS = tuple(f"action_{code}" for code in range(11))
@@ -253,7 +257,7 @@ def test_a_crash_while_saving_leaves_what_was_there(tmp_path, monkeypatch):
 
 
 def test_a_draft_of_a_killed_save_is_not_a_checkpoint_and_goes_with_the_next(tmp_path):
-    shutil.copytree(saved(tmp_path, 1), tmp_path / "checkpoints" / ".5.tmp")
+    shutil.copytree(saved(tmp_path, 1), tmp_path / "checkpoints" / f"{DRAFT}5" / "draft")
     assert newest(tmp_path)[0].manifest.frames == 1
     saved(tmp_path, 2)
     assert sorted(each.name for each in (tmp_path / "checkpoints").iterdir()) == ["1", "2"]
@@ -268,7 +272,7 @@ def test_what_somebody_else_removes_meanwhile_is_gone_and_no_error(tmp_path, mon
 
     monkeypatch.setattr(checkpoints.shutil, "rmtree", after_another)
     for frames in (1, 2, 3, 4):
-        (tmp_path / "checkpoints" / f".{frames}.tmp").mkdir(parents=True)
+        (tmp_path / "checkpoints" / f"{DRAFT}{frames}").mkdir(parents=True)
         saved(tmp_path, frames, keep=2)
     assert sorted(each.name for each in (tmp_path / "checkpoints").iterdir()) == ["3", "4"]
 
@@ -291,10 +295,78 @@ def test_a_disk_that_refuses_the_policy_leaves_the_whole_run(tmp_path, monkeypat
     for frames in (100, 200):
         saved(tmp_path, frames)
 
-    def refuse(*paths):
+    def refuse(*given):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(shutil, "copyfile", refuse)
+    monkeypatch.setattr(checkpoints.disk, "replace", refuse)
     with pytest.raises(OSError, match="No space left"):
         checkpoints.leave_policy(tmp_path)
     assert newest(tmp_path)[0].training()["frames"] == 200
+
+
+def test_a_policy_that_is_left_is_there_whenever_the_power_goes(tmp_path, monkeypatch):
+    for frames in (100, 200):
+        saved(tmp_path, frames)
+
+    def fail(path, **options):
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr("pathlib.Path.unlink", fail)  # after the manifest, and before the training state is gone
+    with pytest.raises(OSError, match="Input/output"):
+        checkpoints.leave_policy(tmp_path)
+    monkeypatch.undo()
+    assert newest(tmp_path)[0].manifest.frames == 200 and not newest(tmp_path)[1]
+    checkpoints.leave_policy(tmp_path)
+    assert sorted(each.name for each in (tmp_path / "checkpoints" / "200").iterdir()) == [
+        "config.json",
+        "manifest.json",
+        "policy.pt",
+    ]
+
+
+def test_an_export_appears_when_what_it_holds_was_loaded(tmp_path):
+    saved(tmp_path, 1)
+    found, seen = newest(tmp_path)[0], []
+    checkpoints.export(found, tmp_path / "out" / "made", check=lambda made: seen.append(made.policy()["weight"]))
+    assert seen[0].tolist() == newest(tmp_path / "out" / "made")[0].policy()["weight"].tolist() == [0, 1, 2, 3]
+    with pytest.raises(CheckpointError, match="holds nan"):
+        checkpoints.export(found, tmp_path / "out" / "nan", policy={"weight": torch.tensor([math.nan])})
+
+    def refuse(made):
+        raise CheckpointError("no")
+
+    with pytest.raises(CheckpointError, match="no"):
+        checkpoints.export(found, tmp_path / "out" / "refused", check=refuse)
+    with pytest.raises(FileExistsError):
+        checkpoints.export(found, tmp_path / "out" / "made")
+    assert [each.name for each in (tmp_path / "out").iterdir()] == ["made"]
+
+
+def test_who_exports_into_one_folder_at_once_does_not_destroy_the_other_s(tmp_path):
+    saved(tmp_path, 1)
+    found = newest(tmp_path)[0]
+
+    def one(number):
+        try:
+            checkpoints.export(found, tmp_path / "made", policy={"weight": torch.full((4,), float(number))})
+        except FileExistsError:
+            return None
+        return number
+
+    with ThreadPoolExecutor(4) as pool:
+        (winner,) = (each for each in pool.map(one, range(12)) if each is not None)
+    assert newest(tmp_path / "made")[0].policy()["weight"].tolist() == [winner] * 4
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["checkpoints", "made"]
+
+
+@pytest.mark.parametrize("harm", ["link", "pipe", "name"])
+def test_a_checkpoint_s_files_are_plain_and_below_it(tmp_path, harm):
+    folder = saved(tmp_path, 1)
+    path, other = folder / "policy.pt", tmp_path / "other.pt"
+    if harm == "name":
+        forge(folder, files={"../../other.pt": {"size": 1, "sha256": "0" * 64}})
+    else:
+        path.rename(other)
+        path.symlink_to(other) if harm == "link" else os.mkfifo(path)
+    with pytest.raises(CheckpointError, match=r"is a link|is no file|must list"):
+        newest(tmp_path)

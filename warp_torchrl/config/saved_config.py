@@ -13,7 +13,7 @@ from omegaconf.errors import OmegaConfBaseException
 from warp_torchrl.config.compose import OPTION, compose_config, conf_folder, option_of, plain, without_targets
 from warp_torchrl.config.construction import ConfigError, component, free_mappings
 from warp_torchrl.config.groups import COMPONENTS, ENVIRONMENT, WORLD_KEYS
-from warp_torchrl.config.renamed import renamed_overrides
+from warp_torchrl.config.renamed import renamed_overrides, renamed_values
 from warp_torchrl.dotted import dotted
 
 _BEFORE = {
@@ -26,6 +26,8 @@ _BEFORE = {
     "reward.act_per": "forest",
 }
 """What runs did whose record has none of a key yet."""
+_DEEPEST = 20
+"""How deep what is recorded may be nested; a configuration is 5 deep."""
 _OF_NETWORKS = {"team.radio.carries": ("graph", "both")}
 """Values of a scenario's keys that a policy's networks need: another scenario does not change them."""
 
@@ -41,6 +43,37 @@ class SavedConfig:
 
     choices: dict[str, str] = field(default_factory=dict)
     values: dict[str, Any] = field(default_factory=dict)
+
+
+def saved_config(content: object) -> SavedConfig:
+    """Return the configuration that a JSON file holds, with the names of now.
+
+    Args:
+        content: From a run folder or a recording: not trusted.
+
+    Raises:
+        ValueError: If it is not choices and values, or they are nested too deep.
+    """
+    choices, values = (content.get(part) if isinstance(content, dict) else None for part in ("choices", "values"))
+    if not (isinstance(choices, dict) and isinstance(values, dict)):
+        raise ValueError("it must hold choices and values")
+    if not all(isinstance(option, str) for option in choices.values()):
+        raise ValueError("choices must be names of options")
+    _check_depth(values)
+    return SavedConfig(choices=choices, values=renamed_values(values))
+
+
+def _check_depth(values: Any) -> None:
+    level = [values]
+    for _ in range(_DEEPEST):
+        level = [
+            each
+            for node in level
+            if isinstance(node, dict | list)
+            for each in (node.values() if isinstance(node, dict) else node)
+        ]
+    if level:
+        raise ValueError(f"values must be nested at most {_DEEPEST} deep")
 
 
 def environment_record(values: Mapping[str, Any]) -> SavedConfig:

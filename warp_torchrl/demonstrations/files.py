@@ -1,14 +1,15 @@
 """Recordings in folders: memory-mapped tensors, as tensordict writes them, and a manifest that vouches for them.
 
 ``steps`` holds what ``TensorDict.load_memmap`` reads. Here it is read by what the manifest says of each entry: nothing
-in a folder is executed or unpickled.
+in a folder is executed or unpickled, and no file is opened that is not below it.
 """
 
+import logging
 import os
 import re
-import shutil
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import asdict
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,50 +18,55 @@ import torch
 import torchrl
 from tensordict import MemoryMappedTensor, TensorDict, TensorDictBase
 
-from warp_torchrl.config.renamed import renamed_values
-from warp_torchrl.config.saved_config import SavedConfig
+from warp_torchrl.config.compose import OPTION
+from warp_torchrl.config.saved_config import saved_config
+from warp_torchrl.demonstrations.entries import Layout, leaves, size
 from warp_torchrl.demonstrations.events import Event
-from warp_torchrl.demonstrations.recording import MOVER, PROPOSED, Mover, Recording
-from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION
+from warp_torchrl.demonstrations.recording import Recording
+from warp_torchrl.foreign import below
+from warp_torchrl.foreign_text import plain_text
+from warp_torchrl.models import OBSERVATION
 from warp_torchrl.observation import renamed
 from warp_torchrl.runs import disk
-from warp_torchrl.runs.sealed import Unsound, check_files, check_seal, described, read_json, sealed
+from warp_torchrl.runs.output import draft_in, publish
+from warp_torchrl.runs.sealed import (
+    Files,
+    Unsound,
+    check_files,
+    check_seal,
+    checked_files,
+    described,
+    read_json,
+    sealed,
+)
 
+log = logging.getLogger("warp_torchrl")
 FORMAT = 1
 MANIFEST, _STEPS = "recording.json", "steps"
-_PART = re.compile(r"[a-z0-9_]+")
-_DTYPES = {str(each).removeprefix("torch."): each for each in (torch.bool, torch.uint8, torch.int64, torch.float32)}
-_MOST_STEPS, _MOST_AGENTS = 1_000_000, 10_000
+_FOLDER = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]*")
+_MOST_STEPS, _MOST_AGENTS, _MOST_ACTIONS, _MOST_EVENTS = 1_000_000, 256, 1000, 10_000
+_LARGEST, _LARGEST_META = 2**32, 100_000  # bytes
+_LONGEST_NAME = 1000
 
 
 def save(recording: Recording, parent: Path) -> Path:
-    """Write a recording into a new folder, which appears under its name when all of it is on the disk.
+    """Write a recording into a new folder, which appears under its name when all of it is on the disk and was read.
 
     Args:
         recording: What was played.
-        parent: Folder of recordings, made where it is not there; the new one is called scenario-seed-number.
+        parent: Folder of recordings, made where it is not there; the new one is called scenario-seed-number, with the
+            first number that is free, also among other processes.
 
     Raises:
         OSError: If a write fails, with the path; nothing is left.
+        Unsound: If what was written is not what is read; nothing is left.
     """
-    stem = f"{recording.scenario}-{recording.seed}"
-    with disk.with_path(parent):
-        parent.mkdir(parents=True, exist_ok=True)
-        folder = next(each for number in range(1, _MOST_STEPS) if not (each := parent / f"{stem}-{number}").exists())
-        draft = parent / f".{folder.name}.tmp"
-        shutil.rmtree(draft, ignore_errors=True)
-        try:
-            draft.mkdir()
-            _check_room(draft / ".room", recording.steps)
-            recording.steps.to_tensordict().memmap(draft / _STEPS, copy_existing=True)
-            (draft / MANIFEST).write_bytes(sealed(_content(recording, draft)))
-            for path in (*draft.rglob("*"), draft):
-                disk.sync(path)
-            draft.rename(folder)
-            disk.sync(parent)
-        finally:
-            shutil.rmtree(draft, ignore_errors=True)
-    return folder
+    with draft_in(parent) as draft, disk.with_path(parent):
+        _check_room(draft / ".room", recording.steps)
+        recording.steps.to_tensordict().memmap(draft / _STEPS, copy_existing=True)
+        (draft / MANIFEST).write_bytes(sealed(_content(recording, draft)))
+        read(draft)
+        return publish(draft, parent, (f"{recording.scenario}-{recording.seed}-{n}" for n in range(1, _MOST_STEPS)))
 
 
 def read(folder: Path) -> Recording:
@@ -70,29 +76,34 @@ def read(folder: Path) -> Recording:
         Unsound: If a file is missing, altered, or not of a known format.
     """
     path = folder / MANIFEST
+    if path.is_symlink():
+        raise Unsound(f"{path} is a link, and a recording's files must be there themselves")
     content = read_json(path)
     if content.get("format") != FORMAT:
-        raise Unsound(f"{path} has format {content.get('format')!r}, this version reads {FORMAT}")
+        raise Unsound(f"{path} has format {content.get('format')!r:.80}, this version reads {FORMAT}")
     check_seal(path, content)
     try:
-        files = content["files"]
-        check_files(folder, files)
-        count, agents = _whole(content["steps"], _MOST_STEPS), tuple(map(str, content["agents"]))
-        steps = _steps(folder / _STEPS, content["entries"], count, len(agents), set(files))
+        agents, actions = _names(content, "agents", _MOST_AGENTS), _names(content, "actions", _MOST_ACTIONS)
+        steps = _whole(content["steps"], _MOST_STEPS)
+        layout = Layout(steps=steps, agents=len(agents), actions=len(actions))
+        entries = layout.check(content["entries"])
+        files = checked_files(content["files"])
+        _check_listed(files, entries)
+        check_files(folder, files, _LARGEST)
         recording = Recording(
-            steps=steps,
-            environment=SavedConfig(
-                choices=content["environment"]["choices"], values=renamed_values(content["environment"]["values"])
-            ),
+            steps=_mapped(folder, entries, layout),
+            environment=saved_config(content["environment"]),
             seed=_whole(content["seed"], 2**62),
-            events=tuple(Event(**{**each, "numbers": tuple(each["numbers"])}) for each in content["events"]),
-            policy=str(content["policy"]),
+            events=_events(content["events"], steps),
+            policy=_text(content["policy"]),
             frames=None if content["frames"] is None else _whole(content["frames"], 2**62),
             agents=agents,
-            actions=tuple(map(str, content["actions"])),
+            actions=actions,
             saved=_share(content.get("saved")),
         )
-        _check(recording)
+        if not OPTION.fullmatch(recording.environment.choices.get("scenario", "")):
+            raise ValueError("it names no scenario")
+        layout.check_numbers(recording.steps)
     except (TypeError, KeyError, ValueError, AttributeError, OverflowError, RuntimeError, OSError) as error:
         raise Unsound(f"{path} is not a recording of format {FORMAT}: {' '.join(str(error).split())}") from None
     return recording
@@ -101,13 +112,37 @@ def read(folder: Path) -> Recording:
 def find(folder: Path) -> list[Path]:
     """Return the folders of all recordings in a folder, itself one or not, by name.
 
+    No link is followed. A folder whose name begins with a dot is a draft, or somebody's own; one whose name has
+    anything but ``A-Za-z0-9._-`` is left, and a line of the log says so.
+
     Raises:
         Unsound: If there is none.
+        OSError: If a folder cannot be read.
     """
-    found = sorted(path.parent for path in folder.rglob(MANIFEST) if not path.parent.name.startswith("."))
+    found = []
+    for path, folders, files in os.walk(folder, onerror=_fail):
+        for name in [each for each in folders if not _FOLDER.fullmatch(each)]:
+            folders.remove(name)
+            if not name.startswith("."):
+                _say_left(Path(path) / name)
+        if MANIFEST in files:
+            found.append(Path(path))
     if not found:
         raise Unsound(f"{folder} holds no recording: no {MANIFEST} in it, nor in its folders")
-    return found
+    return sorted(found)
+
+
+@cache
+def _say_left(path: Path) -> None:
+    """Say once that a folder is left."""
+    log.warning(
+        "%s is left: folders of recordings have names of A-Z, a-z, 0-9, '.', '_' and '-' alone", plain_text(str(path))
+    )
+
+
+def _fail(error: OSError) -> None:
+    if not isinstance(error, (FileNotFoundError, NotADirectoryError)):  # it is none, or was removed meanwhile
+        raise error
 
 
 def _check_room(path: Path, steps: TensorDictBase) -> None:
@@ -121,8 +156,8 @@ def _check_room(path: Path, steps: TensorDictBase) -> None:
 def _content(recording: Recording, folder: Path) -> dict[str, Any]:
     libraries = {"torch": torch, "torchrl": torchrl, "tensordict": tensordict}
     entries = {
-        "/".join(key): {"dtype": str(value.dtype).removeprefix("torch."), "shape": list(value.shape)}
-        for key, value in _leaves(recording.steps)
+        name: {"dtype": str(value.dtype).removeprefix("torch."), "shape": list(value.shape)}
+        for name, value in leaves(recording.steps)
     }
     names = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
     return {
@@ -142,53 +177,66 @@ def _content(recording: Recording, folder: Path) -> dict[str, Any]:
     }
 
 
-def _leaves(steps: TensorDictBase) -> Iterator[tuple[tuple[str, ...], torch.Tensor]]:
-    for key, value in steps.items(include_nested=True, leaves_only=True):
-        yield (key if isinstance(key, tuple) else (key,)), value
+def _check_listed(files: Files, entries: Mapping[str, tuple[torch.dtype, tuple[int, ...]]]) -> None:
+    """Check that a manifest lists the file of each entry, with its size, and what tensordict writes beside them alone.
+
+    Raises:
+        ValueError: If it lists less, or anything else.
+    """
+    needed = {f"{_STEPS}/{name}.memmap": size(*entry) for name, entry in entries.items()}
+    for name, wanted in needed.items():
+        if name not in files:
+            raise ValueError(f"{name} has no file of its own")
+        if files[name]["size"] != wanted:
+            raise ValueError(f"{name} does not fit its file, of {files[name]['size']} bytes and not {wanted}")
+    for name in files.keys() - needed.keys():
+        if not name.startswith(f"{_STEPS}/") or not name.endswith("/meta.json"):
+            raise ValueError(f"file {name[:80]!r} is none of a recording")
+        if files[name]["size"] > _LARGEST_META:
+            raise ValueError(f"{name[:80]} must have at most {_LARGEST_META} bytes, got {files[name]['size']}")
 
 
-def _steps(folder: Path, entries: dict[str, Any], count: int, agents: int, listed: set[str]) -> TensorDictBase:
+def _mapped(folder: Path, entries: Mapping[str, tuple[torch.dtype, tuple[int, ...]]], layout: Layout) -> TensorDictBase:
     """Map the tensors of a folder by what the manifest says of each."""
-    steps = TensorDict({}, batch_size=[count])
-    for name, entry in entries.items():
-        parts = tuple(name.split("/"))
-        path = folder.joinpath(*parts).with_suffix(".memmap")
-        if not all(_PART.fullmatch(part) for part in parts) or f"{_STEPS}/{name}.memmap" not in listed:
-            raise ValueError(f"entry {name} has no file of its own")
-        shape, dtype = tuple(_whole(side, _MOST_STEPS) for side in entry["shape"]), _DTYPES[entry["dtype"]]
-        if shape[:1] != (count,) or path.stat().st_size != torch.Size(shape).numel() * dtype.itemsize:
-            raise ValueError(f"entry {name} of shape {list(shape)} does not fit its file")
-        steps[tuple(map(renamed, parts))] = MemoryMappedTensor.from_filename(path, dtype, torch.Size(shape))
+    steps = TensorDict({}, batch_size=[layout.steps])
+    for name, (dtype, shape) in entries.items():
+        path = below(folder, f"{_STEPS}/{name}.memmap")
+        steps[tuple(renamed(name).split("/"))] = MemoryMappedTensor.from_filename(path, dtype, torch.Size(shape))
     for key in (OBSERVATION, OBSERVATION[:1], ("next", *OBSERVATION[:1])):
         if isinstance(steps.get(key, None), TensorDictBase):
-            steps[key].batch_size = torch.Size([count, agents])
+            steps[key].batch_size = torch.Size([layout.steps, layout.agents])
     return steps
 
 
-def _check(recording: Recording) -> None:
-    """Check that a recording's parts fit each other."""
-    count, agents, actions = len(recording.steps), len(recording.agents), len(recording.actions)
-    if not 0 < agents <= _MOST_AGENTS or "scenario" not in recording.environment.choices:
-        raise ValueError("it names no agents or no scenario")
-    for key in (ACTION, PROPOSED, MOVER):
-        if recording.steps[key].shape != (count, agents):
-            raise ValueError(f"{key[-1]} must be of {count} steps and {agents} agents")
-    if recording.steps[ACTION_MASK].shape != (count, agents, actions):
-        raise ValueError(f"the mask must be of {actions} actions")
-    for key in (ACTION, PROPOSED):
-        if not bool(((recording.steps[key] >= 0) & (recording.steps[key] < actions)).all()):
-            raise ValueError(f"{key[-1]} must be one of {actions} actions everywhere")
-    if int(recording.steps[MOVER].max()) > max(Mover) or any(each.step > count for each in recording.events):
-        raise ValueError("a mover or the step of an event is unknown")
+def _events(content: Any, steps: int) -> tuple[Event, ...]:
+    if not isinstance(content, list) or len(content) > _MOST_EVENTS:
+        raise ValueError(f"events must be a list of at most {_MOST_EVENTS}")
+    events = tuple(Event(**{**each, "numbers": tuple(each["numbers"])}) for each in content)
+    if any(each.step > steps for each in events):
+        raise ValueError(f"an event must come before one of {steps} steps, or after the last")
+    return events
+
+
+def _names(content: Mapping[str, Any], what: str, most: int) -> tuple[str, ...]:
+    names = content[what]
+    if not isinstance(names, list) or not 0 < len(names) <= most or len(set(map(str, names))) < len(names):
+        raise ValueError(f"{what} must be 1 to {most} names, each once")
+    return tuple(map(_text, names))
+
+
+def _text(value: object) -> str:
+    if not isinstance(value, str) or len(value) > _LONGEST_NAME:
+        raise ValueError(f"a text of at most {_LONGEST_NAME} characters is expected, got {value!r:.80}")
+    return value
 
 
 def _whole(value: object, most: int) -> int:
     if type(value) is not int or not 0 <= value <= most:
-        raise ValueError(f"a whole number up to {most} is expected, got {value!r}")
+        raise ValueError(f"a whole number up to {most} is expected, got {value!r:.80}")
     return value
 
 
 def _share(value: object) -> float | None:
-    if value is None or (isinstance(value, float | int) and 0.0 <= value <= 1.0):
+    if value is None or (type(value) in (int, float) and 0.0 <= value <= 1.0):
         return value
-    raise ValueError(f"a share in 0..1 is expected, got {value!r}")
+    raise ValueError(f"a share in 0..1 is expected, got {value!r:.80}")

@@ -4,6 +4,7 @@
 ``weights_only=True``), ``config.json``, and ``manifest.json``, see ``warp_torchrl.runs.manifest``.
 """
 
+import errno
 import json
 import shutil
 from collections.abc import Callable, Mapping
@@ -13,22 +14,24 @@ from typing import Any
 
 import torch
 
-from warp_torchrl.config.renamed import renamed_values
-from warp_torchrl.config.saved_config import SavedConfig
+from warp_torchrl.config.saved_config import SavedConfig, saved_config
 from warp_torchrl.models import Signature
 from warp_torchrl.observation import with_renamed
 from warp_torchrl.runs import disk
 from warp_torchrl.runs.manifest import (
     MANIFEST,
+    POLICY,
     TRAINING,
     CheckpointError,
     Manifest,
+    manifest_bytes,
     of_a_checkpoint,
     read_manifest,
     write_manifest,
 )
-from warp_torchrl.runs.sealed import Unsound, first_line, read_json
-from warp_torchrl.runs.tensors import check_finite
+from warp_torchrl.runs.output import draft_in, publish
+from warp_torchrl.runs.sealed import read_json
+from warp_torchrl.runs.tensors import check_finite, load_tensors
 
 __all__ = [
     "MANIFEST",
@@ -56,16 +59,21 @@ class Checkpoint:
 
     def record(self) -> SavedConfig:
         """Return the training's configuration."""
+        path = self.path / "config.json"
         with of_a_checkpoint():
-            content = read_json(self.path / "config.json")
-        choices, values = content.get("choices"), content.get("values")
-        if not (isinstance(choices, dict) and isinstance(values, dict)):
-            raise CheckpointError(f"{self.path / 'config.json'} must hold choices and values")
-        return SavedConfig(choices=choices, values=renamed_values(values))
+            content = read_json(path)
+        try:
+            return saved_config(content)
+        except ValueError as error:
+            raise CheckpointError(f"{path} is not a run's configuration: {error}") from None
 
     def policy(self) -> dict[str, torch.Tensor]:
         """Return the policy's parameters, all of them finite."""
-        return self._load("policy.pt")
+        parameters = self._load("policy.pt")
+        for name, value in parameters.items():
+            if not (isinstance(name, str) and isinstance(value, torch.Tensor)):
+                raise CheckpointError(f"{self.path / 'policy.pt'} must hold tensors by their names")
+        return parameters
 
     def training(self) -> dict[str, Any]:
         """Return the training state, for a resume; all its numbers are finite."""
@@ -89,13 +97,10 @@ class Checkpoint:
     def _load(self, name: str) -> dict[str, Any]:
         path = self.path / name
         with of_a_checkpoint():
-            try:
-                content = with_renamed(torch.load(path, weights_only=True, map_location="cpu"))
-                check_finite(path, content)
-            except Unsound:
-                raise
-            except Exception as error:
-                raise CheckpointError(f"{path} cannot be read: {first_line(error)}") from None
+            content = with_renamed(load_tensors(path))
+            check_finite(path, content)
+        if not isinstance(content, dict):
+            raise CheckpointError(f"{path} must hold a mapping")
         return content
 
 
@@ -114,8 +119,8 @@ def save(
 ) -> Path:
     """Write a checkpoint, then delete old ones: the newest two stay, and the newest others that ``stays`` allows.
 
-    The checkpoint appears under its name only when every file is on the disk: temporary folder, fsync, rename, fsync.
-    Temporary folders of killed saves are deleted first, newer unsound checkpoints after this one is safe.
+    The checkpoint appears under its name only when every file is on the disk: draft, fsync, rename, fsync. Drafts of
+    killed saves are deleted first, newer unsound checkpoints after this one is safe.
 
     Args:
         run: The run folder.
@@ -136,22 +141,17 @@ def save(
         OSError: If a write fails; the older checkpoints stay.
     """
     parent = run / "checkpoints"
-    final, draft = parent / f"{frames}", parent / f".{frames}.tmp"
-    with disk.with_path(parent):
-        parent.mkdir(parents=True, exist_ok=True)
-    for leftover in parent.glob(".*.tmp"):
-        shutil.rmtree(leftover, ignore_errors=True)
-    if not _is_sound(final):
-        try:
+    final = parent / f"{frames}"
+    with draft_in(parent) as draft:
+        if not _is_sound(final):
             with disk.with_path(draft):
-                draft.mkdir()
                 disk.save_tensors(draft / "policy.pt", dict(policy))
                 disk.save_tensors(draft / TRAINING, dict(training))
                 _write_record(draft, record)
                 write_manifest(draft, frames, scenario, signature, mode)
-                _publish(draft, final)
-        finally:
-            shutil.rmtree(draft, ignore_errors=True)
+            shutil.rmtree(final, ignore_errors=True)  # an unsound one
+            publish(draft, parent, [final.name])
+            disk.sync(run)  # where the folder of checkpoints may be new
     _drop(run, final, keep, stays)
     return final
 
@@ -161,8 +161,9 @@ def export(
     folder: Path,
     record: SavedConfig | None = None,
     policy: Mapping[str, torch.Tensor] | None = None,
+    check: Callable[[Checkpoint], object] = lambda made: None,
 ) -> None:
-    """Write a checkpoint without its training state into a new folder.
+    """Write a checkpoint without its training state into a new folder, which appears when what it holds was loaded.
 
     Its record does not tell from which run the training started, a path that others do not have.
 
@@ -171,32 +172,35 @@ def export(
         folder: What to make.
         record: Of its configuration; None takes its own.
         policy: The policy's parameters; None takes its own.
+        check: Called with what was written, before the folder has its name; what it raises leaves nothing.
 
     Raises:
-        CheckpointError: If its own record cannot be read.
+        CheckpointError: If its own files cannot be read, or what was written is not what is read.
         FileExistsError: If the folder exists.
         OSError: If a write fails.
     """
-    record = found.record() if record is None else record
-    _write_policy(found, folder, replace(record, values={**record.values, "start_from": None}), policy)
-
-
-def _write_policy(
-    found: Checkpoint, folder: Path, record: SavedConfig, policy: Mapping[str, torch.Tensor] | None = None
-) -> None:
-    manifest, draft = found.manifest, folder.with_name(f".{folder.name}.tmp")
     if folder.exists():
-        raise FileExistsError(f"{folder} exists")
-    shutil.rmtree(draft, ignore_errors=True)
-    with disk.with_path(draft):
-        draft.mkdir(parents=True)
+        raise FileExistsError(errno.EEXIST, "it is there already", str(folder))
+    record = found.record() if record is None else record
+    record = replace(record, values={**record.values, "start_from": None})
+    parameters = found.policy() if policy is None else policy
+    with draft_in(folder.parent) as draft, disk.with_path(folder):
         if policy is None:
             shutil.copyfile(found.path / "policy.pt", draft / "policy.pt")
         else:
             disk.save_tensors(draft / "policy.pt", dict(policy))
         _write_record(draft, record)
-        write_manifest(draft, manifest.frames, manifest.scenario, manifest.signature, manifest.mode)
-        _publish(draft, folder)
+        of = found.manifest
+        write_manifest(draft, of.frames, of.scenario, of.signature, of.mode)
+        made = _verified(draft)
+        if made.record() != record or not _is_equal(made.policy(), parameters):
+            raise CheckpointError(f"{folder} cannot be written: what is read there is not what was written")
+        check(made)
+        publish(draft, folder.parent, [folder.name])
+
+
+def _is_equal(one: Mapping[str, torch.Tensor], other: Mapping[str, torch.Tensor]) -> bool:
+    return one.keys() == other.keys() and all(torch.equal(one[name], other[name].cpu()) for name in one)
 
 
 def _write_record(folder: Path, record: SavedConfig) -> None:
@@ -211,14 +215,11 @@ def leave_policy(run: Path) -> None:
         OSError: If a write fails; all checkpoints stay.
     """
     found, _ = newest(run)
-    apart, whole = found.path.with_name(".policy.tmp"), found.path.with_name(".whole.tmp")
-    for left in (apart, whole):
-        shutil.rmtree(left, ignore_errors=True)
-    _write_policy(found, apart, found.record())
-    found.path.rename(whole)
-    apart.rename(found.path)
-    disk.sync(found.path.parent)
-    for folder in (whole, *(each for each in _listed(run) if each != found.path)):
+    of = found.manifest
+    described = manifest_bytes(found.path, of.frames, of.scenario, of.signature, of.mode, POLICY)
+    disk.replace(found.path / MANIFEST, described)  # from now on it has no training state
+    (found.path / TRAINING).unlink(missing_ok=True)
+    for folder in (each for each in _listed(run) if each != found.path):
         shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -252,15 +253,6 @@ def newest(path: Path | str) -> tuple[Checkpoint, list[str]]:
             skipped.append(str(error))
     reason = f": {skipped[0]}" if skipped else f": no folder in {path / 'checkpoints'}"
     raise CheckpointError(f"{path} holds no sound checkpoint{reason}")
-
-
-def _publish(draft: Path, final: Path) -> None:
-    for path in (*draft.iterdir(), draft):
-        disk.sync(path)
-    shutil.rmtree(final, ignore_errors=True)  # an unsound one
-    draft.rename(final)
-    for path in (final.parent, final.parent.parent):  # which may be new too
-        disk.sync(path)
 
 
 def _drop(run: Path, newest: Path, keep: int, stays: Callable[[int], bool]) -> None:

@@ -1,6 +1,6 @@
 """``manifest.json`` of a checkpoint, with the size and sha256 of every file and a sha256 of its own content."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -14,7 +14,17 @@ import torchrl
 from warp_torchrl.models import Entry, Signature
 from warp_torchrl.observation import DEFAULT, PICTURE, STATE, STATE_SYMMETRY, former_symmetry, renamed
 from warp_torchrl.observation.status import IDENTITY, STATUS
-from warp_torchrl.runs.sealed import Files, Unsound, check_files, check_seal, described, read_json, sealed
+from warp_torchrl.runs.sealed import (
+    Files,
+    Unsound,
+    check_files,
+    check_seal,
+    checked_files,
+    described,
+    read_json,
+    sealed,
+)
+from warp_torchrl.runs.tensors import largest
 from warp_torchrl.symmetry import Symmetry, from_plain, to_plain
 from warp_torchrl.world.role import PAPER_ROLES
 from warp_torchrl.world.state import Action
@@ -24,7 +34,8 @@ FORMAT = 2
 _READ = (1, FORMAT)  # 1 has no sha256 of its own
 MANIFEST = "manifest.json"
 TRAINING = "training.pt"
-_POLICY = ("policy.pt", "config.json")  # of an exported policy
+POLICY = ("policy.pt", "config.json")
+"""Files of an exported policy."""
 _FILES = ("policy.pt", TRAINING, "config.json")
 _FORMER_NAMES = {
     "view": (DEFAULT,),
@@ -84,7 +95,7 @@ def read_manifest(folder: Path) -> Manifest:
     """
     with of_a_checkpoint():
         manifest = _parse_manifest(folder)
-        check_files(folder, manifest.files)
+        check_files(folder, manifest.files, largest())
     return manifest
 
 
@@ -100,16 +111,24 @@ def _parse_manifest(folder: Path) -> Manifest:
     try:
         signature = _signature_from_json(content.pop("signature"))
         manifest = Manifest(signature=signature, **content)
-        files = {name: (entry["size"], entry["sha256"]) for name, entry in manifest.files.items()}
+        files = checked_files(manifest.files)
     except (TypeError, KeyError, ValueError, AttributeError, OverflowError):
         raise CheckpointError(f"{path} is not a manifest of format {content['format']}") from None
-    if set(files) not in (set(_FILES), set(_POLICY)):
+    if set(files) not in (set(_FILES), set(POLICY)):
         raise CheckpointError(f"{path} must list {', '.join(_FILES)}; a policy alone lists no {TRAINING}")
     return manifest
 
 
 def write_manifest(folder: Path, frames: int, scenario: str, signature: Signature, mode: str | None) -> None:
     """Write the manifest of a folder that holds the other files; see ``Manifest``."""
+    names = [name for name in _FILES if (folder / name).exists()]
+    (folder / MANIFEST).write_bytes(manifest_bytes(folder, frames, scenario, signature, mode, names))
+
+
+def manifest_bytes(
+    folder: Path, frames: int, scenario: str, signature: Signature, mode: str | None, names: Iterable[str]
+) -> bytes:
+    """Return the manifest of a folder that holds the named files; see ``Manifest``."""
     libraries = {"torch": torch, "torchrl": torchrl, "tensordict": tensordict}
     manifest = Manifest(
         format=FORMAT,
@@ -118,9 +137,9 @@ def write_manifest(folder: Path, frames: int, scenario: str, signature: Signatur
         signature=signature,
         mode=mode,
         versions={name: library.__version__ for name, library in libraries.items()},
-        files=described(folder, (name for name in _FILES if (folder / name).exists())),
+        files=described(folder, names),
     )
-    (folder / MANIFEST).write_bytes(sealed(asdict(manifest) | {"signature": _signature_to_json(signature)}))
+    return sealed(asdict(manifest) | {"signature": _signature_to_json(signature)})
 
 
 def _signature_to_json(signature: Signature) -> dict[str, Any]:
