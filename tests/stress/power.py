@@ -1,7 +1,8 @@
 """A disk and a power cut: a save runs in a child that dies at a chosen file-system call, and loses what it may lose.
 
-What a file got since its last fsync is lost in part: it is cut at half. A name made in a folder since that folder's
-last fsync is lost or kept, as the caller says. A deletion is never lost.
+What a file got since its last fsync is lost in part, also where it was written through mapped memory: it is cut at
+half. A name made in a folder since that folder's last fsync is lost or kept, as the caller says. A deletion is never
+lost.
 """
 
 import builtins
@@ -22,7 +23,7 @@ class _Disk:
     def __init__(self, root: Path, fatal: int, loses_names: bool) -> None:
         self.root, self.fatal, self.loses_names = root, fatal, loses_names
         self.calls = 0
-        self._dirty: set[int] = set()  # inodes
+        self._flushed = {path.stat().st_ino: _state(path) for path in root.rglob("*") if path.is_file()}
         self._undo: list[tuple[int, Callable[[], None]]] = []  # inode of the folder, what takes its new name back
 
     def install(self) -> None:
@@ -41,7 +42,7 @@ class _Disk:
         """Lose what may be lost, and die."""
         self.fatal = -1
         for path in [each for each in self.root.rglob("*") if each.is_file()]:
-            if path.stat().st_ino in self._dirty:
+            if self._flushed.get(path.stat().st_ino) != _state(path):
                 os.truncate(path, path.stat().st_size // 2)
         for _, undo in reversed(self._undo if self.loses_names else []):
             with suppress(FileNotFoundError, NotADirectoryError):
@@ -54,7 +55,6 @@ class _Disk:
         self.call()
         is_new = not Path(file).exists()
         handle = self._open(file, mode, *args, **options)
-        self._dirty.add(os.fstat(handle.fileno()).st_ino)
         if is_new:
             self._named(file, lambda: self._real["unlink"](file))
         return _Handle(handle, self)
@@ -63,7 +63,7 @@ class _Disk:
         self.call()
         self._real["fsync"](descriptor)
         inode = os.fstat(descriptor).st_ino
-        self._dirty.discard(inode)
+        self._flushed[inode] = _state(descriptor)
         self._undo = [each for each in self._undo if each[0] != inode]
 
     def mkdir(self, path: Any, *args: Any, **options: Any) -> None:
@@ -74,7 +74,14 @@ class _Disk:
     def rename(self, source: Any, target: Any, **options: Any) -> None:
         self.call()
         self._real["rename"](source, target, **options)
-        self._named(target, lambda: self._real["rename"](target, source))
+        self._named(target, lambda: self._take_back(target, source))
+
+    def _take_back(self, target: Any, source: Any) -> None:
+        """Lose a new name: what had it is at its old one again, or nowhere where that folder has gone since."""
+        if Path(source).parent.is_dir():
+            self._real["rename"](target, source)
+        else:
+            shutil.rmtree(target, ignore_errors=True)
 
     def replace(self, source: Any, target: Any, **options: Any) -> None:
         self.call()
@@ -90,6 +97,12 @@ class _Disk:
 
     def _named(self, path: Any, undo: Callable[[], None]) -> None:
         self._undo.append((Path(path).parent.stat().st_ino, undo))
+
+
+def _state(file: Path | int) -> tuple[int, int]:
+    """Return the size and time of a file, one of which a write changes."""
+    told = os.stat(file)  # noqa: PTH116, a descriptor has no path
+    return told.st_size, told.st_mtime_ns
 
 
 class _Handle:
