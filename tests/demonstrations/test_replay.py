@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 
+from warp_torchrl.demonstrations.events import Event
 from warp_torchrl.demonstrations.files import read, save
 from warp_torchrl.demonstrations.replay import Replay
 from warp_torchrl.runs.sealed import Unsound
@@ -52,3 +53,44 @@ def test_a_wrong_number_of_what_was_saved_is_told(recording):
         Replay(recording).check()
     object.__setattr__(recording, "saved", None)
     Replay(recording).check()
+
+
+@pytest.mark.parametrize("key", [("agents", "role"), ("next", "terminated"), ("next", "truncated"), ("next", "done")])
+def test_all_that_was_shown_is_compared(recording, key):
+    value = recording.steps[key][-1]
+    recording.steps[key][-1] = ~value if value.dtype is torch.bool else value + 1
+    with pytest.raises(Unsound, match=f"step 11 of the recording is not what this version plays: {key[-1]} differs"):
+        Replay(recording).check()
+
+
+def test_entries_that_are_not_those_of_the_environment_are_told(recording):
+    del recording.steps["agents", "observation", "self"]
+    with pytest.raises(
+        Unsound, match=r"the recording's observation has other entries than this version's: view, picture$"
+    ):
+        Replay(recording).check()
+
+
+def test_numbers_of_another_shape_or_type_are_told(recording):
+    recording.steps["agents", "action_mask"] = recording.steps["agents", "action_mask"][..., :1]
+    with pytest.raises(Unsound, match="action_mask differs"):
+        Replay(recording).check()
+
+
+@pytest.mark.parametrize(("what", "names"), [("agents", ("a", "b", "c")), ("actions", ("up",))])
+def test_names_that_are_not_those_of_the_environment_are_told(recording, what, names):
+    with pytest.raises(Unsound, match=f"the recording's {what} are not those of its configuration"):
+        Replay(replace(recording, **{what: names}))
+
+
+def test_an_event_that_cannot_be_is_told(recording):
+    for kind, numbers in (("ignite", (99.0, 0.0)), ("blow", (1e9, 0.0))):
+        events = (Event(step=0, kind=kind, numbers=numbers),)
+        with pytest.raises(Unsound, match="an event of the recording cannot be: "):
+            Replay(replace(recording, events=events)).check()
+
+
+def test_a_map_that_would_fill_the_memory_is_not_played(recording):
+    recording.environment.values["landscape"]["size"] = 4096
+    with pytest.raises(Unsound, match="has 4096 x 4096 cells, and at most 4194304 are played again"):
+        Replay(recording)

@@ -13,3 +13,10 @@ def test_a_row_tells_whose_the_actions_were_and_what_was_saved(recording):
     line = table([row]).splitlines()[-1]
     assert line.endswith(f"| 12 | {row.acts} | {row.corrections} | {100 * recording.saved:.1f} |")
     assert table([row._replace(saved=None)]).endswith(f"| {row.corrections} |  |")
+
+
+def test_what_others_wrote_makes_no_row_and_rings_no_bell(recording):
+    row = summary(Path("one"), recording)._replace(policy="\x1b]0;owned\x07\x1b[31mred\n| fake | row |" + "a" * 999)
+    lines = table([row]).splitlines()
+    assert len(lines) == 3 and "| red \\| fake \\| row \\|" in lines[-1] and "\x1b" not in lines[-1]
+    assert len(lines[-1]) < 300

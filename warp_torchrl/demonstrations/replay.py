@@ -1,9 +1,10 @@
 """A recording played again, step by step, and held against what was recorded."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import torch
 from tensordict import TensorDictBase
+from torch import Tensor
 
 from warp_torchrl.config.components import build_components
 from warp_torchrl.config.compose import plain
@@ -12,11 +13,12 @@ from warp_torchrl.config.saved_config import restore
 from warp_torchrl.demonstrations.events import carry_out
 from warp_torchrl.demonstrations.recording import Recording
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, REWARD
+from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, REWARD, ROLE
 from warp_torchrl.runs.sealed import Unsound
 from warp_torchrl.world.state import WorldState
 
 _Key = str | tuple[str, ...]
+_MOST_CELLS = 2**22
 
 
 class Replay:
@@ -27,15 +29,29 @@ class Replay:
 
     Raises:
         ConfigError: If its configuration is none of this version.
+        Unsound: If its map is larger than is played again, or its agents or actions are not its configuration's.
     """
 
     def __init__(self, recording: Recording) -> None:
         self.recording = recording
         parts = build_components(plain(restore(recording.environment)), ENVIRONMENT)
+        height, width = parts["world"].size
+        if height * width > _MOST_CELLS:
+            raise Unsound(
+                f"the recording's map has {height} x {width} cells, and at most {_MOST_CELLS} are played again"
+            )
         self.env = WildfireEnv(
             parts["world"], observation=parts["observation"], reward=parts["reward"], seed=recording.seed
         )
         self._world = self.env.world
+        for what, recorded, here in (
+            ("agents", recording.agents, self.env.agent_names),
+            ("actions", recording.actions, self.env.action_names),
+        ):
+            if recorded != tuple(here):
+                raise Unsound(f"the recording's {what} are not those of its configuration, {', '.join(here)}")
+        has_roles = ROLE in recording.steps.keys(include_nested=True)
+        self._seen = (OBSERVATION, ACTION_MASK, *([ROLE] if has_roles else []))
 
     def states(self) -> Iterator[WorldState]:
         """Play, and yield the world at its start and after every step, batch size [1].
@@ -60,9 +76,9 @@ class Replay:
         for at in range(len(steps)):
             shown = self._after_events(at, shown)
             row = steps[at]
-            self._check(at, row, shown, (OBSERVATION, ACTION_MASK))
+            self._check(at, row, shown, self._seen)
             shown = env.step(shown.set(ACTION, row[ACTION][None]))["next"]
-            self._check(at, row["next"], shown, (REWARD, "done"))
+            self._check(at, row["next"], shown, (REWARD, "done", "terminated", "truncated"))
             if at == len(steps) - 1:
                 shown = self._after_events(len(steps), shown)
                 self._check_saved()
@@ -80,7 +96,10 @@ class Replay:
     def _after_events(self, step: int, shown: TensorDictBase) -> TensorDictBase:
         for event in self.recording.events:
             if event.step == step:
-                shown = carry_out(self.env, event)
+                try:
+                    shown = carry_out(self.env, event)
+                except ValueError as error:
+                    raise Unsound(f"an event of the recording cannot be: {error}") from None
         return shown
 
     def _check_saved(self) -> None:
@@ -92,12 +111,27 @@ class Replay:
         self, step: int, recorded: TensorDictBase, shown: TensorDictBase, keys: tuple[str | tuple[str, ...], ...]
     ) -> None:
         for key in keys:
-            wanted = recorded[key]
-            leaves = wanted.items(include_nested=True) if isinstance(wanted, TensorDictBase) else [("", wanted)]
-            for name, value in leaves:
-                found = (shown[key] if name == "" else shown[key][name])[0]
-                # Floats of another processor may differ in their last digits.
-                same = torch.allclose(found, value) if value.is_floating_point() else torch.equal(found, value)
-                if not same:
-                    what = name or (key if isinstance(key, str) else key[-1])
-                    raise Unsound(f"step {step} of the recording is not what this version plays: {what} differs")
+            wanted, found = _entries(recorded[key]), _entries(shown[key])
+            what = key if isinstance(key, str) else key[-1]
+            if wanted.keys() != found.keys():
+                raise Unsound(f"the recording's {what} has other entries than this version's: {_listed(wanted)}")
+            for name, value in wanted.items():
+                if not _is_same(found[name][0], value):
+                    differs = f"{name or what} differs"
+                    raise Unsound(f"step {step} of the recording is not what this version plays: {differs}")
+
+
+def _entries(value: TensorDictBase | Tensor) -> dict[str, Tensor]:
+    """Return the entries of an observation by name, or one tensor under no name."""
+    return dict(value.items()) if isinstance(value, TensorDictBase) else {"": value}
+
+
+def _listed(entries: Iterable[str]) -> str:
+    return ", ".join(name or "a single tensor" for name in entries)
+
+
+def _is_same(found: Tensor, recorded: Tensor) -> bool:
+    if found.shape != recorded.shape or found.dtype != recorded.dtype:
+        return False
+    # Floats of another processor may differ in their last digits.
+    return torch.allclose(found, recorded) if recorded.is_floating_point() else torch.equal(found, recorded)

@@ -5,6 +5,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from warp_torchrl.demonstrations.recording import Mover, Recording
+from warp_torchrl.foreign_text import plain_text
+
+_LONGEST = 80  # characters of a cell
 
 
 class Summary(NamedTuple):
@@ -54,5 +57,10 @@ def table(summaries: Iterable[Summary]) -> str:
     for each in summaries:
         saved = "" if each.saved is None else f"{100 * each.saved:.1f}"
         cells = (each.name, each.scenario, each.seed, each.policy, each.steps, each.acts, each.corrections, saved)
-        lines.append("| " + " | ".join(map(str, cells)) + " |")
+        lines.append("| " + " | ".join(map(_cell, cells)) + " |")
     return "\n".join(lines)
+
+
+def _cell(value: object) -> str:
+    """Return a value as a cell of a Markdown table for a terminal: what others wrote can make no further cell."""
+    return plain_text(str(value), _LONGEST).replace("|", "\\|")
