@@ -80,3 +80,13 @@ def test_the_worker_of_a_command_is_no_command(monkeypatch):
     for module, is_ours in (("warp_torchrl.live", True), ("warp_torchrl_else", False), ("pytest", False)):
         monkeypatch.setattr(sys, "orig_argv", ["python", "-m", module, "seed=1"])
         assert is_command() == is_ours
+
+
+def test_what_an_error_quotes_rings_no_bell_and_is_no_page_long(capsys):
+    def do(given):
+        raise ConfigError("policy \x1b]0;owned\x07\x1b[31mred\x9b2J is none of " + "a" * 100_000)
+
+    assert run_program([], "", do) == 2
+    line = capsys.readouterr().err
+    assert line.startswith("error: policy red is none of aaa")
+    assert line.rstrip("\n").isprintable() and len(line) < 4100

@@ -176,6 +176,8 @@ FORGED = [
     {"frames": "1"},
     {"frames": True},
     {"mode": "lucky"},
+    {"scenario": "\x1b[31mred"},
+    {"scenario": ["tiny"]},
     {"files": []},
     {"files": {}},
     {"files": {"policy.pt": {}}},

@@ -8,6 +8,7 @@ from signal import Signals
 
 from warp_torchrl.config.compose import HYDRA_ERRORS, one_line
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.foreign_text import plain_text
 from warp_torchrl.interruption import SIGNALED
 from warp_torchrl.parallel import WorkerDied
 from warp_torchrl.runs.exit_codes import DISK, DONE, IN_USE, MISTAKE, NUMERICAL, UNSOUND
@@ -17,6 +18,7 @@ from warp_torchrl.training.finite import NumericalFailure
 from warp_torchrl.training.signals import Stopped, left_by
 
 __all__ = ["DISK", "DONE", "IN_USE", "MISTAKE", "NUMERICAL", "UNSOUND", "fail"]
+_LONGEST = 4000  # characters of a line
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 
 
@@ -30,6 +32,7 @@ def fail(error: Exception, debug: bool) -> tuple[int, str]:
     if debug:
         traceback.print_exc()
     code, line = _diagnose(error)
+    line = plain_text(line, _LONGEST)  # it may quote what others wrote
     print(f"error: {line}", file=sys.stderr, flush=True)
     return code, line
 

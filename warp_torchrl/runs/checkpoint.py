@@ -15,6 +15,7 @@ from typing import Any
 import torch
 
 from warp_torchrl.config.saved_config import SavedConfig, saved_config
+from warp_torchrl.foreign_text import plain_text
 from warp_torchrl.models import Signature
 from warp_torchrl.observation import with_renamed
 from warp_torchrl.runs import disk
@@ -43,6 +44,7 @@ __all__ = [
     "newest",
     "save",
 ]
+_LONGEST = 1000  # characters of a line that tells why a checkpoint is skipped
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -250,7 +252,7 @@ def newest(path: Path | str) -> tuple[Checkpoint, list[str]]:
         try:
             return _verified(folder, frames=int(folder.name)), skipped
         except CheckpointError as error:
-            skipped.append(str(error))
+            skipped.append(plain_text(str(error), _LONGEST))
     reason = f": {skipped[0]}" if skipped else f": no folder in {path / 'checkpoints'}"
     raise CheckpointError(f"{path} holds no sound checkpoint{reason}")
 

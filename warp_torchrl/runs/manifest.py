@@ -11,6 +11,7 @@ import tensordict
 import torch
 import torchrl
 
+from warp_torchrl.config.compose import OPTION
 from warp_torchrl.models import Entry, Signature
 from warp_torchrl.observation import DEFAULT, PICTURE, STATE, STATE_SYMMETRY, former_symmetry, renamed
 from warp_torchrl.observation.status import IDENTITY, STATUS
@@ -85,6 +86,8 @@ class Manifest:
     def __post_init__(self) -> None:
         if type(self.frames) is not int or self.mode not in (None, "sampled", "deterministic"):
             raise ValueError(f"frames must be whole and mode one of ours, got {self.frames!r}, {self.mode!r}")
+        if not isinstance(self.scenario, str) or not OPTION.fullmatch(self.scenario):
+            raise ValueError(f"scenario must be a name of letters, digits and _, got {self.scenario!r:.80}")
 
 
 def read_manifest(folder: Path) -> Manifest:
