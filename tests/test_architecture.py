@@ -23,6 +23,7 @@ GROUND = (
     "flags",
     "foreign",
     "foreign_text",
+    "foreign_yaml",
     "interruption",
     "modes",
     "nearest",
@@ -104,11 +105,11 @@ def test_fire_science_knows_torch_and_itself():
     assert not breaks(of_rooms(*FIRE_SCIENCE), lambda module: roots(module) <= known)
 
 
-def test_the_ground_floor_knows_the_standard_library_and_torch():
+def test_the_ground_floor_knows_the_standard_library_torch_and_yaml():
     known = sys.stdlib_module_names | set(GROUND)
+    others = {"device": {"torch"}, "finite": {"torch"}, "modes": {"torch"}, "foreign_yaml": {"yaml"}}
     assert not breaks(GROUND, knows_only)
-    of_tensors = ("device", "finite", "modes")
-    assert not breaks(GROUND, lambda module: roots(module) <= known | ({"torch"} if module in of_tensors else set()))
+    assert not breaks(GROUND, lambda module: roots(module) <= known | others.get(module, set()))
 
 
 def test_what_reads_the_state_knows_only_the_world():

@@ -322,7 +322,7 @@ def test_a_malformed_file_is_told_in_one_line(content, said, tmp_path, capsys, m
 def test_a_file_that_is_too_large_is_refused_unread(tmp_path, monkeypatch):
     monkeypatch.setattr("warp_torchrl.gallery.runs._LARGEST", 10)
     write_metrics(tmp_path)
-    with pytest.raises(ValueError, match="larger than"):
+    with pytest.raises(ValueError, match="is too large: 62 bytes"):
         read_metrics(tmp_path / "metrics.csv")
 
 

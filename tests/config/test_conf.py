@@ -113,6 +113,26 @@ def test_a_folder_of_the_users_own_is_filled_in_too(tmp_path):
             compose("top", overrides=["reward.preserve=2.0"])
 
 
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("act: ${oc.env:HOME}", r"mine\.yaml must hold plain values, and references"),
+        ("act: [{a: 'x${oc.create:{a:5}}'}]", r"mine\.yaml must hold plain values, and references"),
+        ("act: .nan", "numbers must be finite, got nan"),
+        ("act: &a [1]\nburned: *a", "has an alias"),
+        ("act: !!python/name:os.system", "has a tag"),
+        ("act: 1\nact: 2", "has the key act once more"),
+    ],
+)
+def test_an_option_that_does_more_than_hold_values_is_refused(tmp_path, line, told):
+    (tmp_path / "reward").mkdir()
+    (tmp_path / "reward" / "mine.yaml").write_text(f"_target_: warp_torchrl.reward.Efficiency\n{line}\n")
+    (tmp_path / "top.yaml").write_text("defaults: [{reward: mine}]\n")
+    with initialize_config_dir(str(tmp_path), version_base="1.3"), pytest.raises(ValueError, match=told) as raised:
+        compose("top")
+    assert "\n" not in str(raised.value)
+
+
 def test_a_file_that_builds_on_another_keeps_its_values_and_has_its_own_class_s_fields_too(tmp_path):
     (tmp_path / "base.yaml").write_text("_target_: warp_torchrl.world.fire.Fire\nbeta: 0.5\n")
     built_on = "defaults: [base, _self_]\n_target_: warp_torchrl.world.hazard.HazardFire\ntau: 3.0\n"

@@ -212,7 +212,14 @@ def test_a_forged_manifest_is_refused_in_one_line(tmp_path, changes):
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("content", ["{}", "[]", '{"choices": 1, "values": {}}', "[" * 100_000, "\xff"])
+DEEP = '{"choices": {}, "values": {"a": ' + "[" * 30 + "]" * 30 + "}}"
+LONG = '{"choices": {"scenario": "' + "a" * 5000 + '"}, "values": {}}'
+NUMBER = '{"choices": {}, "values": {"seed": 1e999}}'
+
+
+@pytest.mark.parametrize(
+    "content", ["{}", "[]", '{"choices": 1, "values": {}}', "[" * 100_000, "\xff", DEEP, LONG, NUMBER]
+)
 def test_a_forged_configuration_is_refused_in_one_line(tmp_path, content):
     folder = saved(tmp_path, 1)
     (folder / "config.json").write_bytes(content.encode("latin-1"))

@@ -78,7 +78,9 @@ def test_a_group_that_is_newer_than_the_run_is_no_edit(written):
     assert edits(before, record) == ["curriculum is not there and was {}"]
 
 
-@pytest.mark.parametrize("text", ["[1, 2]", "a: [", "seed: !!python/object/apply:os.system [id]", "x" * 2_000_000, ""])
+@pytest.mark.parametrize(
+    "text", ["[1, 2]", "a: [", "seed: !!python/object/apply:os.system [id]", "x" * 2_000_000, "", "a: &a [1]\nb: *a"]
+)
 def test_what_is_no_configuration_is_refused_in_one_line(tmp_path, text):
     (tmp_path / "config.yaml").write_text(text)
     with pytest.raises(ConfigError, match=r"config\.yaml must be as the run wrote it") as error:

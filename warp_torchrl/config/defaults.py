@@ -4,6 +4,7 @@ Where Hydra reads a yaml file, in ``conf/`` or in a folder of the user's own, th
 filled in. So ``--cfg job`` shows every value, every field can be overridden, and a key that is no field is refused.
 """
 
+import re
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import MISSING, fields, is_dataclass
@@ -15,12 +16,15 @@ from hydra._internal.sources_registry import SourcesRegistry
 from hydra.plugins.config_source import ConfigResult
 from omegaconf import DictConfig, OmegaConf
 
-from warp_torchrl.config.construction import component, free_mappings
+from warp_torchrl.config.construction import ConfigError, component, free_mappings
 from warp_torchrl.config.groups import COMPONENTS
 from warp_torchrl.config.prediction_options import PredictionOptions
 from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.config.search_options import SearchOptions
+from warp_torchrl.foreign_yaml import read_yaml
 from warp_torchrl.world.world import World
+
+_RESOLVER = re.compile(r"\$\{[^{}]*:")
 
 
 def defaults(kind: type) -> dict[str, Any]:
@@ -44,7 +48,9 @@ def _plain(value: Any) -> Any:
 class FileConfigSource(file_config_source.FileConfigSource):
     """Hydra's source of yaml files, which fills in the fields that a file leaves out.
 
-    It reads and fills each state of a file once: of the time to compose a configuration that was a third.
+    It reads and fills each state of a file once: of the time to compose a configuration that was a third. A file that
+    ``read_yaml`` refuses is refused, and so is an option of a component that reads the environment or runs a resolver:
+    options are handed around, as a calibrated law is.
     """
 
     _filled: ClassVar[dict[tuple[Path, int], ConfigResult]] = {}
@@ -60,12 +66,30 @@ class FileConfigSource(file_config_source.FileConfigSource):
         return deepcopy(self._filled[state])
 
     def _read(self, config_path: str) -> ConfigResult:
+        path = Path(self.path, self._normalize_file_name(config_path))
+        content = read_yaml(path)  # Hydra would follow aliases, and keep NaN
+        if config_path.split("/")[0] in COMPONENTS:
+            _check_references(path, content)
         result = super().load_config(config_path)
         if isinstance(result.config, DictConfig):
             filled = OmegaConf.merge(_left_out(config_path, result.config), result.config)
             result.config = cast("DictConfig", filled)
             _open_mappings(result.config)
         return result
+
+
+def _check_references(path: Path, content: Any) -> None:
+    """Check that the texts of an option refer to keys of the configuration alone.
+
+    Raises:
+        ConfigError: If one does not.
+    """
+    left = [content]
+    while left:
+        value = left.pop()
+        if isinstance(value, str) and _RESOLVER.search(value):
+            raise ConfigError(f"{path} must hold plain values, and references as ${{horizon}} is one, got {value:.80}")
+        left += [*value, *value.values()] if isinstance(value, dict) else value if isinstance(value, list) else []
 
 
 def _open_mappings(node: DictConfig) -> None:

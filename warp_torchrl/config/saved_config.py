@@ -28,6 +28,8 @@ _BEFORE = {
 """What runs did whose record has none of a key yet."""
 _DEEPEST = 20
 """How deep what is recorded may be nested; a configuration is 5 deep."""
+_LONGEST = 4096
+"""Characters of a text that is recorded; a path has no more."""
 _OF_NETWORKS = {"team.radio.carries": ("graph", "both")}
 """Values of a scenario's keys that a policy's networks need: another scenario does not change them."""
 
@@ -52,28 +54,31 @@ def saved_config(content: object) -> SavedConfig:
         content: From a run folder or a recording: not trusted.
 
     Raises:
-        ValueError: If it is not choices and values, or they are nested too deep.
+        ValueError: If it is not choices and values, or they are nested too deep or have too long texts.
     """
     choices, values = (content.get(part) if isinstance(content, dict) else None for part in ("choices", "values"))
     if not (isinstance(choices, dict) and isinstance(values, dict)):
         raise ValueError("it must hold choices and values")
     if not all(isinstance(option, str) for option in choices.values()):
         raise ValueError("choices must be names of options")
-    _check_depth(values)
+    _check_bounds([values, list(choices.values())])
     return SavedConfig(choices=choices, values=renamed_values(values))
 
 
-def _check_depth(values: Any) -> None:
+def _check_bounds(values: Any) -> None:
     level = [values]
     for _ in range(_DEEPEST):
-        level = [
-            each
-            for node in level
-            if isinstance(node, dict | list)
-            for each in (node.values() if isinstance(node, dict) else node)
-        ]
+        level = [each for node in level for each in _parts(node)]
+        if any(isinstance(each, str) and len(each) > _LONGEST for each in level):
+            raise ValueError(f"texts must have at most {_LONGEST} characters")
     if level:
         raise ValueError(f"values must be nested at most {_DEEPEST} deep")
+
+
+def _parts(node: Any) -> list[Any]:
+    if isinstance(node, dict):
+        return [*node, *node.values()]
+    return node if isinstance(node, list) else []
 
 
 def environment_record(values: Mapping[str, Any]) -> SavedConfig:

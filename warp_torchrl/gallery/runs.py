@@ -5,21 +5,23 @@ import math
 from array import array
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.saved_config import SavedConfig, completed
 from warp_torchrl.evaluation.method import method, teacher_label, unusual
+from warp_torchrl.foreign import Foreign, open_file
+from warp_torchrl.foreign_yaml import read_yaml
 from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError, newest
 
 FRAMES, SECONDS, FPS, SAVED = "time/frames", "time/seconds", "time/fps", "world/saved"
 MOST_ROWS = 400
 """Files of more rows are averaged over bins."""
-_LARGEST, _LARGEST_CONFIG = 100_000_000, 1_000_000  # bytes
+_LARGEST = 100_000_000  # bytes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,9 +88,7 @@ def read_metrics(path: Path) -> dict[str, np.ndarray]:
     Raises:
         ValueError: If it is over 100 MB or malformed.
     """
-    if path.stat().st_size > _LARGEST:
-        raise ValueError(f"{path} is larger than {_LARGEST // 1_000_000} MB")
-    with path.open(newline="", encoding="utf-8") as file:
+    with TextIOWrapper(open_file(path, _LARGEST), encoding="utf-8", newline="") as file:
         lines = csv.reader(file)
         try:
             header = next(lines, [])
@@ -153,11 +153,11 @@ def _completed(record: SavedConfig) -> SavedConfig:
 def _not_recorded(folder: Path) -> dict[str, Any]:
     """Return what is known of a run without a checkpoint: its name, and what its ``config.yaml`` says."""
     content, path = {}, folder / "config.yaml"
-    if path.is_file() and path.stat().st_size <= _LARGEST_CONFIG:
+    if path.exists():
         try:
-            content = yaml.safe_load(path.read_text(encoding="utf-8"))
-        except (yaml.YAMLError, ValueError, RecursionError):
-            raise ValueError(f"{path} is not a run's configuration") from None
+            content = read_yaml(path)
+        except Foreign as error:
+            raise ValueError(f"{path} is not a run's configuration: {error}") from None
     content = content if isinstance(content, dict) else {}
     team, scenario = content.get("team"), content.get("scenario")
     fields = {"names": (folder.name,), "alike": str(folder), "mark": f"in {folder.parent.name}"}

@@ -4,6 +4,8 @@ from pathlib import Path
 
 from warp_torchrl.config.construction import ConfigError
 
+LARGEST = 200_000_000
+"""Size of an ``evaluation.json`` that is read [bytes]."""
 _OF_HYDRA = (".hydra", "multirun.yaml")  # Hydra writes these, and logs, before the evaluation
 DRAFT = ".warp_torchrl-draft-"
 """What names of drafts begin with. A draft that nobody has locked is of a process that was killed."""

@@ -1,13 +1,10 @@
 """Resumption: a run goes on with its checkpoint's configuration, in which only ``total_frames`` may change."""
 
-import json
 import reprlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-
-import yaml
 
 from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import plain
@@ -16,9 +13,11 @@ from warp_torchrl.config.groups import COMPONENTS
 from warp_torchrl.config.renamed import renamed_values
 from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.config.saved_config import SavedConfig, restore
+from warp_torchrl.foreign import Foreign, read_json
+from warp_torchrl.foreign_yaml import read_yaml
 from warp_torchrl.runs.checkpoint import Checkpoint, newest
+from warp_torchrl.runs.destination import LARGEST
 
-_LARGEST = 1_000_000  # bytes
 _MISSING = "not there"
 _MAY_CHANGE = ("total_frames", "resume", "debug")
 _NAMED = 3
@@ -104,9 +103,10 @@ def is_run_of(folder: Path, config: str) -> bool:
 def _evaluated(path: Path) -> int | None:
     """Return the frames of the policy in a run's ``evaluation.json``; None if there is no evaluation."""
     try:
-        return json.loads(path.read_text(encoding="utf-8"))["frames"]
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        frames = read_json(path, LARGEST)["frames"]
+    except (OSError, Foreign, KeyError, TypeError):
         return None
+    return frames if isinstance(frames, int) else None
 
 
 # Edits of config.yaml
@@ -121,12 +121,13 @@ def read_config(path: Path) -> dict[str, Any]:
     if not path.exists():
         return {}
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8")) if path.stat().st_size <= _LARGEST else None
-    except (yaml.YAMLError, ValueError, RecursionError):
-        content = None
+        content, reason = read_yaml(path), ""
+    except Foreign as error:
+        content, reason = None, f"; {error}"
     if not isinstance(content, dict):
-        raise ConfigError(f"{path} must be as the run wrote it; without it resume takes what the checkpoint holds")
-    return renamed_values(content)
+        told = "must be as the run wrote it; without it resume takes what the checkpoint holds"
+        raise ConfigError(f"{path} {told}{reason}")
+    return renamed_values({str(key): value for key, value in content.items()})
 
 
 def _check_unedited(folder: Path, held: Mapping[str, Any], record: SavedConfig, trained: Mapping[str, Any]) -> None:

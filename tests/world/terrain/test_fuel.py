@@ -70,12 +70,15 @@ def test_a_table_may_be_a_file(tmp_path, text):
     "text, words",
     [
         (None, "^table must name a yaml file that can be read, .*No such file"),
-        ("10: [", "^table must name a yaml file that can be read, .*my_table.yaml cannot: while parsing"),
+        ("10: [", "^table must name a yaml file that can be read, .*my_table.yaml cannot: .*while parsing"),
         ("", "^table must be one of .*got .*my_table.yaml"),
         ("forest", "^table must be one of"),
         ("10: jungle", "^table must be one of"),
         ("10: [forest]", "^table must be one of"),
-        ("10: forest\n10: lake", "^table must be one of .*each once, got .*my_table.yaml"),
+        ("10: forest\n10: lake", "my_table.yaml cannot: .* line 2 has the key 10 once more"),
+        ("10: &a forest\n20: *a", "my_table.yaml cannot: .* line 2 has an alias"),
+        ("10: !!python/name:os.system", "my_table.yaml cannot: .* line 1 has a tag"),
+        ("10: \0", "my_table.yaml cannot: .* holds a NUL"),
     ],
 )
 def test_a_file_that_is_no_table_is_refused_in_one_line(tmp_path, text, words):

@@ -5,8 +5,9 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
-import yaml
 
+from warp_torchrl.foreign import Foreign
+from warp_torchrl.foreign_yaml import read_words
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.world.state import Cover
 
@@ -108,15 +109,13 @@ def _given_pairs(table: object) -> list[tuple[object, object]]:
 
 
 def _read_pairs(path: object) -> list[tuple[object, object]]:
-    """Return what a yaml file maps to what, in its own words: a code that comes twice is there twice."""
+    """Return what a yaml file maps to what, in its own words."""
     try:
-        node = yaml.compose(Path(str(path)).read_text(encoding="utf-8"), yaml.SafeLoader)
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        content = read_words(Path(str(path)))
+    except (OSError, Foreign) as error:
         reason = " ".join(str(error).split())
         raise ValueError(f"table must name a yaml file that can be read, {path} cannot: {reason}") from None
-    if not isinstance(node, yaml.MappingNode):
-        return []
-    return [(code.value, to.value) for code, to in node.value]
+    return list(content.items()) if isinstance(content, dict) else []
 
 
 def to_cover(codes: np.ndarray, known: np.ndarray, table: Mapping[int, int]) -> np.ndarray:
