@@ -4,6 +4,7 @@ A sweep writes both at its end; ``python -m warp_torchrl.summary FOLDER ...`` ma
 """
 
 import json
+import argparse
 import math
 import signal
 from collections.abc import Mapping, Sequence
@@ -13,9 +14,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from warp_torchrl.evaluation.reading import read_evaluation
 from warp_torchrl.evaluation.report import place
 from warp_torchrl.evaluation.statistics import compare, performance_profile, summarise
 from warp_torchrl.flags import FlagParser
+from warp_torchrl.foreign_text import plain_text
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.training.signals import exit_on_signal
 
@@ -39,10 +42,14 @@ def gather(*folders: Path) -> list[Entry]:
     """Return the results in the ``evaluation.json`` files under folders, baselines included.
 
     Runs that differ in their seed only are one entry.
+
+    Raises:
+        ConfigError: If a file is no evaluation, in one line.
+        OSError: If one cannot be opened.
     """
     found: dict[_Key, list[Mapping[str, Any]]] = {}
     for path in (path for folder in folders for path in sorted(folder.glob("**/evaluation.json"))):
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = read_evaluation(path)
         key = (place(content), content["method"], content["configuration"], tuple(content["seeds"]))
         found.setdefault(key, []).append(content)
     several = {(scenario, method) for scenario, method, *_ in found if _differ(found, scenario, method)}
@@ -50,11 +57,11 @@ def gather(*folders: Path) -> list[Entry]:
         Entry(
             scenario,
             f"{method} {configuration[:6]}" if (scenario, method) in several else method,
-            _of_episodes(runs, _goal(runs[0])),
+            _of_episodes(runs, runs[0]["goal"]),
             _of_episodes(runs, "success"),
             seeds,
             {name: _of_episodes(runs, name) for name in runs[0]["episodes"][0] if name != "seed"},
-            _goal(runs[0]),
+            runs[0]["goal"],
         )
         for (scenario, method, configuration, seeds), runs in found.items()
     ]
@@ -68,20 +75,14 @@ def _baselines(found: Mapping[_Key, Sequence[Mapping[str, Any]]]) -> list[Entry]
     held: dict[tuple[str, str, str, tuple[int, ...]], list[Mapping[str, Any]]] = {}
     for (scenario, _, _, seeds), runs in found.items():
         for run in runs:
-            former = run.get("yardstick_episodes", {})  # the key in earlier evaluations
-            for name, episodes in run.get("baseline_episodes", former).items():
+            for name, episodes in run["baseline_episodes"].items():
                 if (scenario, name, "", seeds) not in found:
-                    held.setdefault((scenario, name, _goal(run), seeds), []).append(episodes)
+                    held.setdefault((scenario, name, run["goal"], seeds), []).append(episodes)
     return [
         Entry(scenario, name, np.array([episodes[0][goal]]), np.array([episodes[0]["success"]]), seeds, goal=goal)
         for (scenario, name, goal, seeds), episodes in held.items()
         if all(each == episodes[0] for each in episodes)
     ]
-
-
-def _goal(run: Mapping[str, Any]) -> str:
-    """Return what policies are compared by in an evaluation; earlier ones did not tell."""
-    return str(run.get("goal", "saved"))
 
 
 def _of_episodes(runs: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
@@ -142,8 +143,13 @@ def _table(goal: str, entries: Sequence[Entry], against: str | None) -> str:
                     _range(gap["ci95"], "+"),
                     f"{100 * gap['probability_of_improvement']:.0f} %",
                 ]
-            lines.append("| " + " | ".join(cells) + " |")
+            lines.append("| " + " | ".join(map(_cell, cells)) + " |")
     return "\n".join(lines)
+
+
+def _cell(text: str) -> str:
+    """Return a text in which no part is a cell of its own."""
+    return text.replace("|", "\\|")
 
 
 def metrics_table(entries: Sequence[Entry], names: Sequence[str]) -> str:
@@ -160,7 +166,9 @@ def metrics_table(entries: Sequence[Entry], names: Sequence[str]) -> str:
     for entry in (entry for group in _by_scenario(entries) for entry in group if entry.metrics):
         runs, fires = entry.value.shape
         means = (_mean_of_known(entry.metrics.get(name)) for name in names)
-        lines.append(f"| {entry.scenario} | {entry.policy} | {runs} | {fires} | " + " | ".join(means) + " |")
+        lines.append(
+            f"| {_cell(entry.scenario)} | {_cell(entry.policy)} | {runs} | {fires} | " + " | ".join(means) + " |"
+        )
     return "\n".join(lines)
 
 
@@ -181,7 +189,7 @@ def draw(entries: Sequence[Entry], path: Path) -> None:
     groups = _by_scenario(entries)
     policies = list(dict.fromkeys(entry.policy for group in groups for entry in group))
     styles = {policy: line_style(index) for index, policy in enumerate(policies)}
-    with rc_context({"font.size": 8.0, "axes.spines.top": False, "axes.spines.right": False}):
+    with rc_context({"font.size": 8.0, "text.parse_math": False, "axes.spines.top": False, "axes.spines.right": False}):
         rows = [max(1.2, _bar_height(group) * len(group) + 0.6) for group in groups]
         columns = min(4, max(1, int(_LEGEND_WIDTH / max(len(policy) + 8 for policy in policies))))
         legend = 0.17 * math.ceil(len(policies) / columns)
@@ -257,13 +265,16 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--show", nargs="+", metavar="METRIC", help="means of these, of what evaluation.json holds")
     parser.add_argument("--plot", type=Path, metavar="FILE", help="draw them as well")
     options = parser.parse_args(arguments)
-    entries = gather(*options.folders)
+    try:
+        entries = gather(*options.folders)
+    except (OSError, ValueError) as error:
+        parser.error(plain_text(str(error)))
     if not entries:
         parser.error(f"no evaluation.json under {', '.join(map(str, options.folders))}")
     try:
         print(metrics_table(entries, options.show) if options.show else table(entries, options.against))
     except ValueError as error:
-        parser.error(str(error))
+        parser.error(plain_text(str(error)))
     if options.plot is not None:
         try:
             draw(entries, options.plot)

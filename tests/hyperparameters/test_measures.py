@@ -1,6 +1,7 @@
 """What a search reads of a training that is being trained."""
 
 import json
+import os
 
 import pytest
 
@@ -46,3 +47,19 @@ def test_an_evaluation_that_says_nothing_has_no_value(tmp_path, content):
 def test_an_evaluation_has_the_mean_of_its_fires(tmp_path):
     (tmp_path / "evaluation.json").write_text(json.dumps({"metrics": {"saved": {"mean": 0.5}}}))
     assert saved_in_evaluation(tmp_path / "evaluation.json") == 0.5
+
+
+@pytest.mark.parametrize("mean", [10**400, "0.5", True, [0.5], None, {"a": 1}])
+def test_an_evaluation_without_a_number_is_none(tmp_path, mean):
+    (tmp_path / "evaluation.json").write_text(json.dumps({"metrics": {"saved": {"mean": mean}}}))
+    assert saved_in_evaluation(tmp_path / "evaluation.json") is None
+
+
+def test_rows_that_are_none_are_left_out(tmp_path):
+    path = tmp_path / "metrics.csv"
+    long = "9" * 200_000  # more than a cell may have
+    path.write_text(f"time/frames,world/saved\n10,0.5\n{long},1\nnan,1\ninf,1\n\0,1\n20\n20,0.7\n")
+    assert saved_by_share(path, 20) == pytest.approx({5 * n: 0.5 for n in range(10, 20)} | {100: 0.7})
+    path.unlink()
+    os.mkfifo(path)
+    assert saved_by_share(path, 20) == {}

@@ -9,7 +9,6 @@ cut or altered is played again and replaced. It is JSON, and is written whole or
 import json
 import logging
 import os
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from functools import lru_cache
@@ -21,9 +20,12 @@ import numpy as np
 import torch
 
 import warp_torchrl
+from warp_torchrl import foreign
 from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.evaluation.play import Episodes
 from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.runs import disk
+from warp_torchrl.runs.destination import LARGEST
 from warp_torchrl.world.abilities import ABILITIES
 from warp_torchrl.world.role import ROLES
 
@@ -55,7 +57,9 @@ def keep(plan: RunConfig, played: dict[str, Episodes]) -> None:
         episodes = {metric: values.tolist() for metric, values in played[name].items()}
         content = json.dumps(episodes)
         try:
-            _replace(path, json.dumps({"sha256": sha256(content.encode()).hexdigest(), "episodes": episodes}))
+            path.parent.mkdir(parents=True, exist_ok=True)
+            sealed = {"sha256": sha256(content.encode()).hexdigest(), "episodes": episodes}
+            disk.replace(path, json.dumps(sealed))  # others may write the same one
         except OSError as error:
             log.debug("the baselines' episodes are not kept: %s", error)
             return
@@ -149,7 +153,7 @@ def _code() -> str:
 def _read(path: Path) -> Episodes | None:
     """Return the episodes in a file; None where there is none, or it is not as it was written."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = foreign.read_json(path, LARGEST)
         episodes = content["episodes"]
         if content["sha256"] != sha256(json.dumps(episodes).encode()).hexdigest():
             raise ValueError("its sha256 is not its own")
@@ -159,16 +163,3 @@ def _read(path: Path) -> Episodes | None:
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         log.warning("%s is not used, and the baselines are played again: %s", path, " ".join(str(error).split()))
         return None
-
-
-def _replace(path: Path, content: str) -> None:
-    """Write a file whole or not at all; others may write the same one."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, draft = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-    try:
-        with open(handle, "w", encoding="utf-8") as file:  # noqa: PTH123
-            file.write(content)
-        Path(draft).replace(path)
-    except OSError:
-        Path(draft).unlink(missing_ok=True)
-        raise

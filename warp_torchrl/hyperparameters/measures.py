@@ -1,14 +1,18 @@
 """What a search reads in a run folder: how much forest was saved by which share of a training, and what it is worth."""
 
 import csv
-import json
 import math
 from pathlib import Path
+
+from warp_torchrl.foreign import Foreign, read_bytes, read_json
+from warp_torchrl.runs.destination import LARGEST
 
 STEP = 5
 """Between two of the shares at which trials are compared [% of a training]."""
 LAST = 80
 """The mean over what comes after is the value of a training [%]."""
+_LARGEST_NUMBER = 1e15
+_LARGEST = 100_000_000  # bytes of a metrics.csv
 
 
 def saved_by_share(path: Path, total: int) -> dict[int, float]:
@@ -43,23 +47,27 @@ def saved_at_the_end(path: Path, total: int) -> float | None:
 def saved_in_evaluation(path: Path) -> float | None:
     """Return the mean share of the forest that an ``evaluation.json`` says; None where there is none."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))["metrics"]["saved"]["mean"]
+        found = read_json(path, LARGEST)["metrics"]["saved"]["mean"]
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    return float(found) if isinstance(found, int | float) and math.isfinite(found) else None
+    return float(found) if type(found) in (int, float) and abs(found) <= _LARGEST_NUMBER else None
 
 
 def _rows(path: Path) -> list[tuple[float, float]]:
     """Return frames and the forest saved of each row that is written to its end, NaN where no episode ended."""
     try:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError:
+        text = read_bytes(path, _LARGEST).decode(errors="replace").replace("\0", "")
+    except (OSError, Foreign):
         return []
     lines = text[: text.rfind("\n") + 1].splitlines()
-    found = []
-    for row in csv.DictReader(lines):
+    rows, found = csv.DictReader(lines), []
+    while True:
         try:
-            found.append((float(row["time/frames"]), float(row["world/saved"] or "nan")))
-        except (KeyError, TypeError, ValueError):
+            row = next(rows)
+            frames, saved = float(row["time/frames"]), float(row["world/saved"] or "nan")
+        except StopIteration:
+            return found
+        except (KeyError, TypeError, ValueError, csv.Error):
             continue  # cut by a crash
-    return found
+        if math.isfinite(frames):
+            found.append((frames, saved))

@@ -1,0 +1,95 @@
+"""``evaluation.json`` as others may have written it: read, and checked before anything is made of it."""
+
+from collections.abc import Mapping, Sequence
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.foreign import Foreign, read_json
+from warp_torchrl.foreign_text import plain_text
+from warp_torchrl.runs.destination import LARGEST
+
+_TEXTS = ("scenario", "method", "configuration")
+_FORMER_BASELINES = "yardstick_episodes"  # the key in earlier evaluations
+_LARGEST_NUMBER = 1e15
+_LONGEST = 200  # characters of a name
+_MOST_EPISODES = 100_000
+
+
+def read_evaluation(path: Path) -> dict[str, Any]:
+    """Return the content of an ``evaluation.json``, its names as plain lines.
+
+    Raises:
+        ConfigError: If it is none, in one line.
+        OSError: If it cannot be opened.
+    """
+    try:
+        content = read_json(path, LARGEST)
+        _check(content)
+    except Foreign as error:
+        raise ConfigError(str(error)) from None
+    except ValueError as error:
+        raise ConfigError(f"{path} is no evaluation: {error}") from None
+    texts = {key: plain_text(content[key], _LONGEST) for key in _TEXTS}
+    overrides = [plain_text(each, _LONGEST) for each in content.get("world_overrides", [])]
+    baselines = content.get("baseline_episodes", content.get(_FORMER_BASELINES, {}))
+    named = {plain_text(name, _LONGEST): episodes for name, episodes in baselines.items()}
+    return {"goal": "saved", **content, **texts, "world_overrides": overrides, "baseline_episodes": named}
+
+
+def _check(content: Any) -> None:
+    if not isinstance(content, dict):
+        raise ValueError("it must be a mapping")
+    for key in _TEXTS:
+        if not isinstance(content.get(key), str):
+            raise ValueError(f"{key} must be a text, got {content.get(key)!r:.80}")
+    overrides, goal = content.get("world_overrides", []), content.get("goal", "saved")
+    if not (isinstance(overrides, list) and all(isinstance(each, str) for each in overrides)):
+        raise ValueError("world_overrides must be texts")
+    if goal not in ("saved", "watched"):
+        raise ValueError(f"goal must be saved or watched, got {goal!r:.80}")
+    seeds = content.get("seeds")
+    is_some = isinstance(seeds, list) and 0 < len(seeds) <= _MOST_EPISODES
+    if not (is_some and all(type(seed) is int for seed in seeds)):
+        raise ValueError(f"seeds must be 1 to {_MOST_EPISODES} whole numbers")
+    _check_episodes(content.get("episodes"), len(seeds), goal)
+    for key in ("baseline_episodes", _FORMER_BASELINES):
+        _check_baselines(content.get(key, {}), len(seeds), goal)
+
+
+def _check_episodes(episodes: Any, count: int, goal: str) -> None:
+    is_table = isinstance(episodes, list) and all(isinstance(each, dict) for each in episodes)
+    if not is_table or len(episodes) != count:
+        raise ValueError(f"episodes must be one for each of {count} seeds")
+    if any(each.keys() != episodes[0].keys() for each in episodes):
+        raise ValueError("episodes must have the same metrics")
+    for name in episodes[0]:
+        _check_numbers(name, [each[name] for each in episodes], may_lack=name not in (goal, "success"))
+    _check_has(episodes[0], goal)
+
+
+def _check_baselines(baselines: Any, count: int, goal: str) -> None:
+    if not isinstance(baselines, dict):
+        raise ValueError("baseline_episodes must be a mapping")
+    for name, episodes in baselines.items():
+        if not isinstance(episodes, dict):
+            raise ValueError(f"the episodes of {name[:80]} must be a mapping")
+        _check_has(episodes, goal)
+        for metric, values in episodes.items():
+            if not isinstance(values, list) or len(values) != count:
+                raise ValueError(f"{metric[:80]} of {name[:80]} must be one for each of {count} seeds")
+            _check_numbers(metric, values, may_lack=metric not in (goal, "success"))
+
+
+def _check_has(metrics: Mapping[str, Any], goal: str) -> None:
+    for name in (goal, "success"):
+        if name not in metrics:
+            raise ValueError(f"episodes must have {name}")
+
+
+def _check_numbers(name: str, values: Sequence[Any], *, may_lack: bool) -> None:
+    for value in values:
+        is_number = type(value) in (int, float, bool) and abs(value) <= _LARGEST_NUMBER and isfinite(value)
+        if not is_number and not (value is None and may_lack):
+            raise ValueError(f"{name[:80]} must hold finite numbers, got {value!r:.80}")
