@@ -16,6 +16,7 @@ from PIL import Image
 from torch import Tensor
 
 from warp_torchrl.env.render import _ASH, _FIRE, _GROUND, render
+from warp_torchrl.runs import disk
 from warp_torchrl.world.state import Cover, Landscape, WorldState
 
 if TYPE_CHECKING:
@@ -110,7 +111,8 @@ def save(figure: "Figure", path: Path, largest: int | None = _LARGEST) -> None:
     image = Image.open(drawn).convert("RGB")
     if largest is not None and len(drawn.getvalue()) > largest:
         image = image.quantize(256, kmeans=2, dither=Image.Dither.NONE)
-    image.save(path, "PNG", optimize=True, dpi=(_DPI, _DPI))
+    with disk.drafted(path) as draft:
+        image.save(draft, "PNG", optimize=True, dpi=(_DPI, _DPI))
 
 
 # Maps

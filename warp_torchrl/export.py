@@ -17,10 +17,9 @@ import torch
 from warp_torchrl.api import policy_of
 from warp_torchrl.commands.program import one_line_end
 from warp_torchrl.config.saved_config import SavedConfig
-from warp_torchrl.flags import FlagParser
 from warp_torchrl.finite import not_finite
+from warp_torchrl.flags import FlagParser
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs.exit_codes import UNSOUND
 from warp_torchrl.runs.shipped import find_policy
 
 
@@ -37,22 +36,19 @@ def main(arguments: list[str] | None = None) -> None:
     told = "others with the same networks, given as RUN is: it is the mean of all, weighed alike"
     parser.add_argument("--average", nargs="+", default=[], metavar="OTHER", help=told)
     options = parser.parse_args(arguments)
-    try:
-        found, skipped = checkpoints.newest(find_policy(options.run))
-        for line in skipped:
-            print(f"skipped: {line}", file=sys.stderr)
-        record = found.record()
-        if options.trust is not None:
-            record = _trusting(record, options.trust)
-        policy_of(found, record=record)  # what cannot act, or be trusted, is told before anything is written
-        if options.mode is not None:
-            found = replace(found, manifest=replace(found.manifest, mode=options.mode))
-        others = [checkpoints.newest(find_policy(each))[0] for each in options.average]
-        checkpoints.export(found, options.folder, record, _mean([found, *others]) if others else None)
-    except checkpoints.CheckpointError as error:
-        parser.exit(UNSOUND, f"error: {' '.join(str(error).split())}\n")
-    except (OSError, ValueError) as error:
-        parser.error(" ".join(str(error).split()))
+    if options.folder.exists():
+        parser.error(f"FOLDER must be new: {options.folder} exists")
+    found, skipped = checkpoints.newest(find_policy(options.run))
+    for line in skipped:
+        print(f"skipped: {line}", file=sys.stderr)
+    record = found.record()
+    if options.trust is not None:
+        record = _trusting(record, options.trust)
+    if options.mode is not None:
+        found = replace(found, manifest=replace(found.manifest, mode=options.mode))
+    others = [checkpoints.newest(find_policy(each))[0] for each in options.average]
+    policy = _mean([found, *others]) if others else None
+    checkpoints.export(found, options.folder, record, policy, check=policy_of)
     print(f"{options.folder}: {found.manifest.scenario}, {found.manifest.frames} frames, {found.manifest.mode}")
 
 

@@ -3,8 +3,6 @@
 A sweep writes both at its end; ``python -m warp_torchrl.summary FOLDER ...`` makes them for any runs.
 """
 
-import json
-import argparse
 import math
 import signal
 from collections.abc import Mapping, Sequence
@@ -20,6 +18,7 @@ from warp_torchrl.evaluation.statistics import compare, performance_profile, sum
 from warp_torchrl.flags import FlagParser
 from warp_torchrl.foreign_text import plain_text
 from warp_torchrl.nearest import did_you_mean
+from warp_torchrl.runs import disk
 from warp_torchrl.training.signals import exit_on_signal
 
 LEVELS = np.linspace(0.0, 1.0, 101)
@@ -207,7 +206,8 @@ def draw(entries: Sequence[Entry], path: Path) -> None:
                 profile.set_xlabel(f"{goal} on so many fires, at least, %")
         handles = {h.get_label(): h for row in axes for h in row[1].get_lines()}
         figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=columns, frameon=False)
-        figure.savefig(path, metadata={"Software": None})
+        with disk.drafted(path) as draft:
+            figure.savefig(draft, format=path.suffix[1:] or "png", metadata={"Software": None})
 
 
 _WORDS = {"saved": "forest saved", "watched": "front watched"}
@@ -278,6 +278,8 @@ def main(arguments: list[str] | None = None) -> None:
     if options.plot is not None:
         try:
             draw(entries, options.plot)
+        except (OSError, ValueError) as error:  # a format that Matplotlib does not write
+            parser.error(f"--plot: {plain_text(str(error))}")
         except ImportError:
             parser.error('--plot needs Matplotlib: pip install "warp_torchrl[figures]"')
 

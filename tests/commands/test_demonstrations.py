@@ -114,7 +114,7 @@ def test_a_mistake_is_one_line(arguments, code, says, capsys):
 
 def test_a_folder_that_cannot_be_written_is_told(people, capsys):
     assert main([str(people), f"export={people}/nowhere/all.npz"]) == DISK
-    assert capsys.readouterr().err == f"error: {people}/nowhere/.all.npz.tmp: No such file or directory\n"
+    assert capsys.readouterr().err == f"error: {people}/nowhere/all.npz: No such file or directory\n"
 
 
 @pytest.mark.slow

@@ -54,3 +54,25 @@ def test_a_row_of_metrics_on_a_full_disk_tells_the_path_and_the_reason(tmp_path)
     with pytest.raises(OSError, match="No space left on device") as error:
         MetricsFile(tmp_path / "metrics.csv").add({"a": 1})
     assert error.value.filename == str(tmp_path / "metrics.csv")
+
+
+def test_drafts_of_one_file_are_apart_and_the_last_stays(tmp_path):
+    path = tmp_path / "a.npz"
+    with disk.drafted(path) as mine, disk.drafted(path) as yours:
+        assert mine != yours and mine.suffix == yours.suffix == ".npz" and mine.parent == tmp_path
+        mine.write_text("mine")
+        yours.write_text("yours")
+        assert not path.exists()
+    assert path.read_text() == "mine" and [each.name for each in tmp_path.iterdir()] == ["a.npz"]
+
+
+def test_a_draft_that_fails_leaves_the_file_and_is_told_by_its_name(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_text("before")
+    with pytest.raises(OSError, match="No such file") as raised, disk.drafted(path) as draft:
+        draft.write_text("half")
+        draft.unlink()
+    assert raised.value.filename == str(path)
+    with pytest.raises(ZeroDivisionError), disk.drafted(path) as draft:
+        draft.write_text(str(1 / 0))
+    assert path.read_text() == "before" and len(list(tmp_path.iterdir())) == 1

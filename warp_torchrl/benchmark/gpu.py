@@ -26,6 +26,7 @@ from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.device import unread
+from warp_torchrl.runs import disk
 from warp_torchrl.training.loop import Training
 from warp_torchrl.world.tick import advance
 
@@ -96,7 +97,7 @@ def measure_gpu(device: str, path: Path, size: Size, tell: Callable[[str], objec
             found[name] = _told(part, device)
         sound = sound and "error" not in found[name]
         found["seconds"] = round(time.perf_counter() - begin, 1)
-        path.write_text(json.dumps(found, indent=1) + "\n")
+        disk.replace(path, json.dumps(found, indent=1) + "\n")
         tell(f"{found['seconds']:6.1f} s  {name}: {_line(found[name])}")
     return sound
 

@@ -24,6 +24,7 @@ from warp_torchrl.config.groups import COMPONENTS
 from warp_torchrl.config.renamed import renamed_overrides
 from warp_torchrl.config.search_options import SearchOptions
 from warp_torchrl.config.space import Dimension, Value, divided
+from warp_torchrl.foreign import read_json
 from warp_torchrl.hyperparameters.training import SearchEnded, TrainingProcess
 from warp_torchrl.runs import disk
 from warp_torchrl.runs.checkpoint import holds_any
@@ -43,6 +44,7 @@ USAGE = (
 FIRES = 1_000_000_000
 """Seed of the first fire on which a search evaluates: no training has it, and no evaluation unless it is asked to."""
 _RECORD = "search.json"
+_LARGEST = 1_000_000  # bytes
 _NOT_SEARCHED = ("seed", "resume", "debug", "evaluation.first_seed")
 _MISSING = object()
 _SECONDS_BETWEEN_LOOKS = 1.0
@@ -164,7 +166,7 @@ def _check_folder(folder: Path, record: Mapping[str, Any]) -> None:
         check_free(folder, "search.out")
         return
     try:
-        held = json.loads(path.read_text(encoding="utf-8"))
+        held = read_json(path, _LARGEST)
         before = {part: dict(held[part]) for part in ("space", "search", "configuration")}
     except (ValueError, KeyError, TypeError):
         raise ConfigError(f"search.out: {path} is not the record of a search; take another folder") from None

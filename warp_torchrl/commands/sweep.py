@@ -21,6 +21,12 @@ from warp_torchrl.parent import SECONDS_TO_SAVE, bind_workers, end_with
 
 FAILURE = "failed.json"
 _JOBLIB = "hydra_joblib_launcher"
+from warp_torchrl.config.construction import construct
+from warp_torchrl.foreign import read_json
+from warp_torchrl.runs import disk
+
+FAILURE = "failed.json"
+_LARGEST = 1_000_000  # bytes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,13 +76,26 @@ def save_failure(code: int, reason: str) -> None:
     failure = Failure(job=int(job.num), overrides=" ".join(HydraConfig.get().overrides.task), code=code, reason=reason)
     folder = Path(HydraConfig.get().runtime.output_dir)
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / FAILURE).write_text(json.dumps(asdict(failure)), encoding="utf-8")
+    disk.replace(folder / FAILURE, json.dumps(asdict(failure)))
 
 
 def failures(folder: Path) -> list[Failure]:
     """Return the failed jobs in a sweep's folder, in order of their numbers."""
-    found = [Failure(**json.loads(path.read_text(encoding="utf-8"))) for path in folder.glob(f"**/{FAILURE}")]
+    found = [_read(path) for path in folder.glob(f"**/{FAILURE}")]
     return sorted(found, key=lambda each: each.job)
+
+
+def _read(path: Path) -> Failure:
+    """Return the failure in a job's folder.
+
+    Raises:
+        ConfigError: If it is none.
+    """
+    try:
+        failure: Failure = construct(Failure, read_json(path, _LARGEST), "")
+    except ValueError as error:
+        raise ConfigError(f"{path} is not what a failed job writes: {error}") from None
+    return failure
 
 
 class SweepSummary(Callback):
@@ -136,7 +155,7 @@ def _write_summary(folder: Path) -> list[Failure]:
 
 def _summarise(entries: list[summary.Entry], folder: Path) -> None:
     text = summary.table(entries)
-    (folder / "summary.md").write_text(text + "\n", encoding="utf-8")
+    disk.replace(folder / "summary.md", text + "\n")
     print(text, flush=True)
     try:
         summary.draw(entries, folder / "summary.png")

@@ -54,15 +54,9 @@ def export(recordings: Sequence[Recording], path: Path) -> None:
         ValueError: If the teams differ in shape.
         OSError: If the write fails, with the path; nothing is left.
     """
-    content, draft = arrays(recordings), path.with_name(f".{path.name}.tmp")
-    try:
-        with disk.with_path(path):
-            with draft.open("wb") as file:
-                np.savez_compressed(file, allow_pickle=False, **content)  # type: ignore[arg-type]
-            disk.sync(draft)
-            draft.replace(path)
-    finally:
-        draft.unlink(missing_ok=True)
+    content = arrays(recordings)
+    with disk.drafted(path) as draft, draft.open("wb") as file:
+        np.savez_compressed(file, allow_pickle=False, **content)  # type: ignore[arg-type]
 
 
 def _shapes(steps: TensorDictBase) -> dict[str, tuple[str, tuple[int, ...]]]:

@@ -1,6 +1,5 @@
 """An episode as a file that others can look at: a GIF, an MP4, or an HTML document that plays in a browser."""
 
-import os
 from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -12,9 +11,11 @@ from tensordict.nn import TensorDictModuleBase
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.render import EpisodeRecorder
 from warp_torchrl.evaluation.play import play
+from warp_torchrl.runs import disk
 
 Kind = Literal["gif", "html", "mp4"]
 """As what an episode can be written; ``html`` needs the extra ``live``, ``mp4`` the extra ``video``."""
+_WHOLE = {"movflags": "+faststart"}  # a browser plays it before all of it is there
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 
@@ -57,17 +58,12 @@ def write_video(path: Path, frames: Sequence[tuple[Image.Image, int]]) -> None:
     import av  # the extra video
 
     tact = frames[0][1]
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        with av.open(str(partial), "w", format="mp4", options={"movflags": "+faststart"}) as film:
-            stream = film.add_stream("libx264", rate=Fraction(1000, tact), options={"crf": "20"})
-            stream.width, stream.height = (2 * side for side in frames[0][0].size)  # even, as players want them
-            stream.pix_fmt = "yuv420p"  # browsers show no other
-            for picture, duration in frames:
-                large = picture.convert("RGB").resize((stream.width, stream.height), Image.Resampling.NEAREST)
-                for _ in range(max(1, duration // tact)):
-                    film.mux(stream.encode(av.VideoFrame.from_image(large)))
-            film.mux(stream.encode())
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    with disk.drafted(path) as draft, av.open(str(draft), "w", format="mp4", options=_WHOLE) as film:
+        stream = film.add_stream("libx264", rate=Fraction(1000, tact), options={"crf": "20"})
+        stream.width, stream.height = (2 * side for side in frames[0][0].size)  # even, as players want them
+        stream.pix_fmt = "yuv420p"  # browsers show no other
+        for picture, duration in frames:
+            large = picture.convert("RGB").resize((stream.width, stream.height), Image.Resampling.NEAREST)
+            for _ in range(max(1, duration // tact)):
+                film.mux(stream.encode(av.VideoFrame.from_image(large)))
+        film.mux(stream.encode())

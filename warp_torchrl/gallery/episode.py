@@ -13,6 +13,7 @@ from PIL import Image
 
 from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.live.words import title
+from warp_torchrl.runs import disk
 
 _WIDTH, _HEIGHT = 900, 620
 _FLAGS = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")  # a picture without a GPU too
@@ -49,11 +50,14 @@ def photograph(setting: Setting, first: int, last: int, every: int, path: Path, 
     path.parent.mkdir(parents=True, exist_ok=True)
     if len(pictures) == 1:
         path = path.with_suffix(".png")
-        pictures[0].save(path, optimize=True)
+        with disk.drafted(path) as draft:
+            pictures[0].save(draft, optimize=True)
         return path
     path = path.with_suffix(".webp")
     times = [_FRAME_MS] * (len(pictures) - 1) + [_LAST_FRAME_MS]
-    pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=times, loop=0, quality=75, method=6)
+    look = {"duration": times, "loop": 0, "quality": 75, "method": 6}
+    with disk.drafted(path) as draft:
+        pictures[0].save(draft, save_all=True, append_images=pictures[1:], **look)
     return path
 
 

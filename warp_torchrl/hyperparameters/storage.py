@@ -15,10 +15,12 @@ from optuna.storages.journal import JournalFileBackend
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.search_options import SearchOptions
 from warp_torchrl.config.space import Dimension, Value
+from warp_torchrl.foreign import read_bytes
 from warp_torchrl.hyperparameters.measures import STEP
 
 JOURNAL = "journal.log"
 _STUDY = "search"
+_LARGEST = 1_000_000_000  # bytes
 _REDUCTION = 3  # hyperband goes on with one trial of so many
 
 
@@ -34,9 +36,9 @@ def open_study(folder: Path, options: SearchOptions) -> optuna.Study:
     path = folder / JOURNAL
     for left in folder.glob(f"{JOURNAL}.lock*"):
         left.unlink()
-    if path.exists():
-        _drop_cut_line(path)
     try:
+        if path.exists():
+            _drop_cut_line(path)
         return optuna.create_study(
             storage=JournalStorage(JournalFileBackend(str(path))),
             study_name=_STUDY,
@@ -54,7 +56,7 @@ def open_study(folder: Path, options: SearchOptions) -> optuna.Study:
 
 
 def _drop_cut_line(path: Path) -> None:
-    content = path.read_bytes()
+    content = read_bytes(path, _LARGEST)
     whole = content.rfind(b"\n") + 1
     if whole < len(content):
         with path.open("r+b") as file:

@@ -29,13 +29,30 @@ def replace(path: Path, content: str | bytes) -> None:
     Raises:
         OSError: If the write fails, with the path; the old file stays.
     """
-    draft = path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}.tmp")  # two may write the same file
+    with drafted(path) as draft:
+        draft.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+@contextmanager
+def drafted(path: Path) -> Iterator[Path]:
+    """Yield the path of a draft, of a name that no other process has, which takes a file's place when the block ends.
+
+    Its ending is the file's, by which some writers choose a format.
+
+    Raises:
+        OSError: If the write fails, with the path; the old file stays.
+    """
+    draft = path.with_name(f".{path.stem}.{os.getpid()}-{secrets.token_hex(4)}.tmp{path.suffix}")
     try:
         with with_path(path):
-            draft.write_bytes(content.encode() if isinstance(content, str) else content)
+            yield draft
             sync(draft)
             draft.replace(path)
             sync(path.parent)
+    except OSError as error:
+        if error.filename == str(draft):
+            error.filename = str(path)
+        raise
     finally:
         draft.unlink(missing_ok=True)
 
