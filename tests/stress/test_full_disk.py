@@ -1,12 +1,15 @@
 """A disk that fills at every stage of a run, and one that is read-only: exit code 6, and what was saved stays sound."""
 
+import errno
 import logging
+import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
 
 from tests.stress.processes import TINY
+from tests.stress.saves import KINDS, left
 from warp_torchrl.commands.command import train
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
 
@@ -83,3 +86,25 @@ def test_a_read_only_folder(small_disk, run_here, monkeypatch):
         assert code == 6 and errors[-1].startswith("error: ") and errors[-1].endswith("Read-only file system")
         assert "Traceback" not in "".join(errors)
     assert newest(small_disk / "run")[1] == []
+
+
+def test_a_disk_that_fills_while_recordings_are_saved(small_disk, capfd):
+    people, filler, stages = small_disk / "people", small_disk / "filler", []
+    kind, number, room = KINDS["recording"], 1, 0
+    while number < 3:
+        filler.write_bytes(bytes(max(0, shutil.disk_usage(small_disk).free - room)))
+        try:
+            kind.save(people, number)
+        except OSError as error:
+            assert error.errno == errno.ENOSPC and error.filename
+            stages.append(f"{room // 1024} KiB")
+            room += 12 * 1024
+        else:
+            number, room = number + 1, 0
+        filler.unlink()
+        assert (kind.held(people) if number > 1 else set()) == set(range(1, number)) and not left(people)
+    with capfd.disabled():
+        print(
+            f"\nfull disks told and survived, of recordings: {len(stages)} / {len(stages)}, room of {', '.join(stages)}"
+        )
+    assert len(stages) > 5

@@ -1,20 +1,66 @@
-"""A run killed at random moments, and resumed each time, ends with the weights of a run that no one touched."""
+"""A run killed at random moments, and resumed each time, ends with the weights of a run that no one touched.
 
+Savers of recordings that are killed, several at once in one folder, leave what they have said and nothing half.
+"""
+
+import os
 import random
 import shutil
 import signal
+import subprocess
+import sys
 import time
 from functools import partial
 
 import pytest
 import torch
 
-from tests.stress.processes import TINY, finish, rows, start, wait_for
+from tests.stress.processes import ROOT, TINY, finish, rows, start, wait_for
+from tests.stress.saves import KINDS, left
+from warp_torchrl.demonstrations.files import find, read
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
 
 pytestmark = pytest.mark.stress
 KILLS = 10
 ITERATIONS = 400
+
+
+SAVER = """
+import sys
+from pathlib import Path
+from tests.stress.saves import KINDS
+number = int(sys.argv[1])
+while True:
+    KINDS["recording"].save(Path("people"), number)
+    print(number, flush=True)
+"""
+
+
+def said(path):
+    return path.read_text().split()
+
+
+def test_killed_savers_leave_what_they_said_and_nothing_half(tmp_path):
+    draws, told = random.Random(8), [tmp_path / f"told{number}" for number in (1, 2, 3)]
+    processes = []
+    for number, path in enumerate(told, start=1):
+        with path.open("w") as out:
+            given = [sys.executable, "-c", SAVER, str(number)]
+            processes.append(
+                subprocess.Popen(given, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, stdout=out)
+            )
+    wait_for(lambda: all(len(said(path)) > 3 for path in told), processes[0])
+    for process in processes:
+        time.sleep(draws.uniform(0.0, 0.5))
+        process.kill()
+        process.wait()
+    people = tmp_path / "people"
+    seeds = [read(folder).seed for folder in find(people)]
+    for number, path in enumerate(told, start=1):
+        assert 0 <= seeds.count(number) - len(said(path)) <= 1  # it may have been killed before it could say so
+    KINDS["recording"].save(people, 4)
+    assert not left(people)
+    print(f"\nsavers killed: 3, said and there: {[len(said(path)) for path in told]}, broken: 0")
 
 
 def grown(run, before):

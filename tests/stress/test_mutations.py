@@ -1,5 +1,6 @@
-"""Checkpoints that were flipped, cut, zeroed, lengthened, swapped or thinned: all are noticed, in one line."""
+"""Checkpoints and recordings that were flipped, cut, zeroed, lengthened, swapped or thinned: all are noticed."""
 
+import json
 import pickle
 import random
 import shutil
@@ -8,11 +9,15 @@ import pytest
 import torch
 
 from tests.forgery import forge
+from tests.stress.saves import KINDS
 from tests.training.test_loop import tiny
 from warp_torchrl import load_policy
 from warp_torchrl.commands.command import evaluate
 from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.demonstrations.files import MANIFEST, find, read
+from warp_torchrl.demonstrations.replay import Replay
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
+from warp_torchrl.runs.sealed import Unsound, described, sealed
 
 pytestmark = pytest.mark.stress
 MUTATIONS = 200
@@ -26,19 +31,19 @@ def trained(tmp_path_factory):
     return run
 
 
-def mutate(folder, other, draws):
-    """Harm one file of a checkpoint, and say how; ``other`` is a sound one."""
-    name, harm = draws.choice(FILES), draws.choice(("flip", "cut", "zero", "append", "swap", "delete"))
+def mutate(folder, other, draws, files=FILES):
+    """Harm one file of what was saved, and say how; ``other`` is a sound one."""
+    name, harm = draws.choice(files), draws.choice(("flip", "cut", "zero", "append", "swap", "delete"))
     path = folder / name
     content = path.read_bytes()
     place = draws.randrange(len(content))
     if harm == "delete":
         path.unlink()
     elif harm == "swap":
-        twin = draws.choice([folder / each for each in FILES if each != name] + [other / name])
+        twin = draws.choice([folder / each for each in files if each != name] + [other / name])
         changed = twin.read_bytes()
         if changed == content:
-            return mutate(folder, other, draws)
+            return mutate(folder, other, draws, files)
         twin.parent == folder and twin.write_bytes(content)
         path.write_bytes(changed)
     else:
@@ -51,7 +56,7 @@ def mutate(folder, other, draws):
             "append": content + draws.choice((b" ", b"\n", b"\0", draws.randbytes(length))),
         }[harm]
         if changed == content:
-            return mutate(folder, other, draws)
+            return mutate(folder, other, draws, files)
         path.write_bytes(changed)
     return f"{harm} {name}"
 
@@ -104,6 +109,57 @@ def test_no_forgery_is_more_than_an_error_in_one_line(trained, tmp_path):
             assert "\n" not in str(error), what
             refused += 1
     print(f"\nforgeries refused: {refused}, read as what they say: {harmless}, tracebacks: 0")
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    people = tmp_path_factory.mktemp("recorded")
+    for number in (1, 2):
+        KINDS["recording"].save(people, number)
+    return people
+
+
+def harmed(recorded, people, draws):
+    """Copy two recordings, and harm one; return it, its files and how it was harmed."""
+    shutil.rmtree(people, ignore_errors=True)
+    shutil.copytree(recorded, people)
+    folder, other = (KINDS["recording"].result(people, number) for number in (1, 2))
+    files = [str(path.relative_to(folder)) for path in KINDS["recording"].files(people, 1)]
+    return folder, mutate(folder, other, draws, files)
+
+
+def test_every_mutation_of_a_recording_is_noticed(recorded, tmp_path):
+    draws = random.Random(8)
+    for _ in range(MUTATIONS):
+        folder, what = harmed(recorded, tmp_path / "people", draws)
+        if what == f"delete {MANIFEST}":
+            assert folder not in find(tmp_path / "people")
+            continue
+        with pytest.raises(Unsound) as error:
+            read(folder)
+        assert "\n" not in str(error.value), what
+    print(f"\nmutations of recordings caught / tried: {MUTATIONS} / {MUTATIONS}")
+
+
+def test_no_forged_recording_is_more_than_an_error_in_one_line(recorded, tmp_path):
+    draws, refused, harmless = random.Random(9), 0, 0
+    for _ in range(MUTATIONS):
+        folder, what = harmed(recorded, tmp_path / "people", draws)
+        try:
+            content = json.loads((folder / MANIFEST).read_text())
+            content.pop("sha256")
+            content["files"] |= described(folder, [each for each in content["files"] if (folder / each).exists()])
+            (folder / MANIFEST).write_bytes(sealed(content))
+        except (OSError, ValueError, KeyError):
+            continue  # the manifest itself is gone
+        try:
+            Replay(read(folder)).check()
+            harmless += 1
+        except (Unsound, ConfigError) as error:
+            assert "\n" not in str(error), what
+            refused += 1
+    print(f"\nforged recordings refused: {refused}, play as what they say: {harmless}, tracebacks: 0")
+    assert refused > MUTATIONS / 2
 
 
 class Poison:
