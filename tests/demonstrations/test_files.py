@@ -74,6 +74,16 @@ def test_a_disk_without_room_is_told_before_memory_is_mapped_onto_it(recording, 
     assert list((tmp_path / "people").iterdir()) == []
 
 
+def test_a_disk_that_is_full_when_torch_writes_is_told_as_one(recording, tmp_path, monkeypatch):
+    def full(*given, **more):
+        raise RuntimeError("unable to write to file </a/action.memmap>: No space left on device (28)")
+
+    monkeypatch.setattr(TensorDict, "memmap", full)
+    with pytest.raises(OSError, match="No space") as raised:
+        save(recording, tmp_path / "people")
+    assert raised.value.errno == 28 and raised.value.filename and list((tmp_path / "people").iterdir()) == []
+
+
 def test_every_altered_file_is_found(folder):
     for path in sorted(each for each in folder.rglob("*") if each.is_file()):
         kept = path.read_bytes()

@@ -43,6 +43,7 @@ from warp_torchrl.runs.sealed import (
 log = logging.getLogger("warp_torchrl")
 FORMAT = 1
 MANIFEST, _STEPS = "recording.json", "steps"
+_ERRNO = re.compile(r"file <.*>: .*\((\d+)\)")
 _FOLDER = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]*")
 _MOST_STEPS, _MOST_AGENTS, _MOST_ACTIONS, _MOST_EVENTS = 1_000_000, 256, 1000, 10_000
 _LARGEST, _LARGEST_META = 2**32, 100_000  # bytes
@@ -63,7 +64,7 @@ def save(recording: Recording, parent: Path) -> Path:
     """
     with draft_in(parent) as draft, disk.with_path(parent):
         _check_room(draft / ".room", recording.steps)
-        recording.steps.to_tensordict().memmap(draft / _STEPS, copy_existing=True)
+        _write(recording.steps, draft / _STEPS)
         (draft / MANIFEST).write_bytes(sealed(_content(recording, draft)))
         read(draft)
         return publish(draft, parent, (f"{recording.scenario}-{recording.seed}-{n}" for n in range(1, _MOST_STEPS)))
@@ -151,6 +152,21 @@ def _check_room(path: Path, steps: TensorDictBase) -> None:
         with path.open("wb") as file:
             os.posix_fallocate(file.fileno(), 0, steps.bytes())
         path.unlink()
+
+
+def _write(steps: TensorDictBase, folder: Path) -> None:
+    """Write steps as memory-mapped tensors.
+
+    Raises:
+        OSError: If it fails.
+    """
+    try:
+        steps.to_tensordict().memmap(folder, copy_existing=True)
+    except RuntimeError as error:
+        number = _ERRNO.search(str(error))  # torch tells it in its message alone
+        if number is None:
+            raise
+        raise OSError(int(number[1]), os.strerror(int(number[1])), str(folder)) from None
 
 
 def _content(recording: Recording, folder: Path) -> dict[str, Any]:
