@@ -7,8 +7,9 @@ import json
 import os
 import re
 import stat
+from io import BufferedReader
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 _PART = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]*")
 _LONGEST_NAME = 1024
@@ -18,7 +19,7 @@ class Foreign(ValueError):  # noqa: N818
     """A file is none of the kind that is read; the message is one line that names it."""
 
 
-def open_file(path: Path, most: int | None = None) -> BinaryIO:
+def open_file(path: Path, most: int | None = None) -> BufferedReader:
     """Open a regular file to read its bytes; the caller closes it.
 
     Args:

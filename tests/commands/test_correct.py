@@ -12,6 +12,7 @@ from warp_torchrl.demonstrations.recording import Mover
 from warp_torchrl.demonstrations.replay import Replay
 from warp_torchrl.demonstrations.scripted import Person
 from warp_torchrl.runs.checkpoint import newest
+from warp_torchrl.runs.lock import RunFolderLock
 
 
 def test_the_command_writes_recordings_that_replay_and_prints_a_table(weak_run, tmp_path, capsys):
@@ -65,3 +66,12 @@ def test_help_names_every_key(capsys):
     assert main(["--help"]) == 0
     told = capsys.readouterr().out
     assert all(f"{key}" in told for key in ("policy", "out", "episodes", "acts", "delay", "error", "threshold", "seed"))
+
+
+def test_one_command_at_a_time_writes_into_a_folder(tmp_path, capsys):
+    lock = RunFolderLock(tmp_path / "people")
+    assert main(["policy=skirmish", f"out={tmp_path / 'people'}", "episodes=1"]) == 3
+    assert capsys.readouterr().err == f"error: {tmp_path / 'people'} is in use: another process writes into it\n"
+    lock.release()
+    assert main(["policy=nobody", f"out={tmp_path / 'new'}"]) == 2
+    assert not (tmp_path / "new").exists()

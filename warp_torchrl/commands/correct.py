@@ -11,6 +11,9 @@ from warp_torchrl.correction import Correction, Session
 from warp_torchrl.demonstrations.files import save
 from warp_torchrl.demonstrations.scripted import Person
 from warp_torchrl.demonstrations.summary import Summary, summary
+from warp_torchrl.runs import disk
+from warp_torchrl.runs.lock import RunFolderLock
+from warp_torchrl.runs.output import remove_if_empty
 
 USAGE = (
     "python -m warp_torchrl.correct policy=NAME or FOLDER out=FOLDER [episodes=32] [acts=1000] [seed=0] "
@@ -38,13 +41,20 @@ def read(arguments: Sequence[str]) -> tuple[Session, Person]:
 
 
 def _record(session: Session, person: Person) -> None:
-    out = Path(session.out)
-    if out.is_dir() and any(out.iterdir()):
+    out, is_new = Path(session.out), not Path(session.out).exists()
+    if out.is_dir() and any(each.name != ".lock" for each in out.iterdir()):
         raise ConfigError(f"out must be a new folder, {out} holds files")
-    correction = Correction(session, person)
+    with disk.with_path(out):
+        lock = RunFolderLock(out)  # before anything is played, so that nobody plays for nothing
     rows = []
-    for played in correction.episodes():
-        rows.append((summary(save(played.recording, out), played.recording), played.saved_alone))
+    try:
+        correction = Correction(session, person)
+        for played in correction.episodes():
+            rows.append((summary(save(played.recording, out), played.recording), played.saved_alone))
+    finally:
+        if is_new and not rows:
+            remove_if_empty(out)
+        lock.release()
     print(table(rows, correction.scenario), flush=True)
 
 

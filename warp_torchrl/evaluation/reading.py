@@ -49,7 +49,7 @@ def _check(content: Any) -> None:
         raise ValueError("world_overrides must be texts")
     if goal not in ("saved", "watched"):
         raise ValueError(f"goal must be saved or watched, got {goal!r:.80}")
-    seeds = content.get("seeds")
+    seeds: Any = content.get("seeds")
     is_some = isinstance(seeds, list) and 0 < len(seeds) <= _MOST_EPISODES
     if not (is_some and all(type(seed) is int for seed in seeds)):
         raise ValueError(f"seeds must be 1 to {_MOST_EPISODES} whole numbers")

@@ -60,7 +60,8 @@ def _rows(path: Path) -> list[tuple[float, float]]:
     except (OSError, Foreign):
         return []
     lines = text[: text.rfind("\n") + 1].splitlines()
-    rows, found = csv.DictReader(lines), []
+    rows = csv.DictReader(lines)
+    found: list[tuple[float, float]] = []
     while True:
         try:
             row = next(rows)

@@ -40,6 +40,8 @@ class Keeper:
             raise Refused(
                 f"{error.filename or self.folder} cannot be written ({error.strerror}): this episode is not saved"
             ) from None
+        except Unsound as error:
+            raise Refused(f"this episode is not saved: {error}") from None
         if self._last is not None and self._last[0] is side.open_recording:
             shutil.rmtree(self._last[2], ignore_errors=True)
         self._last = (side.open_recording, _length(side.open_recording), folder)

@@ -13,7 +13,7 @@ from warp_torchrl.runs import disk
 from warp_torchrl.runs.destination import DRAFT, check_free
 from warp_torchrl.runs.lock import RunFolderLock
 
-__all__ = ["DRAFT", "draft_in", "output_folder", "publish"]
+__all__ = ["DRAFT", "draft_in", "output_folder", "publish", "remove_if_empty", "sync_all"]
 _TAKEN = (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR)
 
 
@@ -52,8 +52,7 @@ def output_folder(
             _fill(folder, draft, last, replaced)
     except BaseException:
         if is_new:
-            with suppress(OSError):  # others wrote into it
-                _remove_if_empty(folder)
+            remove_if_empty(folder)
         raise
     finally:
         lock.release()
@@ -123,6 +122,14 @@ def sync_all(folder: Path) -> None:
             disk.sync(path)
 
 
+def remove_if_empty(folder: Path) -> None:
+    """Remove a folder that holds nothing but its lock; what others wrote into it stays."""
+    with suppress(OSError):
+        if {each.name for each in folder.iterdir()} <= {".lock"}:
+            (folder / ".lock").unlink(missing_ok=True)
+            folder.rmdir()
+
+
 def _fill(folder: Path, draft: Path, last: str, replaced: Iterable[str]) -> None:
     """Move what a draft holds into a folder, the last file after all others are on the disk."""
     if not (draft / last).is_file():
@@ -146,13 +153,6 @@ def _remove(path: Path) -> None:
         shutil.rmtree(path)
     else:
         path.unlink(missing_ok=True)
-
-
-def _remove_if_empty(folder: Path) -> None:
-    """Remove a folder that holds nothing but its lock."""
-    if {each.name for each in folder.iterdir()} <= {".lock"}:
-        (folder / ".lock").unlink(missing_ok=True)
-        folder.rmdir()
 
 
 def _locked_folder(parent: Path) -> tuple[Path, int]:
