@@ -16,16 +16,13 @@ from hydra.experimental.callback import Callback
 from omegaconf import DictConfig
 
 from warp_torchrl import summary
-from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.parent import SECONDS_TO_SAVE, bind_workers, end_with
-
-FAILURE = "failed.json"
-_JOBLIB = "hydra_joblib_launcher"
-from warp_torchrl.config.construction import construct
+from warp_torchrl.config.construction import ConfigError, construct
 from warp_torchrl.foreign import read_json
+from warp_torchrl.parent import SECONDS_TO_SAVE, bind_workers, end_with
 from warp_torchrl.runs import disk
 
 FAILURE = "failed.json"
+_JOBLIB = "hydra_joblib_launcher"
 _LARGEST = 1_000_000  # bytes
 
 
