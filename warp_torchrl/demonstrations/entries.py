@@ -10,7 +10,7 @@ from tensordict import TensorDictBase
 
 from warp_torchrl.demonstrations.recording import MOVER, PROPOSED, ROLE, Mover
 from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, REWARD
-from warp_torchrl.runs.tensors import not_finite
+from warp_torchrl.finite import not_finite
 from warp_torchrl.world.role import PAPER_ROLES
 
 DTYPES = {str(each).removeprefix("torch."): each for each in (torch.bool, torch.uint8, torch.int64, torch.float32)}

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import plain
 from warp_torchrl.config.construction import ConfigError
