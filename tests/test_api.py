@@ -38,3 +38,8 @@ def test_world_state_has_the_codes_of_the_contract():
 def test_load_policy_tells_what_is_missing(tmp_path):
     with pytest.raises(CheckpointError, match="no sound checkpoint"):
         load_policy(tmp_path)
+
+
+def test_a_key_that_no_file_has_is_refused():
+    with pytest.raises(ValueError, match="no_such_key is not a key of the configuration; it has"):
+        make_env("skirmish", overrides=["+no_such_key=1"])

@@ -28,6 +28,8 @@ def test_a_shipped_policy_is_verified_and_a_baseline_has_no_checkpoint():
 def test_keys_that_it_does_not_read_are_checked_as_a_training_checks_them(name, key):
     with pytest.raises(ConfigError, match=f"{key} is not a key of"):
         NamedPolicy(name).config([f"+{key}=1"])
+    with pytest.raises(ConfigError, match="debug must be true or false, got "):
+        NamedPolicy(name).config(["+debug.x=1"])
 
 
 def test_a_trained_policy_plays_in_the_scenario_of_its_training_unless_told(make_small_env):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import torch
 
+from warp_torchrl.config.building import check_keys
 from warp_torchrl.config.components import build_components
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import build
@@ -54,6 +55,7 @@ def make_env(
         ConfigError: A ``ValueError``, with key, value and rule.
     """
     config = plain(compose_config("train", [f"scenario={scenario}", *overrides]))
+    check_keys(config)
     parts = build_components(config, ENVIRONMENT)
     return WildfireEnv(
         parts["world"],

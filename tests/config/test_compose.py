@@ -42,18 +42,3 @@ def test_a_mistake_is_told_as_hydra_finds_it(overrides: list[str]) -> None:
     with pytest.raises(compose.HYDRA_ERRORS) as slow:
         compose._composed_by_hydra(conf_folder(), "train", overrides)
     assert str(quick.value) == str(compose.explain(slow.value, "train", overrides))
-
-
-@pytest.mark.parametrize("name", ["train", "predict", "calibrate", "evaluate"])
-@pytest.mark.parametrize(
-    ("override", "line"),
-    [
-        ("+no_such_key=1", "no_such_key is not a key of the configuration; it has "),
-        ("++no_such_key.x=1", "no_such_key is not a key of the configuration; it has "),
-        ("+debug.x=1", "debug must be a value, got {'x': 1}"),
-    ],
-)
-def test_a_key_that_no_file_has_is_refused_for_every_command(name: str, override: str, line: str) -> None:
-    with pytest.raises(ConfigError) as refused:
-        compose_config(name, [override])
-    assert str(refused.value).startswith(line)

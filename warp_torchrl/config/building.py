@@ -24,11 +24,7 @@ def run_config(config: Mapping[str, Any]) -> RunConfig:
     Raises:
         ConfigError: With key, value and rule.
     """
-    known = {each.name for each in fields(RunConfig)} | {*COMPONENTS, *WORLD_KEYS, *COMMAND_KEYS}
-    for key in config:
-        if key not in known:
-            has = f"it has {', '.join(sorted(known - {'world', 'make_levels', 'make_kinds'}))}"
-            raise ConfigError(f"{key} is not a key of the configuration; {has}{did_you_mean(key, known)}")
+    check_keys(config)
     for key in COMPONENTS:
         if key not in config:
             raise ConfigError(f"{key} must be given")
@@ -49,6 +45,21 @@ def run_config(config: Mapping[str, Any]) -> RunConfig:
     with _in_section("imitation"):
         made.imitation.check_fits(made.algorithm, made.collector, made.model)
     return made
+
+
+def check_keys(config: Mapping[str, Any]) -> None:
+    """Check that a composed configuration has no key but those that there are: ``+key`` adds whatever one likes.
+
+    Raises:
+        ConfigError: With the first that is none, and those that there are.
+    """
+    known = {each.name for each in fields(RunConfig)} | {*COMPONENTS, *WORLD_KEYS, *COMMAND_KEYS}
+    for key in config:
+        if key not in known:
+            has = f"it has {', '.join(sorted(known - {'world', 'make_levels', 'make_kinds'}))}"
+            raise ConfigError(f"{key} is not a key of the configuration; {has}{did_you_mean(key, known)}")
+    if not isinstance(config.get("debug", False), bool):
+        raise ConfigError(f"debug must be true or false, got {config['debug']!r}")
 
 
 @contextmanager

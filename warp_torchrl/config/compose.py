@@ -53,26 +53,11 @@ def compose_config(name: str, overrides: Sequence[str] = ()) -> DictConfig:
     overrides = renamed_overrides(overrides)
     check_choices(overrides)
     config = _compose(name, overrides)
-    if any(each.startswith("+") for each in overrides):
-        _check_keys(config, name)
     try:
         OmegaConf.resolve(config)
     except OmegaConfBaseException as error:
         raise ConfigError(one_line(error)) from None
     return config
-
-
-def _check_keys(config: DictConfig, name: str) -> None:
-    """Check that a configuration has no key that ``conf/<name>.yaml`` has not: ``+key`` adds whatever one likes."""
-    folder = conf_folder()
-    plainly = _composed(folder, _last_change(folder), name, ())
-    known = sorted(map(str, plainly))
-    for key, value in ((str(key), value) for key, value in config.items_ex(resolve=False)):
-        if key not in known:
-            hint = did_you_mean(key, known)
-            raise ConfigError(f"{key} is not a key of the configuration; it has {', '.join(known)}{hint}")
-        if OmegaConf.is_dict(value) and not OmegaConf.is_dict(plainly._get_node(key)):
-            raise ConfigError(f"{key} must be a value, got {OmegaConf.to_container(value)}")
 
 
 def choices(overrides: Sequence[str]) -> dict[str, str]:
