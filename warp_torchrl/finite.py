@@ -6,6 +6,9 @@ from collections.abc import Iterable
 import torch
 from torch import Tensor
 
+LARGEST = 1.8e19
+"""Of a score of an action; the square of more is no float32, and beside it the others are lost."""
+
 
 class NumericalFailure(Exception):  # noqa: N818
     """A number that is shown, earned, learned or acted by is not finite; no weights were touched."""
@@ -31,9 +34,13 @@ def check_scores(scores: Tensor | None) -> None:
     """Check the logits or values by which actions are chosen; it reads from their device.
 
     Raises:
-        NumericalFailure: If one is not finite.
+        NumericalFailure: If one is not finite, or above ``LARGEST``; closed actions may have the least number there is.
     """
-    if scores is not None and (found := not_finite(scores)) is not None:
+    if scores is None or not scores.numel():
+        return
+    least, most = map(float, scores.detach().aminmax())
+    if not (math.isfinite(least) and most <= LARGEST):
         raise NumericalFailure(
-            f"what the policy says of an action is {found:g}, not finite: its weights or what it is shown are too large"
+            f"the policy scores an action {least if math.isfinite(most) and most <= LARGEST else most:g}, no number to "
+            "act by: its weights, or what it is shown, are too large"
         )
