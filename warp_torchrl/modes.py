@@ -33,9 +33,9 @@ def apart(function: Callable[P, T]) -> Callable[P, T]:
     return call
 
 
-def kept(maxsize: int) -> Callable[[Callable[P, T]], Callable[P, T]]:
+def kept(maxsize: int) -> Callable[[Callable[..., T]], Callable[..., T]]:
     """Return a decorator of functions that make constant tensors: it keeps them, made apart from torch's modes."""
-    return lambda function: lru_cache(maxsize)(apart(function))  # type: ignore[return-value]
+    return lambda function: lru_cache(maxsize)(apart(function))
 
 
 def _is_plain() -> bool:

@@ -83,7 +83,7 @@ class MaskedChoice(MaskedCategorical):
 
     def sample(self, sample_shape: torch.Size | Sequence[int] | None = None) -> Tensor:
         """Return actions, int64 [...]."""
-        chances = self.probs
+        chances: Tensor = self.probs  # type: ignore[has-type]
         self.probs = chances.nan_to_num(nan=1.0)
         try:
             return super().sample(sample_shape)
