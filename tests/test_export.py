@@ -1,5 +1,6 @@
 """A policy that is handed on acts as it did, is verified, and does not pretend to be a run."""
 
+import json
 import re
 import shutil
 
@@ -147,3 +148,17 @@ def test_numbers_that_are_not_finite_are_not_exported(run, tmp_path, capsys, num
             main(arguments)
         assert refused.value.code == 4 and re.search(said, capsys.readouterr().err)
         assert not (tmp_path / "out").exists()
+
+
+def test_networks_that_are_larger_than_the_machine_are_refused_before_they_are_made(run, tmp_path, capsys):
+    shutil.copytree(run, tmp_path / "run")
+    found, _ = checkpoints.newest(tmp_path / "run")
+    content = json.loads((found.path / "config.json").read_text())
+    content["values"]["model"]["actor_hidden"] = [8192] * 60  # 16 GB of parameters
+    (found.path / "config.json").write_text(json.dumps(content))
+    forge(found.path)
+    with pytest.raises(SystemExit) as end:
+        main([str(tmp_path / "run"), str(tmp_path / "made")])
+    assert end.value.code == 4
+    told = "the parameters have other names or shapes than the networks that it is said to have"
+    assert told in capsys.readouterr().err and not (tmp_path / "made").exists()

@@ -1,7 +1,7 @@
 """Environments and trained policies by name."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import torch
@@ -104,6 +104,10 @@ def policy_of(found: checkpoints.Checkpoint, mode: str = "best", record: SavedCo
     algorithm, model = build(config["algorithm"], "algorithm"), build(config["model"], "model")
     weights = found.policy()
     try:
+        with torch.device("meta"):  # without memory: a record may ask for networks that are larger than the machine
+            shapes = _shapes(algorithm.policy(found.manifest.signature, model).state_dict())
+        if shapes != _shapes(former.parameters(weights, shapes)):
+            raise ValueError("the parameters have other names or shapes than the networks that it is said to have")
         policy = algorithm.policy(found.manifest.signature, model)
         policy.load_state_dict(former.parameters(weights, policy.state_dict()))
     except Exception as error:  # torch and TorchRL raise many types for weights that do not fit
@@ -115,3 +119,7 @@ def policy_of(found: checkpoints.Checkpoint, mode: str = "best", record: SavedCo
     overrides += [f"observation.{name}={json.dumps(value)}" for name, value in seen.items()]
     overrides += [f"team.radio.carries={record.values['team']['radio']['carries']}"] if RADIO in policy.in_keys else []
     return TrainedPolicy(policy.requires_grad_(False).eval(), chosen, found.manifest.signature, overrides)
+
+
+def _shapes(parameters: Mapping[str, torch.Tensor]) -> dict[str, torch.Size]:
+    return {name: value.shape for name, value in parameters.items()}

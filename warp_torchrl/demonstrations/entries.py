@@ -9,8 +9,8 @@ import torch
 from tensordict import TensorDictBase
 
 from warp_torchrl.demonstrations.recording import MOVER, PROPOSED, ROLE, Mover
-from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, REWARD
 from warp_torchrl.finite import not_finite
+from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, REWARD
 from warp_torchrl.world.role import PAPER_ROLES
 
 DTYPES = {str(each).removeprefix("torch."): each for each in (torch.bool, torch.uint8, torch.int64, torch.float32)}
@@ -111,13 +111,16 @@ def _is_observation(name: str) -> bool:
 
 
 def _described(name: str, entry: Any) -> tuple[torch.dtype, tuple[int, ...]]:
-    dtype, shape = (entry.get(key) if isinstance(entry, dict) else None for key in ("dtype", "shape"))
+    dtype, shape = (entry.get("dtype"), entry.get("shape")) if isinstance(entry, dict) else (None, None)
     if not isinstance(dtype, str) or dtype not in DTYPES:
         raise ValueError(f"entry {name[:80]!r} must be of type {', '.join(DTYPES)}, got {dtype!r:.80}")
-    is_shape = isinstance(shape, list) and all(type(side) is int and side > 0 for side in shape)
-    if not is_shape or len(shape) > _MOST_DIMENSIONS:
+    if not isinstance(shape, list) or len(shape) > _MOST_DIMENSIONS or not all(map(_is_side, shape)):
         raise ValueError(f"entry {name[:80]!r} must have a shape, got {shape!r:.80}")
     return DTYPES[dtype], tuple(shape)
+
+
+def _is_side(value: object) -> bool:
+    return type(value) is int and value > 0
 
 
 def _words(dtype: torch.dtype, shape: tuple[int, ...]) -> str:

@@ -253,6 +253,6 @@ def _whole(value: object, most: int) -> int:
 
 
 def _share(value: object) -> float | None:
-    if value is None or (type(value) in (int, float) and 0.0 <= value <= 1.0):
+    if value is None or (isinstance(value, int | float) and not isinstance(value, bool) and 0.0 <= value <= 1.0):
         return value
     raise ValueError(f"a share in 0..1 is expected, got {value!r:.80}")

@@ -55,9 +55,8 @@ def photograph(setting: Setting, first: int, last: int, every: int, path: Path, 
         return path
     path = path.with_suffix(".webp")
     times = [_FRAME_MS] * (len(pictures) - 1) + [_LAST_FRAME_MS]
-    look = {"duration": times, "loop": 0, "quality": 75, "method": 6}
     with disk.drafted(path) as draft:
-        pictures[0].save(draft, save_all=True, append_images=pictures[1:], **look)
+        pictures[0].save(draft, save_all=True, append_images=pictures[1:], duration=times, loop=0, quality=75, method=6)
     return path
 
 
