@@ -28,6 +28,7 @@ GROUND = (
     "modes",
     "nearest",
     "parent",
+    "provenance",
     "symmetry",
     "validation",
 )

@@ -19,6 +19,7 @@ from warp_torchrl.commands.program import run_program
 from warp_torchrl.config.compose import compose_config, plain, without_targets
 from warp_torchrl.config.construction import ConfigError, build, construct
 from warp_torchrl.config.grammar import check_flags
+from warp_torchrl.provenance import Provenance, gathered, section
 from warp_torchrl.runs import disk
 from warp_torchrl.runs.destination import check_free
 from warp_torchrl.world.rate import RateFire
@@ -48,12 +49,13 @@ def _run(arguments: Sequence[str]) -> None:
     folder = Path(options.out or datetime.now().strftime(f"outputs/calibrations/%Y-%m-%d/%H-%M-%S-{os.getpid()}"))
     if not options.overwrite:
         check_free(folder, "out")
-    cases = [read_case(each, options.hours) for each in options.fires]
+    with gathered() as files:
+        cases = [read_case(each, options.hours) for each in options.fires]
     _check_names(cases)
     check_told(parameters, cases)
     rows = {case.name: _before(fire, case, options) for case in cases}
     law = _fit(fire, parameters, cases, rows, options) if parameters else None
-    _write(folder, rows, values, law, parameters, time.perf_counter() - began)
+    _write(folder, rows, values, files, law, parameters, time.perf_counter() - began)
 
 
 def _law(node: Mapping[str, Any]) -> RateFire:
@@ -99,6 +101,7 @@ def _write(
     folder: Path,
     rows: Mapping[str, Mapping[str, Scores]],
     values: Mapping[str, Any],
+    files: Sequence[Provenance],
     law: RateFire | None,
     parameters: Sequence[Parameter],
     seconds: float,
@@ -112,6 +115,7 @@ def _write(
         "parameters": found,
         "scores": as_numbers(rows),
         "means": means(rows),
+        "files": [each.as_values for each in files],
         "configuration": without_targets(values),
         "seconds": seconds,
     }
@@ -121,6 +125,7 @@ def _write(
         (folder / LAW).parent.mkdir(exist_ok=True)
         disk.replace(folder / LAW, law_yaml(law, f"Law rate, fitted to {', '.join(rows)}."))
         page += "\n\n" + "\n".join(f"{name}: {value:.4g}" for name, value in found.items())
+    page = "\n".join([page, *section([each.as_values for each in files])])
     disk.replace(folder / "calibration.md", page + "\n")
     print(page)
     print(

@@ -22,6 +22,7 @@ from warp_torchrl.prediction.case import Case, read_case, whole_map
 from warp_torchrl.prediction.files import FIGURE, write_figure, write_layers, write_perimeters
 from warp_torchrl.prediction.predict import Prediction, lasting, predict
 from warp_torchrl.prediction.report import numbers, page, warnings
+from warp_torchrl.provenance import Provenance, gathered
 from warp_torchrl.runs import disk
 from warp_torchrl.runs.destination import check_free
 from warp_torchrl.world.rate import RateFire
@@ -67,10 +68,11 @@ def _run(arguments: Sequence[str]) -> None:
     folder = Path(options.out or datetime.now().strftime(f"outputs/predictions/%Y-%m-%d/%H-%M-%S-{os.getpid()}"))
     if not options.overwrite:
         check_free(folder, "out")
-    case = read_case(_landscape(values["landscape"]), _law(values["fire"]), options)
+    with gathered() as files:
+        case = read_case(_landscape(values["landscape"]), _law(values["fire"]), options)
     prediction, seconds = _burn(case, options)
     folder.mkdir(parents=True, exist_ok=True)
-    report = _report(prediction, case, values, {"fires": seconds, "all": time.perf_counter() - began})
+    report = _report(prediction, case, values, files, {"fires": seconds, "all": time.perf_counter() - began})
     _write(folder, prediction, case, options, report["title"])
     report["seconds"]["all"] = time.perf_counter() - began
     disk.replace(folder / "report.json", json.dumps(report, indent=1))
@@ -123,7 +125,13 @@ def _burn(case: Case, options: PredictionOptions) -> tuple[Prediction, float]:
     return found, time.perf_counter() - began
 
 
-def _report(prediction: Prediction, case: Case, values: Mapping[str, Any], seconds: dict[str, float]) -> dict[str, Any]:
+def _report(
+    prediction: Prediction,
+    case: Case,
+    values: Mapping[str, Any],
+    files: Sequence[Provenance],
+    seconds: dict[str, float],
+) -> dict[str, Any]:
     from warp_torchrl import __version__
 
     found = numbers(prediction)
@@ -146,6 +154,7 @@ def _report(prediction: Prediction, case: Case, values: Mapping[str, Any], secon
         **found,
         "warnings": warnings(found, lasting(case.weather, case.start)),
         "inputs": inputs,
+        "files": [each.as_values for each in files],
         "configuration": without_targets(values),
         "seconds": seconds,
     }

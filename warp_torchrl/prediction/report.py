@@ -7,6 +7,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.prediction.predict import Prediction
+from warp_torchrl.provenance import section
 
 _ROWS = 25  # of the table of hours
 
@@ -54,6 +55,7 @@ def page(found: Mapping[str, Any]) -> str:
         *_table(found["by_hour"]),
         "",
         *(f"- {name}: {value}" for name, value in found["inputs"].items()),
+        *section(found["files"]),
     ]
     return "\n".join(lines) + "\n"
 
