@@ -17,6 +17,7 @@ FILES = {
 MODULES = sorted(FILES)
 GROUND = (
     "content",
+    "delimited",
     "device",
     "dotted",
     "finite",

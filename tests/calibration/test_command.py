@@ -93,7 +93,7 @@ def test_a_refusal_is_one_line(given, line, capsys):
 @pytest.mark.parametrize(
     ("change", "line"),
     [
-        ({"ignition.csv": "row,column\n20,4\n"}, "small: ignition must lie on the map of 20 x 24, got 20, 4"),
+        ({"ignition.csv": "row,column\n20,4\n"}, "small: ignition must have points on the map of 20 x 24 cells"),
         ({"scar.asc": None}, "small: the outcome must be scar"),
         ({"weather.csv": None}, "small: weather must be weather.csv"),
         ({"fuel.asc": None}, "small: fuel must be fuel.tif or fuel.asc"),

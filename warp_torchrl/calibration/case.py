@@ -1,8 +1,7 @@
 """A fire that happened: its ground, its weather, where it started, and what is known of where it burned by when."""
 
-import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from warp_torchrl.calibration.observed import read_perimeters
 from warp_torchrl.weather.table import WeatherTable, read_weather
 from warp_torchrl.world.alone import Spell
 from warp_torchrl.world.state import OLDEST, Cover, Landscape
+from warp_torchrl.world.terrain.cells import read_cells
 from warp_torchrl.world.terrain.fuel import NO_FUEL
 from warp_torchrl.world.terrain.grid import Grid, check_grid
 from warp_torchrl.world.terrain.layer import find_layer, read_grid, read_layer
@@ -77,18 +77,19 @@ class FireCase:
         return mean_wind(winds, torch.tensor([spell.minutes for spell in self.spells]))
 
 
-def read_case(folder: str | Path, hours: float | None = None) -> FireCase:
+def read_case(folder: str | Path, hours: float | None = None, units: Mapping[str, str] | None = None) -> FireCase:
     """Read a fire from a folder.
 
     It holds ``fuel`` and, unless the ground is level, ``elevation`` [m], each a GeoTIFF (.tif) or an ESRI ASCII grid
-    (.asc); ``weather.csv``, whose first row holds when the fire starts; ``ignition.csv`` (row and column of cells, from
-    0) or a raster ``ignition``, not 0 where it starts; and the outcome: ``perimeters.geojson``, or a raster ``arrival``
+    (.asc); ``weather.csv``, whose first row holds when the fire starts; ``ignition.csv`` (see ``read_cells``) or a
+    raster ``ignition``, not 0 where it starts; and the outcome: ``perimeters.geojson``, or a raster ``arrival``
     [minutes from the start], or a raster ``scar``, over 0 where it burned by the last hour. Cells without fuel data
     do not burn; elevation that is not known is the mean of what is.
 
     Args:
         folder: The folder.
         hours: When the scar is known [h]; None is the end of the weather, whose last row lasts as the one before.
+        units: Of columns of its weather that state none, see ``weather.table.read_weather``.
 
     Raises:
         ValueError: If a file is missing or does not fit, in one line that begins with the fire's name.
@@ -97,18 +98,18 @@ def read_case(folder: str | Path, hours: float | None = None) -> FireCase:
     if not folder.is_dir():
         raise ValueError(f"fires must name folders that exist, got {folder}")
     try:
-        return _read(folder, hours)
+        return _read(folder, hours, units)
     except ValueError as error:
         text = str(error)
         raise ValueError(text if text.startswith(f"{folder.name}: ") else f"{folder.name}: {text}") from None
 
 
-def _read(folder: Path, hours: float | None) -> FireCase:
+def _read(folder: Path, hours: float | None, units: Mapping[str, str] | None) -> FireCase:
     fuel = _raster("fuel", folder)
     if fuel is None:
         raise ValueError(f"fuel must be fuel.tif or fuel.asc in {folder}, there is none")
     grid = read_grid("fuel", fuel)
-    rows = _weather(folder / "weather.csv")
+    rows = _weather(folder / "weather.csv", units)
     weather = Weather(table=rows).over(_Placed(grid))  # type: ignore[arg-type]
     last = hours * 60.0 if hours is not None else _end(rows)
     minutes, burned, arrival = _outcome(folder, grid, last)
@@ -131,10 +132,10 @@ class _Placed:
     grid: Grid
 
 
-def _weather(path: Path) -> WeatherTable:
+def _weather(path: Path, units: Mapping[str, str] | None) -> WeatherTable:
     if not path.is_file():
         raise ValueError(f"weather must be {path.name} in {path.parent}, there is none")
-    return read_weather(path)
+    return read_weather(path, units=units)
 
 
 def _end(rows: WeatherTable) -> float:
@@ -172,25 +173,10 @@ def _ignition(folder: Path, grid: Grid) -> Tensor:
     if path is not None:
         values, known = _on_grid("ignition", path, grid)
         return torch.from_numpy(known & (values != 0))
-    lit = torch.zeros(grid.shape, dtype=torch.bool)
-    for row, column in _cells(folder / "ignition.csv", grid):
-        lit[row, column] = True
-    return lit
-
-
-def _cells(path: Path, grid: Grid) -> list[tuple[int, int]]:
-    if not path.is_file():
-        raise ValueError(f"ignition must be ignition.csv, .tif or .asc in {path.parent}, there is none")
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        rows = list(csv.DictReader(file))
-    try:
-        cells = [(int(row["row"]), int(row["column"])) for row in rows]
-    except (KeyError, TypeError, ValueError):
-        raise ValueError("ignition.csv must have whole numbers row and column in each line") from None
-    for row, column in cells:
-        if not (0 <= row < grid.shape[0] and 0 <= column < grid.shape[1]):
-            raise ValueError(f"ignition must lie on the map of {grid.shape[0]} x {grid.shape[1]}, got {row}, {column}")
-    return cells
+    points = folder / "ignition.csv"
+    if not points.is_file():
+        raise ValueError(f"ignition must be ignition.csv, .tif or .asc in {folder}, there is none")
+    return torch.from_numpy(read_cells("ignition", points, grid))
 
 
 def _outcome(folder: Path, grid: Grid, last: float) -> tuple[Tensor, Tensor, Tensor | None]:

@@ -18,6 +18,8 @@ class CalibrationOptions:
     Attributes:
         fires: Folders of fires that happened, see ``warp_torchrl.calibration.case.read_case``.
         hours: When their scars are known [h]; None is the end of each one's weather.
+        units: Unit of a quantity or column of their weather where files state none, ``units.wind_speed=km/h``; of
+            ``datetime`` the order of its dates, ``units.datetime=d/m/y``.
         parameters: What is fitted, see ``warp_torchrl.calibration.parameters``; none scores the law as it is.
         bounds: Lowest and highest value by parameter, in place of the usual.
         scales: Deviation of the prior by parameter, in place of the usual.
@@ -40,6 +42,7 @@ class CalibrationOptions:
 
     fires: tuple[str, ...] = ()
     hours: float | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
     parameters: tuple[str, ...] = ()
     bounds: Mapping[str, Any] = field(default_factory=dict)
     scales: Mapping[str, Any] = field(default_factory=dict)

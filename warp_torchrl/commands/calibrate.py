@@ -50,7 +50,7 @@ def _run(arguments: Sequence[str]) -> None:
     if not options.overwrite:
         check_free(folder, "out")
     with gathered() as files:
-        cases = [read_case(each, options.hours) for each in options.fires]
+        cases = [read_case(each, options.hours, options.units) for each in options.fires]
     _check_names(cases)
     check_told(parameters, cases)
     rows = {case.name: _before(fire, case, options) for case in cases}

@@ -1,6 +1,7 @@
 """What a prediction asks for beside its ground and its law."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
 from warp_torchrl.validation import check_fields
@@ -17,9 +18,11 @@ class PredictionOptions:
         area: Area at which a fire stops, even before [ha]; None lets it go on.
         fires: How many.
         seed: Fire i has seed ``seed + i``.
-        start: When the fires start: minutes since the weather's first row, or a date and time as its rows have them.
+        start: When the fires start: minutes since the weather's first row, or a date and time.
         perimeter_hours: Hours between the perimeters that are written.
         wind_height: At what height the wind was measured; None goes by the file.
+        units: Unit of a quantity or column of the weather where the file states none, ``units.wind_speed=km/h``; of
+            ``datetime`` the order of its dates, ``units.datetime=d/m/y``.
         true_north: Whether the weather's bearings are from true north, and are turned to the map's; else they are from
             the map's grid north already.
         start_ffmc: Fine fuel moisture code an hour before the first row, where the file has none and it is computed.
@@ -43,6 +46,7 @@ class PredictionOptions:
     start: float | str = 0.0
     perimeter_hours: float = 1.0
     wind_height: Literal["10m", "20ft"] | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
     true_north: bool = True
     start_ffmc: float = 85.0
     bui: float | None = None

@@ -54,8 +54,14 @@ def read_case(source: LandscapeSource, fire: RateFire, options: PredictionOption
         place=place,
         cell_size=cell_size,
         fire=fire,
-        weather=read_weather(weather, wind_height=options.wind_height, start_ffmc=options.start_ffmc, bui=options.bui),
-        start=minutes_until(options.start, weather) if isinstance(options.start, str) else options.start,
+        weather=read_weather(
+            weather,
+            wind_height=options.wind_height,
+            start_ffmc=options.start_ffmc,
+            bui=options.bui,
+            units=options.units,
+        ),
+        start=minutes_until(options.start, weather, options.units) if isinstance(options.start, str) else options.start,
         convergence=_convergence(place, (height, width)) if options.true_north else 0.0,
         ignition=lit[rows, columns],
     )

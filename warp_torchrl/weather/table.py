@@ -1,25 +1,31 @@
 """Weather by the hour: a table read from a CSV file, with the moistures that follow from it."""
 
-import csv
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, cast
 
 import torch
 from torch import Tensor
 
-from warp_torchrl.weather.columns import QUANTITIES, Column, find_columns
+from warp_torchrl.provenance import Provenance, tell
+from warp_torchrl.weather.cells import bearings, column_values
+from warp_torchrl.weather.clock import Clock, hours_until
+from warp_torchrl.weather.columns import Column, find_columns, plain, stated_height
 from warp_torchrl.weather.dead_moisture import dead_moisture
 from warp_torchrl.weather.fwi import buildup_index, hourly_ffmc
-from warp_torchrl.weather.times import hours_until, row_hours
+from warp_torchrl.weather.layout import Sheet, read_sheet, zone_of
+from warp_torchrl.weather.reanalysis import humidity_of, wind_of
+from warp_torchrl.weather.sources import Source
+from warp_torchrl.weather.times import read_clock
 
 WindHeight = Literal["10m", "20ft"]
 """At what height over open ground wind was measured: by the Canadian and international custom, or the American."""
 _EXAMPLES = Path(__file__).parent / "examples"
 OPEN_10M_OVER_20FT = 1.15
 """Wind at 10 m over that at 20 ft in the open (Turner and Lawson 1978, BC-X-177)."""
+_log = logging.getLogger("warp_torchrl")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,19 +70,22 @@ def read_weather(
     wind_height: WindHeight | None = None,
     start_ffmc: float = 85.0,
     bui: float | None = None,
+    units: Mapping[str, str] | None = None,
 ) -> WeatherTable:
-    """Return the weather of a CSV file, a row an hour or as its times say.
+    """Return the weather of a file, a row an hour or as its times say.
 
     What is read, by what names and in what units, `warp_torchrl.weather.columns` says; how times are read,
-    `warp_torchrl.weather.times`. Fields are separated by commas, semicolons or tabs. What is not in the file is
-    computed where it can be: FFMC by the hour from temperature, humidity, wind and rain; BUI from DMC and DC; dead
-    moistures from temperature and humidity.
+    `warp_torchrl.weather.times`; which files, `warp_torchrl.weather.layout`. What is not in the file is computed where
+    it can be: FFMC by the hour from temperature, humidity, wind and rain; BUI from DMC and DC; humidity from the dew
+    point; dead moistures from temperature and humidity. A line of the log says what was read and what was left.
 
     Args:
         path: The file; or the name of one that comes with the package: ``august``, three hot dry days, made up.
-        wind_height: At what height the wind was measured; None is 20ft for speeds in mph, else 10m.
+        wind_height: At what height the wind was measured; None goes by the file: 20ft for speeds in mph whose height
+            nobody states, else 10m.
         start_ffmc: Fine fuel moisture code an hour before the first row, where it is to be computed.
         bui: Buildup index of every row, where the file has none and neither DMC nor DC; None leaves it unknown.
+        units: Unit by quantity or column, where the file states none; of ``datetime`` the order of its dates.
 
     Raises:
         ValueError: In one line, with the file, the column and the row (the first under the header is 1): if the file
@@ -88,71 +97,92 @@ def read_weather(
     for name, value, high in (("start_ffmc", start_ffmc, 101), ("bui", bui, 2000)):
         if value is not None and not 0 <= value <= high:
             raise ValueError(f"{name} must be in [0, {high}], got {value}")
-    headers, rows = _read_rows(path)
+    sheet = read_sheet(path)
     try:
-        columns = find_columns(headers)
-        hours = torch.tensor(row_hours(headers, rows), dtype=torch.float32)
-        values = {name: _values(name, column, rows) for name, column in columns.items()}
+        sheet, clock = _in_time(sheet, units or {})
+        columns, source = find_columns(sheet.headers, sheet.rows, sheet.below, units)
+        known, read = _known(columns, sheet)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
-    height: WindHeight = wind_height or ("20ft" if columns["wind_speed"].unit == "mph" else "10m")
-    known = {name: value for name, value in values.items() if value is not None}
-    return WeatherTable(hours=hours, wind_height=height, **_complete(known, hours, height, start_ffmc, bui))
+    height = wind_height or _height(columns, sheet, source)
+    _tell(path, {name: columns[name] for name in read}, clock, sheet, source)
+    hours = torch.tensor(clock.hours, dtype=torch.float32)
+    tensors = {name: torch.tensor(values, dtype=torch.float32) for name, values in known.items()}
+    made = _complete(tensors, hours, height, start_ffmc, bui)
+    return WeatherTable(hours=hours, wind_height=height, **made)
 
 
-def minutes_until(moment: str, path: str | Path) -> float:
-    """Return the minutes from the first row of a CSV file to a date and time, written as its rows have them.
+def minutes_until(moment: str, path: str | Path, units: Mapping[str, str] | None = None) -> float:
+    """Return the minutes from the first row of a file to a date and time.
+
+    Args:
+        moment: A date and time in the order of the rows' dates, or with the year first; with an offset such as -07:00
+            where the rows have offsets, or a zone that the file states.
+        path: The file.
+        units: See ``read_weather``.
 
     Raises:
         ValueError: In one line: if the file cannot be read, has no times, or they are written otherwise.
     """
-    headers, rows = _read_rows(Path(path))
-    return 60.0 * hours_until(moment, headers, rows)
-
-
-def _read_rows(path: Path) -> tuple[list[str], list[list[str]]]:
+    path = _EXAMPLES / f"{path}.csv" if str(path) in ("august",) else Path(path)
+    sheet = read_sheet(path)
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        why = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
-        raise ValueError(f"weather must be a CSV file that can be read, got {path}: {why}") from None
-    first = text.partition("\n")[0]
-    separator = max(",;\t", key=first.count)
-    table = [row for row in csv.reader(text.splitlines(), delimiter=separator) if any(cell.strip() for cell in row)]
-    if len(table) < 2:
-        raise ValueError(f"{path}: weather must have a header and a row, got {len(table)} lines")
-    headers, *rows = table
-    for number, row in enumerate(rows, 1):
-        if len(row) != len(headers):
-            raise ValueError(
-                f"{path}: rows must have {len(headers)} cells as the header, got {len(row)} in row {number}"
-            )
-    return [header.strip() for header in headers], rows
+        sheet, clock = _in_time(sheet, units or {})
+        _, source = find_columns(sheet.headers, sheet.rows, sheet.below, units)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+    stated = [zone_of(column) for column in clock.columns]
+    zones = [zone for zone in (*stated, sheet.zone, source.zone if source else None) if zone is not None]
+    return 60.0 * hours_until(moment, clock, zones[0] if zones else None)
 
 
-def _values(name: str, column: Column, rows: Sequence[Sequence[str]]) -> Tensor | None:
-    """Return a column's values in our unit [T]; None where all its cells are empty."""
-    cells = [row[column.place].strip() for row in rows]
-    if not any(cells) and name not in ("wind_speed", "wind_bearing"):
-        return None
-    values = []
-    for number, cell in enumerate(cells, 1):
-        values.append(column.factor * _number(column.header, cell, number) + column.offset)
-        quantity = QUANTITIES[name]
-        if not quantity.lowest - 1e-6 <= values[-1] <= quantity.highest + 1e-6:
-            limits = f"[{quantity.lowest:g}, {quantity.highest:g}] {quantity.unit}".strip()
-            raise ValueError(f"{column.header} must be in {limits}, got {values[-1]:g} in row {number}")
-    return torch.tensor(values, dtype=torch.float32)
+def _in_time(sheet: Sheet, units: Mapping[str, str]) -> tuple[Sheet, Clock]:
+    """Return the table and its times with the first row first; stations often write the newest above."""
+    clock = read_clock(sheet, next((str(unit) for key, unit in units.items() if plain(key) == "datetime"), None))
+    if clock.hours[-1] >= 0.0:
+        return sheet, clock
+    return replace(sheet, rows=sheet.rows[::-1]), clock.reversed()
 
 
-def _number(header: str, cell: str, row: int) -> float:
-    try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise ValueError(f"{header} must be a number, got {cell!r} in row {row}")
-    return value
+def _known(columns: Mapping[str, Column], sheet: Sheet) -> tuple[dict[str, list[float]], list[str]]:
+    """Return the values of each quantity, and the quantities whose columns were read."""
+    values = {name: column_values(name, column, sheet) for name, column in columns.items() if name != "wind_bearing"}
+    known = {name: each for name, each in values.items() if each is not None}
+    if "wind_bearing" in columns:
+        known["wind_bearing"] = bearings(columns["wind_bearing"], sheet, known["wind_speed"])
+    read = [name for name in columns if name in known]
+    if "wind_u" in known:
+        known |= wind_of(known.pop("wind_u"), known.pop("wind_v"))
+    if (dew := known.pop("dew_point", None)) and "temperature" in known:
+        known["humidity"] = humidity_of(known["temperature"], dew)
+    return known, read
+
+
+def _height(columns: Mapping[str, Column], sheet: Sheet, source: Source | None) -> WindHeight:
+    """Return the height of the wind: as the column's name, the kind of file or its source says, or as is the custom."""
+    column = columns.get("wind_speed") or columns["wind_u"]
+    stated = stated_height(column) or sheet.height or (source.height if source else None)
+    return cast(WindHeight, stated or ("20ft" if column.unit == "mph" else "10m"))
+
+
+def _tell(path: Path, columns: Mapping[str, Column], clock: Clock, sheet: Sheet, source: Source | None) -> None:
+    """Report what was read and what was left, and warn of times that a user must know of."""
+    for warning in clock.warnings:
+        _log.warning("weather: %s", warning)
+    read = dict.fromkeys(clock.columns, "time")
+    read |= {each.header: f"{name}, {each.unit}" if each.unit else name for name, each in columns.items()}
+    known = (
+        [f"{source.title} is whose file it is by its names: units that it does not state are theirs"] if source else []
+    )
+    tell(
+        Provenance(
+            key="weather",
+            file=str(path),
+            read=read,
+            left=(*(header for header in sheet.headers if header and header not in read), *sheet.left),
+            notes=(*known, *clock.warnings),
+        )
+    )
 
 
 def _complete(

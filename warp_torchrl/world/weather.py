@@ -1,7 +1,7 @@
 """Wind and moisture by the hour, from a table of weather."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from typing import Literal
@@ -32,6 +32,7 @@ class Weather(Wind):
         table: The table.
         start: Hours into the table at which episodes begin; None draws the row that each episode begins with.
         wind_height: At what height the wind was measured; None goes by the file.
+        units: Unit by quantity or column where the file states none, see ``read_weather``.
         true_north: Whether bearings are from true north, and are turned where the landscape has a place on Earth; else
             they are from grid north.
         convergence: Angle from true north to grid north [degrees]; None is that at the middle of the landscape.
@@ -45,6 +46,7 @@ class Weather(Wind):
     table: WeatherTable | None = field(default=None, repr=False)
     start: float | None = 0.0
     wind_height: Literal["10m", "20ft"] | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
     true_north: bool = True
     convergence: float | None = None
     minutes_per_tick: float | None = None
@@ -58,7 +60,7 @@ class Weather(Wind):
             raise ValueError(f"path must be null where a table is passed, got {self.path}")
         if self.table is None and self.path is None:
             raise ValueError("path must name a CSV file of weather, got null")
-        rows = self.table or read_weather(str(self.path), wind_height=self.wind_height)
+        rows = self.table or read_weather(str(self.path), wind_height=self.wind_height, units=self.units)
         object.__setattr__(self, "_rows", rows)
         object.__setattr__(self, "_wind", _components(rows, self.convergence or 0.0))
         object.__setattr__(self, "_moisture", _moistures(rows))

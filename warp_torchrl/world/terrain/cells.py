@@ -1,12 +1,13 @@
 """Cells of a grid that a file marks: points in a CSV, a raster, or the shapes of a vector file."""
 
-import csv
 import logging
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
+from warp_torchrl.delimited import SEPARATORS, named_separator, read_text, split_rows, to_number, to_points
+from warp_torchrl.provenance import Provenance, tell
 from warp_torchrl.world.terrain.grid import Grid, check_grid
 from warp_torchrl.world.terrain.layer import read_grid, read_layer
 from warp_torchrl.world.terrain.vector import SUFFIXES, burn_in, in_grid, read_shapes
@@ -17,8 +18,14 @@ _COLUMNS = {
     ("x", "y"): "map",
     ("longitude", "latitude"): "EPSG:4326",
     ("lon", "lat"): "EPSG:4326",
+    ("row", "col"): "cells",
+    ("easting", "northing"): "map",
+    ("lng", "lat"): "EPSG:4326",
+    ("long", "lat"): "EPSG:4326",
 }
 """Pairs of columns of a CSV, and what they count in."""
+_SHOWN = 4
+"""Pairs that a message names."""
 _log = logging.getLogger("warp_torchrl")
 
 
@@ -30,8 +37,9 @@ def read_cells(name: str, path: str | PathLike[str], grid: Grid) -> np.ndarray:
 
     Args:
         name: What the file is, for messages.
-        path: A CSV of ``row,column`` (from 0), ``x,y`` (in the grid's CRS) or ``longitude,latitude``; a raster (.tif,
-            .asc) on the grid; GeoJSON or a shapefile (see ``read_shapes``).
+        path: A CSV of ``row,column`` (from 0), ``x,y`` (in the grid's CRS) or ``longitude,latitude``, with any
+            separator and, where that is a semicolon, decimal commas; a raster (.tif, .asc) on the grid; GeoJSON or a
+            shapefile (see ``read_shapes``).
         grid: The grid; its transform is None where the landscape has no place on Earth.
 
     Raises:
@@ -93,25 +101,52 @@ def _read_points(name: str, path: Path, grid: Grid) -> np.ndarray:
 def _read_pairs(name: str, path: Path) -> tuple[np.ndarray, np.ndarray, str]:
     """Return the two columns of a CSV that tell places, and what they count in."""
     try:
-        with path.open(newline="", encoding="utf-8-sig") as lines:
-            rows = [{str(key).strip().lower(): value for key, value in row.items()} for row in csv.DictReader(lines)]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        named, text = named_separator(read_text(name, path))
+        tables = [(mark, split_rows(text, mark)) for mark in ([named] if named else SEPARATORS)]
+    except ValueError as error:
         raise ValueError(f"{name} must be a CSV file, {path} cannot be read: {error}") from None
-    for (one, other), unit in _COLUMNS.items():
-        if rows and one in rows[0] and other in rows[0]:
-            return _numbers(name, path, rows, one), _numbers(name, path, rows, other), unit
-    wanted = " or ".join(",".join(pair) for pair in _COLUMNS)
-    got = f"has the columns {','.join(rows[0])}" if rows else "has no points"
+    for mark, table in tables:
+        rows = [row for row in table if row and not row[0].startswith("#")]
+        headers = [_column(cell) for cell in rows[0]] if rows else []
+        for (one, other), unit in _COLUMNS.items():
+            if one in headers and other in headers:
+                if len(rows) < 2:
+                    raise ValueError(f"{name} must have a point at least, {path} has no points")
+                places = headers.index(one), headers.index(other)
+                first, second = (_numbers(name, path, table, place, mark) for place in places)
+                _tell(name, path, rows[0], places, unit)
+                return first, second, unit
+    wanted = " or ".join(",".join(pair) for pair in list(_COLUMNS)[:_SHOWN])
+    first_row = next((row for row in tables[0][1] if row), [])
+    got = f"has the columns {','.join(map(_column, first_row))}" if first_row else "has no points"
     raise ValueError(f"{name} must have the columns {wanted} and a point at least, {path} {got}")
 
 
-def _numbers(name: str, path: Path, rows: list[dict[str, str]], column: str) -> np.ndarray:
-    values = []
-    for line, row in enumerate(rows, start=2):
-        try:
-            values.append(float(row[column]))
-        except (TypeError, ValueError):
-            values.append(np.nan)
-        if not np.isfinite(values[-1]):
-            raise ValueError(f"{name} must have a number for {column}, line {line} of {path} has {row[column]!r}")
-    return np.array(values)
+def _column(header: str) -> str:
+    """Return a column's name in lower case, without what stands in brackets."""
+    return header.lower().partition("(")[0].partition("[")[0].strip()
+
+
+def _numbers(name: str, path: Path, table: list[list[str]], place: int, separator: str) -> np.ndarray:
+    """Return the numbers of a column; a message names the line of the file."""
+    lines = [number for number, row in enumerate(table, 1) if row and not row[0].startswith("#")]
+    header, *cells = (table[line - 1][place] if place < len(table[line - 1]) else "" for line in lines)
+    try:
+        cells = to_points(header, cells, separator)
+    except ValueError as error:
+        raise ValueError(f"{name}: column {error} in {path}") from None
+    values = [to_number(cell) for cell in cells]
+    if None in values:
+        at = values.index(None)
+        raise ValueError(
+            f"{name} must have a number for {_column(header)}, line {lines[1 + at]} of {path} has {cells[at] or None!r}"
+        )
+    return np.array(values, dtype=np.float64)
+
+
+def _tell(name: str, path: Path, headers: list[str], places: tuple[int, int], unit: str) -> None:
+    """Report which columns were read, in which unit, and which were left."""
+    units = {"cells": "cells of the map, from 0", "map": "the map's coordinates"}
+    read = {headers[place]: units.get(unit, f"degrees of {unit}") for place in places}
+    left = tuple(header for place, header in enumerate(headers) if place not in places and header)
+    tell(Provenance(key=name, file=str(path), read=read, left=left))
