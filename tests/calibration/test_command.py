@@ -44,6 +44,18 @@ def test_a_fire_is_read_from_a_folder(tmp_path):
     assert case.wind.tolist() == pytest.approx([8 / 3.6, 0.0], abs=1e-4)
 
 
+def test_weather_and_ignition_are_read_as_a_prediction_reads_them(tmp_path):
+    folder = write(tmp_path / "small", scar=scar())
+    plain = read_case(folder)
+    rows = "".join(f"2020-07-01 {h}:00;8,0;270;84;40\n" for h in (12, 13))
+    (folder / "weather.csv").write_text(f"datetime;WindSpeed;WD;FFMC;BUI\n{rows}")
+    (folder / "ignition.csv").write_text("x;y\n225,0;475,0\n")
+    with pytest.raises(ValueError, match=r"small: .*WindSpeed must name its unit"):
+        read_case(folder)
+    case = read_case(folder, units={"WindSpeed": "km/h"})
+    assert torch.equal(case.wind, plain.wind) and torch.equal(case.lit, plain.lit)
+
+
 def test_times_of_arrival_make_an_outcome_by_the_hour(tmp_path):
     times = torch.full((20, 24), -9999.0)
     times[10, 4:8] = torch.tensor([0.0, 30.0, 70.0, 110.0])

@@ -73,6 +73,18 @@ def test_a_start_is_a_moment_or_minutes(folder):
     assert told[1]["inputs"]["start [minutes after the first row]"] == 60.0
 
 
+def test_units_that_the_file_does_not_state_are_those_that_the_user_says(folder):
+    rows = "\n".join(f"2024-07-01T{hour}:00-07:00;10,8;270;90;3" for hour in (12, 13, 14))
+    (folder / "plain.csv").write_text(f"sep=;\ndatetime;WindSpeed;WD;FFMC;Gust\n{rows}\n")
+    given = {"weather": folder / "plain.csv", "units.WindSpeed": "km/h", "start": "2024-07-01T20:00Z"}
+    assert main(arguments(folder, start=60)) == 0 and main(arguments(folder, **given, out=folder / "other")) == 0
+    one, other = (json.loads((folder / name / "report.json").read_text()) for name in ("out", "other"))
+    assert one["by_hour"] == other["by_hour"]
+    told = next(each for each in other["files"] if each["key"] == "weather")
+    assert told["read"]["WindSpeed"] == "wind_speed, km/h" and told["left"] == ["Gust"]
+    assert "WindSpeed [wind_speed, km/h]" in (folder / "other" / "report.md").read_text()
+
+
 def test_a_window_is_predicted_on_its_own(folder):
     window = {"landscape.size": "[20,24]", "landscape.row": 10, "landscape.column": 2}
     assert main(arguments(folder, **window)) == 0
@@ -102,6 +114,8 @@ MISTAKES = {
     "start must be a date and time as the first row has it, '2024-07-01 12:00'": {"start": "noon"},
     "landscape.row and landscape.column must be given": {"landscape.size": 20},
     "wind_height must be 10m or 20ft or null": {"wind_height": "2m"},
+    "units must name a quantity (wind_speed, ": {"units.windsped": "km/h"},
+    "units.WS must be m/s, km/h, mph, kt, got furlong": {"units.WS": "furlong"},
 }
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 
+from warp_torchrl.provenance import gathered
 from warp_torchrl.world.ignition_file import IgnitionFile, on_fuel, read_ignition
 from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.grid import Grid
@@ -81,6 +82,33 @@ def test_points_of_a_csv_light_the_cells_that_they_lie_in(tmp_path, text):
     places = middle(2, 3), middle(7, 11)
     path = written(tmp_path / "points.csv", text.format(*places, degrees(*places)))
     assert cells(path) == [(2, 3), (7, 11)]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"row;column\n2;3\n",
+        b"sep=;\r\nrow;column;name\r\n2;3;a\r\n",
+        b"# the first smoke\nrow\tcolumn\n2\t3\n\n",
+        b'"Row (from 0)","Col"\n"2","3"\n',
+        b"row column\n 2  3\n",
+        b"x;y\n600105,5;4899925,25\n",
+        b"Easting [m];Northing [m]\n600105;4899925\n",
+        "row,column,lieu\n2,3,for\u00eat\n".encode("latin-1"),
+        "\ufeffrow,column\n2,3\n".encode("utf-16-le"),
+    ],
+)
+def test_points_may_be_written_as_spreadsheets_write_them(tmp_path, content):
+    (tmp_path / "points.csv").write_bytes(content)
+    assert cells(tmp_path / "points.csv") == [(2, 3)]
+
+
+def test_what_was_read_of_points_is_told(tmp_path):
+    path = written(tmp_path / "points.csv", "id,Lon,Lat\n7,{0[0][0]},{0[0][1]}\n".format(degrees(middle(2, 3))))
+    with gathered() as files:
+        read_ignition(path, GRID)
+    assert files[0].read == {"Lon": "degrees of EPSG:4326", "Lat": "degrees of EPSG:4326"}
+    assert files[0].left == ("id",) and files[0].key == "ignition.path"
 
 
 def test_rows_and_columns_need_no_place_on_earth(tmp_path):
@@ -170,6 +198,11 @@ def test_what_lies_off_the_map_is_left_out_and_counted(tmp_path, caplog):
         ("a.csv", "row,column\n1,two\n", "^ignition.path must have a number for column, line 2 of .* has 'two'"),
         ("a.csv", "row,column\n1\n", "must have a number for column, line 2 of .* has None"),
         ("a.csv", "row,column\n1,nan\n", "must have a number for column"),
+        ("a.csv", "x,y\n600105,5,4899925,5\n", "must have 2 cells in each row, line 2 of .* has 4"),
+        ("a.csv", "row,column,row\n1,2,3\n", "must have one column row, .* has 2"),
+        ("a.csv", "x;y\n600105,5;4899925\n600105.5;4899925\n", "column x must have one decimal sign"),
+        ("a.csv", 'x,y\n"600,105","4,899,925"\n', "column x must have decimal points, '600,105' may be thousands"),
+        ("a.csv", "row,column\n1,\x002\n", "^ignition.path must be a CSV file that can be read, .*it has NUL bytes"),
         ("a.csv", "row,column\n1.5,2\n", "must have whole rows and columns, from 0"),
         ("a.csv", "row,column\n1,12\n", "must have points on the map of 10 x 12 cells, .* has 1, none of them there"),
         ("a.csv", "x,y\n0,0\n", "must have points on the map"),

@@ -100,26 +100,42 @@ def _read_points(name: str, path: Path, grid: Grid) -> np.ndarray:
 
 def _read_pairs(name: str, path: Path) -> tuple[np.ndarray, np.ndarray, str]:
     """Return the two columns of a CSV that tell places, and what they count in."""
-    try:
-        named, text = named_separator(read_text(name, path))
-        tables = [(mark, split_rows(text, mark)) for mark in ([named] if named else SEPARATORS)]
-    except ValueError as error:
-        raise ValueError(f"{name} must be a CSV file, {path} cannot be read: {error}") from None
-    for mark, table in tables:
-        rows = [row for row in table if row and not row[0].startswith("#")]
-        headers = [_column(cell) for cell in rows[0]] if rows else []
+    named, text = named_separator(read_text(name, path))
+    headers: list[str] = []
+    for separator in [named] if named else SEPARATORS:
+        try:
+            table = split_rows(text, separator)
+        except ValueError:  # quotes stand otherwise
+            continue
+        lines = [number for number, row in enumerate(table) if row and not row[0].startswith("#")]
+        first = [_column(cell) for cell in table[lines[0]]] if lines else []
         for (one, other), unit in _COLUMNS.items():
-            if one in headers and other in headers:
-                if len(rows) < 2:
-                    raise ValueError(f"{name} must have a point at least, {path} has no points")
-                places = headers.index(one), headers.index(other)
-                first, second = (_numbers(name, path, table, place, mark) for place in places)
-                _tell(name, path, rows[0], places, unit)
-                return first, second, unit
+            if one in first and other in first:
+                _check_table(name, path, table, lines, (one, other))
+                places = first.index(one), first.index(other)
+                x, y = (_numbers(name, path, table, lines, place, separator) for place in places)
+                _tell(name, path, table[lines[0]], places, unit)
+                return x, y, unit
+        headers = headers or first
     wanted = " or ".join(",".join(pair) for pair in list(_COLUMNS)[:_SHOWN])
-    first_row = next((row for row in tables[0][1] if row), [])
-    got = f"has the columns {','.join(map(_column, first_row))}" if first_row else "has no points"
+    got = f"has the columns {','.join(headers)}" if headers else "has no points"
     raise ValueError(f"{name} must have the columns {wanted} and a point at least, {path} {got}")
+
+
+def _check_table(name: str, path: Path, table: list[list[str]], lines: list[int], pair: tuple[str, str]) -> None:
+    """Refuse a table without points, with a column twice, or with more cells in a row than in its first."""
+    headers = [_column(cell) for cell in table[lines[0]]]
+    if len(lines) < 2:
+        raise ValueError(f"{name} must have a point at least, {path} has no points")
+    for column in pair:
+        if headers.count(column) > 1:
+            raise ValueError(f"{name} must have one column {column}, {path} has {headers.count(column)}")
+    for line in lines[1:]:
+        if any(table[line][len(headers) :]):
+            count = len(table[line])
+            raise ValueError(
+                f"{name} must have {len(headers)} cells in each row, line {line + 1} of {path} has {count}"
+            )
 
 
 def _column(header: str) -> str:
@@ -127,10 +143,9 @@ def _column(header: str) -> str:
     return header.lower().partition("(")[0].partition("[")[0].strip()
 
 
-def _numbers(name: str, path: Path, table: list[list[str]], place: int, separator: str) -> np.ndarray:
+def _numbers(name: str, path: Path, table: list[list[str]], lines: list[int], place: int, separator: str) -> np.ndarray:
     """Return the numbers of a column; a message names the line of the file."""
-    lines = [number for number, row in enumerate(table, 1) if row and not row[0].startswith("#")]
-    header, *cells = (table[line - 1][place] if place < len(table[line - 1]) else "" for line in lines)
+    header, *cells = (table[line][place] if place < len(table[line]) else "" for line in lines)
     try:
         cells = to_points(header, cells, separator)
     except ValueError as error:
@@ -138,9 +153,8 @@ def _numbers(name: str, path: Path, table: list[list[str]], place: int, separato
     values = [to_number(cell) for cell in cells]
     if None in values:
         at = values.index(None)
-        raise ValueError(
-            f"{name} must have a number for {_column(header)}, line {lines[1 + at]} of {path} has {cells[at] or None!r}"
-        )
+        line, got = lines[1 + at] + 1, cells[at] or None
+        raise ValueError(f"{name} must have a number for {_column(header)}, line {line} of {path} has {got!r}")
     return np.array(values, dtype=np.float64)
 
 
