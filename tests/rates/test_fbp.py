@@ -44,6 +44,18 @@ def spread(code, **changed):
     return fbp_spread(torch.as_tensor(code) if isinstance(code, int | float) else code, **weather)
 
 
+def test_crowns_of_c6_do_not_burn_where_they_would_slow_the_head():
+    # FFMC 95: 5.7165 per cent, f(F) = 41.62; 25 km/h: an index of 30.51. On the surface 30 (1 - e^-2.441)^3 = 22.83
+    # m/min at a buildup index of 62, where its effect is 1; 5 (1 - e^-0.9238)^2.48 = 1.426 kg/m2 burn, and crowns from
+    # 0.001 (7 * 4345)^1.5 / (300 * 1.426) = 12.4 m/min on. With needles of 150 per cent they go 60 (1 - e^-1.516)
+    # 1.0875^4 1000 / 4345 / 0.778 = 19.4 m/min: no gain, so that eq. 58 is not asked, and 300 * 1.426 * 22.83 kW/m
+    head = spread(6, ffmc=95.0, wind_speed=25 / 3.6, bui=62.0, foliar_moisture=150.0)
+    assert head.head.item() == pytest.approx(22.83, rel=1e-3)
+    assert head.intensity.item() == pytest.approx(9765, rel=1e-3)
+    drier = spread(6, ffmc=95.0, wind_speed=25 / 3.6, bui=62.0, foliar_moisture=97.0)
+    assert drier.head > head.head and drier.intensity > 2 * head.intensity
+
+
 def test_it_gives_the_published_examples():
     rows = [line.replace("|", " ").split() for line in EXAMPLES.split("\n") if line.strip()]
     table = torch.tensor([[float(word) for word in row] for row in rows], dtype=torch.float64).T
