@@ -121,12 +121,12 @@ def _body(table: Sequence[list[str]], headers: Sequence[str]) -> tuple[list[list
 
 
 def _is_header(row: Sequence[str], follows: Sequence[str]) -> bool:
-    """Return whether a row names the columns of another table: two quantities, or words alone below a blank line."""
-    if sum(read_header(cell).quantity is not None for cell in row if cell) > 1:
+    """Return whether a row names the columns of another table: words alone, two of quantities or below a blank line."""
+    if len(row) < 2 or any(to_number(cell) is not None for cell in row):
+        return False
+    if not follows and not re.search(r"\d", row[0]):
         return True
-    return (
-        not follows and len(row) > 1 and not re.search(r"\d", row[0]) and all(to_number(cell) is None for cell in row)
-    )
+    return sum(read_header(cell).quantity is not None for cell in row if cell) > 1
 
 
 def _units_below(headers: Sequence[str], rows: list[list[str]]) -> tuple[list[str], list[list[str]]]:
