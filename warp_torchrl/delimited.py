@@ -38,6 +38,7 @@ def read_text(name: str, path: str | PathLike[str]) -> str:
         text = _decoded(content)
     except UnicodeDecodeError:
         raise ValueError(f"{wanted}: it is no text in UTF-8, UTF-16 or Windows-1252") from None
+    text = text.rstrip("\x1a")  # ends files of old programs
     if "\0" in text:
         raise ValueError(f"{wanted}: it has NUL bytes")
     return text

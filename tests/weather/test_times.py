@@ -137,6 +137,9 @@ def test_a_gap_is_named(write, caplog):
     caplog.clear()
     read_weather(write("hours", 0, 1, 2, 12))  # ten times is not more than ten times
     assert not caplog.messages
+    read_weather(write("date", "2024-07-01", "2824-07-01"))  # of two rows, too, where it is over a month
+    assert "hours without weather after '2024-07-01' (row 1)" in caplog.text
+    caplog.clear()
     read_weather(write("hours", *range(0, 100, 20), *range(300, 1000, 300)))
     assert not [text for text in caplog.messages if "more" in text] and len(caplog.messages) == 3
 

@@ -32,6 +32,8 @@ _YEARS = "yr year yyyy ano anio annee jahr yearmonthdayhourminutesinyyyy".split(
 _MONTHS = "mon month mth mo mm mes mois monat".split()
 _DAYS = "day dy dd dia jour tag".split()
 _DAYS_OF_YEAR = "doy jday julianday dayofyear yday juliandate".split()
+_MONTH = 31 * 24.0
+"""A step [hours] that is named as a gap whatever the others are."""
 _ORDERS = {"y/m/d": "ymd", "d/m/y": "dmy", "m/d/y": "mdy"}
 
 
@@ -170,7 +172,7 @@ def _with_gaps(clock: Clock) -> Clock:
     """Return a clock that warns of steps far longer than the others."""
     steps = [abs(after - before) for before, after in pairwise(clock.hours)]
     usual = median_low(steps) if steps else 0.0
-    gaps = [row for row, step in enumerate(steps, 1) if step > APART * usual]
+    gaps = [row for row, step in enumerate(steps, 1) if step > min(APART * usual, _MONTH)]
     told = tuple(
         f"{steps[row - 1]:g} hours without weather after {clock.texts[row - 1] or row!r} (row {row}), where rows are "
         f"{usual:g} hours apart; that row holds on"
