@@ -8,7 +8,7 @@ from warp_torchrl.weather.layout import Sheet
 from warp_torchrl.weather.quantities import QUANTITIES
 from warp_torchrl.weather.units import ascii_text
 
-_MISSING = frozenset("m na n/a nan null none nil missing - -- --- nd n/d s/d * ** *** .".split())
+_MISSING = frozenset("m na n/a nan null none nil missing - -- --- n/d s/d * ** *** .".split())
 _MISSING_NUMBERS = (-9999.0, -999.0, -99.0, 9999.0, 99999.0, -99999.0, 999.9, 9999.9, -999.9, -99.9, 1e20, -6999.0)
 _CALM = frozenset("calm calma calme vrb variable var c".split())
 _NO_DIRECTION = (990.0, 999.0)
