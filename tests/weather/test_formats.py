@@ -230,3 +230,25 @@ def test_the_air_of_an_afternoon_is_the_same_in_every_form(read, source):
             assert found.tolist() == pytest.approx(values, abs=0.06), name
     assert weather.wind_height == ("20ft" if source in IN_FEET else "10m")
     assert files.key == "weather" and any("wind_speed" in unit or "wind_u" in unit for unit in files.read.values())
+
+
+def test_of_several_tables_in_a_file_the_longest_of_weather_is_read(read):
+    weather, files = read("""
+latitude,longitude,elevation,utc_offset_seconds,timezone,timezone_abbreviation
+41.0,2.0,NaN,3600,GMT,GMT
+
+current_weather_time,temperature (°C),windspeed (km/h),winddirection (°),weathercode (wmo code),is_day
+2024-07-01T16:00,23.0,12.0,90,5,1
+
+time,temperature_2m (°C),windspeed_10m (km/h),winddirection_10m (°)
+2024-07-01T12:00,30.0,18.0,270
+2024-07-01T13:00,31.0,36.0,300
+
+time,temperature_2m_max (°C),wind_speed_10m_max (km/h)
+2024-07-01,31,40
+""")
+    assert weather.wind_speed.tolist() == SPEED and weather.temperature.tolist() == [30, 31]
+    assert files.left == ("4 lines above the header", "a second table of 1 rows")
+    two = "WS,WD\n18,270\n36,300\n"
+    weather, files = read(f"{two}{two}windspeed (mph),wd\n1,2\n")  # one header twice, and then another
+    assert weather.wind_speed.tolist() == SPEED * 2 and files.left == ("a second table of 1 rows",)

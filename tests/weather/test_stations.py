@@ -86,7 +86,8 @@ def test_fixed_columns_of_wims_are_read(read):
     assert weather.temperature.tolist() == pytest.approx([30, 30]) and weather.humidity.tolist() == [25, 25]
     assert weather.rain is None and "rain, which is that of 24 hours" in files.left
     metric = "\n".join(wims(time, measure="2").replace("86", "30") for time in ("1200", "1300"))
-    assert read(metric, "a.fw9")[0].wind_speed.tolist() == pytest.approx([10 / 3.6] * 2)
+    weather, _ = read(metric, "a.fw9")
+    assert weather.wind_speed.tolist() == pytest.approx([10 / 3.6] * 2) and weather.wind_height == "20ft"
 
 
 def test_a_bearing_of_0_is_no_direction_in_wims(read):
