@@ -89,6 +89,9 @@ def test_a_unit_stands_in_brackets_or_behind_the_name(table, header, number, tol
 
 
 def test_the_height_of_the_wind_can_be_told(table):
+    assert table("WS (mph),WD\n5,0").wind_height == "20ft"  # miles an hour are not the Canadian custom
+    assert table("windspeed_10m (mp/h),WD\n5,0").wind_height == "10m"
+    assert table("windspeed_20ft (km/h),WD\n5,0").wind_height == "20ft"
     assert table("WS,WD\n5,0", wind_height="20ft").wind_height == "20ft"
     assert table("WindSpeed_mph,WindDirection\n5,0", wind_height="10m").wind_height == "10m"
 

@@ -105,7 +105,7 @@ def read_weather(
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
     height = wind_height or _height(columns, sheet, source)
-    _tell(path, {name: columns[name] for name in read}, clock, sheet, source)
+    _tell(path, {name: columns[name] for name in read}, clock, sheet, source, height)
     hours = torch.tensor(clock.hours, dtype=torch.float32)
     tensors = {name: torch.tensor(values, dtype=torch.float32) for name, values in known.items()}
     made = _complete(tensors, hours, height, start_ffmc, bui)
@@ -160,27 +160,31 @@ def _known(columns: Mapping[str, Column], sheet: Sheet) -> tuple[dict[str, list[
 
 def _height(columns: Mapping[str, Column], sheet: Sheet, source: Source | None) -> WindHeight:
     """Return the height of the wind: as the column's name, the kind of file or its source says, or as is the custom."""
-    column = columns.get("wind_speed") or columns["wind_u"]
-    stated = stated_height(column) or sheet.height or (source.height if source else None)
+    name = "wind_speed" if "wind_speed" in columns else "wind_u"
+    column = columns[name]
+    is_theirs = source is not None and source.units.get(name, column.unit) == column.unit
+    stated = stated_height(column) or sheet.height or (source.height if source and is_theirs else None)
     return cast(WindHeight, stated or ("20ft" if column.unit == "mph" else "10m"))
 
 
-def _tell(path: Path, columns: Mapping[str, Column], clock: Clock, sheet: Sheet, source: Source | None) -> None:
+def _tell(
+    path: Path, columns: Mapping[str, Column], clock: Clock, sheet: Sheet, source: Source | None, height: WindHeight
+) -> None:
     """Report what was read and what was left, and warn of times that a user must know of."""
     for warning in clock.warnings:
         _log.warning("weather: %s", warning)
     read = dict.fromkeys(clock.columns, "time")
     read |= {each.header: f"{name}, {each.unit}" if each.unit else name for name, each in columns.items()}
-    known = (
-        [f"{source.title} is whose file it is by its names: units that it does not state are theirs"] if source else []
-    )
+    notes = [f"wind is that at {height}"]
+    if source:
+        notes.append(f"by its names it is a file of {source.title}: units that it does not state are theirs")
     tell(
         Provenance(
             key="weather",
             file=str(path),
             read=read,
             left=(*(header for header in sheet.headers if header and header not in read), *sheet.left),
-            notes=(*known, *clock.warnings),
+            notes=(*notes, *clock.warnings),
         )
     )
 
