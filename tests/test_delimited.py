@@ -52,6 +52,10 @@ def test_lines_end_in_any_way_and_cells_may_stand_in_quotes(text):
     assert split_rows(text, ",") == [["a", "b"], ["1", "2"]]
 
 
+def test_what_a_terminal_would_obey_is_a_space():
+    assert split_rows("WS\x1b[31m,WD\n", ",") == [["WS [31m", "WD"]]
+
+
 def test_a_space_stands_for_any_number_of_them():
     assert split_rows("a  b\n 1   2 \n\n", " ") == [["a", "b"], ["1", "2"], []]
 

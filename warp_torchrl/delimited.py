@@ -45,7 +45,7 @@ def read_text(name: str, path: str | PathLike[str]) -> str:
 
 
 def split_rows(text: str, separator: str, most: int | None = None) -> list[list[str]]:
-    """Return the cells of each line without the spaces about them; a blank line has none.
+    """Return the cells of each line without the spaces about them and control characters; a blank line has none.
 
     Args:
         text: The file's text.
@@ -69,7 +69,7 @@ def split_rows(text: str, separator: str, most: int | None = None) -> list[list[
     for number, row in enumerate(rows, 1):
         if len(row) > _MOST_COLUMNS:
             raise ValueError(f"rows must have {_MOST_COLUMNS} cells at most, got {len(row)} in line {number}")
-    return [row if any(row) else [] for row in rows]
+    return [[_printable(cell) for cell in row] if any(row) else [] for row in rows]
 
 
 def named_separator(text: str) -> tuple[str | None, str]:
@@ -101,6 +101,11 @@ def to_points(header: str, cells: Sequence[str], separator: str) -> list[str]:
 def to_number(cell: str) -> float | None:
     """Return the number in a cell with a decimal point; None where it holds none."""
     return float(cell) if _NUMBER.fullmatch(cell) else None
+
+
+def _printable(cell: str) -> str:
+    """Return a cell without what a terminal would obey, since messages name cells."""
+    return cell if cell.isprintable() else "".join(each if each.isprintable() else " " for each in cell)
 
 
 def _decoded(content: bytes) -> str:
