@@ -38,10 +38,9 @@ class Provenance:
     def line(self) -> str:
         """Return all of it in one line."""
         read = [f"{_name(name)} [{_plain(unit)}]" if unit else _name(name) for name, unit in self.read.items()]
+        taken = [f"read {_listed(read)}"] if read or not self.notes else []
         left = [f"left {_listed([_name(name) for name in self.left])}"] if self.left else []
-        return f"{self.key}: {_plain(self.file)}: " + "; ".join(
-            [f"read {_listed(read)}", *left, *(_plain(each) for each in self.notes)]
-        )
+        return f"{self.key}: {_plain(self.file)}: " + "; ".join([*taken, *left, *map(_plain, self.notes)])
 
     @property
     def as_values(self) -> dict[str, Any]:

@@ -1,27 +1,39 @@
 """A fire that happened: its ground, its weather, where it started, and what is known of where it burned by when."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import torch
 from torch import Tensor
 
 from warp_torchrl.calibration.null_models import mean_wind
-from warp_torchrl.calibration.observed import read_perimeters
+from warp_torchrl.calibration.observed import Outcome, read_arrival, read_perimeters, read_scar
 from warp_torchrl.weather.table import WeatherTable, read_weather
 from warp_torchrl.world.alone import Spell
 from warp_torchrl.world.state import OLDEST, Cover, Landscape
 from warp_torchrl.world.terrain.cells import read_cells
-from warp_torchrl.world.terrain.fuel import NO_FUEL
+from warp_torchrl.world.terrain.features import SUFFIXES
+from warp_torchrl.world.terrain.fuel import is_code
 from warp_torchrl.world.terrain.grid import Grid, check_grid
-from warp_torchrl.world.terrain.layer import find_layer, read_grid, read_layer
+from warp_torchrl.world.terrain.layer import RASTERS, Header, read_header, read_layer
+from warp_torchrl.world.terrain.layers import elevation_unit, unread
+from warp_torchrl.world.terrain.planes import check_slopes, to_fuel, to_metres
+from warp_torchrl.world.terrain.resampling import fill
 from warp_torchrl.world.weather import Weather
 
-_KINDS = (".tif", ".tiff", ".asc")
-_OUTCOMES = "scar (.tif, .asc), arrival (.tif, .asc) or perimeters.geojson"
+_OUTCOMES = "scar (.tif, .asc, .geojson, .shp), arrival (.tif, .asc) or perimeters (.geojson, .shp)"
+_NAMES = {"fuel": "fuel.tif or fuel.asc", "ignition": "ignition.csv, .tif, .asc, .geojson or .shp"}
+_KINDS = {
+    "fuel": tuple(RASTERS),
+    "elevation": tuple(RASTERS),
+    "ignition": (".csv", *RASTERS, *SUFFIXES),
+    "perimeters": SUFFIXES,
+    "arrival": tuple(RASTERS),
+    "scar": (*RASTERS, *SUFFIXES),
+}
+"""Suffixes of the files that each part of a fire may be."""
+_REMEDY = "it to gdalwarp -t_srs EPSG:326ZONE -tr 30 30 -r mode"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,6 +49,7 @@ class FireCase:
         minutes: When what burned is known, float32 [K] [minutes], growing.
         burned: What had burned by then, bool [K, H, W].
         arrival: When each cell burned, float32 [H, W] [minutes], NaN where not known; None where nowhere.
+        files: A line for each file: what it is, in which unit, and what is left unread.
     """
 
     name: str
@@ -47,6 +60,7 @@ class FireCase:
     minutes: Tensor
     burned: Tensor
     arrival: Tensor | None = None
+    files: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         last = sum(spell.minutes for spell in self.spells)
@@ -80,15 +94,16 @@ class FireCase:
 def read_case(folder: str | Path, hours: float | None = None, units: Mapping[str, str] | None = None) -> FireCase:
     """Read a fire from a folder.
 
-    It holds ``fuel`` and, unless the ground is level, ``elevation`` [m], each a GeoTIFF (.tif) or an ESRI ASCII grid
-    (.asc); ``weather.csv``, whose first row holds when the fire starts; ``ignition.csv`` (see ``read_cells``) or a
-    raster ``ignition``, not 0 where it starts; and the outcome: ``perimeters.geojson``, or a raster ``arrival``
-    [minutes from the start], or a raster ``scar``, over 0 where it burned by the last hour. Cells without fuel data
-    do not burn; elevation that is not known is the mean of what is.
+    It holds ``fuel`` and, unless the ground is level, ``elevation``, each a GeoTIFF (.tif) or an ESRI ASCII grid
+    (.asc); ``weather.csv``, whose first row holds when the fire starts; ``ignition``, any file that ``read_cells``
+    reads; and the outcome: ``perimeters`` (GeoJSON or a shapefile), or a raster ``arrival`` [minutes from the start],
+    or a ``scar``, a raster over 0 where it burned by the last hour, GeoJSON or a shapefile. Cells without fuel data do
+    not burn; elevation that is not known is that of the cells around.
 
     Args:
         folder: The folder.
-        hours: When the scar is known [h]; None is the end of the weather, whose last row lasts as the one before.
+        hours: When a scar, or perimeters without a time, are known [h]; None is the end of the weather, whose last row
+            lasts as the one before.
         units: Of columns of its weather that state none, see ``weather.table.read_weather``.
 
     Raises:
@@ -105,23 +120,30 @@ def read_case(folder: str | Path, hours: float | None = None, units: Mapping[str
 
 
 def _read(folder: Path, hours: float | None, units: Mapping[str, str] | None) -> FireCase:
-    fuel = _raster("fuel", folder)
-    if fuel is None:
-        raise ValueError(f"fuel must be fuel.tif or fuel.asc in {folder}, there is none")
-    grid = read_grid("fuel", fuel)
+    fuel = _only("fuel", folder)
+    header = read_header("fuel", fuel, remedy=_REMEDY)
     rows = _weather(folder / "weather.csv", units)
-    weather = Weather(table=rows).over(_Placed(grid))  # type: ignore[arg-type]
-    last = hours * 60.0 if hours is not None else _end(rows)
-    minutes, burned, arrival = _outcome(folder, grid, last)
+    weather, end = Weather(table=rows).over(_Placed(header.grid)), _end(rows)  # type: ignore[arg-type]
+    outcome, observed = _outcome(folder, header.grid, hours, end)
+    last = float(outcome.minutes[-1])
+    if last > end + 1e-3:
+        got = f"{last / 60.0:g}"
+        raise ValueError(f"the outcome must be known in hours of the weather, {end / 60.0:g}, got {got}")
+    landscape, elevation = _landscape(folder, header)
+    lit = _only("ignition", folder)
+    files = [f"fuel: {header.told}", *elevation, f"ignition: {lit.name}", f"outcome: {observed.name}"]
+    if left := unread(folder, [each for name in (*_KINDS, "weather") if (each := _found(name, folder))]):
+        files.append(f"files of {folder.name} that are not read: {', '.join(left)}")
     return FireCase(
         name=folder.name,
-        landscape=_landscape(folder, fuel, grid),
-        cell_size=grid.cell_size,
-        lit=_ignition(folder, grid),
-        spells=[Spell(wind, lasts, moisture) for wind, moisture, lasts in weather.spells(float(minutes[-1]))],
-        minutes=minutes,
-        burned=burned,
-        arrival=arrival,
+        landscape=landscape,
+        cell_size=header.grid.cell_size,
+        lit=torch.from_numpy(read_cells("ignition", lit, header.grid)),
+        spells=[Spell(wind, lasts, moisture) for wind, moisture, lasts in weather.spells(last)],
+        minutes=outcome.minutes,
+        burned=outcome.burned,
+        arrival=outcome.arrival,
+        files=files,
     )
 
 
@@ -144,70 +166,66 @@ def _end(rows: WeatherTable) -> float:
     return (float(rows.hours[-1]) + lasts) * 60.0
 
 
-def _landscape(folder: Path, fuel: Path, grid: Grid) -> Landscape:
-    codes, known = read_layer("fuel", fuel)
-    broken = known & ((codes != np.rint(codes)) | (codes < 0) | (codes > 32767))
-    if broken.any():
-        raise ValueError(f"fuel must hold whole codes of fuels, 0..32767, got {codes[broken][0]:g}")
-    codes = np.where(known, codes, NO_FUEL).astype(np.int16)
-    cover = torch.full((1, *grid.shape), int(Cover.FOREST), dtype=torch.uint8)
+def _landscape(folder: Path, header: Header) -> tuple[Landscape, list[str]]:
+    """Return the ground, and what is said of its elevation."""
+    codes, known = read_layer("fuel", header.path, header.number)
+    fuel = to_fuel(codes, known & is_code(codes, {}))
+    cover = torch.full((1, *header.grid.shape), int(Cover.FOREST), dtype=torch.uint8)
+    path = _found("elevation", folder)
+    elevation, told = (
+        (None, ["elevation: none, the ground is level"]) if path is None else _elevation(path, header.grid)
+    )
     return Landscape(
         cover=cover,
         age=torch.full_like(cover, OLDEST),
-        elevation=_elevation(folder, grid),
-        fuel=torch.from_numpy(codes)[None],
-    )
+        elevation=elevation,
+        fuel=torch.from_numpy(fuel)[None],
+    ), told
 
 
-def _elevation(folder: Path, grid: Grid) -> Tensor | None:
-    path = _raster("elevation", folder)
+def _elevation(path: Path | None, grid: Grid) -> tuple[Tensor | None, list[str]]:
     if path is None:
-        return None
-    values, known = _on_grid("elevation", path, grid)
-    filled = np.where(known, values, values[known].mean()).astype(np.float32)
-    return torch.from_numpy(filled)[None]
+        return None, ["elevation: none, the ground is level"]
+    header = read_header("elevation", path)
+    check_grid("elevation", header.grid, "fuel", grid)
+    values, known = read_layer("elevation", path, header.number)
+    unit = elevation_unit(header, None)
+    metres = to_metres(values, known, unit)
+    if not header.unit:
+        check_slopes(metres, known, grid.cell_size)
+    told = f"elevation: {header.told} [{header.unit or 'm'}]"
+    return torch.from_numpy(fill(metres, known))[None], [told]
 
 
-def _ignition(folder: Path, grid: Grid) -> Tensor:
-    path = _raster("ignition", folder)
+def _outcome(folder: Path, grid: Grid, hours: float | None, end: float) -> tuple[Outcome, Path]:
+    """Return what burned by when, and the file that says so; the end of the weather is in minutes."""
+    last = end if hours is None else hours * 60.0
+    path = _found("perimeters", folder)
     if path is not None:
-        values, known = _on_grid("ignition", path, grid)
-        return torch.from_numpy(known & (values != 0))
-    points = folder / "ignition.csv"
-    if not points.is_file():
-        raise ValueError(f"ignition must be ignition.csv, .tif or .asc in {folder}, there is none")
-    return torch.from_numpy(read_cells("ignition", points, grid))
-
-
-def _outcome(folder: Path, grid: Grid, last: float) -> tuple[Tensor, Tensor, Tensor | None]:
-    """Return the minutes at which what burned is known, what burned by then, and when each cell burned."""
-    perimeters = folder / "perimeters.geojson"
-    if perimeters.is_file():
-        return *read_perimeters(perimeters, grid), None
-    path = _raster("arrival", folder)
+        return read_perimeters(path, grid, last), path
+    path = _found("arrival", folder)
     if path is not None:
-        values, known = _on_grid("arrival", path, grid)
-        return _by_hour(torch.from_numpy(np.where(known, values, math.nan).astype(np.float32)))
-    path = _raster("scar", folder)
+        return read_arrival(path, grid), path
+    path = _found("scar", folder)
     if path is None:
         raise ValueError(f"the outcome must be {_OUTCOMES} in {folder}, there is none")
-    values, known = _on_grid("scar", path, grid)
-    return torch.tensor([last]), torch.from_numpy(known & (values > 0))[None], None
+    return read_scar(path, grid, last), path
 
 
-def _by_hour(arrival: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-    """Return what burned by each full hour until the last cell did."""
-    latest = float(arrival[~arrival.isnan()].max())
-    minutes = torch.arange(1.0, max(1.0, math.ceil(latest / 60.0)) + 1.0) * 60.0
-    return minutes, arrival <= minutes[:, None, None], arrival
+def _only(name: str, folder: Path) -> Path:
+    path = _found(name, folder)
+    if path is None:
+        raise ValueError(f"{name} must be {_NAMES[name]} in {folder}, there is none")
+    return path
 
 
-def _on_grid(name: str, path: Path, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
-    check_grid(name, read_grid(name, path), "fuel", grid)
-    return read_layer(name, path)
+def _found(name: str, folder: Path) -> Path | None:
+    """Return the one file of a name in a folder; None where there is none.
 
-
-def _raster(name: str, folder: Path) -> Path | None:
-    """Return the one raster of a name in a folder; None where there is none."""
-    there = [folder / f"{name}{kind}" for kind in _KINDS if (folder / f"{name}{kind}").exists()]
-    return find_layer(name, folder, there[0].name if len(there) == 1 else f"{name}.*") if there else None
+    Raises:
+        ValueError: If there are several.
+    """
+    there = [path for kind in _KINDS.get(name, ()) if (path := folder / f"{name}{kind}").is_file()]
+    if len(there) > 1:
+        raise ValueError(f"{name} must be one file in {folder}, got {', '.join(path.name for path in there)}")
+    return there[0] if there else None

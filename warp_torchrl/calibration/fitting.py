@@ -62,6 +62,18 @@ def check_told(parameters: Sequence[Parameter], cases: Sequence[FireCase]) -> No
                 raise ValueError(f"parameters must not be told by the weather, {each.name} is by that of {case.name}")
 
 
+def check_fuel(case: FireCase, fire: RateFire) -> None:
+    """Refuse a fire whose map has fuel codes that the law lacks.
+
+    Raises:
+        ValueError: With the fire, the codes and their cells.
+    """
+    try:
+        fire.check_fuel(case.landscape)
+    except ValueError as error:
+        raise ValueError(f"{case.name}: {error}") from None
+
+
 def folds(cases: Sequence[FireCase]) -> Iterator[tuple[FireCase, list[FireCase]]]:
     """Yield each fire with all the others."""
     for index, left_out in enumerate(cases):

@@ -1,67 +1,100 @@
-"""Perimeters of a fire by hour, from GeoJSON (RFC 7946)."""
+"""What is known of where a fire burned by when: perimeters by hour, times of arrival, or a scar."""
 
-import json
+import math
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
 import torch
 from torch import Tensor
 
+from warp_torchrl.world.terrain.bands import MINUTES, factor_of
+from warp_torchrl.world.terrain.cells import check_lies_on, read_cells
 from warp_torchrl.world.terrain.grid import Grid
+from warp_torchrl.world.terrain.layer import read_header, read_layer
+from warp_torchrl.world.terrain.vector import Shape, mark, read_shapes
 
-_WGS84 = "EPSG:4326"
+_LONGEST = 1e7  # minutes since the ignition that are believed
 
 
-def read_perimeters(path: Path, grid: Grid) -> tuple[Tensor, Tensor]:
-    """Return what had burned by some times: cells whose middle lies in a perimeter.
+class Outcome(NamedTuple):
+    """What had burned by some times, and when each cell burned."""
 
-    Each feature has ``minutes`` or ``hours`` since the ignition among its properties, and is a Polygon or MultiPolygon;
-    features of one time are one. Coordinates are WGS84 longitude and latitude where the grid has a CRS, else the
-    grid's. What burned stays burned.
+    minutes: Tensor  # float32 [K], growing
+    burned: Tensor  # bool [K, H, W]
+    arrival: Tensor | None = None  # float32 [H, W] [minutes], NaN where not known
 
-    Returns:
-        The times, float32 [K] [minutes], growing, and the cells, bool [K, H, W].
+
+def read_perimeters(path: Path, grid: Grid, end: float | None = None) -> Outcome:
+    """Return what had burned by some times: the cells that perimeters mark, see ``vector.mark``.
+
+    Each feature has ``minutes`` or ``hours`` since the ignition among its properties; features of one time are one.
+    Where none has, they are the scar at the end. What burned stays burned.
+
+    Args:
+        path: GeoJSON or a shapefile.
+        grid: The grid.
+        end: When features without a time are known [minutes]; None refuses them.
 
     Raises:
-        ValueError: If the file is none of these, in one line.
+        ValueError: If the file cannot be read or placed, holds other shapes, or a feature has no time.
     """
-    by_time: dict[float, list[Any]] = {}
-    for feature in _features(path):
-        by_time.setdefault(_minutes(feature, path), []).append(feature["geometry"])
+    shapes = read_shapes(path.name, path, grid)
+    if any(shape.part.kind != "Polygon" for shape in shapes):
+        kinds = sorted({shape.part.kind for shape in shapes})
+        raise ValueError(f"{path.name} must hold polygons, got {', '.join(kinds)}")
+    by_time: dict[float, list[Shape]] = {}
+    for shape in shapes:
+        by_time.setdefault(_minutes(shape.properties, path, end), []).append(shape)
     times = sorted(by_time)
-    cells = torch.stack([_inside(by_time[time], grid, path) for time in times])
-    return torch.tensor(times), cells.to(torch.int8).cummax(0).values.to(torch.bool)
+    cells = torch.stack([torch.from_numpy(mark(by_time[time], grid)) for time in times])
+    return Outcome(torch.tensor(times), cells.to(torch.int8).cummax(0).values.to(torch.bool))
 
 
-def _features(path: Path) -> list[dict[str, Any]]:
+def read_arrival(path: Path, grid: Grid) -> Outcome:
+    """Return what burned by each full hour until the last cell did, from a raster of minutes since the ignition.
+
+    Numbers below 0 say that a cell did not burn, as the -9999 of files that declare no nodata.
+
+    Raises:
+        ValueError: If the file cannot be read, does not lie on the grid, or no cell has a time that can be.
+    """
+    header = read_header("arrival", path, metric=False)
+    check_lies_on("arrival", header.grid, grid)
+    values, known = read_layer("arrival", path, header.number)
+    known &= ~(values < 0.0)
+    minutes = values * factor_of("arrival", path, header.unit, MINUTES)
+    broken = known & ~(minutes <= _LONGEST)
+    if broken.any():
+        raise ValueError(f"arrival must be minutes, at most {_LONGEST:g}, got {minutes[broken][0]:g}")
+    if not known.any():
+        raise ValueError(f"arrival must hold a time of 0 or more, {path} holds none")
+    arrival = torch.from_numpy(np.where(known, minutes, math.nan).astype(np.float32))
+    hours = max(1.0, math.ceil(float(minutes[known].max()) / 60.0))
+    by = torch.arange(1.0, hours + 1.0) * 60.0
+    return Outcome(by, arrival <= by[:, None, None], arrival)
+
+
+def read_scar(path: Path, grid: Grid, end: float) -> Outcome:
+    """Return what had burned at the end [minutes]: the cells that a raster marks, see ``cells.read_marks``.
+
+    Raises:
+        ValueError: If the file cannot be read, or marks no cell of the grid.
+    """
+    return Outcome(torch.tensor([end]), torch.from_numpy(read_cells("scar", path, grid))[None])
+
+
+def _minutes(told: Mapping[str, Any], path: Path, end: float | None) -> float:
+    """Return the minutes of a feature's properties, of numbers or of texts of numbers; the end where it has none."""
+    named = {str(name).lower(): value for name, value in told.items() if value is not None}
+    pairs = [(named[name], factor) for name, factor in (("minutes", 1.0), ("hours", 60.0)) if name in named]
+    value, factor = pairs[0] if pairs else (end, 1.0)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        features = content["features"] if content["type"] == "FeatureCollection" else [content]
-        kinds = {feature["geometry"]["type"] for feature in features}
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"{path.name} must be GeoJSON of polygons, it cannot be read: {error}") from None
-    if not kinds or kinds - {"Polygon", "MultiPolygon"}:
-        raise ValueError(f"{path.name} must hold polygons, got {', '.join(sorted(kinds)) or 'no feature'}")
-    return list(features)
-
-
-def _minutes(feature: dict[str, Any], path: Path) -> float:
-    told = feature.get("properties") or {}
-    value = told.get("minutes", 60.0 * told["hours"] if isinstance(told.get("hours"), int | float) else None)
-    if not isinstance(value, int | float) or not 0.0 < value < 1e7:
-        raise ValueError(f"{path.name} must have features with minutes or hours over 0, got {value!r}")
-    return float(value)
-
-
-def _inside(geometries: list[Any], grid: Grid, path: Path) -> Tensor:
-    try:
-        from rasterio.features import geometry_mask
-        from rasterio.warp import transform_geom
-    except ImportError:
-        raise ValueError('perimeters must be read with rasterio: pip install "warp_torchrl[gis]"') from None
-    if grid.crs:
-        geometries = transform_geom(_WGS84, grid.crs, geometries)
-    try:
-        return torch.from_numpy(geometry_mask(geometries, grid.shape, grid.transform, invert=True))
-    except (ValueError, TypeError) as error:
-        raise ValueError(f"{path.name} must hold polygons: {' '.join(str(error).split())}") from None
+        minutes = float(value) * factor  # type: ignore[arg-type]  # None has no float
+    except (TypeError, ValueError, OverflowError):
+        minutes = math.nan
+    if isinstance(value, bool) or not 0.0 < minutes < _LONGEST:
+        rule = "have features with minutes or hours over 0, or none that has, or hours= must say when they are known"
+        raise ValueError(f"{path.name} must {rule}, got {value!r}")
+    return minutes

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from warp_torchrl.calibration.case import FireCase, read_case
-from warp_torchrl.calibration.fitting import check_told, fitted, folds, null_scores, score
+from warp_torchrl.calibration.fitting import check_fuel, check_told, fitted, folds, null_scores, score
 from warp_torchrl.calibration.options import CalibrationOptions
 from warp_torchrl.calibration.parameters import Parameter, parameters_of
 from warp_torchrl.calibration.report import as_numbers, law_yaml, means, table
@@ -19,7 +19,7 @@ from warp_torchrl.commands.program import run_program
 from warp_torchrl.config.compose import compose_config, plain, without_targets
 from warp_torchrl.config.construction import ConfigError, build, construct
 from warp_torchrl.config.grammar import check_flags
-from warp_torchrl.provenance import Provenance, gathered, section
+from warp_torchrl.provenance import Provenance, gathered, section, tell
 from warp_torchrl.runs import disk
 from warp_torchrl.runs.destination import check_free
 from warp_torchrl.world.rate import RateFire
@@ -51,6 +51,9 @@ def _run(arguments: Sequence[str]) -> None:
         check_free(folder, "out")
     with gathered() as files:
         cases = [read_case(each, options.hours, options.units) for each in options.fires]
+        for case in cases:
+            check_fuel(case, fire)
+            tell(_of_map(case, fire))
     _check_names(cases)
     check_told(parameters, cases)
     rows = {case.name: _before(fire, case, options) for case in cases}
@@ -70,6 +73,12 @@ def _check_names(cases: Sequence[FireCase]) -> None:
     names = [case.name for case in cases]
     if len(set(names)) < len(names):
         raise ConfigError(f"fires must have different names, got {', '.join(names)}")
+
+
+def _of_map(case: FireCase, fire: RateFire) -> Provenance:
+    """Return what is read of the map of a fire, and the cells of its fuels."""
+    notes = (*case.files, f"cells of fuels: {fire.told_fuel(case.landscape)}")
+    return Provenance(key=case.name, file="map", notes=notes)
 
 
 def _before(fire: RateFire, case: FireCase, options: CalibrationOptions) -> dict[str, Scores]:

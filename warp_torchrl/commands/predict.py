@@ -146,6 +146,8 @@ def _report(
         "grid convergence [degrees]": round(case.convergence, 3),
         "start [minutes after the first row]": case.start,
         "ignition": f"{values['ignition']}, {int(prediction.lit.sum())} cells with fuel of {int(case.ignition.sum())}",
+        "cells of fuels": case.fire.told_fuel(case.ground),
+        **dict(each.split(": ", 1) for each in case.files),
         "law": without_targets(values["fire"]),
     }
     return {

@@ -1,5 +1,6 @@
 """What is predicted: one map, where and when its fires start, and in which weather."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,8 +16,11 @@ from warp_torchrl.world.ignition_file import read_ignition
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.rate import RateFire
 from warp_torchrl.world.state import Landscape
+from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.landscape import LandscapeSource
 from warp_torchrl.world.terrain.raster import Raster
+
+_NEAR = 0.005  # share by which a cell's side may be off
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,6 +35,7 @@ class Case:
     start: float  # since the weather's first row began [minutes]
     convergence: float  # angle from true north to grid north [degrees]
     ignition: Tensor  # bool [H, W]
+    files: Sequence[str] = ()  # what is read of each file of the map, and what is left
 
 
 def read_case(source: LandscapeSource, fire: RateFire, options: PredictionOptions) -> Case:
@@ -40,10 +45,11 @@ def read_case(source: LandscapeSource, fire: RateFire, options: PredictionOption
         ValueError: If a file cannot be read or does not fit.
     """
     ground = source(world_key(torch.tensor([options.seed])))
-    fire.bed.check(source)
+    fire = fire.on(source)
     cell_size: float = getattr(source, "cell_size", 30.0) if options.cell_size is None else options.cell_size
     height, width = ground.cover.shape[1:]
     grid = getattr(source, "grid", None)
+    _check_cell_size(options.cell_size, grid)
     corner = (0, 0) if grid is None or ground.corner is None else tuple(ground.corner[0].tolist())
     place = Place(grid or local_grid((height, width), cell_size), (corner[0], corner[1]))
     lit = torch.as_tensor(read_ignition(str(options.ignition), place.grid))
@@ -64,7 +70,16 @@ def read_case(source: LandscapeSource, fire: RateFire, options: PredictionOption
         start=minutes_until(options.start, weather, options.units) if isinstance(options.start, str) else options.start,
         convergence=_convergence(place, (height, width)) if options.true_north else 0.0,
         ignition=lit[rows, columns],
+        files=getattr(source, "files", ()),
     )
+
+
+def _check_cell_size(given: float | None, grid: Grid | None) -> None:
+    """Refuse a side of a cell that is not that of a map with a place on Earth."""
+    if given is None or grid is None or not grid.is_on_earth or not grid.is_placed:
+        return
+    if abs(given / grid.cell_size - 1.0) > _NEAR:
+        raise ValueError(f"cell_size must be that of the landscape, {grid.cell_size:g} m, or null, got {given:g}")
 
 
 def whole_map(source: Raster) -> Raster:

@@ -15,6 +15,7 @@ from warp_torchrl.rates.fuel_models import FuelTable
 from warp_torchrl.rates.spread import Spread
 from warp_torchrl.rates.surface import surface_spread
 from warp_torchrl.rates.wind_adjustment import TEN_METRES, wind_adjustment_factor
+from warp_torchrl.world.mapped_fuel import check_codes
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.state import Landscape
 from warp_torchrl.world.terrain.landscape import LandscapeSource, map_size
@@ -55,6 +56,7 @@ class FuelBed:
     rate_gain: float
     wind_gain: float
     slope_gain: float
+    by_cover: bool = False  # the codes of landscapes are no fuels
 
     def __post_init__(self) -> None:
         if self.model not in COVER_FUEL:
@@ -73,15 +75,17 @@ class FuelBed:
         """Refuse landscapes whose fuel codes are of another model.
 
         Raises:
-            ValueError: If their ``table`` is another of ``COVER_FUEL``.
+            ValueError: If their ``table`` is another of ``COVER_FUEL``, or codes are not those of the model.
         """
         table = getattr(landscape, "table", None)
         if isinstance(table, str) and table in COVER_FUEL and table != self.model and not self.fuel_models:
             raise ValueError(f"fire.model must be that of landscape.table, {table}, got {self.model}")
+        if not self.by_cover:
+            check_codes(landscape, self.table, self.model, bool(self.fuel_models))
 
     def fuel(self, landscape: Landscape) -> Tensor:
         """Return the fuel codes of landscapes, int16 [B, H, W]."""
-        if landscape.fuel is not None:
+        if landscape.fuel is not None and not self.by_cover:
             return landscape.fuel
         table = torch.tensor(self.fuel_of_cover, dtype=torch.int16, device=landscape.cover.device)
         return table.index_select(0, landscape.cover.flatten().to(torch.int32)).view(landscape.cover.shape)

@@ -16,7 +16,8 @@ from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.terrain.array import read_npz
 from warp_torchrl.world.terrain.grid import Grid, check_grid
 from warp_torchrl.world.terrain.landscape import LandscapeSource, map_size
-from warp_torchrl.world.terrain.layer import find_layer, read_grid, read_layer, resample
+from warp_torchrl.world.terrain.layer import find_layer, read_grid, read_layer
+from warp_torchrl.world.terrain.resampling import resample
 from warp_torchrl.world.wind import Wind
 
 STRONGEST = 120.0

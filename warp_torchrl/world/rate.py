@@ -13,6 +13,7 @@ from warp_torchrl.validation import check_fields
 from warp_torchrl.world.automaton import Automaton
 from warp_torchrl.world.fuel_bed import COVER_FUEL, FuelBed, moisture_row
 from warp_torchrl.world.geometry import grow, neighbour_in, neighbours
+from warp_torchrl.world.mapped_fuel import check_fuel, has_own_table, told_fuel
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import (
     FIRST_FIRE,
@@ -54,7 +55,8 @@ class RateFire(Automaton):
         wet_minutes: Minutes for which a tree that was put out cannot ignite.
         moisture: Percent by name, of those that the wind tells nothing of: see ``fuel_bed.MOISTURES``.
         fuel_of_cover: Fuel code of lake, wetland, grassland, forest and bare ground, for landscapes without fuel codes;
-            None takes those of ``fuel_bed.COVER_FUEL``.
+            None takes those of ``fuel_bed.COVER_FUEL``. Where given, the codes of a landscape with a table of the
+            user's own are classes of land cover, and the fuel is that of their cover.
         fuel_gain: Factor on the rate of each fuel code that it names.
         rate_gain: Factor on all rates.
         wind_gain: Factor on the wind's speed.
@@ -80,6 +82,7 @@ class RateFire(Automaton):
     slope_gain: float = 1.0
     cell_deviation: float = 0.1
     fire_deviation: float = 0.0
+    _by_cover: bool = field(default=False, init=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -122,21 +125,50 @@ class RateFire(Automaton):
             rate_gain=self.rate_gain,
             wind_gain=self.wind_gain,
             slope_gain=self.slope_gain,
+            by_cover=self._by_cover,
         )
+
+    def on(self, landscape: LandscapeSource) -> Self:
+        """Return the law on a landscape, which says whether its codes are fuels or classes of land cover.
+
+        Raises:
+            ValueError: If the fuel codes of the landscape are of another model, or the model lacks some.
+        """
+        law = self._going_by(self.fuel_of_cover is not None and has_own_table(landscape))
+        law.bed.check(landscape)
+        return law
+
+    def check_fuel(self, landscape: Landscape) -> None:
+        """Refuse landscapes with fuel codes that the model lacks.
+
+        Raises:
+            ValueError: With codes and cells.
+        """
+        check_fuel(self.bed.fuel(landscape), self.bed.table, "fire.fuel_models" if self.fuel_models else self.model)
+
+    def told_fuel(self, landscape: Landscape) -> str:
+        """Return in words how many cells of landscapes have each fuel, and which are no fuel."""
+        return told_fuel(self.bed.fuel(landscape), self.bed.table)
+
+    def _going_by(self, cover: bool) -> Self:
+        """Return the law that takes the fuel of the cover, or of the landscape's codes."""
+        law = replace(self)
+        object.__setattr__(law, "_by_cover", cover)
+        law.__dict__.pop("bed")  # made before it was told
+        return law
 
     def over(self, landscape: LandscapeSource, wind: Wind, cell_size: float) -> Self:
         """Return the automaton with the minutes of a tick that the fastest fire of some worlds asks for.
 
         Raises:
-            ValueError: If the fuel codes of the landscape are of another model.
+            ValueError: See ``on``.
         """
-        self.bed.check(landscape)
-        if self.minutes_per_tick is not None:
-            return self
-        fastest = self.bed.fastest(landscape, wind, cell_size, moisture_row(self.moisture))
-        return replace(
-            self, minutes_per_tick=min(60.0, max(0.05, float(f"{cell_size / fastest / TICKS_PER_CELL:.2g}")))
-        )
+        law = self.on(landscape)
+        if law.minutes_per_tick is not None:
+            return law
+        fastest = law.bed.fastest(landscape, wind, cell_size, moisture_row(law.moisture))
+        minutes = min(60.0, max(0.05, float(f"{cell_size / fastest / TICKS_PER_CELL:.2g}")))
+        return replace(law, minutes_per_tick=minutes)._going_by(law._by_cover)
 
     def flammability(self, landscape: Landscape) -> Tensor:
         """Return the square root of the rate on level ground in a wind of 5 m/s, of the fastest fuel's there."""

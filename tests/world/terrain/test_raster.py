@@ -476,7 +476,7 @@ def test_configuration_is_what_shows_and_compares(folder):
         ({"elevation": ""}, "elevation must name one file"),
         ({"age": "*age*"}, "age must name one file .*matches 0"),
         ({"canopy": "*CC*"}, "canopy must name one file .*matches 0"),
-        ({"canopy_height": "*CH*"}, "height_unit must be given with canopy_height, 0.1 for LANDFIRE or 1 for"),
+        ({"canopy_height": "*Elev*"}, "height_unit must be given with canopy_height, 0.1 for LANDFIRE or 1 for"),
         ({"canopy_height": "*CH*", "height_unit": 0.0}, "height_unit must be in"),
         ({"canopy_height": "*CH*", "height_unit": 0.1}, "canopy_height must name one file .*matches 0"),
         ({"ages": "old"}, "ages must be drawn or oldest, got 'old'"),

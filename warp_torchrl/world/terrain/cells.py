@@ -9,10 +9,9 @@ import numpy as np
 from warp_torchrl.delimited import SEPARATORS, named_separator, read_text, split_rows, to_number, to_points
 from warp_torchrl.provenance import Provenance, tell
 from warp_torchrl.world.terrain.grid import Grid, check_grid
-from warp_torchrl.world.terrain.layer import read_grid, read_layer
-from warp_torchrl.world.terrain.vector import SUFFIXES, burn_in, in_grid, read_shapes
+from warp_torchrl.world.terrain.layer import RASTERS, read_header, read_layer
+from warp_torchrl.world.terrain.vector import SUFFIXES, in_grid, mark, read_shapes
 
-_RASTERS = (".tif", ".tiff", ".asc")
 _COLUMNS = {
     ("row", "column"): "cells",
     ("x", "y"): "map",
@@ -26,14 +25,15 @@ _COLUMNS = {
 """Pairs of columns of a CSV, and what they count in."""
 _SHOWN = 4
 """Pairs that a message names."""
+_LARGEST = (255, 32767, 65535)  # of bytes and of words
 _log = logging.getLogger("warp_torchrl")
 
 
 def read_cells(name: str, path: str | PathLike[str], grid: Grid) -> np.ndarray:
     """Return the cells of a grid that a file marks, bool [rows, columns]; one at least.
 
-    A point marks the cell that it lies in, a line those that it touches, a polygon those whose middle it holds, and a
-    raster those that are neither 0 nor nodata. What lies off the grid is left out, and counted in a warning.
+    Shapes mark cells as ``vector.mark`` says, a point of a CSV the cell that it lies in, and a raster those that are
+    over 0 and not nodata. What lies off the grid is left out, and counted in a warning.
 
     Args:
         name: What the file is, for messages.
@@ -47,33 +47,61 @@ def read_cells(name: str, path: str | PathLike[str], grid: Grid) -> np.ndarray:
     """
     file = Path(path)
     suffix = file.suffix.lower()
-    if suffix not in (".csv", *_RASTERS, *SUFFIXES) or not file.is_file():
-        kinds = ", ".join((".csv", *_RASTERS, *SUFFIXES))
+    if suffix not in (".csv", *RASTERS, *SUFFIXES) or not file.is_file():
+        kinds = ", ".join((".csv", *RASTERS, *SUFFIXES))
         raise ValueError(f"{name} must name a file that exists, one of {kinds}, got {path}")
     if suffix == ".csv":
         cells = _read_points(name, file, grid)
     elif suffix in SUFFIXES:
-        shapes = read_shapes(name, file, grid)
-        cells = burn_in(shapes, np.ones(len(shapes)), grid) > 0.0
+        cells = mark(read_shapes(name, file, grid), grid)
     else:
-        cells = _read_raster(name, file, grid)
+        cells = read_marks(name, file, grid)
     if not cells.any():
         raise ValueError(f"{name} must mark a cell of the map, {path} marks none")
     return cells
 
 
-def _read_raster(name: str, path: Path, grid: Grid) -> np.ndarray:
-    own = read_grid(name, path, metric=False)
+def read_marks(name: str, path: Path, grid: Grid) -> np.ndarray:
+    """Return the cells of a raster on a grid that are over 0 and not nodata, bool [rows, columns].
+
+    Numbers below 0 mark nothing, as the -9999 of files that declare no nodata. The largest number of a type, 255 of
+    bytes, may be nodata that was not declared, too: beside other marks it is refused.
+
+    Raises:
+        ValueError: If the file cannot be read, does not lie on the grid, or does not say what is nodata.
+    """
+    values, known = read_on_grid(name, path, grid)
+    marks = known & (values > 0) & np.isfinite(values)
+    kinds = np.unique(values[marks])
+    if len(kinds) > 1 and (kinds[-1] in _LARGEST or kinds[-1] >= 2**31 - 1):
+        rule = "say what is nodata (gdal_edit -a_nodata)"
+        raise ValueError(f"{name} must {rule}, {path} marks cells by {kinds[0]:g} and by {kinds[-1]:g}")
+    return marks
+
+
+def read_on_grid(name: str, path: Path, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+    """Return the values of a raster that lies on a grid, and where they are known, [rows, columns] and bool.
+
+    Raises:
+        ValueError: If the file cannot be read, or does not lie on the grid.
+    """
+    header = read_header(name, path, metric=False)
+    check_lies_on(name, header.grid, grid)
+    return read_layer(name, path, header.number)
+
+
+def check_lies_on(name: str, own: Grid, grid: Grid) -> None:
+    """Refuse a raster's grid that is not the landscape's; a CRS that either does not state is taken to be the other's.
+
+    Raises:
+        ValueError: With what differs.
+    """
     if own.crs is None or grid.crs is None:  # an ASCII grid has none: its place tells enough
         own = own._replace(crs=grid.crs)
-    if grid.transform is None:
-        own = own._replace(transform=None)
-        if own.shape != grid.shape:
-            raise ValueError(f"{name} must have the shape of the landscape, {grid.shape}, got {own.shape}")
-    else:
+    if grid.transform is not None:
         check_grid(name, own, "the landscape", grid)
-    values, known = read_layer(name, path)
-    return known & (values != 0)
+    elif own.shape != grid.shape:
+        raise ValueError(f"{name} must have the shape of the landscape, {grid.shape}, got {own.shape}")
 
 
 def _read_points(name: str, path: Path, grid: Grid) -> np.ndarray:

@@ -9,11 +9,12 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.random import Stream, uniform
-from warp_torchrl.world.state import Landscape
+from warp_torchrl.world.state import Cover, Landscape
 from warp_torchrl.world.terrain.landscape import draw_age, holds_trees, map_size
 
 DRAWN = 255
 """Age code of a cell whose age is drawn for each episode."""
+_LOWEST = -32768  # fuel code
 _LAYERS = ("cover", "age", "elevation", "assets", "fuel", "canopy_cover", "canopy_height")
 
 
@@ -186,6 +187,17 @@ class Cropped:
     def reach(self) -> np.ndarray:
         """Return where a world may lie, bool [rows, columns]."""
         return self._crop.reach()
+
+    def fuel_codes(self) -> dict[tuple[int, int], int]:
+        """Return how many cells each pair of a fuel code and a cover has where trees can stand and a world may lie."""
+        fuel, cells = self._crop.fuel, {}
+        if fuel is None:
+            return {}
+        reach, covers = self.reach(), torch.arange(len(Cover), dtype=torch.uint8)
+        for cover in covers[holds_trees(covers)].tolist():
+            counts = np.bincount(fuel[(self._crop.cover == cover) & reach].astype(np.int32) - _LOWEST)
+            cells |= {(int(place) + _LOWEST, cover): int(counts[place]) for place in counts.nonzero()[0]}
+        return cells
 
 
 def whereabouts(unknown: np.ndarray, inside: np.ndarray | None = None) -> str:

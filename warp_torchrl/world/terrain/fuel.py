@@ -48,6 +48,34 @@ Tree cover 10 is forest; shrubland 20, grassland 30 and cropland 40 grassland, a
 snow and ice 70, and moss and lichen 100, too thin to carry a front, bare. 0 is its nodata, and no class.
 """
 
+NLCD: Mapping[int, int] = (
+    dict.fromkeys((41, 42, 43), Cover.FOREST)
+    | dict.fromkeys((51, 52, 71, 72, 73, 74, 81, 82), Cover.GRASSLAND)
+    | dict.fromkeys((90, 95), Cover.WETLAND)
+    | dict.fromkeys((12, 21, 22, 23, 24, 31), Cover.BARE)
+    | {11: Cover.LAKE}
+)
+"""Cover of each class of the USGS National Land Cover Database (Yang et al. 2018, legend of NLCD 2016).
+
+Forests 41-43 are forest; shrub 51, 52, herbs 71-74, pasture 81 and crops 82 grassland; wetlands 90, 95 wetland; open
+water 11 lake; ice 12, developed 21-24 and barren 31 bare. 0 is its nodata, and no class.
+"""
+
+CORINE: Mapping[int, int] = (
+    dict.fromkeys((311, 312, 313), Cover.FOREST)
+    | dict.fromkeys((141, 211, 212, 213, 221, 222, 223, 231, 241, 242, 243, 244), Cover.GRASSLAND)
+    | dict.fromkeys((321, 322, 323, 324, 333), Cover.GRASSLAND)
+    | dict.fromkeys((411, 412, 421), Cover.WETLAND)
+    | dict.fromkeys((111, 112, 121, 122, 123, 124, 131, 132, 133, 142, 331, 332, 334, 335, 422, 423), Cover.BARE)
+    | dict.fromkeys((511, 512, 521, 522, 523), Cover.LAKE)
+)
+"""Cover of each class of CORINE Land Cover, of three digits (Kosztra et al. 2019, CLC nomenclature guidelines).
+
+Forests 311-313 are forest; green urban areas 141, agriculture 211-244, grass, heath, shrub and sparse vegetation
+321-324 and 333 grassland; marshes, bogs and salt marshes 411, 412, 421 wetland; water 511-523 lake; artificial
+surfaces, sand, rock, burnt areas, ice, salines and flats bare.
+"""
+
 _CONIFER, _DECIDUOUS, _SLASH, _OPEN = range(1, 8), range(11, 14), range(21, 24), (31, 32)
 
 FBP: Mapping[int, int] = (
@@ -63,14 +91,20 @@ forest, and so are 400-999, mixedwood whose last two digits are the per cent of 
 O-1b 32 is grassland; water 102 lake; what is no fuel, not known or urban, 0, 99, 100, 101 and 103-106, bare.
 """
 
-TABLES = {"fbfm13": FBFM13, "fbfm40": FBFM40, "fbp": FBP, "worldcover": WORLDCOVER}
+TABLES = {
+    "fbfm13": FBFM13,
+    "fbfm40": FBFM40,
+    "fbp": FBP,
+    "worldcover": WORLDCOVER,
+    "nlcd": NLCD,
+    "corine": CORINE,
+}
 """The presets by name."""
-LAND_COVER = ("worldcover",)
+LAND_COVER = ("worldcover", "nlcd", "corine")
 """Those whose codes are classes of land cover, and no fuel models: laws of rates of spread go by the cover there."""
 NO_FUEL = 99
 """Fuel code of cells that are not known: no fuel in FBFM13, FBFM40 and FBP alike."""
-NO_DATA = -9999
-"""Code of a fuel layer that says not known, whatever its file declares, where the table has it not."""
+_UNDECLARED = (255, 32767, 65535)
 
 
 def code_table(table: str | PathLike[str] | Mapping[int, int | str]) -> Mapping[int, int]:
@@ -118,6 +152,12 @@ def _read_pairs(path: object) -> list[tuple[object, object]]:
     return list(content.items()) if isinstance(content, dict) else []
 
 
+def is_code(codes: np.ndarray, table: Mapping[int, int]) -> np.ndarray:
+    """Return where codes may be classes, bool: numbers below 0 that the table has not say that none is known."""
+    below = codes < 0
+    return ~below | np.isin(codes, list(table)) if below.any() else ~below
+
+
 def to_cover(codes: np.ndarray, known: np.ndarray, table: Mapping[int, int]) -> np.ndarray:
     """Return the cover of each cell, uint8 [H, W]; bare where it is not known.
 
@@ -140,5 +180,8 @@ def to_cover(codes: np.ndarray, known: np.ndarray, table: Mapping[int, int]) -> 
         listed = ", ".join(f"{code:.0f}" for code in strange[:50]) + ", ..." * (strange.size > 50)
         fits = [name for name, preset in TABLES.items() if set(np.unique(codes[known])) <= preset.keys()]
         hint = f"; table={' or table='.join(fits)} has them" if fits else ""
+        if (undeclared := set(strange.tolist()) & set(_UNDECLARED)) and not fits:
+            code = f"{min(undeclared):.0f}"
+            hint = f"; if {code} is nodata, gdal_edit -a_nodata {code} makes the file say so"
         raise ValueError(f"table must have every code of fuel, it lacks {strange.size}: {listed}{hint}")
     return np.where(known, cover, np.uint8(Cover.BARE))

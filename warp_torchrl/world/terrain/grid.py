@@ -4,6 +4,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from warp_torchrl.world.terrain.crs import distortion, ground_cells
+
 
 class Grid(NamedTuple):
     """Where the cells of a layer lie.
@@ -29,9 +31,19 @@ class Grid(NamedTuple):
     @property
     def cell_size(self) -> float:
         """Return the side of a cell of a metric grid [m]; 30 where the file has no place on Earth."""
-        if self.transform == type(self.transform).identity():
+        if not self.is_placed:
             return 30.0
         return self.transform[0] * (self.crs.linear_units_factor[1] if self.crs else 1.0)
+
+    @property
+    def distortion(self) -> str:
+        """Return in words why the cells of a metric grid are not on the ground what they are on the map; else nothing.
+
+        In Web Mercator, or far from the parallels of a conic projection, a metre of the map is none of the ground.
+        """
+        if not self.crs or not self.crs.is_projected or not self.is_placed:
+            return ""
+        return distortion(ground_cells(self.crs, self.transform, self.shape), self.cell_size)
 
     @property
     def is_metric(self) -> bool:
@@ -40,7 +52,12 @@ class Grid(NamedTuple):
             return False
         side, skew_x, _, skew_y, down, _ = self.transform[:6]
         straight = all(abs(off) <= 0.01 * side for off in (skew_x, skew_y, side + down))
-        return self.transform == type(self.transform).identity() or (straight and 0.1 <= self.cell_size <= 100_000.0)
+        return not self.is_placed or (straight and 0.1 <= self.cell_size <= 100_000.0)
+
+    @property
+    def is_placed(self) -> bool:
+        """Return whether the file says where its cells lie."""
+        return bool(self.transform != type(self.transform).identity())
 
     @property
     def is_on_earth(self) -> bool:

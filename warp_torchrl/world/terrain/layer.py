@@ -1,30 +1,55 @@
-"""One raster layer: its file, its grid from the header, its values, and its values on another grid.
+"""One raster layer: its file, its grid from the header, its values, and where they are known.
 
-A layer is a GeoTIFF (.tif, .tiff) or an ESRI ASCII grid (.asc) with one band of real numbers. What is wrong with a
-file is one line that begins with the name of the layer; what the header tells is refused before a value is read.
+A layer is a band of real numbers in a GeoTIFF (.tif, .tiff) or an ESRI ASCII grid (.asc). What is wrong with a file is
+one line that begins with the name of the layer; what the header tells is refused before a value is read.
 """
 
-import math
 import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from warp_torchrl.world.terrain.bands import band_names, choose_band, unit_of
+from warp_torchrl.world.terrain.crs import check_crs
+from warp_torchrl.world.terrain.gdal import reading
 from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.vector import SUFFIXES
 
-Method = Literal["nearest", "mode", "bilinear"]
-"""How values are put on another grid."""
 LARGEST_MAP = 100_000_000
 """Most cells of a map that is read; a header that declares more is refused."""
+RASTERS = {".tif": "GTiff", ".tiff": "GTiff", ".asc": "AAIGrid"}
+"""Kinds of files of rasters, and GDAL's driver of each: no other reads them, whatever they hold."""
+NO_DATA = -9999
+"""What cells hold that are not known, in an ASCII grid that does not say: the default of ESRI's format."""
+ALONE = "write the one that is meant into a file of its own, gdal_translate -b NUMBER"
+"""What the user does where a band cannot be chosen by a key."""
 _HEADER_LINE, _NUMBER = rb"(?i)\s*(ncols|nrows|[xy]ll|cellsize|d[xy]|nodata)", rb"(?i)(?<!\S)(nan|[-+.\de]+)(?!\S)"
-_DRIVERS = {".tif": "GTiff", ".tiff": "GTiff", ".asc": "AAIGrid"}
-_UNKNOWN = -(2.0**31)  # the class that stands for nodata while classes are resampled; exact in float32
+_NODATA_LINE = rb"(?i)\s*nodata"
+_HEADER_LINES = 12  # of an ASCII grid at most
+_WORLD_FILES = (".tfw", ".tifw", ".tiffw", ".wld")
+_LARGEST_PRJ = 100_000  # bytes
+
+
+class Header(NamedTuple):
+    """What the header of a layer tells."""
+
+    path: Path
+    grid: Grid
+    number: int  # of the band, from 1
+    bands: list[str]  # descriptions of all bands, or their numbers
+    unit: str  # that the band states; nothing where it states none
+    dtype: str
+
+    @property
+    def told(self) -> str:
+        """Return the file and the band in words."""
+        band = f", band {self.bands[self.number - 1]}" if len(self.bands) > 1 else ""
+        return f"{self.path.name}{band}"
 
 
 def find_layer(name: str, folder: Path, pattern: str) -> Path:
@@ -39,7 +64,7 @@ def find_layer(name: str, folder: Path, pattern: str) -> Path:
         matches = sorted(file for file in folder.iterdir() if fnmatchcase(file.name, str(pattern)))
     except OSError as error:  # no permission, a name too long
         raise ValueError(f"{name} must name one file in {folder}, {pattern!r} does not: {error.strerror}") from None
-    kinds = (*_DRIVERS, *SUFFIXES) if name == "assets" else _DRIVERS
+    kinds = (*RASTERS, *SUFFIXES) if name == "assets" else RASTERS
     matches = [file for file in matches if file.suffix.lower() in kinds] or matches  # not .tif.aux.xml, .prj
     if len(matches) != 1:
         got = ", ".join(file.name for file in matches[:4]) or "none"
@@ -47,217 +72,116 @@ def find_layer(name: str, folder: Path, pattern: str) -> Path:
     return matches[0]
 
 
-def read_grid(name: str, path: Path, metric: bool = True, remedy: str = "resample") -> Grid:
-    """Return a layer's grid; only the header is read.
+def read_header(
+    name: str,
+    path: Path,
+    metric: bool = True,
+    remedy: str = "resample",
+    band: int | str | None = None,
+    key: str = ALONE,
+) -> Header:
+    """Return what a layer's header tells.
 
     Args:
         name: What the layer is, for messages.
         path: Its file.
-        metric: Refuse cells that are not squares in metres, north up. False for a layer that is to be resampled.
+        metric: Refuse cells that are not squares in metres, north up, and on the ground. False for a layer that is to
+            be resampled.
         remedy: What the user gives to have it resampled, for messages.
+        band: Number or description of its band; None takes the only one, or the one whose description is the layer's.
+        key: How the user chooses the band, for messages.
 
     Raises:
-        ValueError: If the file cannot be read, is enormous, or has more than a band or other than real numbers.
+        ValueError: If the file cannot be read, is enormous, or has other than real numbers, or no band is the layer's.
     """
     with _open(name, path) as layer:
-        (rows, columns), crs = layer.shape, layer.crs or None
+        (rows, columns), crs = layer.shape, check_crs(name, layer.crs)
         if rows * columns > LARGEST_MAP:
             raise ValueError(f"{name} must have at most {LARGEST_MAP} cells, {path} declares {rows} x {columns}")
-        if layer.count != 1 or not layer.dtypes[0].startswith(("int", "uint", "float")):
-            raise ValueError(f"{name} must have one band of real numbers, {path} has {', '.join(layer.dtypes[:4])}")
+        number = choose_band(name, path, layer, band, key)
+        dtype = layer.dtypes[number - 1]
+        if not dtype.startswith(("int", "uint", "float")):
+            raise ValueError(f"{name} must have one band of real numbers, {path} has {dtype}")
         grid = Grid((rows, columns), crs, layer.transform)
-        if metric and not grid.is_metric:
-            has = f"{path} has {layer.res} in {crs or 'no CRS'}"
-            hint = f"; give {remedy} to put it on such cells" if grid.is_on_earth else ""
+        header = Header(path, grid, number, band_names(layer), unit_of(layer, number), dtype)
+    _check_place(name, path, grid)
+    if metric:
+        hint = f"; give {remedy} to put it on such cells" if grid.is_on_earth else ""
+        if not grid.is_metric:
+            has = f"{path} has {_cell(grid)} in {crs or 'no CRS'}"
             raise ValueError(f"{name} must have square cells in metres, north up, {has}{hint}")
-        return grid
+        if grid.distortion:
+            has = f"{path} in {crs} has {grid.distortion}"
+            raise ValueError(f"{name} must have square cells in metres of the ground, {has}{hint}")
+    return header
 
 
-def read_layer(name: str, path: Path) -> tuple[np.ndarray, np.ndarray]:
+def read_grid(name: str, path: Path, metric: bool = True, remedy: str = "resample") -> Grid:
+    """Return a layer's grid; see ``read_header``."""
+    return read_header(name, path, metric, remedy).grid
+
+
+def read_layer(name: str, path: Path, number: int | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Return a layer's values, with the scale and offset of its file, and where they are known, [H, W] and bool.
+
+    In an ASCII grid whose header does not say what nodata is, it is -9999.
+
+    Args:
+        name: What the layer is, for messages.
+        path: Its file.
+        number: Of its band, from ``read_header``; None finds it as that does.
 
     Raises:
         ValueError: If the file is cut or damaged, holds no data, or a word stands among the numbers of a text grid.
     """
+    number = read_header(name, path, metric=False).number if number is None else number
     with _open(name, path) as layer:
-        values, known = layer.read(1), layer.read_masks(1) > 0
-        if (layer.scales[0], layer.offsets[0]) != (1.0, 0.0):
-            values = values.astype(np.float64) * layer.scales[0] + layer.offsets[0]
+        values, known = layer.read(number), layer.read_masks(number) > 0
+        if (layer.scales[number - 1], layer.offsets[number - 1]) != (1.0, 0.0):
+            values = values.astype(np.float64) * layer.scales[number - 1] + layer.offsets[number - 1]
         if layer.driver == "AAIGrid":  # GDAL reads a word as 0, and skips numbers past the last cell
             with path.open("rb") as lines:
                 count = sum(len(re.findall(_NUMBER, line)) for line in lines if not re.match(_HEADER_LINE, line))
             if count != values.size:
                 raise ValueError(f"{name} must hold {values.size} numbers after its header, {path} holds {count}")
+            known &= (values != NO_DATA) | _states_nodata(path)
     if not known.any():
         raise ValueError(f"{name} must hold data, {path} is all nodata")
     return values, known
 
 
-def resample_layer(name: str, path: Path, grid: Grid, method: Method) -> tuple[np.ndarray, np.ndarray]:
-    """Return a layer's values on another grid, which may have another CRS, and where they are known.
-
-    Args:
-        name: What the layer is, for messages.
-        path: Its file.
-        grid: The grid to put it on.
-        method: GDAL's ``nearest`` takes the value of the cell that the new cell's middle lies in; ``mode`` the value
-            that most cells under the new one have, nodata being a value too; ``bilinear`` interpolates between the
-            middles of the known cells around, and where cells get larger weighs all that the new one and half its
-            neighbours cover. A new cell whose middle lies on nodata or off the layer is unknown in ``nearest`` and
-            ``bilinear``; in ``mode`` one that lies off it as a whole.
-
-    Returns:
-        float64 and bool, [H, W] of ``grid``.
-
-    Raises:
-        ValueError: As ``read_grid`` and ``read_layer``; or if either grid has no CRS, or they do not overlap.
-    """
-    source = read_grid(name, path, metric=False)
-    _check_overlap(name, source, grid)
-    return resample(name, *read_layer(name, path), source, grid, method)
+def _states_nodata(path: Path) -> bool:
+    """Return whether the header of an ASCII grid says what nodata is."""
+    with path.open("rb") as lines:
+        return any(re.match(_NODATA_LINE, line) for _, line in zip(range(_HEADER_LINES), lines))
 
 
-def resample(
-    name: str, values: np.ndarray, known: np.ndarray, source: Grid, grid: Grid, method: Method
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return values of one grid on another; see ``resample_layer``.
-
-    Args:
-        name: What the layer is, for messages.
-        values: Its values, [rows, columns] of ``source``.
-        known: Where they are known, bool.
-        source: The grid that they are on.
-        grid: The grid to put them on.
-        method: ``nearest``, ``mode`` or ``bilinear``.
-
-    Returns:
-        float64 and bool, [H, W] of ``grid``.
-
-    Raises:
-        ValueError: If either grid has no CRS, they do not overlap, or one cannot be reached from the other.
-    """
-    _check_overlap(name, source, grid)
-    from rasterio.warp import Resampling, reproject
-
-    hole = math.nan if method == "bilinear" else _UNKNOWN
-    target = np.full(grid.shape, hole)
-    nodata = {"src_nodata": hole, "dst_nodata": hole} if method == "bilinear" else {}
-    places = {"src_transform": source.transform, "src_crs": source.crs}
-    places |= {"dst_transform": grid.transform, "dst_crs": grid.crs}
-    values = np.where(known, values, hole).astype(np.float64)
-    with _gdal_errors(f"{name} must be resampled to {grid.crs}, which fails"):
-        reproject(values, target, **places, **nodata, resampling=Resampling[method], init_dest_nodata=False)
-    known = ~np.isnan(target) if method == "bilinear" else target != _UNKNOWN
-    if not known.any():
-        raise ValueError(f"{name} must hold data where it is resampled to, {grid.bounds}, it has none there")
-    return target, known
+def _check_place(name: str, path: Path, grid: Grid) -> None:
+    """Refuse a GeoTIFF without a place that has a world file beside it, which is not read."""
+    beside = [path.with_suffix(each) for each in _WORLD_FILES if path.with_suffix(each).is_file()]
+    if beside and not grid.is_placed:
+        rule = f"hold its place, which stands beside it in {beside[0].name}"
+        raise ValueError(f"{name} must {rule}, {path} does not: gdal_translate puts it into a file")
 
 
-def fill(values: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Return values [H, W] with what is not known interpolated from the known cells around, 100 cells off at most.
-
-    Cells farther off get the mean of all that are known.
-    """
-    from rasterio.fill import fillnodata
-
-    if known.all():
-        return values
-    filled = fillnodata(np.where(known, values, math.nan), mask=known, max_search_distance=100.0)
-    return np.where(np.isnan(filled), values[known].mean(), filled).astype(values.dtype)
-
-
-def regrid(name: str, grid: Grid, resolution: float) -> Grid:
-    """Return the grid of square cells, whole ones only, that covers another from its north-west corner on.
-
-    A grid in degrees becomes one of the UTM zone of its middle; a projected one keeps its CRS.
-
-    Args:
-        name: Whose grid it is, for messages.
-        grid: The grid to cover.
-        resolution: Side of the new cells [m].
-
-    Raises:
-        ValueError: If the grid has no CRS, lies too near a pole for UTM, or makes no cell or too many.
-    """
-    from rasterio import Affine
-
-    if not grid.is_on_earth:
-        raise ValueError(f"{name} must have a CRS, projected or in degrees, to be resampled, got {grid.crs}")
-    crs = grid.crs if grid.crs.is_projected else _find_utm(name, grid)
-    west, south, east, north = _project_bounds(name, grid, crs)
-    side = resolution / crs.linear_units_factor[1]
-    sides = [(north - south) / side + 1e-6, (east - west) / side + 1e-6]  # 6 cells are 5.999.. in floating point
-    if not all(1 <= each <= LARGEST_MAP for each in sides) or int(sides[0]) * int(sides[1]) > LARGEST_MAP:
-        rule = f"give 1 to {LARGEST_MAP} cells on {name}"
-        raise ValueError(f"resolution must {rule}, got {resolution:g} m for {sides[0]:.1f} x {sides[1]:.1f} cells")
-    return Grid((int(sides[0]), int(sides[1])), crs, Affine(side, 0.0, west, 0.0, -side, north))
-
-
-def _find_utm(name: str, grid: Grid) -> Any:
-    """Return the UTM zone of a grid's middle."""
-    from rasterio.crs import CRS
-
-    west, south, east, north = _project_bounds(name, grid, CRS.from_epsg(4326))
-    longitude, latitude = (west + east) / 2, (south + north) / 2
-    if not (-80.0 <= latitude <= 84.0 and -180.0 <= longitude <= 180.0):
-        raise ValueError(f"{name} must lie in 80 S to 84 N to be put on a UTM grid, its middle is at {latitude:g}")
-    zone = min(int((longitude + 180.0) // 6.0) + 1, 60)
-    return CRS.from_epsg((32600 if latitude >= 0.0 else 32700) + zone)
-
-
-def _project_bounds(name: str, grid: Grid, crs: Any) -> tuple[float, float, float, float]:
-    """Return a grid's (west, south, east, north) in another CRS; infinite where it cannot be seen there."""
-    from rasterio._err import CPLE_BaseError
-    from rasterio.errors import RasterioError
-    from rasterio.warp import transform_bounds
-
-    if crs == grid.crs:
-        return grid.bounds
-    try:
-        return transform_bounds(grid.crs, crs, *grid.bounds)
-    except (CPLE_BaseError, RasterioError, ValueError) as error:
-        reason = " ".join(str(error).split())
-        raise ValueError(f"{name} must have a CRS that {crs} can be reached from, got {grid.crs}: {reason}") from None
-
-
-def _check_overlap(name: str, source: Grid, grid: Grid) -> None:
-    if not (source.is_on_earth and grid.is_on_earth):
-        rule = "have a CRS, projected or in degrees, and so must the grid that it is resampled to"
-        raise ValueError(f"{name} must {rule}, it has {source.crs}, the grid {grid.crs}")
-    west, south, east, north = _project_bounds(name, source, grid.crs)
-    left, bottom, right, top = grid.bounds
-    if not (west < right and left < east and south < top and bottom < north):
-        got = tuple(round(each, 1) for each in (west, south, east, north))
-        raise ValueError(f"{name} must overlap the grid {grid.bounds} that it is resampled to, it covers {got}")
+def _cell(grid: Grid) -> tuple[float, float]:
+    a, _, _, _, e, _ = grid.transform[:6]
+    return abs(a), abs(e)
 
 
 @contextmanager
 def _open(name: str, path: Path) -> Iterator[Any]:
     """Open a layer with the driver that its suffix states; GDAL's errors become one line."""
-    try:
-        import rasterio
-    except ImportError:
-        raise ValueError('path must be read with rasterio, which is missing: pip install "warp_torchrl[gis]"') from None
-    driver = _DRIVERS.get(path.suffix.lower())
+    driver = RASTERS.get(path.suffix.lower())
     if driver is None:
         raise ValueError(f"{name} must be a GeoTIFF (.tif, .tiff) or an ESRI ASCII grid (.asc), got {path}")
     options = {"datatype": "Float64"} if driver == "AAIGrid" else {}  # left to guess integers, GDAL cuts decimals off
-    with _gdal_errors(f"{name} must be a whole {driver} raster, {path} cannot be read"):
+    with reading(f"{name} must be a whole {driver} raster, {path} cannot be read") as rasterio:
+        projection = path.with_suffix(".prj")
+        if driver == "AAIGrid" and projection.is_file() and projection.stat().st_size > _LARGEST_PRJ:
+            raise ValueError(f"{name} must have a .prj of at most {_LARGEST_PRJ} bytes, {projection} is larger")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
             dataset = rasterio.open(path, driver=driver, **options)
         with dataset:
             yield dataset
-
-
-@contextmanager
-def _gdal_errors(rule: str) -> Iterator[None]:
-    """Turn what GDAL raises into one line."""
-    from rasterio._err import CPLE_BaseError
-    from rasterio.errors import CRSError, RasterioError
-
-    try:
-        yield
-    except (RasterioError, CRSError, CPLE_BaseError, OSError) as error:
-        reason = " ".join(str(error.__cause__ or error).split())
-        raise ValueError(f"{rule}: {reason}") from None

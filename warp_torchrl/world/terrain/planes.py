@@ -14,15 +14,39 @@ from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.landscape import TALLEST
 from warp_torchrl.world.terrain.vector import burn_in, read_shapes
 
+_ENOUGH = 16  # rows and columns of a map whose slopes are judged
 
-def to_metres(heights: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Return elevation, float32 [H, W] [m]; 0 where it is not known.
+
+def to_metres(heights: np.ndarray, known: np.ndarray, unit: float = 1.0) -> np.ndarray:
+    """Return elevation, float32 [H, W] [m], of heights in a unit [m]; 0 where it is not known.
 
     Raises:
         ValueError: If a height is not in [-1000, 10000] m: NaN, or nodata undeclared, -9999 or 32767.
     """
-    _check("elevation", heights, known, -1000.0, 10_000.0, " m")
-    return np.where(known, heights, 0).astype(np.float32)
+    words = " m" if unit == 1.0 else f" (-1000 to 10000 m in units of {unit:g} m)"
+    _check("elevation", heights, known, -1000.0 / unit, 10_000.0 / unit, words)
+    return np.where(known, heights * unit if unit != 1.0 else heights, 0).astype(np.float32)
+
+
+def check_slopes(metres: np.ndarray, known: np.ndarray, cell_size: float) -> None:
+    """Refuse elevation that is too steep to be in metres: half of the ground steeper than 45 degrees.
+
+    Args:
+        metres: Elevation, [H, W] [m].
+        known: Where it is known, bool.
+        cell_size: Side of a cell [m].
+
+    Raises:
+        ValueError: With the median slope.
+    """
+    if min(metres.shape) < _ENOUGH:
+        return
+    south, east = np.gradient(np.where(known, metres, np.nan), cell_size)
+    steep = np.hypot(south, east)
+    steep = steep[~np.isnan(steep)]
+    if len(steep) and (median := float(np.median(steep))) > 1.0:
+        got = f"half of its slopes are above {math.degrees(math.atan(median)):.0f} degrees"
+        raise ValueError(f"elevation_unit must be given where metres are too steep to be true, {got}; 0.3048 for feet")
 
 
 def to_worth(values: np.ndarray, known: np.ndarray) -> np.ndarray:
@@ -52,7 +76,7 @@ def _worth(path: Path, properties: Mapping[str, Any]) -> float:
     value = next((told[name] for name in ("worth", "value") if told.get(name) is not None), 1.0)
     try:
         worth = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         worth = math.nan
     if not 0.0 <= worth < math.inf:
         raise ValueError(f"assets must have a worth of 0 or more, {path} has {value!r}")
@@ -83,6 +107,9 @@ def to_canopy_cover(values: np.ndarray, known: np.ndarray) -> np.ndarray:
         ValueError: If it is not in [0, 100].
     """
     _check("canopy", values, known, 0.0, 100.0)
+    seen = values[known]
+    if seen.size and seen.max() <= 1.0 and (seen != np.rint(seen)).any():
+        raise ValueError(f"canopy must be in per cent, 0 to 100, it has shares of 1 at most, {seen.max():g}")
     return np.where(known, values, 0).astype(np.float32)
 
 
@@ -97,11 +124,14 @@ def to_canopy_height(values: np.ndarray, known: np.ndarray, unit: float) -> np.n
 
 
 def to_fuel(codes: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Return whole class codes, int16 [H, W]; ``NO_FUEL`` where they are not known.
+    """Return class codes, int16 [H, W]; ``NO_FUEL`` where they are not known.
 
     Raises:
-        ValueError: If a code is not in -32768..32767.
+        ValueError: If a code is not whole, or not in -32768..32767.
     """
+    broken = known & (codes != np.rint(codes))
+    if broken.any():
+        raise ValueError(f"fuel must hold whole class codes, got {codes[broken][0]}")
     _check("fuel", codes, known, -32768, 32767)
     return np.where(known, codes, NO_FUEL).astype(np.int16)
 

@@ -1,11 +1,8 @@
 """Landscapes from rasters: fuel or land cover, elevation, and tree age or canopy cover, cropped to the world's size."""
 
-import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
 from os import PathLike
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -13,12 +10,12 @@ import numpy as np
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.state import OLDEST
 from warp_torchrl.world.terrain.crop import Crop, Cropped
-from warp_torchrl.world.terrain.fuel import LAND_COVER, NO_DATA, code_table, to_cover
-from warp_torchrl.world.terrain.grid import Grid, check_grid
+from warp_torchrl.world.terrain.fuel import LAND_COVER, code_table, is_code, to_cover
+from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.landscape import map_size
-from warp_torchrl.world.terrain.layer import fill, find_layer, read_grid, read_layer, regrid, resample_layer
+from warp_torchrl.world.terrain.layers import Layers, elevation_unit, find_layers, height_unit, read_layers, unread
 from warp_torchrl.world.terrain.planes import (
-    read_worth,
+    check_slopes,
     to_age,
     to_canopy_cover,
     to_canopy_height,
@@ -27,24 +24,28 @@ from warp_torchrl.world.terrain.planes import (
     to_metres,
     to_worth,
 )
-from warp_torchrl.world.terrain.vector import SUFFIXES
+from warp_torchrl.world.terrain.resampling import fill
 
-_log = logging.getLogger("warp_torchrl")
+LAYERS = ("fuel", "elevation", "age", "canopy", "canopy_height", "assets")
+"""The layers of a map, which have a file name or a pattern each."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Raster(Cropped):
     """Real ground: the cover from a fuel or land-cover layer and the elevation, read once and cropped from one grid.
 
-    A layer is a GeoTIFF (.tif, .tiff) or an ESRI ASCII grid (.asc) with one band. The grid is the fuel layer's, which
-    must have square cells in metres, north up, or one of cells of ``resolution``. Where it has no CRS, as ASCII grids
-    have none, its unit is taken to be the metre, and a warning says so.
+    A layer is a band of a GeoTIFF (.tif, .tiff) or an ESRI ASCII grid (.asc). The grid is the fuel layer's, which must
+    have square cells in metres of the ground, north up, or one of cells of ``resolution``. Where it has no CRS, as
+    ASCII grids have none, its unit is taken to be the metre, and a warning says so.
 
     Attributes:
         path: Folder of the layers; or the fuel layer's file, with the others beside it. None is an error.
         size: Side of the crop, or (rows, columns) [cells].
-        elevation: File name of the elevation layer [m], or a pattern that one raster in the folder matches; None
-            makes a flat world.
+        elevation: File name of the elevation layer, or a pattern that one raster in the folder matches; None makes a
+            flat world.
+        elevation_unit: Metres to a unit of that layer, 0.3048 for feet; None takes the unit that the file states, of
+            its band or its vertical CRS, else metres. It must be told where the map is in feet and the file states
+            none, or where metres are too steep to be true.
         fuel: The same for the layer of class codes; not used where ``path`` is a file. Laws of rates of spread read the
             codes as they stand there.
         table: Cover of each class code: a preset of ``fuel.TABLES``, or a mapping to ``Cover`` codes or names, or a
@@ -63,16 +64,19 @@ class Raster(Cropped):
             LANDFIRE has 0 over grass and a mixture over shrub, so there, and under nodata, the age is drawn. A forest
             cell without canopy keeps a young tree, code 1, since its fuel is timber and code 0 is bare ground or ash.
         canopy_height: The same for a layer of the height of the canopy's top; nodata is 0.
-        height_unit: Metres to a unit of that layer, which must be told: 0.1 for LANDFIRE's CH, 1 for metres.
+        height_unit: Metres to a unit of that layer, which must be told where the file does not state it: 0.1 for
+            LANDFIRE's CH, 1 for metres.
         assets: The same for a layer of what each cell is worth, 0 or more in any unit, for rewards that ask; nodata is
             0. Or for GeoJSON or a shapefile, where a cell is worth the sum of what lies in it, each shape's property
             ``worth`` or ``value``, or 1. None leaves all alike.
+        bands: Number or description of the band that a layer is, by the layer's name: ``{fuel: 4, elevation: 1}``.
+            Of a file with several bands others are found by their descriptions, as LANDFIRE and FlamMap write them.
         resample: What becomes of layers on another grid: ``refuse`` makes them an error; ``nearest`` and ``mode``
             (the most frequent class) are how class codes are put on the grid, elevation, age and canopy being
             interpolated (bilinear) in both. See ``resample_layer``.
         resolution: Side of the grid's cells [m], a grid over the fuel layer from its north-west corner on, in the
-            fuel layer's CRS; in the UTM zone of its middle where that is in degrees, as ESA WorldCover is. None keeps
-            the fuel layer's grid. It needs ``resample``.
+            fuel layer's CRS; in the UTM zone of its middle where that is in degrees, as ESA WorldCover is, or has other
+            metres than the ground, as Web Mercator. None keeps the fuel layer's grid. It needs ``resample``.
         row: Top row of the crop in the grid. None, with ``column``, draws a window for each episode.
         column: Left column of the crop in the grid.
         min_fuel: Lowest share of a drawn window where trees can stand, so that there is something to burn.
@@ -86,6 +90,7 @@ class Raster(Cropped):
     path: str | PathLike[str] | None = None
     size: tuple[int, int] | int = 64
     elevation: str | None = "*Elev*"
+    elevation_unit: float | None = None
     fuel: str = "*F13*"
     table: str | PathLike[str] | Mapping[int, int | str] = "fbfm13"
     nodata: Literal["refuse", "unburnable"] = "refuse"
@@ -96,34 +101,34 @@ class Raster(Cropped):
     canopy_height: str | None = None
     height_unit: float | None = None
     assets: str | None = None
+    bands: Mapping[str, int | str] = field(default_factory=dict)
     resample: Literal["refuse", "nearest", "mode"] = "refuse"
     resolution: float | None = None
     row: int | None = None
     column: int | None = None
     min_fuel: float = 0.5
     _grid: Grid = field(init=False, repr=False, compare=False)
+    _files: tuple[str, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         check_fields(
             self,
             full_age=(1e-6, 1e6),
+            elevation_unit=(1e-3, 10.0),
             height_unit=(1e-3, 10.0),
             resolution=(0.1, 100_000.0),
             min_fuel=(0.0, 1.0),
         )
         map_size(self.size)
         self._check_together()
-        table, paths = code_table(self.table), self._find_layers()
-        layers, known = self._read_layers(paths)
-        if NO_DATA not in table:
-            known["fuel"] = known["fuel"] & (layers["fuel"] != NO_DATA)
-        crop = Crop(
-            **self._make_planes(layers, known, table),
-            size=self.size,
-            row=self.row,
-            column=self.column,
-            min_fuel=self.min_fuel,
-        )
+        table = code_table(self.table)
+        paths = find_layers(self.path, {name: getattr(self, name) for name in LAYERS})
+        layers = read_layers(paths, self.bands, self.resample, self.resolution)
+        object.__setattr__(self, "_grid", layers.grid)
+        layers.known["fuel"] &= is_code(layers.values["fuel"], table)
+        planes, units = self._make_planes(layers, table)
+        crop = Crop(**planes, size=self.size, row=self.row, column=self.column, min_fuel=self.min_fuel)
+        object.__setattr__(self, "_files", self._told(layers, units))
         object.__setattr__(self, "_crop", crop)
 
     @property
@@ -136,87 +141,68 @@ class Raster(Cropped):
         """Return the side of a cell of the grid [m]; 30 where the fuel layer has no place on Earth."""
         return self._grid.cell_size
 
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Return a line for each file: which layer it is, in which unit, and which bands and files are left unread."""
+        return self._files
+
     def _check_together(self) -> None:
         if self.age is not None and self.canopy is not None:
             raise ValueError(f"canopy must be null where age makes the trees, got {self.canopy} and {self.age}")
         if self.age is not None and self.ages == "oldest":
             raise ValueError(f"ages must be drawn where age, {self.age}, tells them, got oldest")
-        if self.canopy_height is not None and self.height_unit is None:
-            raise ValueError("height_unit must be given with canopy_height, 0.1 for LANDFIRE or 1 for metres, got None")
         if self.resolution is not None and self.resample == "refuse":
             raise ValueError(f"resample must be nearest or mode where resolution is {self.resolution:g}, got refuse")
 
-    def _make_planes(
-        self, layers: Mapping[str, np.ndarray], known: Mapping[str, np.ndarray], table: Mapping[int, int]
-    ) -> dict[str, Any]:
-        """Return the planes of the map, and where it is known, by their names in ``Crop``."""
-        cover = to_cover(layers["fuel"], known["fuel"], table)
+    def _make_planes(self, layers: Layers, table: Mapping[int, int]) -> tuple[dict[str, Any], dict[str, str]]:
+        """Return the planes of the map, and where it is known, by their names in ``Crop``; and the units of layers."""
+        values, known, units = layers.values, layers.known, {}
+        cover = to_cover(values["fuel"], known["fuel"], table)
         planes: dict[str, Any] = {"cover": cover}
         if self.table not in LAND_COVER:
-            planes["fuel"] = to_fuel(layers["fuel"], known["fuel"])
-        if "elevation" in layers:
-            metres = to_metres(layers["elevation"], known["elevation"])
+            planes["fuel"] = to_fuel(values["fuel"], known["fuel"])
+        if "elevation" in values:
+            unit = elevation_unit(layers.headers["elevation"], self.elevation_unit)
+            metres, units["elevation"] = to_metres(values["elevation"], known["elevation"], unit), _length(unit)
+            if self.elevation_unit is None and not layers.headers["elevation"].unit:
+                check_slopes(metres, known["elevation"], self.cell_size)
             planes["elevation"] = metres if self.nodata == "refuse" else fill(metres, known["elevation"])
-        if "age" in layers:
-            planes["age"] = to_age("age", layers["age"], known["age"], self.full_age)
-        if "canopy" in layers:
-            planes["age"] = to_forest_age(cover, layers["canopy"], known["canopy"])
-            planes["canopy_cover"] = to_canopy_cover(layers["canopy"], known["canopy"])
-        if self.height_unit is not None and "canopy_height" in layers:
-            planes["canopy_height"] = to_canopy_height(
-                layers["canopy_height"], known["canopy_height"], self.height_unit
-            )
-        if "assets" in layers:
-            planes["assets"] = to_worth(layers["assets"], known["assets"])
+        if "age" in values:
+            planes["age"] = to_age("age", values["age"], known["age"], self.full_age)
+        if "canopy" in values:
+            planes["age"] = to_forest_age(cover, values["canopy"], known["canopy"])
+            planes["canopy_cover"] = to_canopy_cover(values["canopy"], known["canopy"])
+            units["canopy"] = "%"
+        if "canopy_height" in values:
+            unit = height_unit(layers.headers["canopy_height"], self.height_unit)
+            planes["canopy_height"] = to_canopy_height(values["canopy_height"], known["canopy_height"], unit)
+            units["canopy_height"] = _length(unit)
+        if "assets" in values:
+            planes["assets"] = to_worth(values["assets"], known["assets"])
         if self.ages == "oldest":
             planes["age"] = np.full(cover.shape, OLDEST, np.uint8)
         whole = known["fuel"] & known.get("elevation", known["fuel"])
-        return {**planes, "known": whole if self.nodata == "refuse" else None}
+        return {**planes, "known": whole if self.nodata == "refuse" else None}, units
 
-    def _find_layers(self) -> dict[str, Path]:
-        try:
-            exists = isinstance(self.path, str | PathLike) and self.path and Path(self.path).exists()
-        except OSError:  # a name too long
-            exists = False
-        if self.path is None or not exists:
-            raise ValueError(f"path must name a folder of rasters, or a raster, that exists, got {self.path!r}")
-        path = Path(self.path)
-        folder = path if path.is_dir() else path.parent
-        paths = {"fuel": find_layer("fuel", folder, self.fuel) if path.is_dir() else path}
-        for name in ("elevation", "age", "canopy", "canopy_height", "assets"):
-            if getattr(self, name) is not None:
-                paths[name] = find_layer(name, folder, getattr(self, name))
-        return paths
-
-    def _read_layers(self, paths: Mapping[str, Path]) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-        """Return the values of each layer on the grid, and where they are known; every header is checked first."""
-        strict = self.resample == "refuse"
-        vector = "assets" in paths and paths["assets"].suffix.lower() in SUFFIXES
-        shapes = paths["assets"] if vector else None
-        paths = {name: path for name, path in paths.items() if not (vector and name == "assets")}
-        grid = read_grid("fuel", paths["fuel"], self.resolution is None, remedy="resolution=30 resample=mode")
-        if not grid.crs:
-            _tell_once(f"{paths['fuel']} has no CRS: its cells are taken as squares of {grid.cell_size:g} m")
-        grids = {"fuel": grid}
-        if self.resolution is not None:
-            grid = regrid("fuel", grid, self.resolution)
-        object.__setattr__(self, "_grid", grid)
-        for name in paths.keys() - grids.keys():
-            grids[name] = read_grid(name, paths[name], metric=strict)
-            if strict:
-                check_grid(name, grids[name], "fuel", grid)
-        layers, known = {}, {}
-        if shapes is not None:
-            layers["assets"], known["assets"] = read_worth(shapes, grid), np.ones(grid.shape, bool)
-        for name, path in paths.items():
-            if grids[name].differs_in(grid) is None:
-                layers[name], known[name] = read_layer(name, path)
-            else:
-                method = self.resample if name == "fuel" else "bilinear"  # "refuse" has raised by now
-                layers[name], known[name] = resample_layer(name, path, grid, method)  # type: ignore[arg-type]
-        return layers, known
+    def _told(self, layers: Layers, units: Mapping[str, str]) -> tuple[str, ...]:
+        """Return what is read of each file, and what is left."""
+        named = self.table if isinstance(self.table, str) else "a table of your own"
+        units = {"fuel": f"codes of {named}", **units}
+        lines = []
+        for name, path in layers.paths.items():
+            header = layers.headers.get(name)
+            told = path.name if header is None else header.told
+            lines.append(f"{name}: {told}" + (f" [{units[name]}]" if name in units else ""))
+        read = {(each.path, each.number) for each in layers.headers.values()}
+        for path, bands in {each.path: each.bands for each in layers.headers.values()}.items():
+            left = [band for number, band in enumerate(bands, start=1) if (path, number) not in read]
+            if left:
+                lines.append(f"bands of {path.name} that are not read: {', '.join(left)}")
+        folder = layers.paths["fuel"].parent
+        if others := unread(folder, layers.paths.values()):
+            lines.append(f"files of {folder.name} that the map does not read: {', '.join(others)}")
+        return tuple(lines)
 
 
-@cache
-def _tell_once(line: str) -> None:
-    _log.warning(line)
+def _length(unit: float) -> str:
+    return "m" if unit == 1.0 else f"{unit:g} m"

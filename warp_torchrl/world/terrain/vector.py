@@ -1,57 +1,54 @@
-"""Points, lines and polygons of a file on a grid: GeoJSON and ESRI shapefiles.
+"""Points, lines and polygons of a file on a grid, and the cells that they mark."""
 
-Shapefiles are read with pyshp: it is pure Python, so the extra ``gis`` brings no second copy of GDAL beside rasterio's.
-"""
-
-import json
 import logging
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from warp_torchrl.world.terrain.crs import project
+from warp_torchrl.world.terrain.features import SUFFIXES, Part, read_features
+from warp_torchrl.world.terrain.gdal import reading
 from warp_torchrl.world.terrain.grid import Grid
 
-SUFFIXES = (".geojson", ".json", ".shp")
-"""Of the files that are read here."""
-_WGS84 = "EPSG:4326"
+__all__ = ["SUFFIXES", "Shape", "burn_in", "in_grid", "mark", "read_shapes"]
+_EDGE = 2  # cells
 _log = logging.getLogger("warp_torchrl")
 
 
 class Shape(NamedTuple):
     """One point, line or polygon in a grid's coordinates, and what its file says of it."""
 
-    geometry: Mapping[str, Any]
+    part: Part
     properties: Mapping[str, Any]
+    feature: int  # its place in the file: parts of one feature have the same
+
+    @property
+    def corners(self) -> np.ndarray:
+        """Return all corners, float64 [n, 2]."""
+        return np.concatenate(self.part.rings)
 
 
 def read_shapes(name: str, path: Path, grid: Grid) -> list[Shape]:
     """Return the shapes of a file, each of one part, that touch the grid's box; those off it are counted in a warning.
 
-    GeoJSON is in longitude and latitude (RFC 7946) unless it has a ``crs``, and in the grid's own coordinates where
-    that is null; a shapefile is in the CRS of its ``.prj``, or in the grid's own coordinates where it has none.
-
     Args:
         name: What the file is, for messages.
-        path: A file with one of ``SUFFIXES``.
+        path: A file with one of ``SUFFIXES``; see ``read_features``.
         grid: The grid.
 
     Raises:
         ValueError: If the file cannot be read, has other shapes, cannot be placed, or lies off the grid as a whole.
     """
-    features, crs = _read_shapefile(name, path) if path.suffix.lower() == ".shp" else _read_geojson(name, path)
-    try:
-        parts = [Shape(part, about) for geometry, about in features for part in _parts(geometry)]
-        corners = [_points(part.geometry["coordinates"]) for part in parts]
-    except (AttributeError, IndexError, KeyError, TypeError, ValueError):
-        raise ValueError(f"{name} must hold points, lines or polygons, {path} holds something else") from None
-    moved = [_moved(name, part, at, crs, grid) for part, at in zip(parts, corners, strict=True)]
-    near = [part for part in moved if _touches(part, grid)]
+    features, crs = read_features(name, path, placed=grid.crs is not None)
+    parts = [(part, each.properties, place) for place, each in enumerate(features) for part in each.parts]
+    moved = [Shape(_moved(name, part, crs, grid), about, place) for part, about, place in parts]
+    near = [shape for shape in moved if _touches(shape, grid)]
     if not near:
-        raise ValueError(
-            f"{name} must hold shapes on the map {_box(grid)}, {path} has {len(moved)}, none of them there"
-        )
+        got = f"{path} has {len(moved)}, none of them there"
+        raise ValueError(f"{name} must hold shapes on the map {[round(each, 1) for each in grid.bounds]}, {got}")
     if len(near) < len(moved):
         _log.warning(
             "%s: %d of %d shapes of %s lie off the map and are left out", name, len(moved) - len(near), len(moved), path
@@ -60,24 +57,35 @@ def read_shapes(name: str, path: Path, grid: Grid) -> list[Shape]:
 
 
 def burn_in(shapes: Iterable[Shape], values: Iterable[float], grid: Grid) -> np.ndarray:
-    """Return the sum of the values of the shapes in each cell, float64 [rows, columns].
+    """Return the sum of the values of the features that mark each cell, float64 [rows, columns].
 
-    A polygon has the cells whose middle is in it, and where it is narrower than a cell those that it touches, as points
-    and lines have.
+    Args:
+        shapes: In the order of their file.
+        values: Of each shape's feature.
+        grid: The grid.
     """
-    from rasterio.enums import MergeAlg
-    from rasterio.features import rasterize
+    total = np.zeros(_beyond(grid))
+    pairs = zip(shapes, values, strict=True)
+    for _, group in groupby(pairs, key=lambda pair: pair[0].feature):
+        parts, worth = zip(*group, strict=True)
+        windows = [_window(shape, grid) for shape in parts]
+        rows, columns = (_hull([window[axis] for window in windows]) for axis in (0, 1))
+        total[rows, columns] += worth[0] * _marked(parts, grid, rows, columns)
+    return total[_EDGE:-_EDGE, _EDGE:-_EDGE]
 
-    groups: dict[bool, list[tuple[Any, float]]] = {False: [], True: []}
-    for shape, value in zip(shapes, values, strict=True):
-        groups[_is_small(shape, grid)].append((shape.geometry, value))
-    total = np.zeros(grid.shape)
-    for touched, pairs in groups.items():
-        if pairs:
-            rasterize(
-                pairs, out=total, transform=grid.transform, all_touched=touched, merge_alg=MergeAlg.add, dtype="float64"
-            )
-    return total
+
+def mark(shapes: Iterable[Shape], grid: Grid) -> np.ndarray:
+    """Return the cells that shapes mark, bool [rows, columns].
+
+    A point marks the cell that it lies in, a line those that it touches, a polygon those whose middle is in it. Where
+    these do not reach all of a polygon, or fall apart, it is narrower than a cell there, and marks cells that it
+    touches too: those farther than a cell from any such middle, and those that join what fell apart.
+    """
+    cells = np.zeros(_beyond(grid), bool)
+    for shape in shapes:
+        rows, columns = _window(shape, grid)
+        cells[rows, columns] |= _marked([shape], grid, rows, columns)
+    return cells[_EDGE:-_EDGE, _EDGE:-_EDGE]
 
 
 def in_grid(name: str, x: np.ndarray, y: np.ndarray, crs: Any, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
@@ -86,8 +94,6 @@ def in_grid(name: str, x: np.ndarray, y: np.ndarray, crs: Any, grid: Grid) -> tu
     Raises:
         ValueError: If the grid has no CRS to come to, or no way leads there.
     """
-    from rasterio.warp import transform
-
     if grid.transform is None:
         raise ValueError(f"{name} must be a CSV of row,column where the landscape has no place on Earth")
     if crs is None or crs == grid.crs:
@@ -95,125 +101,92 @@ def in_grid(name: str, x: np.ndarray, y: np.ndarray, crs: Any, grid: Grid) -> tu
     if grid.crs is None:
         rule = 'x,y in a CSV or "crs": null in GeoJSON, as the map has no CRS'
         raise ValueError(f"{name} must have the map's own coordinates, {rule}, got {crs}")
-    try:
-        east, north = transform(crs, grid.crs, x, y)
-    except Exception as error:  # of half a dozen classes, of rasterio, GDAL and PROJ
-        raise ValueError(f"{name} must have a CRS that leads to {grid.crs}, got {crs}: {_line(error)}") from None
-    return np.asarray(east), np.asarray(north)
+    return project(name, x, y, crs, grid.crs)
 
 
-def _read_geojson(name: str, path: Path) -> tuple[list[tuple[Any, Mapping[str, Any]]], Any]:
-    """Return geometries with their properties, and the CRS; None is the grid's own."""
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-        if not isinstance(document, dict):
-            raise ValueError("it is not an object")
-        kind = document.get("type")
-        features = document["features"] if kind == "FeatureCollection" else [document]
-        pairs = [
-            (each["geometry"], each.get("properties") or {}) if each.get("type") == "Feature" else (each, {})
-            for each in features
-        ]
-        stated = document.get("crs", _WGS84)
-        crs = stated["properties"]["name"] if isinstance(stated, dict) else stated
-    except (OSError, UnicodeDecodeError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise ValueError(f"{name} must be a GeoJSON file, {path} is none: {_line(error)}") from None
-    return [pair for pair in pairs if pair[0] is not None], None if crs is None else _crs(name, crs)
-
-
-def _read_shapefile(name: str, path: Path) -> tuple[list[tuple[Any, Mapping[str, Any]]], Any]:
-    try:
-        import shapefile
-    except ImportError:
-        raise ValueError(f'{name} must be read with pyshp, which is missing: pip install "warp_torchrl[gis]"') from None
-    try:
-        with shapefile.Reader(str(path)) as reader:
-            pairs = [(each.shape, each.record) for each in reader.iterShapeRecords()]
-            features = [(shape.__geo_interface__, record.as_dict()) for shape, record in pairs if shape.shapeType]
-    except Exception as error:  # pyshp raises what struct, the file system and its own classes do
-        raise ValueError(f"{name} must be a whole shapefile with its .shx and .dbf, {path}: {_line(error)}") from None
-    about = path.with_suffix(".prj")
-    if not about.is_file():
-        _log.warning("%s: %s has no .prj, so its coordinates are taken for the map's own", name, path)
-        return features, None
-    return features, _crs(name, about.read_text(encoding="utf-8", errors="replace"))
-
-
-def _crs(name: str, stated: object) -> Any:
-    from rasterio.crs import CRS
-    from rasterio.errors import CRSError
-
-    try:
-        return CRS.from_user_input(stated)
-    except CRSError as error:
-        raise ValueError(f"{name} must have a CRS that is known, got {stated!r}: {_line(error)}") from None
-
-
-def _parts(geometry: Any) -> Iterator[Mapping[str, Any]]:
-    """Return the points, lines and polygons of a geometry."""
-    kind = geometry["type"]
-    if kind == "GeometryCollection":
-        for each in geometry["geometries"]:
-            yield from _parts(each)
-    elif kind in ("MultiPoint", "MultiLineString", "MultiPolygon"):
-        for part in geometry["coordinates"]:
-            yield from _parts({"type": kind.removeprefix("Multi"), "coordinates": part})
-    elif kind in ("Point", "LineString", "Polygon") and _is_whole(kind, geometry["coordinates"]):
-        yield {"type": kind, "coordinates": geometry["coordinates"]}
-    else:
-        raise ValueError(kind)
-
-
-def _is_whole(kind: str, coordinates: Any) -> bool:
-    """Return whether a line has two points, and each ring of a polygon four."""
-    if kind == "Polygon":
-        return len(coordinates) > 0 and all(len(ring) >= 4 for ring in coordinates)
-    return len(coordinates) >= 2
-
-
-def _points(coordinates: Any) -> np.ndarray:
-    """Return the corners of coordinates of any depth, float64 [n, 2]."""
-    if not isinstance(coordinates[0], list | tuple):
-        x, y = (float(each) for each in coordinates[:2])
-        return np.array([[x, y]])
-    return np.concatenate([_points(each) for each in coordinates])
-
-
-def _moved(name: str, shape: Shape, corners: np.ndarray, crs: Any, grid: Grid) -> Shape:
+def _moved(name: str, part: Part, crs: Any, grid: Grid) -> Part:
+    """Return a part in the grid's coordinates."""
+    corners = np.concatenate(part.rings)
     x, y = in_grid(name, corners[:, 0], corners[:, 1], crs, grid)
-    places = iter(zip(x.tolist(), y.tolist(), strict=True))
     if not (np.isfinite(x).all() and np.isfinite(y).all()):
         raise ValueError(f"{name} must have coordinates that {grid.crs} can hold, got {corners[0].tolist()}")
-    geometry = {"type": shape.geometry["type"], "coordinates": _rebuilt(shape.geometry["coordinates"], places)}
-    return Shape(geometry, shape.properties)
-
-
-def _rebuilt(coordinates: Any, places: Iterator[tuple[float, float]]) -> Any:
-    if not isinstance(coordinates[0], list | tuple):
-        return next(places)
-    return [_rebuilt(each, places) for each in coordinates]
+    ends = np.cumsum([len(ring) for ring in part.rings])[:-1]
+    return Part(part.kind, np.split(np.stack((x, y), axis=1), ends))
 
 
 def _touches(shape: Shape, grid: Grid) -> bool:
-    (west, south), (east, north) = _corners(shape)
+    (west, south), (east, north) = shape.corners.min(0), shape.corners.max(0)
     left, bottom, right, top = grid.bounds
     return bool(west < right and left <= east and south <= top and bottom < north)
 
 
-def _is_small(shape: Shape, grid: Grid) -> bool:
-    """Return whether a shape has the cells that it touches, and not those whose middle is in it."""
-    low, high = _corners(shape)
-    return shape.geometry["type"] != "Polygon" or bool((high - low).min() < abs(grid.transform[0]))
+def _beyond(grid: Grid) -> tuple[int, int]:
+    """Return the shape of a grid with some cells beyond each edge: a polygon reaches its cells from there too."""
+    return grid.shape[0] + 2 * _EDGE, grid.shape[1] + 2 * _EDGE
 
 
-def _corners(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
-    places = _points(shape.geometry["coordinates"])
-    return places.min(0), places.max(0)
+def _window(shape: Shape, grid: Grid) -> tuple[slice, slice]:
+    """Return the rows and columns about a shape, of the grid with its edge."""
+    inverse, (x, y) = ~grid.transform, shape.corners.T
+    places = (inverse[at] * x + inverse[at + 1] * y + inverse[at + 2] for at in (3, 0))
+    ends = [np.clip((each.min(), each.max() + 2 * _EDGE + 1), 0, side) for each, side in zip(places, _beyond(grid))]
+    return slice(*(int(end) for end in ends[0])), slice(*(int(end) for end in ends[1]))
 
 
-def _box(grid: Grid) -> list[float]:
-    return [round(each, 1) for each in grid.bounds]
+def _hull(slices: list[slice]) -> slice:
+    return slice(min(each.start for each in slices), max(each.stop for each in slices))
 
 
-def _line(error: BaseException) -> str:
-    return " ".join(str(error).split()) or type(error).__name__
+def _marked(shapes: Sequence[Shape], grid: Grid, rows: slice, columns: slice) -> np.ndarray:
+    """Return the cells of a window that some shapes mark, bool."""
+    size = rows.stop - rows.start, columns.stop - columns.start
+    cells = np.zeros(size, bool)
+    (a, b, left, d, e, top), column, row = grid.transform[:6], columns.start - _EDGE, rows.start - _EDGE
+    place = type(grid.transform)(a, b, left + a * column + b * row, d, e, top + d * column + e * row)
+    with reading("shapes must be put on the map, which fails"):
+        for shape in shapes:
+            touched = _cells_of(shape, size, place, all_touched=True)
+            if shape.part.kind == "Polygon":
+                touched = _whole(_cells_of(shape, size, place, all_touched=False), touched)
+            cells |= touched
+    return cells
+
+
+def _cells_of(shape: Shape, size: tuple[int, int], place: Any, all_touched: bool) -> np.ndarray:
+    from rasterio.features import rasterize
+
+    rings = [ring.tolist() for ring in shape.part.rings]
+    coordinates = {"Point": rings[0][0], "LineString": rings[0], "Polygon": rings}[shape.part.kind]
+    geometry = {"type": shape.part.kind, "coordinates": coordinates}
+    return rasterize([geometry], size, transform=place, all_touched=all_touched, dtype="uint8") > 0
+
+
+def _whole(inside: np.ndarray, touched: np.ndarray) -> np.ndarray:
+    """Return the cells of a polygon from those whose middle it holds and those that it touches; see ``mark``."""
+    far = touched & ~_near(inside)
+    if not far.any() and _is_one_piece(inside):
+        return inside
+    cells = inside | far
+    return cells | (touched & (_parts_sides(cells) | _parts_sides(cells.T).T))
+
+
+def _near(cells: np.ndarray) -> np.ndarray:
+    """Return cells and those about them."""
+    padded = np.pad(cells, 1)
+    across = padded[:, :-2] | padded[:, 1:-1] | padded[:, 2:]
+    return across[:-2] | across[1:-1] | across[2:]
+
+
+def _parts_sides(cells: np.ndarray) -> np.ndarray:
+    """Return the cells that have others on their left and right, one row off at most, and none above, at or below."""
+    padded = np.pad(cells, 1)
+    along = padded[:-2] | padded[1:-1] | padded[2:]
+    return along[:, :-2] & along[:, 2:] & ~along[:, 1:-1]
+
+
+def _is_one_piece(cells: np.ndarray) -> bool:
+    """Return whether cells hang together, by sides or corners."""
+    from rasterio.features import shapes
+
+    pieces = shapes(cells.astype(np.uint8), mask=cells, connectivity=8)
+    return next(pieces, None) is not None and next(pieces, None) is None

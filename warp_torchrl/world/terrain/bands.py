@@ -1,0 +1,98 @@
+"""Bands of a raster: which one a layer is, by its number or by its description, and the unit that it states."""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+LENGTHS: Mapping[str, float] = {
+    **dict.fromkeys(("m", "metre", "metres", "meter", "meters"), 1.0),
+    **dict.fromkeys(("ft", "foot", "feet", "international foot", "international feet"), 0.3048),
+    **dict.fromkeys(("us-ft", "ftus", "us survey foot", "us survey feet", "foot_us", "us foot"), 1200.0 / 3937.0),
+    **dict.fromkeys(("dm", "decimetre", "decimeter"), 0.1),
+    **dict.fromkeys(("cm", "centimetre", "centimeter"), 0.01),
+}
+"""Metres in each unit that a band or a vertical CRS may state."""
+MINUTES: Mapping[str, float] = {
+    **dict.fromkeys(("min", "minute", "minutes"), 1.0),
+    **dict.fromkeys(("h", "hr", "hour", "hours"), 60.0),
+    **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0 / 60.0),
+}
+"""Minutes in each unit of time that a band may state."""
+_LAYERS = {
+    "fuel": r"fbfm|(?<![a-z\d])f(13|40)(?!\d)|fuel|fbp",
+    "elevation": r"elev|altitude|(?<![a-z])dem(?![a-z])",
+    "canopy": r"(?<![a-z])cc(?![a-z])|canopy.?cover",
+    "canopy_height": r"(?<![a-z])ch(?![a-z])|canopy.?height|stand.?height",
+    "age": r"(?<![a-z])age(?![a-z])",
+    "assets": r"asset|worth|value",
+    "arrival": r"arrival",
+    "scar": r"scar|burned",
+    "ignition": r"ignition",
+}
+"""What the description of each layer's band holds, as LANDFIRE (US_230FBFM40, LC22_CC_230) and FlamMap write it."""
+_VERTICAL = re.compile(r'VERT(?:_CS|CRS|ICALCRS)\[.*?UNIT\["[^"]*",\s*([\d.eE+-]+)', re.DOTALL)
+
+
+def choose_band(name: str, path: object, layer: Any, wanted: int | str | None, key: str) -> int:
+    """Return the number of the band, from 1, that a layer is in an open raster.
+
+    Args:
+        name: What the layer is: a key of ``_LAYERS`` is looked for among the descriptions.
+        path: The file, for messages.
+        layer: An open dataset.
+        wanted: The band's number or description; None looks for the only one, or the one that is described so.
+        key: How the user chooses, for messages.
+
+    Raises:
+        ValueError: If it is none, or several, with the names of all.
+    """
+    bands = [number for number in range(1, layer.count + 1) if layer.colorinterp[number - 1].name != "alpha"]
+    if wanted is not None:
+        asked = str(wanted).strip().lower()
+        bands = [number for number in bands if asked in (str(number), _told(layer, number).lower())]
+    elif len(bands) > 1:
+        words = _LAYERS.get(name.removesuffix(".path"), "$.")
+        bands = [number for number in bands if re.search(words, _told(layer, number), re.IGNORECASE)]
+    if len(bands) != 1:
+        asked = "" if wanted is None else f"; {wanted!r} names {len(bands)} of them"
+        raise ValueError(f"{name} must have one band of real numbers, {path} has {_all(layer)}{asked}; {key}")
+    return bands[0]
+
+
+def band_names(layer: Any) -> list[str]:
+    """Return the description of each band of an open raster, its number where it has none."""
+    return [_told(layer, number) or str(number) for number in range(1, layer.count + 1)]
+
+
+def unit_of(layer: Any, number: int) -> str:
+    """Return the unit that a band of an open raster states, in lower case, or its vertical CRS; else nothing."""
+    stated = str(layer.units[number - 1] or "").strip().lower()
+    vertical = _VERTICAL.search(layer.crs.to_wkt()) if layer.crs and not stated else None
+    if vertical is None:
+        return stated
+    metres = float(vertical[1])
+    return next((unit for unit, length in LENGTHS.items() if abs(length / metres - 1.0) < 1e-9), f"{metres:g} m")
+
+
+def factor_of(name: str, path: object, unit: str, units: Mapping[str, float], given: float | None = None) -> float:
+    """Return what a stated unit is worth, 1 where nothing is stated; what the user gives must be the same.
+
+    Raises:
+        ValueError: If the unit is not known, or contradicts what is given.
+    """
+    if not unit:
+        return 1.0 if given is None else given
+    if unit not in units:
+        raise ValueError(f"{name} must be in {', '.join(units)}, {path} states {unit!r}")
+    if given is not None and abs(given / units[unit] - 1.0) > 1e-5:
+        raise ValueError(f"{name}_unit must be that of {path}, which states {unit!r}, {units[unit]:g}, got {given:g}")
+    return units[unit]
+
+
+def _told(layer: Any, number: int) -> str:
+    return str(layer.descriptions[number - 1] or "").strip()
+
+
+def _all(layer: Any) -> str:
+    shown = [f"{number} ({_told(layer, number) or layer.dtypes[number - 1]})" for number in range(1, layer.count + 1)]
+    return ", ".join(shown[:12]) + ", ..." * (len(shown) > 12)

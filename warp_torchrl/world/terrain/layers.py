@@ -1,0 +1,139 @@
+"""The layers of a map on one grid: found in a folder, read or resampled, in the units that their files state."""
+
+import logging
+from collections.abc import Iterable, Mapping
+from functools import cache
+from os import PathLike
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from warp_torchrl.world.terrain.bands import LENGTHS, factor_of
+from warp_torchrl.world.terrain.grid import Grid, check_grid
+from warp_torchrl.world.terrain.layer import RASTERS, Header, find_layer, read_header, read_layer
+from warp_torchrl.world.terrain.planes import read_worth
+from warp_torchrl.world.terrain.resampling import regrid, resample_layer
+from warp_torchrl.world.terrain.vector import SUFFIXES
+
+_log = logging.getLogger("warp_torchrl")
+
+
+class Layers(NamedTuple):
+    """Layers by name, all on one grid."""
+
+    grid: Grid
+    values: dict[str, np.ndarray]  # [H, W]
+    known: dict[str, np.ndarray]  # bool [H, W]
+    headers: dict[str, Header]  # of the rasters
+    paths: Mapping[str, Path]
+
+
+def find_layers(path: str | PathLike[str] | None, patterns: Mapping[str, str | None]) -> dict[str, Path]:
+    """Return the file of each layer that has a pattern.
+
+    Args:
+        path: A folder; or the fuel layer's file, with the others beside it.
+        patterns: File name or pattern by the layer's name, ``fuel`` first; None leaves a layer out.
+
+    Raises:
+        ValueError: If the path does not exist, or a pattern names no file, or several.
+    """
+    try:
+        exists = isinstance(path, str | PathLike) and path and Path(path).exists()
+    except OSError:  # a name too long
+        exists = False
+    if path is None or not exists:
+        raise ValueError(f"path must name a folder of rasters, or a raster, that exists, got {path!r}")
+    place = Path(path)
+    folder = place if place.is_dir() else place.parent
+    named = {name: pattern for name, pattern in patterns.items() if pattern is not None}
+    alone = {} if place.is_dir() else {"fuel": place}
+    return {name: alone.get(name) or find_layer(name, folder, pattern) for name, pattern in named.items()}
+
+
+def read_layers(
+    paths: Mapping[str, Path],
+    bands: Mapping[str, int | str],
+    resample: Literal["refuse", "nearest", "mode"],
+    resolution: float | None,
+) -> Layers:
+    """Return the values of each layer on the grid of ``fuel``, or one over it; every header is checked first.
+
+    Args:
+        paths: The file of each layer.
+        bands: Number or description of the bands that are chosen, by layer.
+        resample: What becomes of layers on another grid, see ``Raster``.
+        resolution: Side of the grid's cells [m]; None keeps that of ``fuel``.
+
+    Raises:
+        ValueError: If a file cannot be read, is enormous, or does not fit.
+    """
+    strict = resample == "refuse"
+    if unknown := [name for name in bands if name not in paths]:
+        raise ValueError(f"bands must choose bands of {', '.join(paths)}, got {unknown[0]}")
+    rasters = {name: path for name, path in paths.items() if path.suffix.lower() not in SUFFIXES}
+    remedy, headers = "resolution=30 resample=mode", {}
+    for name, path in rasters.items():
+        metric = resolution is None if name == "fuel" else strict
+        key = f"give bands={{{name}: NUMBER}}"
+        headers[name] = read_header(name, path, metric, remedy if name == "fuel" else "resample", bands.get(name), key)
+    grid = headers["fuel"].grid
+    if not grid.crs:
+        _tell_once(f"{paths['fuel']} has no CRS: its cells are taken as squares of {grid.cell_size:g} m")
+    if resolution is not None:
+        grid = regrid("fuel", grid, resolution)
+    for name in headers.keys() - {"fuel"} if strict else ():
+        check_grid(name, headers[name].grid, "fuel", grid)
+    made = Layers(grid, {}, {}, headers, paths)
+    for name, path in paths.items():
+        if name not in headers:
+            made.values[name], made.known[name] = read_worth(path, grid), np.ones(grid.shape, bool)
+            continue
+        made.values[name], made.known[name] = _values(name, headers[name], grid, resample)
+    return made
+
+
+def _values(name: str, header: Header, grid: Grid, resample: str) -> tuple[np.ndarray, np.ndarray]:
+    if header.grid.differs_in(grid) is None:
+        return read_layer(name, header.path, header.number)
+    method: Any = resample if name == "fuel" else "bilinear"  # "refuse" has raised by now
+    return resample_layer(name, header.path, grid, method, header.number)
+
+
+def elevation_unit(header: Header, given: float | None) -> float:
+    """Return the metres in the unit of an elevation layer: what the file states, or the user gives; else 1.
+
+    Raises:
+        ValueError: If neither does where the map itself is in feet, or both do and differ.
+    """
+    crs = header.grid.crs
+    if given is None and not header.unit and crs and crs.is_projected and crs.linear_units_factor[1] != 1.0:
+        rule = f"given where the map is in {crs.linear_units_factor[0]}, 0.3048 for feet or 1 for metres"
+        raise ValueError(f"elevation_unit must be {rule}: {header.path} does not state it, got null")
+    return factor_of("elevation", header.path, header.unit, LENGTHS, given)
+
+
+def height_unit(header: Header, given: float | None) -> float:
+    """Return the metres in the unit of a layer of canopy heights: what the user gives, or the file states.
+
+    Raises:
+        ValueError: If neither does, or both do and differ.
+    """
+    if given is None and not header.unit:
+        rule = "given with canopy_height, 0.1 for LANDFIRE or 1 for metres"
+        raise ValueError(f"height_unit must be {rule}: {header.path} does not state it, got null")
+    return factor_of("height", header.path, header.unit, LENGTHS, given)
+
+
+def unread(folder: Path, read: Iterable[Path]) -> list[str]:
+    """Return the names of a folder's rasters and vector files that are not among those that are read."""
+    there = {each.resolve() for each in read}
+    kinds = (*RASTERS, *SUFFIXES)
+    found = sorted(each for each in folder.iterdir() if each.suffix.lower() in kinds and each.is_file())
+    return [each.name for each in found if each.resolve() not in there]
+
+
+@cache
+def _tell_once(line: str) -> None:
+    _log.warning(line)
