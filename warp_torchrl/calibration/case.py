@@ -202,7 +202,7 @@ def _outcome(folder: Path, grid: Grid, hours: float | None, end: float) -> tuple
     last = end if hours is None else hours * 60.0
     path = _found("perimeters", folder)
     if path is not None:
-        return read_perimeters(path, grid, last), path
+        return Outcome(*read_perimeters(path, grid, last, hours is not None)), path
     path = _found("arrival", folder)
     if path is not None:
         return read_arrival(path, grid), path

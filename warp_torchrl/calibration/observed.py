@@ -26,16 +26,20 @@ class Outcome(NamedTuple):
     arrival: Tensor | None = None  # float32 [H, W] [minutes], NaN where not known
 
 
-def read_perimeters(path: Path, grid: Grid, end: float | None = None) -> Outcome:
+def read_perimeters(path: Path, grid: Grid, end: float | None = None, is_stated: bool = False) -> tuple[Tensor, Tensor]:
     """Return what had burned by some times: the cells that perimeters mark, see ``vector.mark``.
 
     Each feature has ``minutes`` or ``hours`` since the ignition among its properties; features of one time are one.
-    Where none has, they are the scar at the end. What burned stays burned.
+    Where none has, they are known at the end. What burned stays burned.
 
     Args:
         path: GeoJSON or a shapefile.
         grid: The grid.
         end: When features without a time are known [minutes]; None refuses them.
+        is_stated: Whether the user gave that end; else some features without a time beside others are refused.
+
+    Returns:
+        The times, float32 [K] [minutes], growing, and the cells, bool [K, H, W].
 
     Raises:
         ValueError: If the file cannot be read or placed, holds other shapes, or a feature has no time.
@@ -44,12 +48,14 @@ def read_perimeters(path: Path, grid: Grid, end: float | None = None) -> Outcome
     if any(shape.part.kind != "Polygon" for shape in shapes):
         kinds = sorted({shape.part.kind for shape in shapes})
         raise ValueError(f"{path.name} must hold polygons, got {', '.join(kinds)}")
+    timed = [bool(_times(shape.properties)) for shape in shapes]
+    end = end if is_stated or not any(timed) else None
     by_time: dict[float, list[Shape]] = {}
     for shape in shapes:
         by_time.setdefault(_minutes(shape.properties, path, end), []).append(shape)
     times = sorted(by_time)
     cells = torch.stack([torch.from_numpy(mark(by_time[time], grid)) for time in times])
-    return Outcome(torch.tensor(times), cells.to(torch.int8).cummax(0).values.to(torch.bool))
+    return torch.tensor(times), cells.to(torch.int8).cummax(0).values.to(torch.bool)
 
 
 def read_arrival(path: Path, grid: Grid) -> Outcome:
@@ -87,8 +93,7 @@ def read_scar(path: Path, grid: Grid, end: float) -> Outcome:
 
 def _minutes(told: Mapping[str, Any], path: Path, end: float | None) -> float:
     """Return the minutes of a feature's properties, of numbers or of texts of numbers; the end where it has none."""
-    named = {str(name).lower(): value for name, value in told.items() if value is not None}
-    pairs = [(named[name], factor) for name, factor in (("minutes", 1.0), ("hours", 60.0)) if name in named]
+    pairs = _times(told)
     value, factor = pairs[0] if pairs else (end, 1.0)
     try:
         minutes = float(value) * factor  # type: ignore[arg-type]  # None has no float
@@ -98,3 +103,9 @@ def _minutes(told: Mapping[str, Any], path: Path, end: float | None) -> float:
         rule = "have features with minutes or hours over 0, or none that has, or hours= must say when they are known"
         raise ValueError(f"{path.name} must {rule}, got {value!r}")
     return minutes
+
+
+def _times(told: Mapping[str, Any]) -> list[tuple[Any, float]]:
+    """Return the times that properties tell, and the minutes in their unit."""
+    named = {str(name).lower(): value for name, value in told.items() if value is not None}
+    return [(named[name], factor) for name, factor in (("minutes", 1.0), ("hours", 60.0)) if name in named]

@@ -70,8 +70,14 @@ def read_case(source: LandscapeSource, fire: RateFire, options: PredictionOption
         start=minutes_until(options.start, weather, options.units) if isinstance(options.start, str) else options.start,
         convergence=_convergence(place, (height, width)) if options.true_north else 0.0,
         ignition=lit[rows, columns],
-        files=getattr(source, "files", ()),
+        files=_files(source, str(options.ignition)),
     )
+
+
+def _files(source: LandscapeSource, ignition: str) -> list[str]:
+    """Return a line for each file of the map, and one for those beside it that nobody reads."""
+    left = source.unread(ignition) if isinstance(source, Raster) else []
+    return [*getattr(source, "files", ()), *([f"files that are not read: {', '.join(left)}"] if left else [])]
 
 
 def _check_cell_size(given: float | None, grid: Grid | None) -> None:

@@ -48,10 +48,9 @@ def check_codes(landscape: object, table: FuelTable | None, model: str, own_mode
     other = {pair: count for pair, count in cells.items() if by_cover and not own_models and _differs(pair, model)}
     if other:
         meant = ", ".join(f"{code} {_name(TABLES[model][code])}" for code, _ in list(other)[:_SHOWN])
-        rule = f"give fire.fuel_of_cover for classes of land cover, or landscape.table={model} for fuels"
-        raise ValueError(
-            f"landscape.table must say what {model} does of its codes ({meant}), got {_listed(other)}: {rule}"
-        )
+        got = f"{_listed(other)}, for {model} {meant}"
+        ways = f"give fire.fuel_of_cover for classes of land cover, or landscape.table={model} for fuels"
+        raise ValueError(f"landscape.table must say of codes what {model} does, got {got}: {ways}")
 
 
 def check_fuel(fuel: Tensor, table: FuelTable | None, model: str) -> None:

@@ -15,8 +15,9 @@ from warp_torchrl.world.terrain.crs import WGS84, stated_crs
 
 SUFFIXES = (".geojson", ".json", ".shp")
 """Of the files that are read here."""
-LARGEST_FILE = 256 * 2**20
-"""Bytes of a vector file at most: some ten million corners."""
+MOST_CORNERS = 1_000_000
+"""Corners of all shapes of a file at most."""
+_LARGEST_FILE = 256 * 2**20  # bytes
 _DEEPEST = 8  # collections in collections
 _log = logging.getLogger("warp_torchrl")
 
@@ -50,9 +51,8 @@ def read_features(name: str, path: Path, placed: bool = True) -> tuple[list[Feat
     Raises:
         ValueError: If the file cannot be read, is enormous, states a CRS that is not known, or has other shapes.
     """
-    if path.stat().st_size > LARGEST_FILE:
-        raise ValueError(f"{name} must have at most {LARGEST_FILE} bytes, {path} has {path.stat().st_size}")
     is_shapefile = path.suffix.lower() == ".shp"
+    _check_size(name, path, is_shapefile)
     pairs, crs = _read_shapefile(name, path) if is_shapefile else _read_geojson(name, path, placed)
     try:
         features = [Feature(list(_parts(geometry)), about) for geometry, about in pairs if geometry is not None]
@@ -64,6 +64,16 @@ def read_features(name: str, path: Path, placed: bool = True) -> tuple[list[Feat
     if crs is not None and crs.is_geographic and corners:
         _check_degrees(name, path, corners)
     return features, crs
+
+
+def _check_size(name: str, path: Path, is_shapefile: bool) -> None:
+    """Refuse enormous files before anything is made of them."""
+    sizes = [each.stat().st_size for each in (path, path.with_suffix(".dbf")) if each.is_file()]
+    if max(sizes) > _LARGEST_FILE:
+        raise ValueError(f"{name} must have at most {_LARGEST_FILE} bytes, {path} has {max(sizes)}")
+    corners = sizes[0] // 16 if is_shapefile else path.read_bytes().count(b"[")  # two numbers of 8 bytes; a list each
+    if corners > MOST_CORNERS:
+        raise ValueError(f"{name} must have at most {MOST_CORNERS} corners, {path} has about {corners}")
 
 
 def _check_degrees(name: str, path: Path, corners: list[np.ndarray]) -> None:
@@ -123,7 +133,7 @@ def _read_shapefile(name: str, path: Path) -> tuple[list[tuple[Any, Mapping[str,
         _log.warning("%s: %s has no .prj, so its coordinates are taken for the map's own", name, path)
         return features, None
     with about.open("rb") as file:
-        return features, stated_crs(name, file.read(LARGEST_FILE).decode("utf-8-sig", "replace"))
+        return features, stated_crs(name, file.read(_LARGEST_FILE).decode("utf-8-sig", "replace"))
 
 
 def _parts(geometry: Any, depth: int = 0) -> Iterator[Part]:
@@ -153,7 +163,7 @@ def _part(kind: str, coordinates: Any) -> Part:
 
 def _places(line: Any) -> np.ndarray:
     """Return places, each a list of x, y and maybe more, as float64 [n, 2]."""
-    if not all(isinstance(place, list | tuple) and len(place) >= 2 for place in line):
+    if not all(isinstance(place, list | tuple) and len(place) >= 2 and bool not in map(type, place) for place in line):
         raise ValueError("places")
     places = np.array([place[:2] for place in line])
     if places.dtype.kind not in "iuf":

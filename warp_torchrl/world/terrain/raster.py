@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from os import PathLike
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -109,6 +110,7 @@ class Raster(Cropped):
     min_fuel: float = 0.5
     _grid: Grid = field(init=False, repr=False, compare=False)
     _files: tuple[str, ...] = field(init=False, repr=False, compare=False)
+    _paths: tuple[Path, ...] = field(init=False, repr=False, compare=False)  # of the layers, the fuel's first
 
     def __post_init__(self) -> None:
         check_fields(
@@ -129,6 +131,7 @@ class Raster(Cropped):
         planes, units = self._make_planes(layers, table)
         crop = Crop(**planes, size=self.size, row=self.row, column=self.column, min_fuel=self.min_fuel)
         object.__setattr__(self, "_files", self._told(layers, units))
+        object.__setattr__(self, "_paths", tuple(paths.values()))
         object.__setattr__(self, "_crop", crop)
 
     @property
@@ -143,8 +146,16 @@ class Raster(Cropped):
 
     @property
     def files(self) -> tuple[str, ...]:
-        """Return a line for each file: which layer it is, in which unit, and which bands and files are left unread."""
+        """Return a line for each file: which layer it is, in which unit, and which of its bands are left unread."""
         return self._files
+
+    def unread(self, *others: str | PathLike[str]) -> list[str]:
+        """Return the names of the rasters and vector files beside the fuel layer that are read by nobody.
+
+        Args:
+            others: Files that are read for something else, such as the ignition.
+        """
+        return unread(self._paths[0].parent, [*self._paths, *map(Path, others)])
 
     def _check_together(self) -> None:
         if self.age is not None and self.canopy is not None:
@@ -185,7 +196,7 @@ class Raster(Cropped):
         return {**planes, "known": whole if self.nodata == "refuse" else None}, units
 
     def _told(self, layers: Layers, units: Mapping[str, str]) -> tuple[str, ...]:
-        """Return what is read of each file, and what is left."""
+        """Return what is read of each file, and which bands are left."""
         named = self.table if isinstance(self.table, str) else "a table of your own"
         units = {"fuel": f"codes of {named}", **units}
         lines = []
@@ -198,9 +209,6 @@ class Raster(Cropped):
             left = [band for number, band in enumerate(bands, start=1) if (path, number) not in read]
             if left:
                 lines.append(f"bands of {path.name} that are not read: {', '.join(left)}")
-        folder = layers.paths["fuel"].parent
-        if others := unread(folder, layers.paths.values()):
-            lines.append(f"files of {folder.name} that the map does not read: {', '.join(others)}")
         return tuple(lines)
 
 

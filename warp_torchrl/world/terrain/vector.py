@@ -78,8 +78,8 @@ def mark(shapes: Iterable[Shape], grid: Grid) -> np.ndarray:
     """Return the cells that shapes mark, bool [rows, columns].
 
     A point marks the cell that it lies in, a line those that it touches, a polygon those whose middle is in it. Where
-    these do not reach all of a polygon, or fall apart, it is narrower than a cell there, and marks cells that it
-    touches too: those farther than a cell from any such middle, and those that join what fell apart.
+    these do not come within a cell of all of a polygon, or fall apart, it is narrower than a cell somewhere. Then it
+    marks those that it touches too, but for the edge of its wide parts, beside four such cells in a square.
     """
     cells = np.zeros(_beyond(grid), bool)
     for shape in shapes:
@@ -163,10 +163,9 @@ def _cells_of(shape: Shape, size: tuple[int, int], place: Any, all_touched: bool
 
 def _whole(inside: np.ndarray, touched: np.ndarray) -> np.ndarray:
     """Return the cells of a polygon from those whose middle it holds and those that it touches; see ``mark``."""
-    far = touched & ~_near(inside)
-    if not far.any() and _is_one_piece(inside):
+    if not (touched & ~_near(inside)).any() and _is_one_piece(inside):
         return inside
-    cells = inside | far
+    cells = inside | (touched & ~_near(_blocks(inside)))
     return cells | (touched & (_parts_sides(cells) | _parts_sides(cells.T).T))
 
 
@@ -175,6 +174,13 @@ def _near(cells: np.ndarray) -> np.ndarray:
     padded = np.pad(cells, 1)
     across = padded[:, :-2] | padded[:, 1:-1] | padded[:, 2:]
     return across[:-2] | across[1:-1] | across[2:]
+
+
+def _blocks(cells: np.ndarray) -> np.ndarray:
+    """Return the cells that are one of four in a square."""
+    padded = np.pad(cells, 1)
+    corners = padded[:-1, :-1] & padded[1:, :-1] & padded[:-1, 1:] & padded[1:, 1:]
+    return corners[:-1, :-1] | corners[1:, :-1] | corners[:-1, 1:] | corners[1:, 1:]
 
 
 def _parts_sides(cells: np.ndarray) -> np.ndarray:
