@@ -42,6 +42,24 @@ def test_a_strong_prior_keeps_the_law_as_it_was():
     assert z.abs().max() < 0.05
 
 
+def test_the_prior_adds_its_weight_times_half_of_z_squared():
+    # z = (1, -2): half of 1 + 4 is 2.5; its slope is z, its curvature 1 for each parameter.
+    start = fire()
+    parameters, z, case = parameters_of(NAMES, start), torch.tensor([1.0, -2.0]), case_of(TRUTH, side=21)
+    free, bound = (Gradients(prior_weight=weight, steps=1) for weight in (0.0, 0.4))
+    (loss, slope, curvature), found = (
+        free.slope(start, parameters, z, [case]),
+        bound.slope(start, parameters, z, [case]),
+    )
+    assert found[0] - loss == pytest.approx(0.4 * 2.5, abs=1e-5)
+    assert torch.allclose(found[1] - slope, 0.4 * z, atol=1e-5)
+    assert torch.allclose(found[2] - curvature, 0.4 * torch.eye(2), atol=1e-4)
+    candidates = torch.stack((torch.zeros(2), z))
+    free, bound = (Evolution(prior_weight=weight) for weight in (0.0, 0.4))
+    more = bound.losses(start, parameters, candidates, [case]) - free.losses(start, parameters, candidates, [case])
+    assert more.tolist() == pytest.approx([0.0, 1.0], abs=1e-5)
+
+
 def test_in_weather_that_stays_the_margin_is_the_logarithm_of_the_time():
     start = fire()
     case = case_of(TRUTH, turned=0.0)

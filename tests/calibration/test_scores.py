@@ -50,6 +50,15 @@ def test_cells_of_few_fires_come_after_those_of_half():
     assert order[0] == 59.0 and 60.0 < order[1] < 120.0 and order[2] == NEVER
 
 
+def test_of_cells_of_few_fires_those_come_first_that_more_fires_reach():
+    # Of eight fires by the hour 60: three come to the first cell, one to the second, two to the third.
+    times = torch.full((8, 1, 4), NEVER)
+    times[:3, 0, 0], times[:1, 0, 1], times[:2, 0, 2] = 50.0, 1.0, 20.0
+    order = order_of_burning(times, 60.0)[0]
+    assert order.tolist() == [60.0 * (2.0 - 3 / 8), 60.0 * (2.0 - 1 / 8), 60.0 * (2.0 - 2 / 8), NEVER]
+    assert first_cells(order[None], 2).tolist() == [[True, False, True, False]]
+
+
 def test_times_of_arrival_are_compared_where_both_burned():
     times = torch.tensor([[[10.0, 30.0, 50.0, NEVER]]])
     observed = torch.tensor([[12.0, 24.0, float("nan"), 5.0]])  # off by -2 and 6
