@@ -184,7 +184,7 @@ def test_adapters_are_views_that_nothing_needs():
             {"rasterio"},
             {
                 *("world/terrain/gdal", "world/terrain/crs", "world/terrain/resampling", "world/terrain/vector"),
-                *("maps/geotiff", "maps/perimeter", "weather/convergence", "calibration/observed"),
+                *("maps/geotiff", "maps/perimeter", "weather/convergence"),
             },
         ),
     ],

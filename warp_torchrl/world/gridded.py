@@ -14,9 +14,10 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.terrain.array import read_npz
+from warp_torchrl.world.terrain.bands import DEGREES, SPEEDS, factor_of
 from warp_torchrl.world.terrain.grid import Grid, check_grid
 from warp_torchrl.world.terrain.landscape import LandscapeSource, map_size
-from warp_torchrl.world.terrain.layer import find_layer, read_grid, read_layer
+from warp_torchrl.world.terrain.layer import Header, find_layer, read_header, read_layer
 from warp_torchrl.world.terrain.resampling import resample
 from warp_torchrl.world.wind import Wind
 
@@ -135,12 +136,18 @@ class Gridded(Wind):
         polar = self.speed is not None
         names: dict[str, Any] = {"speed": self.speed, "bearing": self.bearing} if polar else {"u": self.u, "v": self.v}
         paths = {name: find_layer(name, folder, pattern) for name, pattern in names.items()}
-        grids = [read_grid(name, path, metric=self.resample == "refuse") for name, path in paths.items()]
+        headers = {name: read_header(name, path, self.resample == "refuse") for name, path in paths.items()}
         first, second = names
-        check_grid(second, grids[1], first, grids[0])
-        layers = (read_layer(name, path) for name, path in paths.items())
-        one, other = (np.where(known, values, np.nan) for values, known in layers)
-        return grids[0], *(_to_components(one, other) if polar else (one, other))
+        check_grid(second, headers[second].grid, first, headers[first].grid)
+        one, other = (_read_unit(name, header, polar and name == second) for name, header in headers.items())
+        return headers[first].grid, *(_to_components(one, other) if polar else (one, other))
+
+
+def _read_unit(name: str, header: Header, is_bearing: bool) -> np.ndarray:
+    """Return a layer in metres a second or degrees, NaN where it is not known, by the unit that its file states."""
+    values, known = read_layer(name, header.path, header.number)
+    factor = factor_of(name, header.path, header.unit, DEGREES if is_bearing else SPEEDS)
+    return np.where(known, values * factor if factor != 1.0 else values, np.nan)
 
 
 def _to_components(speed: np.ndarray, bearing: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

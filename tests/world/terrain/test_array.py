@@ -123,7 +123,11 @@ def test_a_caller_who_changes_his_array_does_not_change_the_landscape() -> None:
         ({"cover": [3] * 16}, "^cover must .*two dimensions"),
         ({"cover": [[5] * 4] * 4}, r"^cover must hold whole numbers in 0\.\.4, got 5"),
         ({"cover": [[3] * 4] * 4, "age": [[11] * 4] * 4}, r"^age must hold whole numbers in 0\.\.10, got 11"),
-        ({"cover": [[3] * 4] * 4, "elevation": [[1e300] * 4] * 4}, "^elevation must be finite everywhere, got 1e"),
+        ({"cover": [[3] * 4] * 4, "elevation": [[1e300] * 4] * 4}, "^elevation must be finite and in .*, got 1e"),
+        (
+            {"cover": [[3] * 4] * 4, "elevation": [[-9999] * 4] * 4},
+            r"^elevation must .* \[-1000, 10000\] m .* -9999",
+        ),
         ({"cover": [[3] * 4] * 4, "elevation": [[0] * 5] * 4}, r"^elevation must have the shape of cover \(4, 4\)"),
         ({"cover": [[3] * 3] * 3}, "^size must"),
         ({"cover": [[3] * 8] * 8, "size": 9}, "^size must fit in the map of 8 x 8 cells, got 9 x 9"),

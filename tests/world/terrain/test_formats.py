@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 
+from warp_torchrl.world.gridded import Gridded
 from warp_torchrl.world.ignition_file import read_ignition
 from warp_torchrl.world.rate import RateFire
 from warp_torchrl.world.state import Cover
@@ -133,11 +134,17 @@ def test_elevation_is_in_the_unit_that_the_file_states_or_the_user(tmp_path, uni
             "EPSG:2264",
             None,
             3.0,
-            "^elevation_unit must be given where the map is in US survey foot",
+            "^elevation must state its unit where the map is in US survey foot, .*: give elevation_unit",
         ),
         (("fathom",), UTM, None, 3.0, "^elevation must be in m, .* states 'fathom'"),
         (("ft",), UTM, 1.0, 3.0, "^elevation_unit must be that of .* states 'ft', 0.3048, got 1"),
-        ((), UTM, None, 40.0, "^elevation_unit must be given .* half of its slopes are above 53 degrees"),
+        (
+            (),
+            UTM,
+            None,
+            40.0,
+            "^elevation must be in metres .* slopes are above 53 degrees: give elevation_unit",
+        ),
     ],
 )
 def test_elevation_whose_unit_is_in_doubt_is_asked_for(tmp_path, units, crs, given, step, words):
@@ -169,6 +176,26 @@ def test_ascii_grids_of_fire_models_are_read(tmp_path, name, write_it, expected)
     write_it(tmp_path / "fuel.asc")
     fuel = ground(tmp_path, table="fbfm40", nodata="unburnable")(keys(1)).fuel[0]
     assert fuel[5, 5] == expected and fuel[0, 0] == (99 if "hole" in name else expected)
+
+
+@pytest.mark.parametrize("text", ["http://127.0.0.1:9/crs", "PROJCS[", "+init=/etc/os-release", "\x00", ""])
+def test_a_prj_that_states_no_crs_is_told_of(tmp_path, text, capfd):
+    asc(tmp_path / "fuel.asc", flat(1), prj=text)
+    refuse("^fuel must have a .prj that states a CRS in WKT", ground, tmp_path)
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    "unit, factor", [("m/s", 1.0), ("mph", 0.44704), ("km/h", 1 / 3.6), ("", 1.0), ("furlong", None)]
+)
+def test_a_wind_is_in_the_unit_that_its_band_states(tmp_path, unit, factor):
+    for name, value in (("u", 9.0), ("v", 0.0)):
+        tif(tmp_path / f"a_{name}.tif", flat(value, "float32"), units=(unit,))
+    if factor is None:
+        refuse("^u must be in m/s, .* states 'furlong'", Gridded, path=tmp_path)
+        return
+    found = Gridded(path=tmp_path)(keys(1), (SIDE, SIDE))[0]
+    assert found[0].unique().tolist() == pytest.approx([9.0 * factor]) and (found[1] == 0.0).all()
 
 
 def holed(value, hole, dtype="int16"):

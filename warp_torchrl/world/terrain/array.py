@@ -18,6 +18,7 @@ from warp_torchrl.world.state import OLDEST, Cover
 from warp_torchrl.world.terrain.crop import Crop, Cropped
 from warp_torchrl.world.terrain.landscape import TALLEST, map_size
 from warp_torchrl.world.terrain.layer import LARGEST_MAP
+from warp_torchrl.world.terrain.planes import HIGHEST, LOWEST
 
 LAYERS = {
     "cover": np.uint8,
@@ -32,7 +33,7 @@ LAYERS = {
 _WHOLE = {"cover": (0, int(max(Cover))), "age": (0, OLDEST), "fuel": (-32768, 32767)}
 """Those of whole numbers, and their ranges."""
 _REAL = {
-    "elevation": (-math.inf, math.inf, "finite"),
+    "elevation": (LOWEST, HIGHEST, f"finite and in [{LOWEST:g}, {HIGHEST:g}] m"),
     "assets": (0.0, math.inf, "finite and 0 or more"),
     "canopy_cover": (0.0, 100.0, "in [0, 100]"),
     "canopy_height": (0.0, TALLEST, f"in [0, {TALLEST:g}]"),

@@ -18,6 +18,15 @@ MINUTES: Mapping[str, float] = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0 / 60.0),
 }
 """Minutes in each unit of time that a band may state."""
+SPEEDS: Mapping[str, float] = {
+    **dict.fromkeys(("m/s", "m s-1", "m s**-1", "mps", "metre/second"), 1.0),
+    **dict.fromkeys(("km/h", "km h-1", "kph", "kmh"), 1.0 / 3.6),
+    **dict.fromkeys(("mph", "mi/h"), 0.44704),
+    **dict.fromkeys(("kt", "kts", "knot", "knots"), 1852.0 / 3600.0),
+}
+"""Metres a second in each unit of speed that a band may state."""
+DEGREES: Mapping[str, float] = dict.fromkeys(("degree", "degrees", "deg", "°"), 1.0)
+"""Units of bearings that a band may state."""
 _LAYERS = {
     "fuel": r"fbfm|(?<![a-z\d])f(13|40)(?!\d)|fuel|fbp",
     "elevation": r"elev|altitude|(?<![a-z])dem(?![a-z])",

@@ -184,4 +184,6 @@ def _open(name: str, path: Path) -> Iterator[Any]:
             warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
             dataset = rasterio.open(path, driver=driver, **options)
         with dataset:
+            if driver == "AAIGrid" and projection.is_file() and not dataset.crs:
+                raise ValueError(f"{name} must have a .prj that states a CRS in WKT, {projection} states none")
             yield dataset

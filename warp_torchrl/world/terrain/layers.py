@@ -109,8 +109,9 @@ def elevation_unit(header: Header, given: float | None) -> float:
     """
     crs = header.grid.crs
     if given is None and not header.unit and crs and crs.is_projected and crs.linear_units_factor[1] != 1.0:
-        rule = f"given where the map is in {crs.linear_units_factor[0]}, 0.3048 for feet or 1 for metres"
-        raise ValueError(f"elevation_unit must be {rule}: {header.path} does not state it, got null")
+        ways = "give elevation_unit (0.3048 for feet, 1 for metres) or state it in the file, gdal_edit -units ft"
+        rule = f"state its unit where the map is in {crs.linear_units_factor[0]}"
+        raise ValueError(f"elevation must {rule}, {header.path} does not: {ways}")
     return factor_of("elevation", header.path, header.unit, LENGTHS, given)
 
 

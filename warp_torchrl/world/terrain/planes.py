@@ -14,6 +14,8 @@ from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.landscape import TALLEST
 from warp_torchrl.world.terrain.vector import burn_in, read_shapes
 
+LOWEST, HIGHEST = -1000.0, 10_000.0
+"""Elevation that is believed [m]."""
 _ENOUGH = 16  # rows and columns of a map whose slopes are judged
 
 
@@ -24,7 +26,7 @@ def to_metres(heights: np.ndarray, known: np.ndarray, unit: float = 1.0) -> np.n
         ValueError: If a height is not in [-1000, 10000] m: NaN, or nodata undeclared, -9999 or 32767.
     """
     words = " m" if unit == 1.0 else f" (-1000 to 10000 m in units of {unit:g} m)"
-    _check("elevation", heights, known, -1000.0 / unit, 10_000.0 / unit, words)
+    _check("elevation", heights, known, LOWEST / unit, HIGHEST / unit, words)
     return np.where(known, heights * unit if unit != 1.0 else heights, 0).astype(np.float32)
 
 
@@ -46,7 +48,8 @@ def check_slopes(metres: np.ndarray, known: np.ndarray, cell_size: float) -> Non
     steep = steep[~np.isnan(steep)]
     if len(steep) and (median := float(np.median(steep))) > 1.0:
         got = f"half of its slopes are above {math.degrees(math.atan(median)):.0f} degrees"
-        raise ValueError(f"elevation_unit must be given where metres are too steep to be true, {got}; 0.3048 for feet")
+        ways = "give elevation_unit (0.3048 for feet, 1 for metres) or state it in the file, gdal_edit -units ft"
+        raise ValueError(f"elevation must be in metres where it states no unit, {got}: {ways}")
 
 
 def to_worth(values: np.ndarray, known: np.ndarray) -> np.ndarray:
