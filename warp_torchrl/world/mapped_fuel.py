@@ -49,8 +49,8 @@ def check_codes(landscape: object, table: FuelTable | None, model: str, own_mode
     if other:
         meant = ", ".join(f"{code} {_name(TABLES[model][code])}" for code, _ in list(other)[:_SHOWN])
         got = f"{_listed(other)}, for {model} {meant}"
-        ways = f"give fire.fuel_of_cover for classes of land cover, or landscape.table={model} for fuels"
-        raise ValueError(f"landscape.table must say of codes what {model} does, got {got}: {ways}")
+        hint = f"give fire.fuel_of_cover for classes of land cover, or landscape.table={model} for fuels"
+        raise ValueError(f"landscape.table must say of codes what {model} does, got {got}: {hint}")
 
 
 def check_fuel(fuel: Tensor, table: FuelTable | None, model: str) -> None:

@@ -103,6 +103,19 @@ def test_a_band_is_chosen_where_no_description_tells_which(tmp_path):
     refuse("^ignition.path must have one band .*; write the one that is meant into", read_ignition, lit, GRID)
 
 
+def test_an_alpha_band_is_no_layer(tmp_path):
+    path = tif(tmp_path / "fuel.tif", flat(102, "uint8"), holed(255, 0, "uint8"))
+    with rasterio.open(path, "r+") as file:
+        file.colorinterp = [rasterio.enums.ColorInterp.gray, rasterio.enums.ColorInterp.alpha]
+    assert ground(tmp_path, table="fbfm40", nodata="unburnable")(keys(1)).fuel[0, 0, :2].tolist() == [99, 102]
+
+
+def test_heights_of_minus_9999_are_nodata_in_an_ascii_grid_that_does_not_say(tmp_path):
+    asc(tmp_path / "fuel.asc", flat(1), UNDECLARED)
+    asc(tmp_path / "dem.asc", holed(500, -9999), UNDECLARED)
+    assert (ground(tmp_path, elevation="dem.asc", nodata="unburnable")(keys(1)).elevation == 500).all()
+
+
 @pytest.mark.parametrize(
     "units, epsg, given, metres",
     [
@@ -309,7 +322,8 @@ def test_a_place_beside_a_raster_is_asked_into_it(tmp_path):
     refuse("^fuel must hold its place, which stands beside it in fuel.tfw", ground, path)
 
 
-GRIDS = 'EXTENSION["PROJ4","+proj=longlat +nadgrids=/etc/os-release"],AUTHORITY'
+_OF_A_FILE = 'EXTENSION["PROJ4","+proj=longlat +nadgrids=/etc/os-release"]'
+GRIDS = f"{rasterio.crs.CRS.from_epsg(4326).to_wkt()[:-1]},{_OF_A_FILE}]"
 
 
 @pytest.mark.parametrize(
@@ -327,7 +341,7 @@ GRIDS = 'EXTENSION["PROJ4","+proj=longlat +nadgrids=/etc/os-release"],AUTHORITY'
         "PROJCS[" * 3000,
         "\x00",
         'GEOGCS["x",' + "[" * 30 + "]" * 30 + "]",
-        rasterio.crs.CRS.from_epsg(4326).to_wkt().replace("AUTHORITY", GRIDS, 1),
+        GRIDS,
         ["EPSG:4326"],
         7.5,
         None,
@@ -336,6 +350,16 @@ GRIDS = 'EXTENSION["PROJ4","+proj=longlat +nadgrids=/etc/os-release"],AUTHORITY'
 def test_a_crs_that_is_no_code_urn_or_wkt_is_refused_unasked(tmp_path, name, capfd):
     refuse("^ignition.path must ", read_ignition, geojson(tmp_path, point(), name), GRID)
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("wkt", [GRIDS, "PROJCS[" * 3000, 'GEOGCS["x",' + "[" * 30 + "]" * 31, "GEOGCS" + "[]" * 6000])
+def test_wkt_that_names_a_file_or_is_deep_or_long_never_comes_to_proj(tmp_path, wkt):
+    refuse("must have a CRS that is known, an EPSG code", read_ignition, geojson(tmp_path, point(), wkt), GRID)
+
+
+def test_a_raster_s_own_crs_names_no_file_either(tmp_path):
+    asc(tmp_path / "fuel.asc", flat(1), prj=GRIDS)
+    refuse("^fuel must have a .* names no file", ground, tmp_path)
 
 
 def point(x=5e5 + 165, y=4.5e6 - 75):

@@ -51,8 +51,12 @@ def rows(cells):
         ([[(1.1, 0.1), (1.3, 0.1), (1.3, 3.1), (4.9, 3.1), (4.9, 3.3), (1.1, 3.3)]], [".#", ".#", ".#", ".####"]),
         ([strip((0.2, 0.2), (3.8, 3.8), 0.2)], ["#", ".#", "..#", "...#"]),  # through the middles, corner to corner
         ([[(0, 0), (3, 0), (3, 2.9), (6.9, 2.9), (6.9, 2.95), (3, 2.95), (3, 3), (0, 3)]], ["###", "###", "#######"]),
+        (
+            [[(0.6, 0.6), (4.4, 0.6), (4.4, 2.45), (8.9, 2.45), (8.9, 2.55), (4.4, 2.55), (4.4, 4.4), (0.6, 4.4)]],
+            ["", ".###", ".########", ".###"],  # the tail is marked to its end, the edge of the square is not
+        ),
     ],
-    ids=["square", "off the grid", "small", "hole", "row", "column", "L", "diagonal", "tail"],
+    ids=["square", "off the grid", "small", "hole", "row", "column", "L", "diagonal", "tail", "tail off the grid"],
 )
 def test_a_polygon_marks_the_middles_in_it_and_what_is_narrower_than_a_cell_there(rings, expected):
     assert rows(mark([polygon(*rings)], GRID)) == expected + [""] * (12 - len(expected))

@@ -190,7 +190,7 @@ class Cropped:
 
     def fuel_codes(self) -> dict[tuple[int, int], int]:
         """Return how many cells each pair of a fuel code and a cover has where trees can stand and a world may lie."""
-        fuel, cells = self._crop.fuel, {}
+        fuel, cells = self._crop.fuel, dict[tuple[int, int], int]()
         if fuel is None:
             return {}
         reach, covers = self.reach(), torch.arange(len(Cover), dtype=torch.uint8)

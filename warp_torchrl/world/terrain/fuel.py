@@ -181,7 +181,7 @@ def to_cover(codes: np.ndarray, known: np.ndarray, table: Mapping[int, int]) -> 
         fits = [name for name, preset in TABLES.items() if set(np.unique(codes[known])) <= preset.keys()]
         hint = f"; table={' or table='.join(fits)} has them" if fits else ""
         if (undeclared := set(strange.tolist()) & set(_UNDECLARED)) and not fits:
-            code = f"{min(undeclared):.0f}"
-            hint = f"; if {code} is nodata, gdal_edit -a_nodata {code} makes the file say so"
+            largest = f"{min(undeclared):.0f}"
+            hint = f"; if {largest} is nodata, gdal_edit -a_nodata {largest} makes the file say so"
         raise ValueError(f"table must have every code of fuel, it lacks {strange.size}: {listed}{hint}")
     return np.where(known, cover, np.uint8(Cover.BARE))
