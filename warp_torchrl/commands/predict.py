@@ -172,5 +172,5 @@ def _write(folder: Path, prediction: Prediction, case: Case, options: Prediction
         log.warning('no %s: Matplotlib is missing, pip install "warp_torchrl[figures]"', FIGURE)
     if options.animation:
         end = float(prediction.followed[0])
-        first = prediction.first_fire
-        write_animation(folder / "fire.gif", first, prediction.ground, case.cell_size, end, case.fire.residence)
+        first, ground = prediction.seen["first_fire"], prediction.ground_seen
+        write_animation(folder / "fire.gif", first, ground, case.cell_size, end, case.fire.residence)

@@ -65,29 +65,33 @@ def write_perimeters(path: Path, prediction: Prediction, place: Place, every: fl
     times = [every * 60.0 * step for step in range(1, int(longest / every + 1e-6) + 1)]
     if not times or times[-1] < longest * 60.0 - 1e-3:
         times.append(longest * 60.0)
-    write_geojson(path, perimeters(prediction.half_minutes, place.grid, times, place.corner))
+    window = prediction.window
+    corner = place.corner[0] + window.top, place.corner[1] + window.left
+    write_geojson(path, perimeters(prediction.seen["half_minutes"], place.grid, times, corner))
 
 
 def write_figure(path: Path, prediction: Prediction, title: str) -> None:
-    """Draw the maps beside the ground.
+    """Draw the maps beside the ground: of a map that is larger than the fires' window, what the window has.
 
     Raises:
         ImportError: If Matplotlib is not installed.
         OSError: If the write fails, with the path.
     """
     with disk.with_path(path):
-        save_maps(path, prediction.ground, panels(prediction), prediction.cell_size, title, prediction.lit)
+        ground, lit = prediction.ground_seen, prediction.window.cut(prediction.lit, False)
+        save_maps(path, ground, panels(prediction), prediction.cell_size, title, lit)
 
 
 def panels(prediction: Prediction) -> list[Panel]:
     """Return the panels of the figure; colours of rates and intensities end at their 99th percentile."""
+    maps = prediction.seen
     amounts: Mapping[str, tuple[Tensor, str]] = {
-        "arrival, median": (prediction.arrival_minutes / 60.0, "hours since the start"),
-        "rate of spread": (prediction.rate, "m/min"),
-        "fireline intensity": (prediction.intensity, "kW/m"),
-        "flame length": (prediction.flame_length, "m"),
+        "arrival, median": (maps["arrival_minutes"] / 60.0, "hours since the start"),
+        "rate of spread": (maps["rate"], "m/min"),
+        "fireline intensity": (maps["intensity"], "kW/m"),
+        "flame length": (maps["flame_length"], "m"),
     }
-    seen = prediction.burn_probability.masked_fill(prediction.burn_probability == 0.0, torch.nan)
+    seen = maps["burn_probability"].masked_fill(maps["burn_probability"] == 0.0, torch.nan)
     chance = Panel(title=f"burn probability, {len(prediction.followed)} fires", values=seen, label="share of the fires")
     return [chance, *(Panel(title=name, values=each, label=label, kind="amount", top=_top(each))
                       for name, (each, label) in amounts.items())]  # fmt: skip

@@ -1,51 +1,99 @@
 """Many fires on one map under law ``rate``, and what is read off them."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import torch
 from torch import Tensor
 
-from warp_torchrl.prediction.passing import Behaviour
-from warp_torchrl.prediction.tally import Tally
+from warp_torchrl.prediction.tally import Counter, Tally
 from warp_torchrl.weather.table import WeatherTable, read_weather
-from warp_torchrl.world.alone import Spell, arrival_minutes, spread_in
+from warp_torchrl.world.alone import Fires, Spell
+from warp_torchrl.world.fast.window import Window
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.rate import RateFire
 from warp_torchrl.world.state import Landscape
 from warp_torchrl.world.weather import Weather
 
-_MOST_TIMES = 2**31  # of fires and cells: 4 GiB
+_NOWHERE = {"burn_probability": 0.0}
+"""What maps hold where no fire came; the others hold NaN."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prediction:
-    """What fires on one map did. Maps are [H, W]; where no fire came they hold NaN."""
+    """What fires on one map did. Maps are [H, W]; they are kept in a window that has all fires."""
 
-    burn_probability: Tensor  # share of the fires that came, float32
-    arrival_minutes: Tensor  # median over the fires that came, float32 [min]
-    arrival_early: Tensor  # a tenth of them came before, float32 [min]
-    arrival_late: Tensor  # a tenth of them came after, float32 [min]
-    half_minutes: Tensor  # when half of all fires had come; NaN where fewer ever did, float32 [min]
-    rate: Tensor  # of spread as the fire came, mean over the fires that came, float32 [m/min]
-    intensity: Tensor  # fireline intensity then, the same, float32 [kW/m]
-    flame_length: Tensor  # the same, float32 [m]
+    window: Window
+    seen: Mapping[str, Tensor]  # the maps in the window, float32 [h, w], by their names
     hours: Tensor  # since the fires' start, float32 [T]: 0, 1, 2 ...
     area: Tensor  # burned by then in each fire, float32 [B, T] [ha]
     final_area: Tensor  # burned in each fire at its end, float32 [B] [ha]
     progress: Tensor  # the farthest that each fire had come from the middle of its start, float32 [B, T] [m]
     left_map: Tensor  # whether a fire came to the map's edge, bool [B]
     followed: Tensor  # how long each fire was followed, float32 [B] [min]
-    first_fire: Tensor  # arrival of the first fire, float32 [H, W] [min], NaN where it did not come
     head_rate: Tensor  # highest rate of the model in each spell of weather, of all cells but one in a thousand [m/min]
     lit: Tensor  # where fires started, bool [H, W]
     ground: Landscape  # batch size [1]
     cell_size: float  # side of a cell [m]
 
+    @property
+    def burn_probability(self) -> Tensor:
+        """Return the share of the fires that came, float32 [H, W]."""
+        return self._map("burn_probability")
+
+    @property
+    def arrival_minutes(self) -> Tensor:
+        """Return when fires came, the median over those that did, float32 [H, W] [min]; NaN where none did."""
+        return self._map("arrival_minutes")
+
+    @property
+    def arrival_early(self) -> Tensor:
+        """Return the time before which a tenth of the fires that came did, float32 [H, W] [min]; NaN where none did."""
+        return self._map("arrival_early")
+
+    @property
+    def arrival_late(self) -> Tensor:
+        """Return the time after which a tenth of the fires that came did, float32 [H, W] [min]; NaN where none did."""
+        return self._map("arrival_late")
+
+    @property
+    def half_minutes(self) -> Tensor:
+        """Return when half of all fires had come, float32 [H, W] [min]; NaN where fewer ever did."""
+        return self._map("half_minutes")
+
+    @property
+    def rate(self) -> Tensor:
+        """Return the rate of spread as fires came, mean over those that did, float32 [H, W] [m/min]; NaN for none."""
+        return self._map("rate")
+
+    @property
+    def intensity(self) -> Tensor:
+        """Return the fireline intensity as fires came, the same, float32 [H, W] [kW/m]."""
+        return self._map("intensity")
+
+    @property
+    def flame_length(self) -> Tensor:
+        """Return the flame length as fires came, the same, float32 [H, W] [m]."""
+        return self._map("flame_length")
+
+    @property
+    def first_fire(self) -> Tensor:
+        """Return when the first fire came, float32 [H, W] [min]; NaN where it did not."""
+        return self._map("first_fire")
+
+    @property
+    def ground_seen(self) -> Landscape:
+        """Return the ground of the window, batch size [1]."""
+        return self.ground if self.window.is_whole else self.window.landscape(self.ground)
+
     def burned_by(self, hour: float) -> Tensor:
         """Return where at least half of the fires had come by an hour, bool [H, W]."""
         return self.half_minutes <= 60.0 * hour
+
+    def _map(self, name: str) -> Tensor:
+        plane = torch.full(self.window.map, _NOWHERE.get(name, torch.nan))
+        return self.window.put(self.seen[name], plane)
 
 
 def predict(
@@ -84,62 +132,56 @@ def predict(
 
     Raises:
         ValueError: If a value is out of its range, nothing that is lit can burn, or the fires do not fit in memory.
+            What they take grows with their window: rates are computed hour by hour, and only about the fires.
     """
     law = RateFire() if fire is None else fire
     _check(ground, ignition, cell_size)
-    _check_numbers(ground, fires, area, hours, seed)
+    _check_numbers(fires, area, hours, seed)
     table = weather if isinstance(weather, WeatherTable) else read_weather(weather)
     minutes = lasting(table, start) if hours is None else 60.0 * hours
     air = Weather(table=table, convergence=convergence)
     met = [Spell(wind, lasts, moisture) for wind, moisture, lasts in air.spells(minutes, start)]
-    lit = ignition.cpu() & (law.flammability(ground)[0] > 0.0) & (ground.age[0] >= law.youngest_fuel)
+    burning = Fires(fire=law, landscape=ground, spells=met, cell_size=cell_size)
+    lit = ignition.cpu() & burning.fuel
     if not bool(lit.any()):
         raise ValueError(f"ignition must light a cell with fuel, none of its {int(ignition.sum())} cells has any")
-    spreads = [spread_in(law, ground, cell_size, spell) for spell in met]
-    behaviour = Behaviour.of(spreads, [spell.minutes for spell in met])
-    tally = Tally(behaviour, lit, minutes, cell_size, area)
-    key = world_key(seed + torch.arange(fires))
-    for arrival, pace in _burned(law, ground, lit, key, met, cell_size):
-        tally.add(arrival, pace)
+    count = Counter(fires=burning, lit=lit, minutes=minutes, area=area)
+    tally = Tally(fires, minutes)
+    for part in burning.in_parts(lit, world_key(seed + torch.arange(fires)), count, count.most_cells):
+        tally.add(part)
         if progress is not None:
-            progress(len(arrival))
-    return _prediction(tally, behaviour, lit, ground, cell_size)
+            progress(len(part.left))
+    return _prediction(tally, count)
 
 
-def _burned(
-    law: RateFire, ground: Landscape, lit: Tensor, key: Tensor, met: list[Spell], cell_size: float
-) -> Iterator[tuple[Tensor, Tensor]]:
-    """Yield the arrival times of some fires and the factor on their times, float32 [b, H, W] each."""
-    done = 0
-    for arrival in arrival_minutes(law, ground, lit, key, met, cell_size):
-        yield arrival, law.pace(key[done : done + len(arrival)], (lit.shape[0], lit.shape[1]))
-        done += len(arrival)
-
-
-def _prediction(tally: Tally, behaviour: Behaviour, lit: Tensor, ground: Landscape, cell_size: float) -> Prediction:
+def _prediction(tally: Tally, count: Counter) -> Prediction:
     times, (rate, intensity, flame_length) = tally.arrivals(), tally.means()
-    first = torch.zeros(0) if tally.first is None else tally.first
-    share = max(1, round(0.999 * behaviour.head.shape[1]))
+    window, fires = tally.window.on_map, count.fires
+    lit = tally.window.cut(count.lit, False)
+    maps = {
+        "burn_probability": tally.burn_probability(),
+        "arrival_minutes": times.median,
+        "arrival_early": times.early,
+        "arrival_late": times.late,
+        "half_minutes": times.half,
+        "rate": rate.masked_fill(lit, torch.nan),
+        "intensity": intensity.masked_fill(lit, torch.nan),
+        "flame_length": flame_length.masked_fill(lit, torch.nan),
+        "first_fire": tally.first,
+    }
     return Prediction(
-        burn_probability=tally.burn_probability(),
-        arrival_minutes=times.median,
-        arrival_early=times.early,
-        arrival_late=times.late,
-        half_minutes=times.half,
-        rate=rate.masked_fill(lit, torch.nan),
-        intensity=intensity.masked_fill(lit, torch.nan),
-        flame_length=flame_length.masked_fill(lit, torch.nan),
-        hours=tally.hours,
+        window=window,
+        seen={name: plane[:, : window.width] for name, plane in maps.items()},
+        hours=count.hours,
         area=tally.joined("area"),
         final_area=tally.joined("final"),
         progress=tally.joined("progress"),
         left_map=tally.joined("left"),
         followed=tally.joined("followed"),
-        first_fire=torch.where(first < 1e8, first, torch.nan),
-        head_rate=behaviour.head.kthvalue(share, dim=1).values,
-        lit=lit,
-        ground=ground,
-        cell_size=cell_size,
+        head_rate=torch.tensor([fires.fastest(number)[1] for number in range(len(fires.spells))]),
+        lit=count.lit,
+        ground=fires.landscape,
+        cell_size=fires.cell_size,
     )
 
 
@@ -168,14 +210,10 @@ def _check(ground: Landscape, ignition: Tensor, cell_size: float) -> None:
         raise ValueError(f"cell_size must be over 0 and at most 1e5 m, got {cell_size:g}")
 
 
-def _check_numbers(ground: Landscape, fires: int, area: float | None, hours: float | None, seed: int) -> None:
+def _check_numbers(fires: int, area: float | None, hours: float | None, seed: int) -> None:
     """Refuse numbers out of their ranges."""
-    rows, columns = ground.cover.shape[1:]
     if not 1 <= fires <= 1_000_000:
         raise ValueError(f"fires must be in 1..1000000, got {fires}")
-    if fires * rows * columns > _MOST_TIMES:
-        most = _MOST_TIMES // (rows * columns)
-        raise ValueError(f"fires must be at most {most} on {rows} x {columns} cells, for memory, got {fires}")
     if area is not None and not 0.0 < area < 1e9:
         raise ValueError(f"area must be over 0 and under 1e9 ha, got {area:g}")
     if hours is not None and not 0.0 < hours <= 1e5:

@@ -90,7 +90,9 @@ class FuelBed:
         table = torch.tensor(self.fuel_of_cover, dtype=torch.int16, device=landscape.cover.device)
         return table.index_select(0, landscape.cover.flatten().to(torch.int32)).view(landscape.cover.shape)
 
-    def spread(self, landscape: Landscape, wind: Tensor, moisture: Tensor, cell_size: float) -> Spread:
+    def spread(
+        self, landscape: Landscape, wind: Tensor, moisture: Tensor, cell_size: float, rise: Tensor | None = None
+    ) -> Spread:
         """Return what a fire's head does in each cell, float32 [B, H, W] each; rates on the map, not along the ground.
 
         Args:
@@ -98,8 +100,10 @@ class FuelBed:
             wind: (u east, v north) of the air's motion at 10 m in the open, float32 [B, 2, 1, 1] or [B, 2, H, W] [m/s].
             moisture: float32 [B, 7], in the order of ``MOISTURES``.
             cell_size: Side of a cell [m].
+            rise: How steeply the ground rises, see ``gradient``; None makes it of the landscapes' elevation.
         """
-        rise = gradient(landscape.elevation, landscape.cover, cell_size) * self.slope_gain
+        rise = gradient(landscape.elevation, landscape.cover, cell_size) if rise is None else rise
+        rise = rise * self.slope_gain
         steepness = torch.rad2deg(torch.atan(rise.square().sum(1).clamp(min=1e-12).sqrt()))
         air = {
             "wind_speed": wind.square().sum(1).clamp(min=1e-12).sqrt() * self.wind_gain,

@@ -11,10 +11,11 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.automaton import Automaton
+from warp_torchrl.world.fast.window import Window
 from warp_torchrl.world.fuel_bed import COVER_FUEL, FuelBed, moisture_row
 from warp_torchrl.world.geometry import grow, neighbour_in, neighbours
 from warp_torchrl.world.mapped_fuel import check_fuel, has_own_table, told_fuel
-from warp_torchrl.world.random import Stream, uniform
+from warp_torchrl.world.random import Stream, uniform, uniform_at
 from warp_torchrl.world.state import (
     FIRST_FIRE,
     Air,
@@ -186,9 +187,16 @@ class RateFire(Automaton):
 
     def pace(self, key: Tensor, size: tuple[int, int]) -> Tensor:
         """Return the factor on the fire's times in each cell, float32 [B, H, W]: 1 over that on its rates."""
-        cells = _log_normal(uniform(key, 0, Stream.PACE, size), self.cell_deviation)
+        return self._pace(key, uniform(key, 0, Stream.PACE, size))
+
+    def pace_in(self, key: Tensor, window: Window) -> Tensor:
+        """Return what ``pace`` does of the whole map in a window of it, float32 [B, h, w]."""
+        u = uniform_at(key, 0, Stream.PACE, window.index()[None].to(key.device))
+        return self._pace(key, u.view(len(key), window.height, window.width))
+
+    def _pace(self, key: Tensor, u: Tensor) -> Tensor:
         fires = _log_normal(uniform(key, 1, Stream.PACE, (1, 1)), self.fire_deviation)
-        return cells * fires
+        return _log_normal(u, self.cell_deviation) * fires
 
     def air(self, wind: Tensor, moisture: Tensor | None, ground: Ground) -> Air:
         """See ``Automaton``."""

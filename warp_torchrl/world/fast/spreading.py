@@ -34,25 +34,29 @@ class Spreading:
     """
 
     def __init__(self, lit: Tensor, fuel: Tensor, pace: Tensor) -> None:
-        worlds, height, width = lit.shape
+        burned = pad(lit, (1, 1, 1, 1)).flatten()
+        self._burned = burned
+        self._times = torch.where(burned, 0.0, NEVER)
+        self._origins = torch.full_like(self._times, NOWHERE, dtype=torch.int32)
+        self.minutes = self._times.clone()
+        self._beside = torch.zeros_like(burned)
+        self._lay_out((lit.shape[0], lit.shape[1], lit.shape[2]), fuel, pace)
+        started = burned.nonzero()[:, 0]
+        self._origins[started] = self._place(started)
+        self._waiting = self._lit = started[:0]
+        self._changed = self._lighted(started)
+        self._now = 0.0
+
+    def _lay_out(self, size: tuple[int, int, int], fuel: Tensor, pace: Tensor) -> None:
+        """Make what hangs on the size of the map alone (B, H, W)."""
+        worlds, height, width = size
         self.shape = (worlds, height + 2, width + 2)
         self._map = (height + 2) * (width + 2)
         self._width = width + 2
         self._fuel = pad(fuel, (1, 1, 1, 1)).flatten()
         self._pace = pad(pace, (1, 1, 1, 1), value=1.0).flatten()
-        burned = pad(lit, (1, 1, 1, 1)).flatten()
-        self._times = torch.where(burned, 0.0, NEVER)
-        self._origins = torch.full_like(self._times, NOWHERE, dtype=torch.int32)
-        self._burned = burned
         self._slot = torch.zeros_like(self._origins)
-        self._offsets = torch.tensor([row * self._width + column for row, column in DIRECTIONS], device=lit.device)
-        self.minutes = self._times.clone()
-        self._beside = torch.zeros_like(burned)
-        started = burned.nonzero()[:, 0]
-        self._origins[started] = self._place(started)
-        self._waiting = started[:0]
-        self._changed = self._lighted(started)
-        self._now = 0.0
+        self._offsets = torch.tensor([row * self._width + column for row, column in DIRECTIONS], device=fuel.device)
 
     def arrival(self) -> Tensor:
         """Return when the fire reached each cell, float32 [B, H, W] [minutes]; ``NEVER`` where it has not."""
@@ -61,14 +65,17 @@ class Spreading:
     def burn(self, hours: Iterable[Hour]) -> None:
         """Advance by some hours, one after the other."""
         before: Tensor | None = None
-        tick = 0
         for hour in hours:
-            travel = pad(hour.travel, (1, 1, 1, 1), value=NEVER).view(-1, 3, self._map).transpose(0, 1).flatten(1)
+            travel = self._planes(hour.travel)
             if before is not None:
                 self._change(before, travel)
-            before, began, tick = travel, self._now, 0
+            before, began = travel, self._now
             for tick in range(1, hour.ticks + 1):
                 self._tick(travel, began + tick * hour.minutes)
+
+    def _planes(self, travel: Tensor) -> Tensor:
+        """Return times of ways with a margin, float32 [3, ...]."""
+        return pad(travel, (1, 1, 1, 1), value=NEVER).view(-1, 3, self._map).transpose(0, 1).flatten(1)
 
     def _tick(self, travel: Tensor, end: float) -> None:
         cells = self._around(self._changed)
@@ -82,6 +89,7 @@ class Spreading:
         self._waiting = waiting[~reached]
         self._burned[lit] = True
         self.minutes[lit] = self._times[lit]
+        self._lit = lit
         self._changed = torch.cat((changed, self._lighted(lit)))
         self._now = end
 
