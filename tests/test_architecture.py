@@ -26,6 +26,7 @@ GROUND = (
     "foreign_text",
     "foreign_yaml",
     "interruption",
+    "memory",
     "modes",
     "nearest",
     "parent",

@@ -30,7 +30,7 @@ def too_little(what: str, wanted: float, there: float) -> ValueError:
     """
     return ValueError(
         f"memory must hold {what}, which wants {wanted / 1e9:.1f} GB, got {there / 1e9:.1f} GB: "
-        f"take a smaller window of the map (landscape.size, row, column), fewer hours or fewer fires"
+        f"take a smaller map or window of it (landscape.size, row, column), fewer hours or fewer fires"
     )
 
 

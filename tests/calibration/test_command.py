@@ -7,11 +7,13 @@ import torch
 import yaml
 
 from warp_torchrl.calibration.case import read_case
+from warp_torchrl.commands import calibrate as command
 from warp_torchrl.commands.calibrate import main
-from warp_torchrl.commands.failure import DONE, MISTAKE
+from warp_torchrl.commands.failure import DONE, IN_USE, MISTAKE
 from warp_torchrl.config.compose import option_of, plain
 from warp_torchrl.config.construction import ConfigError, build
 from warp_torchrl.config.saved_config import SavedConfig, restore
+from warp_torchrl.runs.lock import RunFolderLock
 
 rasterio = pytest.importorskip("rasterio", reason="rasters need the extra gis")
 
@@ -128,3 +130,36 @@ def test_a_run_keeps_a_law_of_a_user_s_own_file_by_ours_of_its_class_and_every_v
     kept = SavedConfig(choices={"fire": "rate"}, values={"fire": {"rate_gain": 1.2, "fuel_gain": {"2": 0.9}}})
     law = build(plain(restore(kept))["fire"], "fire")
     assert law.rate_gain == 1.2 and law.bed.fuel_gain == {"2": 0.9}
+
+
+def test_a_calibration_replaces_an_earlier_one_and_nothing_else(tmp_path, monkeypatch):
+    out, fires = tmp_path / "out", f"fires=[{write(tmp_path / 'small', scar=scar())}]"
+    monkeypatch.setattr(command, "_fit", lambda fire, *_: fire)
+    given = [fires, "fire.model=fbp", "draws=1", f"out={out}"]
+    assert main([*given, "parameters=[rate_gain]"]) == DONE and (out / "fire" / "calibrated.yaml").exists()
+    (out / "fire" / "own.yaml").write_text("mine")
+    assert main(given) == MISTAKE and main([*given, "overwrite=true"]) == DONE
+    there = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
+    assert there - {".lock"} == {"calibration.json", "calibration.md", "fire/own.yaml"}
+
+
+def test_two_calibrations_into_one_folder_are_refused_before_the_work(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(command, "read_case", lambda *_: pytest.fail("it began to work"))
+    lock = RunFolderLock(tmp_path / "out")
+    try:
+        assert main([f"fires=[{tmp_path}]", f"out={tmp_path / 'out'}"]) == IN_USE
+    finally:
+        lock.release()
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_calibration_that_ends_in_the_middle_leaves_nothing(tmp_path, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "law_yaml", interrupted)
+    monkeypatch.setattr(command, "_fit", lambda fire, *_: fire)
+    fires = f"fires=[{write(tmp_path / 'small', scar=scar())}]"
+    with pytest.raises(KeyboardInterrupt):
+        main([fires, "fire.model=fbp", "draws=1", "parameters=[rate_gain]", f"out={tmp_path / 'out'}"])
+    assert not (tmp_path / "out").exists()

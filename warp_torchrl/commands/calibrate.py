@@ -21,14 +21,17 @@ from warp_torchrl.config.construction import ConfigError, build, construct
 from warp_torchrl.config.grammar import check_flags
 from warp_torchrl.provenance import Provenance, gathered, section, tell
 from warp_torchrl.runs import disk
-from warp_torchrl.runs.destination import check_free
+from warp_torchrl.runs.output import output_folder
 from warp_torchrl.world.rate import RateFire
 
 log = logging.getLogger("warp_torchrl")
 
+REPORT = "calibration.json"
 USAGE = "python -m warp_torchrl.calibrate fires=[FOLDER,...] [parameters=[rate_gain,...]] [KEY=VALUE ...]"
 LAW = "fire/calibrated.yaml"
 """In the folder that the command writes, so that ``--config-dir`` takes that folder."""
+OUTPUTS = (LAW, "calibration.md")
+"""What an earlier calibration may have left, beside its report."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -47,18 +50,20 @@ def _run(arguments: Sequence[str]) -> None:
     fire = _law(values["fire"])
     parameters = parameters_of(options.parameters, fire, options.bounds, options.scales)
     folder = Path(options.out or datetime.now().strftime(f"outputs/calibrations/%Y-%m-%d/%H-%M-%S-{os.getpid()}"))
-    if not options.overwrite:
-        check_free(folder, "out")
-    with gathered() as files:
-        cases = [read_case(each, options.hours, options.units) for each in options.fires]
-        for case in cases:
-            check_fuel(case, fire)
-            tell(_of_map(case, fire))
-    _check_names(cases)
-    check_told(parameters, cases)
-    rows = {case.name: _before(fire, case, options) for case in cases}
-    law = _fit(fire, parameters, cases, rows, options) if parameters else None
-    _write(folder, rows, values, files, law, parameters, time.perf_counter() - began)
+    with output_folder(folder, "out", overwrite=options.overwrite, last=REPORT, replaced=OUTPUTS) as draft:
+        with gathered() as files:
+            cases = [read_case(each, options.hours, options.units) for each in options.fires]
+            for case in cases:
+                check_fuel(case, fire)
+                tell(_of_map(case, fire))
+        _check_names(cases)
+        check_told(parameters, cases)
+        rows = {case.name: _before(fire, case, options) for case in cases}
+        law = _fit(fire, parameters, cases, rows, options) if parameters else None
+        page = _write(draft, rows, values, files, law, parameters, time.perf_counter() - began)
+        written = sorted(each.name for each in draft.iterdir())
+    print(page)
+    print(f"wrote {', '.join(written)} into {folder}, in {time.perf_counter() - began:.0f} s", flush=True)
 
 
 def _law(node: Mapping[str, Any]) -> RateFire:
@@ -114,10 +119,10 @@ def _write(
     law: RateFire | None,
     parameters: Sequence[Parameter],
     seconds: float,
-) -> None:
+) -> str:
+    """Write the report into a folder, and return its page."""
     from warp_torchrl import __version__
 
-    folder.mkdir(parents=True, exist_ok=True)
     found = {each.name: each.usual(law) for each in parameters} if law else {}
     report = {
         "version": __version__,
@@ -128,7 +133,7 @@ def _write(
         "configuration": without_targets(values),
         "seconds": seconds,
     }
-    disk.replace(folder / "calibration.json", json.dumps(report, indent=1))
+    disk.replace(folder / REPORT, json.dumps(report, indent=1))
     page = table(rows)
     if law is not None:
         (folder / LAW).parent.mkdir(exist_ok=True)
@@ -136,8 +141,4 @@ def _write(
         page += "\n\n" + "\n".join(f"{name}: {value:.4g}" for name, value in found.items())
     page = "\n".join([page, *section([each.as_values for each in files])])
     disk.replace(folder / "calibration.md", page + "\n")
-    print(page)
-    print(
-        f"wrote {', '.join(sorted(each.name for each in folder.iterdir()))} into {folder}, in {seconds:.0f} s",
-        flush=True,
-    )
+    return page

@@ -56,4 +56,6 @@ def _diagnose(error: Exception) -> tuple[int, str]:
         return DISK, f"{error.filename or Path.cwd()}: {error.strerror}"
     if isinstance(error, (ConfigError, ValueError, *HYDRA_ERRORS)):
         return MISTAKE, line
+    if isinstance(error, MemoryError) or "can't allocate memory" in line:
+        return MISTAKE, "memory is full: a smaller map, fewer hours or fewer at once want less"
     return 1, f"{type(error).__name__}: {line} (debug=true shows where)"

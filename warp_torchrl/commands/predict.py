@@ -24,13 +24,19 @@ from warp_torchrl.prediction.predict import Prediction, lasting, predict
 from warp_torchrl.prediction.report import numbers, page, warnings
 from warp_torchrl.provenance import Provenance, gathered
 from warp_torchrl.runs import disk
-from warp_torchrl.runs.destination import check_free
+from warp_torchrl.runs.output import output_folder
 from warp_torchrl.world.rate import RateFire
 from warp_torchrl.world.terrain.raster import Raster
 
 log = logging.getLogger("warp_torchrl")
 
 _GROUPS = ("landscape", "fire")
+REPORT = "report.json"
+OUTPUTS = (
+    *("burn_probability.tif", "arrival_hours.tif", "rate.tif", "intensity.tif", "flame_length.tif"),
+    *("perimeters.geojson", FIGURE, "fire.gif", "report.md"),
+)
+"""What an earlier prediction may have left, beside its report."""
 USAGE = (
     "python -m warp_torchrl.predict landscape.path=FOLDER weather=FILE.csv ignition=FILE [hours=24] [fires=1000] "
     "[KEY=VALUE ...]"
@@ -66,19 +72,18 @@ def _run(arguments: Sequence[str]) -> None:
         PredictionOptions, {key: value for key, value in values.items() if key not in _GROUPS}, ""
     )
     folder = Path(options.out or datetime.now().strftime(f"outputs/predictions/%Y-%m-%d/%H-%M-%S-{os.getpid()}"))
-    if not options.overwrite:
-        check_free(folder, "out")
-    with gathered() as files:
-        case = read_case(_landscape(values["landscape"]), _law(values["fire"]), options)
-    prediction, seconds = _burn(case, options)
-    folder.mkdir(parents=True, exist_ok=True)
-    report = _report(prediction, case, values, files, {"fires": seconds, "all": time.perf_counter() - began})
-    _write(folder, prediction, case, options, report["title"])
-    report["seconds"]["all"] = time.perf_counter() - began
-    disk.replace(folder / "report.json", json.dumps(report, indent=1))
-    disk.replace(folder / "report.md", page(report))
+    with output_folder(folder, "out", overwrite=options.overwrite, last=REPORT, replaced=OUTPUTS) as draft:
+        with gathered() as files:
+            case = read_case(_landscape(values["landscape"]), _law(values["fire"]), options)
+        prediction, seconds = _burn(case, options)
+        report = _report(prediction, case, values, files, {"fires": seconds, "all": time.perf_counter() - began})
+        _write(draft, prediction, case, options, report["title"])
+        report["seconds"]["all"] = time.perf_counter() - began
+        disk.replace(draft / REPORT, json.dumps(report, indent=1))
+        disk.replace(draft / "report.md", page(report))
+        written = sorted(each.name for each in draft.iterdir())
     print(page(report))
-    print(f"wrote {', '.join(sorted(each.name for each in folder.iterdir()))} into {folder}", flush=True)
+    print(f"wrote {', '.join(written)} into {folder}", flush=True)
 
 
 def _landscape(node: Mapping[str, Any]) -> Any:

@@ -139,12 +139,13 @@ def _fill(folder: Path, draft: Path, last: str, replaced: Iterable[str]) -> None
         (folder / last).unlink(missing_ok=True)
         for path in [each for pattern in replaced for each in folder.glob(pattern)]:
             _remove(path)
-        for path in sorted(draft.iterdir(), key=lambda each: each.name == last):
-            if path.name == last:
+        files = [path.relative_to(draft) for path in draft.rglob("*") if path.is_file()]
+        for name in sorted(files, key=lambda each: each == Path(last)):
+            if name == Path(last):
                 disk.sync(folder)
-            if path.is_dir():
-                _remove(folder / path.name)
-            path.replace(folder / path.name)
+            (folder / name).parent.mkdir(exist_ok=True)
+            (draft / name).replace(folder / name)
+            disk.sync((folder / name).parent)
         disk.sync(folder)
 
 

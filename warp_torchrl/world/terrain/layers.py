@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from warp_torchrl import memory
 from warp_torchrl.world.terrain.bands import LENGTHS, factor_of
 from warp_torchrl.world.terrain.grid import Grid, check_grid
 from warp_torchrl.world.terrain.layer import RASTERS, Header, find_layer, read_header, read_layer
@@ -17,6 +18,7 @@ from warp_torchrl.world.terrain.resampling import regrid, resample_layer
 from warp_torchrl.world.terrain.vector import SUFFIXES
 
 _log = logging.getLogger("warp_torchrl")
+_BYTES = 30  # of a cell of a layer while it is read
 
 
 class Layers(NamedTuple):
@@ -83,6 +85,7 @@ def read_layers(
         _tell_once(f"{paths['fuel']} has no CRS: its cells are taken as squares of {grid.cell_size:g} m")
     if resolution is not None:
         grid = regrid("fuel", grid, resolution)
+    _check_memory(grid, len(paths))
     for name in headers.keys() - {"fuel"} if strict else ():
         check_grid(name, headers[name].grid, "fuel", grid)
     made = Layers(grid, {}, {}, headers, paths)
@@ -92,6 +95,14 @@ def read_layers(
             continue
         made.values[name], made.known[name] = _values(name, headers[name], grid, resample)
     return made
+
+
+def _check_memory(grid: Grid, layers: int) -> None:
+    """Refuse layers that do not fit in memory before they are read."""
+    rows, columns = grid.shape
+    wanted, there = rows * columns * layers * _BYTES, memory.available()
+    if wanted > there:
+        raise memory.too_little(f"{layers} layers of {rows} x {columns} cells", wanted, there)
 
 
 def _values(name: str, header: Header, grid: Grid, resample: str) -> tuple[np.ndarray, np.ndarray]:
