@@ -44,6 +44,11 @@ def test_values_stay_inside_the_bounds_and_limits_reach_them():
         (["rate_gain"], {"bounds": {"rate_gain": [2, 3]}}, r"fire.rate_gain must be in its bounds, \[2, 3\], got 1"),
         (["rate_gain"], {"bounds": {"rate_gain": [0, 3]}}, "bounds.rate_gain must be over 0"),
         (["rate_gain"], {"scales": {"rate_gain": 0}}, "scales.rate_gain must be over 0, got 0"),
+        (["rate_gain"], {"scales": {"rate_gain": [1]}}, r"scales.rate_gain must be a finite number, got \[1\]"),
+        (["rate_gain"], {"bounds": {"rate_gain": 1}}, "bounds.rate_gain must be a pair from low to high, got 1"),
+        (["rate_gain"], {"bounds": {"rate_gain": "12"}}, "bounds.rate_gain must be a pair from low to high, got '12'"),
+        (["rate_gain"], {"bounds": {"rate_gain": [0.5, True]}}, "bounds.rate_gain must be a finite number, got True"),
+        (["rate_gain"], {"bounds": {"rate_gain": [0.5, 1e400]}}, "bounds.rate_gain must be a finite number, got inf"),
     ],
 )
 def test_a_refusal_is_one_line(names, options, line):

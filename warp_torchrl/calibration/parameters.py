@@ -24,6 +24,7 @@ _GAIN = (0.2, 5.0, 0.3)  # lowest, highest, scale of the logarithm: two thirds o
 _DEVIATION = (0.02, 1.0, 0.5)
 _DEAD, _LIVE = (1.0, 60.0, 2.0), (30.0, 300.0, 30.0)
 _MOISTURE = {"ffmc": (50.0, 100.0, 3.0), "bui": (1.0, 300.0, 20.0), "live_herbaceous": _LIVE, "live_woody": _LIVE}
+_HUGE = 1e30  # no bound and no scale is as large
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,10 +87,15 @@ def parameter(name: str, bounds: Sequence[float] | None = None, scale: float | N
     """
     low, high, usual_scale = _usual(str(name))
     if bounds is not None:
-        if len(bounds) != 2:
-            raise ValueError(f"bounds.{name} must be a pair from low to high, got {list(bounds)}")
-        low, high = (float(bound) for bound in bounds)
-    return Parameter(name=str(name), low=low, high=high, scale=usual_scale if scale is None else float(scale))
+        if not isinstance(bounds, list | tuple) or len(bounds) != 2:
+            raise ValueError(f"bounds.{name} must be a pair from low to high, got {bounds!r}")
+        low, high = (_number(f"bounds.{name}", bound) for bound in bounds)
+    return Parameter(
+        name=str(name),
+        low=low,
+        high=high,
+        scale=usual_scale if scale is None else _number(f"scales.{name}", scale),
+    )
 
 
 def parameters_of(
@@ -133,6 +139,12 @@ def fire_at(fire: RateFire, parameters: Sequence[Parameter], z: Tensor) -> RateF
         else:
             plain[group] = value
     return replace(fire, fuel_gain=gains, moisture=moisture, **plain)  # type: ignore[arg-type]
+
+
+def _number(key: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not -_HUGE < value < _HUGE:
+        raise ValueError(f"{key} must be a finite number, got {value!r}")
+    return float(value)
 
 
 def _usual(name: str) -> tuple[float, float, float]:

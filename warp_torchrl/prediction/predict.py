@@ -32,7 +32,7 @@ class Prediction:
     progress: Tensor  # the farthest that each fire had come from the middle of its start, float32 [B, T] [m]
     left_map: Tensor  # whether a fire came to the map's edge, bool [B]
     followed: Tensor  # how long each fire was followed, float32 [B] [min]
-    head_rate: Tensor  # highest rate of the model in each spell of weather, of all cells but one in a thousand [m/min]
+    head_rate: Tensor  # highest in each spell that a fire met, of all cells but one in a thousand [m/min]
     lit: Tensor  # where fires started, bool [H, W]
     ground: Landscape  # batch size [1]
     cell_size: float  # side of a cell [m]
@@ -178,7 +178,7 @@ def _prediction(tally: Tally, count: Counter) -> Prediction:
         progress=tally.joined("progress"),
         left_map=tally.joined("left"),
         followed=tally.joined("followed"),
-        head_rate=torch.tensor([fires.fastest(number)[1] for number in range(len(fires.spells))]),
+        head_rate=torch.tensor([fires.fastest(number)[1] for number in range(fires.n_met)]),
         lit=count.lit,
         ground=fires.landscape,
         cell_size=fires.cell_size,

@@ -95,6 +95,11 @@ class Fires:
         """Return (H, W) of the map."""
         return self.landscape.cover.shape[1], self.landscape.cover.shape[2]
 
+    @property
+    def n_met(self) -> int:
+        """Return how many spells fires have met: from the first to the last in which one burned."""
+        return len(self._fastest)
+
     @cached_property
     def fuel(self) -> Tensor:
         """Return the cells that can ignite, bool [H, W]."""

@@ -92,6 +92,7 @@ def test_a_fire_that_is_out_asks_for_no_more_weather():
     fires = Fires(fire=fire, landscape=ground, spells=turning(9, minutes=60.0), cell_size=30.0)
     found = fires.burn(lit(size, (11, 101)), world_key(torch.arange(1)))
     assert int((found.minutes < NEVER / 2).sum()) == 9 and len({tuple(wind) for wind in asked}) < 3
+    assert fires.n_met < 3
 
 
 class _Listening:
