@@ -9,14 +9,14 @@ WEATHER = Provenance(
     key="weather",
     file="station.csv",
     read={"WS": "wind_speed, km/h", "FFMC": ""},
-    left=("GUST", "PRES"),
+    left=("GUST", "VIS"),
     notes=("wind is that at 10 m",),
 )
 
 
 def test_a_line_names_what_was_read_in_which_unit_and_what_was_left():
     assert WEATHER.line == (
-        "weather: station.csv: read WS [wind_speed, km/h], FFMC; left GUST, PRES; wind is that at 10 m"
+        "weather: station.csv: read WS [wind_speed, km/h], FFMC; left GUST, VIS; wind is that at 10 m"
     )
     assert Provenance(key="fuel", file="fuel.tif").line == "fuel: fuel.tif: read nothing"
 

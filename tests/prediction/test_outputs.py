@@ -11,6 +11,7 @@ from warp_torchrl.commands import predict as command
 from warp_torchrl.commands.predict import main
 from warp_torchrl.runs.exit_codes import DISK, DONE, IN_USE, MISTAKE
 from warp_torchrl.runs.lock import RunFolderLock
+from warp_torchrl.world.alone import Fires
 
 __all__ = ["folder"]
 MAPS = {"burn_probability.tif", "arrival_hours.tif", "rate.tif", "intensity.tif", "flame_length.tif"}
@@ -94,6 +95,14 @@ def test_a_map_that_memory_does_not_hold_is_refused_before_it_is_read(folder, mo
     line = capsys.readouterr().err.strip().splitlines()[-1]
     assert "memory must hold 2 layers of 40 x 44 cells" in line and "take a smaller map or window" in line
     assert not (folder / "out").exists()
+
+
+def test_fires_that_memory_does_not_hold_are_refused_before_they_burn(folder, monkeypatch, capsys):
+    monkeypatch.setattr(memory, "available", lambda: 2_000_000)
+    monkeypatch.setattr(Fires, "burn", lambda *_: pytest.fail("it began to burn"))
+    assert main(arguments(folder, fires=1_000_000)) == MISTAKE and not (folder / "out").exists()
+    line = capsys.readouterr().err.strip().splitlines()[-1]
+    assert "memory must hold the arrival times of 1000000 fires in 40 x 44 cells, which wants 3.5 GB" in line
 
 
 def test_the_report_and_the_log_name_what_was_read(folder, monkeypatch, caplog):

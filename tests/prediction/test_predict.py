@@ -180,7 +180,12 @@ REFUSED = {
     "fires must be in 1..1000000, got 0": {"fires": 0},
     "area must be over 0": {"area": 0.0},
     "hours must be over 0": {"hours": 0.0},
-    "seed must be 0 or more": {"seed": -1},
+    "seed must be in 0": {"seed": -1},
+    "seed must be in 0..2": {"seed": 2**63},
+    "hours must be over 0 and at most 1e5, got nan": {"hours": math.nan},
+    "area must be over 0 and under 1e9 ha, got nan": {"area": math.nan},
+    "start must be within 1e.08 minutes of the weather's first row, got nan": {"start": math.nan, "hours": 1.0},
+    "convergence must be in": {"convergence": math.nan},
     "start must be before the weather's end, 60 minutes": {"start": 60.0},
 }
 

@@ -18,6 +18,8 @@ from warp_torchrl.world.weather import Weather
 
 _NOWHERE = {"burn_probability": 0.0}
 """What maps hold where no fire came; the others hold NaN."""
+_LARGEST_SEED = 2**62
+_LONGEST = 1e8  # minutes: two centuries
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -137,6 +139,7 @@ def predict(
     law = RateFire() if fire is None else fire
     _check(ground, ignition, cell_size)
     _check_numbers(fires, area, hours, seed)
+    _check_times(start, convergence)
     table = weather if isinstance(weather, WeatherTable) else read_weather(weather)
     minutes = lasting(table, start) if hours is None else 60.0 * hours
     air = Weather(table=table, convergence=convergence)
@@ -147,6 +150,7 @@ def predict(
         raise ValueError(f"ignition must light a cell with fuel, none of its {int(ignition.sum())} cells has any")
     count = Counter(fires=burning, lit=lit, minutes=minutes, area=area)
     tally = Tally(fires, minutes)
+    tally.check(Window.about(lit))
     for part in burning.in_parts(lit, world_key(seed + torch.arange(fires)), count, count.most_cells):
         tally.add(part)
         if progress is not None:
@@ -218,5 +222,12 @@ def _check_numbers(fires: int, area: float | None, hours: float | None, seed: in
         raise ValueError(f"area must be over 0 and under 1e9 ha, got {area:g}")
     if hours is not None and not 0.0 < hours <= 1e5:
         raise ValueError(f"hours must be over 0 and at most 1e5, got {hours:g}")
-    if seed < 0:
-        raise ValueError(f"seed must be 0 or more, got {seed}")
+    if not 0 <= seed <= _LARGEST_SEED:
+        raise ValueError(f"seed must be in 0..2^62, got {seed}")
+
+
+def _check_times(start: float, convergence: float) -> None:
+    if not abs(start) <= _LONGEST:
+        raise ValueError(f"start must be within {_LONGEST:g} minutes of the weather's first row, got {start:g}")
+    if not -360.0 <= convergence <= 360.0:
+        raise ValueError(f"convergence must be in [-360, 360] degrees, got {convergence:g}")

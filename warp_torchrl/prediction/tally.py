@@ -177,7 +177,7 @@ class Tally:
         Raises:
             ValueError: If the times of all fires do not fit in memory.
         """
-        self._check(count)
+        self.check(count.window)
         self._reach(count.window)
         place = count.window.place_in(self.window)
         self._came[place] += count.came
@@ -225,11 +225,16 @@ class Tally:
                     found[(slice(None), *block)] = quantiles.view(4, *times.shape[1:])
         return Arrivals(*found)
 
-    def _check(self, count: Count) -> None:
+    def check(self, window: Window) -> None:
+        """Refuse fires whose times would not fit in memory if all that are left had this window.
+
+        Raises:
+            ValueError: With how many they are, the window and what they want.
+        """
         left = self._fires - sum(len(each.times) for each in self._counts)
-        wanted, there = 2.0 * left * count.window.cells, memory.available()
+        wanted, there = 2.0 * left * window.cells, memory.available()
         if wanted > there:
-            size = f"{count.window.height} x {count.window.width}"
+            size = f"{window.height} x {window.width}"
             raise memory.too_little(f"the arrival times of {left} fires in {size} cells", wanted, there)
 
     def _reach(self, window: Window) -> None:
