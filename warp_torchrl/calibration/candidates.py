@@ -6,14 +6,14 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.calibration.case import FireCase
-from warp_torchrl.world.alone import Spell, hour_of
+from warp_torchrl.world.alone import Spell, can_ignite, hour_of
 from warp_torchrl.world.fast.spreading import Hour, Spreading
 from warp_torchrl.world.rate import RateFire
 
 
 def burnable(fire: RateFire, case: FireCase) -> Tensor:
     """Return the cells of a case that can ignite, bool [H, W]."""
-    return (fire.flammability(case.landscape)[0] > 0.0) & (case.landscape.age[0] >= fire.youngest_fuel)
+    return can_ignite(fire, case.landscape)
 
 
 def arrivals(fires: Sequence[RateFire], case: FireCase, pace: Tensor) -> Tensor:
@@ -25,10 +25,9 @@ def arrivals(fires: Sequence[RateFire], case: FireCase, pace: Tensor) -> Tensor:
         pace: Factor on the times of each law's F fires, float32 [G, F, H, W].
     """
     fuel = burnable(fires[0], case)
-    hours = [grouped(fires, case, spell, fuel) for spell in case.spells]
     groups, each, height, width = pace.shape
     worlds = Spreading(case.lit.expand(groups * each, height, width), fuel, pace.reshape(-1, height, width))
-    worlds.burn(hours)
+    worlds.burn(grouped(fires, case, spell, fuel) for spell in case.spells)
     return worlds.arrival().reshape(groups, each, height, width)
 
 

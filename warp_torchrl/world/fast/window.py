@@ -37,8 +37,10 @@ class Window:
         """Return the first window about the cells that burn at the start, bool [H, W] or [B, H, W], one at least."""
         plane = lit if lit.dim() == 2 else lit.any(0)
         rows, columns = plane.any(1).nonzero()[:, 0], plane.any(0).nonzero()[:, 0]
-        sides = [(int(each[0]) - _MARGIN, int(each[-1]) + 1 + _MARGIN) for each in (rows, columns)]
-        return cls._between(*(_widened(*side) for side in sides), (plane.shape[0], plane.shape[1]))
+        north_south, west_east = (
+            _widened(int(each[0]) - _MARGIN, int(each[-1]) + 1 + _MARGIN) for each in (rows, columns)
+        )
+        return cls._between(north_south, west_east, (plane.shape[0], plane.shape[1]))
 
     @classmethod
     def _between(cls, rows: tuple[int, int], columns: tuple[int, int], size: tuple[int, int]) -> "Window":
