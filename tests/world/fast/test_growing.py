@@ -1,5 +1,7 @@
 """Fires in windows come to the times of the whole map, to the bit."""
 
+from dataclasses import replace
+
 import pytest
 import torch
 
@@ -134,6 +136,19 @@ def test_too_many_fires_for_their_window_go_on_in_parts(monkeypatch):
     assert len(parts) == 3 and torch.equal(torch.cat([minutes for _, minutes in parts]), whole)
 
 
+def test_threads_change_nothing_and_end_with_an_error(monkeypatch):
+    monkeypatch.setattr(alone, "_AT_ONCE", 1)
+    (fires, cells), key = started(weather=2), world_key(torch.arange(4))
+    one, two = (list(replace(fires, workers=workers).in_parts(cells, key, alone._on_map)) for workers in (1, 2))
+    assert len(two) == 4 and torch.equal(torch.cat(one), torch.cat(two))
+
+    def full(burned):
+        raise OSError(28, "No space left on device")
+
+    with pytest.raises(OSError, match="No space left"):
+        list(replace(fires, workers=2).in_parts(cells, key, full))
+
+
 def test_a_window_that_memory_does_not_hold_is_refused_in_one_line(monkeypatch):
     (fires, cells), key = started(), world_key(torch.arange(2))
     monkeypatch.setattr(memory, "available", lambda: 100_000)
@@ -141,6 +156,19 @@ def test_a_window_that_memory_does_not_hold_is_refused_in_one_line(monkeypatch):
         ValueError, match=r"^memory must hold a fire in a window of \d+ x \d+ cells, which wants 0.0 GB"
     ):
         list(fires.in_parts(cells, key, lambda burned: burned))
+
+
+@pytest.mark.parametrize("size", [(71, 149), (70, 159), (130, 95)])
+def test_rates_of_a_window_are_those_of_the_whole_map_to_the_bit(size):
+    ground = land(1, size).replace(fuel=torch.full((1, *size), 2, dtype=torch.int16))
+    fires = Fires(fire=RateFire(model="fbp"), landscape=ground, spells=turning(8), cell_size=30.0)
+    windows = [Window(0, 0, 20, 64, size), Window(30, 64, size[0] - 30, 128, size), Window(9, 0, 33, 192, size)]
+    for number in range(8):
+        whole = fires.planes(number, Window.whole(size))
+        for window in windows:
+            found, inside = fires.planes(number, window), window.on_map
+            part = whole[:, window.top : window.top + window.height, window.left : window.left + inside.width]
+            assert torch.equal(found[:, :, : inside.width], part), (number, window)
 
 
 def test_strips_have_each_row_once_and_fill_vectors():
