@@ -17,6 +17,11 @@ _SEQUENCE = re.compile(
 _HIDDEN = frozenset(("Cc", "Cf", "Cs", "Co", "Cn"))  # controls, bidi overrides, halves of pairs, what has no glyph
 _LINK = re.compile(r"(?<=:)(?=/)|(?<=www)(?=\.)|(?<=@)", re.IGNORECASE)
 _JOINER = "\u2060"
+_MARKUP = re.compile(
+    r"[^\w ,.-]"
+    r"|(?<![^\W_])_|_(?![^\W_])"  # within a word it is none
+    r"|^[\W_]|^\d(?=\d*\.)|^[ie](?=mport|xport)"
+)
 
 
 def plain_text(value: str, most: int = MOST) -> str:
@@ -38,13 +43,13 @@ def plain_text(value: str, most: int = MOST) -> str:
 def escaped_markdown(value: object, most: int = MOST) -> str:
     """Return the plain text of a value for Markdown, MDX or HTML, in which nothing of it is markup.
 
-    All but letters and digits become character references, which those three read alike; so does a first letter, since
-    a line that begins with ``import`` is a program in MDX. An invisible joiner breaks addresses, of which GitHub's
-    Markdown makes links even where they are references.
+    What may be markup becomes character references, which those three read alike. So does a first character with which
+    a list begins, or ``import``, with which a program begins in MDX. An invisible joiner breaks addresses, of which
+    GitHub's Markdown makes links even where they are references.
 
     Args:
         value: Its text is shown.
         most: Length above which the end is left out [characters].
     """
     line = _LINK.sub(_JOINER, plain_text(str(value), most))
-    return "".join(each if at and each.isalnum() else f"&#{ord(each)};" for at, each in enumerate(line))
+    return _MARKUP.sub(lambda found: f"&#{ord(found[0])};", line)
