@@ -1,6 +1,7 @@
 """The ground in three dimensions, on a map that is drawn by hand."""
 
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -64,3 +65,17 @@ def test_a_ray_into_the_sky_or_beside_the_map_meets_nothing():
     ground = ground_of(draw(MAP))
     assert cell_at((0.0, 0.0, 5.0), (0.0, 0.0, 1.0), ground) is None
     assert cell_at((50.0, 0.0, 5.0), (0.0, 0.0, -1.0), ground) is None
+
+
+@pytest.mark.parametrize("far", [1e3, 1e9])
+def test_a_ray_from_afar_takes_no_more_steps_than_one_from_near(far):
+    ground = ground_of(draw(MAP, elevation=SLOPE))
+    tracemalloc.start()
+    assert cell_at((0.5, 0.5, far), (0.0, 0.0, -1.0), ground) is not None
+    assert tracemalloc.get_traced_memory()[1] < 1e6
+    tracemalloc.stop()
+
+
+@pytest.mark.parametrize("direction", [(0.0, 0.0, 0.0), (0.0, 0.0, -1e9), (math.nan, 0.0, -1.0), (1.0, 1.0, -1.0)])
+def test_what_is_no_direction_meets_nothing(direction):
+    assert cell_at((0.0, 0.0, 5.0), direction, ground_of(draw(MAP))) is None

@@ -77,19 +77,34 @@ def cell_at(
 
     Args:
         origin: Where it starts [cells].
-        direction: Unit vector of where it goes.
+        direction: Unit vector of where it goes; of any other it meets none.
         ground: The ground.
     """
     rows, columns = ground.size
-    reach = math.dist(origin, (0.0, 0.0, 0.0)) + rows + columns
-    along = np.arange(0.0, reach, 0.05)[:, None]
-    x, y, z = (np.asarray(origin) + along * np.asarray(direction)).T
+    start, way = np.array(origin), np.array(direction)
+    near, far = _within(start, way, ground)
+    if not near < far:
+        return None
+    along = np.arange(near, far, 0.05)[:, None]
+    x, y, z = (start + along * way).T
     row = np.floor((rows - 1) / 2.0 - y + 0.5).astype(int)
     column = np.floor(x + (columns - 1) / 2.0 + 0.5).astype(int)
     inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
     below = z <= ground.height[row.clip(0, rows - 1), column.clip(0, columns - 1)]
     met = np.flatnonzero(inside & below)
     return (int(row[met[0]]), int(column[met[0]])) if len(met) else None
+
+
+def _within(start: np.ndarray, way: np.ndarray, ground: Ground) -> tuple[float, float]:
+    """Return from where to where a ray is in the box around the ground [cells]: steps along it are as few as that."""
+    if not abs(np.linalg.norm(way) - 1.0) < 0.01:
+        return math.inf, 0.0
+    rows, columns = ground.size
+    low = np.array((-columns / 2.0, -rows / 2.0, ground.height.min() - 1.0))
+    high = np.array((columns / 2.0, rows / 2.0, ground.height.max() + 1.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        one, other = (low - start) / way, (high - start) / way
+    return max(0.0, float(np.fmin(one, other).max())), float(np.fmax(one, other).min())
 
 
 def _east_and_north(rows: int, columns: int) -> tuple[Tensor, Tensor]:
