@@ -7,6 +7,7 @@ from warp_torchrl.live import words
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.replayed import ReplayedMatch
 from warp_torchrl.runs.sealed import Unsound
+from warp_torchrl.world.intervention import can_be_lit
 from warp_torchrl.world.state import Action
 
 
@@ -42,6 +43,25 @@ def test_it_plays_what_was_played_on_both_sides_and_stops_where_it_was_left(play
     assert replayed.step() == [] and int(replayed.alone.state.step[0]) == step == 10
 
 
+def test_what_people_did_after_the_last_step_comes_at_the_end_on_both_sides(played):
+    lit = next((row, column) for row in range(16) for column in range(16) if can_be_lit_now(played, row, column))
+    before = played.alone.state.cells.clone()
+    played.ignite(*lit)
+    assert not played.alone.state.cells.equal(before)
+    replayed = ReplayedMatch(played.sides[0].record(), played.setting)
+    for _ in range(2):  # anew too
+        replayed.restart()
+        while not replayed.ended:
+            replayed.step()
+        for one, other in zip(replayed.everywhere, played.everywhere):
+            assert one.state.cells.equal(other.state.cells)
+            assert one.curves.burning == other.curves.burning
+
+
+def can_be_lit_now(match, row, column):
+    return all(bool(can_be_lit(side.state, match.world.fire)[0, row, column]) for side in match.everywhere)
+
+
 def test_it_starts_anew_but_not_another_seed(replayed):
     for _ in range(7):
         replayed.step()
@@ -51,6 +71,9 @@ def test_it_starts_anew_but_not_another_seed(replayed):
         replayed.step()
     with pytest.raises(Refused, match="the recording is of seed 1000000"):
         replayed.restart(5)
+    assert replayed.ended
+    replayed.restart(1_000_000)
+    assert not replayed.ended
 
 
 def test_it_is_told_whose_it_is(replayed):

@@ -66,12 +66,18 @@ class ReplayedMatch(Match):
         if self.ended:
             return []
         at = len(self.sides[0].curves.saved) - 1
+        self._carry_out(at)
+        self.sides[0].step()
+        self.alone.questions()
+        told = self.alone.step()
+        if self.ended:
+            self._carry_out(at + 1)  # what people did after the last step
+        return told
+
+    def _carry_out(self, at: int) -> None:
         for event in self.recording.events:
             if event.step == at:
                 self.alone.intervene(event.kind, *event.numbers)
-        self.sides[0].step()
-        self.alone.questions()
-        return self.alone.step()
 
     def blow(self, speed: float, direction: float) -> NoReturn:
         """Refuse it."""
