@@ -1,10 +1,13 @@
 """What was played is saved once, and only where people did something."""
 
+import shutil
+
 import pytest
 
 from warp_torchrl.demonstrations.files import MANIFEST, read
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.keeping import Keeper
+from warp_torchrl.runs.sealed import Unsound
 from warp_torchrl.world.state import Action
 
 
@@ -94,14 +97,56 @@ def test_a_folder_that_cannot_be_made_is_one_line(match, tmp_path):
 
 
 def test_recordings_are_listed_with_their_numbers_and_a_broken_one_with_what_is_wrong(match, keeper):
-    assert keeper.recordings() == {}
+    assert keeper.recordings() == ({}, 0)
     keeper.save(drive(match))
     match.restart()
     broken = keeper.save(drive(match, steps=3))
     (broken / MANIFEST).write_text("{}")
-    sound, other = keeper.recordings().values()
+    sound, other = keeper.recordings()[0].values()
     assert (sound.steps, sound.acts, sound.corrections) == (2, 2, 2) and sound.saved == pytest.approx(1.0, abs=0.2)
     assert "format None" in other
     assert len(keeper.read("skirmish-1000000-1").steps) == 2
     with pytest.raises(Refused, match="holds no recording \\.\\./secret"):
         keeper.read("../secret")
+
+
+def test_a_recording_whose_folder_has_a_name_of_markup_is_neither_listed_nor_read(match, keeper):
+    sound = keeper.save(drive(match))
+    strange = ("<iframe srcdoc=x>", "a b", "a`b", "{x}", "ü", "a\nb", "x/<b>", "<b>/x")
+    for name in strange:
+        shutil.copytree(sound, keeper.folder / name)
+    shutil.copytree(sound, keeper.folder / "of-a.friend/B_2")
+    found, left_out = keeper.recordings()
+    assert list(found) == ["of-a.friend/B_2", sound.name] and left_out == len(strange)
+    for name in strange:
+        with pytest.raises(Refused, match="holds no recording"):
+            keeper.read(name)
+
+
+def test_what_another_has_saved_under_the_same_name_stays(match, keeper):
+    side = drive(match)
+    first = keeper.save(side)
+    shutil.rmtree(first)
+    match.restart()
+    other = Keeper(keeper.folder).save(drive(match, steps=1))
+    assert other == first
+    side.open_recording = keeper._last[0]
+    drive(match)
+    second = keeper.save(side)
+    assert folders(keeper) == sorted((other.name, second.name))
+
+
+@pytest.mark.parametrize(
+    "error", [ValueError("what was written is not what was played"), Unsound("broken"), MemoryError()]
+)
+def test_an_episode_whose_saving_fails_is_not_called_saved(match, keeper, monkeypatch, error):
+    side = drive(match)
+
+    def fail(*given):
+        raise error
+
+    monkeypatch.setattr("warp_torchrl.live.keeping.save", fail)
+    with pytest.raises(type(error)):
+        keeper.save(side)
+    monkeypatch.undo()
+    assert keeper.changes == 0 and keeper.keep(side) is not None, "it can still be saved"

@@ -1,5 +1,6 @@
 """What the page says."""
 
+import html
 import re
 from pathlib import Path
 
@@ -26,7 +27,11 @@ def test_the_headline_tells_the_step_of_the_side_that_is_farthest(match):
 
 def test_the_table_has_a_row_for_each_side_with_its_numbers(match):
     rows = words.numbers(match).splitlines()
-    assert [row.split(" | ")[0].strip("| ") for row in rows[2:]] == ["default (4.0 M)", "local", "without a team"]
+    assert [row.split(" | ")[0].strip("| ") for row in rows[2:]] == [
+        "default &#40;4.0 M&#41;",
+        "local",
+        "without a team",
+    ]
     assert f"**{match.alone.curves.saved[-1]:.1%}**" in rows[-1]
 
 
@@ -109,10 +114,45 @@ def test_recordings_are_a_table_in_which_a_broken_one_is_called_so():
     assert text.splitlines()[-2:] == ["| one | 30 | 5 | 2 | 61% |", "| two | broken | | | |"]
     many = words.recordings(Path("people"), {f"{at:02}": row for at in range(20)})
     assert "| 19 |" in many and "| 04 |" not in many and many.endswith("and 5 before them.")
-    assert words.recordings(Path("people"), {}) == "`people` holds no recording."
+    assert words.recordings(Path("people"), {}) == "**people** holds no recording."
 
 
 def test_a_training_tells_what_can_be_played():
     assert words.training("", None).startswith("Only policies")
-    assert words.training("runs/a trains", None) == "runs/a trains."
-    assert words.training("runs/a trains", 2000) == "runs/a trains. A policy of 2,000 steps can be played."
+    assert words.training("runs/a trains", None) == "runs&#47;a trains."
+    assert words.training("runs/a trains", 2000) == "runs&#47;a trains. A policy of 2,000 steps can be played."
+
+
+MARKUP = "<b>{1}|`[a](x)"
+
+
+def test_names_of_others_are_text_wherever_they_are_shown(match, monkeypatch):
+    side = match.sides[0]
+    monkeypatch.setattr(side.env, "agent_names", [f"{MARKUP}_{agent}" for agent in range(3)])
+    monkeypatch.setattr(side.env, "action_names", [f"{MARKUP}{name}" for name in side.env.action_names])
+    match.scenario, side.player.name = MARKUP, f"\x1b[31m{MARKUP}\u202e"
+    row = Summary(MARKUP, MARKUP, 7, MARKUP, 30, 5, 2, 0.613)
+    texts = {
+        "headline": (words.headline(match), 1),
+        "numbers": (words.numbers(match), 1),
+        "acts": (words.acts(side), 3),
+        "questions": (words.questions(side, [Question(0, 1), Question(1, 2, 0.3)]), 4),
+        "actions": (words.actions(side, 0), len(side.env.action_names)),
+        "told": (words.told({MARKUP: 1.0}), 1),
+        "legend": (words.legend(side), 3),
+        "recordings": (words.recordings(Path(MARKUP), {MARKUP: row, f"{MARKUP}2": "broken"}), 3),
+        "no recordings": (words.recordings(Path(MARKUP), {}), 1),
+        "training": (words.training(f"{MARKUP} trains", 5), 1),
+    }
+    for name, (text, count) in texts.items():
+        assert MARKUP not in text and html.unescape(text).count(MARKUP) == count, name
+        assert not re.search(r"[{}`\x1b\u202e]|\[a", text), name
+    assert words.title(side) == f"{MARKUP} (4.0 M)", "plain, for what is no markup"
+
+
+def test_recordings_that_are_left_out_for_their_names_are_counted():
+    told = "3 left out: names have letters, digits, ., \\_ and - alone."
+    row = Summary("one", "skirmish", 7, "default", 30, 5, 2, 0.613)
+    assert words.recordings(Path("people"), {}, 3).endswith(f"\n\n{told}")
+    assert words.recordings(Path("people"), {"one": row}, 3).endswith(f"\n\n{told}")
+    assert "left out" not in words.recordings(Path("people"), {"one": row})

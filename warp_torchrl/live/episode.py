@@ -6,7 +6,6 @@ the time and the speed, and the mouse turns the scene.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from html import escape
 from pathlib import Path
 
 import torch
@@ -14,6 +13,7 @@ from torch import Tensor
 
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.render import legend_colours
+from warp_torchrl.foreign_text import escaped_markdown
 from warp_torchrl.live.crew import Crew
 from warp_torchrl.live.scene import aim, furnish, local_server, places, quiet
 from warp_torchrl.live.stage import Shown, Stage
@@ -43,7 +43,7 @@ class Film:
     def __init__(self, sides: Sequence[Shown], lines: Sequence[str]) -> None:
         self._sides, self._lines = sides, lines
         size = sides[0].env.world.size
-        self._server = local_server("127.0.0.1", 0)
+        self._server = local_server()
         furnish(self._server)
         aim(self._server, size, len(sides), aside=-0.04, up=0.02)  # heading and legend stand left
         self._stages = [
@@ -97,7 +97,7 @@ def legend(side: Shown) -> dict[str, Sequence[int]]:
 
 def _framed(page: str, lines: Sequence[str], colours: Mapping[str, Sequence[int]]) -> str:
     """Return viser's document with a title, a heading and a legend; the scene's own texts are data, not HTML."""
-    heading, *below = (escape(line) for line in lines)
+    heading, *below = map(escaped_markdown, lines)
     top = f"<h1>{heading}</h1>" + "".join(f"<p>{line}</p>" for line in below)
     page = page.replace("<title>Viser</title>", f"<title>{' - '.join((heading, *below))}</title>", 1)
     before, end, after = page.rpartition("</body>")

@@ -1,5 +1,6 @@
 """The recordings of a page's matches, in one folder."""
 
+import re
 import shutil
 from pathlib import Path
 
@@ -9,6 +10,9 @@ from warp_torchrl.demonstrations.summary import Summary, summary
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.side import Side
 from warp_torchrl.runs.sealed import Unsound
+
+_NAME = re.compile(r"[A-Za-z0-9._-]+")
+_Written = tuple[int, int, int]
 
 
 class Keeper:
@@ -24,8 +28,8 @@ class Keeper:
         """Whether ``keep`` saves."""
         self.changes = 0
         """How often the list of recordings may have changed."""
-        self._last: tuple[OpenRecording, tuple[int, int], Path] | None = None
-        self._known: dict[tuple[Path, int], Summary | str] = {}
+        self._last: tuple[OpenRecording, tuple[int, int], Path, _Written | None] | None = None
+        self._known: dict[tuple[Path, _Written | None], Summary | str] = {}
 
     def save(self, side: Side) -> Path:
         """Save what a side has played so far, and return its folder.
@@ -43,8 +47,10 @@ class Keeper:
         except Unsound as error:
             raise Refused(f"this episode is not saved: {error}") from None
         if self._last is not None and self._last[0] is side.open_recording:
-            shutil.rmtree(self._last[2], ignore_errors=True)
-        self._last = (side.open_recording, _length(side.open_recording), folder)
+            _, _, before, written = self._last
+            if written is not None and _written(before) == written:  # and not another's of the same name
+                shutil.rmtree(before, ignore_errors=True)
+        self._last = (side.open_recording, _length(side.open_recording), folder, _written(folder))
         self.changes += 1
         return folder
 
@@ -63,18 +69,22 @@ class Keeper:
             return None
         return self.save(side)
 
-    def recordings(self) -> dict[str, Summary | str]:
-        """Return the recordings by the paths of their folders in this one: their numbers, or why one is broken."""
-        found = {}
-        for folder in self._folders():
-            key = (folder, (folder / MANIFEST).stat().st_mtime_ns)
+    def recordings(self) -> tuple[dict[str, Summary | str], int]:
+        """Return the recordings by the paths of their folders in this one, and how many have names that are refused.
+
+        Returns:
+            Of each its numbers, or why it is broken; and the number of those that are left out.
+        """
+        found, (folders, left_out) = {}, self._folders()
+        for name, folder in folders.items():
+            key = (folder, _written(folder))
             if key not in self._known:
                 try:
                     self._known[key] = summary(folder, read(folder))
-                except Unsound as error:
+                except (Unsound, OSError) as error:
                     self._known[key] = str(error)
-            found[str(folder.relative_to(self.folder))] = self._known[key]
-        return found
+            found[name] = self._known[key]
+        return found, left_out
 
     def read(self, name: str) -> Recording:
         """Return a recording of ``recordings``, verified.
@@ -83,16 +93,29 @@ class Keeper:
             Refused: If there is none of the name.
             Unsound: If it is broken.
         """
-        folders = {str(folder.relative_to(self.folder)): folder for folder in self._folders()}
+        folders, _ = self._folders()
         if name not in folders:
             raise Refused(f"{self.folder} holds no recording {name}")
         return read(folders[name])
 
-    def _folders(self) -> list[Path]:
+    def _folders(self) -> tuple[dict[str, Path], int]:
+        """Return the folders of recordings by their paths in this one, and how many are refused for their names."""
         try:
-            return find(self.folder)
+            found = find(self.folder)
         except Unsound:
-            return []
+            return {}, 0
+        named = {str(folder.relative_to(self.folder)): folder for folder in found}
+        plain = {name: folder for name, folder in named.items() if all(map(_NAME.fullmatch, Path(name).parts))}
+        return plain, len(found) - len(plain)
+
+
+def _written(folder: Path) -> _Written | None:
+    """Return what tells whether a recording is the one that was written, or another of its name; None without one."""
+    try:
+        found = (folder / MANIFEST).stat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino, found.st_mtime_ns
 
 
 def _length(open_recording: OpenRecording) -> tuple[int, int]:

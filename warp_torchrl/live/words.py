@@ -1,11 +1,15 @@
-"""What the page says: tables and short lines as Markdown, and bars and the legend as HTML."""
+"""What the page says: tables and short lines as Markdown, and bars and the legend as HTML.
+
+Names are of others: of recordings, policies, scenarios, vehicles and actions. All are escaped here.
+"""
 
 from collections.abc import Mapping, Sequence
-from html import escape
 from pathlib import Path
 
 from warp_torchrl.demonstrations.summary import Summary
 from warp_torchrl.env.render import legend_colours
+from warp_torchrl.foreign_text import escaped_markdown as escaped
+from warp_torchrl.foreign_text import plain_text
 from warp_torchrl.live.crew import Question
 from warp_torchrl.live.drawing import VEHICLE_COLOURS
 from warp_torchrl.live.match import Match
@@ -20,7 +24,7 @@ def headline(match: Match) -> str:
     step, horizon = int(match.alone.state.step[0]), match.world.horizon
     step = max(step, *(int(side.state.step[0]) for side in match.sides))
     end = ", over" if match.ended else ""
-    return f"**{match.scenario}**, seed {match.setting.seed}: step {step} of {horizon}{end}"
+    return f"**{escaped(match.scenario)}**, seed {match.setting.seed}: step {step} of {horizon}{end}"
 
 
 def numbers(match: Match) -> str:
@@ -29,13 +33,13 @@ def numbers(match: Match) -> str:
     for side in match.everywhere:
         curves = side.curves
         acts = f"{int(curves.extinguished.sum())} | {int(curves.cleared.sum())}" if side is not match.alone else " | "
-        rows.append(f"| {title(side)} | **{curves.saved[-1]:.1%}** | {curves.burning[-1]:.1%} | {acts} |")
+        rows.append(f"| {escaped(title(side))} | **{curves.saved[-1]:.1%}** | {curves.burning[-1]:.1%} | {acts} |")
     return "\n".join(rows)
 
 
 def title(side: Side) -> str:
-    """Return what a side's policy is called, short; of a run with how far it is trained."""
-    name, frames = side.player.name, side.player.frames
+    """Return what a side's policy is called, short, as plain text; of a run with how far it is trained."""
+    name, frames = plain_text(side.player.name), side.player.frames
     short = name if len(name) <= 26 else f"...{name[-23:]}"
     return short if frames is None else f"{short} ({frames / 1e6:.1f} M)"
 
@@ -54,26 +58,38 @@ def so_far(side: Side) -> str:
     return f"**{len(open_recording.rows)}** steps so far, **{open_recording.acts}** acts of people, {corrections}."
 
 
-def recordings(folder: Path, found: Mapping[str, Summary | str]) -> str:
-    """Return the table of the recordings in a folder, the newest of them last."""
+def recordings(folder: Path, found: Mapping[str, Summary | str], left_out: int = 0) -> str:
+    """Return the table of the recordings in a folder, the newest of them last.
+
+    Args:
+        folder: Their folder.
+        found: Their numbers, or why one is broken, by name.
+        left_out: How many are not shown for their names.
+    """
+    others = f"\n\n{left_out} left out: names have letters, digits, ., \\_ and - alone." if left_out else ""
     if not found:
-        return f"`{folder}` holds no recording."
-    rows = [f"In `{folder}`:", "", "| recording | steps | acts | corrections | saved |", "|---|---:|---:|---:|---:|"]
+        return f"**{escaped(folder)}** holds no recording.{others}"
+    rows = [
+        f"In **{escaped(folder)}**:",
+        "",
+        "| recording | steps | acts | corrections | saved |",
+        "|---|---:|---:|---:|---:|",
+    ]
     for name, each in list(found.items())[-_LISTED:]:
         if isinstance(each, str):
-            rows.append(f"| {name} | broken | | | |")
+            rows.append(f"| {escaped(name)} | broken | | | |")
             continue
         saved = "" if each.saved is None else f"{each.saved:.0%}"
-        rows.append(f"| {name} | {each.steps} | {each.acts} | {each.corrections} | {saved} |")
+        rows.append(f"| {escaped(name)} | {each.steps} | {each.acts} | {each.corrections} | {saved} |")
     if len(found) > _LISTED:
         rows.append(f"\nand {len(found) - _LISTED} before them.")
-    return "\n".join(rows)
+    return "\n".join(rows) + others
 
 
 def training(told: str, newest: int | None) -> str:
     """Return how far a training is, and whether there is a policy to play."""
     ready = "" if newest is None else f" A policy of {newest:,} steps can be played."
-    return f"{told}.{ready}" if told else "Only policies that were trained by mappo, ippo, ppo or a2c learn."
+    return f"{escaped(told)}.{ready}" if told else "Only policies that were trained by mappo, ippo, ppo or a2c learn."
 
 
 def acts(side: Side) -> str:
@@ -84,7 +100,7 @@ def acts(side: Side) -> str:
     for agent, name in enumerate(side.env.agent_names):
         water = "" if full is None else f"{tank[agent]} of {full}"
         done = f"{int(curves.extinguished[agent])} | {int(curves.cleared[agent])}"
-        rows.append(f"| {name} | {moved_by(side, agent)} | {done} | {water} |")
+        rows.append(f"| {escaped(name)} | {moved_by(side, agent)} | {done} | {water} |")
     return "\n".join(rows)
 
 
@@ -100,7 +116,8 @@ def moved_by(side: Side, agent: int, person: int | None = None) -> str:
 
 def questions(side: Side, asked: Sequence[Question]) -> str:
     """Return what a person is asked; of an action that the policy is unsure of with how to answer."""
-    names, actions = side.env.agent_names, side.env.action_names
+    names = [escaped(name) for name in side.env.agent_names]
+    actions = [escaped(name) for name in side.env.action_names]
     lines = [
         f"**{names[each.agent]}** is about to **{actions[each.action]}**."
         if each.chance is None
@@ -124,7 +141,7 @@ def actions(side: Side, agent: int) -> str:
         told = (f"{share:.0%}" if shares else "") if mask[code] else "closed"
         mark = " ◂ last" if code == last else ""
         rows.append(
-            f"<tr style='color:{ink}'><td style='padding-right:8px'>{escape(name)}{mark}</td>"
+            f"<tr style='color:{ink}'><td style='padding-right:8px'>{escaped(name)}{mark}</td>"
             f"<td style='width:45%'>{bar}</td><td style='text-align:right;padding-left:6px'>{told}</td></tr>"
         )
     note = "" if shares else "<div>This policy has no action probabilities.</div>"
@@ -133,7 +150,7 @@ def actions(side: Side, agent: int) -> str:
 
 def told(numbers: Mapping[str, float]) -> str:
     """Return the numbers that an agent is told, those that are not 0, as HTML."""
-    rows = [f"{escape(name)} <b>{value:.2f}</b>" for name, value in numbers.items() if abs(value) >= 0.005]
+    rows = [f"{escaped(name)} <b>{value:.2f}</b>" for name, value in numbers.items() if abs(value) >= 0.005]
     return f"<div style='{_STYLE};padding:0 12px'>{', '.join(rows) or 'nothing else'}</div>"
 
 
@@ -153,6 +170,6 @@ def chips(colours: Mapping[str, Sequence[int]]) -> str:
     return "".join(
         f"<span style='white-space:nowrap;margin-right:10px'><span style='display:inline-block;width:11px;height:11px;"
         f"border:1px solid #888;border-radius:2px;vertical-align:-1px;margin-right:4px;"
-        f"background:rgb({red},{green},{blue})'></span>{escape(name)}</span> "
+        f"background:rgb({red},{green},{blue})'></span>{escaped(name)}</span> "
         for name, (red, green, blue) in colours.items()
     )
