@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from urllib.error import HTTPError
 from urllib.request import urlopen
 
 import pytest
@@ -21,6 +22,7 @@ def test_the_command_s_own_keys_are_apart_from_those_of_the_scenario():
     assert recordings == Path("recordings") and _read([*given, "recordings=people/one"])[2] == Path("people/one")
     assert (setting.policy, setting.seed, setting.beside) == ("outputs/run", 7, None)
     assert setting.overrides == ("scenario=large", "team.n_agents=3") and where == {"port": 0}
+    assert _read(["host=", "token=0123456789"])[1] == {"host": "", "token": "0123456789"}
 
 
 @pytest.mark.parametrize(
@@ -31,6 +33,8 @@ def test_the_command_s_own_keys_are_apart_from_those_of_the_scenario():
         (["seed=x"], "seed must be a whole number, got 'x'"),
         (["seed=-1"], "seed must be in"),
         (["port=70000"], "port must be in [0, 65535], got 70000"),
+        (["host="], "host must be an address or a name, such as 127.0.0.1, got ''"),
+        (["token=abc"], "token must be 8 to 200 letters, digits, - and _, got 3 characters"),
         (["--port", "8080"], "keys are given as port=8080"),
         ([f"recordings={__file__}"], "recordings must be a folder, got the file "),
         (["scenario=larg"], "scenario must be one of"),
@@ -44,7 +48,9 @@ def test_a_mistake_is_one_line_and_the_exit_code_of_a_mistake(arguments, says, c
     pytest.importorskip("viser", reason="needs the extra live")
     assert main(arguments) in (MISTAKE, UNSOUND)
     out, err = capsys.readouterr()
-    assert out == "" and err.startswith("error: ") and len(err.splitlines()) == 1 and says in err
+    *warned, last = err.splitlines()
+    assert out == "" and last.startswith("error: ") and says in last
+    assert all(each.startswith("warning: other users") for each in warned)
 
 
 def test_a_port_that_is_taken_is_one_line(capsys):
@@ -63,27 +69,53 @@ def test_help_names_the_keys(capsys):
     assert "beside=NAME" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
-def test_it_prints_its_address_serves_and_ends_cleanly(number):
+@pytest.fixture
+def start():
+    """Start the page as a command; it is killed at the end."""
     pytest.importorskip("viser", reason="needs the extra live")
-    command = [sys.executable, "-m", "warp_torchrl.live", "policy=noop", "port=0", "landscape.size=12"]
-    with subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=os.environ,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background jobs ignore it
-    ) as live:
-        try:
-            line = live.stdout.readline()
-            url = line.split()[0]
-            assert url.startswith("http://127.0.0.1:") and line.endswith("shows noop; Ctrl-C ends it\n")
-            with urlopen(url, timeout=20) as page:
-                assert page.status == 200 and b"<html" in page.read().lower()
-            time.sleep(0.2)
-            live.send_signal(number)
-            out, err = live.communicate(timeout=30)
-        finally:
-            live.kill()
-    assert live.returncode == 0 and out.strip() == "stopped" and err == ""
+    started = []
+
+    def make(*arguments, **variables):
+        command = [sys.executable, "-m", "warp_torchrl.live", "policy=noop", "port=0", "landscape.size=12", *arguments]
+        started.append(
+            subprocess.Popen(
+                command,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+                env={**os.environ, **variables},
+                preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background jobs ignore it
+            )
+        )
+        return started[-1]
+
+    yield make
+    for each in started:
+        each.kill()
+        each.communicate()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
+def test_it_prints_its_address_serves_and_ends_with_one_line_by_a_signal(start, number):
+    live = start("host=0.0.0.0", WARP_TORCHRL_TOKEN="a-token-of-tests")
+    line = live.stdout.readline()
+    url = line.split()[0]
+    assert url.startswith("http://127.0.0.1:") and url.endswith("/?token=a-token-of-tests")
+    assert line.endswith("shows noop; Ctrl-C ends it\n")
+    with urlopen(url, timeout=20) as page:
+        assert page.status == 200 and b"<html" in page.read().lower()
+    with pytest.raises(HTTPError, match="403"):
+        urlopen(url.partition("?")[0], timeout=20)
+    time.sleep(0.2)
+    live.send_signal(number)
+    out, err = live.communicate(timeout=30)
+    assert live.returncode == 128 + number and out.strip() == "stopped"
+    assert err.startswith("warning: host=0.0.0.0 opens this page to the network") and len(err.splitlines()) == 1
+
+
+@pytest.mark.slow
+def test_a_token_of_the_command_line_is_told_to_be_seen_by_others(start):
+    live = start("token=a-token-of-tests")
+    assert live.stdout.readline().split()[0].endswith("/?token=a-token-of-tests")
+    live.terminate()
+    assert "other users of this machine can read a command line" in live.communicate(timeout=30)[1]

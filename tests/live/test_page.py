@@ -20,9 +20,10 @@ from tests.live.conftest import SMALL
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.demonstrations.files import read
 from warp_torchrl.demonstrations.recording import Mover
+from warp_torchrl.live.address import Address
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.match import Match, Setting
-from warp_torchrl.live.page import Address, Page
+from warp_torchrl.live.page import Page
 from warp_torchrl.live.panel.tab import chosen
 from warp_torchrl.live.replayed import ReplayedMatch
 from warp_torchrl.world.state import Action, is_tree

@@ -26,6 +26,9 @@ from warp_torchrl.world.intervention import can_be_lit
 from warp_torchrl.world.state import is_tree
 from warp_torchrl.world.world import World
 
+SEEDS = (0, 2**62 - 1)
+"""Of fires, from and to."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
@@ -48,7 +51,7 @@ class Setting:
     overrides: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        check_fields(self, seed=(0, 2**62 - 1))
+        check_fields(self, seed=SEEDS)
 
 
 class Match:

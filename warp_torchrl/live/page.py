@@ -1,71 +1,41 @@
 """The page: a local server that shows a match, plays it at a pace, and lets people take part."""
 
-import socket
 import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from weakref import WeakKeyDictionary
 
 import viser
 
-from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.demonstrations.recording import OpenRecording
-from warp_torchrl.live import words
+from warp_torchrl.foreign_text import plain_text
+from warp_torchrl.live import incoming, words
+from warp_torchrl.live.address import Address
+from warp_torchrl.live.door import LOG, Door, arrived
+from warp_torchrl.live.inbox import Act, Inbox
 from warp_torchrl.live.keeping import Keeper
 from warp_torchrl.live.learning import Learning
 from warp_torchrl.live.match import Match, Setting
-from warp_torchrl.live.panel.panel import Panel
+from warp_torchrl.live.once import Once
+from warp_torchrl.live.panel.panel import PACES, Panel, tell
 from warp_torchrl.live.panel.tab import told_if_refused
 from warp_torchrl.live.scene import aim, furnish, local_server, places, quiet
 from warp_torchrl.live.stage import Stage
-from warp_torchrl.validation import check_fields
 
 RECORDINGS = Path("recordings")
 _FOLLOWED_EVERY = 5.0  # seconds between two looks for newer weights
-
-
-@dataclass(frozen=True, kw_only=True)
-class Address:
-    """Where a page is served.
-
-    Attributes:
-        host: Network interface; the default is reachable from this machine alone.
-        port: 0 takes any that is free.
-
-    Raises:
-        ValueError: If the port is out of its range.
-    """
-
-    host: str = "127.0.0.1"
-    port: int = 8080
-
-    def __post_init__(self) -> None:
-        check_fields(self, port=(0, 65535))
-
-    def free(self) -> "Address":
-        """Return the address with a port that is free.
-
-        Raises:
-            ConfigError: If the port is taken, or the host is none of this machine's.
-        """
-        with socket.socket(socket.AF_INET6 if ":" in self.host else socket.AF_INET) as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                probe.bind((self.host, self.port))
-            except OSError as error:
-                raise ConfigError(
-                    f"port {self.port} cannot be used on {self.host} ({error.strerror}): choose another, port=NUMBER"
-                ) from None
-            return Address(host=self.host, port=probe.getsockname()[1])
+_PAINTED_EVERY = 0.25  # seconds between two pictures of what takes long to make, while the match plays
+_PAINTED_SHARE = 0.2  # of the time that these pictures may take
+_MOST_TOLD = 20  # refused messages of one connection that are told
 
 
 class Page:
     """A match on a page. ``with`` serves it; ``play`` runs it until it is interrupted.
 
-    All that changes the match holds ``lock``.
+    ``play`` does all that people ask for, in the thread that plays. What changes the match elsewhere holds ``lock``.
 
     Args:
         setting: What is played first.
@@ -79,22 +49,27 @@ class Page:
 
     def __init__(self, setting: Setting, address: Address, recordings: Path = RECORDINGS) -> None:
         self.given, self.match = setting, Match(setting)
-        self.address = address.free()
+        listener, self.address, access = address.listen()
         self.lock = threading.RLock()
+        self.inbox, self.once = Inbox(), Once()
         self.playing, self.pace = False, 8.0
         self.keeper, self.learning = Keeper(recordings), Learning(recordings)
         self._ended: OpenRecording | None = None  # of the last episode that was seen to end
         self._training = ""
         self._panels: dict[int, Panel] = {}
         self._stages: list[Stage] = []
+        self._clients: WeakKeyDictionary[object, viser.ClientHandle] = WeakKeyDictionary()  # by connection
+        self._refusals: WeakKeyDictionary[object, int] = WeakKeyDictionary()  # by connection
+        self._is_left_out: set[int] = set()  # persons who were told that they ask for too much
         self._stopped = threading.Event()
         self._followed = time.monotonic()
+        self._painted, self._painting_took = 0.0, 0.0
         warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")  # of a browser that just left
-        self.server = local_server(self.address.host, self.address.port)
+        self.server = local_server(Door(listener, access, self._screen))
         self._furnish()
         self.open(self.match)
-        self.server.on_client_connect(self._welcome)
-        self.server.on_client_disconnect(self._part)
+        self.server.on_client_connect(self._arrive)
+        self.server.on_client_disconnect(self._leave)
 
     def __enter__(self) -> "Page":
         return self
@@ -111,20 +86,47 @@ class Page:
 
     @property
     def url(self) -> str:
-        """Return the address for a browser."""
-        return f"http://{self.address.host}:{self.address.port}"
+        """Return the address for a browser, with the token."""
+        return self.address.url
 
     def play(self) -> None:
-        """Play the match at its pace until ``stop``, or a signal."""
+        """Play the match at its pace, and do what people ask for, until ``stop`` or a signal."""
         while not self._stopped.is_set():
             began = time.monotonic()
             with self.lock:
                 self._go_on()
-            self._stopped.wait(max(0.002, 1.0 / self.pace - (time.monotonic() - began)))
+            for act in self.inbox.until(max(time.monotonic() + 0.002, began + 1.0 / self.pace)):
+                with self.lock, told_if_refused(self.tell):
+                    act()
 
     def stop(self) -> None:
         """Let ``play`` return."""
         self._stopped.set()
+        self.inbox.close()
+
+    def ask(self, person: int, act: Act) -> None:
+        """Let an act of a person wait for its turn; too many are left out, which the person is told once.
+
+        It is called in the server's thread. Who has left asks for nothing.
+        """
+        client = next((each for each in self._clients.values() if each.client_id == person), None)
+        if client is None:
+            return
+        if self.inbox.put(person, act):
+            self._is_left_out.discard(person)
+        elif person not in self._is_left_out:
+            self._is_left_out.add(person)
+            tell(client, "the page cannot keep up: some of what you asked for is left out", mistake=True)
+
+    def set_pace(self, pace: float) -> None:
+        """Play so many steps a second.
+
+        Raises:
+            ValueError: If it is out of ``PACES``.
+        """
+        if not PACES[0] <= pace <= PACES[1]:
+            raise ValueError(f"steps a second must be in {PACES[0]}..{PACES[1]}, got {pace}")
+        self.pace = float(pace)
 
     # What panels ask for, under the lock
 
@@ -132,14 +134,15 @@ class Page:
         """Show another match from its start.
 
         Raises:
-            Refused: If the one before is to be kept and cannot be saved; it stays then.
+            Refused: If the one before is to be kept and cannot be saved; it stays then, as with any other error.
         """
         self._keep()
-        self.match, self.playing = match, False
-        self._set_stages()
-        for panel in self._panels.values():
-            panel.fill()
-        self.show()
+        before, self.playing = self.match, False
+        try:
+            self._present(match)
+        except Exception:
+            self._present(before)
+            raise
 
     def step(self) -> None:
         """Advance the match by one step, and show it; the clock stops with the episode."""
@@ -167,11 +170,17 @@ class Page:
         self.show()
 
     def show(self) -> None:
-        """Draw the match as it is, here and on every panel."""
+        """Draw the match as it is, here and on every panel; while it plays pictures and curves follow less often."""
+        self.once.forget()
         for stage, side in zip(self._stages, self.match.sides):
             stage.show(f"{words.title(side)}: {side.curves.saved[-1]:.0%} saved")
+        began = time.monotonic()
+        every = max(_PAINTED_EVERY, self._painting_took / _PAINTED_SHARE)
+        paints = not self.playing or began - self._painted > every
         for panel in list(self._panels.values()):
-            panel.show()
+            panel.show(paints)
+        if paints:
+            self._painted, self._painting_took = began, time.monotonic() - began
 
     def tell(self, line: str, mistake: bool = False) -> None:
         """Tell everybody something."""
@@ -179,6 +188,13 @@ class Page:
             panel.tell(line, mistake)
 
     # Parts
+
+    def _present(self, match: Match) -> None:
+        self.match = match
+        self._set_stages()
+        for panel in self._panels.values():
+            panel.fill()
+        self.show()
 
     def _set_stages(self) -> None:
         match = self.match
@@ -189,8 +205,8 @@ class Page:
             Stage(self.server, index, side, east)
             for index, (side, east) in enumerate(zip(match.sides, places(size[1], count)))
         ]
-        for index, stage in enumerate(self._stages):
-            stage.tiles.on_click(self._clicked(index))
+        for stage in self._stages:
+            stage.tiles.on_click(partial(self._click, stage))
         aim(self.server, size, count, aside=0.15)  # the panel stands on the right
 
     def _go_on(self) -> None:
@@ -211,38 +227,69 @@ class Page:
 
     def _keep_the_last(self) -> None:
         """Save the episode that is being played when the page ends, and say so where it was started."""
-        try:
+        with told_if_refused(lambda line, mistake: print(f"error: {line}", file=sys.stderr, flush=True)):
             folder = self.keeper.keep(self.match.sides[0])
-        except ValueError as error:
-            print(f"error: {error}", file=sys.stderr, flush=True)
-        else:
             if folder is not None:
-                print(f"saved {folder}", flush=True)
+                print(f"saved {plain_text(str(folder))}", flush=True)
 
     def _furnish(self) -> None:
         furnish(self.server)
         self.server.gui.set_panel_label("warp_torchrl")
 
+    # What browsers do; in the server's thread, which waits for nothing
+
+    async def _arrive(self, client: viser.ClientHandle) -> None:
+        self._clients[arrived.get()] = client
+        self.inbox.put_alone(client.client_id, partial(self._welcome, client))
+
+    async def _leave(self, client: viser.ClientHandle) -> None:
+        for connection in [each for each, its in self._clients.items() if its is client]:
+            del self._clients[connection]
+        self.inbox.put_alone(client.client_id, partial(self._part, client))
+
+    async def _click(self, stage: Stage, event: viser.SceneNodePointerEvent) -> None:
+        panel = self._panels.get(event.client_id)
+        if panel is not None:
+            self.ask(event.client_id, partial(panel.click, stage, event.ray_origin, event.ray_direction))
+
+    def _screen(self, connection: object, message: bytes) -> bool:
+        """Return whether viser gets a message; of one that it does not get its browser is told."""
+        client = self._clients.get(connection)
+        try:
+            incoming.check(message, None if client is None else client.gui)
+        except Exception as error:  # a fault of the check lets nothing in
+            self._refuse(connection, client, error)
+            return False
+        return True
+
+    def _refuse(self, connection: object, client: viser.ClientHandle | None, error: Exception) -> None:
+        count = self._refusals[connection] = self._refusals.get(connection, 0) + 1
+        if isinstance(error, incoming.Misfit):
+            incoming.put_back(error.control)
+        if count > _MOST_TOLD:
+            return
+        line = plain_text(str(error))
+        who = "a browser" if client is None else f"browser {client.client_id}"
+        LOG.warning("%s: %s%s", who, line, "; more of it is not told" * (count == _MOST_TOLD))
+        if client is not None:
+            tell(client, line, mistake=True)
+
+    # The same in the thread that plays
+
     def _welcome(self, client: viser.ClientHandle) -> None:
-        with self.lock:
-            self._panels[client.client_id] = Panel(self, client)
-            self._panels[client.client_id].show()
+        if client not in self._clients.values():
+            return  # it has left already
+        with told_if_refused(partial(tell, client)):
+            panel = self._panels[client.client_id] = Panel(self, client)
+            panel.show()
 
     def _part(self, client: viser.ClientHandle) -> None:
-        with self.lock:
-            self._panels.pop(client.client_id, None)
-            for name in self.match.sides[0].crew.leave(client.client_id):
-                self.tell(f"{name} is the policy's again: who drove it has left")
+        self._panels.pop(client.client_id, None)
+        self._is_left_out.discard(client.client_id)
+        for name in self.match.sides[0].crew.leave(client.client_id):
+            self.tell(f"{name} is the policy's again: who drove it has left")
+        with told_if_refused(self.tell):
             self.show()
-
-    def _clicked(self, index: int) -> Callable[[viser.SceneNodePointerEvent], None]:
-        def click(event: viser.SceneNodePointerEvent) -> None:
-            with self.lock:
-                panel = self._panels.get(event.client_id)
-                if panel is not None:
-                    panel.click(self._stages[index], event.ray_origin, event.ray_direction)
-
-        return click
 
     def _follow(self) -> None:
         if time.monotonic() - self._followed < _FOLLOWED_EVERY:

@@ -1,13 +1,13 @@
-"""What all scenes stand in: a server of this machine alone, sky and sun, and where one looks from."""
+"""What all scenes stand in: a server, sky and sun, and where one looks from."""
 
 import contextlib
 import io
-import logging
 
 import numpy as np
 import viser
 
-from warp_torchrl.live.origin import only_own
+from warp_torchrl.live.address import Address
+from warp_torchrl.live.door import Door
 
 _SKY = np.linspace((13, 19, 33), (52, 50, 62), 64).round().astype(np.uint8)[:, None].repeat(2, axis=1)  # at dusk
 
@@ -25,16 +25,17 @@ def quiet() -> contextlib.AbstractContextManager[object]:
     return contextlib.redirect_stdout(io.StringIO())
 
 
-def local_server(host: str, port: int) -> viser.ViserServer:
-    """Return a server that shares nothing and listens to its own pages alone.
+def local_server(door: Door | None = None) -> viser.ViserServer:
+    """Return a server that shares nothing.
 
     Args:
-        host: Network interface.
-        port: 0 takes any that is free.
+        door: What it listens at, and who is let in; None lets in nobody.
     """
-    logging.getLogger("websockets").setLevel(logging.WARNING)  # its lines would stand between ours
-    with quiet(), only_own(host):
-        return _LocalServer(host=host, port=port, verbose=False)
+    if door is None:
+        listener, _, access = Address(port=0).listen()
+        door = Door(listener, access, lambda connection, message: False)
+    with quiet(), door.hung():
+        return _LocalServer(verbose=False)
 
 
 def furnish(server: viser.ViserServer) -> None:

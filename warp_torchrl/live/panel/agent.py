@@ -1,7 +1,10 @@
 """The tab Agent: what the chosen vehicle's agent sees, and how likely it acts."""
 
+from warp_torchrl.foreign_text import escaped_markdown
 from warp_torchrl.live import sight, words
+from warp_torchrl.live.panel.picture import add_picture, png, show_picture
 from warp_torchrl.live.panel.tab import Tab
+from warp_torchrl.live.side import Side
 from warp_torchrl.live.stage import change
 
 
@@ -15,17 +18,28 @@ class AgentTab(Tab):
         self._who = self.gui.add_markdown("")
         self._chances = self.gui.add_html("")
         self._sights = {
-            name: self.gui.add_image(picture, label=name or "observation", format="png")
-            for name, picture in sight.pictures(self.side, 0).items()
+            name: add_picture(self.gui, name or "observation")
+            for name, value in sight.entries(self.side, 0).items()
+            if value.ndim == 3
         }
         self._told = self.gui.add_html("")
 
     def paint(self) -> None:
         """Show what the chosen vehicle's agent sees now."""
-        side, agent = self.side, self.panel.agent
-        change(self._who, content=f"What **{side.env.agent_names[agent]}** sees, and how likely it acts:")
-        change(self._chances, content=words.actions(side, agent))
-        change(self._told, content=words.told(sight.numbers(side, agent)))
-        pictures = sight.pictures(side, agent)
+        agent = self.panel.agent
+        who, chances, told, pictures = self.once(("agent", agent), lambda: _shown(self.side, agent))
+        change(self._who, content=who)
+        change(self._chances, content=chances)
+        change(self._told, content=told)
         for name, handle in self._sights.items():
-            change(handle, image=pictures[name])
+            show_picture(handle, pictures[name])
+
+
+def _shown(side: Side, agent: int) -> tuple[str, str, str, dict[str, bytes]]:
+    """Return whose sight it is, how likely it acts, what it is told, and the pictures of its maps."""
+    return (
+        f"What **{escaped_markdown(side.env.agent_names[agent])}** sees, and how likely it acts:",
+        words.actions(side, agent),
+        words.told(sight.numbers(side, agent)),
+        {name: png(picture) for name, picture in sight.pictures(side, agent).items()},
+    )

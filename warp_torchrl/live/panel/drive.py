@@ -1,7 +1,6 @@
 """The tab Drive: the vehicle, who moves it, orders, and what people are asked before."""
 
 from functools import partial
-from typing import Any
 
 from warp_torchrl.live import words
 from warp_torchrl.live.order import Order
@@ -31,22 +30,24 @@ class DriveTab(Tab):
         self._vehicle = gui.add_dropdown("Vehicle", tuple(names), initial_value=names[0])
         self._mover = gui.add_markdown("")
         take = gui.add_button_group("", ("Take over", "Hand back"))
-        take.on_click(self.guarded(lambda event: self._seat(event.target.value == "Take over")))
+        take.on_click(self.guarded(lambda value: self._seat(value == "Take over")))
         for row in _PADS:
             pad = gui.add_button_group("", row)
-            pad.on_click(self.guarded(lambda event: self.press(_MOVES[event.target.value])))
+            pad.on_click(self.guarded(lambda value: self.press(_MOVES[value])))
         acts = tuple(name for name in self.side.env.action_names if name not in _MOVES.values())
         deeds = gui.add_button_group("", acts)
-        deeds.on_click(self.guarded(lambda event: self.press(event.target.value)))
+        deeds.on_click(self.guarded(self.press))
         gui.add_markdown(
             "Keys: **Q W E A D Z X C** move, **S** stays, **F** extinguishes, **R** clears, **G** says *Do it*, **P** "
             "plays."
         )
         with gui.add_folder("Send it"):
             self._radius = gui.add_slider("Within cells", min=0, max=16, step=1, initial_value=3)
-            self._goal = gui.add_vector2("Row, column", initial_value=self.middle(), min=(0, 0), step=1)
+            self._goal = gui.add_vector2(
+                "Row, column", initial_value=self.middle(), min=(0, 0), max=self.last(), step=1
+            )
             send = gui.add_button_group("", ("Send", "Set free"))
-            send.on_click(self.guarded(lambda event: self._send(event.target.value == "Send")))
+            send.on_click(self.guarded(lambda value: self._send(value == "Send")))
         with gui.add_folder("Ask me before the policy"):
             for name in acts:
                 box = gui.add_checkbox(name, initial_value=name in self.side.crew.asks)
@@ -58,8 +59,8 @@ class DriveTab(Tab):
             )
             self._unsure = gui.add_checkbox("Ask me for the action", initial_value=below is not None)
             for control in (self._below, self._unsure):
-                control.on_update(self.guarded(lambda event: self._ask_where_unsure()))
-        self._vehicle.on_update(self.guarded(lambda event: self.panel.show()))
+                control.on_update(self.guarded(lambda _: self._ask_where_unsure()))
+        self._vehicle.on_update(self.guarded(lambda _: self.panel.show()))
 
     def paint(self) -> None:
         """Show who moves the chosen vehicle."""
@@ -105,15 +106,15 @@ class DriveTab(Tab):
         self.side.order(self.agent, order)
         self.page.show()
 
-    def _ask(self, name: str, event: Any) -> None:
+    def _ask(self, name: str, wanted: bool) -> None:
         crew = self.side.crew
-        crew.ask_before(crew.asks | {name} if event.target.value else crew.asks - {name})
+        crew.ask_before(crew.asks | {name} if wanted else crew.asks - {name})
         self.page.show()
 
     def _ask_where_unsure(self) -> None:
         try:
             self.side.ask_where_unsure(self._below.value / 100.0 if self._unsure.value else None)
         except ValueError:
-            self._unsure.value = False
+            self._unsure.value = self.side.crew.unsure_below is not None
             raise
         self.page.show()

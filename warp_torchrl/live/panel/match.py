@@ -2,7 +2,7 @@
 
 from warp_torchrl.config.compose import conf_folder
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.live.match import Match, Setting
+from warp_torchrl.live.match import SEEDS, Match, Setting
 from warp_torchrl.live.panel.tab import Tab, chosen
 from warp_torchrl.shipped import policy_names
 
@@ -22,9 +22,9 @@ class MatchTab(Tab):
         self._scenario = gui.add_dropdown("Scenario", self._scenarios(), initial_value=self._scenario_of(setting))
         self._policy = gui.add_dropdown("Policy", policies, initial_value=setting.policy)
         self._beside = gui.add_dropdown("Beside it", (_ALONE, *policies), initial_value=setting.beside or _ALONE)
-        self._seed = gui.add_number("Seed", initial_value=setting.seed, min=0, step=1)
+        self._seed = gui.add_number("Seed", initial_value=setting.seed, min=0, max=SEEDS[1], step=1)
         load = gui.add_button("Load", hint="shows this match from its start")
-        load.on_click(self.guarded(lambda event: self._load()))
+        load.on_click(self.guarded(lambda _: self._load()))
 
     def _load(self) -> None:
         scenario, policy, beside = (chosen(each) for each in (self._scenario, self._policy, self._beside))

@@ -1,12 +1,12 @@
 """One person's controls on the page; each browser has its own."""
 
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import viser
 
+from warp_torchrl.foreign_text import plain_text
 from warp_torchrl.live import words
 from warp_torchrl.live.ground import cell_at
 from warp_torchrl.live.panel.agent import AgentTab
@@ -22,7 +22,14 @@ from warp_torchrl.live.stage import Stage, change
 if TYPE_CHECKING:
     from warp_torchrl.live.page import Page
 
-_PAINTED_EVERY = 0.25  # seconds between two pictures of what takes long to make, while the match plays
+PACES = (1, 30)
+"""Steps a second that can be chosen."""
+
+
+def tell(client: viser.ClientHandle, line: str, mistake: bool = False) -> None:
+    """Tell the person at a browser something."""
+    title = "This cannot be done" if mistake else "Told"
+    client.add_notification(title, plain_text(line), auto_close_seconds=7.0, color="red" if mistake else None)
 
 
 class Panel:
@@ -36,7 +43,6 @@ class Panel:
     def __init__(self, page: "Page", client: viser.ClientHandle) -> None:
         self.page, self.gui, self._client = page, client.gui, client
         self._own: list[Any] = []
-        self._painted = 0.0
         self._add_keys()
         self.fill()
 
@@ -70,10 +76,12 @@ class Panel:
         with folder:
             self._headline = gui.add_markdown("")
             play = gui.add_button_group("", ("Play", "Pause", "Step", "Restart"))
-            pace = gui.add_slider("Steps a second", min=1, max=30, step=1, initial_value=round(self.page.pace))
+            low, high = PACES
+            present = min(max(round(self.page.pace), low), high)
+            pace = gui.add_slider("Steps a second", min=low, max=high, step=1, initial_value=present)
             self._numbers = gui.add_markdown("")
-        play.on_click(self.guarded(lambda event: self._play(event.target.value)))
-        pace.on_update(self.guarded(lambda event: setattr(self.page, "pace", float(event.target.value))))
+        play.on_click(self.guarded(self._play))
+        pace.on_update(self.guarded(self.page.set_pace))
         return folder
 
     def _add_keys(self) -> None:
@@ -81,42 +89,52 @@ class Panel:
             command = self.gui.add_command(f"Drive: {action}", hotkey=key)
             command.on_trigger(self.guarded(partial(self._press, action)))
         agree = self.gui.add_command("Do it", hotkey="G")
-        agree.on_trigger(self.guarded(lambda event: self.question.answer(True)))
+        agree.on_trigger(self.guarded(lambda _: self.question.answer(True)))
         play = self.gui.add_command("Play or pause", hotkey="P")
-        play.on_trigger(self.guarded(lambda event: self._play("Pause" if self.page.playing else "Play")))
+        play.on_trigger(self.guarded(lambda _: self._play("Pause" if self.page.playing else "Play")))
 
     # What is shown
 
-    def show(self) -> None:
-        """Show the match as it is; while it plays pictures and curves follow a few times a second."""
+    def show(self, paints: bool = True) -> None:
+        """Show the match as it is.
+
+        Args:
+            paints: Whether the tabs are painted too, which takes longer.
+        """
+        match, once = self.page.match, self.page.once
         with self._client.atomic():
-            change(self._headline, content=words.headline(self.page.match))
-            change(self._numbers, content=words.numbers(self.page.match))
+            change(self._headline, content=once("headline", lambda: words.headline(match)))
+            change(self._numbers, content=once("numbers", lambda: words.numbers(match)))
             self.question.show()
-            if not self.page.playing or time.monotonic() - self._painted > _PAINTED_EVERY:
-                self._painted = time.monotonic()
+            if paints:
                 for tab in self._tabs:
                     tab.paint()
 
     def tell(self, line: str, mistake: bool = False) -> None:
         """Tell the person something."""
-        self._client.add_notification(
-            "This cannot be done" if mistake else "Told", line, auto_close_seconds=7.0, color="red" if mistake else None
-        )
+        tell(self._client, line, mistake)
 
-    # What is done; each under the lock, and told in one line where it cannot be
+    # What is done, in turn with other people's; told in one line where it cannot be
 
-    def guarded(self, do: Callable[[Any], object]) -> Callable[[Any], None]:
-        """Return a callback that does something under the page's lock, and tells what is refused."""
+    def guarded(self, do: Callable[[Any], object]) -> Callable[[Any], Coroutine[Any, Any, None]]:
+        """Return a callback that lets an act wait for its turn; what is refused then is told.
 
-        def call(event: Any) -> None:
-            with self.page.lock, told_if_refused(self.tell):
-                do(event)
+        Args:
+            do: Does the act. It is given the control's value as the person has set it; of a command None.
+        """
+
+        def act(value: object) -> None:
+            with told_if_refused(self.tell):
+                do(value)
+
+        async def call(event: Any) -> None:  # in the server's thread, as messages come
+            if event.client_id is not None:  # else the page itself has set the control
+                self.page.ask(self.person, partial(act, getattr(event.target, "value", None)))
 
         return call
 
     def click(self, stage: Stage, origin: tuple[float, float, float], direction: tuple[float, float, float]) -> None:
-        """Do what a click on a cell is to do; the page's lock is held."""
+        """Do what a click on a cell is to do."""
         with told_if_refused(self.tell):
             x, y, z = origin
             cell = cell_at((x - stage.east, y, z), direction, stage.ground)
@@ -131,5 +149,5 @@ class Panel:
         page.playing = button == "Play" and not page.match.ended
         (page.step if button == "Step" else page.show)()
 
-    def _press(self, action: str, event: Any) -> None:
+    def _press(self, action: str, _: object) -> None:
         self.drive.press(action)

@@ -30,15 +30,17 @@ class QuestionBox:
             self._text = gui.add_markdown("")
             self._chances = gui.add_html("", visible=False)
             word = gui.add_button_group("", ANSWERS)
-        word.on_click(panel.guarded(lambda event: self.answer(event.target.value == ANSWERS[0])))
+        word.on_click(panel.guarded(lambda value: self.answer(value == ANSWERS[0])))
 
     def show(self) -> None:
         """Show what is asked now."""
         side = self._panel.page.match.sides[0]
-        self._asked = self._panel.page.match.questions()  # the policy proposes: its probabilities are of what it sees
+        # The policy proposes: its probabilities are of what it sees.
+        self._asked = self._panel.page.once("asked", self._panel.page.match.questions)
         if self._asked and self._asked[0].chance is not None:
             self._asked = self._asked[:1]
-            change(self._chances, content=words.actions(side, self._asked[0].agent))
+            agent = self._asked[0].agent
+            change(self._chances, content=self._panel.page.once(("asked", agent), lambda: words.actions(side, agent)))
         unsure = bool(self._asked) and self._asked[0].chance is not None
         change(self._chances, visible=unsure)
         change(self._text, content=words.questions(side, self._asked))

@@ -1,6 +1,7 @@
 """The tab Record: what was played is saved, watched again, and learned from."""
 
 from warp_torchrl.live import words
+from warp_torchrl.live.learning import MOST_FRAMES
 from warp_torchrl.live.match import Match
 from warp_torchrl.live.panel.tab import Tab, chosen
 from warp_torchrl.live.replayed import ReplayedMatch
@@ -22,18 +23,18 @@ class RecordTab(Tab):
         self._listed = -1
         self._so_far = gui.add_markdown("")
         save = gui.add_button("Save what was played")
-        save.on_click(self.guarded(lambda event: self._save()))
+        save.on_click(self.guarded(lambda _: self._save()))
         self._every = gui.add_checkbox("Keep every episode", keeper.every, hint="in which a person did something")
-        self._every.on_update(self.guarded(lambda event: setattr(keeper, "every", bool(event.target.value))))
+        self._every.on_update(self.guarded(lambda value: setattr(keeper, "every", value)))
         with gui.add_folder("Recordings"):
             self._list = gui.add_markdown("")
             self._which = gui.add_dropdown("Recording", (_NONE,), initial_value=_NONE)
             watch = gui.add_button("Watch it")
-            watch.on_click(self.guarded(lambda event: self._watch()))
+            watch.on_click(self.guarded(lambda _: self._watch()))
         with gui.add_folder("Train from what people did"):
-            self._frames = gui.add_number("Steps", initial_value=_FRAMES, min=1, step=1000)
+            self._frames = gui.add_number("Steps", initial_value=_FRAMES, min=1, max=MOST_FRAMES, step=1000)
             train = gui.add_button_group("", (_TRAIN, _STOP, _PLAY))
-            train.on_click(self.guarded(lambda event: self._train(event.target.value)))
+            train.on_click(self.guarded(self._train))
             self._training = gui.add_markdown("")
 
     def paint(self) -> None:
@@ -41,11 +42,13 @@ class RecordTab(Tab):
         keeper, learning = self.page.keeper, self.page.learning
         change(self._so_far, content=words.so_far(self.side))
         change(self._every, value=keeper.every)
-        change(self._training, content=words.training(learning.told(), learning.newest()))
+        change(
+            self._training, content=self.once("training", lambda: words.training(learning.told(), learning.newest()))
+        )
         if self._listed != keeper.changes:
             self._listed = keeper.changes
-            found = keeper.recordings()
-            change(self._list, content=words.recordings(keeper.folder, found))
+            found, left_out = self.once("recordings", keeper.recordings)
+            change(self._list, content=words.recordings(keeper.folder, found, left_out))
             self._which.options = tuple(found) or (_NONE,)
             self._which.value = self._which.options[-1]
 

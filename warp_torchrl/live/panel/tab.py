@@ -1,11 +1,14 @@
 """What every tab has: its part of the panel, and callbacks that tell what is refused."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from warp_torchrl.foreign_text import plain_text
+from warp_torchrl.live.door import LOG
 from warp_torchrl.live.match import Match
+from warp_torchrl.live.once import Once
 from warp_torchrl.live.side import Side
 from warp_torchrl.runs.sealed import Unsound
 
@@ -49,9 +52,19 @@ class Tab(ABC):
     def paint(self) -> None:  # noqa: B027 - a tab may show nothing that changes
         """Show what takes long to make and to send."""
 
-    def guarded(self, do: Callable[[Any], object]) -> Callable[[Any], None]:
-        """Return a callback that does something under the page's lock, and tells what is refused."""
+    def guarded(self, do: Callable[[Any], object]) -> Callable[[Any], Coroutine[Any, Any, None]]:
+        """Return a callback that lets an act wait for its turn; it is given the control's new value."""
         return self.panel.guarded(do)
+
+    def last(self) -> tuple[int, int]:
+        """Return the row and column of the map's last cell."""
+        rows, columns = self.match.world.size
+        return rows - 1, columns - 1
+
+    @property
+    def once(self) -> Once:
+        """Return what all panels show, made once for each state of the match."""
+        return self.panel.page.once
 
     def middle(self) -> tuple[int, int]:
         """Return the row and column of the map's middle."""
@@ -61,13 +74,25 @@ class Tab(ABC):
 
 @contextmanager
 def told_if_refused(tell: Callable[[str, bool], object]) -> Iterator[None]:
-    """Tell an error in one line: a page must not fall silent, and the match goes on as it was."""
+    """Tell an error in one line: a page must not fall silent, and the match goes on as it was.
+
+    One that nobody meant to raise is logged in one line too. No error leaves this context.
+    """
     try:
         yield
     except (ValueError, OSError, Unsound) as error:
-        tell(" ".join(str(error).split()), True)
+        _tell(tell, plain_text(str(error)))
     except Exception as error:
-        tell(f"{type(error).__name__}: {' '.join(str(error).split())}", True)
+        line = plain_text(f"{type(error).__name__}: {error}")
+        LOG.error("%s", line)
+        _tell(tell, line)
+
+
+def _tell(tell: Callable[[str, bool], object], line: str) -> None:
+    try:
+        tell(line, True)
+    except Exception as error:  # of a browser that has just left
+        LOG.error("%s, and nobody could be told: %s", line, plain_text(str(error)))
 
 
 def chosen(dropdown: Any) -> str:

@@ -7,11 +7,13 @@ from viser import uplot
 
 from warp_torchrl.env.render import render
 from warp_torchrl.live import words
+from warp_torchrl.live.panel.picture import add_picture, png, show_picture
 from warp_torchrl.live.panel.tab import Tab
 from warp_torchrl.live.stage import change
 
 _LINES = ("#f2a33a", "#6bb7ea", "#9a9a9a")
 _MAP_SIDE = 360  # of the two-dimensional map [pixels]
+Data = tuple[np.ndarray, ...]
 
 
 class WatchTab(Tab):
@@ -23,16 +25,26 @@ class WatchTab(Tab):
         """Make the curves, the map and the table."""
         self._saved = self._curve("Saved [%]", uplot.Scale(auto=False, range=(0.0, 104.0)))
         self._burning = self._curve("Burning [%]", uplot.Scale(auto=True))
-        self._map = self.gui.add_image(self._picture(), label="Map", format="png")
+        self._map = add_picture(self.gui, "Map")
         self._acts = self.gui.add_markdown("")
         self.gui.add_html(words.legend(self.side))
 
     def paint(self) -> None:
         """Show the match so far."""
-        self._plot(self._saved, [each.curves.saved for each in self.match.everywhere])
-        self._plot(self._burning, [each.curves.burning for each in self.match.everywhere])
-        change(self._map, image=self._picture())
-        change(self._acts, content=words.acts(self.side))
+        saved, burning, picture, acts = self.once("watch", self._shown)
+        self._saved.data, self._burning.data = saved, burning
+        show_picture(self._map, picture)
+        change(self._acts, content=acts)
+
+    def _shown(self) -> tuple[Data, Data, bytes, str]:
+        """Return the curves, the map and the table."""
+        sides = self.match.everywhere
+        return (
+            _curves([each.curves.saved for each in sides]),
+            _curves([each.curves.burning for each in sides]),
+            png(self._picture()),
+            words.acts(self.side),
+        )
 
     def _curve(self, name: str, scale: uplot.Scale) -> Any:
         names = [words.title(side) for side in self.match.everywhere]
@@ -44,12 +56,14 @@ class WatchTab(Tab):
             scales={"x": uplot.Scale(time=False), "y": scale}, axes=(axis, axis), height=170,
         )  # fmt: skip
 
-    def _plot(self, handle: Any, curves: list[list[float]]) -> None:
-        count = max(len(curve) for curve in curves)
-        rows = [np.pad(np.array(curve) * 100.0, (0, count - len(curve)), mode="edge") for curve in curves]
-        handle.data = (np.arange(count, dtype=np.float64), *rows)
-
     def _picture(self) -> np.ndarray:
         state, team = self.side.state, self.side.env.world.team
         scale = max(1, _MAP_SIDE // max(self.match.world.size))
         return render(state, team.table(self.side.env.device).flies, scale)[0].numpy()
+
+
+def _curves(shares: list[list[float]]) -> Data:
+    """Return the steps, and curves of shares as percentages, each as long as the longest."""
+    count = max(map(len, shares))
+    rows = (np.pad(np.array(curve) * 100.0, (0, count - len(curve)), mode="edge") for curve in shares)
+    return (np.arange(count, dtype=np.float64), *rows)

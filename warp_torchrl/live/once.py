@@ -1,0 +1,24 @@
+"""What all panels show of a match, made once for each of its states."""
+
+from collections.abc import Callable, Hashable
+from typing import Any, TypeVar
+
+Made = TypeVar("Made")
+
+
+class Once:
+    """Values by what they are of. A page with many browsers makes its texts and pictures for one of them."""
+
+    def __init__(self) -> None:
+        self._made: dict[Hashable, Any] = {}
+
+    def __call__(self, what: Hashable, make: Callable[[], Made]) -> Made:
+        """Return a value, which is made where it is not there yet."""
+        if what not in self._made:
+            self._made[what] = make()
+        value: Made = self._made[what]
+        return value
+
+    def forget(self) -> None:
+        """Let all be made anew: the match has changed."""
+        self._made.clear()
