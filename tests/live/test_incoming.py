@@ -3,6 +3,7 @@
 import math
 import threading
 import time
+from types import SimpleNamespace
 
 import msgspec
 import pytest
@@ -279,3 +280,23 @@ def test_pictures_wait_while_the_match_plays(page, browser, monkeypatch):
         page.show()
         page.show()
     assert len(painted) >= 2
+
+
+def test_a_page_that_plays_faster_than_can_be_chosen_has_panels(page, browser, monkeypatch):
+    monkeypatch.setattr(page, "pace", 500.0)
+    assert browser().value("Steps a second") == 30
+
+
+def test_what_the_page_itself_sets_and_who_is_not_there_ask_for_nothing(page, browser, monkeypatch):
+    browser()
+    panel, asked = list(page._panels.values())[-1], []
+    with monkeypatch.context() as patch, page.lock:
+        patch.setattr(page, "ask", lambda *given: asked.append(given))
+        page.keeper.every = True
+        panel.show()
+        assert panel._tabs[4]._every.value
+        panel._tabs[4]._every.value = page.keeper.every = False
+        time.sleep(0.2)
+    page.ask(12345, lambda: asked.append("an act"))
+    page._welcome(SimpleNamespace(client_id=12345))
+    assert is_well(page, browser) and asked == [] and 12345 not in page._panels

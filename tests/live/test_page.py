@@ -90,6 +90,50 @@ def _until(holds, seconds=60.0):
         time.sleep(0.05)
 
 
+@pytest.mark.parametrize("pace", [0, -3, 31, float("nan"), float("inf")])
+def test_a_pace_that_is_none_is_refused(page, pace):
+    with pytest.raises(ValueError, match=r"steps a second must be in 1\.\.30, got"):
+        page.set_pace(pace)
+    page.set_pace(30)
+    assert page.pace == 30.0
+
+
+def test_stop_ends_a_page_that_waits_for_its_next_step(page):
+    page.pace = 1e-3
+    clock = threading.Thread(target=page.play)
+    clock.start()
+    time.sleep(0.2)
+    page.stop()
+    clock.join(timeout=10)
+    assert not clock.is_alive()
+
+
+def test_an_act_of_the_page_s_own_that_fails_does_not_end_it(page, caplog):
+    clock = threading.Thread(target=page.play)
+    clock.start()
+    page.inbox.put_alone(1, lambda: 1 / 0)
+    _until(lambda: caplog.records)
+    assert caplog.records[0].getMessage() == "ZeroDivisionError: division by zero" and clock.is_alive()
+    page.stop()
+    clock.join(timeout=10)
+
+
+def test_a_match_that_cannot_be_shown_leaves_the_one_before(page, monkeypatch):
+    before, other = page.match, Match(page.given)
+    real = page._set_stages
+
+    def fail():
+        if page.match is other:
+            raise MemoryError("a map of a million cells")
+        real()
+
+    monkeypatch.setattr(page, "_set_stages", fail)
+    with pytest.raises(MemoryError):
+        page.open(other)
+    assert page.match is before and not page.playing
+    page.step()
+
+
 def test_a_match_that_fails_stands_still_and_the_page_stays(page, monkeypatch):
     def fail():
         raise RuntimeError("an ability of one's own\nhas a mistake")
