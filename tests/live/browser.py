@@ -48,7 +48,8 @@ class Browser:
         return self._first(lambda each: "value" in each and each["props"].get("label") == label)
 
     def set(self, label, value):
-        """Give a control a value."""
+        """Give a control a value, which the browser shows."""
+        self.controls[self.find(label)]["value"] = value
         self.send({"type": "GuiUpdateMessage", "uuid": self.find(label), "updates": {"value": value}})
 
     def press(self, button):
