@@ -137,6 +137,13 @@ def test_an_archive_with_a_second_list_of_parts_is_refused(tmp_path):
     for changed in (b"PK\5\6" + bytes(18) + content, content + b" ", content[:-2] + b"\1\0 ", content[:60], b""):
         path.write_bytes(changed)
         refused(path, "")
+    for before in (b"x", b"PK\5\6" + bytes(18)):
+        path.write_bytes(before + content)
+        refused(path, "its end is not where it says|its list of parts is not where it says")
+    path.write_bytes(content)
+    repacked(path, zipfile.ZIP_STORED)  # without the longer end of large archives
+    path.write_bytes(b"x" + path.read_bytes())
+    refused(path, "its list of parts is not where it says")
     repacked_twice = content + content  # which offset is meant?
     path.write_bytes(repacked_twice)
     refused(path, "its end is not where it says|its list of parts is not where it says")
