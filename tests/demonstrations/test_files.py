@@ -208,6 +208,13 @@ def test_a_manifest_that_is_a_link_or_a_pipe_is_refused(folder):
         read(folder)
 
 
+def test_an_entry_that_is_not_as_large_as_its_file_is_refused(folder):
+    entries = json.loads((folder / MANIFEST).read_text())["entries"]
+    reseal(folder, entries=entries | {"agents/observation/view": {"dtype": "uint8", "shape": [12, 3, 7]}})
+    with pytest.raises(Unsound, match=r"view\.memmap does not fit its file, of 47916 bytes and not 252"):
+        read(folder)
+
+
 def test_files_larger_than_a_recording_may_be_are_not_read(folder):
     content = json.loads((folder / MANIFEST).read_text())
     size = 2**40

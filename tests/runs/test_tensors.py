@@ -72,6 +72,7 @@ def test_what_torch_saves_is_read(tmp_path):
 
 WIDE = {
     "one number expanded": lambda: torch.zeros(1).expand(2**40),
+    "a number expanded a little": lambda: torch.zeros(1).expand(64),
     "a row expanded": lambda: torch.zeros(8, 1).expand(8, 2**30),
     "a stride of nothing": lambda: torch.zeros(4).as_strided((2**20, 2**20), (0, 0)),
 }
@@ -140,10 +141,6 @@ def test_an_archive_with_a_second_list_of_parts_is_refused(tmp_path):
     for before in (b"x", b"PK\5\6" + bytes(18)):
         path.write_bytes(before + content)
         refused(path, "its end is not where it says|its list of parts is not where it says")
-    path.write_bytes(content)
-    repacked(path, zipfile.ZIP_STORED)  # without the longer end of large archives
-    path.write_bytes(b"x" + path.read_bytes())
-    refused(path, "its list of parts is not where it says")
     repacked_twice = content + content  # which offset is meant?
     path.write_bytes(repacked_twice)
     refused(path, "its end is not where it says|its list of parts is not where it says")
