@@ -1,6 +1,7 @@
 """Draw mutants, run the tests beside each, and fail if one lives that nobody has accepted.
 
-    python -m tests.mutation results.jsonl
+    python -m tests.mutation results.jsonl              all subjects of plan.toml
+    python -m tests.mutation results.jsonl rates live   the mutants of two
 
 A line of the file is a mutant and its verdict. Those that it calls killed are not run again: after a new test, the same
 command runs the survivors. Without the file all are run.
@@ -20,9 +21,13 @@ def main() -> int:
     """Run the sample and return 1 if a mutant survived that is not accepted."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutation", description=__doc__.splitlines()[0])
     parser.add_argument("results", type=Path, help="file of verdicts, which is read first and added to")
-    results = parser.parse_args().results
     settings, reasons = plan(), accepted()
-    mutants = sample(settings["subjects"], settings["count"], settings["seed"])
+    parser.add_argument("subjects", nargs="*", help=f"of {', '.join(settings['subjects'])}; without any, all")
+    given = parser.parse_args()
+    if unknown := set(given.subjects) - settings["subjects"].keys():
+        parser.error(f"subjects must be of {', '.join(settings['subjects'])}, got {', '.join(sorted(unknown))}")
+    results = given.results
+    mutants = sample(settings["subjects"], settings["count"], settings["seed"], given.subjects)
     verdicts = _read(results)
     with tempfile.TemporaryDirectory() as folder:
         copy_project(copy := Path(folder))

@@ -3,7 +3,7 @@
 import ast
 import random
 import tomllib
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -112,10 +112,19 @@ def drawn(all_places: list[Place], count: int, seed: int) -> list[Mutant]:
     return found
 
 
-def sample(subjects: dict[str, str], count: int, seed: int) -> list[Mutant]:
-    """Return mutants in equal shares of the subjects, in random order: a part of them is a sample too."""
+def sample(subjects: dict[str, str], count: int, seed: int, only: Collection[str] = ()) -> list[Mutant]:
+    """Return mutants in equal shares of the subjects, in random order: a part of them is a sample too.
+
+    Args:
+        subjects: Patterns of their modules, by name.
+        count: Mutants of all subjects.
+        seed: Of what is drawn.
+        only: Subjects whose mutants are returned; none for all. They are the same as among all.
+    """
     found: list[Mutant] = []
-    for number, pattern in enumerate(subjects.values()):
+    for number, (name, pattern) in enumerate(subjects.items()):
+        if only and name not in only:
+            continue
         modules = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.glob(pattern))
         share = count // len(subjects) + (number < count % len(subjects))
         found += drawn([place for module in modules for place in places(module)], share, seed)
@@ -141,9 +150,15 @@ def _positions(source: str) -> Iterator[tuple[str, int, Position]]:
 
 
 def _mutated(source: str, change: Change) -> str:
+    """Return the changed source, with an empty line for each that is taken away, so that lines keep their numbers."""
     from cosmic_ray.mutating import mutate_code
 
-    return mutate_code(source, _operators()[change.operator], change.occurrence)
+    before = source.splitlines(keepends=True)
+    after = mutate_code(source, _operators()[change.operator], change.occurrence).splitlines(keepends=True)
+    if missing := len(before) - len(after):  # a decorator goes with the empty lines above it
+        at = next(number for number, (old, new) in enumerate(zip(before, after)) if old != new)
+        after[at:at] = missing * ["\n"]
+    return "".join(after)
 
 
 @cache

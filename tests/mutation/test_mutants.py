@@ -25,8 +25,16 @@ def test_the_plan_names_what_there_is():
         modules = [path.relative_to(ROOT).as_posix() for path in ROOT.glob(pattern)]
         assert modules, pattern
         for module in modules:
-            assert all((ROOT / each).exists() for each in beside(module, settings["tests"])), module
+            tests = beside(module, settings["tests"])
+            assert all((ROOT / each).exists() for each in tests), module
+            assert "tests/." not in tests, f"{module} has the whole suite beside it: name its tests in plan.toml"
     assert all((ROOT / "warp_torchrl" / f"{module}.py").exists() for module in settings["tests"])
+
+
+def test_every_module_of_every_room_is_of_a_subject():
+    planned = {path for pattern in plan()["subjects"].values() for path in ROOT.glob(pattern)}
+    left_out = set(ROOT.glob("warp_torchrl/**/*.py")) - planned
+    assert not left_out, f"plan.toml has no subject for {sorted(path.relative_to(ROOT).as_posix() for path in left_out)}"
 
 
 def test_a_module_s_tests_are_its_mirror_and_what_the_plan_adds():
@@ -59,8 +67,16 @@ def test_mutants_lie_a_step_apart():
 
 def test_subjects_have_equal_shares():
     pytest.importorskip("cosmic_ray")
-    found = sample({"a": MODULE, "b": "warp_torchrl/world/law.py"}, 9, seed=0)
+    found = sample({"a": MODULE, "b": "warp_torchrl/evaluation/goal.py"}, 9, seed=0)
     assert sorted(each.module for each in found).count(MODULE) == 5 and len(found) == 9
+
+
+def test_a_subject_alone_has_the_mutants_that_it_has_among_all():
+    pytest.importorskip("cosmic_ray")
+    subjects = {"law": MODULE, "goal": "warp_torchrl/evaluation/goal.py"}
+    among_all = {each.name for each in sample(subjects, 8, seed=0)}
+    alone = {each.name for each in sample(subjects, 8, seed=0, only=["goal"])}
+    assert alone == {name for name in among_all if "goal.py" in name} and len(alone) == 4
 
 
 def test_only_what_passes_its_tests_has_survived():
