@@ -9,6 +9,7 @@ from warp_torchrl.demonstrations.events import Event
 from warp_torchrl.demonstrations.files import read, save
 from warp_torchrl.demonstrations.replay import Replay
 from warp_torchrl.runs.sealed import Unsound
+from warp_torchrl.world.state import is_tree
 
 
 def test_the_worlds_are_those_that_were_played(match, recording, tmp_path):
@@ -94,3 +95,20 @@ def test_a_map_that_would_fill_the_memory_is_not_played(recording):
     recording.environment.values["landscape"]["size"] = 4096
     with pytest.raises(Unsound, match="has 4096 x 4096 cells, and at most 4194304 are played again"):
         Replay(recording)
+
+
+def test_what_people_did_after_the_last_step_is_played(match):
+    row, column = is_tree(match.sides[0].state.cells[0]).nonzero()[0].tolist()
+    match.clear(row, column)
+    recording = match.sides[0].record()
+    assert recording.events[-1].step == len(recording.steps)
+    last = Replay(recording).check()
+    assert torch.equal(last.cells, match.sides[0].state.cells)
+    forgotten = replace(recording, events=recording.events[:-1])
+    assert not torch.equal(Replay(replace(forgotten, saved=None)).check().cells, last.cells)
+
+
+def test_the_last_digit_of_a_number_may_differ(recording):
+    steps = recording.steps.clone()
+    steps["next", "agents", "reward"] *= 1.000001
+    Replay(replace(recording, steps=steps)).check()

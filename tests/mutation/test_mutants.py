@@ -34,7 +34,9 @@ def test_the_plan_names_what_there_is():
 def test_every_module_of_every_room_is_of_a_subject():
     planned = {path for pattern in plan()["subjects"].values() for path in ROOT.glob(pattern)}
     left_out = set(ROOT.glob("warp_torchrl/**/*.py")) - planned
-    assert not left_out, f"plan.toml has no subject for {sorted(path.relative_to(ROOT).as_posix() for path in left_out)}"
+    assert not left_out, (
+        f"plan.toml has no subject for {sorted(path.relative_to(ROOT).as_posix() for path in left_out)}"
+    )
 
 
 def test_a_module_s_tests_are_its_mirror_and_what_the_plan_adds():

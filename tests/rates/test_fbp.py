@@ -6,7 +6,7 @@ from dataclasses import fields
 import pytest
 import torch
 
-from warp_torchrl.rates.fbp import fbp_spread, foliar_moisture
+from warp_torchrl.rates.fbp import fbp_spread, foliar_moisture, surface_consumption
 from warp_torchrl.rates.fbp_fuels import curing_effect, fbp_fuels
 
 # The standard test data of the system (Wotton, Alexander and Taylor 2009, GLC-X-10). Inputs: the data set test_fbp of
@@ -212,3 +212,15 @@ def test_a_bad_state_of_the_fuel_is_refused(changed, words):
 def test_codes_that_are_not_whole_numbers_are_refused():
     with pytest.raises(ValueError, match="fuel must be codes of an integer dtype, got float32"):
         spread(2.0)
+
+
+def test_crowns_of_c6_burn_only_where_they_carry_the_fire_faster():
+    # Eq. 62: crowns spread by foliar moisture, the surface by the buildup index. Wet needles leave them slower than the
+    # surface, whose fire would reach them (4 m/min would do): they do not burn, and give no heat.
+    values = {"wind_speed": 25.0, "ffmc": 95.0, "bui": 120.0}
+    wet, dry = (spread(6, foliar_moisture=needles, **values) for needles in (150.0, 100.0))
+    surface = surface_consumption(fbp_fuels(torch.tensor(6)), torch.tensor(95.0), torch.tensor(120.0))
+    assert wet.head > 20.0 and (wet.intensity / (300 * wet.head)).item() == pytest.approx(surface.item(), rel=1e-5)
+    assert dry.head > wet.head and (dry.intensity / (300 * dry.head)).item() == pytest.approx(
+        surface.item() + 1.8, rel=1e-2
+    )

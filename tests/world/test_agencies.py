@@ -117,6 +117,12 @@ def test_vehicles_are_apportioned_by_d_hondt(need, expected):
     assert apportioned(torch.tensor([need, need]), 4).tolist() == [expected, expected]
 
 
+def test_divisors_are_one_two_three_which_favour_the_large():
+    # 100, 50, 33.3, 25 | 80, 40, 26.7 | 30: by odd divisors (Sainte-Lague) it would be 3, 3, 1, 1.
+    need = torch.tensor([[100.0, 80.0, 30.0, 20.0]])
+    assert apportioned(need, 8).tolist() == [[0, 0, 0, 0, 1, 1, 1, 2]]
+
+
 def test_the_pool_is_lent_by_need_when_a_term_is_over():
     agencies = SeveralAgencies(own=1, lending="need", term=4)
     state = parted("a.T.b ..T.c", "00011 00011", [0, 1, 0, 1])
