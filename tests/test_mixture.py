@@ -14,6 +14,8 @@ from warp_torchrl.mixture import Kind, Mixture, apportioned, weights
         ([5.0, 3.0, 1.0], 10, [6, 3, 1]),  # 5.56, 3.33, 1.11
         ([100.0, 1.0, 1.0], 6, [4, 1, 1]),  # none has nothing
         ([0.1, 0.1], 2, [1, 1]),
+        ([3.3, 0.7], 8, [7, 1]),  # 6.6, 1.4: the largest remainder, not the largest quota for each world given
+        ([7.0, 5.0, 0.1, 0.1, 0.1], 7, [3, 1, 1, 1, 1]),  # 3.98, 2.85: one each leaves 7, one of 3 and 2 must give
     ],
 )
 def test_worlds_are_apportioned_by_largest_remainders(shares, count, given):
@@ -30,6 +32,9 @@ def test_a_kind_has_a_share_and_a_teacher_a_weight():
         Kind(scenario="water", share=0.0)
     with pytest.raises(ValueError, match="teacher_weight must be in"):
         Kind(scenario="water", teacher_weight=-1.0)
+    assert Mixture(worlds=100_000).worlds == 100_000
+    with pytest.raises(ValueError, match="worlds must be in"):
+        Mixture(worlds=100_001)
 
 
 def test_what_is_left_to_learn_weighs_by_hand():
@@ -47,3 +52,9 @@ def test_kinds_that_are_equally_far_keep_their_shares():
 def test_an_unknown_baseline_is_refused():
     with pytest.raises(ValueError, match=r"baseline must be one of .*, got gredy: did you mean greedy"):
         Mixture(baseline="gredy")
+
+
+def test_kinds_and_what_was_saved_of_them_must_be_as_many():
+    for shares, saved in (([1.0], [None]), ([0.5, 0.5], [None]), ([1.0], [None, 0.5])):
+        with pytest.raises(ValueError, match=r"shorter|longer"):
+            weights(shares, saved, [0.5, 0.6], 0.25)

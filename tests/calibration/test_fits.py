@@ -123,6 +123,8 @@ def test_refusals_are_one_line():
         Evolution()(start, deviation, cases)
     with pytest.raises(ValueError, match="loss must be cross_entropy or brier for gradients, got jaccard"):
         Gradients(loss="jaccard")
+    with pytest.raises(ValueError, match=r"seed must be in \[1, "):
+        Evolution(seed=2**31)
     cases[0].spells[0].moisture[5] = 90.0
     with pytest.raises(ValueError, match=r"moisture\.ffmc is by that of east"):
         check_told(parameters_of(["moisture.ffmc"], start), cases)

@@ -48,6 +48,7 @@ def test_a_judgement_moves_once():
     [
         ({"low": 0.6, "high": 0.6}, "low must be below high, 0.6, got 0.6"),
         ({"high": 1.2}, r"high must be in \[0, 1\], got 1.2"),
+        ({"low": 1.2}, r"low must be in \[0, 1\], got 1.2"),
     ],
 )
 def test_bounds_that_bound_nothing_are_refused(values, line):

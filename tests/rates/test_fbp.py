@@ -161,8 +161,9 @@ def test_slopes_past_seventy_per_cent_count_as_that():
 @pytest.mark.parametrize("slope", [0.0, 12.0, 50.0])
 @pytest.mark.parametrize("ffmc", [0.0, 70.0, 84.0, 101.0])
 def test_every_gradient_is_finite(wind, slope, ffmc):
-    inputs = {"wind_speed": wind, "slope": slope, "ffmc": ffmc, "bui": 0.0}
+    inputs = {"wind_speed": wind, "slope": slope, "ffmc": ffmc}
     inputs = {name: torch.tensor([value], requires_grad=True) for name, value in inputs.items()}
+    inputs["bui"] = torch.tensor([[0.0], [60.0]], requires_grad=True)
     codes = torch.cat([EVERY_CODE, torch.tensor([101])])
     head = fbp_spread(codes, wind_bearing=10.0, aspect=40.0, **inputs)
     total = sum(getattr(head, each.name).sum() for each in fields(head))

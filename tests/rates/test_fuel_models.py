@@ -77,3 +77,9 @@ def test_classes_of_one_size_share_their_weight():
     expected = torch.eye(6)
     expected[0, 3] = expected[3, 0] = 1.0
     assert torch.equal(same, expected)
+
+
+def test_ratios_of_standard_models_are_published_in_steps_of_50():
+    for table in (scott_burgan_40(), anderson_13()):
+        published = table.fuels.sav[:, [0, 3, 4]][:-1]
+        assert (published % 50 == 0).all() and (published <= 3500).all()

@@ -183,3 +183,30 @@ def test_coarser_fuel_is_wetter_and_rain_wets_the_finest():
     assert finest.tolist() == pytest.approx([1.03 * 5.9958, 35.0], rel=1e-3)
     assert torch.allclose(middle - finest, torch.tensor(1.0)) and torch.allclose(coarse - finest, torch.tensor(2.0))
     assert torch.equal(dead_moisture(warm, damp)[0][0], finest[0])
+
+
+def test_days_grow_from_one_solstice_to_the_other():
+    # Day lengths of the duff moisture code have one maximum and one minimum, half a year apart, and those of the
+    # drought code stand still where nothing dries; north of 30 N they are those of Van Wagner's 46 N.
+    for latitude, longest in ((-35.0, 12), (-20.0, 12), (20.0, 6), (50.0, 5)):
+        air = [torch.full((12,), value) for value in (18.9, 50.0, 2.0, 0.0)]
+        months = torch.arange(12) + longest  # the longest first
+        day = torch.stack(
+            [
+                fwi.daily_dmc(
+                    torch.tensor(10.0),
+                    *(each[0] for each in (air[0], air[1], air[3])),
+                    (month - 1) % 12 + 1,
+                    torch.tensor(latitude),
+                )
+                for month in months
+            ]
+        )
+        falls, grows = day[:7].diff(), day[7:].diff()
+        assert (falls <= 1e-6).all() and (grows >= -1e-6).all(), latitude
+
+
+def test_duff_counts_by_another_equation_past_a_buildup_of_80():
+    # Eq. 28a at 80: 0.626 * 80^0.809 + 2 = 23.6857 (28b has 23.67); 28b at 81: 1000 / (25 + 108.64 e^-1.863) = 23.8882
+    index = fwi.fire_weather_index(torch.tensor([0.3, 0.3]), torch.tensor([80.0, 81.0]))
+    assert index.tolist() == pytest.approx([0.03 * 23.6857, 0.03 * 23.8882], rel=2e-5)
