@@ -1,5 +1,8 @@
 """A match in which people took part, and its recording."""
 
+from copy import deepcopy
+from dataclasses import replace
+
 import pytest
 
 from warp_torchrl.live.match import Match, Setting
@@ -9,8 +12,7 @@ from warp_torchrl.world.state import is_tree
 SMALL = ("landscape.size=16", "team.n_agents=3", "horizon=30")
 
 
-@pytest.fixture
-def match():
+def played_match():
     """Twelve steps: a person drives agent 0 and waits at times, agent 1 has an order, the world is interfered with."""
     made = Match(Setting(policy="coordinated", overrides=SMALL))
     side, names = made.sides[0], made.sides[0].env.action_names
@@ -33,5 +35,16 @@ def match():
 
 
 @pytest.fixture
-def recording(match):
-    return match.sides[0].record()
+def match():
+    return played_match()
+
+
+@pytest.fixture(scope="session")
+def kept_recording():
+    return played_match().sides[0].record()
+
+
+@pytest.fixture
+def recording(kept_recording):
+    """The recording of such a match, which a test may change."""
+    return replace(kept_recording, steps=kept_recording.steps.clone(), environment=deepcopy(kept_recording.environment))

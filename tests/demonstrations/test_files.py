@@ -132,6 +132,11 @@ def test_what_a_recording_says_is_checked_and_told_in_one_line(folder, changes, 
     assert "\n" not in str(raised.value)
 
 
+def test_an_event_may_come_after_the_last_step(folder):
+    reseal(folder, events=[{"step": 12, "kind": "ignite", "numbers": [1, 1]}])
+    assert read(folder).events[0].step == 12
+
+
 @pytest.mark.parametrize(
     ("entry", "number", "told"),
     [
