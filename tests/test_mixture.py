@@ -32,6 +32,9 @@ def test_a_kind_has_a_share_and_a_teacher_a_weight():
         Kind(scenario="water", share=0.0)
     with pytest.raises(ValueError, match="teacher_weight must be in"):
         Kind(scenario="water", teacher_weight=-1.0)
+    assert Kind(scenario="water", share=1e6, teacher_weight=1e6).teacher_weight == 1e6
+    with pytest.raises(ValueError, match="teacher_weight must be in"):
+        Kind(scenario="water", teacher_weight=1e6 + 1)
     assert Mixture(worlds=100_000).worlds == 100_000
     with pytest.raises(ValueError, match="worlds must be in"):
         Mixture(worlds=100_001)

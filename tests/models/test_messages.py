@@ -321,3 +321,28 @@ def test_networks_do_not_answer_what_comes_late(make_late_env):
     with pytest.raises(ValueError, match=r"model\.message_rounds must be 1 where messages come late .*, got 2"):
         Mlp(messages="graph", message_rounds=2).actor(signature(make_late_env()))
     assert Mlp(message_rounds=2).actor(signature(make_late_env())), "who is silent hears nothing"
+
+
+def test_a_message_is_numbers_of_at_most_one_and_comes_with_its_place_in_sixteenths_of_a_cell():
+    network, heard = Round(size=8, message=8, heads=2), []
+    network.hear.register_forward_pre_hook(lambda module, given: heard.append(given[0]))
+    features, upright = 50.0 * torch.eye(2, 8)[None], torch.zeros(1, 2, dtype=torch.int64)
+    radio = torch.zeros(1, 2, 2, 3)
+    radio[0, 0, 1] = torch.tensor([1.0, 16.0, -8.0])
+    network(features, radio, upright)
+    told = network.told(features, upright)
+    assert told.abs().max() <= 1.0 and told.abs().max() > 0.99
+    assert torch.equal(heard[0][0, 0, 1, :8], told[0, 1]) and heard[0][0, 0, 1, 8:].tolist() == [1.0, -0.5]
+
+
+def test_who_hears_nobody_attends_to_nothing_and_who_hears_one_to_that_and_nothing():
+    network = Round(size=8, message=8, heads=1)
+    features, upright = torch.randn(1, 3, 8), torch.zeros(1, 3, dtype=torch.int64)
+    radio = torch.zeros(1, 3, 3, 3)
+    radio[0, 1, 0, 0] = 1.0
+    after = network(features, radio, upright)
+    assert torch.equal(after[0, [0, 2]], features[0, [0, 2]])
+    told = torch.cat((network.told(features, upright)[0, 0], torch.zeros(2)))
+    key, value = network.hear(told).chunk(2)
+    weight = torch.sigmoid(network.ask(features[0, 1]) @ key / 8**0.5)  # a softmax over it and a key of zeros
+    assert torch.allclose(after[0, 1], features[0, 1] + network.take(weight * value), atol=1e-5)
