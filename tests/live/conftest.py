@@ -1,16 +1,19 @@
 """Small matches, and a run folder that goes on training."""
 
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
+from warp_torchrl.config.building import run_config
+from warp_torchrl.config.compose import compose_config, option_of, plain, without_targets
+from warp_torchrl.config.groups import COMPONENTS
+from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.manifest import read_manifest, write_manifest
 from warp_torchrl.runs.shipped import find_policy
+from warp_torchrl.training.loop import Training
 
 SMALL = ("landscape.size=16", "team.n_agents=3", "horizon=30")
 
@@ -28,20 +31,14 @@ def make_match():
 @pytest.fixture(scope="session")
 def trained(tmp_path_factory):
     """The folder of a tiny run that was trained here, and goes on."""
-    folder = tmp_path_factory.mktemp("trained") / "run"
+    folder = tmp_path_factory.mktemp("trained")
     small = ("n_worlds=4", "collector.steps=8", "algorithm.minibatch_size=16", "model.actor_hidden=[16]")
-    given = (
-        *SMALL,
-        *small,
-        "model.critic_hidden=[16]",
-        "total_frames=32",
-        "evaluation.episodes=2",
-        "evaluation.mode=sampled",
-    )
-    command = [sys.executable, "-m", "warp_torchrl.commands.trial", *given, f"hydra.run.dir={folder}"]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL) as process:
-        errors = process.stderr.read()
-    assert process.returncode == 0, errors
+    composed = compose_config("train", [*SMALL, *small, "model.critic_hidden=[16]", "total_frames=32"])
+    config = plain(composed)
+    kept = {key: value for key, value in without_targets(config).items() if key not in ("resume", "debug")}
+    options = {group: option_of(group, config[group]["_target_"]) for group in COMPONENTS}
+    record = SavedConfig(choices={"scenario": config["scenario"], **options}, values=kept)
+    Training(run_config(config), record, folder).train()
     return folder
 
 
