@@ -151,12 +151,26 @@ def test_a_missing_matplotlib_is_told_after_the_table(sweep, capsys, monkeypatch
     assert "| mappo |" in printed.out and "--plot needs Matplotlib: pip install" in printed.err
 
 
-def test_the_figure_is_drawn(sweep, tmp_path):
+def test_the_figure_shows_means_and_the_share_of_fires_that_reach_each_level(sweep, tmp_path, monkeypatch):
     pytest.importorskip("matplotlib")
+    from matplotlib.figure import Figure
     from matplotlib.image import imread
 
-    draw(gather(sweep), tmp_path / "summary.png")
+    save, kept = Figure.savefig, []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *to, **how: (kept.append(figure), save(figure, *to, **how)))
+    entries = gather(sweep)
+    draw(entries, tmp_path / "summary.png")
     assert np.ptp(imread(tmp_path / "summary.png")[..., :3]) > 0.5
+    tiny = [entry for entry in entries if entry.scenario == "tiny"]
+    bars, profile, *_ = kept[0].axes
+    widths = [bar.get_width() for bar in reversed(bars.patches)]  # the best above
+    assert widths == pytest.approx(sorted((100 * entry.value.mean() for entry in tiny), reverse=True))
+    for line in profile.get_lines():
+        values = next(100.0 * entry.value for entry in tiny if entry.policy == line.get_label()).reshape(-1, 1)
+        x, y = line.get_data()
+        assert (x[0], x[-1]) == (0.0, 100.0)
+        apart = (np.abs(values - x) > 1e-6).all(0)
+        assert y[apart] == pytest.approx(100.0 * (values >= x).mean(0)[apart])
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGPIPE"), reason="no pipes that are closed under a writer")

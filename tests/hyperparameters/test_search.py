@@ -92,6 +92,20 @@ def test_jobs_train_side_by_side_and_no_more_of_them(tmp_path):
     assert max(most) == 3 and states(search) == ["COMPLETE"] * 5
 
 
+def test_a_trial_that_ends_before_an_earlier_one_is_told_at_once(tmp_path):
+    search, told = searched(tmp_path, trials=2, jobs=2, pruner="none"), []
+    start = search.start
+
+    def begin(values, seed, place):
+        training = start(values, seed, place)
+        training.until = 20 if place.name == "0" else 10
+        return training
+
+    search.start, search.after = begin, lambda: told.append(states(search))
+    search.run()
+    assert told == [["RUNNING", "COMPLETE"], ["COMPLETE", "COMPLETE"]]
+
+
 def test_a_search_that_was_stopped_goes_on_as_one_that_was_not(tmp_path):
     whole = searched(tmp_path / "whole")
     whole.run()
