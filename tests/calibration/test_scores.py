@@ -59,6 +59,11 @@ def test_of_cells_of_few_fires_those_come_first_that_more_fires_reach():
     assert first_cells(order[None], 2).tolist() == [[True, False, True, False]]
 
 
+def test_half_of_the_fires_are_enough_to_tell_a_cell_to_burn():
+    times = torch.tensor([[[1.0, 1.0, NEVER]], [[1.0, NEVER, NEVER]]])
+    assert scores_of(times, drawn("##."), 60.0).jaccard == 1.0
+
+
 def test_times_of_arrival_are_compared_where_both_burned():
     times = torch.tensor([[[10.0, 30.0, 50.0, NEVER]]])
     observed = torch.tensor([[12.0, 24.0, float("nan"), 5.0]])  # off by -2 and 6

@@ -103,3 +103,26 @@ def test_times_of_many_fires_that_memory_does_not_hold_are_refused(monkeypatch):
     monkeypatch.setattr(memory, "available", lambda: 2 * 999 * 48 - 1)
     with pytest.raises(ValueError, match="memory must hold the arrival times of 999 fires in 6 x 8 cells"):
         tally.add(count)
+
+
+def arrivals(*columns):
+    """Return when fires came to cells of a row, by the minutes of each fire in each cell; None where it did not."""
+    fires = [{(4, at): time for at, time in enumerate(row) if time is not None} for row in zip(*columns, strict=True)]
+    tally = Tally(len(fires), 120.0)
+    tally.add(counter()(burned(*fires)))
+    return tally.arrivals()
+
+
+def test_quantiles_are_places_in_the_order_of_the_fires_that_came():
+    # 11 fires at minutes 0, 10 ... 100 in the first cell, and 5 of 11 in the second, 6 in the third, in no order
+    minutes = [30.0, 0.0, 100.0, 70.0, 10.0, 20.0, 90.0, 40.0, 50.0, 80.0, 60.0]
+    times = arrivals(*([each if each < most else None for each in minutes] for most in (101.0, 50.0, 60.0)))
+    assert times.median[4, :3].tolist() == pytest.approx([50.0, 20.0, 25.0], abs=0.01)
+    assert times.early[4, :3].tolist() == pytest.approx([10.0, 4.0, 5.0], abs=0.01)
+    assert times.late[4, :3].tolist() == pytest.approx([90.0, 36.0, 45.0], abs=0.01)
+    assert times.half[4, [0, 2]].tolist() == pytest.approx([50.0, 50.0], abs=0.01)
+    assert times.half[4, 1].isnan(), "5 of 11 are not half"
+
+
+def test_of_an_even_number_the_half_is_there_when_the_first_half_has_come():
+    assert float(arrivals([10.0, 20.0, 30.0, None]).half[4, 0]) == pytest.approx(20.0, abs=0.01)

@@ -37,3 +37,10 @@ def test_gradients_are_finite_without_a_canopy():
     given = [torch.tensor(each, requires_grad=True) for each in (0.0, 0.0, 0.0, 1.0)]
     wind_adjustment_factor(*given).backward()
     assert all(each.grad.isfinite() for each in given)
+
+
+def test_crowns_shelter_from_15_per_cent_on():
+    # A share of 0.05 is filled, 40 ft: 0.555 / (sqrt(2) ln((20 + 14.4) / 5.2)) = 0.2077, where it is 0.36 in the open
+    assert factor(cover=15, height=40 * 0.3048) == pytest.approx(0.2077, abs=1e-4)
+    assert factor(cover=30, height=40 * 0.3048, ratio=0.5) == factor(cover=15, height=40 * 0.3048)
+    assert factor(cover=14.9, height=40 * 0.3048) == factor()
