@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from warp_torchrl.collection.collectors import MultiProcess
+from warp_torchrl.collection.collectors import InProcess, MultiProcess
 from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
@@ -107,6 +107,21 @@ def test_a_resumed_run_meets_new_fires(tmp_path, here):
     env = run.run_config.make_env(4, first_world_seed(1234))
     env.set_seeds(range(first_world_seed(1234), first_world_seed(1234) + 4), first_episode=12)
     assert torch.equal(env.reset()["state"], batch["state"][:, 0])
+
+
+@pytest.mark.parametrize(("progress", "segments"), [(0.0, 1), (0.249, 1), (0.25, 4), (1.0, 4)])
+def test_batches_have_all_their_steps_from_a_share_of_the_training_on(progress, segments):
+    assert InProcess(steps=32, first_steps=8, grows_at=0.25).segments(progress) == segments
+    assert InProcess(steps=32, grows_at=0.0).segments(progress) == 1
+
+
+def test_a_training_ends_in_whole_batches():
+    # 4 worlds: batches of 32 frames until 25 of 100 are played, one, then of 128: 160 in all
+    growing = InProcess(steps=32, first_steps=8, grows_at=0.25)
+    assert growing.end(100, 4) == 32 + 128 and growing.end(160, 4) == 2 * 32 + 128
+    assert growing.end(32, 4) == 32 and growing.end(33, 4) == 32 + 128
+    assert InProcess(steps=32, grows_at=0.0).end(129, 4) == 256
+    assert InProcess(steps=8, first_steps=4, grows_at=1.0).end(33, 4) == 48
 
 
 def test_workers_must_share_the_worlds():

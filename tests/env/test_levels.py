@@ -55,6 +55,13 @@ def test_with_all_chances_at_the_target_it_is_the_plain_environment():
     same(played(leveled(chances=(0.0, 0.0, 1.0)), 30), played(WildfireEnv(TARGET, n_worlds=16), 30))
 
 
+def test_the_least_and_the_largest_draw_are_of_levels_that_have_a_chance(monkeypatch):
+    env, seeds = leveled(n_worlds=2, chances=(0.0, 0.5, 0.5)), torch.arange(3)
+    draws = torch.tensor([[0.0], [0.5], [1.0 - 2.0**-24]])  # of [0, 1): one half is the first of the second half
+    monkeypatch.setattr("warp_torchrl.env.levels.uniform", lambda *given: draws)
+    assert env.drawn(seeds, seeds).tolist() == [1, 2, 2]
+
+
 def test_what_comes_late_comes_as_in_the_plain_environment():
     late = replace(TARGET, team=Team(n_agents=2, radio=Radio(carries="graph", delay=2, loss=0.2)))
     env = LeveledEnv([replace(late, steps_per_tick=6), late], n_worlds=8)

@@ -55,9 +55,10 @@ def test_acts_downwind_attack_the_head_and_shared_targets_are_contested():
 def test_lead_time_is_from_a_clearing_until_fire_stands_beside_it():
     # Fire in column 0 goes east, a column a step; the trees in columns 3 and 9 are cleared in the first step. It stands
     # beside column 3 when column 2 burns, after the step that began at 1: one step later. Column 9 is never reached,
-    # since the world is one row and the break in column 3 holds.
+    # since the world is one row and the break in column 3 holds. The episode is in its fourth step when it begins.
     certain = Fire(alpha=(0, 0, 0, 1.0, 0), diagonal="unit", wind_gain=0.0, wind_focus=0.0)
     state, world = drawn(["FTTTTTTTTTTT"] + ["~" * 12] * 3, [[0, 3], [0, 9]], steps_per_tick=1, fire=certain)
+    state = state.replace(step=state.step + 3)
     watched = Behaviour(state)
     for action in ([CLEAR, CLEAR], [STAY, STAY], [STAY, STAY]):
         transition = world.step(state, torch.tensor([action]))

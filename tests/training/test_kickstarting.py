@@ -1,10 +1,12 @@
 """A teacher's choices are cloned at first, and forgotten at last."""
 
 import math
+from types import SimpleNamespace
 
 import pytest
 import torch
 from tensordict import TensorDict
+from torch import nn
 from torch.nn.functional import cross_entropy
 from torchrl.objectives import BCLoss
 
@@ -16,7 +18,7 @@ from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.evaluation.method import method
 from warp_torchrl.heuristics import HEURISTICS, TEACHERS
 from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, TEACHER_ACTION, over_canonical
-from warp_torchrl.training.kickstarting import kickstart
+from warp_torchrl.training.kickstarting import _KickstartingLoss, kickstart
 from warp_torchrl.training.loop import Training
 
 TINY = [
@@ -65,6 +67,17 @@ def test_the_lesson_falls_to_nothing(tmp_path):
     now = training.env.reset()
     training.learner.explore(now)
     assert torch.equal(now[TEACHER_ACTION], now[ACTION]), "it is no longer asked"
+
+
+def test_a_factor_on_the_weight_stays_on_it_as_it_falls():
+    learner = SimpleNamespace(
+        loss=SimpleNamespace(actor_network=[nn.Identity()]), schedule=lambda progress: {"train/rate": progress}
+    )
+    lesson = _KickstartingLoss(Imitation(teacher="greedy", weight=2.0, weight_end=0.5, until=0.5), learner, 3.0)
+    assert lesson.weight == 6.0
+    assert lesson.schedule(0.25) == {"train/rate": 0.25} and lesson.weight == 3.0 * 1.25
+    lesson.schedule(1.0)
+    assert lesson.weight == 3.0 * 0.5
 
 
 def sample_of(training):
