@@ -72,7 +72,7 @@ def test_a_trial_below_the_median_at_equal_frames_is_stopped_and_no_better_one_i
     assert best_of(search.study).number == 4
 
 
-def test_a_trial_that_has_ended_is_not_pruned_for_what_it_reports_then(tmp_path):
+def test_a_trial_that_has_ended_reports_all_of_its_training_however_bad(tmp_path):
     search = searched(tmp_path, 0.5, 0.6, 0.7, 0.1, trials=4, startup=3, prune_from=0.4)
 
     class AtOnce(Quick):
@@ -85,6 +85,7 @@ def test_a_trial_that_has_ended_is_not_pruned_for_what_it_reports_then(tmp_path)
     search.start = lambda values, seed, place: AtOnce(0.1, place) if place.name == "3" else start(values, seed, place)
     search.run()
     assert states(search) == ["COMPLETE"] * 4
+    assert max(search.study.trials[3].intermediate_values) == 100
 
 
 def test_without_a_pruner_all_are_trained(tmp_path):
