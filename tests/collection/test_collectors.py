@@ -115,6 +115,13 @@ def test_batches_have_all_their_steps_from_a_share_of_the_training_on(progress, 
     assert InProcess(steps=32, grows_at=0.0).segments(progress) == 1
 
 
+def test_a_segment_is_the_first_batch_or_half_of_one_or_all_of_an_odd_one():
+    told = {(32, None): 16, (5, None): 5, (32, 8): 8, (8, 8): 8}
+    for (steps, first), segment in told.items():
+        assert InProcess(steps=steps, first_steps=first, grows_at=0.25).segment == segment
+    assert InProcess(steps=32, first_steps=8, grows_at=0.0).segment == 32
+
+
 def test_a_training_ends_in_whole_batches():
     # 4 worlds: batches of 32 frames until 25 of 100 are played, one, then of 128: 160 in all
     growing = InProcess(steps=32, first_steps=8, grows_at=0.25)

@@ -5,7 +5,7 @@ import torch
 
 from tests.conftest import small_world
 from warp_torchrl.algorithms.ppo import Ppo
-from warp_torchrl.evaluation.probe import _Heard, _share, drawn_anew, probe
+from warp_torchrl.evaluation.probe import _Heard, _joined, _share, drawn_anew, probe
 from warp_torchrl.models import Mlp, signature
 from warp_torchrl.models.messages import Round
 from warp_torchrl.policy import TrainedPolicy
@@ -38,6 +38,14 @@ def test_what_messages_tell_is_read_from_them_and_what_they_do_not_tell_is_not()
     assert abs(_share([heard(600, False), heard(500, False)], "it")) < 0.05
     nothing = _Heard(torch.randn(5, 4), {"it": torch.full((5,), torch.nan)})
     assert _share([nothing, nothing], "it") != _share([nothing, nothing], "it"), "not a number"
+
+
+def test_what_was_heard_in_all_steps_is_joined_and_of_one_step_is_that():
+    first, second = heard(4, True), heard(3, False)
+    both = _joined([first, second])
+    assert torch.equal(both.messages, torch.cat((first.messages, second.messages)))
+    assert torch.equal(both.known["it"].nan_to_num(), torch.cat((first.known["it"], second.known["it"])).nan_to_num())
+    assert torch.equal(_joined([first]).messages, first.messages)
 
 
 @pytest.mark.parametrize("delay", [pytest.param(0, marks=pytest.mark.slow), 3])

@@ -31,6 +31,16 @@ def test_efficiency_pays_a_put_out_tree_and_charges_the_act():
     assert earned(Efficiency(team_share=1.0), state, world, EXTINGUISH, STAY) == pytest.approx([0.8 / 16] * 2)
 
 
+def test_the_first_reward_alone_charges_for_acts():
+    state, world = drawn(FIELD, [[0, 0], [3, 3]])
+    for reward in CONSERVATION:
+        charged = 0.0 if reward is not Efficiency else 0.1
+        wanted = earned(reward(act=charged), state, world, EXTINGUISH, STAY)
+        assert earned(reward(), state, world, EXTINGUISH, STAY) == wanted
+    free = earned(Efficiency(act=0.0), state, world, EXTINGUISH, STAY)
+    assert free == pytest.approx([0.9 / 16] * 2)
+
+
 def test_an_act_may_cost_a_share_of_the_forest():
     state, world = drawn(FIELD, [[0, 0], [3, 3]])
     dear = Efficiency(act=5e-4, act_per="forest")
