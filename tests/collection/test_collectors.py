@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from warp_torchrl.collection.collectors import InProcess, MultiProcess
+from warp_torchrl.collection.collectors import InProcess, MultiProcess, Ray
 from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
@@ -136,6 +136,9 @@ def test_workers_must_share_the_worlds():
         run_config(plain(compose_config("train", [*TINY, "collector=process", "collector.workers=3"])))
     with pytest.raises(ValueError, match="workers must be in"):
         MultiProcess(workers=0)
+    for name in ("cpus", "gpus"):
+        with pytest.raises(ValueError, match=f"{name} must be in"):
+            Ray(**{name: -0.5})
 
 
 def test_a_missing_ray_is_told(monkeypatch):

@@ -81,3 +81,9 @@ def test_a_term_of_ones_own_is_chosen_by_name():
 def test_mistakes_are_one_line(terms, message):
     with pytest.raises(ValueError, match=message.replace("?", r"\?")):
         Adaptive(terms=terms)
+
+
+def test_weights_of_terms_have_a_limit_that_is_theirs():
+    assert Adaptive(terms={"front": 1e9}).terms == {"front": 1e9}
+    with pytest.raises(ValueError, match=r"terms\.front must be in"):
+        Adaptive(terms={"front": 1e9 + 1.0})
