@@ -192,6 +192,8 @@ def test_a_centred_picture_is_the_picture_seen_from_the_agent(size):
 def test_the_paper_preset_is_three_channels_flattened():
     state, world = drawn([[5] * 4, [5, 11, 5, 5]] * 2, [[0, 0]])
     seen = Paper(radius=1)(state, world, world.forecast(state))[""][0, 0].view(3, 3, 3)
+    space = Paper(radius=1).spaces(world)[""]
+    assert (space.shape, space.low, space.high) == ((27,), 0.0, 1.0)
     forest = torch.tensor([[0, 0, 0], [0, 0.8, 0.8], [0, 0.8, 0.8]])  # (code 3 + 1) / 5, off the map 0
     assert torch.allclose(seen[0], forest, atol=0.01)
     assert seen[1, 1, 1] == pytest.approx(0.5, abs=0.01)  # age 5 of 10
