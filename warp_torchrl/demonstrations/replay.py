@@ -57,7 +57,7 @@ class Replay:
         """Play, and yield the world at its start and after every step, batch size [1].
 
         Raises:
-            Unsound: If an agent sees, may do or earns other than was recorded.
+            Unsound: If an entry that was recorded is missing, or is another here.
         """
         for _ in self.shown():
             yield self.env.shared_state
@@ -66,7 +66,7 @@ class Replay:
         """Play, and yield what the environment shows at its start and after every step, batch size [1].
 
         Raises:
-            Unsound: If an agent sees, may do or earns other than was recorded.
+            Unsound: If an entry that was recorded is missing, or is another here.
         """
         env, steps = self.env, self.recording.steps
         env.world = self._world  # a wind that was held may blow there
@@ -88,7 +88,7 @@ class Replay:
         """Play it all, and return the last world.
 
         Raises:
-            Unsound: If an agent sees, may do or earns other than was recorded.
+            Unsound: If an entry that was recorded is missing, or is another here.
         """
         *_, last = self.states()
         return last
