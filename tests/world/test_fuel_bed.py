@@ -5,6 +5,7 @@ import pytest
 import torch
 
 from tests.world.rasters import keys, write
+from warp_torchrl.world.fuel_bed import moisture_row
 from warp_torchrl.world.rate import RateFire
 from warp_torchrl.world.state import is_burning
 from warp_torchrl.world.terrain.raster import Raster
@@ -44,3 +45,10 @@ def test_land_cover_burns_as_the_fuels_of_its_cover_do(tmp_path, model):
 def test_a_table_of_ones_own_says_nothing_of_the_model(tmp_path):
     ground = raster(tmp_path, 8, {8: "forest"})
     assert World(landscape=ground, fire=RateFire(model="fbfm13")).fire.minutes > 0.0
+
+
+def test_moisture_is_in_0_to_400_per_cent():
+    assert moisture_row({"live_woody": 400.0})[4] == 400.0 and moisture_row({"dead_1h": 0.0})[0] == 0.0
+    for value in (-0.1, 400.1):
+        with pytest.raises(ValueError, match=r"moisture must be in \[0, 400\], got dead_1h"):
+            moisture_row({"dead_1h": value})
