@@ -18,6 +18,7 @@ from warp_torchrl import load_policy, make_env
 from warp_torchrl.commands import checks as checks_module
 from warp_torchrl.commands import command as command_module
 from warp_torchrl.commands.command import evaluate, train
+from warp_torchrl.commands.sweep import SweepSummary
 from warp_torchrl.runs import checkpoint
 from warp_torchrl.runs.lock import RunFolderLock
 from warp_torchrl.training.loop import Training
@@ -65,6 +66,7 @@ def run_here(tmp_path, monkeypatch, capfd):
         return look(hydra, config_name, overrides) if may_be_set else None
 
     monkeypatch.setattr(Hydra, "get_mode", get_mode)
+    monkeypatch.setattr(SweepSummary, "exit_code", 0)  # of a sweep before in this process
 
     def run(program, *arguments):
         monkeypatch.setattr(sys, "argv", [program, *arguments])
@@ -144,7 +146,7 @@ def test_an_evaluation_never_writes_into_a_run_unless_told_to(trained, run_here,
     before = contents(tmp_path / "run")
     code, errors, _ = run_here("evaluate.py", *NOOP, "hydra.run.dir=run")
     assert code == 2 and len(errors) == 1
-    assert "hydra.run.dir: run holds a run: checkpoints, config.yaml, episode.gif and 3 more; take another" in errors[0]
+    assert "hydra.run.dir: run holds a run: checkpoints, config.yaml, episode.gif and 2 more; take another" in errors[0]
     assert "overwrite=true" in errors[0] and contents(tmp_path / "run") == before
     code, errors, _ = run_here("evaluate.py", *NOOP, "hydra.run.dir=run", "overwrite=true")
     assert code == 0, errors

@@ -104,7 +104,9 @@ def test_all_that_a_running_environment_keeps_moves(maps, meta, name):
     played(env)
     assert not elsewhere(env, "cpu")
     assert env.to(meta) is env and env.world_state.cells.shape == (3, *env.world.size)
-    assert not [way for way in elsewhere(env, meta) if not re.search(r"_spec|\.world\.", way)], "a world is rules alone"
+    assert not [way for way in elsewhere(env, meta) if not re.search(r"_spec|\.world\.|_check\.__self__", way)], (
+        "a world is rules alone"
+    )
 
 
 @pytest.mark.parametrize("device", DEVICES)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import pytest
 import torch
 
-from tests.demonstrations.conftest import match, recording  # noqa: F401
+from tests.demonstrations.conftest import kept_recording, recording  # noqa: F401
 from tests.demonstrations.test_files import reseal
 from tests.forgery import forge
 from tests.training.test_loop import RUNS, TINIER, tiny

@@ -36,7 +36,14 @@ def test_fires_are_told_by_their_median_and_by_all_but_the_twentieth_at_each_end
 def test_of_many_hours_the_page_shows_some_and_the_last(prediction):
     said = numbers(prediction)
     hours = [{**said["by_hour"][0], "hour": float(hour)} for hour in range(60)]
-    more = {"title": "a", "version": "0", "seconds": {"all": 1.0, "fires": 0.5}, "warnings": [], "inputs": {}}
+    more = {
+        "title": "a",
+        "version": "0",
+        "seconds": {"all": 1.0, "fires": 0.5},
+        "warnings": [],
+        "inputs": {},
+        "files": [],
+    }
     lines = page({**said, **more, "by_hour": hours}).splitlines()
     shown = [int(line.split("|")[1]) for line in lines if line.startswith("| ") and "hour" not in line]
     assert shown == [*range(0, 60, 3), 59]  # every third: 25 rows at most, and the last

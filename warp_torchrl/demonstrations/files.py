@@ -113,24 +113,35 @@ def read(folder: Path) -> Recording:
 def find(folder: Path) -> list[Path]:
     """Return the folders of all recordings in a folder, itself one or not, by name.
 
-    No link is followed. A folder whose name begins with a dot is a draft, or somebody's own; one whose name has
-    anything but ``A-Za-z0-9._-`` is left, and a line of the log says so.
-
     Raises:
         Unsound: If there is none.
         OSError: If a folder cannot be read.
     """
-    found = []
+    found, _ = search(folder)
+    if not found:
+        raise Unsound(f"{folder} holds no recording: no {MANIFEST} in it, nor in its folders")
+    return found
+
+
+def search(folder: Path) -> tuple[list[Path], list[Path]]:
+    """Return the folders of recordings in a folder, by name, and those that are left out for their names.
+
+    No link is followed. A folder whose name begins with a dot is a draft, or somebody's own; one whose name has
+    anything but ``A-Za-z0-9._-`` is left out, and a line of the log says so.
+
+    Raises:
+        OSError: If a folder cannot be read.
+    """
+    found, left_out = [], []
     for path, folders, files in os.walk(folder, onerror=_fail):
         for name in [each for each in folders if not _FOLDER.fullmatch(each)]:
             folders.remove(name)
             if not name.startswith("."):
-                _say_left(Path(path) / name)
+                left_out.append(Path(path) / name)
+                _say_left(left_out[-1])
         if MANIFEST in files:
             found.append(Path(path))
-    if not found:
-        raise Unsound(f"{folder} holds no recording: no {MANIFEST} in it, nor in its folders")
-    return sorted(found)
+    return sorted(found), left_out
 
 
 @cache

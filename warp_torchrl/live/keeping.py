@@ -1,17 +1,15 @@
 """The recordings of a page's matches, in one folder."""
 
-import re
 import shutil
 from pathlib import Path
 
-from warp_torchrl.demonstrations.files import MANIFEST, find, read, save
+from warp_torchrl.demonstrations.files import MANIFEST, read, save, search
 from warp_torchrl.demonstrations.recording import OpenRecording, Recording
 from warp_torchrl.demonstrations.summary import Summary, summary
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.side import Side
 from warp_torchrl.runs.sealed import Unsound
 
-_NAME = re.compile(r"[A-Za-z0-9._-]+")
 _Written = tuple[int, int, int]
 
 
@@ -100,13 +98,8 @@ class Keeper:
 
     def _folders(self) -> tuple[dict[str, Path], int]:
         """Return the folders of recordings by their paths in this one, and how many are refused for their names."""
-        try:
-            found = find(self.folder)
-        except Unsound:
-            return {}, 0
-        named = {str(folder.relative_to(self.folder)): folder for folder in found}
-        plain = {name: folder for name, folder in named.items() if all(map(_NAME.fullmatch, Path(name).parts))}
-        return plain, len(found) - len(plain)
+        found, left_out = search(self.folder)
+        return {str(folder.relative_to(self.folder)): folder for folder in found}, len(left_out)
 
 
 def _written(folder: Path) -> _Written | None:
