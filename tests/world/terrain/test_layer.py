@@ -53,6 +53,14 @@ def test_the_cell_size_is_in_metres(tmp_path, cell, crs, expected):
         (grid_of(4, 6, 30.0, west=0.29), None),  # a hundredth of a cell is let pass
         (grid_of(4, 6, 30.0, west=0.31), "bounds"),
         (grid_of(4, 6, 30.1), "bounds"),
+        (
+            grid_of(4, 6, 30.0)._replace(transform=rasterio.Affine(30.0, 0.0, 0.0, 0.0, 30.0, TOP - 120.0)),
+            "corners",
+        ),  # south-up
+        (
+            grid_of(4, 6, 30.0)._replace(transform=rasterio.Affine(-30.0, 0.0, 180.0, 0.0, -30.0, TOP)),
+            "corners",
+        ),  # from the east
         (grid_of(4, 7, 30.0), "shape"),
         (grid_of(4, 6, 30.0, crs=UTM), "CRS"),
         (grid_of(4, 6, 30.0, crs=None), "CRS"),

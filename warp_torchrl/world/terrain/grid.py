@@ -23,10 +23,15 @@ class Grid(NamedTuple):
     @property
     def bounds(self) -> tuple[float, float, float, float]:
         """Return (west, south, east, north) in the CRS."""
-        (rows, columns), (a, b, left, d, e, top) = self.shape, self.transform[:6]
-        x = [left + a * column + b * row for column in (0, columns) for row in (0, rows)]
-        y = [top + d * column + e * row for column in (0, columns) for row in (0, rows)]
+        x, y = zip(*self.corners, strict=True)
         return min(x), min(y), max(x), max(y)
+
+    @property
+    def corners(self) -> list[tuple[float, float]]:
+        """Return the places of the four corners in the CRS: the first row's ends, then the last row's."""
+        (rows, columns), (a, b, left, d, e, top) = self.shape, self.transform[:6]
+        ends = [(row, column) for row in (0, rows) for column in (0, columns)]
+        return [(left + a * column + b * row, top + d * column + e * row) for row, column in ends]
 
     @property
     def cell_size(self) -> float:
@@ -65,11 +70,15 @@ class Grid(NamedTuple):
         return bool(self.crs) and (self.crs.is_projected or self.crs.is_geographic)
 
     def differs_in(self, other: "Grid") -> str | None:
-        """Return ``shape``, ``crs`` or ``bounds``, the first that differs; None where every cell lies on its like."""
+        """Return ``shape``, ``crs``, ``bounds`` or ``corners``, the first that differs.
+
+        None where every cell lies on its like: a grid whose first row is its southern one has the bounds alone.
+        """
         near = 0.01 * abs(other.transform[0])
-        if self.shape == other.shape and self.crs == other.crs:
-            return None if np.allclose(self.bounds, other.bounds, rtol=0, atol=near) else "bounds"
-        return "crs" if self.shape == other.shape else "shape"
+        if self.shape != other.shape or self.crs != other.crs:
+            return "crs" if self.shape == other.shape else "shape"
+        pairs = ((each, getattr(self, each), getattr(other, each)) for each in ("bounds", "corners"))
+        return next((each for each, own, wanted in pairs if not np.allclose(own, wanted, rtol=0, atol=near)), None)
 
 
 def check_grid(name: str, grid: Grid, other: str, reference: Grid) -> None:
