@@ -452,6 +452,8 @@ def test_a_byte_order_mark_and_features_without_a_geometry_are_let_pass(tmp_path
         ((-3.4028235e38, 0.5), "float32", None, 1),
         ((math.inf, 1), "float32", None, 1),
         ((255, 1), "uint8", None, "must say what is nodata .* marks cells by 1 and by 255"),
+        ((255, 0), "uint8", None, r"must say what is nodata .* marks \d+ of \d+ cells by 255"),
+        ((255, 0), "uint8", 255, "must mark a cell of the map"),
         ((32767, 1), "int16", None, "must say what is nodata"),
         ((3.4028235e38, 1), "float32", None, "must say what is nodata"),
         ((-9999, 0), "int16", None, "must mark a cell of the map"),

@@ -65,7 +65,7 @@ def read_marks(name: str, path: Path, grid: Grid) -> np.ndarray:
     """Return the cells of a raster on a grid that are over 0 and not nodata, bool [rows, columns].
 
     Numbers below 0 mark nothing, as the -9999 of files that declare no nodata. The largest number of a type, 255 of
-    bytes, may be nodata that was not declared, too: beside other marks it is refused.
+    bytes, may be nodata that was not declared, too: beside other marks, or on most of the map, it is refused.
 
     Raises:
         ValueError: If the file cannot be read, does not lie on the grid, or does not say what is nodata.
@@ -73,9 +73,12 @@ def read_marks(name: str, path: Path, grid: Grid) -> np.ndarray:
     values, known = read_on_grid(name, path, grid)
     marks = known & (values > 0) & np.isfinite(values)
     kinds = np.unique(values[marks])
-    if len(kinds) > 1 and (kinds[-1] in _LARGEST or kinds[-1] >= 2**31 - 1):
-        rule = "say what is nodata (gdal_edit -a_nodata)"
-        raise ValueError(f"{name} must {rule}, {path} marks cells by {kinds[0]:g} and by {kinds[-1]:g}")
+    if len(kinds) and (kinds[-1] in _LARGEST or kinds[-1] >= 2**31 - 1):
+        rule = f"{name} must say what is nodata (gdal_edit -a_nodata), {path} marks"
+        if len(kinds) > 1:
+            raise ValueError(f"{rule} cells by {kinds[0]:g} and by {kinds[-1]:g}")
+        if known.all() and 2 * int(marks.sum()) > marks.size:
+            raise ValueError(f"{rule} {int(marks.sum())} of {marks.size} cells by {kinds[-1]:g}, and leaves the others")
     return marks
 
 
