@@ -102,6 +102,16 @@ def test_text_grids_keep_their_decimals(tmp_path):
     assert read_grid("elevation", path).cell_size == 10.0
 
 
+@pytest.mark.parametrize("line, is_read", [("12,5", False), ("10,0", True), ("1.25e1", True)])
+def test_decimal_commas_of_a_header_are_not_cut_off(tmp_path, line, is_read):
+    path = write_ascii(tmp_path / "z.asc", ["1 2"] * 2)
+    path.write_text(path.read_text().replace("cellsize 10", f"cellsize {line}"))
+    if is_read:
+        assert read_grid("fuel", path).cell_size == float(line.replace(",", "."))
+    else:
+        refuse("^fuel must have decimal points in its header, .* has 'cellsize 12,5'", read_grid, "fuel", path)
+
+
 # --- The values on another grid
 
 

@@ -31,6 +31,7 @@ ALONE = "write the one that is meant into a file of its own, gdal_translate -b N
 _HEADER_LINE, _NUMBER = rb"(?i)\s*(ncols|nrows|[xy]ll|cellsize|d[xy]|nodata)", rb"(?i)(?<!\S)(nan|[-+.\de]+)(?!\S)"
 _NODATA_LINE = rb"(?i)\s*nodata"
 _HEADER_LINES = 12  # of an ASCII grid at most
+_NO_POINT = rb"(?i)\s*([a-z]\w*\s+[-+\d]*,(?!0*\s*$)\S*)"  # GDAL reads 12,5 as 12
 _WORLD_FILES = (".tfw", ".tifw", ".tiffw", ".wld")
 _LARGEST_PRJ = 100_000  # bytes
 
@@ -156,6 +157,15 @@ def _states_nodata(path: Path) -> bool:
         return any(re.match(_NODATA_LINE, line) for _, line in zip(range(_HEADER_LINES), lines))
 
 
+def _check_points(name: str, path: Path) -> None:
+    """Refuse an ASCII grid whose header has decimal commas."""
+    with path.open("rb") as lines:
+        found = (re.match(_NO_POINT, line) for _, line in zip(range(_HEADER_LINES), lines))
+        for line in filter(None, found):
+            got = line[1].decode(errors="replace")
+            raise ValueError(f"{name} must have decimal points in its header, {path} has {got!r}")
+
+
 def _check_place(name: str, path: Path, grid: Grid) -> None:
     """Refuse a GeoTIFF without a place that has a world file beside it, which is not read."""
     beside = [path.with_suffix(each) for each in _WORLD_FILES if path.with_suffix(each).is_file()]
@@ -184,6 +194,8 @@ def _open(name: str, path: Path) -> Iterator[Any]:
             warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
             dataset = rasterio.open(path, driver=driver, **options)
         with dataset:
+            if driver == "AAIGrid":
+                _check_points(name, path)
             if driver == "AAIGrid" and projection.is_file() and not dataset.crs:
                 raise ValueError(f"{name} must have a .prj that states a CRS in WKT, {projection} states none")
             yield dataset
