@@ -116,6 +116,7 @@ def test_a_state_that_is_restored_goes_on_as_it_would_have():
     first, second = leveled(), leveled(seed=77)
     played(first, 17)
     second.load_state_dict(first.state_dict())
+    second.load_state_dict({})  # what TorchRL's collectors keep of it
     assert len(set(first.level.tolist())) == 3 and torch.equal(first.level, second.level)
     shown = [first._observe(), second._observe()]
     for _ in range(25):

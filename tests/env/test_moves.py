@@ -98,6 +98,15 @@ def test_every_part_of_torchrl_moves_every_scenario(maps, name, device):
     assert {leaf.dtype for leaf in wide.values(True, True)} == {torch.float64}
 
 
+def test_what_a_collector_keeps_is_loaded_again(maps):
+    kept = Collector(env_of("default", maps), POLICY, frames_per_batch=6, total_frames=18)
+    frames = next(iter(kept)).numel()
+    again = Collector(env_of("default", maps), POLICY, frames_per_batch=6, total_frames=18)
+    again.load_state_dict(kept.state_dict())
+    assert sum(batch.numel() for batch in again) == 18 - frames
+    kept.shutdown(), again.shutdown()
+
+
 @pytest.mark.parametrize("name", WORLDS)
 def test_all_that_a_running_environment_keeps_moves(maps, meta, name):
     env = env_of(name, maps)

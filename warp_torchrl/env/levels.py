@@ -84,7 +84,7 @@ class LeveledEnv(WildfireEnv):
         Raises:
             ValueError: If an entry is missing or of another shape or type.
         """
-        if strict and "level" not in state_dict:
+        if strict and state_dict and "level" not in state_dict:
             raise ValueError("state_dict must have level, which worlds without a curriculum have not")
         level = state_dict.get("level", self.level)
         if level.shape != self.batch_size or not ((level >= 0) & (level < len(self.levels))).all():
@@ -92,7 +92,7 @@ class LeveledEnv(WildfireEnv):
                 f"level must be {list(self.batch_size)} of 0..{len(self.levels) - 1}, got {level.tolist()}"
             )
         level = level.to(self.device).clone()
-        super().load_state_dict({**state_dict, "level": level}, strict, **kwargs)
+        super().load_state_dict({**state_dict, "level": level} if state_dict else {}, strict, **kwargs)
         self.level = level
 
     def _restored(self, state_dict: Mapping[str, Any]) -> WorldState:

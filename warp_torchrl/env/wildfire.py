@@ -261,15 +261,16 @@ class WildfireEnv(EnvBase):
 
         Args:
             state_dict: Entries by name.
-            strict: Whether all entries must be given; else missing ones keep their value.
+            strict: Whether all entries must be given; else missing ones keep their value. None at all changes nothing:
+                so TorchRL's collectors keep an environment without transforms.
 
         Raises:
             ValueError: If an entry is missing or of another shape or type.
         """
         state_dict = with_renamed(state_dict)
         missing = [name for name in ("seeds", "episodes", "episode_reward", "worlds") if name not in state_dict]
-        if missing and strict:
-            raise ValueError(f"state_dict must have {', '.join(missing)}, got {', '.join(state_dict) or 'nothing'}")
+        if missing and strict and state_dict:
+            raise ValueError(f"state_dict must have {', '.join(missing)}, got {', '.join(state_dict)}")
         if missing:
             state_dict = {**self.state_dict(), **state_dict}
         state = self._restored(state_dict) if state_dict["worlds"] else None
