@@ -152,13 +152,13 @@ def test_a_hole_of_a_perimeter_is_not_lit_and_a_small_one_lights_what_it_touches
     assert cells(written(tmp_path / "small.geojson", small)) == [(2, 3)]
 
 
-@pytest.mark.parametrize("told", [True, False])
-def test_a_shapefile_lights_what_its_perimeter_holds(tmp_path, told, caplog):
+@pytest.mark.parametrize("told, encoding", [(True, "cp1252"), (False, "utf-8"), (True, "gbk")])
+def test_a_shapefile_lights_what_its_perimeter_holds(tmp_path, told, encoding, caplog):
     shapefile = pytest.importorskip("shapefile")
-    with shapefile.Writer(str(tmp_path / "fire.shp"), shapeType=shapefile.POLYGON) as writer:
+    with shapefile.Writer(str(tmp_path / "fire.shp"), shapeType=shapefile.POLYGON, encoding=encoding) as writer:
         writer.field("NAME", "C")
         writer.poly([square(2, 3, 5, 8)])
-        writer.record("Clinge")
+        writer.record({"cp1252": "Peñón", "utf-8": "Clinge", "gbk": "山火"}[encoding])
     if told:
         written(tmp_path / "fire.prj", UTM.to_wkt())
     assert cells(tmp_path / "fire.shp") == [(row, column) for row in (2, 3, 4) for column in (3, 4, 5, 6, 7)]

@@ -123,7 +123,7 @@ def _read_shapefile(name: str, path: Path) -> tuple[list[tuple[Any, Mapping[str,
     except ImportError:
         raise ValueError(f'{name} must be read with pyshp, which is missing: pip install "warp_torchrl[gis]"') from None
     try:
-        with shapefile.Reader(str(path)) as reader:
+        with shapefile.Reader(str(path), encodingErrors="replace") as reader:  # names and numbers are ASCII in all
             pairs = [(each.shape, each.record) for each in reader.iterShapeRecords()]
             features = [(shape.__geo_interface__, record.as_dict()) for shape, record in pairs if shape.shapeType]
     except Exception as error:  # pyshp raises what struct, the file system and its own classes do
