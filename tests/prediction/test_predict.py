@@ -187,6 +187,8 @@ REFUSED = {
     "start must be within 1e.08 minutes of the weather's first row, got nan": {"start": math.nan, "hours": 1.0},
     "convergence must be in": {"convergence": math.nan},
     "start must be before the weather's end, 60 minutes": {"start": 60.0},
+    "start must be before the weather's end, 60 minutes after its first row, got 61": {"start": 61.0, "hours": 1.0},
+    "start must not be before the weather's first row, got 5 minutes before it": {"start": -5.0, "hours": 1.0},
 }
 
 

@@ -141,7 +141,8 @@ def predict(
     _check_numbers(fires, area, hours, seed)
     _check_times(start, convergence)
     table = weather if isinstance(weather, WeatherTable) else read_weather(weather)
-    minutes = lasting(table, start) if hours is None else 60.0 * hours
+    left = lasting(table, start)
+    minutes = left if hours is None else 60.0 * hours
     air = Weather(table=table, convergence=convergence)
     met = [Spell(wind, lasts, moisture) for wind, moisture, lasts in air.spells(minutes, start)]
     burning = Fires(fire=law, landscape=ground, spells=met, cell_size=cell_size)
@@ -193,8 +194,10 @@ def lasting(table: WeatherTable, start: float) -> float:
     """Return the minutes from a start to the end of the last row, which lasts as long as the one before; 1 hour alone.
 
     Raises:
-        ValueError: If the start is not before that end.
+        ValueError: If the start is before the first row, or not before that end.
     """
+    if not start >= 0.0:
+        raise ValueError(f"start must not be before the weather's first row, got {-start:g} minutes before it")
     hours = table.hours.double()
     last = float(hours[-1] - hours[-2]) if len(hours) > 1 else 1.0
     end = (float(hours[-1]) + last) * 60.0
