@@ -61,6 +61,13 @@ def test_raws_files_are_in_miles_fahrenheit_and_inches(table):
     assert weather.rain.tolist() == pytest.approx([2.54, 0]) and weather.hours.tolist() == [0, 1]
 
 
+def test_a_dew_point_is_at_most_the_temperature(table):
+    text = "time,temp [C],dewpoint [{}],ws [m/s],wd\n2024-07-01 12:00,20,21,4,90\n2024-07-01 13:00,20,50,4,90"
+    assert table(text.format("F")).humidity.tolist() == pytest.approx([16.6, 52.5], abs=0.1)  # -6.1 and 10 C
+    with pytest.raises(ValueError, match="dew_point must be at most the temperature, got 50 and 20 C in row 2"):
+        table(text.format("C"))  # a degree above it is rounded
+
+
 def test_our_own_names_say_their_units(table):
     weather = table(
         """

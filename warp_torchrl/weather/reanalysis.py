@@ -3,6 +3,8 @@
 import math
 from collections.abc import Sequence
 
+_ROUNDED = 2.0  # degrees by which stations' dew points exceed temperatures: two whole degrees of Fahrenheit at most
+
 
 def wind_of(east: Sequence[float], north: Sequence[float]) -> dict[str, list[float]]:
     """Return speed [m/s] and where the wind comes from [degrees] of its components to the east and north [m/s]."""
@@ -14,8 +16,15 @@ def wind_of(east: Sequence[float], north: Sequence[float]) -> dict[str, list[flo
 
 
 def humidity_of(temperature: Sequence[float], dew_point: Sequence[float]) -> list[float]:
-    """Return relative humidity [per cent] of temperature and dew point [C] (Magnus; Alduchov and Eskridge 1996)."""
-    both = zip(temperature, dew_point, strict=True)
+    """Return relative humidity [per cent] of temperature and dew point [C] (Magnus; Alduchov and Eskridge 1996).
+
+    Raises:
+        ValueError: If a dew point is more than 2 degrees above its temperature: columns or units are exchanged.
+    """
+    both = list(zip(temperature, dew_point, strict=True))
+    for row, (air, dew) in enumerate(both, 1):
+        if dew > air + _ROUNDED:
+            raise ValueError(f"dew_point must be at most the temperature, got {dew:.4g} and {air:.4g} C in row {row}")
     return [min(100.0, 100.0 * _pressure(dew) / _pressure(air)) for air, dew in both]
 
 
