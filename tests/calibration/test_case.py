@@ -83,6 +83,17 @@ def test_perimeters_without_a_time_beside_others_need_one(fire):
     assert read_case(fire, 1.5).minutes.tolist() == [30.0, 90.0]
 
 
+def test_perimeters_of_other_times_do_not_pass_for_one(fire):
+    perimeters(fire, {"poly_DateCurrent": 1719838800000}, {"poly_DateCurrent": 1719842400000})
+    with pytest.raises(
+        ValueError, match=r"hours= must say .*, its features have poly_DateCurrent 1719838800000, 17198424"
+    ):
+        read_case(fire)
+    assert read_case(fire, 1.5).minutes.tolist() == [90.0]
+    perimeters(fire, {"DATE_": "2024-07-01"}, {"DATE_": "2024-07-01"})
+    assert len(read_case(fire).minutes) == 1
+
+
 @pytest.mark.parametrize("value", ["noon", -1, 0, True, [1], 1e400, "nan"])
 def test_times_that_are_none_are_refused(fire, value):
     perimeters(fire, {"hours": value})

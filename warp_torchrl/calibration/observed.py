@@ -1,7 +1,8 @@
 """What is known of where a fire burned by when: perimeters by hour, times of arrival, or a scar."""
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,6 +17,8 @@ from warp_torchrl.world.terrain.layer import read_header, read_layer
 from warp_torchrl.world.terrain.vector import Shape, mark, read_shapes
 
 _LONGEST = 1e7  # minutes since the ignition that are believed
+_OTHER_TIMES = re.compile(r"hour|hrs?$|time|date|days?$|minute|mins?$", re.IGNORECASE)
+"""Names of properties that tell times which are not read."""
 
 
 class Outcome(NamedTuple):
@@ -49,6 +52,8 @@ def read_perimeters(path: Path, grid: Grid, end: float | None = None, is_stated:
         kinds = sorted({shape.part.kind for shape in shapes})
         raise ValueError(f"{path.name} must hold polygons, got {', '.join(kinds)}")
     timed = [bool(_times(shape.properties)) for shape in shapes]
+    if not is_stated and not any(timed):
+        _check_other_times(shapes, path)
     end = end if is_stated or not any(timed) else None
     by_time: dict[float, list[Shape]] = {}
     for shape in shapes:
@@ -89,6 +94,17 @@ def read_scar(path: Path, grid: Grid, end: float) -> Outcome:
         ValueError: If the file cannot be read, or marks no cell of the grid.
     """
     return Outcome(torch.tensor([end]), torch.from_numpy(read_cells("scar", path, grid))[None])
+
+
+def _check_other_times(shapes: Sequence[Shape], path: Path) -> None:
+    """Refuse features that tell different times by a property that is not read: they would pass for one."""
+    names = {str(name) for shape in shapes for name in shape.properties if _OTHER_TIMES.search(str(name))}
+    for name in sorted(names):
+        values = {str(shape.properties.get(name)) for shape in shapes}
+        if len(values) > 1:
+            got = ", ".join(sorted(values)[:2])
+            rule = "tell times by minutes or hours since the ignition, or hours= must say when all are known"
+            raise ValueError(f"{path.name} must {rule}, its features have {name} {got}")
 
 
 def _minutes(told: Mapping[str, Any], path: Path, end: float | None) -> float:
