@@ -8,6 +8,7 @@ import pytest
 import torch
 from PIL import Image
 
+from warp_torchrl.commands.failure import DISK
 from warp_torchrl.gallery.__main__ import REAL_GROUND, WORLD, draw_figure, main
 from warp_torchrl.gallery.landscapes import burn_probability, ignition
 from warp_torchrl.gallery.laws import front
@@ -131,10 +132,10 @@ def test_a_folder_without_rasters_is_a_mistake(tmp_path, capsys, matplotlib):
     assert "fuel" in one_line_of(capsys)
 
 
-def test_a_file_in_the_place_of_the_folder_is_a_mistake(tmp_path, capsys, matplotlib):
+def test_a_file_in_the_place_of_the_folder_is_told_as_everywhere(tmp_path, capsys, matplotlib):
     (tmp_path / "file").touch()
-    assert main(["noise", "--out", str(tmp_path / "file")]) == 2
-    assert "file" in one_line_of(capsys)
+    assert main(["noise", "--out", str(tmp_path / "file")]) == DISK
+    assert one_line_of(capsys) == f"error: {tmp_path / 'file'}: File exists"
 
 
 def test_without_matplotlib_it_says_what_to_install(monkeypatch, capsys):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from warp_torchrl.commands.failure import UNSOUND
 from warp_torchrl.gallery import episode
 from warp_torchrl.gallery.__main__ import main
 
@@ -30,11 +31,10 @@ def test_steps_that_are_none_are_refused(capsys, steps, said):
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (["foo=1"], "gallery: foo is not a key of the configuration"),
+        (["foo=1"], "error: foo is not a key of the configuration"),
         (["--policy", "locl"], "did you mean local?"),
-        (["--policy", "no/such/run"], "gallery: no/such/run is not a run folder: nothing there"),
-        (["--seed", "-3"], "gallery: seed must be in [0"),
-        (["--sharpness", "9"], "gallery: sharpness must be in 0.2..4, got 9.0"),
+        (["--seed", "-3"], "error: seed must be in [0"),
+        (["--sharpness", "9"], "error: sharpness must be in 0.2..4, got 9.0"),
     ],
 )
 def test_a_mistake_ends_with_one_line(capsys, monkeypatch, tmp_path, given, said):
@@ -44,6 +44,13 @@ def test_a_mistake_ends_with_one_line(capsys, monkeypatch, tmp_path, given, said
     errors = capsys.readouterr().err.splitlines()
     assert said in errors[-1] and len(errors) == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_that_is_no_run_ends_as_it_does_everywhere(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(episode, "find_spec", lambda name: name)
+    pytest.importorskip("viser", reason="needs the extra live")
+    assert main(["episode", "--policy", "no/such/run", "--steps", "1", "--out", str(tmp_path / "out")]) == UNSOUND
+    assert capsys.readouterr().err == "error: no/such/run is not a run folder: nothing there\n"
 
 
 @pytest.mark.parametrize(

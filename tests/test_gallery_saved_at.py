@@ -98,7 +98,7 @@ def test_a_run_that_cannot_say_is_told_before_anything_is_drawn(run, tmp_path, c
     pytest.importorskip("matplotlib")
     out = ("--out", tmp_path / "out")
     line = the_one_line(capsys, run, *out, "--at", "100,6001")
-    assert line == f"gallery: at must be within the run, 6000 world steps of {run}, got 6001"
+    assert line == f"error: at must be within the run, 6000 world steps of {run}, got 6001"
     bare = write_metrics(tmp_path / "bare", train__loss=(1, 2, 3))
     assert the_one_line(capsys, bare, *out, "--at", "1000").endswith(
         f"{bare / 'metrics.csv'} has no column world/saved"

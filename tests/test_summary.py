@@ -143,6 +143,15 @@ def test_folders_without_evaluations_are_refused(tmp_path, capsys):
     assert "no evaluation.json under" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("name", ["missing", "file"])
+def test_a_folder_that_is_none_is_refused_beside_one_that_is(sweep, capsys, name):
+    (sweep / "file").touch()
+    with pytest.raises(SystemExit) as end:
+        main([str(sweep), str(sweep / name)])
+    assert end.value.code == 2
+    assert capsys.readouterr() == ("", f"error: FOLDER must be a folder that is there, got {sweep / name}\n")
+
+
 def test_a_missing_matplotlib_is_told_after_the_table(sweep, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(SystemExit):

@@ -3,7 +3,10 @@
 import argparse
 from typing import NoReturn
 
+from warp_torchrl.foreign_text import plain_text
+
 MISTAKE = 2
+_LONGEST = 4000  # characters of a line
 
 
 class FlagParser(argparse.ArgumentParser):
@@ -11,4 +14,4 @@ class FlagParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """End the process with the line and the exit code of a mistake."""
-        self.exit(MISTAKE, f"error: {message}\n")
+        self.exit(MISTAKE, f"error: {plain_text(message, _LONGEST)}\n")

@@ -265,6 +265,9 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--show", nargs="+", metavar="METRIC", help="means of these, of what evaluation.json holds")
     parser.add_argument("--plot", type=Path, metavar="FILE", help="draw them as well")
     options = parser.parse_args(arguments)
+    for folder in options.folders:
+        if not folder.is_dir():
+            parser.error(f"FOLDER must be a folder that is there, got {folder}")
     try:
         entries = gather(*options.folders)
     except (OSError, ValueError) as error:

@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from warp_torchrl.commands.failure import DONE, fail
 from warp_torchrl.commands.program import one_line_end
 from warp_torchrl.config.grammar import check_overrides
 from warp_torchrl.config.seeds import FIRST_EVALUATED
@@ -48,7 +49,6 @@ WORLD: dict[str, Callable[..., "Figure"]] = {
 """Figures that need nothing, by name; a file is named as its figure."""
 REAL_GROUND: dict[str, Callable[..., "Figure"]] = {"burn_probability": burn_probability}
 """Figures that need a folder of rasters."""
-DONE, MISTAKE = 0, 2
 _EPISODE = "episode [--policy NAME] [--seed SEED] [--steps FIRST:LAST:EVERY] [--out FOLDER] [KEY=VALUE ...]"
 _CURVES = "curves [NAME=]RUN [[NAME=]RUN ...] [--out FOLDER]"
 
@@ -65,8 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         else:
             _world(given)
     except (ValueError, OSError, CheckpointError) as error:  # of the command line, or of a folder to read or write
-        print(f"gallery: {' '.join(str(error).split())}", file=sys.stderr)
-        return MISTAKE
+        return fail(error, debug=False)[0]
     return DONE
 
 
