@@ -2,7 +2,7 @@
 
 import pytest
 
-from warp_torchrl.flags import FlagParser
+from warp_torchrl.flags import FlagParser, whole
 
 
 def test_a_mistake_in_flags_is_one_line_and_the_exit_code_of_a_mistake(capsys):
@@ -17,3 +17,22 @@ def test_the_line_holds_nothing_that_a_terminal_obeys_or_cannot_show(capsys):
     with pytest.raises(SystemExit):
         FlagParser(prog="x").error("no \x1b[31mfolder\x1b[0m\nbad\udcff")
     assert capsys.readouterr().err == "error: no folder bad\n"
+
+
+@pytest.mark.parametrize("given", ["0", "-3", "nan", "1e3", "12", "9" * 5000, "²"])
+def test_a_number_out_of_its_range_is_refused(capsys, given):
+    parser = FlagParser(prog="x")
+    parser.add_argument("--repeats", type=whole(1, 11))
+    assert parser.parse_args(["--repeats", "11"]).repeats == 11
+    with pytest.raises(SystemExit) as end:
+        parser.parse_args([f"--repeats={given}"])
+    assert end.value.code == 2
+    assert "argument --repeats: must be a whole number in 1..11, got" in capsys.readouterr().err
+
+
+def test_a_flag_is_written_in_full(capsys):
+    parser = FlagParser(prog="x")
+    parser.add_argument("--no-compile", action="store_true")
+    with pytest.raises(SystemExit) as end:
+        parser.parse_args(["--no"])
+    assert end.value.code == 2 and capsys.readouterr().err == "error: unrecognized arguments: --no\n"

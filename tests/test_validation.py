@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from warp_torchrl.config.construction import ConfigError, construct
+from warp_torchrl.config.search_options import SearchOptions
 from warp_torchrl.models import Mlp
 from warp_torchrl.reward import Adaptive, Efficiency
 from warp_torchrl.runs.logging import Wandb
@@ -18,6 +19,8 @@ BAD = [
     (Uniform, "speed", "fast", "speed must be a number, got 'fast'"),
     (Uniform, "speed", None, "speed must be a number, got None"),
     (Uniform, "speed", True, "speed must be a number, got True"),
+    (Uniform, "speed", 10**400, f"speed must be a number, got {10**400}"),
+    (SearchOptions, "out", "", "out must be a folder, got ''; null makes one in outputs/searches"),
     (Uniform, "speed", 61.0, "speed must be in [0, 60], got 61.0"),
     (Fire, "growth", 1, "growth must be true or false, got 1"),
     (Fire, "neighbours", 7, "neighbours must be 4 or 8, got 7"),

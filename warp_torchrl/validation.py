@@ -103,7 +103,10 @@ def _try_fit_number(value: object, kind: object) -> tuple[bool, object]:
     if isinstance(value, bool) or not isinstance(value, Real):
         return False, value
     if kind is float:
-        return True, float(value)
+        try:
+            return True, float(value)
+        except OverflowError:  # a whole number of hundreds of digits
+            return False, value
     if isinstance(value, Integral):
         return True, int(value)
     number = float(value)  # 1e6 is how many are written

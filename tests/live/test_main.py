@@ -36,6 +36,7 @@ def test_the_command_s_own_keys_are_apart_from_those_of_the_scenario():
         (["host="], "host must be an address or a name, such as 127.0.0.1, got ''"),
         (["token=abc"], "token must be 8 to 200 letters, digits, - and _, got 3 characters"),
         (["--port", "8080"], "keys are given as port=8080"),
+        (["recordings="], "recordings must be a folder, got ''"),
         ([f"recordings={__file__}"], "recordings must be a folder, got the file "),
         (["scenario=larg"], "scenario must be one of"),
         (["team.n_agents=0"], "team.n_agents must be in"),

@@ -41,7 +41,7 @@ from warp_torchrl.benchmark.trainings import training_speed
 from warp_torchrl.commands.allocation import keep_freed_memory
 from warp_torchrl.commands.program import one_line_end
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.flags import FlagParser
+from warp_torchrl.flags import FlagParser, whole
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.runs.checkpoint import CheckpointError
@@ -175,11 +175,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE", help="overrides, as for train.py")
     parser.add_argument("--experiment", help="for train: one of conf/experiment, also with Stable-Baselines3's PPO")
-    parser.add_argument("--worlds", type=int, help=f"{_WORLDS} by default, or the experiment's")
-    parser.add_argument("--repeats", type=int, default=7, help="times that each speed is measured")
+    parser.add_argument("--worlds", type=whole(1, 4096), help=f"{_WORLDS} by default, or the experiment's")
+    parser.add_argument("--repeats", type=whole(1, 1000), default=7, help="times that each speed is measured")
     parser.add_argument("--no-compile", action="store_true", help="for tick and env: leave what is compiled out")
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="for scaling or generalist: draw it too")
-    parser.add_argument("--episodes", type=int, default=EPISODES)
+    parser.add_argument("--episodes", type=whole(1, 4096), default=EPISODES)
     parser.add_argument(
         "--policies", nargs="+", choices=HEURISTICS, metavar="NAME", help="for tasks: these heuristics, the last paired"
     )
@@ -188,8 +188,8 @@ def _parser() -> argparse.ArgumentParser:
         "--places", nargs="+", metavar="GROUP", help=f"for generalist: {', '.join(PLACES)}, ground, or one row"
     )
     parser.add_argument("--ground", metavar="FOLDER", help="for generalist: rasters, for places on real ground")
-    parser.add_argument("--fires", type=int, default=1000, help="for fires: how many of each law")
-    parser.add_argument("--reach", type=int, default=60, help="for ellipses: cells that the heads go")
+    parser.add_argument("--fires", type=whole(1, 100_000), default=1000, help="for fires: how many of each law")
+    parser.add_argument("--reach", type=whole(1, 1000), default=60, help="for ellipses: cells that the heads go")
     parser.add_argument("--device", help="cpu by default; for gpu cuda, and cpu shows in small that it runs")
     parser.add_argument("--file", type=Path, default=Path("gpu.json"), metavar="FILE.json", help="for gpu")
     parser.add_argument("--json", action="store_true", help="print JSON instead of tables")

@@ -56,6 +56,8 @@ class SearchOptions:
             startup=(1, 10_000),
             seed=(0, 2**31),
         )
+        if self.out is not None and not self.out:
+            raise ValueError("out must be a folder, got ''; null makes one in outputs/searches")
         for key, values in self.space.items():
             if not isinstance(values, str):
                 raise ValueError(f"space must have values in the grammar of Hydra's sweeps, got {key}: {values!r}")

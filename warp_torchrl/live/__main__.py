@@ -60,7 +60,10 @@ def _read(arguments: Sequence[str]) -> tuple[Setting, dict[str, object], Path]:
     values, overrides = own_values(arguments, (*_OURS, *_WHERE, _RECORDINGS, "debug"), _TEXTS)
     ours = {key: value for key, value in values.items() if key in _OURS}
     setting = construct(Setting, {**ours, "overrides": overrides}, "")
-    recordings = Path(str(values.get(_RECORDINGS, _RECORDINGS)))
+    named = str(values.get(_RECORDINGS, _RECORDINGS))
+    if not named:
+        raise ConfigError("recordings must be a folder, got ''")
+    recordings = Path(named)
     if recordings.exists() and not recordings.is_dir():
         raise ConfigError(f"recordings must be a folder, got the file {recordings}")
     return setting, {key: value for key, value in values.items() if key in _WHERE}, recordings
