@@ -1,8 +1,10 @@
 """A mistake in flags is one line."""
 
+from pathlib import Path
+
 import pytest
 
-from warp_torchrl.flags import FlagParser, whole
+from warp_torchrl.flags import FlagParser, file_to_write, whole
 
 
 def test_a_mistake_in_flags_is_one_line_and_the_exit_code_of_a_mistake(capsys):
@@ -36,3 +38,17 @@ def test_a_flag_is_written_in_full(capsys):
     with pytest.raises(SystemExit) as end:
         parser.parse_args(["--no"])
     assert end.value.code == 2 and capsys.readouterr().err == "error: unrecognized arguments: --no\n"
+
+
+@pytest.mark.parametrize("given", [".", "file/x.png", "missing/x.png", ""])
+def test_a_file_that_cannot_be_made_is_told_before_its_content_is(tmp_path, monkeypatch, capsys, given):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
+    parser = FlagParser(prog="x")
+    parser.add_argument("--plot", type=file_to_write)
+    assert parser.parse_args(["--plot", "x.png"]).plot == Path("x.png")
+    with pytest.raises(SystemExit) as end:
+        parser.parse_args(["--plot", given])
+    assert end.value.code == 2
+    told = f"error: argument --plot: must be a file in a folder that can be written to, got {given}"
+    assert capsys.readouterr().err == f"{told}\n".replace(" \n", "\n")

@@ -1,7 +1,9 @@
 """Flags of the commands that read their command line by ``argparse``: a mistake is one line, as everywhere."""
 
 import argparse
+import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import NoReturn
 
 from warp_torchrl.foreign_text import plain_text
@@ -19,6 +21,18 @@ def whole(low: int, high: int) -> Callable[[str], int]:
         return int(given)
 
     return number
+
+
+def file_to_write(given: str) -> Path:
+    """Return the path of a file that can be made, for ``type`` of a flag: known before hours are spent on its content.
+
+    Raises:
+        argparse.ArgumentTypeError: If it is a folder, or in none.
+    """
+    path = Path(given)
+    if path.is_dir() or not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
+        raise argparse.ArgumentTypeError(f"must be a file in a folder that can be written to, got {given}")
+    return path
 
 
 class FlagParser(argparse.ArgumentParser):

@@ -41,7 +41,7 @@ from warp_torchrl.benchmark.trainings import training_speed
 from warp_torchrl.commands.allocation import keep_freed_memory
 from warp_torchrl.commands.program import one_line_end
 from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.flags import FlagParser, whole
+from warp_torchrl.flags import FlagParser, file_to_write, whole
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.runs.checkpoint import CheckpointError
@@ -178,7 +178,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--worlds", type=whole(1, 4096), help=f"{_WORLDS} by default, or the experiment's")
     parser.add_argument("--repeats", type=whole(1, 1000), default=7, help="times that each speed is measured")
     parser.add_argument("--no-compile", action="store_true", help="for tick and env: leave what is compiled out")
-    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="for scaling or generalist: draw it too")
+    parser.add_argument("--plot", type=file_to_write, metavar="FILE.png", help="for scaling or generalist: draw it too")
     parser.add_argument("--episodes", type=whole(1, 4096), default=EPISODES)
     parser.add_argument(
         "--policies", nargs="+", choices=HEURISTICS, metavar="NAME", help="for tasks: these heuristics, the last paired"
@@ -191,7 +191,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--fires", type=whole(1, 100_000), default=1000, help="for fires: how many of each law")
     parser.add_argument("--reach", type=whole(1, 1000), default=60, help="for ellipses: cells that the heads go")
     parser.add_argument("--device", help="cpu by default; for gpu cuda, and cpu shows in small that it runs")
-    parser.add_argument("--file", type=Path, default=Path("gpu.json"), metavar="FILE.json", help="for gpu")
+    parser.add_argument("--file", type=file_to_write, default=Path("gpu.json"), metavar="FILE.json", help="for gpu")
     parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
     return parser
 
