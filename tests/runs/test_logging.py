@@ -1,10 +1,11 @@
 """metrics.csv is complete, and a tracker that fails does not end the run."""
 
 import csv
+import os
 
 import pytest
 
-from warp_torchrl.runs.logging import CsvOnly, MetricsFile, Tensorboard, Wandb, _TorchRlTracker
+from warp_torchrl.runs.logging import FRAMES, CsvOnly, MetricsFile, Tensorboard, Wandb, _TorchRlTracker
 
 
 def lines(path):
@@ -24,10 +25,27 @@ def test_rows_are_appended_and_holes_left_empty(tmp_path):
 def test_a_resumed_file_is_cut_back_to_the_checkpoint(tmp_path):
     metrics = MetricsFile(tmp_path / "metrics.csv")
     for number in range(4):
-        metrics.add({"a": number})
+        metrics.add({FRAMES: number})
     resumed = MetricsFile(tmp_path / "metrics.csv", keep_rows=2)
-    resumed.add({"a": 9, "new": 1})  # a column of a later version
-    assert lines(tmp_path / "metrics.csv") == [["a"], ["0"], ["1"], ["9"]] and resumed.rows == 3
+    resumed.add({FRAMES: 9, "new": 1})  # a column of a later version
+    assert lines(tmp_path / "metrics.csv") == [[FRAMES], ["0"], ["1"], ["9"]] and resumed.rows == 3
+
+
+@pytest.mark.parametrize(
+    ("make", "told"),
+    [
+        (os.mkfifo, "is no file"),
+        (lambda path: path.symlink_to("/dev/zero"), "is no file"),
+        (lambda path: path.touch() or os.truncate(path, 2**40), "is too large"),
+        (lambda path: path.write_bytes(bytes(200_000)), "is no table of metrics: field larger than field limit"),
+        (lambda path: path.write_text("a,b\n1,2\n3,4\n"), "is no table of metrics: it has no column time/frames"),
+    ],
+    ids=["pipe", "device", "holes", "zeros", "another table"],
+)
+def test_a_resumed_file_that_is_none_is_refused(tmp_path, make, told):
+    make(tmp_path / "metrics.csv")
+    with pytest.raises(ValueError, match=told):
+        MetricsFile(tmp_path / "metrics.csv", keep_rows=1)
 
 
 def test_a_new_run_starts_a_new_file(tmp_path):

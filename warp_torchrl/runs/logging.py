@@ -15,6 +15,7 @@ from typing import Any, Literal, Protocol
 
 from torchrl.record.loggers import get_logger
 
+from warp_torchrl.foreign import open_file
 from warp_torchrl.runs import disk
 from warp_torchrl.validation import check_fields
 
@@ -23,6 +24,7 @@ FRAMES = "time/frames"
 """The column that says after how many frames a row was written."""
 _ID = "wandb_id"  # a file of the run folder
 _DIGITS = 8
+_LARGEST = 1_000_000_000  # bytes of a metrics.csv
 _GIVEN = re.compile(rf"[0-9a-z]{{{_DIGITS}}}")
 
 
@@ -82,9 +84,15 @@ class MetricsFile:
         """Truncate the file to its first rows, and return the columns."""
         lines = []
         if self.path.exists():
-            with self.path.open(newline="", encoding="utf-8", errors="replace") as file:  # a crash may cut the last row
-                lines = list(islice(csv.reader(file), rows + 1))
-                self.cut_at = _last_frames(lines[:1], csv.reader(file))
+            opened = open_file(self.path, _LARGEST)
+            with io.TextIOWrapper(opened, encoding="utf-8", errors="replace", newline="") as file:  # a crash may cut it
+                try:
+                    lines = list(islice(csv.reader(file), rows + 1))
+                    self.cut_at = _last_frames(lines[:1], csv.reader(file))
+                except csv.Error as error:
+                    raise ValueError(f"{self.path} is no table of metrics: {error}") from None
+        if lines and FRAMES not in lines[0]:
+            raise ValueError(f"{self.path} is no table of metrics: it has no column {FRAMES}")
         if len(lines) <= rows:
             raise ValueError(f"{self.path} must hold the {rows} rows of the checkpoint, got {max(len(lines) - 1, 0)}")
         kept = io.StringIO(newline="")
