@@ -486,6 +486,18 @@ def test_a_signal_ends_a_sweep(tmp_path, run_here, monkeypatch):
     assert (tmp_path / "sweep" / "0" / "checkpoints" / "32").is_dir() and not (tmp_path / "sweep" / "1").exists()
 
 
+@pytest.mark.parametrize("more", [[], ["overwrite=true"]])
+def test_a_second_evaluation_in_a_folder_is_refused(tmp_path, run_here, more):
+    lock = RunFolderLock(tmp_path / "seen")
+    code, errors, _ = run_here("evaluate.py", *NOOP, "hydra.run.dir=seen", *more)
+    lock.release()
+    assert code == 3 and "seen is in use" in errors[-1] and not (tmp_path / "seen" / "evaluation.json").exists()
+    (tmp_path / "seen" / ".lock").unlink()
+    code, *_ = run_here("evaluate.py", *NOOP, "hydra.run.dir=seen", *more)
+    assert code == 0
+    assert not (tmp_path / "seen" / ".lock").exists() and (tmp_path / "seen" / "evaluation.json").exists()
+
+
 def test_a_second_run_in_a_folder_is_refused_and_the_first_goes_on(tmp_path, run_here):
     lock = RunFolderLock(tmp_path / "run")
     code, errors, _ = run_here("train.py", *SHORT)

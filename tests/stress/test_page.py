@@ -85,7 +85,8 @@ def ends_well(served):
     errors = served.errors.read_text()
     assert "Traceback" not in errors and "never retrieved" not in errors, errors[-3000:]
     served.process.send_signal(signal.SIGINT)
-    assert served.process.communicate(timeout=60)[0].strip() == "stopped" and served.process.returncode == 130
+    assert served.process.communicate(timeout=60)[0] == "" and served.process.returncode == 130
+    assert served.errors.read_text() == f"{errors}error: stopped by signal SIGINT\n"
 
 
 def value(draws):

@@ -148,8 +148,19 @@ def _say_skipped(skipped: Sequence[str]) -> None:
 
 def _evaluate_job(config: DictConfig) -> None:
     folder = Path(HydraConfig.get().runtime.output_dir)
-    if not config.overwrite:
-        check_free(folder, "hydra.run.dir")  # again: two jobs of a sweep may have the same folder
+    is_run = (folder / ".lock").exists()
+    lock = RunFolderLock(folder)
+    try:
+        if not config.overwrite:
+            check_free(folder, "hydra.run.dir")  # again: two jobs of a sweep may have the same folder
+        _evaluate_into(folder, config)
+    finally:
+        if not is_run:
+            (folder / ".lock").unlink(missing_ok=True)
+        lock.release()
+
+
+def _evaluate_into(folder: Path, config: DictConfig) -> None:
     given, name = config.checkpoint, config.policy
     fires, kind = map_fires(plain(config)), picture(plain(config))
     if given is None:
