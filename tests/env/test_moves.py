@@ -68,6 +68,14 @@ def same(one, other):
     return all((a == b).all() for a, b in zip(one, other, strict=True))
 
 
+def alike(one, other):
+    """Whether two devices show the same: numbers with a point may differ in their last digit, others may not."""
+    entries = {key: (each, other[key]) for key, each in one.items(include_nested=True, leaves_only=True)}
+    return entries.keys() == set(other.keys(include_nested=True, leaves_only=True)) and all(
+        torch.allclose(a, b, atol=1e-6) if a.is_floating_point() else torch.equal(a, b) for a, b in entries.values()
+    )
+
+
 @pytest.fixture
 def meta(monkeypatch):
     """The one further device of a CPU, which holds no numbers: TorchRL's specs cannot be moved there, so they stay."""
@@ -88,7 +96,7 @@ def test_every_part_of_torchrl_moves_every_scenario(maps, name, device):
     assert moved.to(device) is moved and moved.device.type == torch.device(device).type and not elsewhere(moved, device)
     assert same(played(moved), expected)
     cast = TransformedEnv(env_of(name, maps), DeviceCastTransform(device))
-    assert same(played(cast), expected)
+    assert all(map(alike, played(cast), expected))  # its worlds stay where they were
     serial = SerialEnv(2, lambda: env_of(name, maps), device=device)
     assert serial.rollout(2).device.type == serial.device.type == torch.device(device).type
     collector = Collector(env_of(name, maps), POLICY, frames_per_batch=6, total_frames=6, device=device)
@@ -124,8 +132,8 @@ def test_an_episode_goes_on_where_it_was(make_small_env, device):
     for env in (there, here):
         played(env)
     there.to(device)
-    assert (here._observe() == there._observe().cpu()).all()
-    assert same(played(here), played(there))
+    assert alike(here._observe(), there._observe().cpu())
+    assert all(map(alike, played(here), played(there)))
     assert not elsewhere(there, device)
 
 
