@@ -33,7 +33,7 @@ STATE_SYMMETRY = TeamPlanes(len(STATE), STATE.index("fire"), (_FIRST_ROLE, len(P
 """How the state turns with the map in teams of the paper's roles."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # torch 2.11 hashes what a compiled function makes before its fields are there
 class CriticState:
     """The ``state`` of worlds, in 16 x 16 blocks for any map size.
 
