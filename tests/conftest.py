@@ -1,6 +1,7 @@
 """Small worlds that the tests of the upper floors share."""
 
 import gc
+import logging
 import os
 from pathlib import Path
 
@@ -75,6 +76,13 @@ def small_world(**changes):
         "horizon": 40,
     }
     return World(**{**parts, **changes})
+
+
+@pytest.fixture(autouse=True)
+def _quiet_log():
+    """Log warnings alone, whatever a command that ran in this process has set."""
+    logging.getLogger().setLevel(logging.WARNING)
+    logging.getLogger("warp_torchrl").setLevel(logging.NOTSET)
 
 
 @pytest.fixture(autouse=True)

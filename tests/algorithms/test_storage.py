@@ -98,3 +98,10 @@ def test_a_batch_lies_in_the_first_rows_though_no_cursor_is_read():
             buffer.extend(batch.clone())
         assert len(buffer) == len(batch) and (buffer[:].exclude("index") == batch).all()
     assert not waits.places
+
+
+def test_a_batch_beside_another_is_put_where_it_is_told():
+    storage = BatchStorage(6)
+    for cursor in (torch.arange(4), torch.arange(4, 6)):
+        storage.set(cursor, TRANSITIONS[cursor])
+    assert len(storage) == 6 and (storage.get(torch.arange(6)) == TRANSITIONS).all()

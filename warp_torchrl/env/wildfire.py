@@ -293,6 +293,7 @@ class WildfireEnv(EnvBase):
     @apart
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
         mask = None if tensordict is None else tensordict.get("_reset", None)
+        mask = None if mask is None else mask.to(self.device)  # a transform may show the worlds on another device
         if isinstance(self._resets, ResetPool) and mask is not None and self._worlds is not None:
             self._resets.fill(self._drawn_seeds(), self._episodes)
             return self._masked_reset(self._resets, mask.flatten(), self._observe())
