@@ -42,11 +42,16 @@ def tensors_of(thing, name="env"):
             open_ends += [(f"{way}.{key}", value) for key, value in getattr(each, "__dict__", {}).items()]
 
 
+RULES = re.compile(r"\.world\.|_check\.__self__")
+"""The way to what a world's rules are made of: it holds no state, and is taken to the device at each start."""
+
+
 def elsewhere(env, device):
-    """The ways to tensors that are not on a device; what a world's rules are made of is taken there at each start."""
+    """The ways to tensors that are not on a device."""
     found = dict(tensors_of(env))
     assert len(found) > 20, "specs at least"
-    return [way for way, tensor in found.items() if tensor.device.type != torch.device(device).type]
+    away = [way for way, tensor in found.items() if tensor.device.type != torch.device(device).type]
+    return [way for way in away if not RULES.search(way)]
 
 
 POLICY = TensorDictModule(
