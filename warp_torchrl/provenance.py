@@ -8,10 +8,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
-_MOST_NAMES, _LONGEST = 40, 120
+from warp_torchrl.foreign_text import plain_text
+
+_MOST_NAMES = 40
+_name, _text = partial(plain_text, most=123), partial(plain_text, most=4000)  # [characters]
 _log = logging.getLogger("warp_torchrl")
 
 
@@ -37,10 +40,10 @@ class Provenance:
     @property
     def line(self) -> str:
         """Return all of it in one line."""
-        read = [f"{_name(name)} [{_plain(unit)}]" if unit else _name(name) for name, unit in self.read.items()]
+        read = [_name(name) + (f" [{_text(unit)}]" if unit else "") for name, unit in self.read.items()]
         taken = [f"read {_listed(read)}"] if read or not self.notes else []
         left = [f"left {_listed([_name(name) for name in self.left])}"] if self.left else []
-        return f"{self.key}: {_plain(self.file)}: " + "; ".join([*taken, *left, *map(_plain, self.notes)])
+        return f"{self.key}: {_text(self.file)}: " + "; ".join([*taken, *left, *map(_text, self.notes)])
 
     @property
     def as_values(self) -> dict[str, Any]:
@@ -100,17 +103,6 @@ def _listed(names: list[str]) -> str:
     return ", ".join(names[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
-def _name(text: str) -> str:
-    """Return a name from a file, cut where it is too long to be one."""
-    text = _plain(text)
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
-
-
 def _inert(text: str) -> str:
     """Return a line of Markdown in which a file's names make neither HTML nor links."""
     return text.replace("<", "&lt;").replace("](", "] (")
-
-
-def _plain(text: str) -> str:
-    """Return a text of a file as one line without control characters."""
-    return "".join(each if each.isprintable() else " " for each in str(text))
