@@ -32,6 +32,14 @@ def output(capsys, *arguments):
     return capsys.readouterr().out
 
 
+def test_a_prediction_is_measured_as_a_process_of_its_own(capsys):
+    pytest.importorskip("rasterio")
+    out = json.loads(output(capsys, "predict", "--sides", "60", "--hours", "1", "--json"))
+    (row,) = out["predict"]
+    assert row["cells"] == "60 x 60" and row["hours"] == 1
+    assert float(row["CPU s"]) > 0 and 0.1 < float(row["memory GB"]) < 4.0
+
+
 def test_the_tick_is_compared_with_numpy(capsys):
     out = output(capsys, "tick", "--no-compile", *TINY)
     assert "ns/cell" in out and "\neager " in out and "\nnumpy " in out

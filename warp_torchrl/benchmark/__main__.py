@@ -1,7 +1,7 @@
 """Measures speed, calibrates scenarios and checks fires: ``python -m warp_torchrl.benchmark WHAT``.
 
-WHAT is tick, env, train, scaling, tasks, rewards, generalist, fires or ellipses; several are measured one after the
-other. Alone, gpu measures all that a card is asked, in under five minutes, and writes it to a file.
+WHAT is tick, env, train, scaling, tasks, rewards, generalist, fires, ellipses or predict; several are measured one
+after the other. Alone, gpu measures all that a card is asked, in under five minutes, and writes it to a file.
 """
 
 import argparse
@@ -23,6 +23,7 @@ from warp_torchrl.benchmark.generalist_figure import draw_generalist
 from warp_torchrl.benchmark.gpu import SMALL, Size, measure_gpu
 from warp_torchrl.benchmark.growth_figure import draw_growth
 from warp_torchrl.benchmark.machine import header, machine, peak_memory
+from warp_torchrl.benchmark.predictions import prediction_costs, prediction_table
 from warp_torchrl.benchmark.scaling import growth, growth_table
 from warp_torchrl.benchmark.shares import share_table
 from warp_torchrl.benchmark.tasks import (
@@ -138,6 +139,10 @@ def _ellipses(options: Namespace) -> dict[str, Rows]:
     return {"ellipses": ellipse_errors(options.reach, (0.0, 0.1))}
 
 
+def _predict(options: Namespace) -> dict[str, Rows]:
+    return {"predict": prediction_costs(options.sides, options.hours)}
+
+
 _MEASURES = {
     "tick": _tick,
     "env": _env,
@@ -148,6 +153,7 @@ _MEASURES = {
     "generalist": _generalist,
     "fires": _fires,
     "ellipses": _ellipses,
+    "predict": _predict,
 }
 _TABLES = {
     "tick": tick_table,
@@ -161,6 +167,7 @@ _TABLES = {
     "generalist": generalist_table,
     "fires": fire_table,
     "ellipses": fire_table,
+    "predict": prediction_table,
 }
 
 
@@ -190,6 +197,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--ground", metavar="FOLDER", help="for generalist: rasters, for places on real ground")
     parser.add_argument("--fires", type=whole(1, 100_000), default=1000, help="for fires: how many of each law")
     parser.add_argument("--reach", type=whole(1, 1000), default=60, help="for ellipses: cells that the heads go")
+    told = "for predict: cells of a side of each map"
+    parser.add_argument("--sides", type=whole(40, 20_000), nargs="+", default=[500, 1000, 2000], help=told)
+    parser.add_argument("--hours", type=whole(1, 1000), default=12, help="for predict: how long the fire is followed")
     parser.add_argument("--device", help="cpu by default; for gpu cuda, and cpu shows in small that it runs")
     parser.add_argument("--file", type=file_to_write, default=Path("gpu.json"), metavar="FILE.json", help="for gpu")
     parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
