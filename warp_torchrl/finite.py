@@ -1,4 +1,4 @@
-"""Numbers that are not finite: how they are found, and what is raised where learning or acting meets them."""
+"""Checks for NaN and infinity, and the error that they raise in learning and acting."""
 
 import math
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""Flags of the commands that read their command line by ``argparse``: a mistake is one line, as everywhere."""
+"""Argument parser of the commands with flags: an error is one line."""
 
 import argparse
 import os

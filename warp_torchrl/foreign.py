@@ -1,4 +1,4 @@
-"""Files that others wrote: regular files of a bounded size, texts, and JSON as its standard has it.
+"""Untrusted files: regular files of a bounded size, texts, and JSON by its standard.
 
 Every reader of such a file opens it here, so that no pipe, device or endless file holds a command up.
 """

@@ -1,4 +1,4 @@
-"""Text that others wrote: names of folders, policies and vehicles, and the messages of errors about them.
+"""Untrusted text: names of folders, policies and vehicles, and error messages that quote them.
 
 A terminal obeys escape sequences and a browser obeys markup, so neither gets such text as it is.
 """

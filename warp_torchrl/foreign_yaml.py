@@ -1,4 +1,4 @@
-"""YAML files that others wrote: plain values, each key once, without aliases, tags or numbers that are not finite.
+"""Untrusted YAML files: plain values, each key once, no aliases, no tags, finite numbers.
 
 A few lines of aliases stand for gigabytes, a tag names a type of Python's, and of a key that is there twice a reader
 takes one without a word.

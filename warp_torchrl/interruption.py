@@ -1,4 +1,4 @@
-"""The line and the exit code of a command that a signal ends, and its end while it still imports.
+"""Exit line and exit code of a command that a signal ends, also during its imports.
 
 Imports take seconds, in which nothing is there to be saved.
 """

@@ -1,4 +1,4 @@
-"""Memory that a process may still take."""
+"""Available memory of a process."""
 
 import os
 import resource

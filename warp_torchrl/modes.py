@@ -1,4 +1,4 @@
-"""Torch's modes that a program may have set, and how to compute apart from them.
+"""Isolation from torch's global modes: default dtype and device, inference mode, autocast.
 
 Worlds are float32 whatever torch's default type is, and live where they were put whatever its default device is. What
 is kept from one call to the next is made outside of inference mode: it can be written to, and learned from, later.

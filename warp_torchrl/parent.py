@@ -1,4 +1,4 @@
-"""The end of a process with the one that started it, however that ended: no worker outlives its run.
+"""Watch on the parent process: a worker ends when its parent has ended.
 
 ``python -P parent.py PID SECONDS MODULE [ARGUMENT ...]`` runs a module as ``python -m`` does, and watches before it
 imports anything: imports take seconds, and whoever started it may be killed in them. So this file needs nothing

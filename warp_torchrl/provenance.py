@@ -1,4 +1,4 @@
-"""Provenance of input data: what was read of each file, in which unit, and what was left.
+"""Provenance of input data: columns and bands read from each file, their units, and those ignored.
 
 Readers of files report here; a command gathers the reports for its own.
 """

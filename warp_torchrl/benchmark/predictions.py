@@ -1,4 +1,4 @@
-"""Cost of a prediction by the size of its map: processor time and peak memory of the whole command."""
+"""Cost of a prediction by map size: processor time and peak memory of the command."""
 
 import os
 import subprocess

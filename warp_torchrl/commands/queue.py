@@ -1,6 +1,6 @@
-"""A job of a sweep in a queue: submitit warns it before it loses its machine, and lets the queue start it again.
+"""Preemption of a job by a queue: the warning signal of submitit, and the job's next start.
 
-It does so by an exception, out of the middle of whatever goes on, where torch may make another one of it.
+submitit raises an exception wherever the job is at that moment, and torch may raise another one from it.
 """
 
 import os

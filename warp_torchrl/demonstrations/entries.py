@@ -1,4 +1,4 @@
-"""Entries of a recording's steps as a manifest lists them: names, types, shapes, and what their numbers may be."""
+"""Schema of a recording's steps: names, dtypes, shapes and ranges of its entries."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

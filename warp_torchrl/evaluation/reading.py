@@ -1,4 +1,4 @@
-"""``evaluation.json`` as others may have written it: read, and checked before anything is made of it."""
+"""Checked reading of ``evaluation.json``."""
 
 from collections.abc import Mapping, Sequence
 from math import isfinite

@@ -1,4 +1,4 @@
-"""Who is let in to the page's server: whoever knows its token, from a page of its own or from a program.
+"""Access to the page's server: its token, cookie and origin.
 
 Every user of a machine can connect to its loopback interface, and so can any page that is open in a browser there. The
 token keeps out the users. A browser tells in ``Origin`` whose page it is, which keeps out the pages.

@@ -1,4 +1,4 @@
-"""Where a page is served, and who can reach it there."""
+"""Address of a page: host, port and token."""
 
 import socket
 from dataclasses import dataclass, field, replace

@@ -1,4 +1,4 @@
-"""The door of a page's server: what comes from the network passes here before viser sees it.
+"""Connection filter of a page's server: requests and messages are checked before viser receives them.
 
 viser lets in whoever connects, and acts on whatever they send. It hands its server no check of ours; so its call to
 ``websockets`` is given a socket that listens already, and connections that check requests and messages.

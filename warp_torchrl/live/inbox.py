@@ -1,4 +1,4 @@
-"""What people asked for and the page has not done yet: few acts of each person, done in turn."""
+"""Queue of people's actions: a few of each person, carried out in turn."""
 
 import threading
 import time

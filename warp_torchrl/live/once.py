@@ -1,4 +1,4 @@
-"""What all panels show of a match, made once for each of its states."""
+"""Cache of what all panels show of a match, by its state."""
 
 from collections.abc import Callable, Hashable
 from typing import Any, TypeVar

@@ -1,4 +1,4 @@
-"""Names of entries in what former versions saved, translated to those of this one."""
+"""Renamed entries of saved files: old names, and the present ones."""
 
 import re
 from collections.abc import Mapping

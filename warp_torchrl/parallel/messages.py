@@ -1,4 +1,4 @@
-"""Values as the bytes by which processes tell them to each other: tensors, numbers, texts, and lists and maps of them.
+"""Serialisation of the messages between processes: tensors and plain values.
 
 They are written and read as checkpoints are, so nothing that is received can run code.
 """

@@ -1,4 +1,4 @@
-"""What processes of one machine talk by: pairs of sockets that the first process has made, and that have no address.
+"""Collectives over inherited socket pairs, between processes of one machine.
 
 A process inherits its end when it is started. Nothing listens, so no other user and no other machine can join or listen
 in. The first process has a pair with each of the others, and all that is told goes through it.

@@ -1,4 +1,4 @@
-"""What processes that ``torchrun`` has started talk by: torch's process group, Gloo between CPUs and NCCL between GPUs.
+"""Collectives over torch's process group under ``torchrun``: Gloo between CPUs, NCCL between GPUs.
 
 They meet at the address that ``torchrun`` was given, and trust whoever can reach it: see ``docs/scaling-out.md``.
 """

@@ -1,4 +1,4 @@
-"""Tensors in files of ``torch.save``: of bounded sizes, plain, and all of their numbers finite."""
+"""Checked reading of ``torch.save`` files: bounded sizes, plain tensors, finite numbers."""
 
 import os
 import struct

@@ -1,4 +1,4 @@
-"""The clock of a table's rows: dates and times as texts, read in the one way that suits all of them."""
+"""Times of a table's rows: one format for all dates and times of the table."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""One date and time as weather has it, in text: what its numbers are, before anybody knows which of them is the day."""
+"""Tokens of one date and time in text, before the order of day and month is known."""
 
 import re
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Where the table stands in a file of weather: below lines about the station, above a row of units, until its end."""
+"""Layout of a weather file: preamble, header, row of units, rows."""
 
 import re
 from collections.abc import Sequence

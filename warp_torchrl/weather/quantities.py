@@ -1,4 +1,4 @@
-"""Every quantity that a table of weather may tell: the names of its columns, its range, its units.
+"""Quantities of weather: column names, ranges and units of each.
 
 Names are in lower case, letters and digits alone. They are those of fire weather (Canadian, RAWS), of reanalyses, of
 weather services, and words of English, Spanish, Portuguese, French, German and Italian.

@@ -1,4 +1,4 @@
-"""Weather as reanalyses tell it: wind by its components, moisture of air by its dew point."""
+"""Conversion of reanalysis weather: wind from its components, humidity from the dew point."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Sources of weather whose files state no units, and whose documents do: found by the names of their columns."""
+"""Weather sources with documented units, recognised by their column names."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -177,7 +177,7 @@ def _tell(
     read |= {each.header: f"{name}, {each.unit}" if each.unit else name for name, each in columns.items()}
     notes = [f"wind is that at {height}"]
     if source:
-        notes.append(f"by its names it is a file of {source.title}: units that it does not state are theirs")
+        notes.append(f"its columns have the names of {source.title}, whose units are taken where the file states none")
     tell(
         Provenance(
             key="weather",

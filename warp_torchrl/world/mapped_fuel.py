@@ -1,4 +1,4 @@
-"""Fuel codes of a map against those of a fuel model: codes that it lacks, and codes that mean something else there."""
+"""Checks of a map's fuel codes against its fuel model."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""Fires in a window that grows with them, to the bit as on the whole map.
+"""Fires in a growing window of the map, bit for bit as on the whole map.
 
 What burns stays off the window's outermost cells but at the map's own sides. So all cells that a fire can reach in a
 tick, and all that their times follow from, lie in the window.

@@ -1,4 +1,4 @@
-"""Rates of fires in the spells of their weather, computed when they are asked for, in windows of the map.
+"""Lazily computed rates of spread, by spell of weather and window of the map.
 
 A value is the same to the bit in every window that has it, and in strips of the map.
 """

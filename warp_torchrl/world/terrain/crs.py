@@ -1,4 +1,4 @@
-"""Coordinate reference systems: which ones a file may state, what PROJ makes of them, and their cells on the ground."""
+"""Coordinate reference systems: accepted notations, and the true size of their cells."""
 
 import math
 import re

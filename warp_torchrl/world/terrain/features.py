@@ -1,4 +1,4 @@
-"""Features of a vector file as it holds them: geometries, properties and the CRS, of GeoJSON and ESRI shapefiles.
+"""Features of GeoJSON files and ESRI shapefiles: geometries, properties and CRS.
 
 Shapefiles are read with pyshp: it is pure Python, so the extra ``gis`` brings no second copy of GDAL beside rasterio's.
 """

@@ -1,4 +1,4 @@
-"""GDAL as it reads files of others: no network, nothing but the file that is named, errors in one line."""
+"""GDAL settings for untrusted files: no network, no sidecar files, one-line errors."""
 
 import os
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""The layers of a map on one grid: found in a folder, read or resampled, in the units that their files state."""
+"""Layers of a map on one grid: found in a folder, read or resampled, with units."""
 
 import logging
 from collections.abc import Iterable, Mapping

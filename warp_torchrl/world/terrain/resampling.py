@@ -1,4 +1,4 @@
-"""Layers on another grid: a grid of square cells over another, and values that are interpolated or chosen there."""
+"""Resampling of layers onto another grid."""
 
 import math
 from pathlib import Path
