@@ -5,8 +5,9 @@ import torch
 
 from tests.world.fast.test_growing import land, lit
 from warp_torchrl import memory
+from warp_torchrl.prediction.counts import Counter
 from warp_torchrl.prediction.passing import Behaviour, passing, steepness_from
-from warp_torchrl.prediction.tally import Counter, Tally
+from warp_torchrl.prediction.tally import Tally
 from warp_torchrl.world.alone import Burned, Fires, Spell
 from warp_torchrl.world.fast.window import Window
 from warp_torchrl.world.rate import RateFire

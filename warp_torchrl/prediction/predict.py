@@ -7,7 +7,8 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from warp_torchrl.prediction.tally import Counter, Tally
+from warp_torchrl.prediction.counts import Counter
+from warp_torchrl.prediction.tally import Tally
 from warp_torchrl.weather.table import WeatherTable, read_weather
 from warp_torchrl.world.alone import Fires, Spell
 from warp_torchrl.world.fast.window import Window
