@@ -58,6 +58,9 @@ class Served:
     def is_well(self):
         """Whether a new browser is served, and the match makes a step for it."""
         visitor = self.browser()
+        if "over" in visitor.texts("seed")[0]:
+            visitor.press("Restart")
+            until(lambda: step(visitor) == 0, 60.0)
         before = step(visitor)
         visitor.press("Step")
         until(lambda: step(visitor) != before, 60.0)
