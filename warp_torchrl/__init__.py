@@ -21,8 +21,9 @@ from typing import Any
 import gymnasium
 import pettingzoo
 
-from warp_torchrl.api import load_policy, make_env
+from warp_torchrl.api import make_env
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.load import load_policy
 from warp_torchrl.rates.rate_of_spread import rate_of_spread
 from warp_torchrl.simulation import fire_history, simulate
 

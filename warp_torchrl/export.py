@@ -14,11 +14,11 @@ from pathlib import Path
 
 import torch
 
-from warp_torchrl.api import policy_of
 from warp_torchrl.commands.program import one_line_end
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.finite import not_finite
 from warp_torchrl.flags import FlagParser
+from warp_torchrl.load import policy_of
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.shipped import find_policy
 

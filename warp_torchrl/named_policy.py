@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from warp_torchrl.api import policy_of
 from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.saved_config import restore
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.load import policy_of
 from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.policy import TrainedPolicy
 from warp_torchrl.runs import checkpoint as checkpoints

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 import torch
 
-from warp_torchrl.api import policy_of
 from warp_torchrl.config.building import run_config
 from warp_torchrl.config.compose import compose_config, conf_folder, plain, without_targets
 from warp_torchrl.config.saved_config import SavedConfig
+from warp_torchrl.load import policy_of
 from warp_torchrl.models import ACTION
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.checkpoint import CheckpointError, export, newest

@@ -4,10 +4,11 @@ import pytest
 import torch
 
 from tests.training.test_kickstarting import configured, sample_of
-from warp_torchrl.api import load_policy, make_env
+from warp_torchrl.api import make_env
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.load import load_policy
 from warp_torchrl.models import ACTION, ACTION_MASK, TEACHER_ACTION
 from warp_torchrl.training.loop import Training
 from warp_torchrl.training.teachers import TrainedTeacher, teacher

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from tests.world.rasters import keys, write
-from warp_torchrl.world.fuel_bed import moisture_row
+from warp_torchrl.rates.moistures import moisture_row
 from warp_torchrl.world.rate import RateFire
 from warp_torchrl.world.state import is_burning
 from warp_torchrl.world.terrain.raster import Raster

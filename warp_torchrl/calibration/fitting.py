@@ -11,8 +11,8 @@ from warp_torchrl.calibration.case import FireCase
 from warp_torchrl.calibration.null_models import circle, ellipse
 from warp_torchrl.calibration.parameters import Parameter, fire_at
 from warp_torchrl.calibration.scores import Scores, scores_at_area, scores_of
+from warp_torchrl.rates.moistures import MOISTURES
 from warp_torchrl.world.alone import arrival_minutes
-from warp_torchrl.world.fuel_bed import MOISTURES
 from warp_torchrl.world.random import world_key
 from warp_torchrl.world.rate import RateFire
 

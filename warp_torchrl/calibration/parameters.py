@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from torch import Tensor
 
 from warp_torchrl.nearest import did_you_mean
-from warp_torchrl.world.fuel_bed import MOISTURES
+from warp_torchrl.rates.moistures import MOISTURES
 from warp_torchrl.world.rate import RateFire
 
 GAINS = ("rate_gain", "wind_gain", "slope_gain")

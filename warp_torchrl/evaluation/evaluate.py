@@ -6,7 +6,6 @@ from pathlib import Path
 
 from tensordict.nn import TensorDictModuleBase
 
-from warp_torchrl.api import policy_of
 from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.config.saved_config import completed
@@ -19,6 +18,7 @@ from warp_torchrl.evaluation.picture import KINDS, Kind, record_episode
 from warp_torchrl.evaluation.play import Episodes, WithoutAgent, baselines_of, play, play_heuristics
 from warp_torchrl.evaluation.report import report, table, write_json
 from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.load import policy_of
 from warp_torchrl.policy import MODES
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs import disk

@@ -13,12 +13,13 @@ import torch
 from torch import Tensor
 
 from warp_torchrl import memory
+from warp_torchrl.rates.moistures import moisture_row
 from warp_torchrl.rates.spread import Spread
 from warp_torchrl.world.fast.growing import GrowingFires, Land, SpellInWindows
 from warp_torchrl.world.fast.spells import Highest, Planes, in_window, on_strips
 from warp_torchrl.world.fast.spreading import Hour
 from warp_torchrl.world.fast.window import Window
-from warp_torchrl.world.fuel_bed import gradient, moisture_row
+from warp_torchrl.world.fuel_bed import gradient
 from warp_torchrl.world.rate import TICKS_PER_CELL, RateFire
 from warp_torchrl.world.state import Landscape
 from warp_torchrl.world.travel import NEVER, travel
@@ -38,7 +39,7 @@ class Spell:
 
     wind: Tensor  # (u east, v north) of the air's motion at 10 m, float32 [2] [m/s]
     minutes: float  # how long it lasts
-    moisture: Tensor | None = None  # float32 [7], in the order of ``fuel_bed.MOISTURES``, NaN where not known
+    moisture: Tensor | None = None  # float32 [7], in the order of ``moistures.MOISTURES``, NaN where not known
 
 
 def spread_in(

@@ -12,6 +12,7 @@ from torch.nn.functional import pad
 from warp_torchrl.rates.fbp import fbp_spread
 from warp_torchrl.rates.fuel_codes import read_model
 from warp_torchrl.rates.fuel_models import FuelTable
+from warp_torchrl.rates.moistures import MOISTURES
 from warp_torchrl.rates.spread import Spread
 from warp_torchrl.rates.surface import surface_spread
 from warp_torchrl.rates.wind_adjustment import TEN_METRES, wind_adjustment_factor
@@ -20,18 +21,6 @@ from warp_torchrl.world.random import world_key
 from warp_torchrl.world.state import Landscape
 from warp_torchrl.world.terrain.landscape import LandscapeSource, map_size
 from warp_torchrl.world.wind import Wind
-
-MOISTURES: Mapping[str, float] = {
-    "dead_1h": 6.0,
-    "dead_10h": 7.0,
-    "dead_100h": 8.0,
-    "live_herbaceous": 60.0,
-    "live_woody": 90.0,
-    "ffmc": 90.0,
-    "bui": 60.0,
-}
-"""Moisture where nothing else is said: per cent of dry weight, "low" dead and two-thirds cured fuels (Scott and Burgan
-2005, tables 3 and 4); of the Canadian model its two codes."""
 
 COVER_FUEL: Mapping[str, tuple[int, int, int, int, int]] = {
     "fbfm13": (98, 8, 1, 10, 99),
@@ -199,20 +188,6 @@ def _on_map(direction: Tensor, rise: Tensor) -> Tensor:
     angle = torch.deg2rad(direction)
     climb = rise[:, 0] * angle.sin() + rise[:, 1] * angle.cos()
     return torch.rsqrt(1.0 + climb * climb)
-
-
-def moisture_row(given: Mapping[str, float]) -> Tensor:
-    """Return moistures by name in the order of ``MOISTURES``, float32 [7].
-
-    Raises:
-        ValueError: If a name is not known, or a value not in [0, 400].
-    """
-    for name, value in given.items():
-        if name not in MOISTURES:
-            raise ValueError(f"moisture must name some of {', '.join(MOISTURES)}, got {name}")
-        if not 0.0 <= value <= 400.0:
-            raise ValueError(f"moisture must be in [0, 400], got {name}: {value}")
-    return torch.tensor([float(given.get(name, usual)) for name, usual in MOISTURES.items()])
 
 
 def gradient(elevation: Tensor | None, cover: Tensor, cell_size: float) -> Tensor:

@@ -9,10 +9,11 @@ from typing import Any, Literal, Self
 import torch
 from torch import Tensor
 
+from warp_torchrl.rates.moistures import moisture_row
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.automaton import Automaton
 from warp_torchrl.world.fast.window import Window
-from warp_torchrl.world.fuel_bed import COVER_FUEL, FuelBed, moisture_row
+from warp_torchrl.world.fuel_bed import COVER_FUEL, FuelBed
 from warp_torchrl.world.geometry import grow, neighbour_in, neighbours
 from warp_torchrl.world.mapped_fuel import check_fuel, has_own_table, told_fuel
 from warp_torchrl.world.random import Stream, uniform, uniform_at
@@ -54,7 +55,7 @@ class RateFire(Automaton):
         minutes_per_tick: Minutes of a tick; None takes half of what the fastest fire needs for a cell of the landscape.
         residence: Minutes that a cell burns at least.
         wet_minutes: Minutes for which a tree that was put out cannot ignite.
-        moisture: Percent by name, of those that the wind tells nothing of: see ``fuel_bed.MOISTURES``.
+        moisture: Percent by name, of those that the wind tells nothing of: see ``moistures.MOISTURES``.
         fuel_of_cover: Fuel code of lake, wetland, grassland, forest and bare ground, for landscapes without fuel codes;
             None takes those of ``fuel_bed.COVER_FUEL``. Where given, the codes of a landscape with a table of the
             user's own are classes of land cover, and the fuel is that of their cover.

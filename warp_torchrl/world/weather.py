@@ -9,10 +9,10 @@ from typing import Literal
 import torch
 from torch import Tensor
 
+from warp_torchrl.rates.moistures import MOISTURES
 from warp_torchrl.validation import check_fields
 from warp_torchrl.weather.convergence import grid_convergence
 from warp_torchrl.weather.table import OPEN_10M_OVER_20FT, WeatherTable, read_weather
-from warp_torchrl.world.fuel_bed import MOISTURES
 from warp_torchrl.world.random import Stream, uniform
 from warp_torchrl.world.state import WorldState
 from warp_torchrl.world.terrain.landscape import LandscapeSource

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from warp_torchrl.device import reads_freely
 from warp_torchrl.world.fast.distances import FAR
-from warp_torchrl.world.fast.rows import in_a_row
+from warp_torchrl.world.fast.row_layout import in_a_row
 
 _TOGETHER = 8
 """Agents whose searches are the bits of one byte."""

@@ -1,7 +1,7 @@
 """How fire passes from burning cells to their neighbours: the sum of the eight directions at every cell.
 
-The maps of a batch lie in one row, each with a margin column and row after it, so that the neighbours of all cells in a
-direction are one contiguous slice at a constant offset.
+The maps of a batch lie in one row (``row_layout``), so that the neighbours of all cells in a direction are one
+contiguous slice at a constant offset.
 """
 
 import torch
@@ -10,8 +10,8 @@ from torch.compiler import is_compiling
 from torch.nn.functional import pad
 
 from warp_torchrl.world.fast.bytes import byte, number, to_uint8
-from warp_torchrl.world.fast.compile import opaque_op
 from warp_torchrl.world.fast.join import Joining
+from warp_torchrl.world.fast.row_layout import in_a_row
 from warp_torchrl.world.geometry import DIRECTIONS
 
 Shape = tuple[int, ...]
@@ -80,24 +80,6 @@ def expected_from_rows(
             strength *= _slope(slope, direction, shape, offset)
         total += law.probability_of(strength)
     return total if is_compiling() else _on_map(total)
-
-
-def _as_long(maps: Tensor) -> Tensor:
-    worlds, height, width = maps.shape
-    return maps.new_empty(2 * (width + 2) + worlds * (height + 1) * (width + 1))
-
-
-# A compiler would ask of every neighbour anew whether it is on the map, and that one by one.
-@opaque_op("(Tensor maps) -> Tensor", like=_as_long)
-def in_a_row(maps: Tensor) -> Tensor:
-    """Lay [B, H, W] maps out in one row, each with a zero column and row after it and a margin at both ends."""
-    worlds, height, width = maps.shape
-    margin, row = width + 2, _as_long(maps)
-    row[:margin] = row[-margin:] = 0
-    inner = row[margin:-margin].view(worlds, height + 1, width + 1)
-    inner[:, height] = inner[:, :, width] = 0
-    inner[:, :height, :width] = maps
-    return row
 
 
 def _offset(direction: int, shape: Shape) -> int:
