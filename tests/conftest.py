@@ -10,43 +10,43 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # the tests run side by side; rea
 import pytest
 import torch
 
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import compose_config, plain, without_targets
-from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import Rollout
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
+from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.training.loop import Training
-from warp_torchrl.world.ignition import Ignition
-from warp_torchrl.world.team import Team
+from warp_torchrl.world.air.wind import Uniform
+from warp_torchrl.world.ignition.ignition import Ignition
+from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
-from warp_torchrl.world.wind import Uniform
 from warp_torchrl.world.world import World
 
 TESTS = Path(__file__).parent
 QUICK = (
     "algorithms/test_ppo.py",
-    "reward/test_base.py",
-    "reward/test_paper.py",
-    "test_api.py",
+    "env/reward/test_base.py",
+    "env/reward/test_paper.py",
+    "api/test_make.py",
     "test_architecture.py",
-    "observation/test_channels.py",
+    "env/observation/test_channels.py",
     "runs/test_checkpoint.py",
-    "config/test_conf.py",
+    "runs/config/test_conf.py",
     "env/test_wildfire.py",
     "test_golden.py",
     "env/test_metrics.py",
-    "observation/test_observation.py",
+    "env/observation/test_observation.py",
     "evaluation/test_statistics.py",
-    "world/test_batch.py",
-    "world/test_burn.py",
-    "world/test_fire.py",
-    "world/test_ignition.py",
+    "world/arrays/test_batch.py",
+    "world/fires/test_burn.py",
+    "world/law/test_fire.py",
+    "world/ignition/test_ignition.py",
     "world/terrain/test_landscape.py",
-    "world/test_law.py",
+    "world/law/test_law.py",
     "world/test_laws.py",
-    "world/test_random.py",
-    "world/test_team.py",
-    "world/test_wind.py",
+    "world/arrays/test_random.py",
+    "world/team/test_team.py",
+    "world/air/test_wind.py",
 )
 """The files of ``pytest -m quick``: the laws of the world, the environment and its specs, configuration, one learner,
 checkpoints there and back, and who may import whom. Of a minute on two free cores they may take a half."""

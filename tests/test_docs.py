@@ -98,7 +98,7 @@ def test_the_site_builds_without_warnings(tmp_path):  # .ci/run builds it too
     assert done.returncode == 0, done.stderr
     built = {path.stem for path in (tmp_path / "site").glob("*.html")}
     assert built >= {page.stem for page in DOCS.glob("*.md")}
-    assert 'id="warp_torchrl.api.make_env"' in (tmp_path / "site" / "api.html").read_text()
+    assert 'id="warp_torchrl.api.make.make_env"' in (tmp_path / "site" / "api.html").read_text()
     assert "concat_vec_envs_v1" in (tmp_path / "site" / "interop.html").read_text(), "the examples stand in the page"
 
 
@@ -193,7 +193,7 @@ def test_an_extension_is_one_module_one_yaml_and_one_test(extended):
 def test_the_extensions_keep_to_their_own_tests_and_the_configuration_s(extended):
     copy, files = extended
     tests = [path for path in files if path.startswith("tests/")]
-    passes(copy, *tests, "tests/config/test_conf.py")
+    passes(copy, *tests, "tests/runs/config/test_conf.py")
 
 
 @pytest.mark.slow

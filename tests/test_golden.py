@@ -9,12 +9,12 @@ import torch
 
 from tests.forgery import forge
 from warp_torchrl import load_policy, make_env
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import plain
-from warp_torchrl.config.saved_config import restore
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.models import ACTION
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import plain
+from warp_torchrl.runs.config.saved_config import restore
 from warp_torchrl.training.loop import Training
 
 GOLDEN = Path(__file__).parent / "golden"

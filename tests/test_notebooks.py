@@ -41,7 +41,7 @@ def test_a_notebook_runs(name, tmp_path, monkeypatch):
     nbclient = pytest.importorskip("nbclient", reason="needs the extra dev")
     nbformat = pytest.importorskip("nbformat", reason="needs the extra dev")
     pytest.importorskip("matplotlib", reason="needs the extra figures")
-    monkeypatch.setenv("PATH", os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))  # warp-train's
+    monkeypatch.setenv("PATH", os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))  # warp's
     notebook = nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
     (parameters,) = [cell for cell in notebook.cells if "parameters" in cell.metadata.get("tags", [])]
     assert set(re.findall(r"^(\w+) =", parameters.source, flags=re.MULTILINE)) == set(SMALL[name])

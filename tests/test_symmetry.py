@@ -5,7 +5,7 @@ import json
 import pytest
 
 from tests.conftest import small_world
-from warp_torchrl.observation import STATE, STATE_SIDE, STATE_SYMMETRY, Local, Paper, Surroundings, former_symmetry
+from warp_torchrl.env.observation import STATE, STATE_SIDE, STATE_SYMMETRY, Local, Paper, Surroundings, former_symmetry
 from warp_torchrl.symmetry import Part, Planes, Target, TeamPlanes, Vector, from_plain, to_plain
 
 PRESETS = [Surroundings(), Surroundings(centred=False, identity=False), Local(channels=("age", "threat")), Paper()]

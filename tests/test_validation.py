@@ -3,16 +3,17 @@
 import numpy as np
 import pytest
 
-from warp_torchrl.config.construction import ConfigError, construct
-from warp_torchrl.config.search_options import SearchOptions
+from warp_torchrl.env.reward import Adaptive, Efficiency
 from warp_torchrl.models import Mlp
-from warp_torchrl.reward import Adaptive, Efficiency
+from warp_torchrl.runs.config.construction import ConfigError, construct
+from warp_torchrl.runs.config.search_options import SearchOptions
 from warp_torchrl.runs.logging import Wandb
-from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.ignition import Ignition
-from warp_torchrl.world.rate import RateFire
+from warp_torchrl.validation import did_you_mean, dotted, nearest
+from warp_torchrl.world.air.wind import Uniform
+from warp_torchrl.world.ignition.ignition import Ignition
+from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.terrain.landscape import Perlin
-from warp_torchrl.world.wind import Uniform
 from warp_torchrl.world.world import World
 
 BAD = [
@@ -50,3 +51,46 @@ def test_a_value_takes_the_form_of_its_hint():
     assert made == [4.0, 4.0, 3] and [type(each) for each in made] == [float, float, int]
     assert Mlp(actor_hidden=[16.0]).actor_hidden == (16,) and Perlin(scale=[10, 20]).scale == (10.0, 20.0)
     assert repr(Adaptive(terms={"front": 1}).terms) == "{'front': 1.0}"
+
+
+# Names
+
+
+KEYS = ["seed", "scenario", "n_worlds", "reward", "reward.gamma", "algorithm", "algorithm.gamma", "collector.steps"]
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("sede", ["seed"]),
+        ("sceanrio", ["scenario"]),
+        ("Seed", ["seed"]),
+        ("num_worlds", ["n_worlds"]),
+        ("algorithm.gama", ["algorithm.gamma"]),  # in its group
+        ("steps", ["collector.steps"]),  # without its group
+        ("gamma", ["reward.gamma", "algorithm.gamma"]),
+        ("algoritm.gamma", ["algorithm.gamma", "reward.gamma"]),  # the whole name tells which comes first
+        ("algoritm.gama", ["algorithm.gamma"]),
+        ("foo", []),
+        ("", []),
+    ],
+)
+def test_the_nearest_key_is_found(name, meant):
+    assert nearest(name, KEYS) == meant
+
+
+def test_it_ends_a_message():
+    assert did_you_mean("gredy", ["greedy", "local"]) == ": did you mean greedy?"
+    assert did_you_mean("gamma", KEYS) == ": did you mean reward.gamma or algorithm.gamma?"
+    assert did_you_mean(None, KEYS) == did_you_mean("xyz", []) == ""
+
+
+def test_what_stands_in_mappings_is_found_by_dotted_keys_in_order():
+    node = {"fire": {"tau": 5.0, "alpha": [0.1, 0.2]}, "seed": 3, "landscape": {"table": {11: 3}}, "none": {}}
+    assert list(dotted(node).items()) == [
+        ("fire.tau", 5.0),
+        ("fire.alpha", [0.1, 0.2]),
+        ("seed", 3),
+        ("landscape.table.11", 3),
+    ]
+    assert dotted({"b": 1}, "a.") == {"a.b": 1}

@@ -2,8 +2,8 @@
 
 import os
 
-from warp_torchrl.interruption import end_on_signal, is_command
-from warp_torchrl.parent import end_with_binder
+from warp_torchrl.system.interruption import end_on_signal, is_command
+from warp_torchrl.system.parent import end_with_binder
 
 if is_command():  # the imports below take seconds
     end_on_signal()
@@ -21,20 +21,20 @@ from typing import Any
 import gymnasium
 import pettingzoo
 
-from warp_torchrl.api import make_env
+from warp_torchrl.api.make import make_env
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.load import load_policy
-from warp_torchrl.rates.rate_of_spread import rate_of_spread
-from warp_torchrl.simulation import fire_history, simulate
+from warp_torchrl.prediction.simulation import fire_history, simulate
+from warp_torchrl.runs.policies.load import load_policy
+from warp_torchrl.world.behaviour.rate_of_spread import rate_of_spread
 
 gymnasium.register(
     "Wildfire-v0",
-    entry_point="warp_torchrl.adapters:FireExtinguishingEnv",
-    vector_entry_point="warp_torchrl.adapters:FireExtinguishingVectorEnv",
+    entry_point="warp_torchrl.api.adapters:FireExtinguishingEnv",
+    vector_entry_point="warp_torchrl.api.adapters:FireExtinguishingVectorEnv",
 )
 if hasattr(pettingzoo, "register"):  # older ones have no registry
-    pettingzoo.register("parallel", "Wildfire-v0", entry_point="warp_torchrl.adapters:parallel_env")
-    pettingzoo.register("aec", "Wildfire-v0", entry_point="warp_torchrl.adapters.pettingzoo:env")
+    pettingzoo.register("parallel", "Wildfire-v0", entry_point="warp_torchrl.api.adapters:parallel_env")
+    pettingzoo.register("aec", "Wildfire-v0", entry_point="warp_torchrl.api.adapters.pettingzoo:env")
 
 __version__ = "0.1.0"
 __all__ = ["WildfireEnv", "__version__", "fire_history", "load_policy", "make_env", "rate_of_spread", "simulate"]

@@ -5,7 +5,7 @@ import argparse
 import supersuit
 from stable_baselines3 import PPO
 
-from warp_torchrl.adapters import parallel_env
+from warp_torchrl.api.adapters import parallel_env
 
 
 def main(steps: int) -> None:

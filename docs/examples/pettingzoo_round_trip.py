@@ -7,7 +7,7 @@ from tensordict import TensorDict
 from torchrl.envs import PettingZooWrapper
 
 from warp_torchrl import make_env
-from warp_torchrl.adapters import parallel_env
+from warp_torchrl.api.adapters import parallel_env
 
 
 def main(steps: int) -> None:

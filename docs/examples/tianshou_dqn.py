@@ -10,7 +10,7 @@ from tianshou.env import DummyVectorEnv, PettingZooEnv
 from tianshou.trainer import OffPolicyTrainerParams
 from tianshou.utils.net.common import Net
 
-from warp_torchrl.adapters import pettingzoo
+from warp_torchrl.api.adapters import pettingzoo
 
 
 def make():

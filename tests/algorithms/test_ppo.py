@@ -8,8 +8,8 @@ from torchrl.objectives.value import MultiAgentGAE
 from tests.conftest import small_world
 from warp_torchrl.algorithms.held_batch import ADVANTAGE, VALUE_TARGET, narrowed, with_advantages
 from warp_torchrl.algorithms.ppo import Ppo
+from warp_torchrl.env.observation import Paper, Surroundings
 from warp_torchrl.models import CANONICAL_STATE, REWARD, STATE, VALUE, CanonicalBatch, Cnn, Mlp, signature
-from warp_torchrl.observation import Paper, Surroundings
 
 
 def collected(env, learner, steps):

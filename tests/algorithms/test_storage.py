@@ -7,7 +7,7 @@ from torchrl.data import LazyTensorStorage, SamplerWithoutReplacement, TensorDic
 
 from warp_torchrl.algorithms.storage import BatchStorage, RowStorage
 from warp_torchrl.benchmark.waits import counted_waits
-from warp_torchrl.device import unread
+from warp_torchrl.system.device import unread
 
 TRANSITIONS = TensorDict(
     agents=TensorDict(

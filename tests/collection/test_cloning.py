@@ -7,12 +7,12 @@ import torch
 
 from tests.demonstrations.played import SMALL, played
 from warp_torchrl.collection.cloning import AGENT
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import compose_config, plain, without_targets
-from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.demonstrations.files import save
 from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, OBSERVATION
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
+from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.training.loop import Training
 
 TINY = [

@@ -5,13 +5,13 @@ import torch
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from warp_torchrl.collection.imitation import Imitation
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.evaluation.method import teacher_label
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION, ACTION_MASK
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.training.loop import Training
 
 TINY = ["landscape.size=12", "horizon=20", "n_worlds=64", "collector.steps=8", "total_frames=512", "algorithm=dqn"]

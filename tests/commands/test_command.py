@@ -20,7 +20,7 @@ from warp_torchrl.commands import command as command_module
 from warp_torchrl.commands.command import evaluate, train
 from warp_torchrl.commands.sweep import SweepSummary
 from warp_torchrl.runs import checkpoint
-from warp_torchrl.runs.lock import RunFolderLock
+from warp_torchrl.system.lock import RunFolderLock
 from warp_torchrl.training.loop import Training
 
 ROOT = Path(__file__).parents[2]

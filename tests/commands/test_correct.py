@@ -5,14 +5,14 @@ import re
 import pytest
 
 from warp_torchrl.commands.correct import main, read
-from warp_torchrl.correction import Session
+from warp_torchrl.commands.correction import Session
 from warp_torchrl.demonstrations.files import find
 from warp_torchrl.demonstrations.files import read as read_recording
 from warp_torchrl.demonstrations.recording import Mover
 from warp_torchrl.demonstrations.replay import Replay
 from warp_torchrl.demonstrations.scripted import Person
 from warp_torchrl.runs.checkpoint import newest
-from warp_torchrl.runs.lock import RunFolderLock
+from warp_torchrl.system.lock import RunFolderLock
 
 
 def test_the_command_writes_recordings_that_replay_and_prints_a_table(weak_run, tmp_path, capsys):

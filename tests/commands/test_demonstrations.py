@@ -11,8 +11,8 @@ from warp_torchrl.commands.demonstrations import main
 from warp_torchrl.commands.failure import DISK, DONE, MISTAKE, UNSOUND
 from warp_torchrl.demonstrations.files import MANIFEST, save
 from warp_torchrl.live.match import Match, Setting
-from warp_torchrl.runs.sealed import Unsound
-from warp_torchrl.world.state import Action
+from warp_torchrl.system.sealed import Unsound
+from warp_torchrl.world.state.state import Action
 
 
 def played(people, *overrides):
@@ -119,7 +119,7 @@ def test_a_folder_that_cannot_be_written_is_told(people, capsys):
 
 @pytest.mark.slow
 def test_it_is_a_program(people):
-    command = [sys.executable, "-m", "warp_torchrl.demonstrations", str(people)]
+    command = [sys.executable, "-m", "warp_torchrl", "demonstrations", str(people)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0 and done.stdout.count("skirmish-") == 2 and done.stderr == ""
 

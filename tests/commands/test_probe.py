@@ -3,8 +3,8 @@
 import pytest
 
 from warp_torchrl.commands.probe import main, read, table
-from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.evaluation.probe import Reading
+from warp_torchrl.runs.config.construction import ConfigError
 
 
 def test_a_command_line_is_read():

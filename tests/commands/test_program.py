@@ -9,8 +9,8 @@ import pytest
 
 from tests.stress.processes import ROOT, catches, wait_for
 from warp_torchrl.commands.program import one_line_end, run_program
-from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.interruption import is_command
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.system.interruption import is_command
 
 
 def test_help_is_printed_and_nothing_is_done(capsys):
@@ -52,7 +52,7 @@ def test_an_error_of_a_command_with_flags_is_one_line_and_an_exit_code(capsys):
     assert end.value.code == 2 and capsys.readouterr().err == "error: this is wrong\n"
 
 
-@pytest.mark.parametrize("program", [["-m", "warp_torchrl.predict"], [str(ROOT / "train.py"), "total_frames=64"]])
+@pytest.mark.parametrize("program", [["-m", "warp_torchrl", "predict"], [str(ROOT / "train.py"), "total_frames=64"]])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_command_that_still_imports_ends_with_one_line(tmp_path, program, number):
     process = subprocess.Popen(

@@ -6,7 +6,7 @@ import signal
 import pytest
 
 from warp_torchrl.commands.queue import Ended, queued
-from warp_torchrl.training.signals import Stopped
+from warp_torchrl.system.signals import Stopped
 
 
 class Submitit:

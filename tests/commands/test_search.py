@@ -10,14 +10,14 @@ import time
 import pytest
 import yaml
 
+from tests.commands.hyperparameters.training import TOTAL, Quick
 from tests.commands.test_command import TINY
-from tests.hyperparameters.training import TOTAL, Quick
 from warp_torchrl.commands import search as search_module
 from warp_torchrl.commands.failure import DISK, DONE, IN_USE, MISTAKE
 from warp_torchrl.commands.search import FIRES, check_points, main
-from warp_torchrl.config.compose import compose_config, conf_folder, plain
-from warp_torchrl.config.space import divided
-from warp_torchrl.runs.lock import RunFolderLock
+from warp_torchrl.runs.config.compose import compose_config, conf_folder, plain
+from warp_torchrl.runs.config.space import divided
+from warp_torchrl.system.lock import RunFolderLock
 
 optuna = pytest.importorskip("optuna", reason="needs the extra search")
 
@@ -217,7 +217,7 @@ def test_the_ready_searches_are_of_the_learners_that_their_names_say():
 
 def begin(folder, *arguments):
     return subprocess.Popen(
-        [sys.executable, "-m", "warp_torchrl.search", *TINY, RATE, "search.trials=2", "search.out=x", *arguments],
+        [sys.executable, "-m", "warp_torchrl", "search", *TINY, RATE, "search.trials=2", "search.out=x", *arguments],
         cwd=folder,
         env={**os.environ, "OMP_NUM_THREADS": "1"},
         stdout=subprocess.PIPE,

@@ -4,9 +4,9 @@ import copy
 
 import pytest
 
-from warp_torchrl.config.compose import compose_config, plain, without_targets
-from warp_torchrl.config.saved_config import SavedConfig, completed
 from warp_torchrl.evaluation.method import method
+from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
+from warp_torchrl.runs.config.saved_config import SavedConfig, completed
 
 
 @pytest.mark.parametrize(

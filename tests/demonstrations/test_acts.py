@@ -7,14 +7,14 @@ import torch
 
 from tests.demonstrations.played import SMALL, played
 from warp_torchrl.collection.cloning import AGENT
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.demonstrations.acts import acts_of, demonstrations
 from warp_torchrl.demonstrations.files import save
 from warp_torchrl.demonstrations.recording import MOVER, Mover
 from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, ORIENTATION, ROLE, signature
 from warp_torchrl.models.canonical import Orientation
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.construction import ConfigError
 
 
 def found(folder, *overrides):

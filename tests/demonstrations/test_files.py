@@ -13,7 +13,7 @@ import torch
 from tensordict import TensorDict
 
 from warp_torchrl.demonstrations.files import MANIFEST, find, read, save
-from warp_torchrl.runs.sealed import Unsound, described, sealed
+from warp_torchrl.system.sealed import Unsound, described, sealed
 
 
 @pytest.fixture

@@ -8,8 +8,8 @@ import torch
 from warp_torchrl.demonstrations.events import Event
 from warp_torchrl.demonstrations.files import read, save
 from warp_torchrl.demonstrations.replay import Replay
-from warp_torchrl.runs.sealed import Unsound
-from warp_torchrl.world.state import is_tree
+from warp_torchrl.system.sealed import Unsound
+from warp_torchrl.world.state.state import is_tree
 
 
 def test_the_worlds_are_those_that_were_played(match, recording, tmp_path):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from warp_torchrl import make_env
-from warp_torchrl.config.compose import conf_folder
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.runs.config.compose import conf_folder
 
 OF_A_MAP = ("landfire", "wildland")
 """Scenarios whose ground is a folder of the user's."""

@@ -9,11 +9,11 @@ from torchrl.envs.utils import check_env_specs
 from tests.conftest import small_world
 from warp_torchrl.env import LeveledEnv, WildfireEnv
 from warp_torchrl.env.levels import LEVEL, joined
-from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.ignition import Ignition
-from warp_torchrl.world.radio import Radio
-from warp_torchrl.world.team import Team
-from warp_torchrl.world.wind import Uniform
+from warp_torchrl.world.air.wind import Uniform
+from warp_torchrl.world.ignition.ignition import Ignition
+from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.team.radio import Radio
+from warp_torchrl.world.team.team import Team
 
 TARGET = small_world(horizon=12)
 EASY = replace(TARGET, steps_per_tick=6, horizon=20)

@@ -5,10 +5,10 @@ import torch
 
 from tests.conftest import small_world
 from warp_torchrl.env.metrics import FLYING, METRICS, WATCHING, metrics
-from warp_torchrl.world.flight import Flight
-from warp_torchrl.world.sensing import Sight
-from warp_torchrl.world.state import Action, count_trees
-from warp_torchrl.world.team import Team
+from warp_torchrl.world.mechanics.sensing.sensing import Sight
+from warp_torchrl.world.state.state import Action, count_trees
+from warp_torchrl.world.team.flight import Flight
+from warp_torchrl.world.team.team import Team
 
 
 def test_metrics_are_fractions_that_add_up(make_small_env):

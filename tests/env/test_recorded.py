@@ -4,12 +4,12 @@ import pytest
 import torch
 from torch.fx.experimental.proxy_tensor import make_fx
 
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.device import unread
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.recorded import RecordedStep
-from warp_torchrl.reward import Time
+from warp_torchrl.env.reward import Time
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.system.device import unread
 
 BRIEFLY = [
     ["scenario=skirmish"],
@@ -56,7 +56,7 @@ def test_recorded_worlds_are_those_of_steps(overrides):
 @pytest.mark.parametrize("overrides", SCENARIOS, ids=" ".join)
 def test_no_size_in_a_step_depends_on_a_result(overrides, monkeypatch):
     for module in ("status", "critic"):  # a CPU alone looks at the codes, and refuses those out of range
-        monkeypatch.setattr(f"warp_torchrl.observation.{module}.one_hot", one_hot)
+        monkeypatch.setattr(f"warp_torchrl.env.observation.{module}.one_hot", one_hot)
     with unread():
         env = env_of(overrides)
         shown = env.rand_action(env.reset())

@@ -5,9 +5,9 @@ import torch
 
 from tests.conftest import small_world
 from warp_torchrl import make_env
-from warp_torchrl.device import unread
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.reset_pool import ResetPool
+from warp_torchrl.system.device import unread
 
 SHORT = ["landscape.size=10", "horizon=12"]
 LATE = ["scenario=search", "team.radio.carries=both", "team.radio.delay=2", "team.radio.loss=0.2"]

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
+from warp_torchrl.env.reward import Adaptive, Collaborative, Coverage, Efficiency, Paper, Reward, Time
 from warp_torchrl.env.scene import compiles
-from warp_torchrl.reward import Adaptive, Collaborative, Coverage, Efficiency, Paper, Reward, Time
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,17 +12,17 @@ from torchrl.envs.utils import check_env_specs
 from tests.conftest import small_world
 from warp_torchrl import WildfireEnv, make_env
 from warp_torchrl.env import scene
-from warp_torchrl.observation import Local, Paper, Surroundings
-from warp_torchrl.reward import Efficiency
-from warp_torchrl.world.fast import road
-from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.radio import Radio
-from warp_torchrl.world.sensing import Sight
-from warp_torchrl.world.state import Action, count_trees
-from warp_torchrl.world.team import Team
+from warp_torchrl.env.observation import Local, Paper, Surroundings
+from warp_torchrl.env.reward import Efficiency
+from warp_torchrl.world.air.wind import Paper as PaperWind
+from warp_torchrl.world.backends import road
+from warp_torchrl.world.backends.tick import in_wind
+from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.mechanics.sensing.sensing import Sight
+from warp_torchrl.world.state.state import Action, count_trees
+from warp_torchrl.world.team.radio import Radio
+from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
-from warp_torchrl.world.tick import in_wind
-from warp_torchrl.world.wind import Paper as PaperWind
 from warp_torchrl.world.world import World
 
 STAY = int(Action.STAY)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import torch
 
-from tests.reward.drawing import CLEAR, EXTINGUISH, STAY, drawn
+from tests.env.reward.drawing import CLEAR, EXTINGUISH, STAY, drawn
 from warp_torchrl.evaluation.behaviour import Behaviour, divided, mutual_information
-from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.state import is_burning
-from warp_torchrl.world.tick import in_wind
+from warp_torchrl.world.backends.tick import in_wind
+from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.state.state import is_burning
 
 
 def test_mutual_information_by_hand():

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 import torch
 
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.evaluation import cache
 from warp_torchrl.evaluation import evaluate as evaluation_module
 from warp_torchrl.evaluation.play import play_heuristics
 from warp_torchrl.heuristics import HEURISTICS, NoOp
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, plain
 from warp_torchrl.world.terrain.array import Array
 
 TINY = ["evaluation.episodes=3", "landscape.size=12", "horizon=16"]

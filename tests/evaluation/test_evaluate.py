@@ -1,9 +1,9 @@
 """What is told of a policy: the baselines of worlds that were met before are not played again."""
 
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.evaluation import evaluate as evaluation_module
 from warp_torchrl.evaluation.play import play_heuristics
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, plain
 
 TINY = ["landscape.size=12", "horizon=16", "evaluation.episodes=3", "evaluation.cache=false"]
 

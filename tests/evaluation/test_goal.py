@@ -4,8 +4,8 @@ import pytest
 
 from tests.conftest import small_world
 from warp_torchrl.evaluation.goal import goal
-from warp_torchrl.world.sensing import Full, Sight
-from warp_torchrl.world.team import Team
+from warp_torchrl.world.mechanics.sensing.sensing import Full, Sight
+from warp_torchrl.world.team.team import Team
 
 
 @pytest.mark.parametrize(

@@ -5,12 +5,12 @@ import pytest
 import torch
 
 from tests.world.rasters import LANDFIRE, needs_landfire, rasterio
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import compose_config, plain
 from warp_torchrl.evaluation import maps as maps_module
 from warp_torchrl.evaluation.maps import described, play_maps, write_maps
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.heuristics import Coordinated, NoOp
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, plain
 from warp_torchrl.world.terrain.fixed import Fixed
 
 TINY = ["landscape.size=12", "horizon=24", "evaluation.first_seed=2000000"]

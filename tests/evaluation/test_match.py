@@ -7,14 +7,14 @@ import torch
 from tests.conftest import small_world
 from warp_torchrl.algorithms.ppo import Ppo
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.env.observation import Paper, Surroundings
 from warp_torchrl.evaluation import play as play_module
 from warp_torchrl.evaluation.match import Match, fits
 from warp_torchrl.evaluation.play import WithoutAgent, play
 from warp_torchrl.heuristics import HEURISTICS, Greedy
 from warp_torchrl.models import Mlp, signature
-from warp_torchrl.observation import Paper, Surroundings
-from warp_torchrl.world.agencies import SeveralAgencies
-from warp_torchrl.world.team import Team
+from warp_torchrl.world.mechanics.agencies.agencies import SeveralAgencies
+from warp_torchrl.world.team.team import Team
 
 
 def trained(env, **options):

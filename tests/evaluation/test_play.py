@@ -7,14 +7,14 @@ import torch
 
 from tests.conftest import small_world
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.env.reward import Monitor
 from warp_torchrl.evaluation.behaviour import BEHAVIOUR
 from warp_torchrl.evaluation.goal import goal
 from warp_torchrl.evaluation.play import BASELINES, WithoutAgent, baselines_of, play
 from warp_torchrl.evaluation.report import report, table, write_json
 from warp_torchrl.heuristics import Coordinated, Follower, Greedy, NoOp, Random
-from warp_torchrl.reward import Monitor
-from warp_torchrl.world.sensing import Sight
-from warp_torchrl.world.team import Team
+from warp_torchrl.world.mechanics.sensing.sensing import Sight
+from warp_torchrl.world.team.team import Team
 
 
 def test_policies_meet_the_same_worlds_and_the_generator_is_left_alone(make_small_env):

@@ -8,10 +8,10 @@ from warp_torchrl.algorithms.ppo import Ppo
 from warp_torchrl.evaluation.probe import _Heard, _joined, _share, drawn_anew, probe
 from warp_torchrl.models import Mlp, signature
 from warp_torchrl.models.messages import Round
-from warp_torchrl.policy import TrainedPolicy
-from warp_torchrl.world.radio import Radio
-from warp_torchrl.world.sensing import Sight
-from warp_torchrl.world.team import Team
+from warp_torchrl.runs.policies.trained import TrainedPolicy
+from warp_torchrl.world.mechanics.sensing.sensing import Sight
+from warp_torchrl.world.team.radio import Radio
+from warp_torchrl.world.team.team import Team
 
 
 def made(make_small_env, n_worlds=6, messages="graph", delay=0, **team):

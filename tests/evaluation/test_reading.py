@@ -5,9 +5,9 @@ import re
 
 import pytest
 
-from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.evaluation.reading import read_evaluation
-from warp_torchrl.summary import draw, gather, main, table
+from warp_torchrl.evaluation.summary import draw, gather, main, table
+from warp_torchrl.runs.config.construction import ConfigError
 
 SOUND = {
     "scenario": "tiny",

@@ -5,11 +5,11 @@ import torch
 from tests.world.drawing import draw, drawn_cover
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.state import Action, WorldState
-from warp_torchrl.world.team import Team
+from warp_torchrl.world.air.wind import Calm
+from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.state.state import Action, WorldState
+from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.array import Array
-from warp_torchrl.world.wind import Calm
 from warp_torchrl.world.world import World
 
 

@@ -3,13 +3,12 @@
 import pytest
 import torch
 
+from tests.heuristics.drawing import chosen, scene, with_tanks
 from warp_torchrl import make_env
-from warp_torchrl.device import unread
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.heuristics import HEURISTICS, TEACHERS
-from warp_torchrl.world.state import Action
-
-from .drawing import chosen, scene, with_tanks
+from warp_torchrl.system.device import unread
+from warp_torchrl.world.state.state import Action
 
 WALL = "TTT~TTT TTT~TTa TTT~TTT TTTTTTT TTTTTTT"
 MEADOW = " TTTTTTTT" * 3

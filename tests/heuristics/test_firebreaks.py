@@ -3,9 +3,8 @@
 import pytest
 import torch
 
+from tests.heuristics.drawing import scene
 from warp_torchrl.heuristics.firebreaks import cells_to_clear, pace_of_fire
-
-from .drawing import scene
 
 MEADOW = "TTTTTTTTT " * 4 + "TTTTaTTTT" + " TTTTTTTTT" * 4
 

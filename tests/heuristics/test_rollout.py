@@ -6,14 +6,13 @@ import pytest
 import torch
 from torch import Tensor
 
+from tests.heuristics.drawing import scene
 from tests.world.drawing import differing
 from warp_torchrl import make_env
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import Dispatch, Rollout
-from warp_torchrl.world import random
-from warp_torchrl.world.state import Action, WorldState
-
-from .drawing import scene
+from warp_torchrl.world.arrays import random
+from warp_torchrl.world.state.state import Action, WorldState
 
 # The fire in the west has no neighbours; that in the middle ignites trees for certain at the next tick.
 TWO_FIRES = "a..aTTTT ....TTTT ....TTTT ....TTTT"

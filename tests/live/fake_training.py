@@ -10,9 +10,10 @@ from pathlib import Path
 
 
 def main() -> None:
-    given = dict(each.split("=", 1) for each in sys.argv[1:])
+    assert sys.argv[1] == "train"
+    given = dict(each.split("=", 1) for each in sys.argv[2:])
     folder, total = Path(given["hydra.run.dir"]), int(given["total_frames"])
-    (folder / "arguments.txt").write_text("\n".join(sys.argv[1:]))
+    (folder / "arguments.txt").write_text("\n".join(sys.argv[2:]))
     if total == 2:
         sys.exit("error: the disk is full")
     (folder / "metrics.csv").write_text("time/frames,world/saved\n1000,\n2000,0.75\n3000,0.")

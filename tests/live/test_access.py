@@ -12,13 +12,13 @@ from websockets.datastructures import Headers
 
 from tests.live.browser import CAMERA, Browser
 from tests.live.conftest import SMALL
-from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.live.access import Access, is_own
 from warp_torchrl.live.address import Address
 from warp_torchrl.live.door import MOST_CONNECTIONS, Door
 from warp_torchrl.live.match import Setting
 from warp_torchrl.live.page import Page
 from warp_torchrl.live.scene import local_server, quiet
+from warp_torchrl.runs.config.construction import ConfigError
 
 HERE, EVERYWHERE = "127.0.0.1", "0.0.0.0"
 TOKEN = "a-token-of-tests"

@@ -6,8 +6,8 @@ import torch
 from warp_torchrl.demonstrations.recording import Mover
 from warp_torchrl.live.crew import MOST_KEYS, Crew, Question, Refused
 from warp_torchrl.live.order import Order
-from warp_torchrl.world.state import Action
-from warp_torchrl.world.team import Team
+from warp_torchrl.world.state.state import Action
+from warp_torchrl.world.team.team import Team
 
 ANN, BOB = 7, 8
 OPEN = torch.ones(2, 11, dtype=torch.bool)

@@ -7,11 +7,11 @@ import pytest
 import torch
 
 from tests.world.drawing import draw
-from warp_torchrl.env.render import fire_colours, render
+from warp_torchrl.env.pictures.render import fire_colours, render
 from warp_torchrl.live import drawing
 from warp_torchrl.live.ground import ground_of
 from warp_torchrl.live.match import Match, Setting
-from warp_torchrl.world.state import Action
+from warp_torchrl.world.state.state import Action
 
 MAP = """
     15T.

@@ -10,12 +10,13 @@ import pytest
 
 pytest.importorskip("viser", reason="needs the extra live")
 
+from drawings.episode import _picture
+
 from warp_torchrl.evaluation.picture import record_episode
 from warp_torchrl.evaluation.play import play
-from warp_torchrl.gallery.episode import _picture
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.live.episode import Film, SceneRecorder, legend, progress
-from warp_torchrl.world.state import is_burning
+from warp_torchrl.world.state.state import is_burning
 
 SEED = 1_000_000
 HOSTILE = "<script>alert('&')</script>"

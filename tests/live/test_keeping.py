@@ -7,8 +7,8 @@ import pytest
 from warp_torchrl.demonstrations.files import MANIFEST, read
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.keeping import Keeper
-from warp_torchrl.runs.sealed import Unsound
-from warp_torchrl.world.state import Action
+from warp_torchrl.system.sealed import Unsound
+from warp_torchrl.world.state.state import Action
 
 
 @pytest.fixture

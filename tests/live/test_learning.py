@@ -6,17 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.saved_config import SavedConfig, restore
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.keeping import Keeper
 from warp_torchrl.live.learning import Learning, _literal, arguments
 from warp_torchrl.live.match import Match
-from warp_torchrl.named_policy import NamedPolicy
 from warp_torchrl.runs.checkpoint import newest
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.saved_config import SavedConfig, restore
+from warp_torchrl.runs.policies.named_policy import NamedPolicy
 from warp_torchrl.runs.transfer import check_start
-from warp_torchrl.world.state import Action
+from warp_torchrl.world.state.state import Action
 
 PEOPLE, RUN = Path("people"), Path("people/runs/one")
 
@@ -95,7 +95,7 @@ def test_values_are_written_as_hydra_reads_them(value, literal):
 
 @pytest.fixture
 def learning(tmp_path, monkeypatch):
-    monkeypatch.setattr("warp_torchrl.hyperparameters.training.MODULE", "tests.live.fake_training")
+    monkeypatch.setattr("warp_torchrl.runs.process.MODULE", "tests.live.fake_training")
     made = Learning(tmp_path / "people")
     yield made
     made.close()

@@ -3,12 +3,12 @@
 import pytest
 import torch
 
-from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.demonstrations.recording import Mover
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.live.order import Order
-from warp_torchrl.world.state import Action, is_tree
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.world.state.state import Action, is_tree
 
 
 def run(match, steps):

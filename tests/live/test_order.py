@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from warp_torchrl.live.order import Order
-from warp_torchrl.world.state import Action
+from warp_torchrl.world.state.state import Action
 
 N, NE, E, SE, S, SW, W, NW, EXTINGUISH, CLEAR, STAY = range(11)
 OPEN = torch.ones(11, dtype=torch.bool)

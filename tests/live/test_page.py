@@ -17,7 +17,6 @@ from PIL import Image
 pytest.importorskip("viser", reason="needs the extra live")
 
 from tests.live.conftest import SMALL
-from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.demonstrations.files import read
 from warp_torchrl.demonstrations.recording import Mover
 from warp_torchrl.live.address import Address
@@ -26,7 +25,8 @@ from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.live.page import Page
 from warp_torchrl.live.panel.tab import chosen
 from warp_torchrl.live.replayed import ReplayedMatch
-from warp_torchrl.world.state import Action, is_tree
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.world.state.state import Action, is_tree
 
 BROWSER = next((path for name in ("chromium", "google-chrome") if (path := shutil.which(name))), None)
 FLAGS = ["--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]

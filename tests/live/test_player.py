@@ -3,12 +3,12 @@
 import pytest
 import torch
 
-from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.live.player import player_of
 from warp_torchrl.models import ACTION
-from warp_torchrl.named_policy import NamedPolicy
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.policies.named_policy import NamedPolicy
 
 
 @pytest.mark.parametrize("name", ["skirmish", "local", pytest.param("random", marks=pytest.mark.slow)])

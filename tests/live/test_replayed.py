@@ -8,9 +8,9 @@ from warp_torchrl.live import words
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.live.replayed import ReplayedMatch
-from warp_torchrl.runs.sealed import Unsound
-from warp_torchrl.world.intervention import can_be_lit
-from warp_torchrl.world.state import Action
+from warp_torchrl.system.sealed import Unsound
+from warp_torchrl.world.ignition.intervention import can_be_lit
+from warp_torchrl.world.state.state import Action
 
 
 @pytest.fixture(scope="module")

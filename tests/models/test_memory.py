@@ -10,9 +10,7 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 from tests.conftest import small_world
 from warp_torchrl.algorithms.a2c import A2c
 from warp_torchrl.algorithms.ppo import Ppo
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.env.observation import Paper
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.models import (
     ACTION,
@@ -29,9 +27,11 @@ from warp_torchrl.models import (
     recurrent_actors,
     signature,
 )
-from warp_torchrl.observation import Paper
-from warp_torchrl.policy import TrainedPolicy
-from warp_torchrl.world.team import Team
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.policies.trained import TrainedPolicy
+from warp_torchrl.world.team.team import Team
 
 SMALL = {"actor_hidden": (16,), "critic_hidden": (16,), "memory": 8}
 MODELS = {

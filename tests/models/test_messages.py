@@ -14,17 +14,17 @@ from tests.models.canonical.test_canonical import (
     turned_world,
 )
 from warp_torchrl.algorithms.ppo import Ppo
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.saved_config import SavedConfig, restore
+from warp_torchrl.env.observation import Surroundings
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION, LOGITS, OBSERVATION, RADIO, SENT, Cnn, Mlp, over_canonical, signature
 from warp_torchrl.models.messages import Round
 from warp_torchrl.models.signature import canonical_key
-from warp_torchrl.observation import Surroundings
-from warp_torchrl.world.radio import Radio
-from warp_torchrl.world.team import Team
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.saved_config import SavedConfig, restore
+from warp_torchrl.world.team.radio import Radio
+from warp_torchrl.world.team.team import Team
 
 SMALL = {"actor_hidden": (16, 16), "critic_hidden": (16,), "messages": "graph", "message_size": 16}
 MODELS = {

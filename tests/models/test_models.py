@@ -7,6 +7,7 @@ from torch import nn
 from tests.conftest import small_world
 from warp_torchrl.algorithms.held_batch import ADVANTAGE, with_advantages
 from warp_torchrl.algorithms.ppo import Ppo
+from warp_torchrl.env.observation import Local, Paper, Surroundings
 from warp_torchrl.models import (
     ACTION,
     ACTION_ONE_HOT,
@@ -20,10 +21,9 @@ from warp_torchrl.models import (
     signature,
 )
 from warp_torchrl.models.networks import LinearEncoder
-from warp_torchrl.observation import Local, Paper, Surroundings
-from warp_torchrl.policy import TrainedPolicy
-from warp_torchrl.world.agencies import SeveralAgencies
-from warp_torchrl.world.team import Team
+from warp_torchrl.runs.policies.trained import TrainedPolicy
+from warp_torchrl.world.mechanics.agencies.agencies import SeveralAgencies
+from warp_torchrl.world.team.team import Team
 
 
 def test_the_encoder_equals_one_layer_over_joined_fractions():

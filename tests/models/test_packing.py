@@ -13,7 +13,7 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.models import CANONICAL_STATE, LOGITS, STATE, VALUE, Cnn, Entry, Mlp, signature
 from warp_torchrl.models.networks import LinearEncoder
 from warp_torchrl.models.packing import Packing
-from warp_torchrl.world.team import Team
+from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
 
 VIEW = Entry((4, 3, 3), "uint8", content=(None, Follows(0, -0.5, 128.0), Empty(), None))

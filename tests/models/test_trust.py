@@ -8,13 +8,13 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 from warp_torchrl.algorithms.dqn import Dqn
 from warp_torchrl.algorithms.ppo import Ppo
 from warp_torchrl.algorithms.sac import Sac
-from warp_torchrl.api import make_env
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.api.make import make_env
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION, LOGITS, Mlp, over_canonical, signature
 from warp_torchrl.models.trust import Trust
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.construction import ConfigError
 
 ADVISED = ("observation.advice=coordinated", "observation.rules=true")
 SMALL = {"actor_hidden": (16,), "critic_hidden": (8,), "dtype": "float32"}

@@ -57,9 +57,9 @@ def beside(module: str, also: dict[str, list[str]]) -> tuple[str, ...]:
     path = Path(module).relative_to("warp_torchrl").with_suffix("")
     mirror = Path("tests") / path.parent / f"test_{path.name}.py"
     named = [mirror.as_posix()] * (ROOT / mirror).exists() + also.get(path.as_posix(), [])
-    folder = f"tests/{path.parent}"
-    package = folder if (ROOT / folder).exists() else f"tests/test_{path.parent}.py"
-    return tuple(dict.fromkeys(named)) or (package,)
+    folders = [Path("tests") / each for each in path.parents]
+    package = next(each for each in folders if (ROOT / each).exists())
+    return tuple(dict.fromkeys(named)) or (package.as_posix(),)
 
 
 def annotations(source: str) -> list[tuple[Position, Position]]:

@@ -8,7 +8,7 @@ from tests.mutation import __main__ as command
 from tests.mutation.mutants import ROOT, Mutant, accepted, beside, drawn, places, plan, sample
 from tests.mutation.runner import KILLED, SURVIVED, TOO_LONG, Run, run, verdict
 
-MODULE = "warp_torchrl/world/law.py"
+MODULE = "warp_torchrl/world/law/law.py"
 
 
 def test_every_accepted_mutant_stands_in_the_code_with_a_reason():
@@ -27,7 +27,7 @@ def test_the_plan_names_what_there_is():
         for module in modules:
             tests = beside(module, settings["tests"])
             assert all((ROOT / each).exists() for each in tests), module
-            assert "tests/." not in tests, f"{module} has the whole suite beside it: name its tests in plan.toml"
+            assert "tests" not in tests, f"{module} has the whole suite beside it: name its tests in plan.toml"
     assert all((ROOT / "warp_torchrl" / f"{module}.py").exists() for module in settings["tests"])
 
 
@@ -40,8 +40,11 @@ def test_every_module_of_every_room_is_of_a_subject():
 
 
 def test_a_module_s_tests_are_its_mirror_and_what_the_plan_adds():
-    also = {"world/fire": ["tests/world/test_laws.py"]}
-    assert beside("warp_torchrl/world/fire.py", also) == ("tests/world/test_fire.py", "tests/world/test_laws.py")
+    also = {"world/law/fire": ["tests/world/test_laws.py"]}
+    assert beside("warp_torchrl/world/law/fire.py", also) == (
+        "tests/world/law/test_fire.py",
+        "tests/world/test_laws.py",
+    )
     assert beside("warp_torchrl/evaluation/statistics.py", also) == ("tests/evaluation/test_statistics.py",)
     assert beside("warp_torchrl/algorithms/replay.py", also) == ("tests/algorithms",)
 

@@ -5,13 +5,13 @@ import logging
 
 import pytest
 
-from tests.prediction.test_command import arguments, folder
-from warp_torchrl import memory
+from tests.commands.test_predict import arguments, folder
 from warp_torchrl.commands import predict as command
 from warp_torchrl.commands.predict import main
-from warp_torchrl.runs.exit_codes import DISK, DONE, IN_USE, MISTAKE
-from warp_torchrl.runs.lock import RunFolderLock
-from warp_torchrl.world.alone import Fires
+from warp_torchrl.system import memory
+from warp_torchrl.system.exit_codes import DISK, DONE, IN_USE, MISTAKE
+from warp_torchrl.system.lock import RunFolderLock
+from warp_torchrl.world.fires.alone import Fires
 
 __all__ = ["folder"]
 MAPS = {"burn_probability.tif", "arrival_hours.tif", "rate.tif", "intensity.tif", "flame_length.tif"}
@@ -106,7 +106,7 @@ def test_fires_that_memory_does_not_hold_are_refused_before_they_burn(folder, mo
 
 
 def test_the_report_and_the_log_name_what_was_read(folder, monkeypatch, caplog):
-    from warp_torchrl.provenance import Provenance, tell
+    from warp_torchrl.system.provenance import Provenance, tell
 
     read, one = command.read_case, Provenance(key="weather", file="w.csv", read={"WS": "km/h"}, left=("GUST",))
     monkeypatch.setattr(command, "read_case", lambda *given: tell(one) or read(*given))

@@ -9,12 +9,12 @@ from warp_torchrl import fire_history
 from warp_torchrl import predict as exported
 from warp_torchrl.prediction.passing import steepness
 from warp_torchrl.prediction.predict import lasting, predict
-from warp_torchrl.weather.table import WeatherTable
-from warp_torchrl.world import alone
-from warp_torchrl.world.alone import Spell, spread_in
-from warp_torchrl.world.rate import RateFire
-from warp_torchrl.world.state import Landscape
-from warp_torchrl.world.weather import Weather
+from warp_torchrl.world.air.weather import Weather
+from warp_torchrl.world.fires import alone
+from warp_torchrl.world.fires.alone import Spell, spread_in
+from warp_torchrl.world.law.rate import RateFire
+from warp_torchrl.world.state.state import Landscape
+from warp_torchrl.world.weather.table import WeatherTable
 
 SIDE = 61
 EVEN = RateFire(model="fbp", cell_deviation=0.0)

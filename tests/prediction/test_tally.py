@@ -3,15 +3,15 @@
 import pytest
 import torch
 
-from tests.world.fast.test_growing import land, lit
-from warp_torchrl import memory
+from tests.world.backends.test_growing import land, lit
 from warp_torchrl.prediction.counts import Counter
 from warp_torchrl.prediction.passing import Behaviour, passing, steepness_from
 from warp_torchrl.prediction.tally import Tally
-from warp_torchrl.world.alone import Burned, Fires, Spell
-from warp_torchrl.world.fast.window import Window
-from warp_torchrl.world.rate import RateFire
-from warp_torchrl.world.travel import NEVER
+from warp_torchrl.system import memory
+from warp_torchrl.world.fires.alone import Burned, Fires, Spell
+from warp_torchrl.world.law.rate import RateFire
+from warp_torchrl.world.law.travel import NEVER
+from warp_torchrl.world.state.window import Window
 
 SIZE = (6, 8)
 

@@ -12,11 +12,11 @@ import pytest
 import torch
 
 from tests.forgery import forge
-from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.saved_config import SavedConfig, restore
 from warp_torchrl.models import Entry, Signature
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.saved_config import SavedConfig, restore
 from warp_torchrl.runs.output import DRAFT
 from warp_torchrl.symmetry import Planes, to_plain
 

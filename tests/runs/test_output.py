@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.runs.lock import RunFolderInUse
+from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.output import DRAFT, draft_in, output_folder, publish
+from warp_torchrl.system.lock import RunFolderInUse
 
 
 def write(folder: Path, overwrite: bool = False, **texts: str) -> None:

@@ -3,8 +3,8 @@
 import pytest
 import yaml
 
-from warp_torchrl.config.compose import compose_config, plain, without_targets
-from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
+from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.resumption import _other_classes, edits, read_config
 
 NOT_RECORDED = ("resume", "debug")
@@ -64,7 +64,7 @@ def test_another_value_is_told_with_its_key(written, tmp_path, old, new, told):
 def test_another_class_of_the_same_fields_is_told_and_another_module_is_not(written):
     config, _ = written
     moved = {**config, "wind": {**config["wind"], "_target_": "warp_torchrl.wind.Uniform"}}
-    other = {**config, "wind": {**config["wind"], "_target_": "warp_torchrl.world.wind.Calm"}}
+    other = {**config, "wind": {**config["wind"], "_target_": "warp_torchrl.world.air.wind.Calm"}}
     renamed = {**config, "collector": {**config["collector"], "_target_": "warp_torchrl.collectors.Direct"}}
     assert _other_classes(moved, config) == _other_classes(renamed, config) == []
     assert _other_classes(other, config) == ["wind is Calm and was Uniform"]

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.config.test_conf import MISTAKES
+from tests.runs.config.test_conf import MISTAKES
 from warp_torchrl.commands.command import train
 
 pytestmark = pytest.mark.stress
@@ -107,7 +107,7 @@ INVALID = [
     "resume=. ++total_frames=3",
     "policy=greedy",
     "fire._target_=builtins.eval",
-    "reward._target_=warp_torchrl.world.fire.Fire2",
+    "reward._target_=warp_torchrl.world.law.fire.Fire2",
 ]
 
 VALID = [

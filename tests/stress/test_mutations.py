@@ -13,11 +13,11 @@ from tests.stress.saves import KINDS
 from tests.training.test_loop import tiny
 from warp_torchrl import load_policy
 from warp_torchrl.commands.command import evaluate
-from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.demonstrations.files import MANIFEST, find, read
 from warp_torchrl.demonstrations.replay import Replay
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
-from warp_torchrl.runs.sealed import Unsound, described, sealed
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.system.sealed import Unsound, described, sealed
 
 pytestmark = pytest.mark.stress
 MUTATIONS = 200

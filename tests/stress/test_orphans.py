@@ -19,7 +19,7 @@ COMMANDS = {
     "processes": (*TRAIN, "processes=2"),
     "collector": (*TRAIN, "collector=process", "collector.workers=2", "collector.steps=20000"),
     "sweep": (*TRAIN[:-1], "-m", "seed=0,1", "hydra/launcher=joblib", "hydra.launcher.n_jobs=3", "hydra.sweep.dir=run"),
-    "search": ("-m", "warp_torchrl.search", *TRAIN[1:-1], "search=ppo", "search.jobs=2", "search.out=run"),
+    "search": ("-m", "warp_torchrl", "search", *TRAIN[1:-1], "search=ppo", "search.jobs=2", "search.out=run"),
 }
 
 

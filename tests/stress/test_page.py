@@ -32,7 +32,7 @@ class Served:
     def __init__(self, folder, *arguments):
         self.folder, self.errors = folder, folder / "stderr"
         command = [
-            *(sys.executable, "-m", "warp_torchrl.live", "policy=skirmish", "port=0", "landscape.size=24"),
+            *(sys.executable, "-m", "warp_torchrl", "live", "policy=skirmish", "port=0", "landscape.size=24"),
             *("team.n_agents=3", "horizon=100000", *arguments),
         ]
         self.process = subprocess.Popen(

@@ -10,10 +10,11 @@ from tests.stress.power import with_power_cut
 from tests.world.rasters import write
 from warp_torchrl.commands import predict as command
 from warp_torchrl.commands.predict import OUTPUTS, REPORT
-from warp_torchrl.config.prediction_options import PredictionOptions
 from warp_torchrl.prediction.case import read_case
-from warp_torchrl.runs import disk, output
+from warp_torchrl.runs import output
+from warp_torchrl.runs.config.prediction_options import PredictionOptions
 from warp_torchrl.runs.output import DRAFT, output_folder
+from warp_torchrl.system import disk
 
 pytestmark = pytest.mark.stress
 

@@ -95,11 +95,11 @@ def test_a_killed_run_leaves_no_workers_and_lets_go_of_its_folder(tmp_path, capf
 
 COMMANDS = {
     "evaluate": ["evaluate.py", "policy=local", "scenario=skirmish", "evaluation.episodes=4000", "hydra.run.dir=seen"],
-    "correct": ["-m", "warp_torchrl.correct", "policy=skirmish", "out=people", "episodes=1000"],
-    "live": ["-m", "warp_torchrl.live", "policy=local", "scenario=skirmish", "port=0"],
-    "search": ["-m", "warp_torchrl.search", "search=ppo", "scenario=skirmish", "search.out=found"],
-    "benchmark": ["-m", "warp_torchrl.benchmark", "env", "--repeats", "99"],
-    "gallery": ["-m", "warp_torchrl.gallery", "--out", "figures"],
+    "correct": ["-m", "warp_torchrl", "correct", "policy=skirmish", "out=people", "episodes=1000"],
+    "live": ["-m", "warp_torchrl", "live", "policy=local", "scenario=skirmish", "port=0"],
+    "search": ["-m", "warp_torchrl", "search", "search=ppo", "scenario=skirmish", "search.out=found"],
+    "benchmark": ["-m", "warp_torchrl", "benchmark", "env", "--repeats", "99"],
+    "drawings": ["docs/drawings", "--out", "figures"],
     "processes": ["train.py", *LONG, "processes=2"],
 }
 

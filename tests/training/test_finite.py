@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from warp_torchrl.device import unread
+from warp_torchrl.system.device import unread
 from warp_torchrl.training.finite import FiniteSteps, NumericalFailure
 
 INF, NAN = float("inf"), float("nan")

@@ -11,13 +11,13 @@ from torch.nn.functional import cross_entropy
 from torchrl.objectives import BCLoss
 
 from warp_torchrl.collection.imitation import Imitation
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.evaluation.method import method
 from warp_torchrl.heuristics import HEURISTICS, TEACHERS
 from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, TEACHER_ACTION, over_canonical
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.training.kickstarting import _KickstartingLoss, kickstart
 from warp_torchrl.training.loop import Training
 

@@ -13,17 +13,17 @@ import numpy as np
 import pytest
 import torch
 
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import compose_config, conf_folder, plain, without_targets
-from warp_torchrl.config.saved_config import SavedConfig
-from warp_torchrl.load import policy_of
 from warp_torchrl.models import ACTION
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.checkpoint import CheckpointError, export, newest
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, conf_folder, plain, without_targets
+from warp_torchrl.runs.config.saved_config import SavedConfig
+from warp_torchrl.runs.policies.load import policy_of
+from warp_torchrl.system.signals import Stopped
 from warp_torchrl.training import loop
 from warp_torchrl.training.finite import NumericalFailure
 from warp_torchrl.training.loop import Training
-from warp_torchrl.training.signals import Stopped
 
 TINY = [
     "landscape.size=12",

@@ -5,10 +5,10 @@ import torch
 from torch.fx.experimental.proxy_tensor import make_fx
 
 from tests.training.test_waits import training
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.device import unread
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.system.device import unread
 from warp_torchrl.training.finite import NumericalFailure
 from warp_torchrl.training.recorded import RecordedUpdate
 

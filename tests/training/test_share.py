@@ -6,10 +6,10 @@ import pytest
 import torch
 
 from tests.training.test_loop import TINY, rows, tiny
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.seeds import first_world_seed
 from warp_torchrl.models import REWARD, differing, joint, signature
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.seeds import first_world_seed
 
 THREE = [
     "mixture=several",

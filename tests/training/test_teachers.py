@@ -4,12 +4,12 @@ import pytest
 import torch
 
 from tests.training.test_kickstarting import configured, sample_of
-from warp_torchrl.api import make_env
-from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.saved_config import SavedConfig
+from warp_torchrl.api.make import make_env
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.load import load_policy
 from warp_torchrl.models import ACTION, ACTION_MASK, TEACHER_ACTION
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.saved_config import SavedConfig
+from warp_torchrl.runs.policies.load import load_policy
 from warp_torchrl.training.loop import Training
 from warp_torchrl.training.teachers import TrainedTeacher, teacher
 

@@ -17,12 +17,12 @@ import torch
 from tests.demonstrations.played import played
 from tests.stress.processes import ROOT, TINY, alive, finish, rows, start, wait_for
 from tests.training.test_loop import flattened
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.saved_config import SavedConfig, restore
 from warp_torchrl.demonstrations.files import save
 from warp_torchrl.runs.checkpoint import newest
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.saved_config import SavedConfig, restore
 
 LENGTH = ("processes=2", "total_frames=256", "checkpoint.interval=64", "checkpoint.keep=9")
 

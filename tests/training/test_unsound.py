@@ -8,10 +8,10 @@ import torch
 from tests.training.test_loop import ALGORITHMS, RUNS, TINIER, tiny
 from warp_torchrl.commands.failure import NUMERICAL, fail
 from warp_torchrl.evaluation.play import play
-from warp_torchrl.finite import NumericalFailure, are_unsound, check_scores
 from warp_torchrl.models import LOGITS, OBSERVATION, REWARD, signature
-from warp_torchrl.policy import TrainedPolicy
 from warp_torchrl.runs.checkpoint import newest
+from warp_torchrl.runs.policies.trained import TrainedPolicy
+from warp_torchrl.system.finite import NumericalFailure, are_unsound, check_scores
 
 NAN, INF = math.nan, math.inf
 LEARNERS = [*ALGORITHMS, "remembers", "taught", "talks late", "regrets"]

@@ -4,10 +4,10 @@ import pytest
 import torch
 
 from warp_torchrl.benchmark.waits import counted_waits
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.saved_config import SavedConfig
-from warp_torchrl.device import unread
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.saved_config import SavedConfig
+from warp_torchrl.system.device import unread
 from warp_torchrl.training.loop import Training
 
 SMALL = ["n_worlds=8", "landscape.size=12", "horizon=20", "model.actor_hidden=[8]", "model.critic_hidden=[8]"]

@@ -4,9 +4,9 @@ import pytest
 
 from tests.training.test_loop import rows, tiny
 from tests.training.test_share import THREE
-from warp_torchrl.config.seeds import first_world_seed
+from warp_torchrl.collection.mixture import Mixture, weights
 from warp_torchrl.evaluation.play import play_heuristics
-from warp_torchrl.mixture import Mixture, weights
+from warp_torchrl.runs.config.seeds import first_world_seed
 from warp_torchrl.training.weighing import Weighing
 
 NAMES = ("one", "two", "large")

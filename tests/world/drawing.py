@@ -11,11 +11,11 @@ The ground under it is grassland, or drawn the same way: ~ lake, w wetland, g gr
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.random import world_key
-from warp_torchrl.world.state import Cover, Landscape, WorldState
-from warp_torchrl.world.team import Team
-from warp_torchrl.world.tick import initial_state
+from warp_torchrl.world.arrays.random import world_key
+from warp_torchrl.world.backends.tick import initial_state
+from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.state.state import Cover, Landscape, WorldState
+from warp_torchrl.world.team.team import Team
 
 CELLS = ".123456789Tabcde"
 GROUND = "~wgfb"

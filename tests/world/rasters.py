@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from warp_torchrl.world.random import world_key
+from warp_torchrl.world.arrays.random import world_key
 
 rasterio = pytest.importorskip("rasterio")
 

@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warp_torchrl.world.agencies import SeveralAgencies
-from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.flight import Flight
-from warp_torchrl.world.hazard import HazardFire
-from warp_torchrl.world.ignition import Ignition
-from warp_torchrl.world.radio import Radio
-from warp_torchrl.world.team import Team
+from warp_torchrl.world.air.wind import Paper, Uniform, Wandering
+from warp_torchrl.world.ignition.ignition import Ignition
+from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.law.hazard import HazardFire
+from warp_torchrl.world.mechanics.agencies.agencies import SeveralAgencies
+from warp_torchrl.world.team.flight import Flight
+from warp_torchrl.world.team.radio import Radio
+from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.landscape import Perlin
-from warp_torchrl.world.wind import Paper, Uniform, Wandering
 from warp_torchrl.world.world import World
 
 NAN, INF = math.nan, math.inf

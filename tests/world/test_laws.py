@@ -10,13 +10,13 @@ import pytest
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.burn import burn, start_burning, trace
-from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.hazard import HazardFire
-from warp_torchrl.world.state import WorldState, is_burning
-from warp_torchrl.world.tick import in_wind
-from warp_torchrl.world.wind import Uniform, constant_wind
-from warp_torchrl.world.wind_and_slope import length_to_breadth
+from warp_torchrl.world.air.wind import Uniform, constant_wind
+from warp_torchrl.world.backends.tick import in_wind
+from warp_torchrl.world.fires.burn import burn, start_burning, trace
+from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.law.hazard import HazardFire
+from warp_torchrl.world.law.wind_and_slope import length_to_breadth
+from warp_torchrl.world.state.state import WorldState, is_burning
 
 CALM = Uniform(speed=0.0)
 SLOW = pytest.mark.slow

@@ -5,21 +5,20 @@ import pytest
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.fast import road
-from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.gridded import Gridded
-from warp_torchrl.world.hazard import HazardFire
-from warp_torchrl.world.ignition import Ignition
-from warp_torchrl.world.random import Stream, uniform
-from warp_torchrl.world.state import Cover, WorldState, count_trees, is_burning, is_tree
-from warp_torchrl.world.team import Team
+from tests.world.drawing import differing, draw, drawn
+from warp_torchrl.world.air.gridded import Gridded
+from warp_torchrl.world.air.wind import Calm, Paper, Uniform, Wandering
+from warp_torchrl.world.arrays.random import Stream, uniform
+from warp_torchrl.world.backends import road
+from warp_torchrl.world.backends.tick import advance, in_wind
+from warp_torchrl.world.ignition.ignition import Ignition
+from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.law.hazard import HazardFire
+from warp_torchrl.world.state.state import Cover, WorldState, count_trees, is_burning, is_tree
+from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.landscape import Perlin
-from warp_torchrl.world.tick import advance, in_wind
-from warp_torchrl.world.wind import Calm, Paper, Uniform, Wandering
 from warp_torchrl.world.world import _CELLS_AT_ONCE, World
-
-from .drawing import differing, draw, drawn
 
 STAY, EXTINGUISH, CLEAR, EAST = 10, 8, 9, 2
 

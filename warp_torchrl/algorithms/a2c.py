@@ -11,7 +11,7 @@ from tensordict import TensorDictBase
 from torchrl.modules import ProbabilisticActor
 from torchrl.objectives import A2CLoss, ValueEstimators
 
-from warp_torchrl import parallel
+from warp_torchrl.algorithms import parallel
 from warp_torchrl.algorithms.on_policy import KEYS, OnPolicy
 
 

@@ -10,9 +10,8 @@ from torch import Tensor
 from torchrl.data import SamplerWithoutReplacement, TensorDictReplayBuffer
 from torchrl.objectives import LossModule
 
-from warp_torchrl import parallel
+from warp_torchrl.algorithms import parallel
 from warp_torchrl.algorithms.storage import BatchStorage
-from warp_torchrl.device import reads_freely
 from warp_torchrl.models import (
     CANONICAL,
     CANONICAL_STATE,
@@ -22,6 +21,7 @@ from warp_torchrl.models import (
     VALUE,
     CanonicalBatch,
 )
+from warp_torchrl.system.device import reads_freely
 
 ADVANTAGE = ("agents", "advantage")
 VALUE_TARGET = ("agents", "value_target")

@@ -15,7 +15,7 @@ from torchrl.modules import EGreedyModule
 from torchrl.objectives import HardUpdate, LossModule, SoftUpdate
 from torchrl.objectives.utils import TargetNetUpdater
 
-from warp_torchrl import parallel
+from warp_torchrl.algorithms import parallel
 from warp_torchrl.algorithms.algorithm import Algorithm, falling
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.algorithms.replay import ReplayMemory, check_prioritised, replay_buffer, weighted

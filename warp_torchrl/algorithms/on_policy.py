@@ -8,7 +8,7 @@ from torchrl.envs import EnvBase
 from torchrl.modules import ProbabilisticActor
 from torchrl.objectives import LossModule
 
-from warp_torchrl import parallel
+from warp_torchrl.algorithms import parallel
 from warp_torchrl.algorithms.algorithm import Algorithm, falling, masked_actor
 from warp_torchrl.algorithms.held_batch import ADVANTAGE, VALUE_TARGET, HeldBatch
 from warp_torchrl.algorithms.learner import Learner

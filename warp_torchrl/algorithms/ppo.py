@@ -13,7 +13,7 @@ from torch import Tensor
 from torchrl.modules import MaskedCategorical, PopArtValueNorm, ProbabilisticActor
 from torchrl.objectives.multiagent import IPPOLoss, MAPPOLoss
 
-from warp_torchrl import parallel
+from warp_torchrl.algorithms import parallel
 from warp_torchrl.algorithms.on_policy import KEYS, OnPolicy
 
 

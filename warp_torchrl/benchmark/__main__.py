@@ -1,4 +1,4 @@
-"""Measures speed, calibrates scenarios and checks fires: ``python -m warp_torchrl.benchmark WHAT``.
+"""Measures speed, calibrates scenarios and checks fires: ``warp benchmark WHAT``.
 
 WHAT is tick, env, train, scaling, tasks, rewards, generalist, fires, ellipses or predict; several are measured one
 after the other. Alone, gpu measures all that a card is asked, in under five minutes, and writes it to a file.
@@ -39,13 +39,13 @@ from warp_torchrl.benchmark.tasks import (
 )
 from warp_torchrl.benchmark.ticks import tick_cost, tick_table
 from warp_torchrl.benchmark.trainings import training_speed
-from warp_torchrl.commands.allocation import keep_freed_memory
 from warp_torchrl.commands.program import one_line_end
-from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.flags import FlagParser, file_to_write, whole
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.runs.checkpoint import CheckpointError
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.system.flags import FlagParser, file_to_write, whole
+from warp_torchrl.system.malloc import keep_freed_memory
+from warp_torchrl.validation import did_you_mean
 
 Rows = list[dict[str, Any]]
 _WORLDS = 256
@@ -172,7 +172,7 @@ _TABLES = {
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = FlagParser(prog="python -m warp_torchrl.benchmark", description=__doc__)
+    parser = FlagParser(prog="warp benchmark", description=__doc__)
     parser.add_argument("what", nargs="*", choices=[[], *_MEASURES, "gpu"], help="env and train by default")
     parser.add_argument(
         "--scenario",

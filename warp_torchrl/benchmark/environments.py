@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from warp_torchrl.api import make_env
+from warp_torchrl.api.make import make_env
 from warp_torchrl.benchmark.tables import entry, spread_of, table
 from warp_torchrl.benchmark.timing import mean_rate, take_turns
 from warp_torchrl.world.world import World

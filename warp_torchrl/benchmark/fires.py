@@ -9,16 +9,16 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.benchmark.tables import entry, table
-from warp_torchrl.simulation import fire_history
-from warp_torchrl.world.alone import Spell, arrival_minutes, spread_in
-from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.hazard import HazardFire
-from warp_torchrl.world.random import world_key
-from warp_torchrl.world.rate import RateFire
-from warp_torchrl.world.state import Landscape
+from warp_torchrl.prediction.simulation import fire_history
+from warp_torchrl.world.air.weather import Weather
+from warp_torchrl.world.air.wind import Uniform
+from warp_torchrl.world.arrays.random import world_key
+from warp_torchrl.world.fires.alone import Spell, arrival_minutes, spread_in
+from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.law.hazard import HazardFire
+from warp_torchrl.world.law.rate import RateFire
+from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.terrain.landscape import Perlin
-from warp_torchrl.world.weather import Weather
-from warp_torchrl.world.wind import Uniform
 
 _SIZE = (126, 127)
 _TICKS = 256  # of the paper's laws, in which their fires cross the map

@@ -6,13 +6,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import torch
 
-from warp_torchrl.api import make_env
+from warp_torchrl.api.make import make_env
 from warp_torchrl.benchmark.tasks import FIRST_SEED, SCENARIOS, difference_cell, interval_cell
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation.play import play, play_heuristics
 from warp_torchrl.evaluation.statistics import compare, summarise
-from warp_torchrl.load import load_policy
-from warp_torchrl.policy import TrainedPolicy
+from warp_torchrl.runs.policies.load import load_policy
+from warp_torchrl.runs.policies.trained import TrainedPolicy
 
 
 class Place(NamedTuple):

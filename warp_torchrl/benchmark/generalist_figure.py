@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from warp_torchrl.drawing import BLUE, GRID, ORANGE, SOFT, save, sheet, style
+from warp_torchrl.env.pictures.drawing import BLUE, GRID, ORANGE, SOFT, save, sheet, style
 
 _DRAWN = {"policy": ("policy", BLUE, -0.15), "beside": ("rival, named on the right", ORANGE, 0.15)}
 """Label, colour and offset [rows] of what is drawn of a row."""

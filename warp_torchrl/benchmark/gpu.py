@@ -17,18 +17,18 @@ from typing import Any
 
 import torch
 
-from warp_torchrl.api import make_env
+from warp_torchrl.api.make import make_env
 from warp_torchrl.benchmark.environments import random_play
 from warp_torchrl.benchmark.machine import machine, peak_memory
 from warp_torchrl.benchmark.timing import clock, spread, take_turns
 from warp_torchrl.benchmark.waits import counted_waits
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.saved_config import SavedConfig
-from warp_torchrl.device import unread
-from warp_torchrl.runs import disk
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.saved_config import SavedConfig
+from warp_torchrl.system import disk
+from warp_torchrl.system.device import unread
 from warp_torchrl.training.loop import Training
-from warp_torchrl.world.tick import advance
+from warp_torchrl.world.backends.tick import advance
 
 _SCENARIO = "skirmish"
 _WAYS: dict[str, dict[str, Any]] = {"eager": {}, "graph": {"graph": True}, "compiled": {"compile": True}}

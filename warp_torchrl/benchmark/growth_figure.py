@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warp_torchrl.drawing import BLUE, GRID, INK, SOFT, VERMILION, save, sheet, style
+from warp_torchrl.env.pictures.drawing import BLUE, GRID, INK, SOFT, VERMILION, save, sheet, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,9 +9,9 @@ from pettingzoo import ParallelEnv
 from warp_torchrl.benchmark.numpy_team import NumpyTeam
 from warp_torchrl.benchmark.numpy_terrain import light, new_ground, start_cells
 from warp_torchrl.benchmark.numpy_world import NumpyWorld
-from warp_torchrl.reward import Efficiency
-from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.state import Action, Cover
+from warp_torchrl.env.reward import Efficiency
+from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.state.state import Action, Cover
 
 _WIND = 4.0  # m/s, as conf/wind/uniform.yaml
 _REWARD = Efficiency()

@@ -4,9 +4,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from warp_torchrl.benchmark.numpy_world import NumpyWorld
-from warp_torchrl.reward import Efficiency
-from warp_torchrl.world.geometry import DIRECTIONS
-from warp_torchrl.world.state import EMBER, FIRST_FIRE, OLDEST, Action, Cover
+from warp_torchrl.env.reward import Efficiency
+from warp_torchrl.world.arrays.geometry import DIRECTIONS
+from warp_torchrl.world.state.state import EMBER, FIRST_FIRE, OLDEST, Action, Cover
 
 _CODES = np.arange(EMBER + 1)
 _AGE = np.where(_CODES <= OLDEST, _CODES / OLDEST, 0.0).astype(np.float32)
@@ -78,7 +78,7 @@ class NumpyTeam:
         return int(np.count_nonzero(wants_water | wants_clear))
 
     def observe(self) -> np.ndarray:
-        """Return the agents' observations, float32 [A, 3 (2 r + 1)^2]: see ``warp_torchrl.observation.Paper``."""
+        """Return the agents' observations, float32 [A, 3 (2 r + 1)^2]: see ``warp_torchrl.env.observation.Paper``."""
         radius = self.radius
         self._frame[radius:-radius, radius:-radius] = self.world.on_map(self.world.cells)
         row, column = self.places

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from warp_torchrl.world.state import OLDEST, Cover
+from warp_torchrl.world.state.state import OLDEST, Cover
 from warp_torchrl.world.terrain.landscape import Perlin
 
 _PERLIN: dict[str, Any] = asdict(Perlin())

@@ -8,10 +8,10 @@ import math
 
 import numpy as np
 
-from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.geometry import DIRECTIONS, DISTANCES
-from warp_torchrl.world.state import EMBER, FIRST_FIRE, OLDEST, Cover
-from warp_torchrl.world.wind import Wind
+from warp_torchrl.world.air.wind import Wind
+from warp_torchrl.world.arrays.geometry import DIRECTIONS, DISTANCES
+from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.state.state import EMBER, FIRST_FIRE, OLDEST, Cover
 
 _ONE = np.float32(1.0)
 
@@ -148,7 +148,7 @@ def _chances(
 ) -> np.ndarray:
     """Return the chance to be ignited from each direction by a neighbour that burns, float32 [8, H, W].
 
-    p_d = clip(alpha w_d s_d / dist_d, 0, 1), wind read at the source; see ``warp_torchrl.world.law``.
+    p_d = clip(alpha w_d s_d / dist_d, 0, 1), wind read at the source; see ``warp_torchrl.world.law.law``.
     """
     height, width = alpha.shape
     u, v = wind if wind.shape[1:] == (1, 1) else np.pad(wind, ((0, 0), (1, 1), (1, 1)))

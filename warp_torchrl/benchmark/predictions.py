@@ -13,8 +13,8 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.benchmark.tables import entry, table
-from warp_torchrl.maps.geotiff import local_grid, write_geotiff
-from warp_torchrl.parent import environment
+from warp_torchrl.system.parent import environment
+from warp_torchrl.world.terrain.geotiff import local_grid, write_geotiff
 
 _CELL = 30.0  # [m]
 _PATCH = 20  # cells of one fuel, across
@@ -45,7 +45,7 @@ def _cost(side: int, hours: int) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         _write_case(Path(folder), side, hours)
         process = subprocess.Popen(
-            [sys.executable, "-m", "warp_torchrl.predict", *_arguments(Path(folder))],
+            [sys.executable, "-m", "warp_torchrl", "predict", *_arguments(Path(folder))],
             stdout=subprocess.DEVNULL,
             stderr=(Path(folder) / "stderr").open("wb"),
             env={**environment(), "OMP_NUM_THREADS": "1"},

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from torch import Tensor
 
-from warp_torchrl.api import make_env
+from warp_torchrl.api.make import make_env
 from warp_torchrl.benchmark.machine import peak_memory
 from warp_torchrl.benchmark.tables import entry, spread_of, table
 from warp_torchrl.benchmark.timing import clock, spread

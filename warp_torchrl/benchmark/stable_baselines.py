@@ -7,8 +7,8 @@ import torch
 
 from warp_torchrl.algorithms.ppo import Ppo
 from warp_torchrl.benchmark.environments import paper_stack
-from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.models import Mlp
+from warp_torchrl.runs.config.run_config import RunConfig
 
 NAME = "SuperSuit + SB3 PPO"
 

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import torch
 
-from warp_torchrl.api import make_env
+from warp_torchrl.api.make import make_env
 from warp_torchrl.benchmark.timing import clock
+from warp_torchrl.env.reward import Adaptive, Collaborative, Coverage, Efficiency, Paper, Reward, Time
 from warp_torchrl.evaluation.play import BASELINES, play, play_heuristics
 from warp_torchrl.evaluation.statistics import compare, summarise
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.reward import Adaptive, Collaborative, Coverage, Efficiency, Paper, Reward, Time
-from warp_torchrl.world.state import Transition
+from warp_torchrl.world.state.state import Transition
 
 SCENARIOS = (
     "skirmish",

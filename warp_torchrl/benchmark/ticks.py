@@ -6,16 +6,16 @@ from typing import Any
 import numpy as np
 import torch
 
-from warp_torchrl.api import make_env
+from warp_torchrl.api.make import make_env
 from warp_torchrl.benchmark.numpy_world import NumpyWorld, plays
 from warp_torchrl.benchmark.tables import entry, spread_of, table
 from warp_torchrl.benchmark.timing import spread, take_turns
-from warp_torchrl.world.burn import burn
-from warp_torchrl.world.fast.compile import check_compiler, compiled
-from warp_torchrl.world.fast.road import in_bytes
-from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.state import WorldState
-from warp_torchrl.world.tick import advance
+from warp_torchrl.world.arrays.compile import check_compiler, compiled
+from warp_torchrl.world.backends.road import in_bytes
+from warp_torchrl.world.backends.tick import advance
+from warp_torchrl.world.fires.burn import burn
+from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.world import World
 
 _TICKS = 10  # in a repeat, and before

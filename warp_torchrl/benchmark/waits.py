@@ -60,7 +60,7 @@ def counted_waits(device: torch.device | str) -> Iterator[Waits]:
 
     Args:
         device: Where the worlds live. If that is a CPU, what a GPU would compute must run inside
-            ``warp_torchrl.device.unread()``.
+            ``warp_torchrl.system.device.unread()``.
     """
     found = Waits()
     if torch.device(device).type != "cpu":

@@ -12,7 +12,7 @@ import torch
 from tensordict import TensorDictBase
 from torch import Tensor
 
-from warp_torchrl import parallel
+from warp_torchrl.algorithms import parallel
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.collection.imitation import CLONING_COLUMN, CLONING_LOSS, Imitation
 from warp_torchrl.models import ACTION

@@ -12,7 +12,7 @@ from torchrl.collectors import BaseCollector, Collector
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.collection.running import Collection, InProcessCollection, MultiProcessCollection
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.parent import bind_workers, end_with
+from warp_torchrl.system.parent import bind_workers, end_with
 from warp_torchrl.validation import check_fields
 
 MakeEnv = Callable[[int, int], WildfireEnv]

@@ -9,9 +9,8 @@ from warp_torchrl.algorithms.on_policy import OnPolicy
 from warp_torchrl.collection.collectors import InProcess, MultiProcess
 from warp_torchrl.heuristics import HEURISTICS, TEACHERS
 from warp_torchrl.models import Mlp
-from warp_torchrl.nearest import did_you_mean
-from warp_torchrl.shipped import policy_names
-from warp_torchrl.validation import check_fields
+from warp_torchrl.system.shipped import policy_names
+from warp_torchrl.validation import check_fields, did_you_mean
 
 CLONING_LOSS, CLONING_COLUMN = "loss_bc", "train/cloning_loss"
 """The term of the loss, the sum of the teacher's and the people's where there are both, and its column."""

@@ -8,8 +8,8 @@ from tensordict import TensorDict, TensorDictBase
 from torchrl.collectors import BaseCollector, Collector
 
 from warp_torchrl.algorithms.learner import Learner
+from warp_torchrl.algorithms.parallel import WorkerDied
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.parallel import WorkerDied
 
 
 class Collection(Protocol):

@@ -9,25 +9,25 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from warp_torchrl.calibration.case import FireCase, read_case
-from warp_torchrl.calibration.fitting import check_fuel, check_told, fitted, folds, null_scores, score
-from warp_torchrl.calibration.options import CalibrationOptions
-from warp_torchrl.calibration.parameters import Parameter, parameters_of
-from warp_torchrl.calibration.report import as_numbers, law_yaml, means, table
-from warp_torchrl.calibration.scores import Scores
 from warp_torchrl.commands.program import run_program
-from warp_torchrl.config.compose import compose_config, plain, without_targets
-from warp_torchrl.config.construction import ConfigError, build, construct
-from warp_torchrl.config.grammar import check_flags
-from warp_torchrl.provenance import Provenance, gathered, section, tell
-from warp_torchrl.runs import disk
+from warp_torchrl.prediction.calibration.case import FireCase, read_case
+from warp_torchrl.prediction.calibration.fitting import check_fuel, check_told, fitted, folds, null_scores, score
+from warp_torchrl.prediction.calibration.options import CalibrationOptions
+from warp_torchrl.prediction.calibration.parameters import Parameter, parameters_of
+from warp_torchrl.prediction.calibration.report import as_numbers, law_yaml, means, table
+from warp_torchrl.prediction.calibration.scores import Scores
+from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
+from warp_torchrl.runs.config.construction import ConfigError, build, construct
+from warp_torchrl.runs.config.grammar import check_flags
 from warp_torchrl.runs.output import output_folder
-from warp_torchrl.world.rate import RateFire
+from warp_torchrl.system import disk
+from warp_torchrl.system.provenance import Provenance, gathered, section, tell
+from warp_torchrl.world.law.rate import RateFire
 
 log = logging.getLogger("warp_torchrl")
 
 REPORT = "calibration.json"
-USAGE = "python -m warp_torchrl.calibrate fires=[FOLDER,...] [parameters=[rate_gain,...]] [KEY=VALUE ...]"
+USAGE = "warp calibrate fires=[FOLDER,...] [parameters=[rate_gain,...]] [KEY=VALUE ...]"
 LAW = "fire/calibrated.yaml"
 """In the folder that the command writes, so that ``--config-dir`` takes that folder."""
 OUTPUTS = (LAW, "calibration.md")

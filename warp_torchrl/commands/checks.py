@@ -15,23 +15,22 @@ from omegaconf import DictConfig, OmegaConf
 
 from warp_torchrl.commands.failure import fail
 from warp_torchrl.commands.sweep import jobs
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import HYDRA_ERRORS, check_choices, explain, plain
-from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.run_config import RunConfig
-from warp_torchrl.config.saved_config import restore
-from warp_torchrl.config.seeds import BEYOND_EVALUATION
 from warp_torchrl.demonstrations.acts import demonstrations
 from warp_torchrl.evaluation.evaluate import check_policy
 from warp_torchrl.evaluation.picture import Kind
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.nearest import did_you_mean
 from warp_torchrl.runs import checkpoint as checkpoints
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import HYDRA_ERRORS, check_choices, explain, plain
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.run_config import RunConfig
+from warp_torchrl.runs.config.saved_config import restore
+from warp_torchrl.runs.config.seeds import BEYOND_EVALUATION
 from warp_torchrl.runs.destination import check_free
+from warp_torchrl.runs.policies.find import find_policy
 from warp_torchrl.runs.resumption import resumption
-from warp_torchrl.runs.shipped import find_policy
 from warp_torchrl.runs.transfer import check_start
-from warp_torchrl.validation import fit
+from warp_torchrl.validation import did_you_mean, fit
 
 _MOST_FIRES = 1_000_000
 _PICTURE_NEEDS = {"html": ("viser", "live"), "mp4": ("av", "video")}  # module, and the extra that has it

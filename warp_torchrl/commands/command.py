@@ -12,30 +12,30 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 
-from warp_torchrl import parallel
-from warp_torchrl.commands.allocation import keep_freed_memory
+from warp_torchrl.algorithms import parallel
 from warp_torchrl.commands.checks import map_fires, new_total, of_worlds, picture, without_checkpoint
 from warp_torchrl.commands.failure import fail
 from warp_torchrl.commands.following import FOLLOWING, folder_of_its_own, follow
 from warp_torchrl.commands.queue import queued
 from warp_torchrl.commands.sweep import SweepSummary, remove_failure, save_failure, summarise_unfinished
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import HYDRA_ERRORS, conf_folder, explain, option_of, plain, without_targets
-from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.grammar import check_flags, check_overrides
-from warp_torchrl.config.groups import COMPONENTS
-from warp_torchrl.config.renamed import renamed_overrides
-from warp_torchrl.config.saved_config import SavedConfig, restore, world_overrides
 from warp_torchrl.evaluation.evaluate import evaluate_policy
-from warp_torchrl.parent import SECONDS_TO_SAVE, end_with, is_orphaned
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs import disk
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import HYDRA_ERRORS, conf_folder, explain, option_of, plain, without_targets
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.grammar import check_flags, check_overrides
+from warp_torchrl.runs.config.groups import COMPONENTS
+from warp_torchrl.runs.config.renamed import renamed_overrides
+from warp_torchrl.runs.config.saved_config import SavedConfig, restore, world_overrides
 from warp_torchrl.runs.destination import check_free
-from warp_torchrl.runs.lock import RunFolderLock
+from warp_torchrl.runs.policies.find import find_policy
 from warp_torchrl.runs.resumption import Resumption, is_run_of, resumption
-from warp_torchrl.runs.shipped import find_policy
+from warp_torchrl.system import disk
+from warp_torchrl.system.lock import RunFolderLock
+from warp_torchrl.system.malloc import keep_freed_memory
+from warp_torchrl.system.parent import SECONDS_TO_SAVE, end_with, is_orphaned
+from warp_torchrl.system.signals import Stopped, exit_on_signal
 from warp_torchrl.training.loop import Training
-from warp_torchrl.training.signals import Stopped, exit_on_signal
 
 log = logging.getLogger("warp_torchrl")
 
@@ -45,12 +45,12 @@ _NOT_RECORDED = ("resume", "debug", "policy", "hydra")
 
 
 def train() -> None:
-    """Run ``python train.py`` or ``warp-train``; ends the process with an exit code."""
+    """Run ``python train.py`` or ``warp train``; ends the process with an exit code."""
     _run("train", _train_job)
 
 
 def evaluate() -> None:
-    """Run ``python evaluate.py`` or ``warp-evaluate``; ends the process with an exit code."""
+    """Run ``python evaluate.py`` or ``warp evaluate``; ends the process with an exit code."""
     _run("evaluate", _evaluate_job)
 
 

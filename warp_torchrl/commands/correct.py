@@ -4,19 +4,19 @@ from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 
+from warp_torchrl.commands.correction import Correction, Session
 from warp_torchrl.commands.program import run_program
-from warp_torchrl.config.construction import ConfigError, construct
-from warp_torchrl.config.grammar import own_values
-from warp_torchrl.correction import Correction, Session
 from warp_torchrl.demonstrations.files import save
 from warp_torchrl.demonstrations.scripted import Person
 from warp_torchrl.demonstrations.summary import Summary, summary
-from warp_torchrl.runs import disk
-from warp_torchrl.runs.lock import RunFolderLock
+from warp_torchrl.runs.config.construction import ConfigError, construct
+from warp_torchrl.runs.config.grammar import own_values
 from warp_torchrl.runs.output import remove_if_empty
+from warp_torchrl.system import disk
+from warp_torchrl.system.lock import RunFolderLock
 
 USAGE = (
-    "python -m warp_torchrl.correct policy=NAME or FOLDER out=FOLDER [episodes=32] [acts=1000] [seed=0] "
+    "warp correct policy=NAME or FOLDER out=FOLDER [episodes=32] [acts=1000] [seed=0] "
     "[by=coordinated] [delay=1] [error=0.1] [threshold=0.5] [KEY=VALUE ...]"
 )
 _TEXTS = ("policy", "out", "by")

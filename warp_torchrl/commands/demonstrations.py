@@ -7,22 +7,22 @@ from pathlib import Path
 
 from warp_torchrl.commands.failure import DONE
 from warp_torchrl.commands.program import run_program
-from warp_torchrl.config.construction import ConfigError, construct
-from warp_torchrl.config.grammar import check_flags, own_values
 from warp_torchrl.demonstrations.export import export
 from warp_torchrl.demonstrations.files import find, read
 from warp_torchrl.demonstrations.recording import Recording
 from warp_torchrl.demonstrations.replay import Replay
 from warp_torchrl.demonstrations.summary import summary, table
-from warp_torchrl.runs.sealed import Unsound
+from warp_torchrl.runs.config.construction import ConfigError, construct
+from warp_torchrl.runs.config.grammar import check_flags, own_values
+from warp_torchrl.system.sealed import Unsound
 from warp_torchrl.validation import check_fields
 
-USAGE = "python -m warp_torchrl.demonstrations FOLDER [check=true] [export=FILE.npz] [html=FILE.html]"
+USAGE = "warp demonstrations FOLDER [check=true] [export=FILE.npz] [html=FILE.html]"
 
 
 @dataclass(frozen=True, kw_only=True)
 class DemonstrationOptions:
-    """What ``python -m warp_torchrl.demonstrations`` is told.
+    """What ``warp demonstrations`` is told.
 
     Attributes:
         folder: A recording, or a folder of recordings.

@@ -12,13 +12,13 @@ from typing import Any
 
 import torch
 
-from warp_torchrl import parallel
-from warp_torchrl.commands.allocation import keep_freed_memory
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.saved_config import SavedConfig
+from warp_torchrl.algorithms import parallel
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.saved_config import SavedConfig
+from warp_torchrl.system.malloc import keep_freed_memory
+from warp_torchrl.system.signals import Stopped
 from warp_torchrl.training.finite import NumericalFailure
 from warp_torchrl.training.loop import Training
-from warp_torchrl.training.signals import Stopped
 
 FOLLOWING = "warp_torchrl.commands.following"
 """The module that another process runs."""

@@ -13,19 +13,19 @@ from typing import Any
 from tqdm import tqdm
 
 from warp_torchrl.commands.program import run_program
-from warp_torchrl.config.compose import compose_config, plain, without_targets
-from warp_torchrl.config.construction import ConfigError, build, construct
-from warp_torchrl.config.grammar import check_flags
-from warp_torchrl.config.prediction_options import PredictionOptions
 from warp_torchrl.prediction.animation import write_animation
 from warp_torchrl.prediction.case import Case, read_case, whole_map
 from warp_torchrl.prediction.files import FIGURE, write_figure, write_layers, write_perimeters
 from warp_torchrl.prediction.predict import Prediction, lasting, predict
 from warp_torchrl.prediction.report import numbers, page, warnings
-from warp_torchrl.provenance import Provenance, gathered
-from warp_torchrl.runs import disk
+from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
+from warp_torchrl.runs.config.construction import ConfigError, build, construct
+from warp_torchrl.runs.config.grammar import check_flags
+from warp_torchrl.runs.config.prediction_options import PredictionOptions
 from warp_torchrl.runs.output import output_folder
-from warp_torchrl.world.rate import RateFire
+from warp_torchrl.system import disk
+from warp_torchrl.system.provenance import Provenance, gathered
+from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.terrain.raster import Raster
 
 log = logging.getLogger("warp_torchrl")
@@ -37,10 +37,7 @@ OUTPUTS = (
     *("perimeters.geojson", FIGURE, "fire.gif", "report.md"),
 )
 """What an earlier prediction may have left, beside its report."""
-USAGE = (
-    "python -m warp_torchrl.predict landscape.path=FOLDER weather=FILE.csv ignition=FILE [hours=24] [fires=1000] "
-    "[KEY=VALUE ...]"
-)
+USAGE = "warp predict landscape.path=FOLDER weather=FILE.csv ignition=FILE [hours=24] [fires=1000] [KEY=VALUE ...]"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from warp_torchrl.commands.program import run_program
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.construction import ConfigError, construct
-from warp_torchrl.config.grammar import own_values
-from warp_torchrl.config.seeds import FIRST_EVALUATED
 from warp_torchrl.evaluation.probe import Reading, probe
-from warp_torchrl.named_policy import NamedPolicy, fitted_policy
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.construction import ConfigError, construct
+from warp_torchrl.runs.config.grammar import own_values
+from warp_torchrl.runs.config.seeds import FIRST_EVALUATED
+from warp_torchrl.runs.policies.named_policy import NamedPolicy, fitted_policy
 from warp_torchrl.validation import check_fields
 
-USAGE = "python -m warp_torchrl.probe policy=NAME or FOLDER [episodes=64] [KEY=VALUE ...]"
+USAGE = "warp probe policy=NAME or FOLDER [episodes=64] [KEY=VALUE ...]"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from warp_torchrl.commands.failure import DONE, fail
-from warp_torchrl.training.signals import exit_on_signal
+from warp_torchrl.system.signals import exit_on_signal
 
 
 def run_program(arguments: Sequence[str] | None, about: str, do: Callable[[list[str]], int | None]) -> int:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
-from warp_torchrl.training.signals import Stopped, warning_of_submitit
+from warp_torchrl.system.signals import Stopped, warning_of_submitit
 
 Handler = Callable[[int, FrameType | None], object]
 

@@ -17,20 +17,20 @@ import torch
 from warp_torchrl.commands.checks import check_training
 from warp_torchrl.commands.failure import DONE
 from warp_torchrl.commands.program import run_program
-from warp_torchrl.config.compose import GROUPS, compose_config, conf_folder, plain, without_targets
-from warp_torchrl.config.construction import ConfigError, UnknownKeyError, construct
-from warp_torchrl.config.grammar import check_flags, check_overrides
-from warp_torchrl.config.groups import COMPONENTS
-from warp_torchrl.config.renamed import renamed_overrides
-from warp_torchrl.config.search_options import SearchOptions
-from warp_torchrl.config.space import Dimension, Value, divided
-from warp_torchrl.foreign import read_json
-from warp_torchrl.hyperparameters.training import SearchEnded, TrainingProcess
-from warp_torchrl.runs import disk
 from warp_torchrl.runs.checkpoint import holds_any
+from warp_torchrl.runs.config.compose import GROUPS, compose_config, conf_folder, plain, without_targets
+from warp_torchrl.runs.config.construction import ConfigError, UnknownKeyError, construct
+from warp_torchrl.runs.config.grammar import check_flags, check_overrides
+from warp_torchrl.runs.config.groups import COMPONENTS
+from warp_torchrl.runs.config.renamed import renamed_overrides
+from warp_torchrl.runs.config.search_options import SearchOptions
+from warp_torchrl.runs.config.space import Dimension, Value, divided
 from warp_torchrl.runs.destination import check_free
-from warp_torchrl.runs.lock import RunFolderLock
-from warp_torchrl.training.signals import DeferredSignals
+from warp_torchrl.runs.process import SearchEnded, TrainingProcess
+from warp_torchrl.system import disk
+from warp_torchrl.system.foreign import read_json
+from warp_torchrl.system.lock import RunFolderLock
+from warp_torchrl.system.signals import DeferredSignals
 
 if TYPE_CHECKING:
     import optuna
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("warp_torchrl")
 
 USAGE = (
-    "python -m warp_torchrl.search [search=NAME] [KEY='tag(log, interval(LOW, HIGH))' ...] [KEY=VALUE ...] "
+    "warp search [search=NAME] [KEY='tag(log, interval(LOW, HIGH))' ...] [KEY=VALUE ...] "
     "[search.trials=30] [search.jobs=1]"
 )
 FIRES = 1_000_000_000
@@ -196,9 +196,9 @@ def _differing(name: str, was: Any, now: Any) -> str:
 def _search(
     folder: Path, space: Sequence[Dimension], fixed: Sequence[str], options: SearchOptions, base: Mapping[str, Any]
 ) -> int:
-    from warp_torchrl.hyperparameters.report import write
-    from warp_torchrl.hyperparameters.search import Search
-    from warp_torchrl.hyperparameters.storage import open_study
+    from warp_torchrl.commands.hyperparameters.report import write
+    from warp_torchrl.commands.hyperparameters.search import Search
+    from warp_torchrl.commands.hyperparameters.storage import open_study
 
     study = open_study(folder, options)
     _first(study, space, base)
@@ -270,7 +270,7 @@ def _quoted(path: Path) -> str:
 
 
 def _draw(study: "optuna.Study", space: Sequence[Dimension], folder: Path) -> None:
-    from warp_torchrl.hyperparameters.figure import draw
+    from warp_torchrl.commands.hyperparameters.figure import draw
 
     try:
         draw(study, space, folder)

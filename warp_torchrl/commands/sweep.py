@@ -15,11 +15,11 @@ from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.experimental.callback import Callback
 from omegaconf import DictConfig
 
-from warp_torchrl import summary
-from warp_torchrl.config.construction import ConfigError, construct
-from warp_torchrl.foreign import read_json
-from warp_torchrl.parent import SECONDS_TO_SAVE, bind_workers, end_with
-from warp_torchrl.runs import disk
+from warp_torchrl.evaluation import summary
+from warp_torchrl.runs.config.construction import ConfigError, construct
+from warp_torchrl.system import disk
+from warp_torchrl.system.foreign import read_json
+from warp_torchrl.system.parent import SECONDS_TO_SAVE, bind_workers, end_with
 
 FAILURE = "failed.json"
 _JOBLIB = "hydra_joblib_launcher"

@@ -11,14 +11,14 @@ from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
 
 from warp_torchrl.collection.cloning import AGENT, Demonstrations
-from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.demonstrations.files import MANIFEST, find, read
 from warp_torchrl.demonstrations.recording import Mover, Recording
 from warp_torchrl.demonstrations.replay import Replay
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.models import ACTION, ACTION_MASK, ROLE, Signature, signature
-from warp_torchrl.runs.sealed import Unsound
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.run_config import RunConfig
+from warp_torchrl.system.sealed import Unsound
 
 
 def demonstrations(plan: RunConfig, env: WildfireEnv) -> Demonstrations | None:

@@ -9,9 +9,9 @@ import torch
 from tensordict import TensorDictBase
 
 from warp_torchrl.demonstrations.recording import MOVER, PROPOSED, ROLE, Mover
-from warp_torchrl.finite import not_finite
 from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, REWARD
-from warp_torchrl.world.role import PAPER_ROLES
+from warp_torchrl.system.finite import not_finite
+from warp_torchrl.world.state.role import PAPER_ROLES
 
 DTYPES = {str(each).removeprefix("torch."): each for each in (torch.bool, torch.uint8, torch.int64, torch.float32)}
 _OBSERVATION = "/".join(OBSERVATION)

@@ -9,9 +9,9 @@ from tensordict import TensorDictBase
 from torch import Tensor
 
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.world.intervention import cleared, ignited
-from warp_torchrl.world.tick import in_wind
-from warp_torchrl.world.wind import constant_wind
+from warp_torchrl.world.air.wind import constant_wind
+from warp_torchrl.world.backends.tick import in_wind
+from warp_torchrl.world.ignition.intervention import cleared, ignited
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,7 @@ import numpy as np
 from tensordict import TensorDictBase
 
 from warp_torchrl.demonstrations.recording import Recording
-from warp_torchrl.runs import disk
+from warp_torchrl.system import disk
 
 
 def arrays(recordings: Sequence[Recording]) -> dict[str, np.ndarray]:

@@ -18,18 +18,18 @@ import torch
 import torchrl
 from tensordict import MemoryMappedTensor, TensorDict, TensorDictBase
 
-from warp_torchrl.config.compose import OPTION
-from warp_torchrl.config.saved_config import saved_config
 from warp_torchrl.demonstrations.entries import Layout, leaves, size
 from warp_torchrl.demonstrations.events import Event
 from warp_torchrl.demonstrations.recording import Recording
-from warp_torchrl.foreign import below
-from warp_torchrl.foreign_text import plain_text
+from warp_torchrl.env.observation import renamed
 from warp_torchrl.models import OBSERVATION
-from warp_torchrl.observation import renamed
-from warp_torchrl.runs import disk
+from warp_torchrl.runs.config.compose import OPTION
+from warp_torchrl.runs.config.saved_config import saved_config
 from warp_torchrl.runs.output import draft_in, publish
-from warp_torchrl.runs.sealed import (
+from warp_torchrl.system import disk
+from warp_torchrl.system.foreign import below
+from warp_torchrl.system.foreign_text import plain_text
+from warp_torchrl.system.sealed import (
     Files,
     Unsound,
     check_files,

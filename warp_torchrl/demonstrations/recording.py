@@ -8,9 +8,9 @@ import torch
 from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
 
-from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.demonstrations.events import Event
 from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, REWARD
+from warp_torchrl.runs.config.saved_config import SavedConfig
 
 PROPOSED, MOVER = ("agents", "proposed"), ("agents", "mover")
 ROLE = ("agents", "role")

@@ -6,16 +6,16 @@ import torch
 from tensordict import TensorDictBase
 from torch import Tensor
 
-from warp_torchrl.config.components import build_components
-from warp_torchrl.config.compose import plain
-from warp_torchrl.config.groups import ENVIRONMENT
-from warp_torchrl.config.saved_config import restore
 from warp_torchrl.demonstrations.events import carry_out
 from warp_torchrl.demonstrations.recording import Recording
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, REWARD, ROLE
-from warp_torchrl.runs.sealed import Unsound
-from warp_torchrl.world.state import WorldState
+from warp_torchrl.runs.config.components import build_components
+from warp_torchrl.runs.config.compose import plain
+from warp_torchrl.runs.config.groups import ENVIRONMENT
+from warp_torchrl.runs.config.saved_config import restore
+from warp_torchrl.system.sealed import Unsound
+from warp_torchrl.world.state.state import WorldState
 
 _Key = str | tuple[str, ...]
 _MOST_CELLS = 2**22

@@ -7,8 +7,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.heuristics import TEACHERS
-from warp_torchrl.nearest import did_you_mean
-from warp_torchrl.validation import check_fields
+from warp_torchrl.validation import check_fields, did_you_mean
 
 
 @dataclass(frozen=True, kw_only=True)

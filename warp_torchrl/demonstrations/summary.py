@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from warp_torchrl.demonstrations.recording import Mover, Recording
-from warp_torchrl.foreign_text import plain_text
+from warp_torchrl.system.foreign_text import plain_text
 
 _LONGEST = 80  # characters of a cell
 

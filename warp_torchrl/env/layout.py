@@ -4,9 +4,9 @@ import torch
 from tensordict import TensorDict
 from torch import Tensor
 
-from warp_torchrl.device import is_same
 from warp_torchrl.env.scene import Observations
-from warp_torchrl.world.state import WorldState
+from warp_torchrl.system.device import is_same
+from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.world import World
 
 

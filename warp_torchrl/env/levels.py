@@ -11,11 +11,11 @@ from torchrl.data import Categorical
 from warp_torchrl.env.reset_cache import ResetCache, Start
 from warp_torchrl.env.scene import Observations, Scene, Step
 from warp_torchrl.env.wildfire import WildfireEnv
-from warp_torchrl.modes import apart
-from warp_torchrl.world.batch import Batch, concatenated
-from warp_torchrl.world.random import Stream, uniform, world_key
-from warp_torchrl.world.saved import filled
-from warp_torchrl.world.state import ActionResult, Transition, TreeCounts, WorldState
+from warp_torchrl.system.modes import apart
+from warp_torchrl.world.arrays.batch import Batch, concatenated
+from warp_torchrl.world.arrays.random import Stream, uniform, world_key
+from warp_torchrl.world.state.saved import filled
+from warp_torchrl.world.state.state import ActionResult, Transition, TreeCounts, WorldState
 from warp_torchrl.world.world import World
 
 LEVEL = ("info", "level")

@@ -3,8 +3,8 @@
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.agencies import standing
-from warp_torchrl.world.state import TreeCounts, WorldState
+from warp_torchrl.world.mechanics.agencies.agencies import standing
+from warp_torchrl.world.state.state import TreeCounts, WorldState
 
 METRICS = (
     "saved",

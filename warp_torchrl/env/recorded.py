@@ -3,8 +3,8 @@
 from torch import Tensor
 
 from warp_torchrl.env.scene import Observations, Scene, Step
-from warp_torchrl.world.fast.graph import Graph
-from warp_torchrl.world.state import TreeCounts, WorldState
+from warp_torchrl.world.arrays.graph import Graph
+from warp_torchrl.world.state.state import TreeCounts, WorldState
 
 
 class RecordedStep:

@@ -10,7 +10,7 @@ import torch
 from tensordict import TensorDict
 from torch import Tensor
 
-from warp_torchrl.world.state import TreeCounts, WorldState
+from warp_torchrl.world.state.state import TreeCounts, WorldState
 
 Start = tuple[WorldState, TreeCounts, TensorDict]
 """Worlds at the start of an episode, the counts of their trees, and what is observed there."""

@@ -13,7 +13,7 @@ from tensordict import TensorDict
 from torch import Tensor
 
 from warp_torchrl.env.reset_cache import Start
-from warp_torchrl.world.batch import Batch
+from warp_torchrl.world.arrays.batch import Batch
 
 STEPS = 32
 """Steps between two fillings."""

@@ -12,11 +12,11 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.env.metrics import metrics
-from warp_torchrl.observation import Observation, critic_state, searched_for
-from warp_torchrl.reward import Collaborative, Efficiency, Reward, Time
-from warp_torchrl.world.fast.compile import check_compiler, compiled
-from warp_torchrl.world.fast.road import in_bytes, in_flags, why_eager
-from warp_torchrl.world.state import ActionResult, Forecast, Transition, TreeCounts, WorldState, count_trees
+from warp_torchrl.env.observation import Observation, critic_state, searched_for
+from warp_torchrl.env.reward import Collaborative, Efficiency, Reward, Time
+from warp_torchrl.world.arrays.compile import check_compiler, compiled
+from warp_torchrl.world.backends.road import in_bytes, in_flags, why_eager
+from warp_torchrl.world.state.state import ActionResult, Forecast, Transition, TreeCounts, WorldState, count_trees
 from warp_torchrl.world.world import World
 
 _log = logging.getLogger("warp_torchrl")

@@ -10,7 +10,7 @@ from tensordict import TensorDict
 from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 
 from warp_torchrl.env.metrics import FLYING, METRICS, SAVED_BY, WATCHING
-from warp_torchrl.observation import Observation, Space, critic_state
+from warp_torchrl.env.observation import Observation, Space, critic_state
 from warp_torchrl.world.world import World
 
 EPISODE_METRICS = (*METRICS, "episode_reward", "episode_length")

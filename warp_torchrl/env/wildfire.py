@@ -10,20 +10,20 @@ from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
 from torchrl.envs import EnvBase
 
-from warp_torchrl.device import reads_freely
 from warp_torchrl.env.layout import checked_action, packed
+from warp_torchrl.env.observation import Observation, Surroundings, critic_state, searched_for, with_renamed
+from warp_torchrl.env.pictures.render import render
 from warp_torchrl.env.recorded import RecordedStep
-from warp_torchrl.env.render import render
 from warp_torchrl.env.reset_cache import ResetCache, Start
 from warp_torchrl.env.reset_pool import ResetPool
+from warp_torchrl.env.reward import Efficiency, Reward
 from warp_torchrl.env.scene import Observations, Scene, Step, why_not_compiled
 from warp_torchrl.env.specs import make_specs
-from warp_torchrl.modes import apart
-from warp_torchrl.observation import Observation, Surroundings, critic_state, searched_for, with_renamed
-from warp_torchrl.reward import Efficiency, Reward
-from warp_torchrl.world.role import ROLES
-from warp_torchrl.world.saved import filled
-from warp_torchrl.world.state import Transition, TreeCounts, WorldState, count_trees
+from warp_torchrl.system.device import reads_freely
+from warp_torchrl.system.modes import apart
+from warp_torchrl.world.state.role import ROLES
+from warp_torchrl.world.state.saved import filled
+from warp_torchrl.world.state.state import Transition, TreeCounts, WorldState, count_trees
 from warp_torchrl.world.world import World
 
 

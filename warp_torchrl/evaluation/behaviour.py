@@ -4,9 +4,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.front import alignment, centre, containment, sector
-from warp_torchrl.world.geometry import grow
-from warp_torchrl.world.state import Transition, WorldState, is_burning, is_tree
+from warp_torchrl.world.arrays.geometry import grow
+from warp_torchrl.world.state.front import alignment, centre, containment, sector
+from warp_torchrl.world.state.state import Transition, WorldState, is_burning, is_tree
 
 SECTORS = 8
 SHUFFLES = 64

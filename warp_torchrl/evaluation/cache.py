@@ -20,14 +20,13 @@ import numpy as np
 import torch
 
 import warp_torchrl
-from warp_torchrl import foreign
-from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.evaluation.play import Episodes
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.runs import disk
+from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.runs.destination import LARGEST
-from warp_torchrl.world.abilities import ABILITIES
-from warp_torchrl.world.role import ROLES
+from warp_torchrl.system import disk, foreign
+from warp_torchrl.world.state.role import ROLES
+from warp_torchrl.world.team.abilities import ABILITIES
 
 log = logging.getLogger("warp_torchrl")
 _PACKAGE = Path(warp_torchrl.__file__).parent

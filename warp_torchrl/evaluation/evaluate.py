@@ -6,9 +6,6 @@ from pathlib import Path
 
 from tensordict.nn import TensorDictModuleBase
 
-from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.run_config import RunConfig
-from warp_torchrl.config.saved_config import completed
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation import cache
 from warp_torchrl.evaluation.goal import goal
@@ -18,10 +15,13 @@ from warp_torchrl.evaluation.picture import KINDS, Kind, record_episode
 from warp_torchrl.evaluation.play import Episodes, WithoutAgent, baselines_of, play, play_heuristics
 from warp_torchrl.evaluation.report import report, table, write_json
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.load import policy_of
-from warp_torchrl.policy import MODES
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs import disk
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.run_config import RunConfig
+from warp_torchrl.runs.config.saved_config import completed
+from warp_torchrl.runs.policies.load import policy_of
+from warp_torchrl.runs.policies.trained import MODES
+from warp_torchrl.system import disk
 
 log = logging.getLogger("warp_torchrl")
 

@@ -2,8 +2,8 @@
 
 from typing import Literal
 
-from warp_torchrl.world.abilities import ABILITIES
-from warp_torchrl.world.role import ROLES
+from warp_torchrl.world.state.role import ROLES
+from warp_torchrl.world.team.abilities import ABILITIES
 from warp_torchrl.world.world import World
 
 Goal = Literal["saved", "watched"]

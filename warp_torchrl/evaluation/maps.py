@@ -17,17 +17,17 @@ import torch
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
-from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.env.pictures.maps import Panel, save_maps
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.evaluation.statistics import summarise
 from warp_torchrl.heuristics import NoOp
-from warp_torchrl.maps.figure import Panel, save_maps
-from warp_torchrl.maps.geotiff import local_grid, write_geotiff
-from warp_torchrl.runs import disk
-from warp_torchrl.world.random import world_key
-from warp_torchrl.world.state import Landscape, WorldState, is_burning
+from warp_torchrl.runs.config.run_config import RunConfig
+from warp_torchrl.system import disk
+from warp_torchrl.world.arrays.random import world_key
+from warp_torchrl.world.state.state import Landscape, WorldState, is_burning
 from warp_torchrl.world.terrain.fixed import Fixed
+from warp_torchrl.world.terrain.geotiff import local_grid, write_geotiff
 from warp_torchrl.world.terrain.grid import Grid
 
 Actor = Callable[[WildfireEnv], TensorDictModuleBase]

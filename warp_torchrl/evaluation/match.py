@@ -9,11 +9,11 @@ from torch import Tensor
 
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.metrics import metrics
-from warp_torchrl.finite import check_scores
 from warp_torchrl.heuristics import Heuristic
 from warp_torchrl.models import ACTION, ACTION_MASK, AGENCY, OBSERVATION, ROLE
-from warp_torchrl.policy import scores
-from warp_torchrl.world.state import Transition, count_trees
+from warp_torchrl.runs.policies.trained import scores
+from warp_torchrl.system.finite import check_scores
+from warp_torchrl.world.state.state import Transition, count_trees
 
 Watcher = Callable[[Transition, Tensor], None]
 """Called with the transition of each step, and the rows of its worlds, int64 [n]."""

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from hashlib import sha256
 from typing import Any
 
-from warp_torchrl.config.saved_config import SavedConfig
+from warp_torchrl.runs.config.saved_config import SavedConfig
 
 _NOT_TRAINED_BY = ("seed", "device", "evaluation", "checkpoint")
 

@@ -9,9 +9,9 @@ from PIL import Image
 from tensordict.nn import TensorDictModuleBase
 
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.env.render import EpisodeRecorder
+from warp_torchrl.env.pictures.render import EpisodeRecorder
 from warp_torchrl.evaluation.play import play
-from warp_torchrl.runs import disk
+from warp_torchrl.system import disk
 
 Kind = Literal["gif", "html", "mp4"]
 """As what an episode can be written; ``html`` needs the extra ``live``, ``mp4`` the extra ``video``."""

@@ -14,12 +14,12 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.specs import episode_metrics
 from warp_torchrl.evaluation.behaviour import Behaviour
 from warp_torchrl.evaluation.match import Match, fits
-from warp_torchrl.finite import check_scores
 from warp_torchrl.heuristics import HEURISTICS, idle_action
 from warp_torchrl.models import ACTION, ACTION_MASK, memory_apart
-from warp_torchrl.policy import MODES, scores
-from warp_torchrl.world.state import WorldState
-from warp_torchrl.world.team import Team
+from warp_torchrl.runs.policies.trained import MODES, scores
+from warp_torchrl.system.finite import check_scores
+from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.world import World
 
 BASELINES = ("noop", "random", "local", "greedy", "coordinated")

@@ -19,8 +19,8 @@ from torchrl.envs.utils import set_exploration_type
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics.base import known_fire, nearest_marked, place
 from warp_torchrl.models.messages import Round
-from warp_torchrl.policy import MODES, TrainedPolicy
-from warp_torchrl.world.state import WorldState
+from warp_torchrl.runs.policies.trained import MODES, TrainedPolicy
+from warp_torchrl.world.state.state import WorldState
 
 _RIDGE = 1e-3
 """Weight of the squared coefficients, for each message."""

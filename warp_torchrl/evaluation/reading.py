@@ -5,10 +5,10 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.foreign import Foreign, read_json
-from warp_torchrl.foreign_text import plain_text
+from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.destination import LARGEST
+from warp_torchrl.system.foreign import Foreign, read_json
+from warp_torchrl.system.foreign_text import plain_text
 
 _TEXTS = ("scenario", "method", "configuration")
 _FORMER_BASELINES = "yardstick_episodes"  # the key in earlier evaluations

@@ -12,7 +12,7 @@ from warp_torchrl.evaluation.behaviour import BEHAVIOUR
 from warp_torchrl.evaluation.goal import Goal
 from warp_torchrl.evaluation.play import Episodes
 from warp_torchrl.evaluation.statistics import compare, summarise
-from warp_torchrl.runs import disk
+from warp_torchrl.system import disk
 
 SHOWN = ("averted", *BEHAVIOUR)
 

@@ -8,15 +8,15 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
-from warp_torchrl.device import reads_freely
-from warp_torchrl.modes import apart
-from warp_torchrl.world.fast.distances import FAR, nearest
-from warp_torchrl.world.geometry import offsets
-from warp_torchrl.world.random import Stream, uniform, uniform_at
-from warp_torchrl.world.records import known_codes
-from warp_torchrl.world.state import FIRST_FIRE, Action, Cover, WorldState, is_burning
-from warp_torchrl.world.supply import mark_base
-from warp_torchrl.world.team import Team
+from warp_torchrl.system.device import reads_freely
+from warp_torchrl.system.modes import apart
+from warp_torchrl.world.arrays.distances import FAR, nearest
+from warp_torchrl.world.arrays.geometry import offsets
+from warp_torchrl.world.arrays.random import Stream, uniform, uniform_at
+from warp_torchrl.world.mechanics.sensing.records import known_codes
+from warp_torchrl.world.mechanics.water.supply import mark_base
+from warp_torchrl.world.state.state import FIRST_FIRE, Action, Cover, WorldState, is_burning
+from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.world import World
 
 

@@ -14,7 +14,7 @@ from warp_torchrl.heuristics.base import (
     move_towards,
     target_or_supply,
 )
-from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.state.state import WorldState
 
 
 class Coordinated(Heuristic):

@@ -16,14 +16,14 @@ from warp_torchrl.heuristics.base import (
 )
 from warp_torchrl.heuristics.coordinated import Coordinated
 from warp_torchrl.heuristics.firebreaks import cells_to_clear
-from warp_torchrl.world.abilities import Extinguish, Situation, own_cell, places
-from warp_torchrl.world.fast.detours import moves_around, moves_from
-from warp_torchrl.world.fast.distances import FAR
-from warp_torchrl.world.geometry import offsets
-from warp_torchrl.world.role import ROLES
-from warp_torchrl.world.state import Action, Cover, WorldState, is_burning
-from warp_torchrl.world.supply import mark_base
-from warp_torchrl.world.team import is_second
+from warp_torchrl.world.arrays.detours import moves_around, moves_from
+from warp_torchrl.world.arrays.distances import FAR
+from warp_torchrl.world.arrays.geometry import offsets
+from warp_torchrl.world.mechanics.water.supply import mark_base
+from warp_torchrl.world.state.role import ROLES
+from warp_torchrl.world.state.state import Action, Cover, WorldState, is_burning
+from warp_torchrl.world.team.abilities import Extinguish, Situation, own_cell, places
+from warp_torchrl.world.team.team import is_second
 
 _LAST = 4096.0
 """By how much less cells are worth to agents that cannot extinguish: they choose after the others."""

@@ -3,9 +3,9 @@
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.fast.distances import distance_to_nearest
-from warp_torchrl.world.reach import way_of_fire
-from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.arrays.distances import distance_to_nearest
+from warp_torchrl.world.fires.reach import way_of_fire
+from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.world import World
 
 _THREATENED = 0.01

@@ -12,10 +12,10 @@ from warp_torchrl.heuristics.base import (
     target_or_supply,
 )
 from warp_torchrl.heuristics.searching import Oldest
-from warp_torchrl.world.front import spreading_front
-from warp_torchrl.world.random import Stream, uniform
-from warp_torchrl.world.records import known_codes, steps_since
-from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.arrays.random import Stream, uniform
+from warp_torchrl.world.mechanics.sensing.records import known_codes, steps_since
+from warp_torchrl.world.state.front import spreading_front
+from warp_torchrl.world.state.state import WorldState
 
 _ANOTHERS = 1e6
 """What a cell is worth less to an agent that knows another to be nearer to it."""

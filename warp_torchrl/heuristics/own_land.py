@@ -14,8 +14,8 @@ from warp_torchrl.heuristics.base import (
     target_or_supply,
 )
 from warp_torchrl.heuristics.coordinated import Coordinated
-from warp_torchrl.world.agencies import own_land
-from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.mechanics.agencies.agencies import own_land
+from warp_torchrl.world.state.state import WorldState
 
 
 class OwnLand(Coordinated):

@@ -14,9 +14,9 @@ from warp_torchrl.heuristics.base import (
     target_or_supply,
 )
 from warp_torchrl.heuristics.coordinated import Coordinated
-from warp_torchrl.world.fast.distances import distance_to_nearest
-from warp_torchrl.world.geometry import grow
-from warp_torchrl.world.state import Action, WorldState, is_burning, is_tree
+from warp_torchrl.world.arrays.distances import distance_to_nearest
+from warp_torchrl.world.arrays.geometry import grow
+from warp_torchrl.world.state.state import Action, WorldState, is_burning, is_tree
 
 
 class Ring(Coordinated):

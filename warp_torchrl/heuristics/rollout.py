@@ -7,9 +7,9 @@ from torch import Tensor
 
 from warp_torchrl.heuristics.base import Heuristic, Worlds
 from warp_torchrl.heuristics.coordinated import Coordinated
-from warp_torchrl.world.imagined import imagined, rules_in_sight
-from warp_torchrl.world.random import imagined_keys
-from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.arrays.random import imagined_keys
+from warp_torchrl.world.fires.imagined import imagined, rules_in_sight
+from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.world import World
 
 _PART = 8

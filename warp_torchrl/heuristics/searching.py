@@ -18,9 +18,9 @@ from warp_torchrl.heuristics.base import (
     place,
     target_or_supply,
 )
-from warp_torchrl.world.random import Stream, uniform
-from warp_torchrl.world.records import freshness
-from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.arrays.random import Stream, uniform
+from warp_torchrl.world.mechanics.sensing.records import freshness
+from warp_torchrl.world.state.state import WorldState
 
 
 class Searching(Heuristic):

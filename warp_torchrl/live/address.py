@@ -3,8 +3,8 @@
 import socket
 from dataclasses import dataclass, field, replace
 
-from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.live.access import Access, check_token, is_this_machine, new_token
+from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.validation import check_fields
 
 

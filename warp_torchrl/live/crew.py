@@ -11,8 +11,8 @@ from torch import Tensor
 from warp_torchrl.demonstrations.recording import Mover
 from warp_torchrl.heuristics import idle_action
 from warp_torchrl.live.order import Order
-from warp_torchrl.nearest import did_you_mean
-from warp_torchrl.world.team import Team
+from warp_torchrl.validation import did_you_mean
+from warp_torchrl.world.team.team import Team
 
 MOST_KEYS = 4
 """Acts of a person that wait for their steps; more would be done long after the keys were pressed."""

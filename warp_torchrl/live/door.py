@@ -20,8 +20,8 @@ from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 from websockets.protocol import State
 
-from warp_torchrl.foreign_text import plain_text
 from warp_torchrl.live.access import Access
+from warp_torchrl.system.foreign_text import plain_text
 
 MOST_BYTES = 64 * 1024
 """Of a message: a page sends less than a thousandth of it."""

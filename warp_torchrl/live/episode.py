@@ -12,15 +12,15 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.env.render import legend_colours
-from warp_torchrl.foreign_text import escaped_markdown
+from warp_torchrl.env.pictures.render import legend_colours
 from warp_torchrl.live.crew import Crew
 from warp_torchrl.live.scene import aim, furnish, local_server, places, quiet
 from warp_torchrl.live.stage import Shown, Stage
 from warp_torchrl.live.words import chips, labels, vehicle_colours
-from warp_torchrl.runs import disk
-from warp_torchrl.world.geometry import DIRECTIONS
-from warp_torchrl.world.state import Cover, WorldState, count_trees
+from warp_torchrl.system import disk
+from warp_torchrl.system.foreign_text import escaped_markdown
+from warp_torchrl.world.arrays.geometry import DIRECTIONS
+from warp_torchrl.world.state.state import Cover, WorldState, count_trees
 
 STEP_SECONDS, END_SECONDS = 0.12, 2.0
 """How long a picture stands, and the last one."""

@@ -13,7 +13,7 @@ from torch import Tensor
 from torch.nn.functional import avg_pool2d, pad
 
 from warp_torchrl.live.shapes import Shape
-from warp_torchrl.world.state import Cover, WorldState
+from warp_torchrl.world.state.state import Cover, WorldState
 
 EXAGGERATION = 2.0
 """Of heights."""

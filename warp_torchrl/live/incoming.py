@@ -13,8 +13,8 @@ import viser
 from viser import _messages as sent
 from viser.infra._messages import get_type_hints_cached, wire_field_names
 
-from warp_torchrl.foreign_text import plain_text
 from warp_torchrl.live.crew import Refused
+from warp_torchrl.system.foreign_text import plain_text
 
 _KINDS = (sent.ViewerCameraMessage, sent.GuiUpdateMessage, sent.CommandTriggerMessage, sent.SceneNodeClickMessage)
 _LONGEST = 200  # text of a message [characters]

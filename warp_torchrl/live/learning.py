@@ -9,15 +9,15 @@ from pathlib import Path
 
 import torch
 
-from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.groups import WORLD_KEYS
-from warp_torchrl.config.saved_config import SavedConfig, restore
-from warp_torchrl.dotted import dotted
-from warp_torchrl.hyperparameters.training import STOPPED, Training, TrainingProcess
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.match import Setting
 from warp_torchrl.live.side import Side
 from warp_torchrl.runs import checkpoint as checkpoints
+from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.groups import WORLD_KEYS
+from warp_torchrl.runs.config.saved_config import SavedConfig, restore
+from warp_torchrl.runs.process import STOPPED, Training, TrainingProcess
+from warp_torchrl.validation import dotted
 
 ON_POLICY = ("mappo", "ippo", "ppo", "a2c")
 """Algorithms that learn from recordings."""

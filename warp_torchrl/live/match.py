@@ -10,20 +10,20 @@ from typing import Any
 
 from torch import Tensor
 
-from warp_torchrl.config.components import build_components
-from warp_torchrl.config.groups import ENVIRONMENT
-from warp_torchrl.config.saved_config import environment_record
-from warp_torchrl.config.seeds import FIRST_EVALUATED
 from warp_torchrl.demonstrations.events import at_cell
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.live.crew import Question, Refused
 from warp_torchrl.live.player import Player, player_of
 from warp_torchrl.live.side import Side
-from warp_torchrl.named_policy import NamedPolicy
+from warp_torchrl.runs.config.components import build_components
+from warp_torchrl.runs.config.groups import ENVIRONMENT
+from warp_torchrl.runs.config.saved_config import environment_record
+from warp_torchrl.runs.config.seeds import FIRST_EVALUATED
+from warp_torchrl.runs.policies.named_policy import NamedPolicy
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.intervention import can_be_lit
-from warp_torchrl.world.state import is_tree
+from warp_torchrl.world.ignition.intervention import can_be_lit
+from warp_torchrl.world.state.state import is_tree
 from warp_torchrl.world.world import World
 
 SEEDS = (0, 2**62 - 1)

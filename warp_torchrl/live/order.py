@@ -6,8 +6,8 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.geometry import DIRECTIONS
-from warp_torchrl.world.state import Action
+from warp_torchrl.world.arrays.geometry import DIRECTIONS
+from warp_torchrl.world.state.state import Action
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,6 @@ from weakref import WeakKeyDictionary
 import viser
 
 from warp_torchrl.demonstrations.recording import OpenRecording
-from warp_torchrl.foreign_text import plain_text
 from warp_torchrl.live import incoming, words
 from warp_torchrl.live.address import Address
 from warp_torchrl.live.door import LOG, Door, arrived
@@ -24,6 +23,7 @@ from warp_torchrl.live.panel.panel import PACES, Panel, tell
 from warp_torchrl.live.panel.tab import told_if_refused
 from warp_torchrl.live.scene import aim, furnish, local_server, places, quiet
 from warp_torchrl.live.stage import Stage
+from warp_torchrl.system.foreign_text import plain_text
 
 RECORDINGS = Path("recordings")
 _FOLLOWED_EVERY = 5.0  # seconds between two looks for newer weights

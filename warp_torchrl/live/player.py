@@ -8,13 +8,13 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs.utils import set_exploration_type
 
-from warp_torchrl.config.construction import ConfigError
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION
-from warp_torchrl.named_policy import NamedPolicy, fitted_policy
-from warp_torchrl.policy import MODES, TrainedPolicy
 from warp_torchrl.runs import checkpoint as checkpoints
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.policies.named_policy import NamedPolicy, fitted_policy
+from warp_torchrl.runs.policies.trained import MODES, TrainedPolicy
 
 
 class Player:

@@ -7,10 +7,6 @@ from typing import NoReturn
 from tensordict import TensorDictBase
 from torch import Tensor
 
-from warp_torchrl.config.components import build_components
-from warp_torchrl.config.compose import plain
-from warp_torchrl.config.groups import ENVIRONMENT
-from warp_torchrl.config.saved_config import restore
 from warp_torchrl.demonstrations.recording import Recording
 from warp_torchrl.demonstrations.replay import Replay
 from warp_torchrl.env import WildfireEnv
@@ -20,7 +16,11 @@ from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.live.order import Order
 from warp_torchrl.live.player import Player
 from warp_torchrl.live.side import Side
-from warp_torchrl.runs.sealed import Unsound
+from warp_torchrl.runs.config.components import build_components
+from warp_torchrl.runs.config.compose import plain
+from warp_torchrl.runs.config.groups import ENVIRONMENT
+from warp_torchrl.runs.config.saved_config import restore
+from warp_torchrl.system.sealed import Unsound
 
 _WATCHED = "a recording is watched as it was played: load a match to take part"
 

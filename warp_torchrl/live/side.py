@@ -6,7 +6,6 @@ import torch
 from tensordict import TensorDictBase
 from torch import Tensor
 
-from warp_torchrl.config.saved_config import SavedConfig
 from warp_torchrl.demonstrations.events import Event, carry_out
 from warp_torchrl.demonstrations.recording import OpenRecording, Recording
 from warp_torchrl.env import WildfireEnv
@@ -14,8 +13,9 @@ from warp_torchrl.live.crew import Crew, Question, Refused
 from warp_torchrl.live.order import Order
 from warp_torchrl.live.player import Player
 from warp_torchrl.models import ACTION, ACTION_MASK
-from warp_torchrl.world.geometry import DIRECTIONS
-from warp_torchrl.world.state import Transition, WorldState
+from warp_torchrl.runs.config.saved_config import SavedConfig
+from warp_torchrl.world.arrays.geometry import DIRECTIONS
+from warp_torchrl.world.state.state import Transition, WorldState
 
 
 @dataclass

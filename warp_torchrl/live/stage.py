@@ -14,8 +14,8 @@ from warp_torchrl.live.drawing import Instances
 from warp_torchrl.live.ground import Ground, ground_of
 from warp_torchrl.live.shapes import TILE, Shape, bulldozer, drone, flame, puff, tree
 from warp_torchrl.live.words import labels
-from warp_torchrl.world.role import ROLES
-from warp_torchrl.world.state import WorldState
+from warp_torchrl.world.state.role import ROLES
+from warp_torchrl.world.state.state import WorldState
 
 _EARTH, _IRON, _WIND, _GLOW = (84, 66, 52), (38, 40, 44), (196, 214, 240), (255, 128, 40)
 

@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from warp_torchrl.demonstrations.summary import Summary
-from warp_torchrl.env.render import legend_colours
-from warp_torchrl.foreign_text import escaped_markdown as escaped
-from warp_torchrl.foreign_text import plain_text
+from warp_torchrl.env.pictures.render import legend_colours
 from warp_torchrl.live.crew import Question
 from warp_torchrl.live.drawing import VEHICLE_COLOURS
 from warp_torchrl.live.match import Match
 from warp_torchrl.live.side import Side
+from warp_torchrl.system.foreign_text import escaped_markdown as escaped
+from warp_torchrl.system.foreign_text import plain_text
 
 _LISTED = 15  # recordings on the page
 _STYLE = "font-family:inherit;font-size:12px;line-height:1.35"

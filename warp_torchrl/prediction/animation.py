@@ -8,9 +8,9 @@ import torch
 from PIL import Image, ImageDraw, ImageFont
 from torch import Tensor
 
-from warp_torchrl.drawing import cover_image, hillshade
-from warp_torchrl.runs import disk
-from warp_torchrl.world.state import Landscape
+from warp_torchrl.env.pictures.drawing import cover_image, hillshade
+from warp_torchrl.system import disk
+from warp_torchrl.world.state.state import Landscape
 
 _SIDE = 480  # of the map's longer side [pixels]
 _STRIP = 24  # below it, for the clock [pixels]

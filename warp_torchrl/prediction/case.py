@@ -7,18 +7,18 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from warp_torchrl.config.prediction_options import PredictionOptions
-from warp_torchrl.maps.geotiff import local_grid
 from warp_torchrl.prediction.files import Place
-from warp_torchrl.weather.convergence import grid_convergence
-from warp_torchrl.weather.table import WeatherTable, minutes_until, read_weather
-from warp_torchrl.world.ignition_file import read_ignition
-from warp_torchrl.world.random import world_key
-from warp_torchrl.world.rate import RateFire
-from warp_torchrl.world.state import Landscape
+from warp_torchrl.runs.config.prediction_options import PredictionOptions
+from warp_torchrl.world.arrays.random import world_key
+from warp_torchrl.world.ignition.file import read_ignition
+from warp_torchrl.world.law.rate import RateFire
+from warp_torchrl.world.state.state import Landscape
+from warp_torchrl.world.terrain.geotiff import local_grid
 from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.landscape import LandscapeSource
 from warp_torchrl.world.terrain.raster import Raster
+from warp_torchrl.world.weather.convergence import grid_convergence
+from warp_torchrl.world.weather.table import WeatherTable, minutes_until, read_weather
 
 _NEAR = 0.005  # share by which a cell's side may be off
 

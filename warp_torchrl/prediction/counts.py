@@ -9,10 +9,10 @@ from torch import Tensor
 from torch.nn.functional import pad
 
 from warp_torchrl.prediction.passing import Behaviour, passing, steepness_from
-from warp_torchrl.world.alone import Burned, Fires
-from warp_torchrl.world.fast.window import COLUMNS, Window
-from warp_torchrl.world.geometry import DIRECTIONS
-from warp_torchrl.world.travel import NEVER
+from warp_torchrl.world.arrays.geometry import DIRECTIONS
+from warp_torchrl.world.fires.alone import Burned, Fires
+from warp_torchrl.world.law.travel import NEVER
+from warp_torchrl.world.state.window import COLUMNS, Window
 
 STEPS = 65534
 """Of a time in 16 bits, over the whole time."""

@@ -8,12 +8,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from warp_torchrl.maps.figure import Panel, save_maps
-from warp_torchrl.maps.geotiff import write_geotiff
-from warp_torchrl.maps.perimeter import perimeters, write_geojson
+from warp_torchrl.env.pictures.maps import Panel, save_maps
 from warp_torchrl.prediction.predict import Prediction
-from warp_torchrl.runs import disk
+from warp_torchrl.system import disk
+from warp_torchrl.world.terrain.geotiff import write_geotiff
 from warp_torchrl.world.terrain.grid import Grid
+from warp_torchrl.world.terrain.perimeter import perimeters, write_geojson
 
 FIGURE = "maps.png"
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.geometry import neighbours
-from warp_torchrl.world.travel import NEVER
+from warp_torchrl.world.arrays.geometry import neighbours
+from warp_torchrl.world.law.travel import NEVER
 
 _LEAST = 1e-9
 

@@ -9,13 +9,13 @@ from torch import Tensor
 
 from warp_torchrl.prediction.counts import Counter
 from warp_torchrl.prediction.tally import Tally
-from warp_torchrl.weather.table import WeatherTable, read_weather
-from warp_torchrl.world.alone import Fires, Spell
-from warp_torchrl.world.fast.window import Window
-from warp_torchrl.world.random import world_key
-from warp_torchrl.world.rate import RateFire
-from warp_torchrl.world.state import Landscape
-from warp_torchrl.world.weather import Weather
+from warp_torchrl.world.air.weather import Weather
+from warp_torchrl.world.arrays.random import world_key
+from warp_torchrl.world.fires.alone import Fires, Spell
+from warp_torchrl.world.law.rate import RateFire
+from warp_torchrl.world.state.state import Landscape
+from warp_torchrl.world.state.window import Window
+from warp_torchrl.world.weather.table import WeatherTable, read_weather
 
 _NOWHERE = {"burn_probability": 0.0}
 """What maps hold where no fire came; the others hold NaN."""

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.prediction.predict import Prediction
-from warp_torchrl.provenance import section
+from warp_torchrl.system.provenance import section
 
 _ROWS = 25  # of the table of hours
 

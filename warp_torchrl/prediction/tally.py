@@ -6,10 +6,10 @@ import torch
 from torch import Tensor
 from torch.nn.functional import pad
 
-from warp_torchrl import memory
 from warp_torchrl.prediction.counts import LATE, STEPS, Count
-from warp_torchrl.world.fast.window import Window
-from warp_torchrl.world.travel import NEVER
+from warp_torchrl.system import memory
+from warp_torchrl.world.law.travel import NEVER
+from warp_torchrl.world.state.window import Window
 
 _BLOCK = 2**24  # times that are sorted at once
 

@@ -14,11 +14,9 @@ from typing import Any
 
 import torch
 
-from warp_torchrl.config.saved_config import SavedConfig, saved_config
-from warp_torchrl.foreign_text import plain_text
+from warp_torchrl.env.observation import with_renamed
 from warp_torchrl.models import Signature
-from warp_torchrl.observation import with_renamed
-from warp_torchrl.runs import disk
+from warp_torchrl.runs.config.saved_config import SavedConfig, saved_config
 from warp_torchrl.runs.manifest import (
     MANIFEST,
     POLICY,
@@ -31,8 +29,10 @@ from warp_torchrl.runs.manifest import (
     write_manifest,
 )
 from warp_torchrl.runs.output import draft_in, publish
-from warp_torchrl.runs.sealed import read_json
-from warp_torchrl.runs.tensors import check_finite, load_tensors
+from warp_torchrl.system import disk
+from warp_torchrl.system.foreign_text import plain_text
+from warp_torchrl.system.sealed import read_json
+from warp_torchrl.system.tensors import check_finite, load_tensors
 
 __all__ = [
     "MANIFEST",

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from warp_torchrl.config.construction import ConfigError
+from warp_torchrl.runs.config.construction import ConfigError
 
 LARGEST = 200_000_000
 """Size of an ``evaluation.json`` that is read [bytes]."""

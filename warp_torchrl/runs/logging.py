@@ -15,8 +15,8 @@ from typing import Any, Literal, Protocol
 
 from torchrl.record.loggers import get_logger
 
-from warp_torchrl.foreign import open_file
-from warp_torchrl.runs import disk
+from warp_torchrl.system import disk
+from warp_torchrl.system.foreign import open_file
 from warp_torchrl.validation import check_fields
 
 log = logging.getLogger("warp_torchrl")

@@ -11,11 +11,12 @@ import tensordict
 import torch
 import torchrl
 
-from warp_torchrl.config.compose import OPTION
+from warp_torchrl.env.observation import DEFAULT, PICTURE, STATE, STATE_SYMMETRY, former_symmetry, renamed
+from warp_torchrl.env.observation.status import IDENTITY, STATUS
 from warp_torchrl.models import Entry, Signature
-from warp_torchrl.observation import DEFAULT, PICTURE, STATE, STATE_SYMMETRY, former_symmetry, renamed
-from warp_torchrl.observation.status import IDENTITY, STATUS
-from warp_torchrl.runs.sealed import (
+from warp_torchrl.runs.config.compose import OPTION
+from warp_torchrl.symmetry import Symmetry, from_plain, to_plain
+from warp_torchrl.system.sealed import (
     Files,
     Unsound,
     check_files,
@@ -25,10 +26,9 @@ from warp_torchrl.runs.sealed import (
     read_json,
     sealed,
 )
-from warp_torchrl.runs.tensors import largest
-from warp_torchrl.symmetry import Symmetry, from_plain, to_plain
-from warp_torchrl.world.role import PAPER_ROLES
-from warp_torchrl.world.state import Action
+from warp_torchrl.system.tensors import largest
+from warp_torchrl.world.state.role import PAPER_ROLES
+from warp_torchrl.world.state.state import Action
 
 FORMAT = 2
 """Version of the format that checkpoints are written in."""

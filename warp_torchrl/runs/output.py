@@ -9,9 +9,9 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from warp_torchrl.runs import disk
 from warp_torchrl.runs.destination import DRAFT, check_free
-from warp_torchrl.runs.lock import RunFolderLock
+from warp_torchrl.system import disk
+from warp_torchrl.system.lock import RunFolderLock
 
 __all__ = ["DRAFT", "draft_in", "output_folder", "publish", "remove_if_empty", "sync_all"]
 _TAKEN = (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR)

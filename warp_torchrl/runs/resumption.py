@@ -8,17 +8,17 @@ from typing import Any
 
 import yaml
 
-from warp_torchrl.config.building import run_config
-from warp_torchrl.config.compose import plain
-from warp_torchrl.config.construction import ConfigError
-from warp_torchrl.config.groups import COMPONENTS
-from warp_torchrl.config.renamed import renamed_values
-from warp_torchrl.config.run_config import RunConfig
-from warp_torchrl.config.saved_config import SavedConfig, restore
-from warp_torchrl.foreign import Foreign, read_json
-from warp_torchrl.foreign_yaml import read_yaml
 from warp_torchrl.runs.checkpoint import Checkpoint, newest
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import plain
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.groups import COMPONENTS
+from warp_torchrl.runs.config.renamed import renamed_values
+from warp_torchrl.runs.config.run_config import RunConfig
+from warp_torchrl.runs.config.saved_config import SavedConfig, restore
 from warp_torchrl.runs.destination import LARGEST
+from warp_torchrl.system.foreign import Foreign, read_json
+from warp_torchrl.system.foreign_yaml import read_yaml
 
 _MISSING = "not there"
 _MAY_CHANGE = ("total_frames", "resume", "debug")

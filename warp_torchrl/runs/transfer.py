@@ -5,9 +5,9 @@ from torchrl.objectives import LossModule
 
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.algorithms.on_policy import OnPolicy
-from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.runs import former
 from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError
+from warp_torchrl.runs.config.run_config import RunConfig
 
 
 def check_start(run_config: RunConfig, found: Checkpoint) -> None:

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from warp_torchrl.config.run_config import RunConfig
-from warp_torchrl.config.seeds import first_world_seed
 from warp_torchrl.evaluation.play import play_heuristics
+from warp_torchrl.runs.config.run_config import RunConfig
+from warp_torchrl.runs.config.seeds import first_world_seed
 from warp_torchrl.world.world import World
 
 

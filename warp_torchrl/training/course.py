@@ -6,11 +6,11 @@ from typing import Any
 
 from tensordict import TensorDictBase
 
-from warp_torchrl import parallel
-from warp_torchrl.config.run_config import RunConfig
-from warp_torchrl.curriculum import Curriculum, Standing
-from warp_torchrl.curriculum.standing import episodes_by_level
+from warp_torchrl.algorithms import parallel
+from warp_torchrl.collection.curriculum import Curriculum, Standing
+from warp_torchrl.collection.curriculum.standing import episodes_by_level
 from warp_torchrl.env import LeveledEnv, WildfireEnv
+from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.training.baseline import reached
 
 log = logging.getLogger("warp_torchrl")

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import torch
 from torch import Tensor
 
-from warp_torchrl.device import reads_freely
-from warp_torchrl.finite import NumericalFailure
+from warp_torchrl.system.device import reads_freely
+from warp_torchrl.system.finite import NumericalFailure
 
 __all__ = ["FiniteSteps", "NumericalFailure"]
 

@@ -12,16 +12,16 @@ import torch
 from tensordict import TensorDictBase
 from torch import Tensor
 
-from warp_torchrl import parallel
+from warp_torchrl.algorithms import parallel
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.collection.cloning import clone
 from warp_torchrl.collection.guidance import guided
 from warp_torchrl.collection.running import Collection
-from warp_torchrl.config.run_config import RunConfig
 from warp_torchrl.demonstrations.acts import demonstrations
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.runs import former
 from warp_torchrl.runs.checkpoint import Checkpoint
+from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.runs.transfer import actor_parameters, learned_parameters
 from warp_torchrl.training.course import course
 from warp_torchrl.training.finite import FiniteSteps, NumericalFailure
@@ -30,7 +30,7 @@ from warp_torchrl.training.progress import TRAIN_COLUMNS, episode_columns
 from warp_torchrl.training.recorded import RecordedUpdate
 from warp_torchrl.training.share import Played, Share, learners, played
 from warp_torchrl.training.weighing import weighing
-from warp_torchrl.world.fast.compile import compile_function
+from warp_torchrl.world.arrays.compile import compile_function
 
 
 class Learning:

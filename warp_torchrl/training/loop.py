@@ -14,23 +14,23 @@ from typing import Any
 from tensordict import TensorDictBase
 from tqdm import tqdm
 
-from warp_torchrl import parallel
-from warp_torchrl.config.run_config import RunConfig
-from warp_torchrl.config.saved_config import SavedConfig
-from warp_torchrl.config.seeds import WORLDS, first_world_seed
+from warp_torchrl.algorithms import parallel
+from warp_torchrl.algorithms.parallel import WorkerDied
 from warp_torchrl.evaluation.goal import goal
 from warp_torchrl.evaluation.play import play
-from warp_torchrl.finite import NumericalFailure, not_finite
 from warp_torchrl.models import signature
-from warp_torchrl.parallel import WorkerDied
-from warp_torchrl.policy import MODES
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs import disk
+from warp_torchrl.runs.config.run_config import RunConfig
+from warp_torchrl.runs.config.saved_config import SavedConfig
+from warp_torchrl.runs.config.seeds import WORLDS, first_world_seed
 from warp_torchrl.runs.logging import MetricsFile, Tracker
+from warp_torchrl.runs.policies.trained import MODES
 from warp_torchrl.runs.saving import SaveClock, passes
+from warp_torchrl.system import disk
+from warp_torchrl.system.finite import NumericalFailure, not_finite
+from warp_torchrl.system.signals import DeferredSignals, Stopped
 from warp_torchrl.training.learning import Learning
 from warp_torchrl.training.progress import batch_size_notice, line
-from warp_torchrl.training.signals import DeferredSignals, Stopped
 
 log = logging.getLogger("warp_torchrl")
 _SECONDS_BETWEEN_LINES = 15.0

@@ -6,12 +6,12 @@ import torch
 from tensordict import TensorDictBase
 from torch import Tensor
 
-from warp_torchrl import parallel
+from warp_torchrl.algorithms import parallel
 from warp_torchrl.env.metrics import FLYING, SAVED_BY, WATCHING
 from warp_torchrl.env.specs import EPISODE_METRICS
-from warp_torchrl.finite import are_unsound
 from warp_torchrl.models import CANONICAL, OBSERVATION, RADIO, REWARD, SENT, STATE, VALUE
 from warp_torchrl.models.signature import Key
+from warp_torchrl.system.finite import are_unsound
 
 NUMBERS = ("a reward", "an observation", "an output of the policy")
 """What a batch holds that must be finite."""

@@ -4,7 +4,7 @@ import torch
 from tensordict import TensorDictBase
 from torch import Tensor
 
-from warp_torchrl import parallel
+from warp_torchrl.algorithms import parallel
 from warp_torchrl.models import REWARD
 
 

@@ -4,15 +4,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from warp_torchrl import parallel
+from warp_torchrl.algorithms import parallel
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.collection.collectors import InProcess
 from warp_torchrl.collection.running import Collection
-from warp_torchrl.config.kinds import KindOfWorld
-from warp_torchrl.config.run_config import RunConfig
-from warp_torchrl.config.seeds import first_world_seed
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.models import joint, signature
+from warp_torchrl.runs.config.kinds import KindOfWorld
+from warp_torchrl.runs.config.run_config import RunConfig
+from warp_torchrl.runs.config.seeds import first_world_seed
 from warp_torchrl.training.reward_scale import RewardScale
 
 

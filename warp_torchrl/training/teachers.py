@@ -7,18 +7,18 @@ from tensordict import TensorDictBase
 from torch import no_grad
 from torchrl.envs.utils import set_exploration_type
 
-from warp_torchrl.config.compose import plain
-from warp_torchrl.config.construction import ConfigError, build
-from warp_torchrl.config.saved_config import restore
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.env.observation import Observation
 from warp_torchrl.heuristics import HEURISTICS, Heuristic
 from warp_torchrl.models import ACTION_MASK, AGENCY, OBSERVATION, ROLE, recurrent_actors
-from warp_torchrl.named_policy import fitted_policy
-from warp_torchrl.observation import Observation
-from warp_torchrl.policy import MODES
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.checkpoint import Checkpoint
-from warp_torchrl.runs.shipped import find_policy
+from warp_torchrl.runs.config.compose import plain
+from warp_torchrl.runs.config.construction import ConfigError, build
+from warp_torchrl.runs.config.saved_config import restore
+from warp_torchrl.runs.policies.find import find_policy
+from warp_torchrl.runs.policies.named_policy import fitted_policy
+from warp_torchrl.runs.policies.trained import MODES
 
 
 class TrainedTeacher:

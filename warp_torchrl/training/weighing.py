@@ -4,8 +4,8 @@ import logging
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from warp_torchrl.config.run_config import RunConfig
-from warp_torchrl.mixture import Mixture, weights
+from warp_torchrl.collection.mixture import Mixture, weights
+from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.training.baseline import reached
 
 log = logging.getLogger("warp_torchrl")

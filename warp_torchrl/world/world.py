@@ -9,15 +9,17 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.agencies import Agencies, OneAgency
-from warp_torchrl.world.automaton import Automaton
-from warp_torchrl.world.batch import concatenated
-from warp_torchrl.world.fast import road
-from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.ignition import Ignition, IgnitionSource
-from warp_torchrl.world.random import world_key
-from warp_torchrl.world.sensing import Full, Sensing
-from warp_torchrl.world.state import (
+from warp_torchrl.world.air.wind import Uniform, Wind
+from warp_torchrl.world.arrays.batch import concatenated
+from warp_torchrl.world.arrays.random import world_key
+from warp_torchrl.world.backends import road
+from warp_torchrl.world.backends.tick import advance, initial_state
+from warp_torchrl.world.ignition.ignition import Ignition, IgnitionSource
+from warp_torchrl.world.law.automaton import Automaton
+from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.mechanics.agencies.agencies import Agencies, OneAgency
+from warp_torchrl.world.mechanics.sensing.sensing import Full, Sensing
+from warp_torchrl.world.state.state import (
     EMBER,
     FIRST_FIRE,
     Cover,
@@ -27,10 +29,8 @@ from warp_torchrl.world.state import (
     WorldState,
     count_trees,
 )
-from warp_torchrl.world.team import Team
+from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.landscape import LandscapeSource, Perlin, map_size
-from warp_torchrl.world.tick import advance, initial_state
-from warp_torchrl.world.wind import Uniform, Wind
 
 _CELLS_AT_ONCE = {"cpu": 2**17, "cuda": 2**20}
 """Whose ground is made together: it takes some hundred bytes a cell while it is made, on a CPU best of its cache."""

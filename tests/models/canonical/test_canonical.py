@@ -11,13 +11,14 @@ from torchrl.data import LazyTensorStorage, TensorDictReplayBuffer
 from torchrl.envs import CatFrames, TransformedEnv
 
 from tests.conftest import small_world
-from tests.observation.test_observation import drawn
+from tests.env.observation.test_observation import drawn
 from warp_torchrl.algorithms.ddpg import Ddpg
 from warp_torchrl.algorithms.dqn import Dqn
 from warp_torchrl.algorithms.ppo import Ppo
 from warp_torchrl.algorithms.replay import ReplayMemory
 from warp_torchrl.algorithms.sac import Sac
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.env.observation import DEFAULT, STATE_SYMMETRY, STATUS_SIZE, Local, Paper, Surroundings
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import (
     ACTION,
@@ -44,17 +45,16 @@ from warp_torchrl.models.canonical import (
     turned,
 )
 from warp_torchrl.models.fitting import fitted
-from warp_torchrl.observation import DEFAULT, STATE_SYMMETRY, STATUS_SIZE, Local, Paper, Surroundings
-from warp_torchrl.policy import TrainedPolicy
+from warp_torchrl.runs.policies.trained import TrainedPolicy
 from warp_torchrl.symmetry import Part, Planes, Target, Vector
-from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.geometry import DIRECTIONS
-from warp_torchrl.world.radio import Radio
-from warp_torchrl.world.state import Action
-from warp_torchrl.world.team import Team
+from warp_torchrl.world.air.wind import Uniform
+from warp_torchrl.world.arrays.geometry import DIRECTIONS
+from warp_torchrl.world.backends.tick import in_wind
+from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.state.state import Action
+from warp_torchrl.world.team.radio import Radio
+from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
-from warp_torchrl.world.tick import in_wind
-from warp_torchrl.world.wind import Uniform
 
 TURNS = list(itertools.product((1, -1), (1, -1), (False, True)))
 """Whether rows, then columns, are mirrored, and whether they change places after that."""

@@ -11,7 +11,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.random import world_key
+from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.terrain.array import Array
 
 

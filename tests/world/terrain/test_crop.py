@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import torch
 
-from warp_torchrl.world.random import world_key
-from warp_torchrl.world.state import Cover
+from warp_torchrl.world.arrays.random import world_key
+from warp_torchrl.world.state.state import Cover
 from warp_torchrl.world.terrain.crop import DRAWN, Crop
 from warp_torchrl.world.terrain.landscape import draw_age
 

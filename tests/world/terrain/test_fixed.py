@@ -8,7 +8,7 @@ import torch
 
 from tests.conftest import small_world
 from tests.world.rasters import LANDFIRE, keys, needs_landfire, refuse
-from warp_torchrl.world.random import world_key
+from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.terrain.fixed import Fixed
 from warp_torchrl.world.terrain.landscape import LandscapeSource, Perlin
 from warp_torchrl.world.terrain.raster import Raster

@@ -7,16 +7,15 @@ import numpy as np
 import pytest
 import torch
 
-from warp_torchrl.world.gridded import Gridded
-from warp_torchrl.world.ignition_file import read_ignition
-from warp_torchrl.world.rate import RateFire
-from warp_torchrl.world.state import Cover
+from tests.world.rasters import keys, rasterio, refuse, write
+from warp_torchrl.world.air.gridded import Gridded
+from warp_torchrl.world.ignition.file import read_ignition
+from warp_torchrl.world.law.rate import RateFire
+from warp_torchrl.world.state.state import Cover
 from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.layer import read_grid
 from warp_torchrl.world.terrain.raster import Raster
 from warp_torchrl.world.terrain.resampling import resample_layer
-
-from ..rasters import keys, rasterio, refuse, write
 
 UTM = rasterio.crs.CRS.from_epsg(32610)
 SIDE = 20

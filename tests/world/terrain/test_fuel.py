@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 import torch
 
-from warp_torchrl.rates.fbp_fuels import fbp_fuels
-from warp_torchrl.world.state import Cover
+from tests.world.rasters import FIRES, LANDFIRE, needs_fires, needs_landfire, read
+from warp_torchrl.world.behaviour.fbp_fuels import fbp_fuels
+from warp_torchrl.world.state.state import Cover
 from warp_torchrl.world.terrain.fuel import FBFM13, FBFM40, FBP, NO_FUEL, TABLES, WORLDCOVER, code_table, to_cover
 from warp_torchrl.world.terrain.landscape import holds_trees
-
-from ..rasters import FIRES, LANDFIRE, needs_fires, needs_landfire, read
 
 LETTERS = {Cover.LAKE: "L", Cover.WETLAND: "W", Cover.GRASSLAND: "G", Cover.FOREST: "F", Cover.BARE: "B"}
 

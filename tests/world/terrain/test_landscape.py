@@ -5,9 +5,9 @@ import torch
 from scipy.stats import chi2
 from torch import Tensor
 
-from warp_torchrl.world.fire import Fire
-from warp_torchrl.world.random import Stream, world_key
-from warp_torchrl.world.state import Cover
+from warp_torchrl.world.arrays.random import Stream, world_key
+from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.state.state import Cover
 from warp_torchrl.world.terrain.landscape import Perlin, draw_age, holds_trees, map_size
 from warp_torchrl.world.terrain.perlin import fractal_noise
 from warp_torchrl.world.world import World

@@ -9,11 +9,10 @@ import warnings
 import numpy as np
 import pytest
 
+from tests.world.rasters import NODATA, rasterio, refuse, write, write_ascii, write_enormous
 from warp_torchrl.world.terrain.grid import Grid, check_grid
 from warp_torchrl.world.terrain.layer import find_layer, read_grid, read_layer
 from warp_torchrl.world.terrain.resampling import regrid, resample_layer
-
-from ..rasters import NODATA, rasterio, refuse, write, write_ascii, write_enormous
 
 ALBERS, UTM = "EPSG:5070", "EPSG:32618"
 TOP = 5e4  # north edge of what ``write`` makes

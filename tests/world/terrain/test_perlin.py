@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.random import Stream, world_key
+from warp_torchrl.world.arrays.random import Stream, world_key
 from warp_torchrl.world.terrain import perlin
 from warp_torchrl.world.terrain.perlin import fade, fractal_noise
 

@@ -10,15 +10,8 @@ import numpy as np
 import pytest
 import torch
 
-from warp_torchrl.commands.command import train
-from warp_torchrl.config.compose import compose_config, plain
-from warp_torchrl.config.construction import build
-from warp_torchrl.world.state import Cover
-from warp_torchrl.world.terrain.landscape import draw_age, holds_trees
-from warp_torchrl.world.terrain.raster import Raster
-
-from .. import rasters
-from ..rasters import (
+from tests.world import rasters
+from tests.world.rasters import (
     FIRES,
     LANDFIRE,
     NODATA,
@@ -31,6 +24,12 @@ from ..rasters import (
     write_ascii,
     write_enormous,
 )
+from warp_torchrl.commands.command import train
+from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.construction import build
+from warp_torchrl.world.state.state import Cover
+from warp_torchrl.world.terrain.landscape import draw_age, holds_trees
+from warp_torchrl.world.terrain.raster import Raster
 
 
 def refuse(words, **fields):

@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from tests.world.rasters import rasterio
 from warp_torchrl.world.terrain.features import Part
 from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.vector import Shape, burn_in, mark
-
-from ..rasters import rasterio
 
 GRID = Grid((12, 12), None, rasterio.Affine(1.0, 0.0, 0.0, 0.0, -1.0, 12.0))
 """12 x 12 cells of one metre, rows from the top: the place x, y lies in column x, row 12 - y."""

@@ -1,11 +1,11 @@
 """The tab Agent: what the chosen vehicle's agent sees, and how likely it acts."""
 
-from warp_torchrl.foreign_text import escaped_markdown
 from warp_torchrl.live import sight, words
 from warp_torchrl.live.panel.picture import add_picture, png, show_picture
 from warp_torchrl.live.panel.tab import Tab
 from warp_torchrl.live.side import Side
 from warp_torchrl.live.stage import change
+from warp_torchrl.system.foreign_text import escaped_markdown
 
 
 class AgentTab(Tab):

@@ -1,10 +1,10 @@
 """The tab Match: scenario, policies, seed."""
 
-from warp_torchrl.config.compose import conf_folder
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.live.match import SEEDS, Match, Setting
 from warp_torchrl.live.panel.tab import Tab, chosen
-from warp_torchrl.shipped import policy_names
+from warp_torchrl.runs.config.compose import conf_folder
+from warp_torchrl.system.shipped import policy_names
 
 _NEED_A_FOLDER = ("landfire", "wildland")
 _ALONE = "nobody"

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import viser
 
-from warp_torchrl.foreign_text import plain_text
 from warp_torchrl.live import words
 from warp_torchrl.live.ground import cell_at
 from warp_torchrl.live.panel.agent import AgentTab
@@ -18,6 +17,7 @@ from warp_torchrl.live.panel.tab import Tab, told_if_refused
 from warp_torchrl.live.panel.watch import WatchTab
 from warp_torchrl.live.panel.world import WorldTab
 from warp_torchrl.live.stage import Stage, change
+from warp_torchrl.system.foreign_text import plain_text
 
 if TYPE_CHECKING:
     from warp_torchrl.live.page import Page

@@ -5,12 +5,12 @@ from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from warp_torchrl.foreign_text import plain_text
 from warp_torchrl.live.door import LOG
 from warp_torchrl.live.match import Match
 from warp_torchrl.live.once import Once
 from warp_torchrl.live.side import Side
-from warp_torchrl.runs.sealed import Unsound
+from warp_torchrl.system.foreign_text import plain_text
+from warp_torchrl.system.sealed import Unsound
 
 if TYPE_CHECKING:
     from warp_torchrl.live.page import Page

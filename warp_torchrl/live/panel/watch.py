@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from viser import uplot
 
-from warp_torchrl.env.render import render
+from warp_torchrl.env.pictures.render import render
 from warp_torchrl.live import words
 from warp_torchrl.live.panel.picture import add_picture, png, show_picture
 from warp_torchrl.live.panel.tab import Tab

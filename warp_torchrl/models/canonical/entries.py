@@ -12,8 +12,8 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.models.canonical.orientation import Orientation, orientation_to
-from warp_torchrl.modes import kept
 from warp_torchrl.symmetry import Part, Planes, Target, Vector
+from warp_torchrl.system.modes import kept
 
 Symmetries = Mapping[str, Planes | Vector]
 """What each entry of an observation declares, by name."""

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from warp_torchrl.modes import kept
 from warp_torchrl.symmetry import ADVICE, COMPASS, LAST
+from warp_torchrl.system.modes import kept
 
 _SYMMETRIES = 8
 

@@ -14,7 +14,7 @@ import numpy as np
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.state import OLDEST, Cover
+from warp_torchrl.world.state.state import OLDEST, Cover
 from warp_torchrl.world.terrain.crop import Crop, Cropped
 from warp_torchrl.world.terrain.landscape import TALLEST, map_size
 from warp_torchrl.world.terrain.layer import LARGEST_MAP

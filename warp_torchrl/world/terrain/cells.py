@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from warp_torchrl.delimited import SEPARATORS, named_separator, read_text, split_rows, to_number, to_points
-from warp_torchrl.provenance import Provenance, tell
+from warp_torchrl.system.delimited import SEPARATORS, named_separator, read_text, split_rows, to_number, to_points
+from warp_torchrl.system.provenance import Provenance, tell
 from warp_torchrl.world.terrain.grid import Grid, check_grid
 from warp_torchrl.world.terrain.layer import RASTERS, read_header, read_layer
 from warp_torchrl.world.terrain.vector import SUFFIXES, in_grid, mark, read_shapes

@@ -8,8 +8,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.random import Stream, uniform
-from warp_torchrl.world.state import Cover, Landscape
+from warp_torchrl.world.arrays.random import Stream, uniform
+from warp_torchrl.world.state.state import Cover, Landscape
 from warp_torchrl.world.terrain.landscape import draw_age, holds_trees, map_size
 
 DRAWN = 255

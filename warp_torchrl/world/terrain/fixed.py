@@ -7,8 +7,8 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.random import world_key
-from warp_torchrl.world.state import Landscape
+from warp_torchrl.world.arrays.random import world_key
+from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.terrain.landscape import LandscapeSource
 
 

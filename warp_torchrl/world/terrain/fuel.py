@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from warp_torchrl.foreign import Foreign
-from warp_torchrl.foreign_yaml import read_words
-from warp_torchrl.nearest import did_you_mean
-from warp_torchrl.world.state import Cover
+from warp_torchrl.system.foreign import Foreign
+from warp_torchrl.system.foreign_yaml import read_words
+from warp_torchrl.validation import did_you_mean
+from warp_torchrl.world.state.state import Cover
 
 _NON_BURNABLE = {91: Cover.BARE, 92: Cover.BARE, 93: Cover.GRASSLAND, 98: Cover.LAKE, 99: Cover.BARE}
 

@@ -12,11 +12,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from warp_torchrl.device import reads_freely
+from warp_torchrl.system.device import reads_freely
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.fast.bytes import byte, equal
-from warp_torchrl.world.random import Stream, uniform
-from warp_torchrl.world.state import OLDEST, Cover, Landscape
+from warp_torchrl.world.arrays.bytes import byte, equal
+from warp_torchrl.world.arrays.random import Stream, uniform
+from warp_torchrl.world.state.state import OLDEST, Cover, Landscape
 from warp_torchrl.world.terrain.perlin import fractal_noise
 
 LARGEST_SIDE = 4096

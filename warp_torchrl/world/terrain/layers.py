@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from warp_torchrl import memory
+from warp_torchrl.system import memory
 from warp_torchrl.world.terrain.bands import LENGTHS, factor_of
 from warp_torchrl.world.terrain.grid import Grid, check_grid
 from warp_torchrl.world.terrain.layer import RASTERS, Header, find_layer, read_header, read_layer

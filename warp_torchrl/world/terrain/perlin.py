@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.random import Stream, uniform
+from warp_torchrl.world.arrays.random import Stream, uniform
 
 
 def fade(t: Tensor) -> Tensor:

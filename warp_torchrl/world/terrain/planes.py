@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from warp_torchrl.world.state import OLDEST, Cover
+from warp_torchrl.world.state.state import OLDEST, Cover
 from warp_torchrl.world.terrain.crop import DRAWN
 from warp_torchrl.world.terrain.fuel import NO_FUEL
 from warp_torchrl.world.terrain.grid import Grid

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.state import OLDEST
+from warp_torchrl.world.state.state import OLDEST
 from warp_torchrl.world.terrain.crop import Crop, Cropped
 from warp_torchrl.world.terrain.fuel import LAND_COVER, code_table, is_code, to_cover
 from warp_torchrl.world.terrain.grid import Grid

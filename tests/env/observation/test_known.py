@@ -1,0 +1,187 @@
+"""What agents are shown where they know of the fire what was seen alone."""
+
+from pathlib import Path
+
+import pytest
+import torch
+
+from tests.conftest import small_world
+from tests.world.drawing import draw
+from warp_torchrl import load_policy, make_env
+from warp_torchrl.env import WildfireEnv
+from warp_torchrl.env.observation import CriticState, Local, Paper, Surroundings
+from warp_torchrl.env.observation.channels import DEFAULT
+from warp_torchrl.heuristics import HEURISTICS, TEACHERS
+from warp_torchrl.world.mechanics.sensing.sensing import Full, Sight, in_reach
+from warp_torchrl.world.state.state import Forecast
+from warp_torchrl.world.team.radio import Radio
+from warp_torchrl.world.team.team import Team
+
+GOLDEN = Path(__file__).parents[2] / "golden" / "0.1.0"
+CHANNELS = (*DEFAULT, "last_seen")
+KNOWING = [name for name in TEACHERS if not HEURISTICS[name].sees_all]
+PRESETS = {
+    "centred": Surroundings(channels=CHANNELS),
+    "whole map": Surroundings(channels=CHANNELS, centred=False),
+    "near": Surroundings(channels=CHANNELS, near=2),
+    "local": Local(channels=CHANNELS),
+    **{f"advice by {name}": Local(radius=3, channels=CHANNELS, advice=name) for name in KNOWING},
+    "paper": Paper(),
+}
+
+
+def limited(sight, **team):
+    return small_world(sensing=sight, team=Team(n_agents=2, **team))
+
+
+def shown(preset, state, world):
+    return preset(state, world, world.forecast(state))
+
+
+def drawn(sight, drawing, at, **team):
+    world = limited(sight, **team)
+    state = draw(drawing, team=world.team, at=at)
+    return sight.begun(state, world.team), world
+
+
+@pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)
+def test_what_nobody_has_seen_makes_no_difference_to_what_is_shown(preset):
+    """A fire beyond sight, ash, a firebreak, a wet tree and a silent team-mate change no number of any entry."""
+    sight = Sight(radius=2)
+    world = limited(sight, radio=Radio(range=0.0))
+    env = WildfireEnv(world, observation=preset, n_worlds=4, seed=5)
+    env.reset()
+    state = env.world_state
+    hidden = ~in_reach(state, sight.reach(world.team)).any(dim=1)
+    other = state.replace(
+        cells=torch.where(hidden, 11, state.cells),
+        age=torch.where(hidden, 9, state.age),
+        burned=state.burned ^ hidden,
+        firebreak=state.firebreak ^ hidden,
+        wet=torch.where(hidden, 5, state.wet),
+    )
+    before, after = shown(preset, state, world), shown(preset, other, world)
+    assert all(torch.equal(before[name], after[name]) for name in before)
+    if "view" not in before:
+        return
+    moved = state.vehicles.position.clone()
+    moved[:, 1] = torch.where(moved[:, 0] < 8, moved[:, 0] + 4, moved[:, 0] - 4)  # in view, beyond sight
+    far = state.replace(vehicles=state.vehicles.replace(position=moved))
+    assert not world.sensing.knows_where(far, world.team)[0].any()
+    alone = far.replace(vehicles=far.vehicles.replace(position=moved[:, :1].expand(-1, 2, -1).contiguous()))
+    ours, theirs = shown(preset, far, world), shown(preset, alone, world)
+    mates = [CHANNELS.index("other_ugv")]
+    assert not ours["view"][:, 0, mates].any() and theirs["view"][:, 0, mates].any()
+
+
+def test_a_world_that_shows_all_shows_the_same_fire_to_who_sees_all():
+    """The check on the check: sight over the whole map shows what full sensing does, but for the threat."""
+    far, full = limited(Sight(radius=64)), limited(Full())
+    preset = Surroundings(channels=tuple(name for name in DEFAULT if name != "threat"))
+    first, second = (WildfireEnv(world, observation=preset, n_worlds=3, seed=1) for world in (far, full))
+    ours, theirs = first.reset(), second.reset()
+    for _ in range(8):
+        ours["agents", "action"] = theirs["agents", "action"] = torch.randint(0, 11, (3, 2))
+        ours, theirs = first.step(ours)["next"], second.step(theirs)["next"]
+        for name in ("view", "status"):
+            assert torch.equal(ours["agents", "observation", name], theirs["agents", "observation", name])
+        picture = ours["agents", "observation", "picture"]
+        assert torch.equal(picture[:, :, :3], theirs["agents", "observation", "picture"])
+        assert picture[:, :, 3].max() == 255
+
+
+def test_a_view_shows_what_is_known_and_how_fresh_it_is():
+    state, world = drawn(Sight(radius=1), "TTTTa TTTTT TTTTT TTTTT TTTTT", [(0, 3), (4, 0)], radio=Radio(range=0.0))
+    gone = state.vehicles.position.clone()
+    gone[0, 0] = torch.tensor([0, 0])
+    later = state.replace(step=state.step + 16, vehicles=state.vehicles.replace(position=gone))
+    later = world.sensing.updated(later.replace(cells=torch.full_like(later.cells, 10)), world.team, ~later.done)
+    view = Local(channels=("fire_stage", "age", "last_seen", "threat"))(later, world, world.forecast(later))["view"][0]
+    assert view[0, 0, 5, 9] == 51 and view[0, 0, 5, 5:9].sum() == 0, "the fire of before"
+    assert view[0, 1, 5, 5:10].tolist() == [250, 250, 250, 250, 0]
+    assert view[0, 2, 5, 5:10].tolist() == [255, 255, 127, 127, 127], "16 steps are half as fresh"
+    assert view[0, 2, 8, 5] == 0, "never seen"
+    assert view[0, 2, 5, 4] == 0, "beyond the map"
+    assert not view[:, 3].any()
+    assert view[1, 0].sum() == 0, "the other has not heard of it"
+
+
+@pytest.mark.parametrize("centred", [True, False], ids=["centred", "whole map"])
+def test_team_mates_are_shown_where_they_were_when_they_sent_what_arrives_late(centred):
+    """On a map of 16 x 16, whose picture has blocks of two cells; the second agent goes from (4, 4) to (8, 4)."""
+    world = limited(Sight(radius=1), radio=Radio(delay=1))
+    flies = world.team.table(torch.device("cpu")).flies
+    state = draw(" ".join(["T" * 16] * 16), team=world.team, at=[(6, 4), (4, 4)])
+    state = world.sensing.begun(world.team.radio.begun(state, flies), world.team)
+    preset = Surroundings(channels=CHANNELS, centred=centred)
+    first = shown(preset, state, world)
+    mate = CHANNELS.index("other_ugv")
+    assert not first["view"][0, 0, mate].any() and not first["picture"][0, 0, 2].any(), "nothing has arrived yet"
+    gone = state.vehicles.position.clone()
+    gone[0, 1] = torch.tensor([8, 4])
+    state = state.replace(step=state.step + 1, vehicles=state.vehicles.replace(position=gone))
+    state = world.sensing.updated(world.team.radio.sent(state, flies, ~state.done), world.team, ~state.done)
+    now = shown(preset, state, world)
+    assert now["view"][0, 0, mate].nonzero().tolist() == [[3, 5]], "two cells north of the middle, which is (5, 5)"
+    block = [[6, 7]] if centred else [[2, 2]]  # the block north of its own, which is (3, 2) of the map's 8 x 8
+    assert now["picture"][0, 0, 2].nonzero().tolist() == block
+
+
+def test_the_picture_pools_what_is_known():
+    sight = Sight(radius=1)
+    drawing = " ".join(["T" * 16] * 7 + ["TTTTTTTTTTTTaaTT"] * 2 + ["T" * 16] * 7)
+    state, world = drawn(sight, drawing, [(7, 12), (15, 0)], radio=Radio(range=0.0))
+    preset = Surroundings(centred=False)
+    picture = preset(state, world, world.forecast(state))["picture"][0]
+    assert preset.spaces(world)["picture"].names == ("fire", "fuel", "team_mates", "last_seen")
+    # Rows 6 and 7 are block row 3, columns 12 and 13 block column 6: two of its four cells burn, and all were seen.
+    assert picture[0, 0, 3, 6].item() == pytest.approx(0.5**0.5) and picture[0, 3, 3, 6] == 1.0
+    # Of block (4, 6) it saw row 8 alone.
+    assert picture[0, 0, 4, 6].item() == pytest.approx(0.5**0.5) and picture[0, 3, 4, 6] == 0.5
+    assert picture[1, 0].sum() == 0.0 and picture[1, 3, 7, 0] == 1.0
+    assert picture[:, 2].sum() == 0.0, "each knows nothing of the other"
+    assert picture[1, 1, 3, 6] == pytest.approx(world.fire.ground(state.landscape, 30.0, state.key).alpha[0, 7, 12])
+
+
+def test_the_critic_sees_the_fire_and_what_agents_know_of_it():
+    state, world = drawn(Sight(radius=1), " ".join(["T" * 16] * 15 + ["T" * 14 + "aa"]), [(15, 15), (0, 0)])
+    planes = dict(zip(CriticState(world).names, CriticState(world)(state, world.forecast(state))[0]))
+    assert planes["fire"][15, 14:].tolist() == [1.0, 1.0]
+    assert planes["known_fire"][15, 14:].tolist() == [0.5, 0.5], "one of two agents"
+    assert planes["last_seen"][15, 14].item() == 0.5 and planes["last_seen"][8, 8] == 0.0
+    assert "known_fire" not in CriticState(small_world()).names
+
+
+def test_threat_is_not_told_of_what_may_not_be_known():
+    state, world = drawn(Sight(radius=2), "aTTTT TTTTT TTTTT TTTTT TTTTT", [(1, 1), (4, 4)])
+    one = torch.ones_like(state.cells, dtype=torch.float32)
+    risky = Forecast(expected_ignitions=one, ignition_probability=one * 0.0, fuel=one)
+    assert not Local(channels=("threat",))(state, world, risky)["view"].any()
+    full = state.replace(knowledge=None)
+    assert Local(channels=("threat",))(full, small_world(), risky)["view"].any()
+
+
+def test_a_battery_is_shown_where_it_runs_down():
+    plain = make_env("scouts", n_worlds=2)
+    env = make_env("scouts", n_worlds=2, overrides=["team.flight.battery=10"])
+    names = env.channel_names["status"]
+    assert names == (*plain.channel_names["status"], "battery")
+    now = env.reset()
+    policy = HEURISTICS["oldest"](env)
+    for _ in range(3):
+        now = env.step(policy(now))["next"]
+    shown = now["agents", "observation", "status"][..., -1]
+    assert torch.equal(shown, env.world_state.vehicles.battery / 10.0)
+    assert shown[0].tolist() == pytest.approx([0.7, 1.0, 0.7, 1.0])  # scouts fly, bulldozers do not
+
+
+def test_an_older_policy_plays_on_beside_a_battery():
+    policy = load_policy(GOLDEN, mode="deterministic")
+    played = [
+        env.rollout(12, policy.fitted(env), break_when_any_done=False)["agents", "action"]
+        for env in (
+            make_env("skirmish", n_worlds=4, overrides=[*policy.overrides, *further])
+            for further in ([], ["team.flight.battery=9"])  # bulldozers do not fly
+        )
+    ]
+    assert torch.equal(*played)

@@ -1,0 +1,130 @@
+"""Fits find the parameters of synthetic fires again, and gradients are those of differences."""
+
+import pytest
+import torch
+
+from tests.prediction.calibration.ground import case_of, cases_of, fire
+from warp_torchrl.prediction.calibration.candidates import arrivals, burnable, grouped, median_pace
+from warp_torchrl.prediction.calibration.evolution import Evolution
+from warp_torchrl.prediction.calibration.expected import burning_probability, differentiated, margin
+from warp_torchrl.prediction.calibration.fitting import check_told, folds
+from warp_torchrl.prediction.calibration.gradients import Gradients
+from warp_torchrl.prediction.calibration.parameters import fire_at, parameters_of
+from warp_torchrl.world.law.travel import NEVER
+
+TRUTH = fire(rate_gain=1.4, wind_gain=0.8)
+NAMES = ["rate_gain", "wind_gain"]
+
+
+@pytest.mark.parametrize(
+    "method",
+    [
+        pytest.param(Gradients(prior_weight=1e-4, softness=0.1, steps=4), marks=pytest.mark.slow),
+        pytest.param(Evolution(generations=10, prior_weight=1e-4), marks=pytest.mark.slow),
+    ],
+    ids=["g", "e"],
+)
+def test_known_parameters_are_found_again(method):
+    if isinstance(method, Evolution):
+        pytest.importorskip("cma", reason="evolution needs the extra calibration")
+    start = fire()
+    parameters = parameters_of(NAMES, start)
+    law = fire_at(
+        start, parameters, method(start, parameters, [case_of(TRUTH, side=31), case_of(TRUTH, (0.5, 2.0), side=31)])
+    )
+    assert law.rate_gain == pytest.approx(1.4, rel=0.05) and law.wind_gain == pytest.approx(0.8, rel=0.05)
+
+
+def test_a_strong_prior_keeps_the_law_as_it_was():
+    start = fire()
+    parameters = parameters_of(NAMES, start)
+    z = Gradients(prior_weight=100.0, steps=2)(start, parameters, cases_of(TRUTH)[1:])
+    assert z.abs().max() < 0.05
+
+
+def test_the_prior_adds_its_weight_times_half_of_z_squared():
+    # z = (1, -2): half of 1 + 4 is 2.5; its slope is z, its curvature 1 for each parameter.
+    start = fire()
+    parameters, z, case = parameters_of(NAMES, start), torch.tensor([1.0, -2.0]), case_of(TRUTH, side=21)
+    free, bound = (Gradients(prior_weight=weight, steps=1) for weight in (0.0, 0.4))
+    (loss, slope, curvature), found = (
+        free.slope(start, parameters, z, [case]),
+        bound.slope(start, parameters, z, [case]),
+    )
+    assert found[0] - loss == pytest.approx(0.4 * 2.5, abs=1e-5)
+    assert torch.allclose(found[1] - slope, 0.4 * z, atol=1e-5)
+    assert torch.allclose(found[2] - curvature, 0.4 * torch.eye(2), atol=1e-4)
+    candidates = torch.stack((torch.zeros(2), z))
+    free, bound = (Evolution(prior_weight=weight) for weight in (0.0, 0.4))
+    more = bound.losses(start, parameters, candidates, [case]) - free.losses(start, parameters, candidates, [case])
+    assert more.tolist() == pytest.approx([0.0, 1.0], abs=1e-5)
+
+
+def test_in_weather_that_stays_the_margin_is_the_logarithm_of_the_time():
+    start = fire()
+    case = case_of(TRUTH, turned=0.0)
+    times = arrivals([start], case, median_pace([start], case))[0, 0]
+    found = margin(start, (), torch.zeros(0), case)
+    near = (times > 100.0) & (times < 178.0)
+    off = found.log_factor[-1][near] - torch.log(times[near] / 180.0)
+    assert off.abs().median() < 0.02 and off.abs().max() < 0.12
+    assert ((found.log_factor[-1] <= 0.0) == (times <= 180.0)).all()
+
+
+def test_the_gradient_is_that_of_finite_differences():
+    start = fire()
+    case, parameters, step = case_of(TRUTH, side=31), parameters_of(NAMES, start), 0.2
+    at = margin(start, parameters, torch.zeros(2), case)
+
+    def burned(z):
+        return burning_probability(margin(start, parameters, z, case).log_factor, 0.2).sum()
+
+    density = torch.exp(-0.5 * (at.log_factor / 0.2).square()) / (0.2 * (2 * torch.pi) ** 0.5)
+    told = -(density * at.gradient).sum((1, 2, 3))
+    moves = torch.eye(2) * step
+    differences = torch.stack([(burned(move) - burned(-move)) / (2 * step) for move in moves])
+    assert torch.allclose(told, differences, rtol=0.25, atol=0.05 * float(differences.abs().max())), "rungs are apart"
+
+
+def test_times_go_down_by_their_share_where_all_rates_go_up():
+    # In weather that stays t is proportional to 1 / rate, so dt / dx is -t: on the engine's own derivatives
+    start = fire()
+    case = case_of(TRUTH, side=25, turned=0.0)
+    hours = [grouped([start], case, spell, burnable(start, case)) for spell in case.spells]
+    tangents = torch.stack([-hour.travel for hour in hours])
+    minutes, slopes = differentiated(hours, tangents, case, burnable(start, case))
+    came = minutes < NEVER / 2
+    assert came.sum() > 500 and torch.allclose(slopes[0][came], -minutes[came], rtol=1e-3, atol=1e-2)
+
+
+def test_groups_of_laws_burn_as_each_does_alone():
+    laws = [fire(), fire(rate_gain=1.4)]
+    case = case_of(TRUTH, side=25)
+    both = arrivals(laws, case, median_pace(laws, case))[:, 0]
+    alone = arrivals(laws[1:], case, median_pace(laws[1:], case))[0, 0]
+    assert torch.equal(both[1], alone), "the faster law sets the ticks of both"
+    assert (both[0] <= 180.0).sum() < (both[1] <= 180.0).sum()
+
+
+def test_each_fire_is_left_out_once_and_judges_the_others():
+    cases = cases_of(TRUTH)
+    assert [(left.name, [each.name for each in others]) for left, others in folds(cases)] == [
+        ("east", ["north"]),
+        ("north", ["east"]),
+    ]
+
+
+def test_refusals_are_one_line():
+    start, cases = fire(), cases_of(TRUTH)
+    deviation = parameters_of(["cell_deviation"], start)
+    with pytest.raises(ValueError, match="method must be evolution where cell_deviation is fitted"):
+        Gradients()(start, deviation, cases)
+    with pytest.raises(ValueError, match="loss must be brier or cross_entropy where cell_deviation is fitted"):
+        Evolution()(start, deviation, cases)
+    with pytest.raises(ValueError, match="loss must be cross_entropy or brier for gradients, got jaccard"):
+        Gradients(loss="jaccard")
+    with pytest.raises(ValueError, match=r"seed must be in \[1, "):
+        Evolution(seed=2**31)
+    cases[0].spells[0].moisture[5] = 90.0
+    with pytest.raises(ValueError, match=r"moisture\.ffmc is by that of east"):
+        check_told(parameters_of(["moisture.ffmc"], start), cases)

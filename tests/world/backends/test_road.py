@@ -1,0 +1,142 @@
+"""Every fast road comes to what the law's page does, to the bit."""
+
+from dataclasses import dataclass
+
+import pytest
+import torch
+from torch import Tensor
+
+from tests.world.drawing import differing
+from warp_torchrl.world.air.wind import Calm, Paper, Uniform, Wandering, Wind
+from warp_torchrl.world.arrays.random import Stream, uniform, uniform_among
+from warp_torchrl.world.backends.edge import AtEdge
+from warp_torchrl.world.backends.join import in_place
+from warp_torchrl.world.backends.planes import Planes
+from warp_torchrl.world.backends.road import FEW_CELLS, Page, fastest, why_eager
+from warp_torchrl.world.backends.rows import probability_from_rows
+from warp_torchrl.world.backends.tick import advance
+from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.law.hazard import HazardFire
+from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.world.terrain.landscape import Perlin
+from warp_torchrl.world.world import World
+
+ALONE = {
+    "paper": Fire(),
+    "unit": Fire(diagonal="unit", kernel="ellipse", alpha=(0.3, 0.1, 1.0, 0.8, 0.2)),
+    "four": Fire(burning_stages=5, neighbours=4, wind_gain=0.3),  # gains over 1 / alpha, which are clipped
+    "hazard": HazardFire(refinement=3, wet_ticks=2),
+}
+WHOLE = {
+    "growth": Fire(growth=True, tau=1.0),
+    "few ages and stages": Fire(growth=True, tau=1.0, beta=60.0, oldest=4, burning_stages=2),
+    "lightning": Fire(beta=60.0),
+    "regrowth": Fire(p_regrow=0.2),
+    "all": HazardFire(growth=True, beta=90.0, p_regrow=0.3, refinement=2, youngest_fuel=1),
+}
+WINDS = {"calm": Calm(), "uniform": Uniform(speed=7.0), "wandering": Wandering(), "field": Paper()}
+
+
+def burning(fire: Fire, relief: float, wind: Wind, ticks: int = 7) -> list[WorldState]:
+    """Return six worlds as they are before each of some ticks, the third of which waits."""
+    world = World(landscape=Perlin(size=(11, 13), relief=relief), fire=fire, wind=wind)
+    states, ticks_now = [world.reset(torch.arange(6), torch.zeros(6, dtype=torch.int64))], torch.arange(6) != 2
+    for _ in range(ticks):
+        wet = torch.where(states[-1].cells == 5, 3, states[-1].wet).to(torch.uint8)
+        states.append(advance(states[-1].replace(wet=wet), fire, world.air, ticks_now))
+    return states
+
+
+def whole_map(state: WorldState) -> Tensor:
+    return uniform(state.key, state.tick, Stream.FIRE, tuple(state.cells.shape[1:]))
+
+
+@pytest.mark.parametrize("fire", [*ALONE.values(), *WHOLE.values()], ids=[*ALONE, *WHOLE])
+@pytest.mark.parametrize("relief", [0.0, 300.0], ids=["level", "slopes"])
+@pytest.mark.parametrize("wind", WINDS.values(), ids=WINDS)
+def test_planes_come_to_what_the_page_does(fire: Fire, relief: float, wind: Wind) -> None:
+    lit, ticks_now = 0, torch.arange(6) != 4
+    for state in burning(fire, relief, wind):
+        q = fire.ignition_probability(state)
+        expected, probability = Planes(fire).forecast(state)
+        assert torch.equal(probability, q) and torch.equal(expected, fire.expected_ignitions(state))
+        after = fire.tick(state, whole_map(state), ticks_now)
+        for road in (Page(fire), Planes(fire), fastest(fire, state.cells.device)):
+            assert differing(road.tick(state, ticks_now), after) == []
+        lit += int((q > 0.0).sum())
+    assert lit > 100
+
+
+@pytest.mark.parametrize("fire", ALONE.values(), ids=ALONE)
+@pytest.mark.parametrize("relief", [0.0, 300.0], ids=["level", "slopes"])
+@pytest.mark.parametrize("wind", WINDS.values(), ids=WINDS)
+def test_the_edge_comes_to_what_the_page_does(fire: Fire, relief: float, wind: Wind) -> None:
+    listed, ticks_now = 0, torch.arange(6) != 4
+    for state in burning(fire, relief, wind):
+        road, draws = AtEdge(fire), whole_map(state)
+        edge = road.edge(state)
+        at_trees = uniform_among(state.key, state.tick, Stream.FIRE, edge.world, edge.place)
+        assert torch.equal(at_trees, edge.of(draws))
+        assert differing(road.tick(state, ticks_now), fire.tick(state, draws, ticks_now)) == []
+        expected, probability = road.forecast(state)
+        assert torch.equal(expected, fire.expected_ignitions(state))
+        assert torch.equal(probability, fire.ignition_probability(state))
+        listed += len(edge.cell)
+    assert listed > 300
+
+
+@pytest.mark.parametrize("fire", ALONE.values(), ids=ALONE)
+def test_rows_come_to_what_the_table_does(fire: Fire) -> None:
+    for state in burning(fire, 0.0, Uniform(speed=7.0), ticks=5):
+        assert state.air.table is not None
+        without = state.replace(air=state.air.replace(table=None))
+        q = Planes(fire).ignition_probability(without)
+        assert torch.equal(Planes(fire).ignition_probability(state), q)
+        made = probability_from_rows(
+            in_place(fire.law),
+            fire.spreads(state),
+            in_place(fire.law).susceptibility(state.alpha) * fire.is_fuel(state),
+            fire.gain(state.wind),
+            None,
+            fire.directions,
+        )
+        assert torch.equal(made, q)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Certain(Fire):
+    """Every tree ignites beside any fire: a law of another form."""
+
+    def spread_probability(self, state: WorldState) -> Tensor:
+        """Return 1 for each tree beside fire, float32 [B, H, W]."""
+        return (super().spread_probability(state) > 0.0).to(torch.float32)
+
+
+def test_an_automaton_with_rules_of_its_own_takes_the_page() -> None:
+    fire = Certain()
+    world = World(landscape=Perlin(size=12), fire=fire, wind=Calm(), steps_per_tick=1)
+    state = world.reset(torch.arange(4), torch.zeros(4, dtype=torch.int64))
+    assert state.air.table is None
+    beside = Fire().ignition_probability(state) > 0.0
+    assert torch.equal(world.forecast(state).ignition_probability, beside.to(torch.float32)) and beside.any()
+    after = world.step(state, torch.full((4, world.team.n_agents), 10)).after
+    assert torch.equal((after.cells == 11), beside | (state.cells == 11) & (after.cells == 11))
+
+
+@pytest.mark.parametrize(
+    ("vectors", "device", "cells", "compiles"),
+    [
+        ("AVX512", "cpu", 1024 * 32 * 32, True),
+        ("AVX2", "cpu", 1024 * 32 * 32, False),
+        ("AVX2", "cpu", FEW_CELLS, True),
+        ("AVX2", "cpu", FEW_CELLS + 1, False),
+        ("AVX2", "cuda", 1024 * 32 * 32, True),
+    ],
+)
+def test_steps_are_compiled_where_that_gains(
+    monkeypatch, vectors: str, device: str, cells: int, compiles: bool
+) -> None:
+    monkeypatch.setattr("warp_torchrl.world.backends.road.vectors", lambda: vectors)
+    why = why_eager(Fire(), torch.device(device), cells)
+    assert (why is None) == compiles
+    assert compiles or f"{cells} cells is faster eager with {vectors}" in str(why)

@@ -1,0 +1,48 @@
+"""Imagined worlds: other draws from now on, the same past."""
+
+import torch
+
+from tests.world.drawing import differing, draw
+from warp_torchrl import make_env
+from warp_torchrl.world.air.weather import Weather
+from warp_torchrl.world.air.wind import Wandering
+from warp_torchrl.world.arrays.random import Stream, uniform
+from warp_torchrl.world.fires.imagined import imagined, rules_in_sight
+from warp_torchrl.world.weather.table import WeatherTable
+
+STEADY = Wandering(speed_deviation=0.0, direction_deviation=0.0)
+
+
+def test_what_is_imagined_draws_with_another_key() -> None:
+    state = draw("aTT", worlds=4)
+    ahead = imagined(state, state.key + 1)
+    assert differing(ahead.replace(origin=None), state) == ["key"]
+    assert torch.equal(imagined(ahead, state.key + 2).episode_key, state.key), "and what is imagined in it"
+
+
+def test_the_prevailing_wind_is_that_of_the_episode() -> None:
+    state = draw("aTT", worlds=8)
+    state = state.replace(air=state.air.replace(wind=STEADY(state.key, (1, 3))))
+    torch.testing.assert_close(STEADY.after_tick(imagined(state, state.key + 1)), state.wind)
+
+
+def test_the_weather_goes_on_from_the_hour_at_which_the_episode_began() -> None:
+    hours = torch.arange(24.0)
+    weather = Weather(table=WeatherTable(hours=hours, wind_speed=hours, wind_bearing=hours * 0), start=None)
+    weather = weather.paced(60.0)
+    state = draw("aTT", worlds=8)
+    state = state.replace(tick=state.tick + 1)
+    began = (uniform(state.key, 0, Stream.WEATHER, (1,))[:, 0] * 24).long()
+    blown = weather.after_tick(imagined(state, state.key + 1)).flatten(1).norm(dim=1)
+    torch.testing.assert_close(blown, (began + 1).clamp(max=23).float())
+
+
+def test_nothing_hides_fire_from_who_imagines() -> None:
+    env = make_env("smoke", n_worlds=2, overrides=["landscape.size=12", "team.radio.delay=1"])
+    env.reset()
+    world, state = rules_in_sight(env.world), imagined(env.world_state, env.world_state.key + 1)
+    assert env.world.sensing.is_limited and not world.sensing.is_limited
+    after = world.step(state, torch.zeros(2, env.n_agents, dtype=torch.int64)).after
+    assert after.knowledge is None and after.watching is None and after.packets is None
+    seen = make_env("skirmish").world
+    assert rules_in_sight(seen) is seen

@@ -1,0 +1,232 @@
+"""Law rate: ellipses of the told rate, and a fire that is fought."""
+
+import math
+
+import pytest
+import torch
+
+from tests.world.drawing import draw, drawn
+from warp_torchrl.world.air.wind import Calm, Uniform
+from warp_torchrl.world.arrays.random import world_key
+from warp_torchrl.world.backends.tick import advance, in_wind
+from warp_torchrl.world.fires.alone import Spell, arrival_minutes, spread_in
+from warp_torchrl.world.law.rate import RateFire
+from warp_torchrl.world.law.travel import NEVER
+from warp_torchrl.world.state.state import Landscape, WorldState
+from warp_torchrl.world.terrain.landscape import Perlin
+from warp_torchrl.world.world import World
+
+C2 = 2
+EVERY = torch.ones(1, dtype=torch.bool)
+
+
+def forest(size: int, fuel: int = C2) -> Landscape:
+    whole = torch.ones(1, size, size, dtype=torch.uint8)
+    return Landscape(cover=whole * 3, age=whole * 10, elevation=None, fuel=whole.to(torch.int16) * fuel)
+
+
+def law(**options: object) -> RateFire:
+    return RateFire(**{"model": "fbp", "cell_deviation": 0.0, "minutes_per_tick": 1.0} | options)
+
+
+def steps(state: WorldState, fire: RateFire, ticks: int) -> WorldState:
+    for _ in range(ticks):
+        state = advance(state, fire, Calm(), torch.ones(len(state.cells), dtype=torch.bool))
+    return state
+
+
+def start(drawing: str, fire: RateFire, **options: object) -> WorldState:
+    return fire.started(draw(drawing, fire=fire, ground=" ".join("f" * len(row) for row in drawing.split()), **options))
+
+
+SPEEDS = {1.0: 0.0, 2.3: 17.8 / 3.6, 4.6: 36.3 / 3.6}  # m/s, of the Canadian curve of length to breadth
+
+
+@pytest.mark.parametrize("deviation", [0.0, 0.1])
+@pytest.mark.parametrize("bearing", [0, 11, 22, 33, 45])
+@pytest.mark.parametrize("ratio", SPEEDS)
+def test_a_fire_on_uniform_ground_is_the_told_ellipse(ratio: float, bearing: int, deviation: float) -> None:
+    reach, cell = 60, 30.0
+    size, (row, column) = (reach + 30, (reach + 15, 15)) if ratio > 1.0 else (101, (50, 50))
+    fire, ground = law(cell_deviation=deviation), forest(size)
+    angle, speed = math.radians(bearing), SPEEDS[ratio]
+    wind = torch.tensor([speed * math.sin(angle), speed * math.cos(angle)])
+    told = spread_in(fire, ground, cell, Spell(wind, 1.0))
+    assert told.length_to_breadth[0, 0, 0].item() == pytest.approx(ratio, rel=0.01)
+    head = told.head[0, 0, 0].item()
+    minutes = (45 if ratio == 1.0 else reach) * cell / head
+    lit = torch.zeros(size, size, dtype=torch.bool)
+    lit[row, column] = True
+    key = world_key(torch.arange(4 if deviation else 1))
+    (arrival,) = arrival_minutes(fire, ground, lit, key, [Spell(wind, minutes)], cell)
+    burned = (arrival <= minutes).nonzero()
+    east, north = (burned[:, 2] - column) * cell, (row - burned[:, 1]) * cell
+    along, across = east * math.sin(angle) + north * math.cos(angle), east * math.cos(angle) - north * math.sin(angle)
+    heads = [along[burned[:, 0] == fires].max().item() for fires in range(len(key))]
+    close = 0.2 if ratio > 4.0 else 0.1
+    assert sum(heads) / len(heads) / minutes == pytest.approx(head, rel=close)
+    moments = torch.cov(torch.stack((along, across)).float())
+    lengths, axes = torch.linalg.eigh(moments)
+    assert (lengths[1] / lengths[0]).sqrt().item() == pytest.approx(ratio, rel=0.2 if ratio > 4.0 else 0.15)
+    if ratio > 1.0:
+        lean = math.degrees(math.atan2(axes[1, 1].item(), axes[0, 1].item()))
+        assert abs((lean + 90.0) % 180.0 - 90.0) < 3.0
+
+
+@pytest.mark.slow
+def test_a_slope_makes_an_ellipse_without_wind() -> None:
+    size, fire = 61, law()
+    ground = forest(size).replace(elevation=torch.arange(size).flip(0)[None, :, None].expand(1, size, size) * 15.0)
+    told = spread_in(fire, ground, 30.0, Spell(torch.zeros(2), 1.0))
+    assert told.direction[0, 30, 30].item() == pytest.approx(0.0, abs=0.1)  # uphill, to the north
+    lit = torch.zeros(size, size, dtype=torch.bool)
+    lit[50, 30] = True
+    minutes = 30 * 30.0 / told.head[0, 30, 30].item()
+    (arrival,) = arrival_minutes(
+        fire, ground, lit, world_key(torch.zeros(1).long()), [Spell(torch.zeros(2), 1e4)], 30.0
+    )
+    assert arrival[0, 20, 30].item() == pytest.approx(minutes, rel=0.02)
+
+
+def test_minutes_of_a_tick_follow_from_the_fastest_fire() -> None:
+    world = World(landscape=Perlin(size=32), wind=Uniform(speed=8.0), fire=RateFire(model="fbp"))
+    fastest = world.fire.bed.fastest(world.landscape, world.air, 30.0, torch.tensor([6.0, 7, 8, 60, 90, 90, 60]))
+    assert world.fire.minutes == pytest.approx(15.0 / fastest, rel=0.05)
+    given = World(landscape=Perlin(size=32), fire=RateFire(model="fbp", minutes_per_tick=7.0))
+    assert given.fire.minutes == 7.0
+
+
+def test_cells_ignite_at_the_minute_that_the_fire_needs() -> None:
+    fire = law(minutes_per_tick=2.0, residence=1000.0)
+    state = start("aTTTT", fire)
+    rate = fire.bed.spread(state.landscape, state.wind, torch.tensor([[6.0, 7, 8, 60, 90, 90, 60]]), 30.0).head[0, 0, 0]
+    cell = 30.0 / rate.item()  # minutes
+    for tick in range(1, 30):
+        state = steps(state, fire, 1)
+        expected = 1 + min(4, int(tick * 2.0 / cell))
+        assert (state.cells > 10).sum().item() == expected
+    assert state.arrivals is not None
+    assert state.arrivals.minutes[0, 0, 1:3].tolist() == pytest.approx([cell, 2 * cell], rel=1e-5)
+
+
+def test_the_edge_burns_until_it_has_nowhere_to_go() -> None:
+    fire = law(residence=5.0)
+    state = steps(start("aTT", fire), fire, 3)
+    assert fire.ticks_per_stage == 1
+    for _ in range(400):
+        state = steps(state, fire, 1)
+        if drawn(state) == "...":
+            break
+        front = state.cells[0, 0] > 10
+        assert front.any(), "the fire died beside a tree"
+    assert drawn(state) == "..."
+
+
+def test_a_fire_beside_a_wet_tree_burns_out_and_does_not_come_back() -> None:
+    fire = law(residence=5.0, wet_minutes=200.0)
+    state = start("aT", fire)
+    state = steps(state.replace(wet=torch.tensor([[[0, 200]]], dtype=torch.uint8)), fire, 250)
+    assert drawn(state) == ".T"
+
+
+def test_fire_goes_round_a_firebreak_and_not_over_it() -> None:
+    fire = law(residence=2000.0)
+    shut = start("aT#TT TT#TT TT#TT", fire)
+    assert (steps(shut, fire, 300).cells[0, :, 3:] == 10).all()
+    gap = start("aT#TT TT#TT TTTTT", fire)
+    after = steps(gap, fire, 300)
+    assert (after.cells[0, :, 3:] > 10).all()
+    assert after.arrivals is not None
+    straight, round_it = (steps(start(each, fire), fire, 300).arrivals for each in ("aTTTT " * 3, "aT#TT TT#TT TTTTT"))
+    assert straight is not None and round_it is not None
+    assert round_it.minutes[0, 0, 4] > straight.minutes[0, 0, 4] * 1.1
+
+
+def test_what_is_put_out_sends_no_more_fire() -> None:
+    fire = law(residence=2000.0)
+    state = steps(start("aTTTT", fire), fire, 3)
+    assert drawn(state)[0] == "a" and drawn(state)[1:] == "TTTT"
+    out = state.replace(cells=torch.full_like(state.cells, 10), wet=torch.full_like(state.wet, 3))
+    assert drawn(steps(out, fire, 300)) == "TTTTT"
+
+
+def test_in_another_wind_the_fire_goes_on_from_where_it_is() -> None:
+    fire = law(residence=2000.0)
+    row = "a" + "T" * 9
+    slow, fast = (torch.tensor([speed, 0.0])[None, :, None, None] for speed in (2.0, 8.0))
+
+    def minutes_of(first: torch.Tensor, second: torch.Tensor, change: int) -> torch.Tensor:
+        state = start(row, fire, wind=first[0])
+        state = steps(state, fire, change)
+        state = steps(in_wind(state, fire, second), fire, 200 - change)
+        return state.arrivals.minutes[0, 0]  # type: ignore[union-attr]
+
+    one, other = (minutes_of(each, each, 1)[1].item() for each in (slow, fast))
+    changed = minutes_of(slow, fast, 4)
+    # After 4 minutes a share 4 / one of the first cell is behind the front; the rest goes at the new rate.
+    assert changed[1].item() == pytest.approx(4.0 + (1.0 - 4.0 / one) * other, rel=1e-3)
+    assert (changed[3] - changed[2]).item() == pytest.approx(other, rel=1e-3)
+
+
+def test_the_same_wind_again_changes_no_time() -> None:
+    fire = law(cell_deviation=0.3)
+    state = steps(start("TTTTT TTaTT TTTTT", fire, wind=(3.0, 1.0)), fire, 4)
+    again = fire.in_air(state, state.air)
+    assert torch.allclose(again.arrivals.minutes, state.arrivals.minutes)  # type: ignore[union-attr]
+
+
+def test_rates_differ_as_much_as_they_are_told_to() -> None:
+    key = world_key(torch.arange(400))
+    pace = RateFire(cell_deviation=0.2, fire_deviation=0.4).pace(key, (40, 40))
+    within, between = pace.log().std(dim=(1, 2)).mean().item(), pace.log().mean(dim=(1, 2)).std().item()
+    assert within == pytest.approx(math.sqrt(math.log1p(0.04)), rel=0.02)
+    assert between == pytest.approx(math.sqrt(math.log1p(0.16)), rel=0.15)  # of 400 fires: 4 standard errors
+    assert pace.log().mean().item() == pytest.approx(0.0, abs=0.08)
+    assert torch.equal(pace[7], RateFire(cell_deviation=0.2, fire_deviation=0.4).pace(key[7:8], (40, 40))[0])
+
+
+def test_gains_are_factors_on_rates() -> None:
+    ground, spell = forest(3), Spell(torch.tensor([3.0, 0.0]), 1.0)
+    told = spread_in(law(), ground, 30.0, spell).head
+    assert torch.allclose(spread_in(law(rate_gain=1.7), ground, 30.0, spell).head, told * 1.7)
+    assert torch.allclose(spread_in(law(fuel_gain={C2: 0.5}), ground, 30.0, spell).head, told * 0.5)
+    assert torch.equal(spread_in(law(fuel_gain={3: 0.5}), ground, 30.0, spell).head, told)
+    stronger = spread_in(law(wind_gain=2.0), ground, 30.0, spell).head
+    assert torch.allclose(stronger, spread_in(law(), ground, 30.0, Spell(torch.tensor([6.0, 0.0]), 1.0)).head)
+
+
+def test_moisture_of_the_air_goes_before_that_of_the_fire() -> None:
+    ground = forest(3)
+    dry = torch.full((7,), math.nan)
+    dry[5] = 96.0  # FFMC
+    spells = [Spell(torch.zeros(2), 1.0, moisture) for moisture in (None, dry)]
+    usual, drier = (spread_in(law(moisture={"bui": 80.0}), ground, 30.0, spell).head for spell in spells)
+    both = spread_in(law(moisture={"bui": 80.0, "ffmc": 96.0}), ground, 30.0, spells[0]).head
+    assert (drier > usual).all() and torch.equal(drier, both)
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        ({"model": "fbfm99"}, "model must be"),
+        ({"moisture": {"dead": 3.0}}, "moisture must name some of dead_1h"),
+        ({"moisture": {"dead_1h": 900.0}}, "moisture must be in"),
+        ({"fuel_gain": {"grass": 2.0}}, "fuel_gain must map fuel codes"),
+        ({"cell_deviation": -0.1}, "cell_deviation must be"),
+        ({"minutes_per_tick": 0.0}, "minutes_per_tick must be"),
+    ],
+)
+def test_values_out_of_range_are_refused(options: dict[str, object], line: str) -> None:
+    with pytest.raises(ValueError, match=line):
+        RateFire(**options)
+
+
+def test_forecasts_tell_how_near_the_fire_is() -> None:
+    fire = law(minutes_per_tick=1.0)
+    state = steps(start("aTT", fire), fire, 1)
+    probability = fire.ignition_probability(state)[0, 0]
+    assert state.arrivals is not None
+    left = state.arrivals.minutes[0, 0, 1].item() - 1.0
+    assert probability.tolist() == pytest.approx([0.0, 1.0 / left, 0.0], rel=1e-4)
+    assert fire.expected_ignitions(state)[0, 0].tolist() == pytest.approx([1.0 / (left + 1.0), 0.0, 0.0], rel=1e-4)
+    assert (state.arrivals.minutes < NEVER).sum() == 2

@@ -1,0 +1,45 @@
+"""The state of the worlds: its tensors are of the types that the comments beside them tell."""
+
+import inspect
+import re
+
+import pytest
+from torch import Tensor
+
+from warp_torchrl import make_env
+from warp_torchrl.world.arrays.batch import Batch
+
+
+def told(batch):
+    """The types that the comments of a batch's class tell, by name."""
+    return dict(re.findall(r"^    (\w+): Tensor.*?# (\w+) \[", inspect.getsource(type(batch)), flags=re.MULTILINE))
+
+
+def of_other_types(batch):
+    """The tensors of a batch that are of another type than is told, or of which none is."""
+    types, found = told(batch), {}
+    for name, value in vars(batch).items():
+        if isinstance(value, Batch):
+            found |= {f"{name}.{inner}": each for inner, each in of_other_types(value).items()}
+        elif isinstance(value, Tensor) and str(value.dtype).removeprefix("torch.") != types.get(name):
+            found[name] = value.dtype
+    return found
+
+
+@pytest.mark.parametrize(
+    ("scenario", "overrides"),
+    [
+        ("water", []),
+        ("agencies", ["landscape.relief=50"]),
+        ("haksar", []),
+        ("front", ["team.flight.battery=60"]),
+        ("smoke", ["team.radio.carries=map", "team.radio.delay=2"]),
+        ("default", ["fire=rate", "wind=wandering"]),
+    ],
+)
+def test_tensors_are_of_the_types_that_are_told(scenario, overrides):
+    env = make_env(scenario, n_worlds=2, overrides=overrides)
+    env.reset()
+    assert not of_other_types(env.world_state), "at the start"
+    env.rollout(2)
+    assert not of_other_types(env.world_state), "after steps"

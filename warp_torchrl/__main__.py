@@ -1,0 +1,51 @@
+"""One command line: ``warp COMMAND ...``, or ``python -m warp_torchrl COMMAND ...``."""
+
+import sys
+from importlib import import_module
+
+from warp_torchrl.system.exit_codes import DONE, MISTAKE
+from warp_torchrl.system.foreign_text import plain_text
+from warp_torchrl.validation import did_you_mean
+
+COMMANDS = {
+    "train": ("warp_torchrl.commands.command:train", "train a team"),
+    "evaluate": ("warp_torchrl.commands.command:evaluate", "evaluate a policy beside the baselines"),
+    "live": ("warp_torchrl.commands.live:main", "watch a team on a local page, and take part"),
+    "demonstrations": ("warp_torchrl.commands.demonstrations:main", "list, check and export recordings"),
+    "correct": ("warp_torchrl.commands.correct:main", "let a scripted person correct a policy"),
+    "predict": ("warp_torchrl.commands.predict:main", "predict fires alone on real ground"),
+    "calibrate": ("warp_torchrl.commands.calibrate:main", "score and fit the law of fires to observed ones"),
+    "search": ("warp_torchrl.commands.search:main", "search values of a training's keys"),
+    "summary": ("warp_torchrl.evaluation.summary:main", "summarise evaluations in one table"),
+    "curves": ("warp_torchrl.commands.curves:main", "draw learning curves of runs"),
+    "probe": ("warp_torchrl.commands.probe:main", "read a team's messages by linear probes"),
+    "export": ("warp_torchrl.commands.export:main", "export a trained policy"),
+    "benchmark": ("warp_torchrl.benchmark.__main__:main", "measure speed and difficulty on this machine"),
+}
+"""Function and purpose of each command."""
+
+
+def main() -> int:
+    """Run the command that the command line names, and return its exit code."""
+    name, rest = (sys.argv[1], sys.argv[2:]) if len(sys.argv) > 1 else ("", [])
+    if name in ("", "-h", "--help"):
+        print(usage())
+        return DONE if name else MISTAKE
+    if name not in COMMANDS:
+        known = ", ".join(COMMANDS)
+        hint = did_you_mean(name, COMMANDS)
+        print(f"error: the command must be one of {known}, got {plain_text(name)}{hint}", file=sys.stderr)
+        return MISTAKE
+    module, _, function = COMMANDS[name][0].partition(":")
+    sys.argv = [sys.argv[0], *rest]
+    return getattr(import_module(module), function)() or DONE
+
+
+def usage() -> str:
+    """Return what ``--help`` prints."""
+    lines = (f"  {name:<16}{purpose}" for name, (_, purpose) in COMMANDS.items())
+    return "\n".join(("usage: warp COMMAND ...", "", *lines, "", "warp COMMAND --help tells more of one."))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Environments by name, and their views for other libraries."""

@@ -1,0 +1,61 @@
+"""Environments by name."""
+
+from collections.abc import Sequence
+
+import torch
+
+from warp_torchrl.env import WildfireEnv
+from warp_torchrl.runs.config.building import check_keys
+from warp_torchrl.runs.config.components import build_components
+from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.groups import ENVIRONMENT
+from warp_torchrl.system.modes import apart
+
+
+@apart
+def make_env(
+    scenario: str = "default",
+    *,
+    n_worlds: int = 64,
+    device: torch.device | str = "cpu",
+    seed: int | None = 0,
+    seeds: Sequence[int] | None = None,
+    overrides: Sequence[str] = (),
+    validate: bool | None = None,
+    compile: bool = False,
+    graph: bool = False,
+) -> WildfireEnv:
+    """Make the environment of a scenario.
+
+    Args:
+        scenario: One of ``conf/scenario``.
+        n_worlds: B.
+        device: Where the worlds live.
+        seed: World i has seed ``seed + i``; None draws a seed on first use, so that copies differ.
+        seeds: Seed of each world, instead of ``seed``.
+        overrides: In the command line's grammar, ``["fire=paper", "team.n_agents=3"]``.
+        validate: Check actions on CUDA too.
+        compile: Compile the step with ``torch.compile``.
+        graph: Record the step as one CUDA graph, where the device is cuda.
+
+    Returns:
+        A TorchRL ``EnvBase`` of batch size [B].
+
+    Raises:
+        ConfigError: A ``ValueError``, with key, value and rule.
+    """
+    config = plain(compose_config("train", [f"scenario={scenario}", *overrides]))
+    check_keys(config)
+    parts = build_components(config, ENVIRONMENT)
+    return WildfireEnv(
+        parts["world"],
+        observation=parts["observation"],
+        reward=parts["reward"],
+        n_worlds=n_worlds if seeds is None else len(seeds),
+        seed=seed,
+        seeds=seeds,
+        device=device,
+        validate=validate,
+        fuse=compile,
+        graph=graph,
+    )

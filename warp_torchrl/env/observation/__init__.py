@@ -1,0 +1,50 @@
+"""What the agents see, and what the central critic sees."""
+
+from warp_torchrl.env.observation.channels import CHANNELS, DEFAULT, ELEVATION_SCALE, channel
+from warp_torchrl.env.observation.coarse_picture import PICTURE, PICTURE_SIDE, picture
+from warp_torchrl.env.observation.critic import STATE, STATE_SIDE, STATE_SYMMETRY, CriticState
+from warp_torchrl.env.observation.former import renamed, with_renamed
+from warp_torchrl.env.observation.look import Look
+from warp_torchrl.env.observation.presets import (
+    OF_CRITIC,
+    Local,
+    Observation,
+    Paper,
+    Space,
+    Surroundings,
+    critic_state,
+    former_symmetry,
+    searched_for,
+)
+from warp_torchrl.env.observation.status import STATUS_SIZE, WIND_SCALE, status_vector
+from warp_torchrl.env.observation.view import egocentric_view
+
+__all__ = [
+    "CHANNELS",
+    "DEFAULT",
+    "ELEVATION_SCALE",
+    "OF_CRITIC",
+    "PICTURE",
+    "PICTURE_SIDE",
+    "STATE",
+    "STATE_SIDE",
+    "STATE_SYMMETRY",
+    "STATUS_SIZE",
+    "WIND_SCALE",
+    "CriticState",
+    "Local",
+    "Look",
+    "Observation",
+    "Paper",
+    "Space",
+    "Surroundings",
+    "channel",
+    "critic_state",
+    "egocentric_view",
+    "former_symmetry",
+    "picture",
+    "renamed",
+    "searched_for",
+    "status_vector",
+    "with_renamed",
+]

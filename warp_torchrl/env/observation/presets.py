@@ -1,0 +1,247 @@
+"""What agents may be shown: a preset is a component.
+
+Its ``spaces`` tell the environment the shape, type and range of each entry, and called with a state it returns them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.content import Content
+from warp_torchrl.env.observation.advice import check_adviser, check_may_advise
+from warp_torchrl.env.observation.channels import CHANNELS, DEFAULT, FIRE, ages, check_channels, stages
+from warp_torchrl.env.observation.coarse_picture import (
+    PICTURE_SIDE,
+    centred_picture,
+    picture,
+    picture_content,
+    picture_highs,
+    picture_names,
+    picture_symmetry,
+)
+from warp_torchrl.env.observation.critic import CriticState
+from warp_torchrl.env.observation.status import IDENTITY, STATUS, STATUS_SIZE, Told, status_entries, status_vector
+from warp_torchrl.env.observation.view import egocentric_view
+from warp_torchrl.symmetry import Planes, Target, Vector
+from warp_torchrl.validation import check_fields
+from warp_torchrl.world.arrays.squares import window
+from warp_torchrl.world.mechanics.sensing.records import read
+from warp_torchrl.world.state.state import Forecast, WorldState
+from warp_torchrl.world.world import World
+
+
+class Space(NamedTuple):
+    """Shape (one agent's), type and range of an entry of an observation."""
+
+    shape: tuple[int, ...]
+    dtype: torch.dtype
+    low: float
+    high: float | tuple[float, ...]  # of all numbers, or one for each channel
+    names: tuple[str, ...] = ()  # of the channels of a map or the entries of a vector, where they have any
+    symmetry: Planes | Vector | None = None  # how it turns with the map; None: networks read it north up alone
+    content: tuple[Content, ...] = ()  # of each channel of a map, what it can hold in this world; (): anything
+
+    def bounds(self) -> tuple[Tensor, Tensor]:
+        """Return the least and the largest value of each number, both of the entry's shape and type."""
+        low, high = torch.full(self.shape, self.low, dtype=self.dtype), torch.tensor(self.high, dtype=self.dtype)
+        per_channel = high.view(-1, *[1] * (len(self.shape) - 1)) if high.ndim else high
+        return low, per_channel.expand(self.shape).contiguous()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Local:
+    """What an agent sees of its own surroundings, and nothing else.
+
+    ``view`` is the square of 2 r + 1 cells about the agent, north up, uint8, in channels that are chosen by name from
+    ``observation.channels.CHANNELS``. ``status`` is what it knows of itself, see ``status_entries``.
+
+    Attributes:
+        radius: r [cells].
+        identity: Whether ``status`` tells the agent's place in its team, see ``identity``: agents that stand together
+            and see the same can then part.
+        rules: Whether ``status`` tells the rules of the world, see ``rules``: one policy can then play by several.
+        water: Whether ``status`` tells the way to the nearest water, see ``way_to_water``: else agents whose tanks are
+            empty know of lakes within their view alone.
+        advice: Name of a heuristic, one of ``TEACHERS``, that tells each agent, in ``status``, the action that it would
+            choose for it, see ``advised_actions``: agents may do otherwise; None has no adviser.
+        reach: Whether the central critic's ``state`` tells how soon fire and team can be where, see
+            ``critic.reach_of_fire_and_team``: else it cannot tell a closed firebreak from one that lacks a cell.
+        channels: Names of the view's channels, in order.
+
+    Raises:
+        ValueError: If the radius is not in 1..32, or a channel or the adviser is unknown.
+    """
+
+    radius: int = 5
+    identity: bool = True
+    rules: bool = False
+    water: bool = False
+    advice: str | None = None
+    reach: bool = False
+    channels: tuple[str, ...] = DEFAULT
+
+    def __post_init__(self) -> None:
+        check_fields(self, radius=(1, 32))
+        check_channels(self.channels)
+        if self.advice is not None:
+            check_adviser(self.advice)
+
+    def spaces(self, world: World) -> dict[str, Space]:
+        """Return the space of each entry."""
+        side, highs = 2 * self.radius + 1, tuple(CHANNELS[name].high for name in self.channels)
+        if self.advice is not None:
+            check_may_advise(self.advice, world)
+        own, content = status_entries(world, self.told), self._contents(view_content(self.channels, world))
+        symmetry = view_symmetry(self.channels)
+        return {
+            "view": Space((len(highs), side, side), torch.uint8, 0, highs, self.channels, symmetry, content),
+            "status": Space((len(own.names),), torch.float32, -3.0, 3.0, own.names, own),
+        }
+
+    def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
+        """Return ``view`` uint8 [B, A, C, V, V] and ``status`` float32 [B, A, F]."""
+        own = status_vector(state, world, self.told)
+        return {"view": egocentric_view(state, world, forecast, self.radius, self.channels), "status": own}
+
+    @property
+    def told(self) -> Told:
+        """Return what ``status`` tells beside what it tells every agent."""
+        return Told(identity=self.identity, rules=self.rules, water=self.water, advice=self.advice)
+
+    def _contents(self, content: tuple[Content, ...]) -> tuple[Content, ...]:
+        """Return what is told of channels; nothing for a subclass that shows them in a way of its own."""
+        return content if type(self).__call__.__module__ == __name__ else ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Surroundings(Local):
+    """An agent's own surroundings and the state of the fire, as the paper has it: the default.
+
+    As ``Local``, and ``picture``: what a dispatcher would radio, the whole map's fire (square root of the share of
+    each block that burns), fuel and team-mates in 8 x 8 blocks.
+
+    Attributes:
+        centred: Whether the agent's own block is the middle of the picture, which then has 15 x 15 blocks, uint8; else
+            it is of the map, 8 x 8 blocks, float32.
+        near: Side of the blocks of a second picture, ``near``, of 15 x 15 blocks about the agent whatever the map's
+            size [cells]: on large maps the blocks of ``picture`` are too coarse to find a fire by; 0 shows none.
+
+    Raises:
+        ValueError: If the radius is not in 1..32, or near not in 0..64.
+    """
+
+    centred: bool = True
+    near: int = 0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_fields(self, near=(0, 64))
+
+    def spaces(self, world: World) -> dict[str, Space]:
+        """Return the space of each entry."""
+        side = 2 * PICTURE_SIDE - 1 if self.centred else PICTURE_SIDE
+        dtype = torch.uint8 if self.centred else torch.float32
+        high: float | tuple[float, ...] = picture_highs(world) if self.centred else 1.0
+        names = picture_names(world)
+        content = self._contents(picture_content(world))
+        symmetry = picture_symmetry(self.centred, len(names), order=2 if self.near else 1)
+        found = {
+            **super().spaces(world),
+            "picture": Space((len(names), side, side), dtype, 0, high, names, symmetry, content),
+        }
+        if self.near:
+            wide, highs = 2 * PICTURE_SIDE - 1, picture_highs(world)
+            about = picture_symmetry(centred=True, channels=len(names))
+            found["near"] = Space((len(names), wide, wide), torch.uint8, 0, highs, names, about, content)
+        return found
+
+    def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
+        """Return ``view``, ``status`` and ``picture``: uint8 [B, A, C, 15, 15]; of the map, float32 [B, A, C, 8, 8].
+
+        And ``near`` if it is shown, uint8 [B, A, C, 15, 15].
+        """
+        shown = centred_picture(state, world, forecast) if self.centred else picture(state, world, forecast)
+        found = {**super().__call__(state, world, forecast), "picture": shown}
+        if self.near:
+            found["near"] = centred_picture(state, world, forecast, max(1, round(max(world.size) / self.near)))
+        return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Paper:
+    """The paper's view: terrain class, tree age and fire stage about the agent, flattened.
+
+    Off the map the terrain class is 0 and the others too; covers are (code + 1) / 5, ages / 10.2, fire stages / 5.
+
+    Attributes:
+        radius: r of the view [cells]; the vector has 3 (2 r + 1)^2 entries.
+
+    Raises:
+        ValueError: If the radius is not in 1..32.
+    """
+
+    radius: int = 3
+
+    def __post_init__(self) -> None:
+        check_fields(self, radius=(1, 32))
+
+    def spaces(self, world: World) -> dict[str, Space]:
+        """Return the space of the one, nameless entry."""
+        return {"": Space((3 * (2 * self.radius + 1) ** 2,), torch.float32, 0.0, 1.0, symmetry=PAPER_SYMMETRY)}
+
+    def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
+        """Return one entry, float32 [B, A, 3 (2 r + 1)^2]."""
+        seen = window(state.vehicles.position, state.cells.shape[1:], self.radius)
+        cells = seen.of(state.cells) if state.knowledge is None else read(seen.of_own(state.knowledge))[0]
+        cover = (seen.of(state.landscape.cover) + seen.inside) * 51
+        view = torch.stack((cover, ages(cells), stages(cells)), dim=2)
+        return {"": view.flatten(2).to(torch.float32).mul_(1.0 / 255.0)}
+
+
+PAPER_SYMMETRY = Planes(3, Target(2), is_flat=True)
+"""How the paper's view turns with the map; its last channel shows fire."""
+
+
+def view_symmetry(channels: Sequence[str]) -> Planes:
+    """Return how a view in channels by name turns with the map; agents turn towards ``FIRE`` if it shows it."""
+    return Planes(len(channels), Target(list(channels).index(FIRE)) if FIRE in channels else None)
+
+
+def view_content(channels: Sequence[str], world: World) -> tuple[Content, ...]:
+    """Return what each channel of a view in channels by name can hold."""
+    return tuple(CHANNELS[name].content(world, channels) for name in channels)
+
+
+def former_symmetry(name: str, shape: tuple[int, ...], names: tuple[str, ...]) -> Planes | Vector | None:
+    """Return how an entry of a preset turns, for manifests that do not tell it; None for an entry of no preset."""
+    of_presets: dict[str, Planes | Vector] = {
+        "": PAPER_SYMMETRY,
+        "view": view_symmetry(names),
+        "status": STATUS if shape == (STATUS_SIZE,) else Vector((*STATUS.parts, IDENTITY)),
+        "picture": picture_symmetry(centred=shape[-1] != PICTURE_SIDE),
+    }
+    found = of_presets.get(name)
+    return found if found is not None and found.fits(shape) else None
+
+
+Observation = Surroundings | Local | Paper
+"""Any observation preset."""
+
+
+def searched_for(observation: Observation) -> str | None:
+    """Return the key of what the map is searched for in every step, which is neither compiled nor recorded; or None."""
+    if not isinstance(observation, Local):
+        return None
+    return "advice" if observation.advice is not None else "reach" if observation.reach else None
+
+
+OF_CRITIC = ("reach",)
+"""Keys of presets that tell the central critic and no agent."""
+
+
+def critic_state(observation: Observation, world: World) -> CriticState:
+    """Return what the central critic sees of worlds where agents see this."""
+    return CriticState(world, reach=isinstance(observation, Local) and observation.reach)

@@ -1,0 +1,175 @@
+"""Reads run folders for learning curves, without instantiating anything from their configuration."""
+
+import csv
+import math
+from array import array
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from io import TextIOWrapper
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warp_torchrl.evaluation.method import method, teacher_label, unusual
+from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError, newest
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.saved_config import SavedConfig, completed
+from warp_torchrl.system.foreign import Foreign, open_file
+from warp_torchrl.system.foreign_yaml import read_yaml
+
+FRAMES, SECONDS, FPS, SAVED = "time/frames", "time/seconds", "time/fps", "world/saved"
+MOST_ROWS = 400
+"""Files of more rows are averaged over bins."""
+_LARGEST = 100_000_000  # bytes
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """Configuration and metrics of a run folder.
+
+    Attributes:
+        folder: Where it is.
+        rows: Columns of ``metrics.csv``, [rows] each, NaN where a value is missing.
+        columns: The same as means over bins, [bins] each, of at most ``MOST_ROWS``.
+        rows_per_bin: Rows that a bin stands for.
+        names: Algorithm and teacher, reward, observation and scenario; the folder's own name where nothing is recorded.
+        alike: Equal for runs that differ in their seed only.
+        mark: Distinguishes runs of the same names.
+        scenario: Its name.
+        n_agents: A; None where it is not recorded.
+        seed: None where it is not recorded.
+        called: What the figure calls it, if it was told.
+    """
+
+    folder: Path
+    rows: Mapping[str, np.ndarray]
+    columns: Mapping[str, np.ndarray]
+    rows_per_bin: int
+    names: tuple[str, ...]
+    alike: str
+    mark: str
+    scenario: str
+    n_agents: int | None
+    seed: str | None
+    called: str = ""
+
+
+def run_folders(paths: Sequence[Path]) -> list[Path]:
+    """Return the run folders of the given paths, each once: a run itself, or all runs of a sweep."""
+    found: dict[Path, Path] = {}
+    for path in paths:
+        if not path.is_dir():
+            raise ValueError(f"RUN must be the folder of a run or of a sweep, got {path}")
+        below = [path] if (path / "metrics.csv").exists() else [file.parent for file in path.glob("**/metrics.csv")]
+        if not below:
+            raise ValueError(f"{path} holds no metrics.csv, nor do its sub-folders")
+        for folder in sorted(below, key=lambda each: (len(str(each)), str(each))):  # job 2 comes before job 10
+            found.setdefault(folder.resolve(), folder)
+    return list(found.values())
+
+
+def read_run(folder: Path) -> Run:
+    """Return what a run folder holds, without instantiating anything."""
+    rows = read_metrics(folder / "metrics.csv")
+    rows_per_bin = math.ceil(len(rows[FRAMES]) / MOST_ROWS)
+    columns = {name: bin_means(values, rows_per_bin) for name, values in rows.items()}
+    try:
+        found, _ = newest(folder)
+        trained = _recorded(found, found.record())
+    except CheckpointError:  # none was saved yet
+        trained = _not_recorded(folder.resolve())
+    return Run(folder=folder, rows=rows, columns=columns, rows_per_bin=rows_per_bin, **trained)
+
+
+def read_metrics(path: Path) -> dict[str, np.ndarray]:
+    """Return the columns of a ``metrics.csv``, float64 [rows], NaN where a cell is empty or not finite.
+
+    Raises:
+        ValueError: If it is over 100 MB or malformed.
+    """
+    with TextIOWrapper(open_file(path, _LARGEST), encoding="utf-8", newline="") as file:
+        lines = csv.reader(file)
+        try:
+            header = next(lines, [])
+            if FRAMES not in header:
+                raise ValueError(f"it has no column {FRAMES}")
+            cells = array("d")  # a list of Python's numbers would be four times as large
+            for line in lines:
+                cells.extend(_numbers(line, header, lines.line_num))
+            columns = dict(zip(header, np.array(cells).reshape(-1, len(header)).T))
+            _check_time(columns)
+        except (csv.Error, ValueError) as error:
+            raise ValueError(f"{path} is malformed: {error}") from None
+    return columns
+
+
+def _numbers(cells: Sequence[str], header: Sequence[str], number: int) -> list[float]:
+    if len(cells) != len(header):
+        raise ValueError(f"line {number} has {len(cells)} cells, the header has {len(header)}")
+    values = []
+    for name, cell in zip(header, cells):
+        try:
+            value = float(cell) if cell else math.nan
+        except ValueError:
+            raise ValueError(f"line {number}, {name}: {cell[:40]!r} is not a number") from None
+        values.append(value if math.isfinite(value) else math.nan)
+    return values
+
+
+def _check_time(columns: Mapping[str, np.ndarray]) -> None:
+    if not columns[FRAMES].size:
+        raise ValueError("it has no rows")
+    for name in (FRAMES, SECONDS):
+        times = columns.get(name, columns[FRAMES])
+        if not (np.diff(times, prepend=0.0) > 0.0).all():  # False for NaN too
+            raise ValueError(f"{name} must be in every row, positive, and grow")
+
+
+def _recorded(found: Checkpoint, record: SavedConfig) -> dict[str, Any]:
+    try:
+        algorithm, reward, observation = (
+            str(record.choices[group]) for group in ("algorithm", "reward", "observation")
+        )
+        names = (" ".join((algorithm, *unusual(record), *teacher_label(record))), reward, observation)
+        _, digest = method(_completed(record))
+        n_agents, seed = record.values["team"]["n_agents"], str(record.values["seed"])
+    except (KeyError, TypeError, AttributeError):
+        raise ValueError(f"{found.path / 'config.json'} does not hold a run's configuration") from None
+    scenario = str(found.manifest.scenario)
+    alike = " ".join((scenario, *names, digest))
+    fields = {"names": (*names, scenario), "alike": alike, "mark": digest[:6]}
+    return fields | {"scenario": scenario, "n_agents": n_agents, "seed": seed}
+
+
+def _completed(record: SavedConfig) -> SavedConfig:
+    """Return a record with this version's keys, or as it is where it has others."""
+    try:
+        return completed(record)
+    except ConfigError:
+        return record
+
+
+def _not_recorded(folder: Path) -> dict[str, Any]:
+    """Return what is known of a run without a checkpoint: its name, and what its ``config.yaml`` says."""
+    content, path = {}, folder / "config.yaml"
+    if path.exists():
+        try:
+            content = read_yaml(path)
+        except Foreign as error:
+            raise ValueError(f"{path} is not a run's configuration: {error}") from None
+    content = content if isinstance(content, dict) else {}
+    team, scenario = content.get("team"), content.get("scenario")
+    fields = {"names": (folder.name,), "alike": str(folder), "mark": f"in {folder.parent.name}"}
+    n_agents = team.get("n_agents") if isinstance(team, dict) else None
+    scenario = scenario if isinstance(scenario, str) else "not recorded"
+    return fields | {"scenario": scenario, "n_agents": n_agents, "seed": None}
+
+
+def bin_means(values: np.ndarray, size: int) -> np.ndarray:
+    """Return the means over bins of so many rows, the last of what is left; NaN where a bin has no value."""
+    if size == 1:
+        return values
+    starts, there = np.arange(0, len(values), size), np.isfinite(values)
+    sums, counts = (np.add.reduceat(each, starts) for each in (np.where(there, values, 0.0), there.astype(float)))
+    return np.where(counts > 0, sums / counts.clip(1), math.nan)

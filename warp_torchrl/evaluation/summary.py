@@ -1,0 +1,293 @@
+"""Summarises runs: one table and one figure from their ``evaluation.json`` files.
+
+A sweep writes both at its end; ``warp summary FOLDER ...`` makes them for any runs.
+"""
+
+import math
+import signal
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from textwrap import fill
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from warp_torchrl.evaluation.reading import read_evaluation
+from warp_torchrl.evaluation.report import place
+from warp_torchrl.evaluation.statistics import compare, performance_profile, summarise
+from warp_torchrl.system import disk
+from warp_torchrl.system.flags import FlagParser
+from warp_torchrl.system.foreign_text import plain_text
+from warp_torchrl.system.signals import exit_on_signal
+from warp_torchrl.validation import did_you_mean
+
+LEVELS = np.linspace(0.0, 1.0, 101)
+_Key = tuple[str, str, str, tuple[int, ...]]  # scenario, method, configuration, seeds
+
+
+class Entry(NamedTuple):
+    """Results of a policy on a scenario, over all runs that differ in their seed only."""
+
+    scenario: str
+    policy: str
+    value: np.ndarray  # of the goal, [runs, n]
+    success: np.ndarray  # [runs, n]
+    seeds: tuple[int, ...]
+    metrics: Mapping[str, np.ndarray] = {}  # by name, [runs, n], NaN where an episode has none; empty for baselines
+    goal: str = "saved"  # what policies are compared by there
+
+
+def gather(*folders: Path) -> list[Entry]:
+    """Return the results in the ``evaluation.json`` files under folders, baselines included.
+
+    Runs that differ in their seed only are one entry.
+
+    Raises:
+        ConfigError: If a file is no evaluation, in one line.
+        OSError: If one cannot be opened.
+    """
+    found: dict[_Key, list[Mapping[str, Any]]] = {}
+    for path in (path for folder in folders for path in sorted(folder.glob("**/evaluation.json"))):
+        content = read_evaluation(path)
+        key = (place(content), content["method"], content["configuration"], tuple(content["seeds"]))
+        found.setdefault(key, []).append(content)
+    several = {(scenario, method) for scenario, method, *_ in found if _differ(found, scenario, method)}
+    return _baselines(found) + [
+        Entry(
+            scenario,
+            f"{method} {configuration[:6]}" if (scenario, method) in several else method,
+            _of_episodes(runs, runs[0]["goal"]),
+            _of_episodes(runs, "success"),
+            seeds,
+            {name: _of_episodes(runs, name) for name in runs[0]["episodes"][0] if name != "seed"},
+            runs[0]["goal"],
+        )
+        for (scenario, method, configuration, seeds), runs in found.items()
+    ]
+
+
+def _baselines(found: Mapping[_Key, Sequence[Mapping[str, Any]]]) -> list[Entry]:
+    """Return the baselines in other policies' evaluations that have no evaluation of their own.
+
+    A baseline whose episodes differ between evaluations played in different worlds, and is left out.
+    """
+    held: dict[tuple[str, str, str, tuple[int, ...]], list[Mapping[str, Any]]] = {}
+    for (scenario, _, _, seeds), runs in found.items():
+        for run in runs:
+            for name, episodes in run["baseline_episodes"].items():
+                if (scenario, name, "", seeds) not in found:
+                    held.setdefault((scenario, name, run["goal"], seeds), []).append(episodes)
+    return [
+        Entry(scenario, name, np.array([episodes[0][goal]]), np.array([episodes[0]["success"]]), seeds, goal=goal)
+        for (scenario, name, goal, seeds), episodes in held.items()
+        if all(each == episodes[0] for each in episodes)
+    ]
+
+
+def _of_episodes(runs: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
+    """Return a metric of each episode of each run, [runs, n]."""
+    return np.array([[episode.get(name) for episode in run["episodes"]] for run in runs], dtype=np.float64)
+
+
+def _differ(found: Mapping[_Key, Any], scenario: str, method: str) -> bool:
+    return len({key[2] for key in found if key[:2] == (scenario, method)}) > 1
+
+
+def table(entries: Sequence[Entry], against: str | None = None) -> str:
+    """Return a Markdown table of the entries, best first in each scenario, each compared with one policy.
+
+    Scenarios where policies are compared by something else than the trees saved have a table of their own.
+
+    Args:
+        entries: Policies on scenarios.
+        against: The policy to compare with; by default, or if a scenario lacks it, the best one.
+
+    Raises:
+        ValueError: If no scenario has the policy to compare with.
+    """
+    known = list(dict.fromkeys(entry.policy for entry in entries))
+    if against not in (None, *known):
+        raise ValueError(f"against must be one of {', '.join(known)}, got {against}{did_you_mean(against, known)}")
+    goals = sorted({entry.goal for entry in entries})  # saved first
+    return "\n\n".join(_table(goal, [entry for entry in entries if entry.goal == goal], against) for goal in goals)
+
+
+def _table(goal: str, entries: Sequence[Entry], against: str | None) -> str:
+    """Return the table of the scenarios of one goal."""
+    lines = [
+        f"| scenario | policy | runs | fires | {goal} % | 95 % | iqm % | success % | to {against or 'the best'} | 95 % "
+        "| better on |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for group in _by_scenario(entries):
+        other = next((entry for entry in group if entry.policy == against), group[0])
+        for entry in group:
+            found = summarise(entry.value)
+            cells = [
+                entry.scenario,
+                entry.policy,
+                str(len(entry.value)),
+                str(entry.value.shape[1]),
+                f"{100 * found['mean']:.1f}",
+                _range(found["ci95"]),
+                f"{100 * found['iqm']:.1f}",
+                f"{100 * entry.success.mean():.1f}",
+            ]
+            if entry is other or entry.seeds != other.seeds:
+                cells += ["-", "-", "-"]
+            else:
+                gap = compare(entry.value, other.value, goal)
+                cells += [
+                    f"{100 * gap[f'{goal}_difference']:+.1f}",
+                    _range(gap["ci95"], "+"),
+                    f"{100 * gap['probability_of_improvement']:.0f} %",
+                ]
+            lines.append("| " + " | ".join(map(_cell, cells)) + " |")
+    return "\n".join(lines)
+
+
+def _cell(text: str) -> str:
+    """Return a text in which no part is a cell of its own."""
+    return text.replace("|", "\\|")
+
+
+def metrics_table(entries: Sequence[Entry], names: Sequence[str]) -> str:
+    """Return a Markdown table of mean metrics, best policy first in each scenario; a dash where no episode has a value.
+
+    Raises:
+        ValueError: If no policy has the metric.
+    """
+    known = list(dict.fromkeys(name for entry in entries for name in entry.metrics))
+    for name in names:
+        if name not in known:
+            raise ValueError(f"{name} is not evaluated; {', '.join(known)} are")
+    lines = ["| scenario | policy | runs | fires | " + " | ".join(names) + " |", "|---" * (4 + len(names)) + "|"]
+    for entry in (entry for group in _by_scenario(entries) for entry in group if entry.metrics):
+        runs, fires = entry.value.shape
+        means = (_mean_of_known(entry.metrics.get(name)) for name in names)
+        lines.append(
+            f"| {_cell(entry.scenario)} | {_cell(entry.policy)} | {runs} | {fires} | " + " | ".join(means) + " |"
+        )
+    return "\n".join(lines)
+
+
+def _mean_of_known(values: np.ndarray | None) -> str:
+    known = np.empty(0) if values is None else values[~np.isnan(values)]
+    return f"{known.mean():.3f}" if known.size else "-"
+
+
+def draw(entries: Sequence[Entry], path: Path) -> None:
+    """Draw the trees saved, or the front watched, with their intervals, and the performance profile of each policy.
+
+    Raises:
+        ImportError: If Matplotlib is not installed.
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    groups = _by_scenario(entries)
+    policies = list(dict.fromkeys(entry.policy for group in groups for entry in group))
+    styles = {policy: line_style(index) for index, policy in enumerate(policies)}
+    with rc_context({"font.size": 8.0, "text.parse_math": False, "axes.spines.top": False, "axes.spines.right": False}):
+        rows = [max(1.2, _bar_height(group) * len(group) + 0.6) for group in groups]
+        columns = min(4, max(1, int(_LEGEND_WIDTH / max(len(policy) + 8 for policy in policies))))
+        legend = 0.17 * math.ceil(len(policies) / columns)
+        figure = Figure(figsize=(8.0, sum(rows) + legend + 0.2), dpi=140, layout="constrained")
+        axes = figure.subplots(len(groups), 2, squeeze=False, height_ratios=rows)
+        for (bars, profile), group in zip(axes, groups, strict=True):
+            _draw_bars(bars, group, styles)
+            for entry in group:
+                shares = 100.0 * performance_profile(entry.value, LEVELS)
+                profile.plot(100.0 * LEVELS, shares, label=entry.policy, linewidth=1.4, **styles[entry.policy])
+            profile.set(xlim=(0, 100), ylim=(0, 102), ylabel="fires, %")
+            goal = _WORDS[group[0].goal]
+            if group is groups[-1] or any(goal != _WORDS[each[0].goal] for each in groups):
+                bars.set_xlabel(f"{goal}: mean, 95 % interval, %")
+                profile.set_xlabel(f"{goal} on so many fires, at least, %")
+        handles = {h.get_label(): h for row in axes for h in row[1].get_lines()}
+        figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=columns, frameon=False)
+        with disk.drafted(path) as draft:
+            figure.savefig(draft, format=path.suffix[1:] or "png", metadata={"Software": None})
+
+
+_WORDS = {"saved": "forest saved", "watched": "front watched"}
+_LABEL_WIDTH, _LEGEND_WIDTH = 32, 130  # characters in a line
+_ROOM_BESIDE = 87.0  # longer bars have their number inside
+
+
+def _bar_height(group: Sequence[Entry]) -> float:
+    """Return the height of a bar that leaves room for the longest label [inches]."""
+    return max(0.3, 0.05 + 0.14 * max(_label(entry).count("\n") + 1 for entry in group))
+
+
+def _label(entry: Entry) -> str:
+    return fill(entry.policy, _LABEL_WIDTH, break_long_words=False)
+
+
+def _draw_bars(axes: Any, group: Sequence[Entry], styles: Mapping[str, Mapping[str, Any]]) -> None:
+    for row, entry in enumerate(reversed(group)):
+        found = summarise(entry.value)
+        mean, (low, high) = 100 * found["mean"], (100 * bound for bound in found["ci95"])
+        axes.barh(row, mean, height=0.7, color=styles[entry.policy]["color"], alpha=0.75)
+        axes.errorbar(mean, row, xerr=[[mean - low], [high - mean]], color="#222222", capsize=2.5, linewidth=1.0)
+        place, side = (high + 1.5, "left") if high < _ROOM_BESIDE else (low - 1.5, "right")
+        axes.text(place, row, f"{mean:.1f}", va="center", ha=side, fontsize=7.0)
+    labels = [_label(entry) for entry in reversed(group)]
+    axes.set(yticks=range(len(group)), yticklabels=labels, xlim=(0, 100))
+    axes.set_title(group[0].scenario, fontsize=8.0, loc="left")
+
+
+def line_style(index: int) -> dict[str, Any]:
+    """Return the colour and the dashes of line number ``index`` of a figure."""
+    colours = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7", "#555555", "#F0E442")  # Okabe, Ito
+    dashes = ("-", "--", "-.", ":")
+    return {"color": colours[index % len(colours)], "linestyle": dashes[index // len(colours) % len(dashes)]}
+
+
+def _by_scenario(entries: Sequence[Entry]) -> list[list[Entry]]:
+    """Return the entries of each scenario, the best first."""
+    scenarios = dict.fromkeys(entry.scenario for entry in entries)
+    groups = [[entry for entry in entries if entry.scenario == scenario] for scenario in scenarios]
+    return [sorted(group, key=lambda entry: -entry.value.mean()) for group in groups]
+
+
+def _range(bounds: Sequence[float], sign: str = "") -> str:
+    low, high = (100.0 * bound for bound in bounds)
+    return f"{low:{sign}.1f} .. {high:{sign}.1f}"
+
+
+@exit_on_signal()
+def main(arguments: list[str] | None = None) -> None:
+    """Print the table of the given runs, and draw the figure if asked to."""
+    parser = FlagParser(prog="warp summary", description=__doc__)
+    parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER", help="runs, or folders of runs")
+    parser.add_argument("--against", metavar="POLICY", help="compare with this policy instead of the best")
+    parser.add_argument("--show", nargs="+", metavar="METRIC", help="means of these, of what evaluation.json holds")
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="draw them as well")
+    options = parser.parse_args(arguments)
+    for folder in options.folders:
+        if not folder.is_dir():
+            parser.error(f"FOLDER must be a folder that is there, got {folder}")
+    try:
+        entries = gather(*options.folders)
+    except (OSError, ValueError) as error:
+        parser.error(plain_text(str(error)))
+    if not entries:
+        parser.error(f"no evaluation.json under {', '.join(map(str, options.folders))}")
+    try:
+        print(metrics_table(entries, options.show) if options.show else table(entries, options.against))
+    except ValueError as error:
+        parser.error(plain_text(str(error)))
+    if options.plot is not None:
+        try:
+            draw(entries, options.plot)
+        except (OSError, ValueError) as error:  # a format that Matplotlib does not write
+            parser.error(f"--plot: {plain_text(str(error))}")
+        except ImportError:
+            parser.error('--plot needs Matplotlib: pip install "warp_torchrl[figures]"')
+
+
+if __name__ == "__main__":
+    if hasattr(signal, "SIGPIPE"):
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # ends quietly when piped into head
+    main()

@@ -1,1 +1,0 @@
-"""Figures of the paper and of the fire laws: ``python -m warp_torchrl.gallery``."""

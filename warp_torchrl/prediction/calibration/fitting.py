@@ -1,0 +1,91 @@
+"""Scores of laws on fires, and fits: to all fires, and to all but one, which then judges."""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Protocol
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.prediction.calibration.candidates import burnable
+from warp_torchrl.prediction.calibration.case import FireCase
+from warp_torchrl.prediction.calibration.null_models import circle, ellipse
+from warp_torchrl.prediction.calibration.parameters import Parameter, fire_at
+from warp_torchrl.prediction.calibration.scores import Scores, scores_at_area, scores_of
+from warp_torchrl.world.arrays.random import world_key
+from warp_torchrl.world.behaviour.moistures import MOISTURES
+from warp_torchrl.world.fires.alone import arrival_minutes
+from warp_torchrl.world.law.rate import RateFire
+
+
+class Method(Protocol):
+    """What fits: ``Gradients`` or ``Evolution``."""
+
+    def __call__(
+        self,
+        fire: RateFire,
+        parameters: Sequence[Parameter],
+        cases: Sequence[FireCase],
+        tell: Callable[[int, float], None] = ...,
+    ) -> Tensor:
+        """Return z, float32 [P]."""
+        ...
+
+
+def score(fire: RateFire, case: FireCase, draws: int = 64, seed: int = 1) -> Scores:
+    """Return the scores of a law on a fire, of so many fires with its own deviations of rates."""
+    key = world_key(torch.arange(draws) + seed)
+    parts = arrival_minutes(fire, case.landscape, case.lit, key, case.spells, case.cell_size)
+    return scores_of(torch.cat(list(parts)), case.scar, case.last, case.arrival)
+
+
+def null_scores(fire: RateFire, case: FireCase) -> dict[str, Scores]:
+    """Return the scores of the circle and of the ellipse over the cells that can burn under a law."""
+    fuel, cells = burnable(fire, case), int(case.scar.sum())
+    grown = {
+        "circle": circle(case.lit, fuel, cells),
+        "ellipse": ellipse(case.lit, fuel, cells, case.wind),
+    }
+    return {name: scores_at_area(burned, case.scar) for name, burned in grown.items()}
+
+
+def check_told(parameters: Sequence[Parameter], cases: Sequence[FireCase]) -> None:
+    """Refuse a moisture that the weather of a fire tells: the law's own is not read there.
+
+    Raises:
+        ValueError: With the parameter and the fire.
+    """
+    names = [f"moisture.{name}" for name in MOISTURES]
+    for each in parameters:
+        for case in cases:
+            told = [spell.moisture for spell in case.spells if spell.moisture is not None]
+            if each.name in names and any(not bool(row[names.index(each.name)].isnan()) for row in told):
+                raise ValueError(f"parameters must not be told by the weather, {each.name} is by that of {case.name}")
+
+
+def check_fuel(case: FireCase, fire: RateFire) -> None:
+    """Refuse a fire whose map has fuel codes that the law lacks.
+
+    Raises:
+        ValueError: With the fire, the codes and their cells.
+    """
+    try:
+        fire.check_fuel(case.landscape)
+    except ValueError as error:
+        raise ValueError(f"{case.name}: {error}") from None
+
+
+def folds(cases: Sequence[FireCase]) -> Iterator[tuple[FireCase, list[FireCase]]]:
+    """Yield each fire with all the others."""
+    for index, left_out in enumerate(cases):
+        yield left_out, [case for place, case in enumerate(cases) if place != index]
+
+
+def fitted(
+    method: Method,
+    fire: RateFire,
+    parameters: Sequence[Parameter],
+    cases: Sequence[FireCase],
+    tell: Callable[[int, float], None] = lambda step, loss: None,
+) -> RateFire:
+    """Return the law with its parameters fitted to some fires."""
+    return fire_at(fire, parameters, method(fire, parameters, cases, tell))

@@ -1,0 +1,88 @@
+"""What a calibration asks for beside the law."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from warp_torchrl.prediction.calibration.evolution import Evolution
+from warp_torchrl.prediction.calibration.fitting import Method
+from warp_torchrl.prediction.calibration.gradients import Gradients
+from warp_torchrl.prediction.calibration.losses import Loss
+from warp_torchrl.validation import check_fields
+
+
+@dataclass(frozen=True, kw_only=True)
+class CalibrationOptions:
+    """What ``warp calibrate`` is told beside ``fire``.
+
+    Attributes:
+        fires: Folders of fires that happened, see ``warp_torchrl.prediction.calibration.case.read_case``.
+        hours: When their scars are known [h]; None is the end of each one's weather.
+        units: Unit of a quantity or column of their weather where files state none, ``units.wind_speed=km/h``; of
+            ``datetime`` the order of its dates, ``units.datetime=d/m/y``.
+        parameters: What is fitted, see ``prediction.calibration.parameters``; none scores the law as it is.
+        bounds: Lowest and highest value by parameter, in place of the usual.
+        scales: Deviation of the prior by parameter, in place of the usual.
+        method: ``gradients`` or ``evolution``.
+        loss: What is made small; None is ``cross_entropy`` of gradients, ``jaccard`` of evolution.
+        prior_weight: Weight of the priors against the mean loss of the fires.
+        steps: Steps of gradients or generations of evolution; None is 8 or 15.
+        population: Candidates of each generation.
+        softness: Deviation of the logarithm of a fire's rates in the expected burning of gradients.
+        leave_one_out: Whether each fire is left out in turn, and scored by a law fitted to the others.
+        draws: Fires that are run for each score.
+        seed: Of all draws.
+        out: Folder to write to; None makes one in ``outputs/calibrations``.
+        overwrite: Write into a folder that holds something.
+        debug: Print a traceback when something fails.
+
+    Raises:
+        ValueError: If a value is out of its range, or values do not go together.
+    """
+
+    fires: tuple[str, ...] = ()
+    hours: float | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
+    parameters: tuple[str, ...] = ()
+    bounds: Mapping[str, Any] = field(default_factory=dict)
+    scales: Mapping[str, Any] = field(default_factory=dict)
+    method: Literal["gradients", "evolution"] = "gradients"
+    loss: Loss | None = None
+    prior_weight: float = 0.1
+    steps: int | None = None
+    population: int = 8
+    softness: float = 0.2
+    leave_one_out: bool = False
+    draws: int = 64
+    seed: int = 1
+    out: str | None = None
+    overwrite: bool = False
+    debug: bool = False
+
+    def __post_init__(self) -> None:
+        check_fields(self, hours=(1e-2, 1e5), draws=(1, 100_000), steps=(1, 10_000))
+        if not self.fires:
+            raise ValueError("fires must name folders of fires that happened, got none")
+        if self.leave_one_out and not self.parameters:
+            raise ValueError("parameters must be given where fires are left out, got none")
+        if self.leave_one_out and len(self.fires) < 2:
+            raise ValueError(f"fires must be two at least where one is left out, got {len(self.fires)}")
+        _ = self.fit  # refuse what it refuses
+
+    @property
+    def fit(self) -> Method:
+        """Return the method with its options."""
+        if self.method == "gradients":
+            return Gradients(
+                steps=self.steps or 8,
+                loss=self.loss or "cross_entropy",
+                softness=self.softness,
+                prior_weight=self.prior_weight,
+            )
+        return Evolution(
+            generations=self.steps or 15,
+            population=self.population,
+            loss=self.loss or "jaccard",
+            prior_weight=self.prior_weight,
+            seed=self.seed,
+        )

@@ -1,0 +1,101 @@
+"""Building a run's configuration: every component made and checked from plain values."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import fields
+from functools import partial
+from typing import Any
+
+from warp_torchrl.collection.imitation import Imitation
+from warp_torchrl.runs.config.checkpoint_config import CheckpointConfig
+from warp_torchrl.runs.config.components import build_components, chosen
+from warp_torchrl.runs.config.composed_kinds import kinds_of_worlds
+from warp_torchrl.runs.config.construction import ConfigError, construct
+from warp_torchrl.runs.config.evaluation_config import EvaluationConfig
+from warp_torchrl.runs.config.groups import COMMAND_KEYS, COMPONENTS, WORLD_KEYS
+from warp_torchrl.runs.config.levels import level_worlds
+from warp_torchrl.runs.config.run_config import RunConfig
+from warp_torchrl.validation import did_you_mean
+
+
+def run_config(config: Mapping[str, Any]) -> RunConfig:
+    """Check a composed configuration and build what it describes.
+
+    Raises:
+        ConfigError: With key, value and rule.
+    """
+    check_keys(config)
+    for key in COMPONENTS:
+        if key not in config:
+            raise ConfigError(f"{key} must be given")
+    built = build_components(config)
+    parts = {"checkpoint": CheckpointConfig, "evaluation": EvaluationConfig, "imitation": Imitation}
+    built |= {name: construct(kind, config.get(name, {}), name) for name, kind in parts.items()}
+    built["make_levels"] = partial(level_worlds, config, built, WORLD_KEYS)
+    built["make_kinds"] = partial(kinds_of_worlds, config, teacher=built["imitation"].teacher)
+    values = chosen(RunConfig, {**config, **built})
+    _check_together(config)
+    made = construct(RunConfig, values, "")
+    with _in_section("algorithm"):
+        made.algorithm.check_batch(made.n_worlds * made.collector.steps)
+    with _in_section("model"):
+        made.algorithm.check_model(made.model)
+    with _in_section("collector"):
+        made.collector.check_worlds(made.n_worlds)
+    with _in_section("imitation"):
+        made.imitation.check_fits(made.algorithm, made.collector, made.model)
+    return made
+
+
+def check_keys(config: Mapping[str, Any]) -> None:
+    """Check that a composed configuration has no key but those that there are: ``+key`` adds whatever one likes.
+
+    Raises:
+        ConfigError: With the first that is none, and those that there are.
+    """
+    known = {each.name for each in fields(RunConfig)} | {*COMPONENTS, *WORLD_KEYS, *COMMAND_KEYS}
+    for key in config:
+        if key not in known:
+            has = f"it has {', '.join(sorted(known - {'world', 'make_levels', 'make_kinds'}))}"
+            raise ConfigError(f"{key} is not a key of the configuration; {has}{did_you_mean(key, known)}")
+    if not isinstance(config.get("debug", False), bool):
+        raise ConfigError(f"debug must be true or false, got {config['debug']!r}")
+
+
+@contextmanager
+def _in_section(section: str) -> Iterator[None]:
+    """Let a mistake name the section of the configuration that it is in."""
+    try:
+        yield
+    except ValueError as error:
+        raise ConfigError(f"{section}.{error}") from None
+
+
+def _check_together(config: Mapping[str, Any]) -> None:
+    reward, algorithm = config["reward"], config["algorithm"]
+    model, radio = config["model"]["messages"], config["team"]["radio"]["carries"]
+    if model in ("graph", "both") and radio not in ("graph", "both"):
+        raise ConfigError(
+            f"team.radio.carries must be graph or both where networks talk, model.messages={model}, got {radio}"
+        )
+    rounds, delay = config["model"]["message_rounds"], config["team"]["radio"]["delay"]
+    if model in ("graph", "both") and delay and rounds != 1:
+        raise ConfigError(
+            f"model.message_rounds must be 1 where messages come late, team.radio.delay={delay}, got {rounds}"
+        )
+    trust, observation = config["model"].get("trust", 0.0), config["observation"]
+    if trust and not (observation.get("advice") and observation.get("rules")):
+        raise ConfigError(
+            "model.trust must be 0 where agents are not advised and told the rules, observation.advice and "
+            f"observation.rules, got {trust}"
+        )
+    mixer, cooperation = algorithm.get("mixer", "none"), reward.get("cooperation", 1.0)
+    if mixer != "none" and cooperation != 1.0:
+        raise ConfigError(
+            f"reward.cooperation must be 1 where the team has one value, algorithm.mixer={mixer}, got {cooperation}"
+        )
+    if reward["shaping"] > 0.0 and reward["gamma"] != algorithm["gamma"]:
+        raise ConfigError(
+            f"reward.gamma must be algorithm.gamma, {algorithm['gamma']}, for shaping to leave optimal policies as "
+            f"they are, got {reward['gamma']}"
+        )

@@ -1,0 +1,35 @@
+"""Building the components of a composed configuration, and the world of those that make one."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+from warp_torchrl.runs.config.construction import ConfigError, build, construct
+from warp_torchrl.runs.config.groups import COMPONENTS
+from warp_torchrl.world.world import World
+
+
+def build_components(config: Mapping[str, Any], names: Sequence[str] = COMPONENTS) -> dict[str, Any]:
+    """Build components of a composed configuration, and the ``world`` of those that make one.
+
+    Args:
+        config: As plain values.
+        names: Which; those of the world must be among them.
+
+    Raises:
+        ConfigError: With key, value and rule.
+    """
+    first = ("model",) if "model" in names else ()  # whose messages are the team's: mistakes are told of the model
+    built = {name: build(config[name], name) for name in dict.fromkeys((*first, *names))}
+    world = construct(World, chosen(World, {**config, **built}), "")
+    if "reward" in built:
+        try:
+            built["reward"].check_world(world)
+        except ValueError as error:
+            raise ConfigError(str(error)) from None
+    return {**built, "world": world}
+
+
+def chosen(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return those values that are fields of a dataclass."""
+    return {each.name: values[each.name] for each in fields(kind) if each.name in values}

@@ -1,0 +1,236 @@
+"""Configuration: composes the yaml files of ``conf/``.
+
+A component's types, defaults and rules stand in its dataclass and nowhere else. The yaml files name the class, always
+one of this package's own; nothing that is read from a run folder is ever instantiated by name.
+"""
+
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import fields
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, cast
+
+from hydra import compose, initialize_config_dir
+from hydra.core.global_hydra import GlobalHydra
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.errors import HydraException
+from omegaconf import DictConfig, OmegaConf, open_dict
+from omegaconf.errors import OmegaConfBaseException
+
+from warp_torchrl.runs.config.construction import ConfigError, UnknownKeyError, component
+from warp_torchrl.runs.config.defaults import defaults
+from warp_torchrl.runs.config.grammar import check_overrides, several_values
+from warp_torchrl.runs.config.groups import COMPONENTS
+from warp_torchrl.runs.config.renamed import renamed_overrides
+from warp_torchrl.validation import did_you_mean
+
+OmegaConf.register_new_resolver("pid", os.getpid, replace=True, use_cache=True)  # a sweep's jobs get its own process's
+HYDRA_ERRORS = (HydraException, OmegaConfBaseException)
+"""What Hydra raises where a configuration has a mistake."""
+GROUPS = ("scenario", "experiment")
+"""Groups whose options are no classes."""
+OPTION = re.compile(r"[A-Za-z0-9_]+")
+"""What an option may be called."""
+_KEY = re.compile(r"[A-Za-z0-9_.]+")
+
+
+def conf_folder() -> Path:
+    """Return the folder of the yaml files: inside the package when installed, beside it in a checkout."""
+    package = Path(__file__).parents[2]
+    inside = package / "conf"
+    return inside if inside.is_dir() else package.parent / "conf"
+
+
+def compose_config(name: str, overrides: Sequence[str] = ()) -> DictConfig:
+    """Compose ``conf/<name>.yaml`` with overrides in Hydra's grammar.
+
+    Raises:
+        ConfigError: If an override does not fit, in one line.
+    """
+    overrides = renamed_overrides(overrides)
+    check_choices(overrides)
+    config = _compose(name, overrides)
+    try:
+        OmegaConf.resolve(config)
+    except OmegaConfBaseException as error:
+        raise ConfigError(one_line(error)) from None
+    return config
+
+
+def choices(overrides: Sequence[str]) -> dict[str, str]:
+    """Return the option of each group of ``conf/train.yaml`` with overrides that ``compose_config`` takes."""
+    GlobalHydra.instance().clear()
+    with initialize_config_dir(str(conf_folder()), version_base="1.3"):
+        composed = compose("train", overrides=renamed_overrides(overrides), return_hydra_config=True)
+    return dict(composed.hydra.runtime.choices)
+
+
+def check_choices(overrides: Sequence[str]) -> None:
+    """Check that each group has one option, by its name.
+
+    Hydra merges lists of options and follows paths; a run folder could not tell them, nor resume.
+
+    Raises:
+        ConfigError: If not, in one line.
+    """
+    for override in overrides:
+        group, _, option = override.partition("=")
+        if group in (*COMPONENTS, "scenario") and not OPTION.fullmatch(option.strip("'\"")):
+            several = "; -m sweeps over several" if "," in option else ""
+            raise ConfigError(f"{group} must be one of the files of conf/{group}, got {option}{several}")
+
+
+def _compose(name: str, overrides: Sequence[str]) -> DictConfig:
+    try:
+        folder = conf_folder()
+        config = deepcopy(_composed(folder, _last_change(folder), name, tuple(overrides)))
+        return _without_values_of_others(config, overrides)
+    except HYDRA_ERRORS as error:
+        raise explain(error, name, overrides) from None
+    except ValueError as error:
+        raise ConfigError(f"{one_line(error)}, in {' '.join(overrides)}") from None
+
+
+def _without_values_of_others(config: DictConfig, overrides: Sequence[str]) -> DictConfig:
+    """Return a configuration without what its scenario says of options that the overrides replace.
+
+    ``ignition=file`` in a scenario with ``ignition: {count: 3}`` has no count. What is no field of any option stays, to
+    be refused as a mistake.
+    """
+    given = [override.partition("=")[0].lstrip("+~") for override in overrides]
+    for group in (each for each in COMPONENTS if each in given and each in config):
+        kind = component(config[group].get("_target_"))
+        own = {"_target_"} if kind is None else {"_target_", *(each.name for each in fields(kind))}
+        for key in [each for each in config[group] if each not in own and f"{group}.{each}" not in given]:
+            if kind is not None and _options_with(f"{group}.{key}"):
+                with open_dict(config):
+                    del config[group][key]
+    return config
+
+
+def _known_keys(name: str, overrides: Sequence[str]) -> list[str]:
+    """Return every key of a configuration with the options that the overrides choose, where they can be had."""
+    chosen = tuple(each for each in overrides if each.partition("=")[0] in (*COMPONENTS, *GROUPS))
+    for choices in (chosen, ()):
+        try:
+            config = _composed(conf_folder(), _last_change(conf_folder()), name, choices)
+        except HYDRA_ERRORS:
+            continue
+        return [*_keys(plain(config)), *GROUPS]
+    return []
+
+
+@lru_cache(maxsize=256)
+def _composed(folder: Path, last_change: int, name: str, overrides: tuple[str, ...]) -> DictConfig:
+    """Return a composed configuration, once for each state of the files.
+
+    Hydra takes a fifth of a second for it, so options are composed once and values set over a copy, as Hydra does.
+    """
+    values = [each for each in overrides if _may_name_a_value(folder, each)]
+    if values:
+        options = tuple(each for each in overrides if each not in values)
+        try:
+            config = deepcopy(_composed(folder, last_change, name, options))
+            for each in OverridesParser.create().parse_overrides(values):
+                OmegaConf.update(config, each.key_or_group, each.value(), merge=True)
+            return config
+        except HYDRA_ERRORS:
+            pass  # several values, or a mistake, of which Hydra says more
+    return _composed_by_hydra(folder, name, overrides)
+
+
+def _may_name_a_value(folder: Path, override: str) -> bool:
+    """Return whether an override gives a key a value, and chooses no option and neither adds nor removes."""
+    key, equals, _ = override.partition("=")
+    return bool(equals and _KEY.fullmatch(key)) and not key.startswith("hydra.") and not (folder / key).is_dir()
+
+
+def _composed_by_hydra(folder: Path, name: str, overrides: Sequence[str]) -> DictConfig:
+    GlobalHydra.instance().clear()
+    with initialize_config_dir(str(folder), version_base="1.3"):
+        return compose(name, overrides=list(overrides))
+
+
+def _last_change(folder: Path) -> int:
+    return max(path.stat().st_mtime_ns for path in (folder, *folder.glob("**/*")))
+
+
+def explain(error: Exception, name: str, overrides: Sequence[str]) -> ConfigError:
+    """Return the error that Hydra raised on composing ``conf/<name>.yaml`` as ours, in one line.
+
+    Raises:
+        ConfigError: If an override is not of Hydra's grammar.
+    """
+    check_overrides(overrides)
+    unknown = re.match(r"Could not override '([^']*)'", str(error))
+    line = one_line(error, _known_keys(name, overrides))
+    return UnknownKeyError(line, unknown[1]) if unknown else ConfigError(line)
+
+
+def one_line(error: Exception, known: Sequence[str] = ()) -> str:
+    """Return Hydra's message in one line, with the options where it lists them, and the known key that is nearest."""
+    text = str(error)
+    unknown = re.match(r"Could not override '([^']*)'", text)
+    if unknown:
+        others = _options_with(unknown[1])
+        hint = f", but with {' or '.join(others)}" if others else did_you_mean(unknown[1], known)
+        return f"{unknown[1]} is not a key of the configuration{hint or '; conf/ and --cfg job show what there is'}"
+    missing = re.search(
+        r"Could not find '([\w/]+)/([^']*)'.*Available options in '[^']*':(.*)Config search", text, re.S
+    )
+    if missing:
+        options = missing[3].split()
+        return f"{missing[1]} must be one of {', '.join(options)}, got {missing[2]}{did_you_mean(missing[2], options)}"
+    several = re.match(r"Ambiguous value for argument '(.*)'$", text, re.M)
+    if several:
+        return several_values(several[1])
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    return " ".join(line for line in lines if not line.startswith(("full_key", "object_type", "Set the environment")))
+
+
+def _options_with(key: str) -> list[str]:
+    """Return the options of a key's group whose files have it."""
+    group, _, name = key.partition(".")
+    files = sorted((conf_folder() / group).glob("*.yaml")) if group in COMPONENTS and name else []
+    return [f"{group}={path.stem}" for path in files if name in defaults(_class_of(path))]
+
+
+def _class_of(path: Path) -> type:
+    """Return the class that an option's file names."""
+    return cast("type", component(cast("DictConfig", OmegaConf.load(path))["_target_"]))
+
+
+def option_of(group: str, target: str) -> str:
+    """Return the first of our options of a group whose file names a class.
+
+    Raises:
+        ConfigError: If none does.
+    """
+    for path in sorted((conf_folder() / group).glob("*.yaml")):
+        if cast("DictConfig", OmegaConf.load(path)).get("_target_") == target:
+            return path.stem
+    raise ConfigError(f"{group}._target_ must be a class that an option of conf/{group} names, got {target}")
+
+
+def plain(config: DictConfig) -> dict[str, Any]:
+    """Return a configuration as plain, resolved values."""
+    return cast("dict[str, Any]", OmegaConf.to_container(config, resolve=True))
+
+
+def without_targets(node: Any) -> Any:
+    """Return a configuration node without its ``_target_`` entries."""
+    if isinstance(node, Mapping):
+        return {key: without_targets(value) for key, value in node.items() if key != "_target_"}
+    return list(node) if isinstance(node, list) else node
+
+
+def _keys(node: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    """Yield the keys of a configuration, those of groups included."""
+    for key, value in node.items():
+        if key != "_target_":
+            yield f"{prefix}{key}"
+        if isinstance(value, Mapping):
+            yield from _keys(value, f"{prefix}{key}.")

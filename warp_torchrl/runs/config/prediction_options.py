@@ -1,0 +1,73 @@
+"""What a prediction asks for beside its ground and its law."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from warp_torchrl.validation import check_fields
+
+
+@dataclass(frozen=True, kw_only=True)
+class PredictionOptions:
+    """What ``warp predict`` is told beside ``landscape`` and ``fire``.
+
+    Attributes:
+        weather: CSV file of weather by the hour, see ``warp_torchrl.world.weather.table``.
+        ignition: File of where the fire starts: points, a raster or a perimeter.
+        hours: How long fires are followed; None: to the end of the weather.
+        area: Area at which a fire stops, even before [ha]; None lets it go on.
+        fires: How many.
+        seed: Fire i has seed ``seed + i``.
+        start: When the fires start: minutes since the weather's first row, or a date and time.
+        perimeter_hours: Hours between the perimeters that are written.
+        wind_height: At what height the wind was measured; None goes by the file.
+        units: Unit of a quantity or column of the weather where the file states none, ``units.wind_speed=km/h``; of
+            ``datetime`` the order of its dates, ``units.datetime=d/m/y``.
+        true_north: Whether the weather's bearings are from true north, and are turned to the map's; else they are from
+            the map's grid north already.
+        start_ffmc: Fine fuel moisture code an hour before the first row, where the file has none and it is computed.
+        bui: Buildup index, where the file has none and neither DMC nor DC; None leaves that of the law.
+        cell_size: Side of a cell [m]; None is that of the landscape.
+        animation: Whether the first fire is written as a GIF.
+        out: Folder to write to; None makes one in ``outputs/predictions``.
+        overwrite: Write into a folder that holds something.
+        debug: Print a traceback when something fails.
+
+    Raises:
+        ValueError: If a value is out of its range, or a file is not named.
+    """
+
+    weather: str | None = None
+    ignition: str | None = None
+    hours: float | None = None
+    area: float | None = None
+    fires: int = 100
+    seed: int = 0
+    start: float | str = 0.0
+    perimeter_hours: float = 1.0
+    wind_height: Literal["10m", "20ft"] | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
+    true_north: bool = True
+    start_ffmc: float = 85.0
+    bui: float | None = None
+    cell_size: float | None = None
+    animation: bool = False
+    out: str | None = None
+    overwrite: bool = False
+    debug: bool = False
+
+    def __post_init__(self) -> None:
+        check_fields(
+            self,
+            hours=(1e-2, 1e5),
+            area=(1e-3, 1e9),
+            fires=(1, 1_000_000),
+            seed=(0, 2**62),
+            perimeter_hours=(1e-2, 1e5),
+            start_ffmc=(0.0, 101.0),
+            bui=(0.0, 2000.0),
+            cell_size=(0.01, 100_000.0),
+        )
+        for name, what in (("weather", "a CSV file of weather"), ("ignition", "a file of where the fire starts")):
+            if getattr(self, name) is None:
+                raise ValueError(f"{name} must name {what}, got null")

@@ -1,0 +1,199 @@
+"""What run folders keep of a configuration, and how it is composed anew from that.
+
+What is read from a run folder is plain values: classes come from this package's own files alone.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from warp_torchrl.runs.config.compose import OPTION, compose_config, conf_folder, option_of, plain, without_targets
+from warp_torchrl.runs.config.construction import ConfigError, component, free_mappings
+from warp_torchrl.runs.config.groups import COMPONENTS, ENVIRONMENT, WORLD_KEYS
+from warp_torchrl.runs.config.renamed import renamed_overrides, renamed_values
+from warp_torchrl.validation import dotted
+
+_BEFORE = {
+    "model.symmetry": "none",
+    "processes": 1,
+    "collector.grows_at": 0.0,
+    "observation.identity": False,
+    "observation.centred": False,
+    "algorithm.logit_penalty": 0.0,
+    "reward.act_per": "forest",
+}
+"""What runs did whose record has none of a key yet."""
+_DEEPEST = 20
+"""How deep what is recorded may be nested; a configuration is 5 deep."""
+_LONGEST = 4096
+"""Characters of a text that is recorded; a path has no more."""
+_OF_NETWORKS = {"team.radio.carries": ("graph", "both")}
+"""Values of a scenario's keys that a policy's networks need: another scenario does not change them."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SavedConfig:
+    """A configuration as a run folder keeps it: which option each group had, and every value.
+
+    Attributes:
+        choices: Option by group.
+        values: Resolved values, without the names of classes.
+    """
+
+    choices: dict[str, str] = field(default_factory=dict)
+    values: dict[str, Any] = field(default_factory=dict)
+
+
+def saved_config(content: object) -> SavedConfig:
+    """Return the configuration that a JSON file holds, with the names of now.
+
+    Args:
+        content: From a run folder or a recording: not trusted.
+
+    Raises:
+        ValueError: If it is not choices and values, or they are nested too deep or have too long texts.
+    """
+    choices, values = (content.get(part) if isinstance(content, dict) else None for part in ("choices", "values"))
+    if not (isinstance(choices, dict) and isinstance(values, dict)):
+        raise ValueError("it must hold choices and values")
+    if not all(isinstance(option, str) for option in choices.values()):
+        raise ValueError("choices must be names of options")
+    _check_bounds([values, list(choices.values())])
+    return SavedConfig(choices=choices, values=renamed_values(values))
+
+
+def _check_bounds(values: Any) -> None:
+    level = [values]
+    for _ in range(_DEEPEST):
+        level = [each for node in level for each in _parts(node)]
+        if any(isinstance(each, str) and len(each) > _LONGEST for each in level):
+            raise ValueError(f"texts must have at most {_LONGEST} characters")
+    if level:
+        raise ValueError(f"values must be nested at most {_DEEPEST} deep")
+
+
+def _parts(node: Any) -> list[Any]:
+    if isinstance(node, dict):
+        return [*node, *node.values()]
+    return node if isinstance(node, list) else []
+
+
+def environment_record(values: Mapping[str, Any]) -> SavedConfig:
+    """Return what a composed configuration, as plain values, says of its environment.
+
+    Raises:
+        ConfigError: If a class is none that an option of ours names.
+    """
+    choices = {group: option_of(group, values[group]["_target_"]) for group in ENVIRONMENT}
+    kept = {key: values[key] for key in dict.fromkeys((*WORLD_KEYS, *ENVIRONMENT)) if key in values}
+    return SavedConfig(choices={"scenario": values["scenario"], **choices}, values=without_targets(kept))
+
+
+def restore(record: SavedConfig, overrides: Sequence[str] = ()) -> DictConfig:
+    """Compose the configuration of a record anew from this package's own files, and lay its values over it.
+
+    Classes come from our yaml files alone. Values that an override touches are the override's; an override of
+    ``scenario`` takes the whole world from that scenario.
+
+    Args:
+        record: From a run folder: not trusted.
+        overrides: In Hydra's grammar.
+
+    Raises:
+        ConfigError: If a choice or a value does not fit.
+    """
+    overrides = renamed_overrides(overrides)
+    for group, option in record.choices.items():
+        if group not in (*COMPONENTS, "scenario") or not OPTION.fullmatch(str(option)):
+            raise ConfigError(f"{group}={option!r} in the run folder is not one of our options")
+    touched = [override.split("=", 1)[0].lstrip("+~") for override in overrides]
+    if "scenario" in touched:
+        touched += WORLD_KEYS
+    choices = [f"{group}={option}" for group, option in record.choices.items() if group not in touched]
+    config = compose_config("train", [*choices, *overrides])
+    recorded = _recorded(record, config, touched)
+    groups = {*record.values, "processes"}
+    before = {
+        key: value
+        for key, value in _BEFORE.items()
+        if key.split(".")[0] in groups and OmegaConf.select(config, key) is not None
+    }
+    for path, value in {**before, **recorded}.items():
+        if "${" in str(value):  # what is recorded was resolved: this one was put there to read what is ours
+            raise ConfigError(f"{path} in the run folder must be a plain value, got {value!r}")
+        is_touched = any(path == key or _is_in(path, key) for key in touched)
+        if is_touched and value not in _OF_NETWORKS.get(path, ()):
+            continue
+        try:
+            OmegaConf.update(config, path, value, merge=False, force_add=path.count(".") > 1)  # into a field's mapping
+        except OmegaConfBaseException:
+            raise ConfigError(f"{path} in the run folder is not a key of this version's configuration") from None
+    return config
+
+
+def completed(record: SavedConfig) -> SavedConfig:
+    """Return a record with every key of this version: those that came after it have the value that it was run by.
+
+    Raises:
+        ConfigError: If a choice or a value does not fit.
+    """
+    return SavedConfig(choices=record.choices, values=without_targets(plain(restore(record))))
+
+
+def _recorded(record: SavedConfig, config: DictConfig, touched: Sequence[str]) -> dict[str, Any]:
+    """Return the values of a record by dotted key; a mapping of any keys is one value, unless a key in it is touched.
+
+    So it has the keys that it had, and no others that our files have.
+    """
+    whole: dict[str, Any] = {}
+    for group in (each for each in COMPONENTS if isinstance(record.values.get(each), Mapping)):
+        kind, values = component(config[group]["_target_"]), record.values[group]
+        for name in sorted(free_mappings(kind) & values.keys()) if kind is not None else ():
+            whole[f"{group}.{name}"] = values[name]
+    whole = {path: value for path, value in whole.items() if not any(_is_in(key, path) for key in touched)}
+    leaves = dotted(record.values).items()
+    return {**{key: value for key, value in leaves if not any(_is_in(key, path) for path in whole)}, **whole}
+
+
+def _is_in(key: str, path: str) -> bool:
+    """Return whether a key names something in what a path names."""
+    return key.startswith(f"{path}.")
+
+
+def world_overrides(values: Mapping[str, Any]) -> list[str]:
+    """Return how a configuration's worlds differ from those of its scenario, as overrides; files are not named.
+
+    Args:
+        values: Plain, with ``_target_``.
+    """
+    choices = [f"scenario={values['scenario']}"]
+    usual = _composed_worlds(choices)
+    for group, parts in values.items():
+        if group in usual and isinstance(parts, Mapping) and parts.get("_target_") != usual[group].get("_target_"):
+            options = (f"{group}={path.stem}" for path in sorted((conf_folder() / group).glob("*.yaml")))
+            of_its_class = (
+                each for each in options if _composed_worlds([*choices, each])[group]["_target_"] == parts["_target_"]
+            )
+            choices.append(next(of_its_class))
+            usual = _composed_worlds(choices)
+    usual = dotted(usual)
+    changed = [
+        f"{path}={value}".replace(" ", "")
+        for path, value in map(_of_worlds, dotted({key: values[key] for key in WORLD_KEYS if key in values}).items())
+        if (path not in usual or usual[path] != value) and not path.endswith(".path")
+    ]
+    return choices[1:] + changed
+
+
+def _of_worlds(leaf: tuple[str, Any]) -> tuple[str, Any]:
+    """Return a leaf as it is for the worlds: what networks send each other changes none."""
+    path, value = leaf
+    return (path, {"graph": "none", "both": "map"}.get(value, value)) if path == "team.radio.carries" else leaf
+
+
+def _composed_worlds(choices: Sequence[str]) -> dict[str, Any]:
+    composed = plain(compose_config("train", choices))
+    return {key: composed[key] for key in WORLD_KEYS}

@@ -1,0 +1,1 @@
+"""Trained policies: found, loaded, and played."""

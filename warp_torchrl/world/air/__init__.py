@@ -1,0 +1,1 @@
+"""Wind and weather of a world."""

@@ -1,0 +1,1 @@
+"""Arrays under the state: batches, draws, directions, and kernels on maps of bytes."""

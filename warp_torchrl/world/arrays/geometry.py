@@ -1,0 +1,79 @@
+"""The grid's directions and distances.
+
+Rows grow south and columns grow east. Direction 0 is north; the eight directions go round clockwise, so
+direction ``d`` and ``(d + 4) % 8`` are opposite.
+"""
+
+import math
+
+import torch
+from torch import Tensor
+from torch.nn.functional import pad
+
+from warp_torchrl.system.modes import kept
+
+DIRECTIONS = ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1))
+"""(row, column) offset of N, NE, E, SE, S, SW, W, NW [cells]."""
+
+DISTANCES = tuple(math.hypot(row, column) for row, column in DIRECTIONS)
+"""Distance to the neighbour in each direction [cells]: 1 along the axes, sqrt(2) along the diagonals."""
+
+
+@kept(8)
+def offsets(device: torch.device) -> Tensor:
+    """Return the (row, column) offset of each direction, int64 [N, 2], kept for the next time [cells]."""
+    return torch.tensor(DIRECTIONS, device=device)
+
+
+def unit_vectors(device: torch.device | str = "cpu") -> Tensor:
+    """Return the unit vector (east, north) of each direction, float32 [N, 2]."""
+    rows = [(column / length, -row / length) for (row, column), length in zip(DIRECTIONS, DISTANCES, strict=True)]
+    return torch.tensor(rows, device=device)
+
+
+def neighbour_in(direction: int, plane: Tensor) -> Tensor:
+    """Return what each cell's neighbour in a direction holds, [B, H, W]; 0 beyond the map."""
+    row, column = DIRECTIONS[direction]
+    height, width = plane.shape[-2:]
+    return pad(plane, (1, 1, 1, 1))[..., 1 + row : 1 + row + height, 1 + column : 1 + column + width]
+
+
+def neighbours(plane: Tensor, beyond: float) -> Tensor:
+    """Return what each cell's neighbours hold, [8, B, H, W]; a number beyond the map."""
+    height, width = plane.shape[-2:]
+    padded = pad(plane, (1, 1, 1, 1), value=beyond)
+    return torch.stack(
+        [padded[..., 1 + row : 1 + row + height, 1 + column : 1 + column + width] for row, column in DIRECTIONS]
+    )
+
+
+def grow(mask: Tensor, radius: int = 1) -> Tensor:
+    """Return the cells within a Chebyshev distance ``radius`` of a marked cell, bool [..., H, W]."""
+    for _ in range(radius):
+        rows = mask.clone()
+        rows[..., 1:, :] |= mask[..., :-1, :]
+        rows[..., :-1, :] |= mask[..., 1:, :]
+        mask = rows.clone()
+        mask[..., 1:] |= rows[..., :-1]
+        mask[..., :-1] |= rows[..., 1:]
+    return mask
+
+
+def flood(seeds: Tensor, open_cells: Tensor) -> Tensor:
+    """Return the open cells that are reached from the seeds over open cells, eight neighbours each.
+
+    The walk is followed for 2 (H + W) steps, a fixed number, so that no value is ever read back from the device;
+    only a labyrinth holds longer shortest paths.
+
+    Args:
+        seeds: bool [B, H, W]; a seed need not be open.
+        open_cells: bool [B, H, W].
+
+    Returns:
+        bool [B, H, W].
+    """
+    reached = seeds
+    passable = open_cells | seeds
+    for _ in range(2 * sum(seeds.shape[-2:])):
+        reached = grow(reached) & passable
+    return reached & open_cells

@@ -1,0 +1,118 @@
+"""Law ``rate`` at the trees beside the fire alone: the road of a CPU.
+
+Only they have a time of arrival. They are a few cells in a hundred, and times there alone come to the same bits as
+those of whole maps. How many they are is read back, which a CPU does for nothing and a CUDA device does not.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+from torch.nn.functional import pad
+
+from warp_torchrl.world.arrays.bytes import byte
+from warp_torchrl.world.arrays.geometry import DIRECTIONS, grow
+from warp_torchrl.world.arrays.random import Stream, uniform
+from warp_torchrl.world.backends.edge import places
+from warp_torchrl.world.law.rate import RateFire
+from warp_torchrl.world.law.travel import NEVER, NOWHERE, Metric, Places, arrival, rate_from
+from warp_torchrl.world.state.state import Arrivals, WorldState
+
+
+class AtBand:
+    """Ticks and forecasts from the trees beside the fire alone.
+
+    Args:
+        fire: The automaton.
+    """
+
+    def __init__(self, fire: RateFire) -> None:
+        self.fire = fire
+
+    def tick(self, state: WorldState, ticks_now: Tensor) -> WorldState:
+        """Return the worlds after one tick of the fire with their own draws, in the worlds that tick now, bool [B]."""
+        fire = self.fire
+        draws = fire.growth or fire.beta > 0.0 or fire.p_regrow > 0.0
+        size = (state.cells.shape[1], state.cells.shape[2])
+        u = uniform(state.key, state.tick, Stream.FIRE, size) if draws else torch.zeros_like(state.alpha)
+        return fire.tick_to(state, u, ticks_now, self.next_arrivals(state))
+
+    def forecast(self, state: WorldState) -> tuple[Tensor, Tensor]:
+        """Return what ``RateFire.expected_ignitions`` and ``RateFire.ignition_probability`` do, float32 [B, H, W]."""
+        band = self._band(state)
+        return self._expected_ignitions(state, band), self.fire.share_of_tick(state, self._arrivals(state, band))
+
+    def next_arrivals(self, state: WorldState) -> Arrivals:
+        """Return what ``RateFire.next_arrivals`` does."""
+        return self._arrivals(state, self._band(state))
+
+    def _band(self, state: WorldState) -> "_Band":
+        beside = grow(self.fire.spreads(state)) & self.fire.can_ignite(state)
+        return _band_of(places(byte(beside).flatten()), state)
+
+    def _arrivals(self, state: WorldState, band: "_Band") -> Arrivals:
+        kept, times = self.fire.sources(state)
+        around = [padded(times, NEVER), padded(kept.origin, NOWHERE)]
+        times, origins = (plane.index_select(0, band.around.flatten()).view(8, -1) for plane in around)
+        reached = self.fire.reached(state).flatten()
+
+        def time_of(origin: Tensor) -> Tensor:
+            return reached.index_select(0, band.first + origin)
+
+        at = Places(band.row, band.column, state.cells.shape[2], time_of)
+        minutes, origin = arrival(times, origins, _metric(state, band.cell), at)
+        known = minutes < NEVER / 2
+        never, nowhere = torch.full_like(kept.minutes, NEVER), torch.full_like(kept.origin, NOWHERE)
+        return Arrivals(
+            _put(never, band.cell, torch.where(known, minutes, NEVER)),
+            _put(nowhere, band.cell, torch.where(known, origin, NOWHERE)),
+        )
+
+    def _expected_ignitions(self, state: WorldState, band: "_Band") -> Tensor:
+        spreads = padded(self.fire.spreads(state), 0)
+        metric = _metric(state, band.cell)
+        total = torch.zeros_like(spreads, dtype=torch.float32)
+        for direction in range(8):
+            source = band.around[direction]
+            share = (rate_from(direction, metric) * self.fire.minutes).clamp(max=1.0)
+            total.scatter_add_(0, source, share * spreads.index_select(0, source))
+        worlds, height, width = state.cells.shape
+        return total.view(worlds, height + 2, width + 2)[:, 1:-1, 1:-1].contiguous()
+
+
+@dataclass(frozen=True, eq=False)
+class _Band:
+    cell: Tensor  # flat index in [B, H, W], int64 [N]
+    first: Tensor  # flat index of the first cell of the same world, int64 [N]
+    row: Tensor  # int32 [N]
+    column: Tensor  # int32 [N]
+    around: Tensor  # flat index of each neighbour in maps with a margin of one cell, int64 [8, N]
+
+
+def _band_of(cell: Tensor, state: WorldState) -> _Band:
+    _, height, width = state.cells.shape
+    world = cell.div(height * width, rounding_mode="floor")
+    place = cell - world * (height * width)
+    row = place.div(width, rounding_mode="floor")
+    column = place - row * width
+    here = (world * (height + 2) + row + 1) * (width + 2) + column + 1
+    offsets = torch.tensor([down * (width + 2) + right for down, right in DIRECTIONS], device=cell.device)
+    return _Band(cell, world * (height * width), row.to(torch.int32), column.to(torch.int32), offsets[:, None] + here)
+
+
+def padded(plane: Tensor, beyond: float) -> Tensor:
+    """Return maps [B, H, W] with a margin of one cell, flat."""
+    return pad(plane, (1, 1, 1, 1), value=beyond).flatten()
+
+
+def _metric(state: WorldState, cell: Tensor) -> Metric:
+    made, pace = state.air.travel, state.ground.pace
+    if made is None or pace is None:
+        raise ValueError("the worlds must be those of a fire with rates of spread")
+    factor = pace.flatten().index_select(0, cell)
+    slowness, east, north = (made[:, part].flatten().index_select(0, cell) * factor for part in range(3))
+    return slowness, east, north
+
+
+def _put(plane: Tensor, cell: Tensor, values: Tensor) -> Tensor:
+    return plane.flatten().scatter_(0, cell, values).view(plane.shape)

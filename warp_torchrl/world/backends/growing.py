@@ -1,0 +1,144 @@
+"""Fires in a growing window of the map, bit for bit as on the whole map.
+
+What burns stays off the window's outermost cells but at the map's own sides. So all cells that a fire can reach in a
+tick, and all that their times follow from, lie in the window.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+from torch.nn.functional import pad
+
+from warp_torchrl.world.backends.spreading import Spreading
+from warp_torchrl.world.law.travel import NEVER, NOWHERE
+from warp_torchrl.world.state.window import Window
+
+
+@dataclass(frozen=True, eq=False)
+class SpellInWindows:
+    """A time of one weather, of which any window can be asked."""
+
+    travel: Callable[[Window], Tensor]  # float32 [3, h, w]; see ``travel.travel`` [minutes a cell]
+    minutes: float  # of a tick
+    ticks: int
+
+
+@dataclass(frozen=True, eq=False)
+class Land:
+    """What does not change with the weather, of which any window can be asked; nothing can ignite past the map."""
+
+    fuel: Callable[[Window], Tensor]  # cells that can ignite, bool [h, w]
+    pace: Callable[[Window], Tensor]  # factor on the times of each fire, float32 [B, h, w]
+
+
+class GrowingFires(Spreading):
+    """Fires on one map, in one window.
+
+    Args:
+        lit: The cells that burn at minute 0, bool [H, W], or of each fire [B, H, W].
+        fires: How many, B.
+        land: The map.
+        most: Cells that each fire burns before it stops; None lets it go on.
+        check: Is told each new window before anything is made for it, and may refuse it by an exception.
+    """
+
+    def __init__(
+        self,
+        lit: Tensor,
+        fires: int,
+        land: Land,
+        most: int | None = None,
+        check: Callable[[Window], None] = lambda window: None,
+    ) -> None:
+        self.window = Window.about(lit)
+        self._land, self._most, self._check = land, most, check
+        check(self.window)
+        self._rim: tuple[Tensor, ...] | None = None
+        first = self.window.cut(lit, False).expand(fires, self.window.height, self.window.width)
+        super().__init__(first, land.fuel(self.window), land.pace(self.window))
+        self._count = self._burned.view(fires, -1).sum(1)
+        self._going = torch.ones(fires, dtype=torch.bool, device=lit.device)
+        self._measure_rim()
+
+    @property
+    def is_over(self) -> bool:
+        """Return whether nothing can burn any more."""
+        return not len(self._waiting)
+
+    def burn_spells(self, spells: Iterable[SpellInWindows]) -> None:
+        """Advance by some spells, one after the other, as long as anything can burn; later ones are not asked for."""
+        before: Tensor | None = None
+        for spell in spells:
+            travel = self._planes(spell.travel(self.window))
+            if before is not None:
+                self._change(before, travel)
+            began = self._now
+            for tick in range(1, spell.ticks + 1):
+                if self._is_cramped():
+                    self._grow()
+                    travel = self._planes(spell.travel(self.window))
+                self._tick(travel, began + tick * spell.minutes)
+                if self._most is not None:
+                    self._stop_at(self._most)
+                if self.is_over:
+                    return
+            before = travel
+
+    def _is_cramped(self) -> bool:
+        """Return whether the fire may come to the outermost cells in the next tick."""
+        if self._rim is None or not len(self._waiting):
+            return False
+        return bool(self._rim_any[self._place(self._waiting).long()].any())
+
+    def _measure_rim(self) -> None:
+        """Find the outermost cells of the window, in planes with their margin."""
+        if self.window.is_whole:
+            self._rim = None
+            return
+        self._rim = tuple(pad(side, (1, 1, 1, 1)).flatten() for side in self.window.rim())
+        self._rim_any = torch.stack(self._rim).any(0)
+
+    def _grow(self) -> None:
+        """Go on in a window that is twice as long to the sides that the fire nears."""
+        near = self._place(self._waiting).long()
+        before, after = self.window, self.window.grown(*(bool(side[near].any()) for side in self._rim or ()))
+        self._check(after)
+        rows, columns = before.on_map.place_in(after)
+        width, cells = after.width + 2, (after.height + 2) * (after.width + 2)
+        worlds, old_map, old_width = self.shape[0], self._map, self._width
+
+        def moved(place: Tensor) -> Tensor:
+            return (place // old_width + rows.start) * width + place % old_width + columns.start
+
+        def relaid(plane: Tensor, beyond: float) -> Tensor:
+            grown = torch.full((worlds, after.height + 2, width), beyond, dtype=plane.dtype, device=plane.device)
+            inside = plane.view(self.shape)[:, 1:-1, 1 : 1 + before.on_map.width]
+            grown[:, 1 + rows.start : 1 + rows.stop, 1 + columns.start : 1 + columns.stop] = inside
+            return grown.flatten()
+
+        def listed(of: Tensor) -> Tensor:
+            return of // old_map * cells + moved(of % old_map)
+
+        self._times, self.minutes = relaid(self._times, NEVER), relaid(self.minutes, NEVER)
+        self._burned, self._beside = relaid(self._burned, False), relaid(self._beside, False)
+        self._origins = relaid(torch.where(self._origins < 0, NOWHERE, moved(self._origins)), NOWHERE)
+        self._waiting, self._changed = listed(self._waiting), listed(self._changed)
+        self._lay_out((worlds, after.height, after.width), self._land.fuel(after), self._land.pace(after))
+        self.window = after
+        self._measure_rim()
+
+    def _stop_at(self, most: int) -> None:
+        """Stop fires that have burned so many cells, once none that may still change comes before the last of them."""
+        fires = torch.arange(self.shape[0], device=self._burned.device)
+        self._count += torch.bincount(self._lit // self._map, minlength=len(fires))
+        for fire in fires[self._going & (self._count >= most)].tolist():
+            times = self.minutes[fire * self._map : (fire + 1) * self._map]
+            last = times[self._burned[fire * self._map : (fire + 1) * self._map]].kthvalue(most).values
+            ahead = torch.cat((self._waiting, self._changed))
+            ahead = self._times[ahead[ahead // self._map == fire]]
+            if not bool((ahead <= last).any()):
+                self._going[fire] = False
+        self._waiting = self._waiting[self._going[self._waiting // self._map]]
+        self._changed = self._changed[self._going[self._changed // self._map]]

@@ -1,0 +1,211 @@
+"""Rates of spread as users ask for them: one call for all fuel models."""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any, Literal, get_args
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from warp_torchrl.validation import did_you_mean
+from warp_torchrl.world.behaviour.fuel_codes import read_fuel, read_model
+from warp_torchrl.world.behaviour.fuel_models import FuelTable
+from warp_torchrl.world.behaviour.rothermel import bed_response
+from warp_torchrl.world.behaviour.spread import Spread
+from warp_torchrl.world.behaviour.surface import head_of_fire
+from warp_torchrl.world.behaviour.wind_adjustment import TEN_METRES, wind_adjustment_factor
+
+WindHeight = Literal["10m", "20ft", "midflame"]
+"""Where the wind is measured."""
+
+_DEAD = {"dead_1h": (1.0, 300.0), "dead_10h": (1.0, 300.0), "dead_100h": (1.0, 300.0)}
+_LIVE = {"live_herbaceous": (1.0, 1000.0), "live_woody": (1.0, 1000.0)}
+_CODES = {"ffmc": (0.0, 101.0), "bui": (0.0, 10000.0)}
+_LATER = {"dead_10h": 1.0, "dead_100h": 2.0}
+"""How much moister thicker dead fuel is where nothing is said [%]: as in the moisture scenarios of Scott and Burgan
+(2005), table 3."""
+_NO_LIVE = 100.0  # per cent; of live fuel that no model in use has, so that it does nothing
+
+
+def rate_of_spread(
+    fuel: object,
+    model: str | Mapping[Any, Any] = "fbfm40",
+    wind: tuple[object, object] = (0.0, 0.0),
+    slope: object = 0.0,
+    aspect: object = 0.0,
+    *,
+    moisture: Mapping[str, object],
+    wind_height: WindHeight = "10m",
+    canopy_cover: object = None,
+    canopy_height: object = None,
+    crown_ratio: object = None,
+) -> Spread:
+    """Return what the head of a surface fire does.
+
+    Numbers, arrays and tensors are broadcast to one shape; the fields are float32 tensors of it. Gradients flow back
+    to tensors of wind, slope and moisture. Rates are steady and along the ground, not the map. See
+    ``rates.rothermel`` and ``rates.surface`` for the equations and their sources, ``rates.fbp`` for the Canadian ones.
+
+    Args:
+        fuel: Codes of fuel models, or their names ("GR2", "FM4", "C-2").
+        model: "fbfm13" (Anderson 1982), "fbfm40" (Scott and Burgan 2005), "fbp" (Forestry Canada 1992), or own fuel
+            models by code, each a ``FuelModel`` or a mapping of its fields.
+        wind: Speed [m/s], and where the wind comes from [degrees clockwise from grid north].
+        slope: Steepness [degrees], below 90.
+        aspect: Where downhill is [degrees clockwise from grid north].
+        moisture: "dead_1h", "dead_10h", "dead_100h", "live_herbaceous", "live_woody" [% of dry weight]. Without
+            dead_10h it is dead_1h + 1, without dead_100h dead_1h + 2. Live moistures may be left out where no fuel has
+            such a load. For "fbp": "ffmc" and "bui".
+        wind_height: Where the wind is measured: "10m" or "20ft" above the vegetation in the open, or "midflame". To
+            midflame height the wind is reduced by the fuel's depth, or by the canopy. "fbp" needs "10m" or "20ft".
+        canopy_cover: Ground under crowns [%]; 0 if not given.
+        canopy_height: Height of trees [m]; needed with a canopy cover.
+        crown_ratio: Length of crowns over the height of trees, in (0, 1]; 1 if not given, as FlamMap and FARSITE do.
+
+    Raises:
+        ValueError: If a fuel is not known, a value lies out of its range or is missing, or shapes do not broadcast.
+    """
+    if wind_height not in get_args(WindHeight):
+        raise ValueError(f"wind_height must be {', '.join(get_args(WindHeight))}, got {wind_height!r}")
+    if not isinstance(wind, tuple | list) or len(wind) != 2:
+        raise ValueError(f"wind must be a speed and a bearing, got {wind!r}")
+    if not isinstance(moisture, Mapping):
+        raise ValueError(f"moisture must be a mapping of per cent by name, got {moisture!r}")
+    table = read_model(model)
+    codes = read_fuel(fuel, table, model)
+    place = _device(codes, *wind, slope, aspect, *moisture.values(), canopy_cover, canopy_height, crown_ratio)
+    ground = {
+        "wind speed": _numbers("wind speed", wind[0], 0.0, 150.0),
+        "wind bearing": _numbers("wind bearing", wind[1], -720.0, 720.0),
+        "slope": _numbers("slope", slope, 0.0, 89.0),
+        "aspect": _numbers("aspect", aspect, -720.0, 720.0),
+    }
+    canopy = _canopy(canopy_cover, canopy_height, crown_ratio)
+    water = _moisture(moisture, {**_DEAD, **_LIVE} if table else _CODES)
+    shape = _shape({"fuel": codes, **ground, **canopy, **{f"moisture.{name}": each for name, each in water.items()}})
+    codes = codes.to(place)
+    speed, bearing, steepness, downhill = (each.to(place) for each in ground.values())
+    water = {name: each.to(place) for name, each in water.items()}
+    if table is None:
+        spread = _canadian(codes, speed, bearing, steepness, downhill, water, wind_height, canopy)
+    else:
+        table = table.to(device=place)
+        row = table.index(codes)
+        speed = speed * _to_midflame(table, row, wind_height, {name: each.to(place) for name, each in canopy.items()})
+        spread = _rothermel(table, row, speed, bearing, steepness, downhill, water)
+    return Spread(**{each.name: getattr(spread, each.name).float().expand(shape) for each in fields(Spread)})
+
+
+def _rothermel(
+    table: FuelTable,
+    row: Tensor,
+    speed: Tensor,
+    bearing: Tensor,
+    slope: Tensor,
+    aspect: Tensor,
+    water: dict[str, Tensor],
+) -> Spread:
+    used = table.fuels.load[row.unique()].sum(0) > 0.0
+    for column, name in ((3, "live_herbaceous"), (4, "live_woody")):
+        if name not in water and bool(used[column]):
+            raise ValueError(f"moisture must have {name} where fuels have such a load, got {', '.join(water)}")
+    if "dead_1h" not in water:
+        raise ValueError(f"moisture must have dead_1h, got {', '.join(water) or 'nothing'}")
+    filled = {name: water["dead_1h"] + more for name, more in _LATER.items()}
+    filled |= {name: torch.full((), _NO_LIVE, device=row.device) for name in _LIVE} | water
+    ordered = torch.broadcast_tensors(*(filled[name] for name in (*_DEAD, *_LIVE)))
+    levels = torch.stack(ordered, dim=-1)
+    beds = bed_response(table.fuels, levels).at(row) if levels.dim() == 1 else bed_response(table.fuels.at(row), levels)
+    return head_of_fire(beds, speed * 60.0, bearing, slope, aspect)
+
+
+def _canadian(
+    codes: Tensor,
+    speed: Tensor,
+    bearing: Tensor,
+    slope: Tensor,
+    aspect: Tensor,
+    water: dict[str, Tensor],
+    wind_height: str,
+    canopy: dict[str, Tensor],
+) -> Spread:
+    from warp_torchrl.world.behaviour.fbp import fbp_spread
+
+    if wind_height == "midflame":
+        raise ValueError("wind_height must be 10m or 20ft for fbp, whose wind is that at 10 m, got midflame")
+    if canopy:
+        raise ValueError(f"{next(iter(canopy))} must be left out for fbp, whose fuel types have their canopy, got one")
+    if missing := [name for name in _CODES if name not in water]:
+        raise ValueError(f"moisture must have {' and '.join(missing)} for fbp, got {', '.join(water) or 'nothing'}")
+    if wind_height == "20ft":
+        speed = speed * TEN_METRES
+    return fbp_spread(
+        codes, wind_speed=speed, wind_bearing=bearing, slope=slope, aspect=aspect, ffmc=water["ffmc"], bui=water["bui"]
+    )
+
+
+def _to_midflame(table: FuelTable, row: Tensor, wind_height: str, canopy: dict[str, Tensor]) -> Tensor:
+    """Return the midflame wind over the wind at the height where it is measured."""
+    if wind_height == "midflame":
+        if canopy:
+            raise ValueError(f"{next(iter(canopy))} must be left out where wind_height is midflame, got one")
+        return torch.ones((), device=row.device)
+    zero = torch.zeros((), device=row.device)
+    cover, height = canopy.get("canopy_cover", zero), canopy.get("canopy_height", zero)
+    factor = wind_adjustment_factor(table.fuels.depth[row], cover, height, canopy.get("crown_ratio", zero + 1.0))
+    return factor / TEN_METRES if wind_height == "10m" else factor
+
+
+def _canopy(cover: object, height: object, ratio: object) -> dict[str, Tensor]:
+    """Return what is given of the canopy."""
+    if cover is None and (height is not None or ratio is not None):
+        raise ValueError("canopy_cover must be given with canopy_height and crown_ratio, got none")
+    if cover is None:
+        return {}
+    if height is None:
+        raise ValueError("canopy_height must be given with canopy_cover, got none")
+    canopy = {
+        "canopy_cover": _numbers("canopy_cover", cover, 0.0, 100.0),
+        "canopy_height": _numbers("canopy_height", height, 0.0, 120.0),
+    }
+    return canopy if ratio is None else canopy | {"crown_ratio": _numbers("crown_ratio", ratio, 0.01, 1.0)}
+
+
+def _moisture(given: Mapping[str, object], ranges: Mapping[str, tuple[float, float]]) -> dict[str, Tensor]:
+    for name in given:
+        if name not in ranges:
+            hint = did_you_mean(name, ranges)
+            raise ValueError(f"moisture must have some of {', '.join(ranges)} for this model, got {name!r}{hint}")
+    return {name: _numbers(f"moisture.{name}", value, *ranges[name]) for name, value in given.items()}
+
+
+def _numbers(name: str, value: object, low: float, high: float) -> Tensor:
+    """Return numbers as a float32 tensor; one on which a gradient may flow back stays on its graph."""
+    if isinstance(value, Tensor):
+        numbers = value.float()
+    else:
+        given = np.asarray(value)
+        if given.dtype.kind not in "iuf":
+            raise ValueError(f"{name} must be numbers, got {value!r}")
+        numbers = torch.tensor(given.astype(np.float32))
+    is_fit = (numbers >= low) & (numbers <= high)  # NaN is in no range
+    if not bool(is_fit.all()):
+        first = numbers.detach()[~is_fit].flatten()[0].item()
+        raise ValueError(f"{name} must be in [{low:g}, {high:g}], got {first:g}")
+    return numbers
+
+
+def _shape(values: Mapping[str, Tensor]) -> torch.Size:
+    shapes = {name: tuple(each.shape) for name, each in values.items() if each.dim()}
+    try:
+        return torch.broadcast_shapes(*shapes.values())
+    except RuntimeError as error:
+        told = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+        raise ValueError(f"shapes must broadcast to one, got {told}") from error
+
+
+def _device(*values: object) -> torch.device:
+    """Return the device of the first tensor that is not on the CPU; the CPU's if there is none."""
+    places = [each.device for each in values if isinstance(each, Tensor) and each.device.type != "cpu"]
+    return places[0] if places else torch.device("cpu")

@@ -1,0 +1,1 @@
+"""Fires without vehicles, and imagined ones."""

@@ -1,0 +1,331 @@
+"""Fires alone under law ``rate``: many on one map, in weather by the hour, from their ignition to an end."""
+
+import math
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from typing import TypeVar
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.system import memory
+from warp_torchrl.world.backends.growing import GrowingFires, Land, SpellInWindows
+from warp_torchrl.world.backends.spells import Highest, Planes, in_window, on_strips
+from warp_torchrl.world.backends.spreading import Hour
+from warp_torchrl.world.behaviour.moistures import moisture_row
+from warp_torchrl.world.behaviour.spread import Spread
+from warp_torchrl.world.law.fuel_bed import gradient
+from warp_torchrl.world.law.rate import TICKS_PER_CELL, RateFire
+from warp_torchrl.world.law.travel import NEVER, travel
+from warp_torchrl.world.state.state import Landscape
+from warp_torchrl.world.state.window import Window
+
+_LEAST_TICKS = 4  # of a spell: the fire's edge goes on from the times of the tick before
+_BUT_FASTEST = 0.999  # share of the cells whose rates set the ticks
+_AT_ONCE = 64  # fires, whose planes a CPU's cache holds
+_MOST_CELLS = 2**24  # of the windows of fires that burn at once
+_BYTES_A_FIRE, _BYTES_A_CELL = 64, 200  # that a cell of a window takes at most, for each fire and for the map
+_PLANES = ("head", "backing", "intensity", "flame_length")
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, eq=False)
+class Spell:
+    """A time in which the weather stays as it is."""
+
+    wind: Tensor  # (u east, v north) of the air's motion at 10 m, float32 [2] [m/s]
+    minutes: float  # how long it lasts
+    moisture: Tensor | None = None  # float32 [7], in the order of ``moistures.MOISTURES``, NaN where not known
+
+
+def spread_in(
+    fire: RateFire, landscape: Landscape, cell_size: float, spell: Spell, window: Window | None = None
+) -> Spread:
+    """Return what a fire's head does in each cell of one landscape in a spell, [1, H, W], or of a window of it."""
+    row = moisture_row(fire.moisture)
+    moisture = row if spell.moisture is None else torch.where(spell.moisture.isnan(), row, spell.moisture)
+    air = spell.wind[None, :, None, None], moisture[None], cell_size
+    if window is None:
+        return fire.bed.spread(landscape, *air)
+    return fire.bed.spread(window.landscape(landscape), *air, rise=_rise(landscape, window, cell_size))
+
+
+def can_ignite(fire: RateFire, landscape: Landscape) -> Tensor:
+    """Return the cells of one landscape that can ignite, bool [H, W]."""
+    return (fire.flammability(landscape)[0] > 0.0) & (landscape.age[0] >= fire.youngest_fuel)
+
+
+@dataclass(frozen=True, eq=False)
+class Burned:
+    """What some fires have burned, in a window of the map."""
+
+    window: Window
+    minutes: Tensor  # when each fire reached each cell, float32 [b, h, w]; ``travel.NEVER`` where it does not come
+    pace: Tensor  # factor on its times, float32 [b, h, w]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fires:
+    """Fires alone on one map, in weather by the spell. Nothing is computed before it is asked for.
+
+    Ticks are as short in each spell as its fastest cells ask for; ``fire.minutes_per_tick`` is not read.
+
+    Attributes:
+        fire: The automaton.
+        landscape: One landscape, batch size [1].
+        spells: The weather.
+        cell_size: Side of a cell [m].
+        workers: Threads.
+    """
+
+    fire: RateFire
+    landscape: Landscape
+    spells: Sequence[Spell]
+    cell_size: float
+    workers: int = field(default_factory=torch.get_num_threads)
+    _lock: threading.Lock = field(init=False, repr=False, default_factory=threading.Lock)
+    _fastest: dict[int, tuple[float, float]] = field(init=False, repr=False, default_factory=dict)
+    _ended: threading.Event = field(init=False, repr=False, default_factory=threading.Event)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Return (H, W) of the map."""
+        return self.landscape.cover.shape[1], self.landscape.cover.shape[2]
+
+    @property
+    def n_met(self) -> int:
+        """Return how many spells fires have met: from the first to the last in which one burned."""
+        return len(self._fastest)
+
+    @cached_property
+    def fuel(self) -> Tensor:
+        """Return the cells that can ignite, bool [H, W]."""
+        return can_ignite(self.fire, self.landscape)
+
+    @cached_property
+    def planes(self) -> Planes:
+        """Return what tells the planes of a spell in a window: times of ways, then ``Heads``, float32 [7, h, w]."""
+        return Planes(lambda number, window: in_window(partial(self._planes, number), window))
+
+    def fastest(self, number: int) -> tuple[float, float]:
+        """Return the rates of a spell's fastest heads but one in a thousand [m/min].
+
+        Of the cells that can ignite, and of all cells.
+        """
+        with self._lock:
+            if number not in self._fastest:
+                self._fastest[number] = self._fastest_of(number)
+            return self._fastest[number]
+
+    def spell(self, number: int) -> SpellInWindows:
+        """Return a spell in ticks as short as its fastest cells but one in a thousand ask for."""
+        minutes = self.spells[number].minutes
+        ticks = ticks_of(minutes, self.fastest(number)[0], self.cell_size)
+        return SpellInWindows(lambda window: self.planes(number, window)[:3], minutes / ticks, ticks)
+
+    def burn(self, lit: Tensor, key: Tensor, most: int | None = None) -> Burned:
+        """Burn some fires at once, to the end of the weather.
+
+        Args:
+            lit: The cells that burn at minute 0, bool [H, W], or of each fire [b, H, W].
+            key: Of the fires, int64 [b]: their draws of rates.
+            most: Cells that each burns before it stops; None lets it go on.
+
+        Raises:
+            ValueError: If their window does not fit in memory.
+        """
+        land = Land(lambda window: window.cut(self.fuel, False), lambda window: self.pace(key, window))
+        fires = GrowingFires(lit, len(key), land, most, partial(self._check, len(key)))
+        fires.burn_spells(self._going(number) for number in range(len(self.spells)))
+        return Burned(fires.window, fires.arrival(), self.pace(key, fires.window))
+
+    def in_parts(self, lit: Tensor, key: Tensor, then: Callable[[Burned], T], most: int | None = None) -> Iterator[T]:
+        """Burn many fires, some at a time, and yield what becomes of each part, in order.
+
+        Args:
+            lit: The cells that burn at minute 0, bool [H, W], or of each fire [B, H, W].
+            key: Of the fires, int64 [B].
+            then: Is handed each part in a thread of its own, and its result is yielded.
+            most: See ``burn``.
+
+        Raises:
+            ValueError: If the window of one fire does not fit in memory.
+        """
+        limit = [_AT_ONCE]
+
+        def burned(part: tuple[Tensor, Tensor]) -> list[T]:
+            keys, begun = part
+            try:
+                if len(keys) > limit[0]:
+                    raise _TooMany
+                return [then(self.burn(begun, keys, most))]
+            except _TooMany:
+                half = limit[0] = min(limit[0], -(-len(keys) // 2))
+                return [each for less in _parts(keys, begun, half) for each in burned(less)]
+
+        self._ended.clear()
+        workers = 1 if lit.is_cuda else self.workers
+        for found in _side_by_side(burned, _parts(key, lit, _AT_ONCE), workers, self._ended):
+            yield from found
+
+    def pace(self, key: Tensor, window: Window) -> Tensor:
+        """Return the factor on the times of some fires in a window, float32 [b, h, w]."""
+        return self.fire.pace(key, self.size) if window.is_whole else self.fire.pace_in(key, window)
+
+    def _going(self, number: int) -> SpellInWindows:
+        if self._ended.is_set():
+            raise _Ended
+        return self.spell(number)
+
+    def _check(self, fires: int, window: Window) -> None:
+        """Refuse a window that is too large for so many fires.
+
+        Raises:
+            _TooMany: If it may do for less of them.
+            ValueError: If it does not do for one.
+        """
+        wanted = window.cells * (fires * _BYTES_A_FIRE + _BYTES_A_CELL)
+        there = memory.available()
+        if fires > 1 and (fires * window.cells > _MOST_CELLS or wanted * self.workers > there):
+            raise _TooMany
+        if wanted > there:
+            raise memory.too_little(f"a fire in a window of {window.height} x {window.width} cells", wanted, there)
+
+    def _planes(self, number: int, window: Window) -> Tensor:
+        place = None if window.is_whole else window
+        spread = spread_in(self.fire, self.landscape, self.cell_size, self.spells[number], place)
+        made = travel(spread.head, spread.direction, spread.length_to_breadth, self.cell_size)
+        return torch.cat((made[0], _heads(spread)))
+
+    def _head(self, number: int, strip: Window) -> Tensor:
+        if strip.is_whole:
+            return self.planes(number, strip)[3]
+        return spread_in(self.fire, self.landscape, self.cell_size, self.spells[number], strip).head[0]
+
+    def _fastest_of(self, number: int) -> tuple[float, float]:
+        n_fuel, n_cells = int(self.fuel.sum()), self.fuel.numel()
+        of_fuel = Highest(n_fuel - max(1, math.ceil(_BUT_FASTEST * n_fuel)) + 1)
+        of_all = Highest(n_cells - max(1, round(_BUT_FASTEST * n_cells)) + 1)
+        for strip, head in on_strips(partial(self._head, number), self.size, self.workers):
+            of_fuel.add(head[strip.cut(self.fuel, False)])
+            of_all.add(head.flatten())
+        return of_fuel.least if n_fuel else 0.0, of_all.least
+
+
+def arrival_minutes(
+    fire: RateFire,
+    landscape: Landscape,
+    lit: Tensor,
+    key: Tensor,
+    spells: Sequence[Spell],
+    cell_size: float,
+) -> Iterator[Tensor]:
+    """Return when each fire reaches each cell, some fires at a time.
+
+    Args:
+        fire: The automaton.
+        landscape: One landscape, batch size [1].
+        lit: The cells that burn at minute 0, bool [H, W], or of each fire [B, H, W].
+        key: Of the fires, int64 [B]: their draws of rates.
+        spells: The weather.
+        cell_size: Side of a cell [m].
+
+    Yields:
+        float32 [b, H, W] [minutes], in order; ``travel.NEVER`` where the fire does not come.
+    """
+    fires = Fires(fire=fire, landscape=landscape, spells=spells, cell_size=cell_size)
+    yield from fires.in_parts(lit, key, _on_map)
+
+
+def _on_map(burned: Burned) -> Tensor:
+    """Return the minutes on the whole map."""
+    if burned.window.is_whole:
+        return burned.minutes.clone()
+    plane = burned.minutes.new_full((len(burned.minutes), *burned.window.map), NEVER)
+    return burned.window.put(burned.minutes, plane)
+
+
+def hour_of(fire: RateFire, landscape: Landscape, cell_size: float, spell: Spell, fuel: Tensor) -> Hour:
+    """Return the times of ways in a spell, and ticks as short as its fastest cells but one in a thousand ask for.
+
+    Args:
+        fire: The automaton.
+        landscape: One landscape, batch size [1].
+        cell_size: Side of a cell [m].
+        spell: The weather.
+        fuel: Cells that can ignite, bool [H, W].
+    """
+    spread = spread_in(fire, landscape, cell_size, spell)
+    rates = spread.head[0][fuel]
+    fastest = float(rates.kthvalue(max(1, math.ceil(_BUT_FASTEST * len(rates)))).values) if len(rates) else 0.0
+    ticks = ticks_of(spell.minutes, fastest, cell_size)
+    made = travel(spread.head, spread.direction, spread.length_to_breadth, cell_size)[0]
+    return Hour(made, spell.minutes / ticks, ticks)
+
+
+def ticks_of(minutes: float, fastest: float, cell_size: float) -> int:
+    """Return the ticks of some minutes in which the fastest fire [m/min] crosses half a cell [m]."""
+    return max(_LEAST_TICKS, math.ceil(TICKS_PER_CELL * minutes * fastest / cell_size))
+
+
+def _rise(landscape: Landscape, window: Window, cell_size: float) -> Tensor:
+    """Return how steeply the ground of a window rises, float32 [1, 2, h, w]."""
+    cover = window.around(landscape.cover)
+    if landscape.elevation is None:
+        return gradient(None, cover, cell_size)
+    return gradient(window.around(landscape.elevation, margin=1), cover, cell_size)[:, :, 1:-1, 1:-1]
+
+
+def _heads(spread: Spread) -> Tensor:
+    """Return what ``Behaviour`` tells of the heads of a spread [1, h, w], float32 [4, h, w].
+
+    The rear goes at R_head (1 - e) / (1 + e), e the eccentricity of the ellipse.
+    """
+    focus = (1.0 - spread.length_to_breadth.pow(-2)).clamp(min=0.0).sqrt()
+    backing = spread.head * (1.0 - focus) / (1.0 + focus)
+    return torch.cat((spread.head, backing, spread.intensity, spread.flame_length))
+
+
+class _TooMany(Exception):  # noqa: N818
+    """So many fires do not burn at once in their window."""
+
+
+class _Ended(Exception):  # noqa: N818
+    """Other threads have ended the work."""
+
+
+def _parts(key: Tensor, lit: Tensor, size: int) -> Iterator[tuple[Tensor, Tensor]]:
+    """Yield the keys of so many fires at a time, and where they start, bool [H, W] or [b, H, W]."""
+    parts = key.split(size)
+    yield from zip(parts, lit.split(size) if lit.dim() == 3 else [lit] * len(parts), strict=True)
+
+
+def _side_by_side(
+    function: Callable[[tuple[Tensor, Tensor]], T],
+    parts: Iterable[tuple[Tensor, Tensor]],
+    workers: int,
+    ended: threading.Event,
+) -> Iterator[T]:
+    """Yield a function of each part, in order, computed by so many threads, which an event ends early.
+
+    Few operations of a fire are large enough for torch's own threads, so fires take one each.
+    """
+    if workers == 1:
+        yield from map(function, parts)
+        return
+    waiting: deque[Future[T]] = deque()
+    with ThreadPoolExecutor(workers, initializer=torch.set_num_threads, initargs=(1,)) as pool:
+        try:
+            for part in parts:
+                waiting.append(pool.submit(function, part))
+                if len(waiting) > workers:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            ended.set()  # after an error, an interruption, or who asked has had enough
+            pool.shutdown(wait=False, cancel_futures=True)

@@ -1,0 +1,1 @@
+"""Where fires start, and how people intervene."""

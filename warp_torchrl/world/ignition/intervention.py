@@ -1,0 +1,45 @@
+"""What people do to a world from outside of the rules: they light a cell, cut a firebreak, or change the wind.
+
+Each function is pure. It changes cells that allow it and leaves all others as they are.
+"""
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.world.law.automaton import Automaton
+from warp_torchrl.world.state.state import FIRST_FIRE, WorldState, is_tree
+
+
+def can_be_lit(state: WorldState, fire: Automaton) -> Tensor:
+    """Return which cells hold a tree that can ignite now: old enough, dry and flammable; bool [B, H, W]."""
+    return fire.is_fuel(state) & (state.alpha > 0.0)
+
+
+def ignited(state: WorldState, fire: Automaton, where: Tensor) -> WorldState:
+    """Return worlds in which marked cells have caught fire; a world that had ended without fire goes on.
+
+    Args:
+        state: The worlds.
+        fire: Their automaton.
+        where: bool [B, H, W]; cells that cannot be lit stay as they are.
+    """
+    lit = where & can_be_lit(state, fire)
+    changes = {
+        "cells": torch.where(lit, FIRST_FIRE, state.cells),
+        "age": torch.where(lit, state.cells, state.age),
+        "terminated": state.terminated & ~lit.flatten(1).any(dim=1),
+    }
+    if state.stage_age is not None:
+        changes["stage_age"] = state.stage_age.masked_fill(lit, 0)
+    return fire.lit(state.replace(**changes), lit)
+
+
+def cleared(state: WorldState, where: Tensor) -> WorldState:
+    """Return worlds in which the trees of marked cells have become firebreaks, as a vehicle that clears makes them.
+
+    Args:
+        state: The worlds.
+        where: bool [B, H, W]; cells without a tree, and those that burn, stay as they are.
+    """
+    cut = where & is_tree(state.cells)
+    return state.replace(cells=state.cells.masked_fill(cut, 0), firebreak=state.firebreak | cut)

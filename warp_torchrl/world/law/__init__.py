@@ -1,0 +1,1 @@
+"""The laws of fire: one readable statement each."""

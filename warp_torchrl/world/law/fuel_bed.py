@@ -1,0 +1,210 @@
+"""The fuel of landscapes, and the rates at which fire spreads in it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.nn.functional import pad
+
+from warp_torchrl.world.air.wind import Wind
+from warp_torchrl.world.arrays.random import world_key
+from warp_torchrl.world.behaviour.fbp import fbp_spread
+from warp_torchrl.world.behaviour.fuel_codes import read_model
+from warp_torchrl.world.behaviour.fuel_models import FuelTable
+from warp_torchrl.world.behaviour.moistures import MOISTURES
+from warp_torchrl.world.behaviour.spread import Spread
+from warp_torchrl.world.behaviour.surface import surface_spread
+from warp_torchrl.world.behaviour.wind_adjustment import TEN_METRES, wind_adjustment_factor
+from warp_torchrl.world.law.mapped_fuel import check_codes
+from warp_torchrl.world.state.state import Landscape
+from warp_torchrl.world.terrain.landscape import LandscapeSource, map_size
+
+COVER_FUEL: Mapping[str, tuple[int, int, int, int, int]] = {
+    "fbfm13": (98, 8, 1, 10, 99),
+    "fbfm40": (98, 161, 102, 165, 99),
+    "fbp": (102, 11, 31, 2, 101),
+}
+"""Fuel code of lake, wetland, grassland, forest and bare ground in each model, for landscapes without fuel codes."""
+
+_REFERENCE_WIND = 5.0  # m/s, of flammability
+_SAMPLES = 4  # worlds in which the fastest fire is looked for
+_UNTOLD_HEIGHT = 15.0  # m, of a canopy of which no height is known
+
+
+@dataclass(frozen=True, kw_only=True)
+class FuelBed:
+    """Fuels of one model, and factors on how they burn. See ``RateFire`` for the attributes."""
+
+    model: str
+    fuel_models: Mapping[int, Any]
+    fuel_of_cover: tuple[int, ...]
+    fuel_gain: Mapping[int, float]
+    rate_gain: float
+    wind_gain: float
+    slope_gain: float
+    by_cover: bool = False  # the codes of landscapes are no fuels
+
+    def __post_init__(self) -> None:
+        if self.model not in COVER_FUEL:
+            raise ValueError(f"model must be one of {', '.join(COVER_FUEL)}, got {self.model}")
+        _ = self.table
+        for code, gain in self.fuel_gain.items():
+            if not (str(code).isdigit() and 0.0 <= gain <= 100.0):
+                raise ValueError(f"fuel_gain must map fuel codes to factors in [0, 100], got {code}: {gain}")
+
+    @cached_property
+    def table(self) -> FuelTable | None:
+        """Return the fuel models by code; None for the Canadian system, which has equations for each."""
+        return read_model(dict(self.fuel_models) or self.model)
+
+    def check(self, landscape: LandscapeSource) -> None:
+        """Refuse landscapes whose fuel codes are of another model.
+
+        Raises:
+            ValueError: If their ``table`` is another of ``COVER_FUEL``, or codes are not those of the model.
+        """
+        table = getattr(landscape, "table", None)
+        if isinstance(table, str) and table in COVER_FUEL and table != self.model and not self.fuel_models:
+            raise ValueError(f"fire.model must be that of landscape.table, {table}, got {self.model}")
+        if not self.by_cover:
+            check_codes(landscape, self.table, self.model, bool(self.fuel_models))
+
+    def fuel(self, landscape: Landscape) -> Tensor:
+        """Return the fuel codes of landscapes, int16 [B, H, W]."""
+        if landscape.fuel is not None and not self.by_cover:
+            return landscape.fuel
+        table = torch.tensor(self.fuel_of_cover, dtype=torch.int16, device=landscape.cover.device)
+        return table.index_select(0, landscape.cover.flatten().to(torch.int32)).view(landscape.cover.shape)
+
+    def spread(
+        self, landscape: Landscape, wind: Tensor, moisture: Tensor, cell_size: float, rise: Tensor | None = None
+    ) -> Spread:
+        """Return what a fire's head does in each cell, float32 [B, H, W] each; rates on the map, not along the ground.
+
+        Args:
+            landscape: The landscapes.
+            wind: (u east, v north) of the air's motion at 10 m in the open, float32 [B, 2, 1, 1] or [B, 2, H, W] [m/s].
+            moisture: float32 [B, 7], in the order of ``MOISTURES``.
+            cell_size: Side of a cell [m].
+            rise: How steeply the ground rises, see ``gradient``; None makes it of the landscapes' elevation.
+        """
+        rise = gradient(landscape.elevation, landscape.cover, cell_size) if rise is None else rise
+        rise = rise * self.slope_gain
+        steepness = torch.rad2deg(torch.atan(rise.square().sum(1).clamp(min=1e-12).sqrt()))
+        air = {
+            "wind_speed": wind.square().sum(1).clamp(min=1e-12).sqrt() * self.wind_gain,
+            "wind_bearing": bearing(-wind[:, 0], -wind[:, 1]),
+            "slope": steepness,
+            "aspect": bearing(-rise[:, 0], -rise[:, 1]),
+        }
+        fuel = self.fuel(landscape)
+        if self.table is None:
+            spread = self._canadian(fuel, moisture, **air)
+        else:
+            air["wind_speed"] = air["wind_speed"] * self._to_midflame(fuel, landscape)
+            spread = self._rothermel(fuel, moisture, **air)
+            spread = replace(spread, head=spread.head * _on_map(spread.direction, rise))
+        factor = self._factor(fuel)
+        return replace(
+            spread,
+            head=spread.head * factor,
+            intensity=spread.intensity * factor,
+            flame_length=spread.flame_length * factor.pow(0.46),
+        )
+
+    def _canadian(
+        self,
+        fuel: Tensor,
+        moisture: Tensor,
+        *,
+        wind_speed: Tensor,
+        wind_bearing: Tensor,
+        slope: Tensor,
+        aspect: Tensor,
+    ) -> Spread:
+        codes = dict(zip(MOISTURES, moisture[:, :, None, None].unbind(1), strict=True))
+        return fbp_spread(
+            fuel,
+            wind_speed=wind_speed,
+            wind_bearing=wind_bearing,
+            slope=slope,
+            aspect=aspect,
+            ffmc=codes["ffmc"],
+            bui=codes["bui"],
+        )
+
+    def _rothermel(self, fuel: Tensor, moisture: Tensor, **air: Tensor) -> Spread:
+        table = _on(self.table, fuel.device)
+        return surface_spread(table, table.index(fuel), **air, moisture=moisture[:, :5])
+
+    def _to_midflame(self, fuel: Tensor, landscape: Landscape) -> Tensor:
+        """Return the midflame wind over that at 10 m: under the canopy where one is known, else over the fuel bed."""
+        table = _on(self.table, fuel.device)
+        depth = table.fuels.depth[table.index(fuel)]
+        none = torch.zeros_like(depth)
+        cover = none if landscape.canopy_cover is None else landscape.canopy_cover
+        height = none + _UNTOLD_HEIGHT if landscape.canopy_height is None else landscape.canopy_height
+        return wind_adjustment_factor(depth, cover, height, none + 1.0) / TEN_METRES
+
+    def _factor(self, fuel: Tensor) -> Tensor:
+        factor = torch.full(fuel.shape, self.rate_gain, device=fuel.device)
+        for code, gain in self.fuel_gain.items():
+            factor = torch.where(fuel == int(code), factor * gain, factor)
+        return factor
+
+    def flammability(self, landscape: Landscape, moisture: Tensor) -> Tensor:
+        """Return the square root of each cell's rate on level ground, of the fastest fuel's, float32 [B, H, W]."""
+        fuel = self.fuel(landscape)
+        codes = torch.arange(int(fuel.min()), int(fuel.max()) + 1, device=fuel.device)
+        zero = torch.zeros(1, 1, 1, device=fuel.device)
+        air = {"wind_speed": zero + _REFERENCE_WIND, "wind_bearing": zero, "slope": zero, "aspect": zero}
+        rule = self._canadian if self.table is None else self._rothermel
+        rates = rule(codes[None, None], moisture[None].to(fuel.device), **air)
+        share = (rates.head / rates.head.max().clamp(min=1e-6)).sqrt()[0, 0]
+        return share.index_select(0, (fuel - codes[0]).flatten().to(torch.int32)).view(fuel.shape)
+
+    def fastest(self, landscape: LandscapeSource, wind: Wind, cell_size: float, moisture: Tensor) -> float:
+        """Return the highest rate in a few worlds over the hours that the wind knows [m/min]; 1e-3 at least."""
+        key = world_key(torch.arange(_SAMPLES))
+        ground = landscape(key)
+        rates = [1e-3]
+        for air, damp in wind.hours(key, map_size(landscape.size), ground.corner):
+            row = moisture if damp is None else torch.where(damp.isnan(), moisture, damp)
+            rates.append(float(self.spread(ground, air, row.expand(len(air), -1), cell_size).head.max()))
+        return max(rates)
+
+
+def _on(table: FuelTable | None, device: torch.device) -> FuelTable:
+    if table is None:
+        raise ValueError("model must be one of Rothermel's, got fbp")
+    return table.to(device=device)
+
+
+def _on_map(direction: Tensor, rise: Tensor) -> Tensor:
+    """Return how far a way along the ground goes on the map: the cosine of the slope in its direction."""
+    angle = torch.deg2rad(direction)
+    climb = rise[:, 0] * angle.sin() + rise[:, 1] * angle.cos()
+    return torch.rsqrt(1.0 + climb * climb)
+
+
+def gradient(elevation: Tensor | None, cover: Tensor, cell_size: float) -> Tensor:
+    """Return how steeply the ground rises to the east and to the north, float32 [B, 2, H, W]; 0 where it is level.
+
+    By Horn's differences over the eight neighbours (Horn 1981), the border's cells repeated beyond it.
+    """
+    if elevation is None:
+        return torch.zeros(len(cover), 2, *cover.shape[1:], device=cover.device)
+    ground = pad(elevation[:, None], (1, 1, 1, 1), mode="replicate")[:, 0]
+    across = ground[:, :, 2:] - ground[:, :, :-2]
+    along = ground[:, :-2] - ground[:, 2:]
+    east = (across[:, :-2] + 2.0 * across[:, 1:-1] + across[:, 2:]) / (8.0 * cell_size)
+    north = (along[:, :, :-2] + 2.0 * along[:, :, 1:-1] + along[:, :, 2:]) / (8.0 * cell_size)
+    return torch.stack((east, north), dim=1)
+
+
+def bearing(east: Tensor, north: Tensor) -> Tensor:
+    """Return where a vector points, degrees clockwise from grid north in [0, 360)."""
+    return torch.rad2deg(torch.atan2(east, north + (north == 0.0) * (east == 0.0))) % 360.0

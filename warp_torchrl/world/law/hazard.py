@@ -1,0 +1,44 @@
+"""The automaton in finer time, whose fires grow round."""
+
+from dataclasses import dataclass
+
+from warp_torchrl.validation import check_fields
+from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.law.law import Hazard
+
+
+@dataclass(frozen=True, kw_only=True)
+class HazardFire(Fire):
+    """The automaton under ``law.Hazard``: a tick is a k-th of the paper's, and a neighbour's probability is
+
+        p_d = 1 - exp(-h_d),   h_d = -ln(1 - min(alpha, 0.95)) / k w_d s_d / dist_d
+
+    Every burning stage lasts k ticks, so that what a fire passes on in its life is kept, 1 - (1 - alpha)^F; fires
+    grow round where the paper's grow square. Growth, lightning, regrowth and drying keep their pace as well.
+
+    Attributes:
+        refinement: k.
+        slope_gain: a [1/degree]; a fire's speed doubles every ten degrees.
+
+    Raises:
+        ValueError: If a value is out of its range, or ``wet_ticks`` times ``refinement`` over 255.
+    """
+
+    slope_gain: float = 0.115
+    refinement: int = 8
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_fields(self, refinement=(1, 64))
+        if self.wet_for > 255:
+            raise ValueError(f"wet_ticks times refinement must be at most 255, got {self.wet_for}")
+
+    @property
+    def ticks_per_stage(self) -> int:
+        """Return k."""
+        return self.refinement
+
+    @property
+    def law(self) -> Hazard:
+        """Return how the hazards of burning neighbours make a probability."""
+        return Hazard(self.refinement)

@@ -1,0 +1,364 @@
+"""The automaton in metres and minutes: fires that spread at the rates of a fuel model."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Literal, Self
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.validation import check_fields
+from warp_torchrl.world.air.wind import Wind
+from warp_torchrl.world.arrays.geometry import grow, neighbour_in, neighbours
+from warp_torchrl.world.arrays.random import Stream, uniform, uniform_at
+from warp_torchrl.world.behaviour.moistures import moisture_row
+from warp_torchrl.world.law.automaton import Automaton
+from warp_torchrl.world.law.fuel_bed import COVER_FUEL, FuelBed
+from warp_torchrl.world.law.mapped_fuel import check_fuel, has_own_table, told_fuel
+from warp_torchrl.world.law.travel import NEVER, NOWHERE, Metric, Places, arrival, rate_from, travel
+from warp_torchrl.world.state.state import (
+    FIRST_FIRE,
+    Air,
+    Arrivals,
+    Ground,
+    Landscape,
+    WorldState,
+    is_burning,
+    is_tree,
+)
+from warp_torchrl.world.state.window import Window
+from warp_torchrl.world.terrain.landscape import LandscapeSource
+
+TICKS_PER_CELL = 2
+"""Ticks in which the fastest fire crosses a cell: with one the narrowest heads fall back by a tenth more."""
+_STAGES = 5
+_LONGEST_WAIT = 255  # ticks, of a byte
+
+
+@dataclass(frozen=True, kw_only=True)
+class RateFire(Automaton):
+    """Law ``rate``: a fire reaches each cell at the rate of spread of its fuel, slope, wind and moisture.
+
+    The rates are those of ``world.behaviour``; how they make times is written in ``world.law.travel``. A
+    tick is ``minutes_per_tick``. A cell that the fire has reached burns for ``residence`` minutes, and as long as a
+    neighbour that can ignite has not been reached: the fire's edge burns until it has nowhere to go. Then it is ash.
+
+    Rates differ from cell to cell and from fire to fire by log-normal factors of median 1, drawn for each episode:
+    the same ones from its first tick to its last. Without them the arrival times are those of least travel time.
+
+    Attributes:
+        model: Fuel models: ``fbfm13`` (Anderson 1982), ``fbfm40`` (Scott and Burgan 2005) or ``fbp`` (Canadian).
+        fuel_models: Fuel models of one's own by code, in place of those of ``model``: each a mapping of the fields of
+            ``rates.fuel_models.FuelModel``.
+        minutes_per_tick: Minutes of a tick; None takes half of what the fastest fire needs for a cell of the landscape.
+        residence: Minutes that a cell burns at least.
+        wet_minutes: Minutes for which a tree that was put out cannot ignite.
+        moisture: Percent by name, of those that the wind tells nothing of: see ``moistures.MOISTURES``.
+        fuel_of_cover: Fuel code of lake, wetland, grassland, forest and bare ground, for landscapes without fuel codes;
+            None takes those of ``fuel_bed.COVER_FUEL``. Where given, the codes of a landscape with a table of the
+            user's own are classes of land cover, and the fuel is that of their cover.
+        fuel_gain: Factor on the rate of each fuel code that it names.
+        rate_gain: Factor on all rates.
+        wind_gain: Factor on the wind's speed.
+        slope_gain: Factor on the slope's tangent.
+        cell_deviation: Coefficient of variation of the rates from cell to cell.
+        fire_deviation: Coefficient of variation of the rates from fire to fire.
+
+    Raises:
+        ValueError: If a value is out of its range.
+    """
+
+    youngest_fuel: int = 1
+    model: Literal["fbfm13", "fbfm40", "fbp"] = "fbfm40"
+    fuel_models: Mapping[int, Any] = field(default_factory=dict)
+    minutes_per_tick: float | None = None
+    residence: float = 20.0
+    wet_minutes: float = 60.0
+    moisture: Mapping[str, float] = field(default_factory=dict)
+    fuel_of_cover: tuple[int, int, int, int, int] | None = None
+    fuel_gain: Mapping[int, float] = field(default_factory=dict)
+    rate_gain: float = 1.0
+    wind_gain: float = 1.0
+    slope_gain: float = 1.0
+    cell_deviation: float = 0.1
+    fire_deviation: float = 0.0
+    _by_cover: bool = field(default=False, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_fields(
+            self,
+            minutes_per_tick=(1e-3, 1440.0),
+            residence=(0.0, 1e5),
+            wet_minutes=(0.0, 1e5),
+            rate_gain=(0.0, 100.0),
+            wind_gain=(0.0, 10.0),
+            slope_gain=(0.0, 10.0),
+            cell_deviation=(0.0, 2.0),
+            fire_deviation=(0.0, 2.0),
+        )
+        _ = moisture_row(self.moisture), self.bed  # refuse what they do not know
+
+    @property
+    def minutes(self) -> float:
+        """Return the minutes of a tick in force; 1 where no landscape has set them."""
+        return 1.0 if self.minutes_per_tick is None else self.minutes_per_tick
+
+    @property
+    def ticks_per_stage(self) -> int:
+        """Return the ticks that a burning stage lasts: a fifth of the residence."""
+        return min(_LONGEST_WAIT, max(1, round(self.residence / _STAGES / self.minutes)))
+
+    @property
+    def wet_for(self) -> int:
+        """Return the ticks for which a tree that was put out cannot ignite."""
+        return min(_LONGEST_WAIT, math.ceil(self.wet_minutes / self.minutes))
+
+    @cached_property
+    def bed(self) -> FuelBed:
+        """Return the fuels with their factors."""
+        return FuelBed(
+            model=self.model,
+            fuel_models=self.fuel_models,
+            fuel_of_cover=COVER_FUEL[self.model] if self.fuel_of_cover is None else tuple(self.fuel_of_cover),
+            fuel_gain=self.fuel_gain,
+            rate_gain=self.rate_gain,
+            wind_gain=self.wind_gain,
+            slope_gain=self.slope_gain,
+            by_cover=self._by_cover,
+        )
+
+    def on(self, landscape: LandscapeSource) -> Self:
+        """Return the law on a landscape, which says whether its codes are fuels or classes of land cover.
+
+        Raises:
+            ValueError: If the fuel codes of the landscape are of another model, or the model lacks some.
+        """
+        law = self._going_by(self.fuel_of_cover is not None and has_own_table(landscape))
+        law.bed.check(landscape)
+        return law
+
+    def check_fuel(self, landscape: Landscape) -> None:
+        """Refuse landscapes with fuel codes that the model lacks.
+
+        Raises:
+            ValueError: With codes and cells.
+        """
+        check_fuel(self.bed.fuel(landscape), self.bed.table, "fire.fuel_models" if self.fuel_models else self.model)
+
+    def told_fuel(self, landscape: Landscape) -> str:
+        """Return in words how many cells of landscapes have each fuel, and which are no fuel."""
+        return told_fuel(self.bed.fuel(landscape), self.bed.table)
+
+    def _going_by(self, cover: bool) -> Self:
+        """Return the law that takes the fuel of the cover, or of the landscape's codes."""
+        law = replace(self)
+        object.__setattr__(law, "_by_cover", cover)
+        law.__dict__.pop("bed")  # made before it was told
+        return law
+
+    def over(self, landscape: LandscapeSource, wind: Wind, cell_size: float) -> Self:
+        """Return the automaton with the minutes of a tick that the fastest fire of some worlds asks for.
+
+        Raises:
+            ValueError: See ``on``.
+        """
+        law = self.on(landscape)
+        if law.minutes_per_tick is not None:
+            return law
+        fastest = law.bed.fastest(landscape, wind, cell_size, moisture_row(law.moisture))
+        minutes = min(60.0, max(0.05, float(f"{cell_size / fastest / TICKS_PER_CELL:.2g}")))
+        return replace(law, minutes_per_tick=minutes)._going_by(law._by_cover)
+
+    def flammability(self, landscape: Landscape) -> Tensor:
+        """Return the square root of the rate on level ground in a wind of 5 m/s, of the fastest fuel's there."""
+        return self.bed.flammability(landscape, moisture_row(self.moisture))
+
+    def ground(self, landscape: Landscape, cell_size: float, key: Tensor) -> Ground:
+        """See ``Automaton``."""
+        return Ground(
+            landscape=landscape,
+            alpha=self.flammability(landscape),
+            slope=None,
+            pace=self.pace(key, (landscape.cover.shape[1], landscape.cover.shape[2])),
+            cell_size=cell_size,
+        )
+
+    def pace(self, key: Tensor, size: tuple[int, int]) -> Tensor:
+        """Return the factor on the fire's times in each cell, float32 [B, H, W]: 1 over that on its rates."""
+        return self._pace(key, uniform(key, 0, Stream.PACE, size))
+
+    def pace_in(self, key: Tensor, window: Window) -> Tensor:
+        """Return what ``pace`` does of the whole map in a window of it, float32 [B, h, w]."""
+        u = uniform_at(key, 0, Stream.PACE, window.index()[None].to(key.device))
+        return self._pace(key, u.view(len(key), window.height, window.width))
+
+    def _pace(self, key: Tensor, u: Tensor) -> Tensor:
+        fires = _log_normal(uniform(key, 1, Stream.PACE, (1, 1)), self.fire_deviation)
+        return _log_normal(u, self.cell_deviation) * fires
+
+    def air(self, wind: Tensor, moisture: Tensor | None, ground: Ground) -> Air:
+        """See ``Automaton``."""
+        row = moisture_row(self.moisture).to(wind.device)
+        here = row.expand(len(wind), -1) if moisture is None else torch.where(moisture.isnan(), row, moisture)
+        spread = self.bed.spread(ground.landscape, wind, here, ground.cell_size)
+        made = travel(spread.head, spread.direction, spread.length_to_breadth, ground.cell_size)
+        return Air(wind=wind, gain=None, moisture=moisture, travel=made)
+
+    def started(self, state: WorldState) -> WorldState:
+        """Return worlds whose fires have reached the cells that burn at minute 0."""
+        burning = is_burning(state.cells)
+        minutes = torch.where(burning, 0.0, NEVER)
+        return state.replace(arrivals=Arrivals(minutes, torch.where(burning, _own_cell(state.cells), NOWHERE)))
+
+    def lit(self, state: WorldState, where: Tensor) -> WorldState:
+        """Return worlds whose fires have reached these cells, bool [B, H, W], now, each from itself."""
+        kept = _of(state)
+        minutes = torch.where(where, self._now(state), kept.minutes)
+        return state.replace(arrivals=Arrivals(minutes, torch.where(where, _own_cell(state.cells), kept.origin)))
+
+    def in_air(self, state: WorldState, air: Air) -> WorldState:
+        """Return worlds in another air: the fire has gone as far as it has, and goes on at the new rates.
+
+        What a cell has waited, or has to wait, changes by the ratio of the mean rates to or from its neighbours. Every
+        burning cell is an origin from now on.
+        """
+        before, after = self._mean_rate(state, state.air), self._mean_rate(state, air)
+        arrivals, now = _of(state), self._now(state)
+        ratio = torch.where((before > 0.0) & (after > 0.0), before / after, 1.0)
+        waits = arrivals.minutes < NEVER / 2
+        minutes = torch.where(waits, now + (arrivals.minutes - now) * ratio, arrivals.minutes)
+        origin = torch.where(is_burning(state.cells), _own_cell(state.cells), NOWHERE)
+        return state.replace(air=air, arrivals=Arrivals(minutes, origin))
+
+    def can_ignite(self, state: WorldState) -> Tensor:
+        """Return which trees can ignite now and burn where they stand, bool [B, H, W]."""
+        return self.is_fuel(state) & (state.alpha > 0.0)
+
+    def sources(self, state: WorldState) -> tuple[Arrivals, Tensor]:
+        """Return what is kept of arrivals, and the times that neighbours go by, float32 [B, H, W].
+
+        They are those of cells that burn, and of trees that the fire has not reached yet.
+        """
+        kept = _of(state)
+        ahead = self.can_ignite(state) & (kept.minutes > self._now(state))
+        return kept, torch.where(self.spreads(state) | ahead, kept.minutes, NEVER)
+
+    def reached(self, state: WorldState) -> Tensor:
+        """Return when the fire reached the cells that burn or have burned, else ``NEVER``, float32 [B, H, W]."""
+        return torch.where(is_tree(state.cells), NEVER, _of(state).minutes)
+
+    def next_arrivals(self, state: WorldState) -> Arrivals:
+        """Return when the fire reaches each cell that can ignite and is beside it, else ``NEVER``."""
+        kept, times = self.sources(state)
+        reached, (row, column) = self.reached(state).flatten(1), _rows_and_columns(state.cells)
+
+        def time_of(origin: Tensor) -> Tensor:
+            return reached.gather(1, origin.flatten(1).to(torch.int64)).view(origin.shape)
+
+        places = Places(row, column, state.cells.shape[2], time_of)
+        around = neighbours(times, NEVER), neighbours(kept.origin, NOWHERE)
+        minutes, origin = arrival(*around, self._metric(state, state.air), places)
+        beside = grow(self.spreads(state)) & self.can_ignite(state) & (minutes < NEVER / 2)
+        return Arrivals(torch.where(beside, minutes, NEVER), torch.where(beside, origin, NOWHERE))
+
+    def tick(self, state: WorldState, u: Tensor, ticks_now: Tensor) -> WorldState:
+        """See ``Automaton``. What the fire reaches within the tick ignites, at the minute when it does."""
+        return self.tick_to(state, u, ticks_now, self.next_arrivals(state))
+
+    def tick_to(self, state: WorldState, u: Tensor, ticks_now: Tensor, coming: Arrivals) -> WorldState:
+        """Advance as ``tick`` does, with these arrivals."""
+        here = ticks_now[:, None, None]
+        end = ((state.tick + 1) * self.minutes)[:, None, None]
+        reached = coming.minutes <= end
+        after = self.tick_with(state, u, ticks_now, torch.maximum(reached.to(torch.float32), self.spontaneous(state)))
+        after = self._held(state, after)
+        lit = (after.cells == FIRST_FIRE) & ~is_burning(state.cells)
+        kept, waits = _of(state), is_tree(after.cells)
+        minutes = torch.where(lit, torch.where(reached, coming.minutes, end), kept.minutes)
+        origin = torch.where(lit, torch.where(reached, coming.origin, _own_cell(state.cells)), kept.origin)
+        minutes = torch.where(waits, torch.where(here, coming.minutes, kept.minutes), minutes)
+        origin = torch.where(waits, torch.where(here, coming.origin, kept.origin), origin)
+        return after.replace(arrivals=Arrivals(minutes, origin))
+
+    def ignition_probability(self, state: WorldState) -> Tensor:
+        """Return 1 where the fire arrives in the next tick, else a tick's share of the minutes until it does.
+
+        Or p_spont, where that is more; float32 [B, H, W], 0 where nothing can ignite.
+        """
+        return self.share_of_tick(state, self.next_arrivals(state))
+
+    def share_of_tick(self, state: WorldState, coming: Arrivals) -> Tensor:
+        """Return what ``ignition_probability`` does of these arrivals."""
+        wait = coming.minutes - self._now(state)
+        spread = (self.minutes / wait.clamp(min=self.minutes)) * (coming.minutes < NEVER / 2)
+        return spread if self.beta == 0.0 else torch.maximum(spread, self.spontaneous(state))
+
+    def expected_ignitions(self, state: WorldState) -> Tensor:
+        """Return how many neighbours each burning cell would reach in a tick of its own, float32 [B, H, W]; else 0.
+
+        A neighbour that takes several ticks counts for its share of them.
+        """
+        total = torch.zeros_like(state.alpha)
+        fuel, metric = self.can_ignite(state), self._metric(state, state.air)
+        for direction in range(8):
+            rate = rate_from(direction, metric)
+            share = (rate * self.minutes).clamp(max=1.0) * fuel
+            total = total + neighbour_in((direction + 4) % 8, share)
+        return total * self.spreads(state)
+
+    def _now(self, state: WorldState) -> Tensor:
+        return (state.tick * self.minutes)[:, None, None]
+
+    def _held(self, before: WorldState, after: WorldState) -> WorldState:
+        """Return the worlds after a tick in which cells that are about to burn out wait for their neighbours."""
+        ends = (before.cells == self.last_spreading) & (after.cells != before.cells)
+        holds = ends & grow(self.can_ignite(after))
+        kept = {
+            name: torch.where(holds, getattr(before, name), getattr(after, name))
+            for name in ("cells", "age", "stage_age", "burned")
+            if getattr(after, name) is not None
+        }
+        return after.replace(**kept)
+
+    def _metric(self, state: WorldState, air: Air) -> Metric:
+        made, pace = air.travel, state.ground.pace
+        if made is None or pace is None:
+            raise ValueError("the worlds must be those of a fire with rates of spread")
+        return made[:, 0] * pace, made[:, 1] * pace, made[:, 2] * pace
+
+    def _mean_rate(self, state: WorldState, air: Air) -> Tensor:
+        """Return the sum of the rates from each burning cell to fuel, or from burning cells into fuel [B, H, W]."""
+        burning = self.spreads(state)
+        fuel, metric = self.can_ignite(state).to(torch.float32), self._metric(state, air)
+        into, out = torch.zeros_like(fuel), torch.zeros_like(fuel)
+        for direction in range(8):
+            rate = rate_from(direction, metric)
+            into = into + rate * neighbour_in(direction, burning.to(torch.float32))
+            out = out + neighbour_in((direction + 4) % 8, rate * fuel)
+        return torch.where(burning, out, into * fuel)
+
+
+def _of(state: WorldState) -> Arrivals:
+    if state.arrivals is None:
+        raise ValueError("the worlds must be those of a fire with rates of spread")
+    return state.arrivals
+
+
+def _log_normal(u: Tensor, variation: float) -> Tensor:
+    """Return log-normal factors of median 1 and a coefficient of variation, from uniform draws in [0, 1)."""
+    deviation = math.sqrt(math.log1p(variation * variation))
+    return torch.exp(deviation * math.sqrt(2.0) * torch.erfinv((2.0 * u - 1.0).clamp(-1.0 + 1e-6, 1.0 - 1e-6)))
+
+
+def _rows_and_columns(cells: Tensor) -> tuple[Tensor, Tensor]:
+    row = torch.arange(cells.shape[1], dtype=torch.int32, device=cells.device)[:, None]
+    column = torch.arange(cells.shape[2], dtype=torch.int32, device=cells.device)
+    return row.expand(cells.shape), column.expand(cells.shape)
+
+
+def _own_cell(cells: Tensor) -> Tensor:
+    row, column = _rows_and_columns(cells)
+    return row * cells.shape[2] + column

@@ -1,0 +1,208 @@
+"""The law of a fire with rates of spread: when it reaches each cell, in plain tensor operations.
+
+A fire that spreads freely grows into an ellipse with its origin at a focus. From a point it reaches a place at v after
+
+    F(v) = a |v| - w . v,    a = 1 / (R (1 - e)),    w = a e n
+
+R is the head's rate, n the unit vector where it goes, e = sqrt(1 - 1 / LB^2) (Richards 1990; LB: length to breadth).
+So T = t + w . x obeys the isotropic eikonal equation |grad T| = a (a Randers metric): an ellipse of any length is a
+circle that the wind carries along. The times follow from a cell's eight neighbours in two ways, and the earlier holds:
+
+* ``from_edges``: the fire comes over the edge between two adjacent neighbours, between which T is linear (Tsitsiklis
+  1995; Sethian and Vladimirsky 2003). Right for any front that is straight, and for a start from a neighbour.
+* ``along_ray``: it comes straight from the cell that its neighbours have had it from, at the mean slowness that they
+  met. Right for the narrow tip of a young fire, which is sharper than a cell.
+
+Times are in minutes, lengths in cells. The functions read stacks of the neighbours of any cells, [8, ...], directions
+in the order of ``geometry.DIRECTIONS``.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.system.modes import kept
+from warp_torchrl.world.arrays.geometry import DIRECTIONS
+
+NEVER = 1e9
+"""A time that does not come [minutes]."""
+NOWHERE = -1
+"""The origin of a fire that came over an edge, from no one cell."""
+ROUNDING = 2e-4
+"""By how much of a cell's crossing a straight way may seem the longer for rounding."""
+Metric = tuple[Tensor, Tensor, Tensor]
+"""a, w_east and w_north of the fire in some cells, float32 of one shape [minutes a cell]."""
+_SOUTH, _EAST = zip(*DIRECTIONS, strict=True)
+_BESIDE = (0, 2, 2, 4, 4, 6, 6, 0)
+_ACROSS = (1, 1, 3, 3, 5, 5, 7, 7)
+"""Directions of the two ends of the eight edges about a cell: beside it, and across its corner."""
+_WHOLE = 1.0 / math.sqrt(2.0) - 1e-5
+_LEAST = 1e-9
+
+
+def travel(head: Tensor, direction: Tensor, length_to_breadth: Tensor, cell_size: float) -> Tensor:
+    """Return a, w_east and w_north of the fire in each cell, float32 [B, 3, H, W] [minutes a cell].
+
+    Args:
+        head: R, float32 [B, H, W] [m/min]; 0 where nothing burns, which gives ``NEVER``.
+        direction: Where the head goes, float32 [B, H, W] [degrees clockwise from grid north].
+        length_to_breadth: LB, float32 [B, H, W], 1 or more.
+        cell_size: Side of a cell [m].
+    """
+    focus = torch.sqrt((1.0 - length_to_breadth.pow(-2)).clamp(min=0.0))
+    slowness = (cell_size / (head * (1.0 - focus)).clamp(min=_LEAST)).clamp(max=NEVER)
+    angle = torch.deg2rad(direction)
+    return torch.stack((slowness, slowness * focus * angle.sin(), slowness * focus * angle.cos()), dim=1)
+
+
+def duration(metric: Metric, east: Tensor, north: Tensor) -> Tensor:
+    """Return F of a way, float32 [minutes].
+
+    Args:
+        metric: a, w_east, w_north [minutes a cell].
+        east: Its part to the east [cells].
+        north: Its part to the north [cells].
+    """
+    slowness, drift_east, drift_north = metric
+    return slowness * torch.sqrt(east * east + north * north) - drift_east * east - drift_north * north
+
+
+def rate_from(direction: int, metric: Metric) -> Tensor:
+    """Return 1 / F into cells from their neighbours in a direction, float32, shape of the metric's [cells/min]."""
+    row, column = DIRECTIONS[direction]
+    east, north = torch.full_like(metric[0], -column), torch.full_like(metric[0], row)
+    return 1.0 / duration(metric, east, north).clamp(min=1e-9)
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Some cells of maps of one size."""
+
+    row: Tensor  # int32 [...]
+    column: Tensor  # int32 [...]
+    width: int  # columns of the maps
+    time_of: Callable[[Tensor], Tensor]
+    """Returns when the fire reached other cells of the same maps, given their flat index in the map, int32 [...]."""
+
+
+def arrival(times: Tensor, origins: Tensor, metric: Metric, at: Places) -> tuple[Tensor, Tensor]:
+    """Return when the fire reaches some cells, and the cell that it comes from on a straight way.
+
+    Args:
+        times: When it reaches each neighbour, float32 [8, ...] [minutes]; ``NEVER`` where it does not.
+        origins: Flat index of the cell that each neighbour has had it from, int32 [8, ...], or ``NOWHERE``.
+        metric: Of the cells.
+        at: The cells.
+
+    Returns:
+        float32 [...] [minutes], ``NEVER`` or more where it does not come, and int32 [...] like ``origins``.
+    """
+    time, direction, from_one = from_edges(times, metric)
+    handed = origins.gather(0, direction[None])[0]
+    straight = along_ray(times, origins, handed, metric, at)
+    on_ray = straight <= time + ROUNDING * metric[0]
+    neighbour = _neighbour(direction, at)
+    return torch.where(on_ray, straight, time), torch.where(on_ray, handed, torch.where(from_one, neighbour, NOWHERE))
+
+
+def from_edges(times: Tensor, metric: Metric) -> tuple[Tensor, Tensor, Tensor]:
+    """Return when fire comes over an edge between two adjacent neighbours, or from one of them.
+
+        T = min over s in [0, 1] of (1 - s) T_a + s T_b + a sqrt(1 + s^2)
+
+    of the neighbour a beside the cell and b across its corner, at s / sqrt(1 + s^2) = (T_a - T_b) / a.
+
+    Returns:
+        The time, float32 [...] [minutes]; the direction of the nearer neighbour, int64 [...]; and whether the fire
+        comes from that one alone, bool [...].
+    """
+    slowness = metric[0]
+    carried = times - _drift(metric, times)
+    beside, across = carried[list(_BESIDE)], carried[list(_ACROSS)]
+    sine = ((beside - across) / slowness).clamp(0.0, _WHOLE)
+    part = torch.where(sine >= _WHOLE, 1.0, sine / torch.sqrt(1.0 - sine * sine))
+    time = (1.0 - part) * beside + part * across + slowness * torch.sqrt(1.0 + part * part)
+    time, edge = time.min(dim=0)
+    part = part.gather(0, edge[None])[0]
+    nearer = torch.where(part < 0.5, _table(_BESIDE, edge), _table(_ACROSS, edge))
+    return time, nearer, (part == 0.0) | (part == 1.0)
+
+
+def along_ray(times: Tensor, origins: Tensor, origin: Tensor, metric: Metric, at: Places) -> Tensor:
+    """Return when the fire comes straight from an origin that both neighbours on the way have had it from.
+
+    Their mean slownesses from there, t / F, tell that of the way to the edge between them:
+
+        t = t_o + F(x - o) (m (1 - 1 / n) + 1 / n),   m = (1 - s) (t_a - t_o) / F(a - o) + s (t_b - t_o) / F(b - o)
+
+    n is the distance from the origin in rows or columns, whichever is more, and s n the other.
+
+    Args:
+        times: See ``arrival``.
+        origins: See ``arrival``.
+        origin: Of the cells, int32 [...], or ``NOWHERE``.
+        metric: See ``arrival``.
+        at: The cells.
+
+    Returns:
+        float32 [...] [minutes]; ``NEVER`` where there is no such way.
+    """
+    south, east = at.row - origin // at.width, at.column - origin % at.width
+    steps, sideways = torch.maximum(south.abs(), east.abs()), torch.minimum(south.abs(), east.abs())
+    beside, across = _towards(south, east)
+    t_beside, t_across = times.gather(0, beside[None])[0], times.gather(0, across[None])[0]
+    shares = (origins.gather(0, beside[None])[0] == origin) | (sideways == steps)
+    shares &= (origins.gather(0, across[None])[0] == origin) | (sideways == 0)
+    begun = at.time_of(origin.clamp(min=0))
+
+    def slowness(time: Tensor, direction: Tensor) -> Tensor:
+        down, right = _table(_SOUTH, direction), _table(_EAST, direction)
+        way = duration(metric, (east + right).to(torch.float32), -(south + down).to(torch.float32))
+        return (time - begun) / way.clamp(min=_LEAST)
+
+    s, share = sideways / steps.clamp(min=1), 1.0 / steps.clamp(min=1)
+    mean = torch.where(sideways == 0, 0.0, s * slowness(t_across, across))
+    mean = mean + torch.where(sideways == steps, 0.0, (1.0 - s) * slowness(t_beside, beside))
+    whole = duration(metric, east.to(torch.float32), -south.to(torch.float32))
+    time = begun + whole * (mean * (1.0 - share) + share)
+    return torch.where(shares & (origin >= 0) & (steps > 1) & (begun < NEVER / 2), time, NEVER)
+
+
+def _drift(metric: Metric, times: Tensor) -> Tensor:
+    """Return w . (x - y) of each neighbour's place y, float32 [8, ...] [minutes]."""
+    east, north = (_part(part, times) for part in (0, 1))
+    return -(metric[1] * east + metric[2] * north)
+
+
+def _towards(south: Tensor, east: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the directions of the neighbours beside and across on the way back, int64 [...] each."""
+    down, right = (south > 0).to(torch.int64), (east > 0).to(torch.int64)
+    beside = torch.where(south.abs() >= east.abs(), 4 - 4 * down, 2 + 4 * right)
+    across = torch.where(south > 0, 1 + 6 * right, 3 + 2 * right)
+    return beside, across
+
+
+def _neighbour(direction: Tensor, at: Places) -> Tensor:
+    """Return the flat index of each cell's neighbour in a direction, int32 [...]."""
+    row, column = at.row + _table(_SOUTH, direction), at.column + _table(_EAST, direction)
+    return (row * at.width + column).to(torch.int32)
+
+
+def _table(values: tuple[int, ...], index: Tensor) -> Tensor:
+    """Return the value of each index, int32, shape of the index."""
+    table = _kept(values, index.device)
+    return table.index_select(0, index.flatten()).view(index.shape)
+
+
+def _part(axis: int, like: Tensor) -> Tensor:
+    """Return by how much each neighbour lies east (0) or north (1), float32 [8, 1, ...] [cells]."""
+    values = _kept(_EAST, like.device) if axis == 0 else -_kept(_SOUTH, like.device)
+    return values.to(torch.float32).view(8, *(1 for _ in like.shape[1:]))
+
+
+@kept(32)
+def _kept(values: tuple[int, ...], device: torch.device) -> Tensor:
+    return torch.tensor(values, dtype=torch.int32, device=device)

@@ -1,0 +1,1 @@
+"""Agencies: whose land is whose, and whom vehicles serve."""

@@ -1,0 +1,251 @@
+"""Agencies: whose land is whose, whom each vehicle serves, and how vehicles are lent.
+
+The map is parted among agencies. Each has land and vehicles of its own, and there may be a pool of vehicles that serve
+whoever needs them.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Literal
+
+import torch
+from torch import Tensor
+from torch.nn.functional import one_hot
+
+from warp_torchrl.validation import check_fields
+from warp_torchrl.world.arrays.random import Stream, uniform
+from warp_torchrl.world.state.state import Cover, Lands, WorldState, is_burning, is_tree
+from warp_torchrl.world.team.start import distances_to, first_free
+from warp_torchrl.world.team.team import Team
+
+_HOME = 0.35
+"""How far an agency's home is from the middle of the map, as a share of its shorter side."""
+
+
+class Agencies(ABC):
+    """What the world needs of a component that tells whom a team serves."""
+
+    @property
+    @abstractmethod
+    def names(self) -> tuple[str, ...]:
+        """Return the agencies' names; none where the whole team serves all land."""
+
+    @abstractmethod
+    def check(self, team: Team) -> None:
+        """Check that a team has vehicles enough.
+
+        Raises:
+            ValueError: If not.
+        """
+
+    @abstractmethod
+    def groups(self, team: Team) -> dict[str, list[int]]:
+        """Return the vehicles of each group by their index: those of each agency, then those of the pool."""
+
+    @abstractmethod
+    def begun(self, state: WorldState, team: Team) -> WorldState:
+        """Return worlds at the start of an episode with their lands, and the vehicles where they start."""
+
+    @abstractmethod
+    def updated(self, state: WorldState, running: Tensor) -> WorldState:
+        """Return worlds after a step, with whom each vehicle serves now in those that go on, bool [B]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OneAgency(Agencies):
+    """The whole team serves all land."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return no name."""
+        return ()
+
+    def check(self, team: Team) -> None:
+        """Check nothing."""
+
+    def groups(self, team: Team) -> dict[str, list[int]]:
+        """Return the team, ``agents``."""
+        return {"agents": list(range(team.n_agents))}
+
+    def begun(self, state: WorldState, team: Team) -> WorldState:
+        """Return the worlds."""
+        return state
+
+    def updated(self, state: WorldState, running: Tensor) -> WorldState:
+        """Return the worlds."""
+        return state
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeveralAgencies(Agencies):
+    """Agencies with land and vehicles of their own, and a pool of vehicles that serve one of them at a time.
+
+    The land is parted into sectors about the middle of the map, all of one angle, in a direction drawn for each
+    episode. The first ``own`` vehicles are the first agency's, the next ``own`` the second's, and so on; those that
+    remain are the pool's. A vehicle starts near the home of the agency that it serves, on its land, unless
+    ``team.start`` is ``anywhere``. Tanks and batteries fill up at the one base of all.
+
+    Attributes:
+        count: K, agencies.
+        own: Vehicles of each agency; None parts the whole team equally, and what is left over is the pool's.
+        lending: ``fixed``, vehicles of the pool serve the agencies in turn, each the same one for ever; ``need``, they
+            are lent anew every ``term`` steps in proportion to the worth of the trees that burn on each agency's land,
+            by the method of D'Hondt. Where nothing burns they stay with whom they serve.
+        term: For how long vehicles are lent [steps].
+
+    Raises:
+        ValueError: If a value is out of its range.
+    """
+
+    count: int = 2
+    own: int | None = None
+    lending: Literal["fixed", "need"] = "fixed"
+    term: int = 16
+
+    def __post_init__(self) -> None:
+        check_fields(self, count=(2, 16), own=(0, 256), term=(1, 1_000_000))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return ``agency_0`` and so on."""
+        return tuple(f"agency_{index}" for index in range(self.count))
+
+    def check(self, team: Team) -> None:
+        """Check that a team has vehicles enough.
+
+        Raises:
+            ValueError: If not.
+        """
+        least = self.count * (1 if self.own is None else self.own)
+        if team.n_agents < least:
+            raise ValueError(
+                f"team.n_agents must be at least {least}, the vehicles that {self.count} agencies own, "
+                f"got {team.n_agents}"
+            )
+
+    def groups(self, team: Team) -> dict[str, list[int]]:
+        """Return the vehicles of each agency and of the ``pool`` by their index; no group is empty."""
+        own, places = self._owned(team.n_agents), list(range(team.n_agents))
+        parts = {name: places[index * own : (index + 1) * own] for index, name in enumerate(self.names)}
+        return {name: part for name, part in {**parts, "pool": places[self.count * own :]}.items() if part}
+
+    def begun(self, state: WorldState, team: Team) -> WorldState:
+        """Return worlds at the start of an episode with their lands, and the vehicles where they start."""
+        owner, homes = self._parted(state)
+        worth = by_land(worth_of(state) * state.initial, owner, self.count)
+        own, places = self._owned(team.n_agents), torch.arange(team.n_agents, device=owner.device)
+        serves = torch.where(places < self.count * own, places // max(own, 1), (places - self.count * own) % self.count)
+        vehicles = state.vehicles.replace(serves=serves.expand(len(owner), -1).clone())
+        if team.start == "corner":
+            vehicles = vehicles.replace(position=self._starts(state, owner, homes, serves))
+        return state.replace(lands=Lands(owner=owner, worth=worth), vehicles=vehicles)
+
+    def updated(self, state: WorldState, running: Tensor) -> WorldState:
+        """Return worlds after a step, with whom each vehicle serves now in those that go on, bool [B]."""
+        lands, serves = lands_of(state)
+        pool = serves.shape[1] - self.count * self._owned(serves.shape[1])
+        if self.lending == "fixed" or pool == 0:
+            return state
+        need = by_land(worth_of(state) * is_burning(state.cells), lands.owner, self.count)
+        lent = apportioned(need, pool)
+        now = running & (state.step % self.term == 0) & (need > 0.0).any(dim=1)
+        lent = torch.where(now[:, None], lent, serves[:, -pool:])
+        serves = torch.cat((serves[:, :-pool], lent), dim=1)
+        return state.replace(vehicles=state.vehicles.replace(serves=serves))
+
+    def _owned(self, n_agents: int) -> int:
+        """Return how many of a team's vehicles each agency owns."""
+        return n_agents // self.count if self.own is None else self.own
+
+    def _parted(self, state: WorldState) -> tuple[Tensor, Tensor]:
+        """Return whose each cell is, uint8 [B, H, W], and the (row, column) of the homes, int64 [B, K, 2] [cells]."""
+        height, width = state.cells.shape[1:]
+        device = state.cells.device
+        turn = torch.arange(self.count, device=device) / self.count
+        angle = 2.0 * math.pi * (uniform(state.key, 0, Stream.LANDS, (1,)) + turn)
+        south, east = angle.sin(), angle.cos()
+        row = torch.arange(height, device=device) - 0.5 * (height - 1)
+        column = torch.arange(width, device=device) - 0.5 * (width - 1)
+        along = row[:, None] * south[..., None, None] + column * east[..., None, None]  # [B, K, H, W]
+        owner = along.argmax(dim=1).to(torch.uint8)
+        away = _HOME * min(height, width)
+        home = torch.stack((0.5 * (height - 1) + away * south, 0.5 * (width - 1) + away * east), dim=-1)
+        return owner, home.round().to(torch.int64)
+
+    def _starts(self, state: WorldState, owner: Tensor, homes: Tensor, serves: Tensor) -> Tensor:
+        """Return the free cells nearest to each vehicle's home on its agency's land, int64 [B, A, 2] [cells]."""
+        agents, (height, width) = len(serves), owner.shape[1:]
+        taken = (state.cover == int(Cover.LAKE)) | is_burning(state.cells)
+        taken = taken[:, None] | (owner[:, None] != torch.arange(self.count, device=owner.device)[:, None, None])
+        order = distances_to(homes.flatten(0, 1), height, width)
+        cells = first_free(order, taken.flatten(0, 1), agents).unflatten(0, (-1, self.count))
+        earlier = (serves[:, None] == serves).tril(diagonal=-1).sum(dim=1)
+        return cells[:, serves, earlier]
+
+
+def apportioned(need: Tensor, seats: int) -> Tensor:
+    """Return which agency each of so many vehicles is lent to, by the method of D'Hondt, int64 [B, seats].
+
+    Vehicle after vehicle goes to the agency with the largest need / (1 + vehicles lent to it), the first one of equals.
+    Those of one agency stand together, in the order of the agencies.
+
+    Args:
+        need: float32 [B, K], 0 or more.
+        seats: Vehicles.
+    """
+    quotients = need[..., None] / torch.arange(1, seats + 1, device=need.device)
+    first = quotients.flatten(1).sort(dim=1, descending=True, stable=True).indices[:, :seats]
+    held = one_hot(first // seats, need.shape[1]).sum(dim=1).cumsum(dim=1)
+    return (torch.arange(seats, device=need.device)[:, None] >= held[:, None]).sum(dim=-1)
+
+
+def worth_of(state: WorldState) -> Tensor:
+    """Return what each cell is worth, float32 [B, H, W]: the landscape's assets, or 1."""
+    assets = state.landscape.assets
+    return torch.ones_like(state.alpha) if assets is None else assets
+
+
+def by_land(plane: Tensor, owner: Tensor, count: int) -> Tensor:
+    """Return the sums of a plane, float32 [B, H, W], over the land of each agency, float32 [B, K].
+
+    Args:
+        plane: What is summed.
+        owner: Of ``Lands``.
+        count: K.
+    """
+    agencies = torch.arange(count, device=owner.device)[:, None, None]
+    return torch.where(owner[:, None] == agencies, plane[:, None], 0.0).sum(dim=(2, 3))
+
+
+def standing(state: WorldState) -> Tensor:
+    """Return the share of its trees' worth that each agency has left, (T_p + T_e) / N0 of its land, float32 [B, K].
+
+    It is 1 where there was none.
+    """
+    lands, _ = lands_of(state)
+    alive = state.initial & ~state.burned & is_tree(state.cells)
+    left = by_land(worth_of(state) * alive, lands.owner, lands.worth.shape[1])
+    return torch.where(lands.worth > 0.0, left / lands.worth, 1.0)
+
+
+def land_of_each(lands: Lands) -> Tensor:
+    """Return the cells of each agency's land, bool [B, K, H, W]."""
+    return lands.owner[:, None] == torch.arange(lands.worth.shape[1], device=lands.owner.device)[:, None, None]
+
+
+def own_land(state: WorldState) -> Tensor:
+    """Return the cells on the land of the agency that each vehicle serves, bool [B, A, H, W]."""
+    lands, serves = lands_of(state)
+    return lands.owner[:, None] == serves[..., None, None]
+
+
+def lands_of(state: WorldState) -> tuple[Lands, Tensor]:
+    """Return the lands of worlds, and whom each vehicle serves, int64 [B, A].
+
+    Raises:
+        ValueError: If there is but one agency.
+    """
+    if state.lands is None or state.vehicles.serves is None:
+        raise ValueError("worlds must have lands: choose agencies=several")
+    return state.lands, state.vehicles.serves

@@ -1,0 +1,1 @@
+"""Aircraft that drop retardant."""

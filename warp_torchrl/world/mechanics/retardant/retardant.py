@@ -1,0 +1,191 @@
+"""Aircraft that drop retardant wherever they fly over fire (Haksar and Schwager, IROS 2018).
+
+Retardant is no action: an aircraft that is over a burning tree treats it, whatever it chose. The tree goes on burning,
+and is less likely to after the next tick (``warp_torchrl.world.law.lattice``).
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.system.modes import kept
+from warp_torchrl.validation import check_fields
+from warp_torchrl.world.arrays.geometry import DIRECTIONS
+from warp_torchrl.world.state.role import Role, add_role
+from warp_torchrl.world.state.state import Action, ActionResult, Vehicles, WorldState, is_burning
+from warp_torchrl.world.team.abilities import own_cell
+from warp_torchrl.world.team.team import Team, changed, is_second
+
+TANKER = "tanker"
+"""The role of these aircraft."""
+add_role(TANKER, Role(TANKER, abilities=("move",), flies=True))
+
+_APPROACH = (0, 2, 4, 6, 7, 1, 3, 5)
+"""Directions in the order in which an aircraft on its way to the fire prefers them: N, E, S, W, NW, NE, SE, SW."""
+_BASE = 5
+"""The base is in this row from the south and this column from the west, from 1."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RetardantTeam(Team):
+    """A team whose aircraft, role ``tanker``, treat the burning trees that they fly over.
+
+    In each step an aircraft moves to one of the eight cells about it, or stays. It treats the burning tree that it
+    leaves and the one that it comes to; each takes one of its ``tank``. With the last it is back at its base at once,
+    five cells from the south-west corner, with a full tank. It starts anywhere.
+
+    Attributes:
+        treats: ``path`` treats the tree that an aircraft leaves and the one that it comes to, as the program has it of
+            which the authors' results are; ``end`` the latter alone, as their later program has it.
+        approach: Whether aircraft that have not reached the fire since they set out are shown one action alone, the
+            move towards the middle of the map: learned policies then act at the fire only, as the authors' do.
+
+    Raises:
+        ValueError: If a value is out of its range or a role is unknown.
+    """
+
+    n_agents: int = 10
+    roles: tuple[str, ...] = (TANKER,)
+    start: Literal["corner", "anywhere"] = "anywhere"
+    treats: Literal["path", "end"] = "path"
+    approach: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_fields(self)
+
+    def place(self, key: Tensor, cover: Tensor, burning: Tensor) -> Vehicles:
+        """Return the team at the start of an episode; its base is near the south-west corner."""
+        vehicles = super().place(key, cover, burning)
+        vehicles = vehicles.replace(arrived=torch.zeros_like(vehicles.tank, dtype=torch.bool))
+        if self.start == "corner":
+            return vehicles
+        row, column = max(cover.shape[1] - _BASE, 0), min(_BASE, cover.shape[2]) - 1
+        here = torch.arange(2, device=cover.device)
+        return vehicles.replace(base=torch.where(here == 0, row, column).expand_as(vehicles.base).contiguous())
+
+    def action_mask(self, state: WorldState, last_spreading: int) -> Tensor:
+        """Return which actions would do something, or are shown alone, bool [B, A, actions]."""
+        mask = super().action_mask(state, last_spreading)
+        if not self.approach:
+            return mask
+        actions = torch.arange(mask.shape[-1], device=mask.device)
+        alone = actions == approach_move(state)[..., None]
+        sets_out = self._drops(state.cells.device) & ~has_reached(state)
+        return torch.where(sets_out[..., None], alone, mask)
+
+    def act(
+        self, state: WorldState, action: Tensor, running: Tensor, last_spreading: int, wet_ticks: int
+    ) -> tuple[WorldState, ActionResult]:
+        """Let the vehicles do as in any team, and the aircraft drop their retardant; see ``Team.act``.
+
+        An aircraft that treats a tree is credited for it, unless it was treated in this tick already: then that was
+        redundant.
+        """
+        drops, step = self._drops(action.device) & running[:, None], state.step
+        target, reached = own_cell(state), has_reached(state) & running[:, None]
+        treated = first = torch.zeros_like(drops)
+        if self.treats == "path":
+            state, treated, first = _treat(state, drops)
+        state, result = super().act(state, action, running, last_spreading, wet_ticks)
+        state, ends, new = _treat(state, drops & result.moved if self.treats == "path" else drops)
+        treated, first = treated | ends, first | new
+        target = torch.where(drops, torch.where(ends, own_cell(state), target), result.target)
+        redundant, vehicles = treated & ~first, state.vehicles
+        vehicles = vehicles.replace(
+            acts=vehicles.acts + treated,
+            redundant=vehicles.redundant + redundant,
+            last_useful=torch.where(first, step[:, None], vehicles.last_useful),
+            arrived=reached if vehicles.arrived is None else reached | vehicles.arrived,
+        )
+        return state.replace(vehicles=self._sent_back(vehicles, drops)), result.replace(
+            credited=result.credited | first, redundant=result.redundant | redundant, target=target
+        )
+
+    def _sent_back(self, vehicles: Vehicles, drops: Tensor) -> Vehicles:
+        """Return the vehicles, of which those that dropped their last, bool [B, A], are at the base with full tanks."""
+        if not self.tank:
+            return vehicles
+        empty = drops & (vehicles.tank == 0)
+        return vehicles.replace(
+            position=torch.where(empty[..., None], vehicles.base[:, None], vehicles.position),
+            tank=torch.where(empty, self.tank, vehicles.tank),
+            arrived=None if vehicles.arrived is None else vehicles.arrived & ~empty,
+        )
+
+    def _drops(self, device: torch.device) -> Tensor:
+        """Return which vehicles drop retardant, bool [A]."""
+        names = self.role_names
+        return self.table(device).index == (names.index(TANKER) if TANKER in names else -1)
+
+
+def _treat(state: WorldState, drops: Tensor) -> tuple[WorldState, Tensor, Tensor]:
+    """Return worlds in which vehicles treated their own burning cells.
+
+    Args:
+        state: The worlds.
+        drops: Which vehicles would, bool [B, A].
+
+    Returns:
+        The worlds, which vehicles treated a tree, and which were the first to do so in this tick, bool [B, A] each.
+    """
+    cell, tank = own_cell(state), state.vehicles.tank
+    treated = drops & is_burning(state.cells.flatten(1).gather(1, cell)) & (tank != 0)
+    first = treated & (state.wet.flatten(1).gather(1, cell) == 0)
+    first = first & ~is_second(cell, first)
+    after = changed(state, cell, [(first, {"wet": 1})])
+    left = tank - (treated & (tank > 0)).to(torch.int32)
+    return after.replace(vehicles=after.vehicles.replace(tank=left)), treated, first
+
+
+def has_reached(state: WorldState) -> Tensor:
+    """Return which agents have been over a tree that burned, or had, since they set out, bool [B, A].
+
+    In teams that do not keep it, those that are now, or have acted in this episode.
+    """
+    cell, vehicles = own_cell(state), state.vehicles
+    here = state.cells.flatten(1).gather(1, cell)
+    burnt = (state.burned.flatten(1).gather(1, cell) != 0) & (here == 0)
+    was = vehicles.acts > 0 if vehicles.arrived is None else vehicles.arrived
+    return is_burning(here) | burnt | was
+
+
+def from_middle(state: WorldState) -> Tensor:
+    """Return where each agent is from the middle of the map, (east, north), float32 [B, A, 2] [cells]."""
+    height, width = state.cells.shape[1:]
+    row, column = state.vehicles.position.to(torch.float32).unbind(-1)
+    return torch.stack((column - 0.5 * (width - 1), 0.5 * (height - 1) - row), dim=-1)
+
+
+def approach_move(state: WorldState) -> Tensor:
+    """Return the move of each agent that has not reached the fire, int64 [B, A]; stay in the very middle of a map.
+
+    It is the move to the cell with the least way to the middle, along rows and columns; of such that take as much, the
+    first of N, E, S, W, NW, NE, SE, SW, and each place in that order is worth a tenth of a cell.
+    """
+    way = from_middle(state)
+    order, preferred = _in_order(way.device)
+    then = (way[..., None, :] + order).abs().sum(-1) - preferred
+    move = then.argmin(dim=-1)
+    return torch.where(way.abs().amax(dim=-1) < 0.5, int(Action.STAY), move)
+
+
+def nearest_mate(state: WorldState) -> Tensor:
+    """Return the index of the team-mate nearest to each agent, the first of those as near, int64 [B, A].
+
+    Of an agent alone it is its own.
+    """
+    position = state.vehicles.position
+    square = (position[:, :, None] - position[:, None]).square().sum(-1)
+    alone = torch.eye(position.shape[1], dtype=torch.bool, device=position.device)
+    return square.masked_fill(alone, 1 << 40).argmin(dim=-1)
+
+
+@kept(8)
+def _in_order(device: torch.device) -> tuple[Tensor, Tensor]:
+    """Return the (east, north) offset of each direction, float32 [8, 2], and what its place is worth, float32 [8]."""
+    offsets = torch.tensor([(column, -row) for row, column in DIRECTIONS], dtype=torch.float32, device=device)
+    worth = torch.tensor([0.1 * (8 - _APPROACH.index(each)) for each in range(8)], device=device)
+    return offsets, worth

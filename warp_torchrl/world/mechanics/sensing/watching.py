@@ -1,0 +1,96 @@
+"""How well a team of limited sight keeps the fire in sight: measured after every step, in one place."""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.world.mechanics.sensing.records import codes, freshness, steps_since
+from warp_torchrl.world.state.front import spreading_front
+from warp_torchrl.world.state.state import FIRST_FIRE, Watching, WorldState, is_burning
+
+
+@dataclass(frozen=True, eq=False)
+class NewestRecords:
+    """What the newest record of each cell of any agent of the team tells."""
+
+    burns: Tensor  # bool [B,H,W], that it burns
+    burned_before: Tensor  # bool [B,H,W], what ``burns`` was a step ago
+    since: Tensor  # int32 [B,H,W], how old it is [steps]; of a cell that nobody saw the step + 1
+    fresh: Tensor  # float32 [B,H,W], how fresh it is, 0..1
+    holders: Tensor  # bool [B,A,H,W], the agents that hold it and saw it themselves
+
+
+def unwatched(state: WorldState) -> Watching:
+    """Return what teams have watched before their first look."""
+    no = torch.zeros_like(state.vehicles.position[..., 0], dtype=torch.bool)
+    zero = torch.zeros_like(state.burning_area)
+    return Watching(
+        itself=no[..., None, None].expand(*no.shape, *state.cells.shape[1:]).clone(),
+        watches=no.to(torch.float32),
+        finds=no.to(torch.float32),
+        uncertain=zero.clone(),
+        watched=zero.clone(),
+        found=zero.clone(),
+        uncertainty=zero.clone(),
+        fronts=zero.to(torch.int32),
+    )
+
+
+def at_start(watching: Watching) -> Watching:
+    """Return what teams have watched before their first step: what they see, in no sum."""
+    sums = ("watched", "found", "uncertainty", "fronts")
+    return watching.replace(**{name: torch.zeros_like(getattr(watching, name)) for name in sums})
+
+
+def newest_records(before: Tensor, records: Tensor, itself: Tensor, step: Tensor) -> NewestRecords:
+    """Return what the team's newest records tell after a step.
+
+    Args:
+        before: The agents' records before it, int32 [B, A, H, W].
+        records: The same after it.
+        itself: Of ``Watching``, after it.
+        step: The worlds' steps after it, int32 [B].
+    """
+    newest = records.amax(dim=1)
+    return NewestRecords(
+        burns=codes(newest) >= FIRST_FIRE,
+        burned_before=codes(before.amax(dim=1)) >= FIRST_FIRE,
+        since=steps_since(newest, step),
+        fresh=freshness(newest, step),
+        holders=itself & (records == newest[:, None]),
+    )
+
+
+def counted(state: WorldState, before: Watching, itself: Tensor, newest: NewestRecords, recent: int) -> Watching:
+    """Return what teams have watched after a step.
+
+    The team watches a cell of the front that it saw burn at most ``recent`` steps ago. The agents that hold the newest
+    record of a cell, and saw it themselves, share the credit for it.
+
+    Args:
+        state: The worlds after the step.
+        before: What was watched before it.
+        itself: Of ``Watching``, after the step.
+        newest: What the team's records tell after it.
+        recent: n [steps].
+    """
+    front, burning = spreading_front(state.cells, state.alpha), is_burning(state.cells)
+    watched = front & newest.burns & (newest.since <= recent)
+    found = burning & newest.burns & ~newest.burned_before & (newest.since == 0)
+    share = newest.holders / newest.holders.sum(dim=1, keepdim=True).clamp(min=1)
+    size, uncertain = _count(front), (1.0 - newest.fresh).mean(dim=(1, 2))
+    return Watching(
+        itself=itself,
+        watches=(share * watched[:, None]).sum((2, 3)) / size.clamp(min=1)[:, None],
+        finds=(share * found[:, None]).sum((2, 3)) / _count(burning).clamp(min=1)[:, None],
+        uncertain=uncertain,
+        watched=before.watched + _count(watched) / size.clamp(min=1),
+        found=before.found + _count(front & newest.burns) / size.clamp(min=1),
+        uncertainty=before.uncertainty + uncertain,
+        fronts=before.fronts + (size > 0).to(torch.int32),
+    )
+
+
+def _count(cells: Tensor) -> Tensor:
+    return cells.sum((1, 2))

@@ -1,0 +1,1 @@
+"""Water: where vehicles fill their tanks."""

@@ -1,0 +1,314 @@
+"""What the world is made of: the batches every other module reads, and the public codes.
+
+Letters, everywhere: B worlds, A agents, H rows, W columns.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+from torch import Tensor
+
+from warp_torchrl.world.arrays.batch import Batch
+from warp_torchrl.world.arrays.bytes import at_least, between, byte, counts
+from warp_torchrl.world.state.packets import Packets
+
+
+class Cover(IntEnum):
+    """Land cover of a cell (WARP-CA, terrain types), and ``BARE``, which only rasters use."""
+
+    LAKE = 0
+    WETLAND = 1
+    GRASSLAND = 2
+    FOREST = 3
+    BARE = 4
+
+
+class Action(IntEnum):
+    """The paper's ten actions A = {0..9}, and ``STAY`` where a team may stay. 0..7 move N, NE, E, SE, S, SW, W, NW.
+
+    These are the first actions of every team; those of other abilities follow, see ``Team.action_names``.
+    """
+
+    NORTH = 0
+    NORTH_EAST = 1
+    EAST = 2
+    SOUTH_EAST = 3
+    SOUTH = 4
+    SOUTH_WEST = 5
+    WEST = 6
+    NORTH_WEST = 7
+    EXTINGUISH = 8
+    CLEAR = 9
+    STAY = 10
+
+
+EMPTY = 0
+"""Cell code of bare ground, ash, lakes and firebreaks."""
+OLDEST = 10
+"""Cell code of the oldest tree; 1..10 are ages."""
+FIRST_FIRE = 11
+"""Cell code of the first burning stage; 11..15 burn."""
+EMBER = 15
+"""Cell code of the last stage."""
+
+
+@dataclass(eq=False, repr=False)
+class Landscape(Batch):
+    """The ground of each world, fixed for an episode."""
+
+    cover: Tensor  # uint8 [B,H,W], a Cover code
+    age: Tensor  # uint8 [B,H,W], tree age before the fire, 0..10
+    elevation: Tensor | None  # float32 [B,H,W] [m]; None where every world is flat
+    assets: Tensor | None = None  # float32 [B,H,W], what each cell is worth, any unit; None: all alike
+    fuel: Tensor | None = None  # int16 [B,H,W], class codes of the fuel layer; None where there is none
+    canopy_cover: Tensor | None = None  # float32 [B,H,W] [%], 0 without trees; None where no source tells it
+    canopy_height: Tensor | None = None  # float32 [B,H,W] [m], 0 without trees; None where no source tells it
+    corner: Tensor | None = None  # int64 [B,2], (row, column) of the map's first cell in its source; None: at (0, 0)
+
+
+@dataclass(eq=False, repr=False)
+class TreeCounts(Batch):
+    """Counts of the initial trees by fate; they add up to ``initial`` (trees that regrow are counted apart)."""
+
+    initial: Tensor  # int32 [B], N0, trees before ignition
+    preserved: Tensor  # int32 [B], T_p, alive, untouched by fire or agents
+    extinguished: Tensor  # int32 [B], T_e, alive, put out at least once
+    cleared: Tensor  # int32 [B], T_c, turned into firebreak
+    burned: Tensor  # int32 [B], T_b, burned to ash at least once
+    burning: Tensor  # int32 [B], on fire for the first time
+    alight: Tensor  # int32 [B], every burning cell of the map, regrown trees included
+
+    def saved(self) -> Tensor:
+        """Return the share of the initial trees that stand: (T_p + T_e) / N0, float32 [B]."""
+        return (self.preserved + self.extinguished) / self.initial
+
+
+@dataclass(eq=False, repr=False)
+class Vehicles(Batch):
+    """The team on the map."""
+
+    position: Tensor  # int64 [B,A,2], (row, column) [cells]
+    tank: Tensor  # int32 [B,A], water left [extinguish acts]; -1 without a tank
+    last_action: Tensor  # int64 [B,A], -1 before the first
+    base: Tensor  # int64 [B,2], (row, column) of the corner where the team started [cells]
+    acts: Tensor  # int32 [B,A], extinguish and clear actions chosen so far
+    redundant: Tensor  # int32 [B,A], those on a target that a team-mate had
+    last_useful: Tensor  # int32 [B,A], step of the last credited act; -1 before the first
+    arrived: Tensor | None = None  # bool [B,A], was over the fire since it set out; None but in ``retardant`` teams
+    near_misses: Tensor | None = None  # int32 [B,A], steps that ended too near another aircraft; None: not counted
+    battery: Tensor | None = None  # int32 [B,A], steps of flight left; None where they are not counted
+    serves: Tensor | None = None  # int64 [B,A], the agency that each serves now; None where there is but one
+
+
+@dataclass(eq=False, repr=False)
+class Ground(Batch):
+    """A landscape and all that follows from it for the fire; ``Automaton.ground`` makes it."""
+
+    landscape: Landscape
+    alpha: Tensor  # float32 [B,H,W], flammability
+    slope: Tensor | None  # float32 [B,8,H+2,W+1], s_d into a cell, a margin about the map; None where flat
+    pace: Tensor | None = None  # float32 [B,H,W], factor on the times of law ``rate``; None elsewhere
+    cell_size: float = 30.0  # side of a cell [m]
+
+    @property
+    def slope_into_cell(self) -> Tensor | None:
+        """Return s_d into each cell by direction of travel, float32 [B, 8, H, W]; None where flat."""
+        return None if self.slope is None else self.slope[:, :, 1:-1, :-1]
+
+
+@dataclass(eq=False, repr=False)
+class Air(Batch):
+    """A wind and all that follows from it for the fire; ``world.backends.road.air`` makes it."""
+
+    wind: Tensor  # float32 [B,2,1,1] or [B,2,H,W], (u east, v north) of the air's motion [m/s]
+    gain: Tensor | None  # float32 [B,8,1,1], w_d / distance_d; None where the wind differs by cell
+    table: Tensor | None = None  # float32 [B,G,256], see ``world.backends.table``; None where no road asks for one
+    moisture: Tensor | None = None  # float32 [B,7] [%], see ``Wind.moisture``; None where the fire's own holds
+    travel: Tensor | None = None  # float32 [B,3,H,W], see ``travel.travel``; None but under law ``rate``
+
+
+@dataclass(eq=False, repr=False)
+class Arrivals(Batch):
+    """When the fire reaches each cell at the present rates of spread, and where it comes from; of law ``rate``."""
+
+    minutes: Tensor  # float32 [B,H,W], since ignition; of cells that burn and their neighbours, else ``travel.NEVER``
+    origin: Tensor  # int32 [B,H,W], flat index of the cell that it came from on a straight way, or -1
+
+
+@dataclass(eq=False, repr=False)
+class Forecast(Batch):
+    """What the fire is about to do in the next tick; it follows from a state, and is passed along with it."""
+
+    expected_ignitions: Tensor  # float32 [B,H,W], neighbours that a burning cell ignites in the mean / 4, at most 1
+    ignition_probability: Tensor  # float32 [B,H,W], of each tree
+    fuel: Tensor  # float32 [B,H,W], flammability of each tree that does not burn
+
+    def fire_risk(self) -> Tensor:
+        """Return where the fire is about to grow, float32 [B, H, W] in 0..1.
+
+        Of a burning cell its ``expected_ignitions``, and of a tree its ``ignition_probability``: no cell has both.
+        """
+        return self.expected_ignitions + self.ignition_probability
+
+
+@dataclass(eq=False, repr=False)
+class Watching(Batch):
+    """What a team of limited sight has watched of the fire so far; ``world.watching`` counts it."""
+
+    itself: Tensor  # bool [B,A,H,W], whether the agent saw itself what its record tells
+    watches: Tensor  # float32 [B,A], share of the front that the team watches by this agent's records, now
+    finds: Tensor  # float32 [B,A], burning cells that this agent was the first to record in the last step / all of them
+    uncertain: Tensor  # float32 [B], mean over the map of 1 - freshness of the team's newest records, now
+    watched: Tensor  # float32 [B], sum over steps of the share of the front that the team watches
+    found: Tensor  # float32 [B], sum over steps of the share of the front that the team knows to burn
+    uncertainty: Tensor  # float32 [B], sum over steps of ``uncertain``
+    fronts: Tensor  # int32 [B], steps at whose end there was a front
+
+
+@dataclass(eq=False, repr=False)
+class Lands(Batch):
+    """Whose land is whose, where there are several agencies; see ``world.agencies``."""
+
+    owner: Tensor  # uint8 [B,H,W], index of an agency
+    worth: Tensor  # float32 [B,K], of the initial trees of each agency's land, in the unit of ``Landscape.assets`` or 1
+
+
+@dataclass(eq=False, repr=False)
+class WorldState(Batch):
+    """What changes in the worlds, and the ground and air that it changes in; batch size [B].
+
+    Ground and air are replaced whole: there is no way to change the wind without what follows from it.
+    """
+
+    ground: Ground
+    air: Air
+    cells: Tensor  # uint8 [B,H,W], 0 empty, 1..10 tree age, 11..15 fire
+    age: Tensor  # uint8 [B,H,W], age a burning tree had when it caught fire, else 0
+    stage_age: Tensor | None  # uint8 [B,H,W], ticks burned in the present stage; None where a stage lasts one tick
+    initial: Tensor  # bool [B,H,W], had a tree before ignition
+    extinguished: Tensor  # bool [B,H,W], was put out at least once
+    burned: Tensor  # bool [B,H,W], has burned to ash at least once
+    firebreak: Tensor  # bool [B,H,W], cleared by an agent
+    wet: Tensor  # uint8 [B,H,W], ticks for which the cell cannot ignite
+    vehicles: Vehicles
+    key: Tensor  # int64 [B], key of the world's draws in this episode
+    step: Tensor  # int32 [B], agent steps since the start of the episode
+    tick: Tensor  # int32 [B], fire ticks since ignition
+    burning_area: Tensor  # float32 [B], sum over steps of burning initial trees / N0, the area under the fire's curve
+    terminated: Tensor  # bool [B], no cell burns any more
+    truncated: Tensor  # bool [B], the horizon was reached
+    arrivals: Arrivals | None = None  # None but under law ``rate``
+    knowledge: Tensor | None = None  # int32 [B,A,H,W], records of ``world.records``; None where all is seen
+    watching: Watching | None = None  # None where all is seen
+    lands: Lands | None = None  # None where there is but one agency
+    packets: Packets | None = None  # None where packets arrive in the step in which they are sent
+    origin: Tensor | None = None  # int64 [B], key of what began with the episode, in imagined worlds; None: ``key``
+
+    def what_changes(self) -> dict[str, Tensor]:
+        """Return all tensors by name but those that follow from others, of which they can be made again."""
+        return {name: leaf for name, leaf in self.leaves().items() if name not in _FOLLOWS}
+
+    @property
+    def episode_key(self) -> Tensor:
+        """Return the key of what began with the episode, int64 [B]: the true one in worlds that are imagined too."""
+        return self.key if self.origin is None else self.origin
+
+    @property
+    def landscape(self) -> Landscape:
+        """Return the landscapes."""
+        return self.ground.landscape
+
+    @property
+    def alpha(self) -> Tensor:
+        """Return the flammability of the ground, float32 [B, H, W]."""
+        return self.ground.alpha
+
+    @property
+    def wind(self) -> Tensor:
+        """Return the wind, float32 [B, 2, 1, 1] or [B, 2, H, W], (u east, v north) of the air's motion [m/s]."""
+        return self.air.wind
+
+    @property
+    def cover(self) -> Tensor:
+        """Return the land cover, uint8 [B, H, W], a ``Cover`` code."""
+        return self.landscape.cover
+
+    @property
+    def done(self) -> Tensor:
+        """Return which worlds have ended, bool [B]."""
+        return self.terminated | self.truncated
+
+
+_FOLLOWS = ("ground.alpha", "ground.slope", "ground.pace", "air.gain", "air.table", "air.travel")
+
+
+@dataclass(eq=False, repr=False)
+class ActionResult(Batch):
+    """What each agent's action of one step came to."""
+
+    action: Tensor  # int64 [B,A], as chosen
+    moved: Tensor  # bool [B,A], changed cell
+    credited: Tensor  # bool [B,A], did what it should to its target, and first of those who did
+    redundant: Tensor  # bool [B,A], acted on a target that a team-mate of lower index took
+    target: Tensor  # int64 [B,A], flat index of the cell acted on, valid where credited or redundant
+
+    @property
+    def extinguished(self) -> Tensor:
+        """Return which agents put a fire out, credited, bool [B, A]."""
+        return self.credited & (self.action == int(Action.EXTINGUISH))
+
+    @property
+    def cleared(self) -> Tensor:
+        """Return which agents cleared a tree, credited, bool [B, A]."""
+        return self.credited & (self.action == int(Action.CLEAR))
+
+
+@dataclass(eq=False, repr=False)
+class Transition(Batch):
+    """One step of every world: all that rewards, metrics and pictures read."""
+
+    before: WorldState
+    result: ActionResult
+    after: WorldState
+    counts_before: TreeCounts  # of ``before``
+    counts_after: TreeCounts  # of ``after``
+
+
+def is_burning(cells: Tensor) -> Tensor:
+    """Return which cells, uint8 codes, burn (11..15), bool, shape of the input."""
+    return at_least(cells, FIRST_FIRE)
+
+
+def is_tree(cells: Tensor) -> Tensor:
+    """Return which cells, uint8 codes, hold a tree that does not burn (1..10), bool, shape of the input."""
+    return between(cells, 1, OLDEST)
+
+
+def count_trees(state: WorldState) -> TreeCounts:
+    """Count the initial trees by fate.
+
+        T_p + T_e + T_c + T_b + burning = N0      (WARP-CA, conservation metric)
+
+    A tree that has once burned to ash stays counted as burned when the ground regrows.
+    """
+    initial, burned, burning = byte(state.initial), byte(state.burned), byte(is_burning(state.cells))
+    unburned = initial & (burned ^ 1)
+    alive = unburned & byte(is_tree(state.cells))
+    trees, standing, extinguished, cleared, ash, aflame, alight = counts(
+        initial,
+        alive,
+        alive & byte(state.extinguished),
+        unburned & byte(state.firebreak),
+        initial & burned,
+        unburned & burning,
+        burning,
+    )
+    return TreeCounts(
+        initial=trees,
+        preserved=standing - extinguished,
+        extinguished=extinguished,
+        cleared=cleared,
+        burned=ash,
+        burning=aflame,
+        alight=alight,
+    )

@@ -1,0 +1,1 @@
+"""The team: vehicles, their abilities, their radio and their flight."""

@@ -1,0 +1,233 @@
+"""Which columns of a table of weather are read, by what names, and in what units.
+
+Names are read in any case, with or without accents; only their letters and digits count. A unit is what the file
+states: in the name, as in "WindSpeed (km/h)", "temperature [C]", "Temp - °F", `wind_speed_ms` and `tmpf`, or in a row
+of units below it. Without one it is what the user says (`units.wind_speed=km/h`), or that of the file's source where
+its names tell the source (`warp_torchrl.world.weather.sources`): `WS`, for one, is Canadian and so in km/h. What nobody
+states is asked for. A height behind a name, as in `windspeed_10m`, says how high the wind was measured; of others than
+10 m, 20 ft and 6 m, and of air above 2 m, nothing is read.
+
+Bearings are in degrees from true north, where the wind comes from, or points of the compass; humidity and moistures are
+in per cent; the codes of the Canadian system have no unit. ISI and FWI follow from the codes and are left unread.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from warp_torchrl.validation import did_you_mean
+from warp_torchrl.world.weather.quantities import OWNER, QUANTITIES, SHOWN, STATED
+from warp_torchrl.world.weather.sources import Source, find_source
+from warp_torchrl.world.weather.units import SPEED, Units, ascii_text, unit_of, without_unit
+
+_TAILS = re.compile(r"(?:set\d+d?|avg|mean|average|smp|value|hourly|horaria|horario|tot|at|agl)$")
+_HEIGHT = re.compile(r"(\d{1,3})(m|ft)$")
+_WIND_HEIGHTS = {"10m": "10m", "20ft": "20ft", "6m": "20ft"}
+_NOTE = re.compile(
+    r"\d*|\d+(?:\.\d+)?\s*(?:m|ft|min|mn|minutes?)(?: agl| above ground)?|lst|utc|gmt|local.*|avg|average|mean|hourly|"
+    r"true|from|smp|inst.*|aut.?|aws|obs.*|unitless|index|none|-|lgr.*|s/n.*|dry bulb|air|decimal degrees"
+)
+"""What may stand in brackets and is no unit."""
+
+
+@dataclass(frozen=True)
+class Header:
+    """What the first row says of a column."""
+
+    text: str
+    quantity: str | None  # None: nothing that is read
+    name: str  # its letters and digits, without unit and height
+    unit: str | None = None  # None: none is stated; a text that is no unit stands as it is
+    height: str | None = None
+
+
+@dataclass(frozen=True)
+class Column:
+    """Where a quantity stands in a table, and how its numbers become values in our unit."""
+
+    header: str
+    place: int
+    unit: str
+    factor: float
+    offset: float
+    height: str | None = None
+
+
+def plain(text: str) -> str:
+    """Return the letters and digits of a name, in lower case and without accents."""
+    return re.sub(r"[^a-z0-9]", "", ascii_text(text))
+
+
+def read_header(text: str) -> Header:
+    """Return what the text above a column says."""
+    name, *inside = (part.strip() for part in re.split(r"[\[\]()]", ascii_text(text)))
+    unit, odd = None, [part for part in inside if not _NOTE.fullmatch(part)]
+    for part in odd:
+        unit = unit_of(part) or unit
+    if unit is None and (tail := re.fullmatch(r"(.+)(?:,| - | in )\s*([^,]+)", name)) and unit_of(tail[2]):
+        name, unit = tail[1], unit_of(tail[2])
+    found, glued, height = _known(plain(name))
+    if found is None:
+        return Header(text, None, plain(name))
+    height = height or next(
+        (part.replace(" ", "") for part in inside if _HEIGHT.fullmatch(part.replace(" ", ""))), None
+    )
+    unit = unit or glued or (odd[-1] if odd else None) or STATED.get(found)
+    quantity = OWNER[found] if _is_at(height, OWNER[found]) else None
+    if found == "wind" and unit not in SPEED:  # a word that stands for much else
+        quantity = None
+    return Header(text, quantity, found, unit, height)
+
+
+def _known(name: str) -> tuple[str | None, str | None, str | None]:
+    """Return the name that a column's name is without unit, height and the like; then the unit and the height."""
+    unit = height = None
+    for _ in range(5):
+        if name in OWNER:
+            return name, unit, height
+        glued = [(base, word) for base, word in without_unit(name) if word in _units_of(base)]
+        if unit is None and glued:
+            name, unit = glued[0]
+        elif found := _HEIGHT.search(name):
+            name, height = name[: found.start()], height or found[0]
+        elif found := _TAILS.search(name):
+            name = name[: found.start()]
+        else:
+            break
+    return (name, unit, height) if name in OWNER else (None, None, None)
+
+
+def _units_of(name: str) -> Units:
+    """Return the units of a name; of one with a height or the like behind it, too."""
+    while name and name not in OWNER and (found := _HEIGHT.search(name) or _TAILS.search(name)):
+        name = name[: found.start()]
+    return QUANTITIES[OWNER[name]].units if name in OWNER else {}
+
+
+def _is_at(height: str | None, quantity: str) -> bool:
+    """Return whether a height is one at which a quantity is read."""
+    if height is None or quantity in ("wind_u", "wind_v"):
+        return True
+    if quantity in ("wind_speed", "wind_bearing"):
+        return height in _WIND_HEIGHTS
+    return height in ("1m", "2m")
+
+
+def stated_height(column: Column) -> str | None:
+    """Return the height of the wind that a column's name states, ``10m`` or ``20ft``; None where it states none."""
+    return _WIND_HEIGHTS.get(column.height or "")
+
+
+def find_columns(
+    headers: Sequence[str],
+    rows: Sequence[Sequence[str]] = (),
+    below: Sequence[str] = (),
+    told: Mapping[str, str] | None = None,
+) -> tuple[dict[str, Column], Source | None]:
+    """Return the column of each quantity that a table has, and the source that its names are those of.
+
+    Args:
+        headers: The table's first row.
+        rows: The rows below it; they tell whether names of RAWS may be taken for its units.
+        below: What a row of units below the names states, empty where there is none.
+        told: Units by quantity or header, as the user says them.
+
+    Raises:
+        ValueError: If a quantity has two columns, no unit or one that is not known, or the wind has no column.
+    """
+    heads = [read_header(text) for text in headers]
+    source = find_source([plain(head.text.split("(")[0].split("[")[0]) for head in heads], rows)
+    if source:
+        heads = [replace(head, quantity=source.names.get(head.name, head.quantity)) for head in heads]
+    places = {name: _places(name, heads) for name in QUANTITIES}
+    _check_wind(places, heads)
+    for name in _unread(places):
+        places[name] = []
+    said = _said(told or {}, heads)
+    found = {}
+    for name, at in places.items():
+        columns = [_column(name, heads[k], k, below, said, source) for k in at]
+        if len({(column.unit, column.height) for column in columns}) < len(columns):
+            raise ValueError(f"weather must have one column of {name}, got {', '.join(headers[k] for k in at)}")
+        if columns:
+            found[name] = columns[0]
+    return found, source
+
+
+def _places(name: str, heads: Sequence[Header]) -> list[int]:
+    """Return where a quantity's columns stand: of all that there are those of the first names."""
+    at = [place for place, head in enumerate(heads) if head.quantity == name]
+    tiers = ([place for place in at if heads[place].name in tier] for tier in QUANTITIES[name].names)
+    return next((tier for tier in tiers if tier), at)
+
+
+def _unread(places: Mapping[str, list[int]]) -> list[str]:
+    """Return the quantities that say what others say already."""
+    has_wind = places["wind_speed"] and places["wind_bearing"]
+    unread = ["wind_u", "wind_v"] if has_wind else ["wind_speed", "wind_bearing"]
+    return unread + ([] if places["temperature"] and not places["humidity"] else ["dew_point"])
+
+
+def _check_wind(places: Mapping[str, list[int]], heads: Sequence[Header]) -> None:
+    if places["wind_u"] and places["wind_v"]:
+        return
+    for name in ("wind_speed", "wind_bearing"):
+        if not places[name]:
+            high = [head.text for head in heads if head.height and head.name in OWNER and OWNER[head.name] == name]
+            why = f"; {', '.join(high)} is not the wind at 10 m or 20 ft" if high else ""
+            got = ", ".join(head.text for head in heads)
+            raise ValueError(f"weather must have a column of {name} ({SHOWN[name]}), got {got}{why}")
+
+
+def _said(told: Mapping[str, str], heads: Sequence[Header]) -> dict[str, str]:
+    """Return the units that the user says, by quantity.
+
+    Raises:
+        ValueError: If one names no column or no unit.
+    """
+    said = {}
+    by_name = {plain(head.text): head.quantity for head in heads} | {head.name: head.quantity for head in heads}
+    by_name |= {plain(name): name for name in QUANTITIES}
+    for key, word in told.items():
+        quantity = by_name.get(plain(key))
+        if plain(key) == "datetime":
+            continue
+        if quantity is None:
+            hint = did_you_mean(key, QUANTITIES)
+            raise ValueError(f"units must name a quantity ({', '.join(QUANTITIES)}) or its column, got {key}{hint}")
+        unit, known = unit_of(str(word)), QUANTITIES[quantity].units
+        if unit not in known:
+            raise ValueError(f"units.{key} must be {_listed(known)}, got {word}")
+        said[quantity] = unit
+    return said
+
+
+def _column(
+    name: str, head: Header, place: int, below: Sequence[str], said: Mapping[str, str], source: Source | None
+) -> Column:
+    quantity = QUANTITIES[name]
+    stated = [each for each in (head.unit, _below(below, place)) if each is not None]
+    if name in said:  # what is no unit may be put right
+        stated = [each for each in stated if each in quantity.units]
+    if len(set(stated)) > 1 or (stated and name in said and said[name] != stated[0]):
+        others = f"units.{name}={said[name]}" if len(set(stated)) == 1 else f"{stated[1]} in the row below it"
+        raise ValueError(f"{head.text} must have one unit, it says {stated[0]} and {others}")
+    unit = stated[0] if stated else said.get(name)
+    unit = unit or (source.units.get(name) if source else None) or quantity.usual
+    if unit is None or unit not in quantity.units:
+        raise ValueError(
+            f"{head.text} must name its unit ({_listed(quantity.units)}), as in {name} [{quantity.unit}], got "
+            f"{unit or 'none'}: write it there, or say which by the key units.{name}"
+        )
+    factor, offset = quantity.units[unit]
+    return Column(head.text, place, unit, factor, offset, head.height)
+
+
+def _below(below: Sequence[str], place: int) -> str | None:
+    """Return the unit in a row of units below the names, None where none stands there."""
+    word = below[place] if below else ""
+    return None if not word or _NOTE.fullmatch(ascii_text(word)) else unit_of(word) or word
+
+
+def _listed(units: Units) -> str:
+    return ", ".join(filter(None, units)) or "none"
