@@ -167,6 +167,10 @@ def test_the_house_can_be_held_in_the_head():
     assert len(set(rooms.values())) <= 22 and len({(a, b) for a, b in arrows if a != b}) <= 105
 
 
+def test_files_import_each_other_in_no_circle():
+    assert not in_circles(MODULES, 99)
+
+
 def test_the_rooms_of_the_world_stand_one_on_another():
     assert not in_circles(WORLD, 2)
 

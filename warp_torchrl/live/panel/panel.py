@@ -1,14 +1,15 @@
 """One person's controls on the page; each browser has its own."""
 
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import viser
 
 from warp_torchrl.live import words
 from warp_torchrl.live.ground import cell_at
 from warp_torchrl.live.panel.agent import AgentTab
+from warp_torchrl.live.panel.controls import Callback, Controls
 from warp_torchrl.live.panel.drive import KEYS, DriveTab
 from warp_torchrl.live.panel.match import MatchTab
 from warp_torchrl.live.panel.question import QuestionBox
@@ -18,9 +19,6 @@ from warp_torchrl.live.panel.watch import WatchTab
 from warp_torchrl.live.panel.world import WorldTab
 from warp_torchrl.live.stage import Stage, change
 from warp_torchrl.system.foreign_text import plain_text
-
-if TYPE_CHECKING:
-    from warp_torchrl.live.page import Page
 
 PACES = (1, 30)
 """Steps a second that can be chosen."""
@@ -40,7 +38,7 @@ class Panel:
         client: The browser.
     """
 
-    def __init__(self, page: "Page", client: viser.ClientHandle) -> None:
+    def __init__(self, page: Controls, client: viser.ClientHandle) -> None:
         self.page, self.gui, self._client = page, client.gui, client
         self._own: list[Any] = []
         self._add_keys()
@@ -116,7 +114,7 @@ class Panel:
 
     # What is done, in turn with other people's; told in one line where it cannot be
 
-    def guarded(self, do: Callable[[Any], object]) -> Callable[[Any], Coroutine[Any, Any, None]]:
+    def guarded(self, do: Callable[[Any], object]) -> Callback:
         """Return a callback that lets an act wait for its turn; what is refused then is told.
 
         Args:

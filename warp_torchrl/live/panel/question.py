@@ -1,13 +1,9 @@
 """The questions that a match waits with: what the policy is about to do, and whether a person lets it."""
 
-from typing import TYPE_CHECKING
-
 from warp_torchrl.live import words
 from warp_torchrl.live.crew import Question
+from warp_torchrl.live.panel.controls import Window
 from warp_torchrl.live.stage import change
-
-if TYPE_CHECKING:
-    from warp_torchrl.live.panel.panel import Panel
 
 ANSWERS = ("Do it", "Don't")
 
@@ -21,7 +17,7 @@ class QuestionBox:
         panel: What it is part of.
     """
 
-    def __init__(self, panel: "Panel") -> None:
+    def __init__(self, panel: Window) -> None:
         self._panel = panel
         self._asked: list[Question] = []
         gui = panel.gui

@@ -1,20 +1,17 @@
-"""What every tab has: its part of the panel, and callbacks that tell what is refused."""
+"""Base class of the tabs, and the report of what is refused."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from warp_torchrl.live.door import LOG
 from warp_torchrl.live.match import Match
 from warp_torchrl.live.once import Once
+from warp_torchrl.live.panel.controls import Callback, Controls, Window
 from warp_torchrl.live.side import Side
 from warp_torchrl.system.foreign_text import plain_text
 from warp_torchrl.system.sealed import Unsound
-
-if TYPE_CHECKING:
-    from warp_torchrl.live.page import Page
-    from warp_torchrl.live.panel.panel import Panel
 
 
 class Tab(ABC):
@@ -26,12 +23,12 @@ class Tab(ABC):
 
     title: str
 
-    def __init__(self, panel: "Panel") -> None:
+    def __init__(self, panel: Window) -> None:
         self.panel, self.gui = panel, panel.gui
         self.make()
 
     @property
-    def page(self) -> "Page":
+    def page(self) -> Controls:
         """Return the page."""
         return self.panel.page
 
@@ -52,7 +49,7 @@ class Tab(ABC):
     def paint(self) -> None:  # noqa: B027 - a tab may show nothing that changes
         """Show what takes long to make and to send."""
 
-    def guarded(self, do: Callable[[Any], object]) -> Callable[[Any], Coroutine[Any, Any, None]]:
+    def guarded(self, do: Callable[[Any], object]) -> Callback:
         """Return a callback that lets an act wait for its turn; it is given the control's new value."""
         return self.panel.guarded(do)
 
