@@ -62,7 +62,9 @@ def named(module: str) -> frozenset[str]:
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+            within = {f"{node.module}.{alias.name}" for alias in node.names}
+            are_modules = all(name.removeprefix("warp_torchrl.").replace(".", "/") in FILES for name in within)
+            found |= within if are_modules else within | {node.module}
     return frozenset(found)
 
 
