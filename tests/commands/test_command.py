@@ -602,7 +602,7 @@ def test_the_experiment_of_all_algorithms_is_a_sweep(tmp_path, run_here):
         "horizon=8",
         "evaluation.episodes=2",
         "evaluation.mode=sampled",
-        "experiment=algorithms",
+        *("--config-dir", str(ROOT / "docs"), "experiment=algorithms"),
         "algorithm=a2c,vdn",
         "seed=4",
     )
