@@ -597,12 +597,12 @@ def test_a_loaded_policy_plays(trained):
 @pytest.mark.slow
 def test_the_experiment_of_all_algorithms_is_a_sweep(tmp_path, run_here):
     arguments = (
+        *("--config-dir", str(ROOT / "docs"), "experiment=algorithms"),
         *TINY,
         "total_frames=32",
         "horizon=8",
         "evaluation.episodes=2",
         "evaluation.mode=sampled",
-        *("--config-dir", str(ROOT / "docs"), "experiment=algorithms"),
         "algorithm=a2c,vdn",
         "seed=4",
     )
