@@ -23,7 +23,7 @@ from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import HYDRA_ERRORS, conf_folder, explain, option_of, plain, without_targets
 from warp_torchrl.runs.config.construction import ConfigError
-from warp_torchrl.runs.config.grammar import check_flags, check_overrides
+from warp_torchrl.runs.config.grammar import check_flags, check_overrides, flags_first
 from warp_torchrl.runs.config.groups import COMPONENTS
 from warp_torchrl.runs.config.renamed import renamed_overrides
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore, world_overrides
@@ -218,7 +218,7 @@ def _run(name: str, job: Callable[[DictConfig], None]) -> None:
 def _start_hydra(name: str, job: Callable[[DictConfig], None], arguments: list[str], debug: bool) -> None:
     if name == "train" and not parallel.torchrun_rank():
         arguments = _with_run_folder(arguments)
-    sys.argv[1:] = sorted(arguments, key=lambda each: each not in _MULTIRUN)  # Hydra wants -m before the overrides
+    sys.argv[1:] = flags_first(arguments)
 
     def guarded(config: DictConfig) -> None:
         with queued() as queue:

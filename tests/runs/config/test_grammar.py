@@ -7,7 +7,7 @@ from hydra._internal.utils import get_args_parser
 from hydra.core.override_parser.overrides_parser import OverridesParser
 
 from warp_torchrl.runs.config.construction import ConfigError
-from warp_torchrl.runs.config.grammar import FLAGS, check_flags, check_overrides, own_values
+from warp_torchrl.runs.config.grammar import FLAGS, check_flags, check_overrides, flags_first, own_values
 
 
 def test_hydra_has_these_flags_and_no_others():
@@ -79,3 +79,34 @@ def test_a_command_s_own_values_are_read_and_the_others_left_as_they_are():
 def test_several_values_of_a_command_s_own_key_are_refused():
     with pytest.raises(ConfigError, match="seed=1,2 has several values"):
         own_values(["seed=1,2"], ("seed",))
+
+
+@pytest.mark.parametrize(
+    ("given", "ordered"),
+    [
+        ("seed=1 -m", "-m seed=1"),
+        ("seed=1 --config-dir docs experiment=x -m", "--config-dir docs -m seed=1 experiment=x"),
+        ("seed=1 --config-dir=docs", "--config-dir docs seed=1"),
+        ("--cfg job seed=1 -p fire", "--cfg job -p fire seed=1"),
+        ("--info seed=1", "--info=all seed=1"),
+        ("seed=1 -i plugins", "-i=plugins seed=1"),
+        ("'a=--cfg' b=2", "'a=--cfg' b=2"),
+    ],
+)
+def test_flags_stand_before_keys_with_their_values(given, ordered):
+    assert flags_first(given.split()) == ordered.split()
+
+
+@pytest.mark.parametrize(
+    ("given", "line"),
+    [
+        ("seed=1 --cfg", "--cfg needs a value of job, hydra, all"),
+        ("--cfg seed=1", "--cfg needs a value of job, hydra, all, got seed=1"),
+        ("--cfg=jobs", "--cfg needs a value of job, hydra, all, got jobs"),
+        ("--config-dir -m", "--config-dir needs a value"),
+        ("--info=some", "--info needs a value of all, config"),
+    ],
+)
+def test_a_flag_without_its_value_is_told_in_one_line(given, line):
+    with pytest.raises(ConfigError, match=f"^{line}"):
+        flags_first(given.split())

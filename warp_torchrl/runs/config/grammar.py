@@ -18,6 +18,14 @@ FLAGS = (
     *("--config-dir", "-cd", "--experimental-rerun", "--info", "-i"),
 )
 """Hydra's own."""
+_CHOICES = {
+    **dict.fromkeys(("--cfg", "-c"), ("job", "hydra", "all")),
+    **dict.fromkeys(("--info", "-i"), ("all", "config", "defaults", "defaults-tree", "plugins", "searchpath")),
+}
+_WITH_VALUE = (
+    *("--cfg", "-c", "--package", "-p", "--config-path", "-cp", "--config-name", "-cn", "--config-dir", "-cd"),
+    "--experimental-rerun",
+)
 
 
 def check_flags(arguments: Sequence[str]) -> None:
@@ -36,6 +44,37 @@ def check_flags(arguments: Sequence[str]) -> None:
         key = flag.lstrip("-").replace("-", "_")
         given = f"{key}={value or 'VALUE'}"
         raise ConfigError(f"keys are given as {given}, without dashes; {flag} is no flag{did_you_mean(flag, FLAGS)}")
+
+
+def flags_first(arguments: Sequence[str]) -> list[str]:
+    """Return flags with their values, and then the keys: Hydra's parser takes them in no other order.
+
+    Raises:
+        ConfigError: If a flag lacks its value, or has one that it does not take.
+    """
+    flags: list[str] = []
+    keys: list[str] = []
+    rest = list(arguments)
+    while rest:
+        argument = rest.pop(0)
+        if not argument.startswith("-"):
+            keys.append(argument)
+            continue
+        flag, equals, value = argument.partition("=")
+        choices = _CHOICES.get(flag, ())
+        if not equals and rest and (flag in _WITH_VALUE or rest[0] in choices) and not rest[0].startswith("-"):
+            value = rest.pop(0)
+        if not value and flag in _WITH_VALUE:
+            raise ConfigError(f"{flag} needs a value{_one_of(choices)}")
+        if value and choices and value not in choices:
+            raise ConfigError(f"{flag} needs a value{_one_of(choices)}, got {value}")
+        flags.append(f"{flag}={value or 'all'}" if flag in ("--info", "-i") else flag)
+        flags += [value] if value and flag not in ("--info", "-i") else []
+    return [*flags, *keys]
+
+
+def _one_of(choices: Sequence[str]) -> str:
+    return f" of {', '.join(choices)}" if choices else ""
 
 
 def check_overrides(overrides: Sequence[str]) -> None:
