@@ -215,3 +215,19 @@ def passes(copy: Path, *tests: str) -> None:
     done = run("-m", "pytest", "-n", "0", "-p", "no:cacheprovider", *tests, *new, folder=copy, PYTHONPATH=str(copy))
     assert done.returncode == 0, done.stdout
     assert " passed" in done.stdout
+
+
+# The map of the code
+
+
+def test_the_map_of_the_code_has_every_room():
+    page = (DOCS / "house.md").read_text()
+    for folder, table in (("warp_torchrl", 0), ("warp_torchrl/world", 1)):
+        named = re.findall(r"(?m)^\| `([\w.]+)` \|", page.split("| room")[table + 1])
+        there = {path.name for path in (ROOT / folder).iterdir() if path.is_dir() and path.name != "__pycache__"}
+        assert set(named) == there | ({"world.py"} if table else set()), folder
+
+
+def test_the_glossary_is_in_order():
+    terms = re.findall(r"(?m)^\| ([\w' ]+) \| ", (DOCS / "glossary.md").read_text())[1:]
+    assert len(terms) >= 30 and terms == sorted(terms)

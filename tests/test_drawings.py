@@ -37,6 +37,7 @@ SMALL = {
     "cover": {"size": 24},
     "isotropy": {"reach": 12, "worlds": 4},
     "ellipses": {"speeds": (0.0, 5.0), "reach": 12, "worlds": 6},
+    "house": {},
     "fire_sizes": {"size": 24, "trees_per_strike": 20, "fires": 60, "discard": 5},
 }
 

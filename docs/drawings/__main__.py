@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # of this package
 
 from drawings.episode import photograph
 from drawings.fires import fire_plain, fire_terrain_wind
+from drawings.house import house
 from drawings.landscapes import burn_probability
 from drawings.laws import ellipses, fire_sizes, isotropy
 from drawings.terrain import cover, noise, noise_scales
@@ -42,6 +43,7 @@ WORLD: dict[str, Callable[..., "Figure"]] = {
     "isotropy": isotropy,
     "ellipses": ellipses,
     "fire_sizes": fire_sizes,
+    "house": house,
 }
 """Figures that need nothing, by name; a file is named as its figure."""
 REAL_GROUND: dict[str, Callable[..., "Figure"]] = {"burn_probability": burn_probability}

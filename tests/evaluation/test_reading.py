@@ -62,7 +62,6 @@ def test_a_sound_one_is_read_with_what_earlier_ones_left_out(tmp_path):
             {"baseline_episodes": {"noop": {"saved": [1, 2], "success": [1]}}},
             "success of noop must be one for each of 2",
         ),
-        ({"yardstick_episodes": {"noop": 1}}, "the episodes of noop must be a mapping"),
         ({"more": float("nan")}, "NaN is no number"),
     ],
     ids=str,

@@ -35,11 +35,10 @@ def test_runs_that_were_trained_alike_are_gathered(sweep):
     assert other.scenario == "other"
 
 
-@pytest.mark.parametrize("key", ["baseline_episodes", "yardstick_episodes"])  # the latter in earlier evaluations
-def test_baselines_are_those_of_any_evaluation_that_holds_them(sweep, key):
+def test_baselines_are_those_of_any_evaluation_that_holds_them(sweep):
     path = sweep / "0" / "evaluation.json"
     held = {"saved": [0.2, 0.3, 0.4], "success": [0.0, 0.0, 1.0]}
-    content = json.loads(path.read_text()) | {key: {"noop": held, "local": held}}
+    content = json.loads(path.read_text()) | {"baseline_episodes": {"noop": held, "local": held}}
     path.write_text(json.dumps(content))
     entries = {(entry.scenario, entry.policy): entry for entry in gather(sweep)}
     assert entries["tiny", "noop"].value.tolist() == [[0.2, 0.3, 0.4]]

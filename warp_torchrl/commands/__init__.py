@@ -1,1 +1,1 @@
-"""The commands train and evaluate, and their sweeps."""
+"""Commands and their sweeps."""

@@ -11,7 +11,6 @@ from warp_torchrl.system.foreign import Foreign, read_json
 from warp_torchrl.system.foreign_text import plain_text
 
 _TEXTS = ("scenario", "method", "configuration")
-_FORMER_BASELINES = "yardstick_episodes"  # the key in earlier evaluations
 _LARGEST_NUMBER = 1e15
 _LONGEST = 200  # characters of a name
 _MOST_EPISODES = 100_000
@@ -33,7 +32,7 @@ def read_evaluation(path: Path) -> dict[str, Any]:
         raise ConfigError(f"{path} is no evaluation: {error}") from None
     texts = {key: plain_text(content[key], _LONGEST) for key in _TEXTS}
     overrides = [plain_text(each, _LONGEST) for each in content.get("world_overrides", [])]
-    baselines = content.get("baseline_episodes", content.get(_FORMER_BASELINES, {}))
+    baselines = content.get("baseline_episodes", {})
     named = {plain_text(name, _LONGEST): episodes for name, episodes in baselines.items()}
     return {"goal": "saved", **content, **texts, "world_overrides": overrides, "baseline_episodes": named}
 
@@ -54,8 +53,7 @@ def _check(content: Any) -> None:
     if not (is_some and all(type(seed) is int for seed in seeds)):
         raise ValueError(f"seeds must be 1 to {_MOST_EPISODES} whole numbers")
     _check_episodes(content.get("episodes"), len(seeds), goal)
-    for key in ("baseline_episodes", _FORMER_BASELINES):
-        _check_baselines(content.get(key, {}), len(seeds), goal)
+    _check_baselines(content.get("baseline_episodes", {}), len(seeds), goal)
 
 
 def _check_episodes(episodes: Any, count: int, goal: str) -> None:
