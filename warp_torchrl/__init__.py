@@ -16,16 +16,19 @@ else:
 if "OMP_WAIT_POLICY" not in os.environ:
     os.environ.setdefault("GOMP_SPINCOUNT", "1000")
 
-from typing import Any
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import pettingzoo
 
-from warp_torchrl.api.make import make_env
-from warp_torchrl.env import WildfireEnv
-from warp_torchrl.prediction.simulation import fire_history, simulate
-from warp_torchrl.runs.policies.load import load_policy
-from warp_torchrl.world.behaviour.rate_of_spread import rate_of_spread
+if TYPE_CHECKING:
+    from warp_torchrl.api.make import make_env
+    from warp_torchrl.env import WildfireEnv
+    from warp_torchrl.prediction.predict import predict
+    from warp_torchrl.prediction.simulation import fire_history, simulate
+    from warp_torchrl.runs.policies.load import load_policy
+    from warp_torchrl.world.behaviour.rate_of_spread import rate_of_spread
 
 gymnasium.register(
     "Wildfire-v0",
@@ -37,13 +40,35 @@ if hasattr(pettingzoo, "register"):  # older ones have no registry
     pettingzoo.register("aec", "Wildfire-v0", entry_point="warp_torchrl.api.adapters.pettingzoo:env")
 
 __version__ = "0.1.0"
-__all__ = ["WildfireEnv", "__version__", "fire_history", "load_policy", "make_env", "rate_of_spread", "simulate"]
+_PLACES = {
+    "WildfireEnv": "env",
+    "fire_history": "prediction.simulation",
+    "load_policy": "runs.policies.load",
+    "make_env": "api.make",
+    "predict": "prediction.predict",
+    "rate_of_spread": "world.behaviour.rate_of_spread",
+    "simulate": "prediction.simulation",
+}
+__all__ = [
+    "WildfireEnv",
+    "__version__",
+    "fire_history",
+    "load_policy",
+    "make_env",
+    "predict",
+    "rate_of_spread",
+    "simulate",
+]
 
 
 def __getattr__(name: str) -> Any:
-    """Return what is imported when it is first asked for."""
-    if name == "predict":
-        from warp_torchrl.prediction.predict import predict
+    """Import a public name when it is first used: torch and TorchRL take seconds."""
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = globals()[name] = getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)
+    return found
 
-        return predict
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+def __dir__() -> list[str]:
+    """Return the public names."""
+    return sorted(__all__)
