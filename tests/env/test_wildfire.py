@@ -440,3 +440,12 @@ def test_steps_of_late_packets_are_not_compiled(monkeypatch):
     monkeypatch.setattr(scene, "check_compiler", lambda device: None)
     env = WildfireEnv(World(team=Team(radio=Radio(delay=1))), n_worlds=1, fuse=True)
     assert "packets come late" in env.why_eager
+
+
+def test_worlds_that_cannot_fit_in_memory_are_refused_before_they_are_made(monkeypatch):
+    monkeypatch.setattr("warp_torchrl.system.memory.available", lambda: 10**9)
+    world = small_world(landscape=Perlin(size=4096))
+    line = r"n_worlds must fit in memory: 4 of 4096 x 4096 cells need 1\.1 GB, got 1\.0 GB: take fewer worlds"
+    with pytest.raises(ValueError, match=line):
+        WildfireEnv(world, n_worlds=4)
+    assert WildfireEnv(world, n_worlds=3).batch_size == (3,)

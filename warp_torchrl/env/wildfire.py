@@ -19,12 +19,15 @@ from warp_torchrl.env.reset_pool import ResetPool
 from warp_torchrl.env.reward import Efficiency, Reward
 from warp_torchrl.env.scene import Observations, Scene, Step, why_not_compiled
 from warp_torchrl.env.specs import make_specs
+from warp_torchrl.system import memory
 from warp_torchrl.system.device import reads_freely
 from warp_torchrl.system.modes import apart
 from warp_torchrl.world.state.role import ROLES
 from warp_torchrl.world.state.saved import filled
 from warp_torchrl.world.state.state import Transition, TreeCounts, WorldState, count_trees
 from warp_torchrl.world.world import World
+
+_LEAST_BYTES = 16  # of a cell of a world with its start that lies ready; a step of `default` takes 40
 
 
 class _Asked(NamedTuple):
@@ -58,7 +61,8 @@ class WildfireEnv(EnvBase):
 
     Raises:
         ValueError: If ``n_worlds`` is not positive, ``seeds`` are not as many, a seed is out of range, the world lacks
-            what the reward pays for, there is no C++ compiler to compile with, or steps with advice are recorded.
+            what the reward pays for, there is no C++ compiler to compile with, steps with advice are recorded, or
+            the worlds cannot fit in memory.
     """
 
     batch_locked = True
@@ -85,6 +89,7 @@ class WildfireEnv(EnvBase):
         self.observation = Surroundings() if observation is None else observation
         self.reward_function = Efficiency() if reward is None else reward
         self.reward_function.check_world(self.world)
+        self._check_memory()
         if graph and (key := searched_for(self.observation)) is not None:
             raise ValueError(f"graph must be false with observation.{key}")
         self._asked = _Asked(validate, fuse, graph)
@@ -114,6 +119,17 @@ class WildfireEnv(EnvBase):
         specs = make_specs(self.world, self.observation, n_worlds, self.device)
         self.observation_spec, self.action_spec = specs.observation, specs.action
         self.reward_spec, self.done_spec = specs.reward, specs.done
+
+    def _check_memory(self) -> None:
+        """Refuse worlds that cannot fit in memory, before hours are spent on them."""
+        (worlds,), (height, width) = self.batch_size, self.world.size
+        wanted = _LEAST_BYTES * worlds * height * width
+        there = torch.cuda.mem_get_info(self.device)[1] if self.device.type == "cuda" else memory.available()
+        if wanted > there:
+            raise ValueError(
+                f"n_worlds must fit in memory: {worlds} of {height} x {width} cells need {wanted / 1e9:.1f} GB, "
+                f"got {there / 1e9:.1f} GB: take fewer worlds or episodes, or a smaller map"
+            )
 
     def _settle(self) -> None:
         """Set what depends on the device: how actions are checked, steps are computed, and starts are kept ready."""
