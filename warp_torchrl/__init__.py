@@ -2,9 +2,11 @@
 
 import os
 
-from warp_torchrl.system.interruption import end_on_signal, is_command
-from warp_torchrl.system.parent import end_with_binder
+from warp_torchrl.system.interruption import end_on_signal, is_command, watch_end
+from warp_torchrl.system.parent import end_with_binder, is_child
 
+if is_command() or is_child():
+    watch_end()
 if is_command():  # the imports below take seconds
     end_on_signal()
 else:

@@ -3,10 +3,12 @@
 Imports take seconds, in which nothing is there to be saved.
 """
 
+import atexit
 import os
 import signal
 import sys
 import threading
+from contextlib import suppress
 from pathlib import Path
 from types import FrameType
 
@@ -26,6 +28,32 @@ def end_on_signal() -> None:
     """Let Ctrl-C and SIGTERM end this process at once, with one line."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _end)
+
+
+def watch_end() -> None:
+    """Let ``skip_teardown`` work in this process; called before other libraries register exit functions."""
+    atexit.register(_end_before_teardown)  # the first of all, and so called last
+
+
+def skip_teardown(code: int) -> None:
+    """End this process with a code after its exit functions, before Python destroys its objects.
+
+    A signal leaves objects half shut down. Their destructors may wait for ever: a weight updater of TorchRL starts a
+    thread, which Python does not run any more.
+    """
+    _Ending.code = code
+
+
+class _Ending:
+    code = 0
+
+
+def _end_before_teardown() -> None:
+    if _Ending.code:
+        with suppress(OSError, ValueError):  # nobody reads any more
+            sys.stdout.flush()
+            sys.stderr.flush()
+        os._exit(_Ending.code)
 
 
 def _end(number: int, frame: FrameType | None) -> None:

@@ -47,6 +47,11 @@ def end_with(parent: int, seconds_to_save: float = 0.0) -> None:
         threading.Thread(target=_watch, args=(parent, seconds_to_save), name="parent", daemon=True).start()
 
 
+def is_child() -> bool:
+    """Return whether this process was started by ``command``."""
+    return __file__ in sys.orig_argv
+
+
 def bind_workers(seconds_to_save: float = 0.0) -> None:
     """Let processes that a library starts for this one end with it, from their import of this package on."""
     os.environ[_BOUND] = f"{os.getpid()} {seconds_to_save}"
