@@ -1,7 +1,8 @@
 """Access to the page's server: its token, cookie and origin.
 
 Every user of a machine can connect to its loopback interface, and so can any page that is open in a browser there. The
-token keeps out the users. A browser tells in ``Origin`` whose page it is, which keeps out the pages.
+token keeps out other users. The header ``Origin`` names the server of the page that sends a request; the check of it
+keeps out other pages.
 """
 
 import hmac
@@ -39,15 +40,15 @@ def check_token(token: str) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Access:
-    """The rule of a server.
+    """Access rule of a server.
 
-    The first page is asked for with the token. It brings a cookie, by which the browser asks for all else; that is
-    another secret, of this server alone.
+    The first request carries the token. The response sets a cookie, which the browser sends with all later requests.
+    The cookie is another secret, and belongs to this server only.
 
     Attributes:
         host: The network interface that is served.
-        port: Of the server. Cookies are shared by all servers of a machine, so their names have it.
-        token: What a browser or a program must know.
+        port: Port of the server. All servers of a machine share cookies, so the port is part of the cookie's name.
+        token: Secret that a browser or a program must send.
     """
 
     host: str
@@ -89,13 +90,14 @@ class Access:
 
 
 def is_own(origin: str | None, asked: str | None, host: str) -> bool:
-    """Return whether a request is of a page that this server served, of no page yet, or of no browser.
+    """Return whether a request comes from a page of this server, from no page yet, or from no browser.
 
     Args:
-        origin: Header ``Origin``: of whose page; None where no browser asks, or for a page itself.
-        asked: Header ``Host``: what the browser takes this server for.
-        host: The network interface that is served. On one of this machine alone, what a browser asks for must be a name
-            of this machine too: else a name of somebody's that is pointed at this machine would do.
+        origin: Header ``Origin``: the server of the page that sends the request; None without a browser, or for a page
+            itself.
+        asked: Header ``Host``: the name that the browser uses for this server.
+        host: The network interface that is served. If it is reached from this machine only, the name that the browser
+            uses must be a name of this machine too: somebody could point another name at this machine.
     """
     if asked is None or not _HOST.fullmatch(asked):
         return False

@@ -44,7 +44,7 @@ class Address:
         return f"http://{f'[{here}]' if ':' in here else here}:{self.port}/?token={self.token}"
 
     def listen(self) -> tuple[socket.socket, "Address", Access]:
-        """Return a socket that is bound to it, the address with the port that it has, and who is let in there.
+        """Return a socket bound to the address, the address with its real port, and the access rule.
 
         Raises:
             ConfigError: If the port is taken, or the host is none of this machine's.

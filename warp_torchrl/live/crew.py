@@ -1,4 +1,4 @@
-"""Who moves each vehicle: the policy, the policy under an order, or a person. And what people are asked before."""
+"""Vehicles' actions, by the policy, by the policy under an order or by a person, and the policy's questions."""
 
 from collections import deque
 from collections.abc import Iterable
@@ -19,17 +19,17 @@ MOST_KEYS = 4
 
 
 class Refused(ValueError):  # noqa: N818
-    """What a person asked for cannot be done; one line says why."""
+    """A request of a person that cannot be done; one line gives the reason."""
 
 
 class Question(NamedTuple):
-    """An act of the policy that waits for a person's word.
+    """An action of the policy that waits for a person's answer.
 
     Attributes:
         agent: Index of the vehicle.
         action: What the policy proposes.
-        chance: Probability of the policy's most likely action, where that is so low that a person is asked for the
-            action; None where the act is of a kind that needs a word.
+        chance: Probability of the policy's most likely action, where it is so low that a person chooses the action;
+            None where the action is of a kind that needs permission.
     """
 
     agent: int
@@ -39,12 +39,12 @@ class Question(NamedTuple):
 
 @dataclass
 class Seat:
-    """One vehicle's.
+    """Control of one vehicle.
 
     Attributes:
-        person: Who drives it; None leaves it to the policy.
-        keys: Acts that wait for their steps, oldest first.
-        order: What the policy works at; None leaves it free.
+        person: The person that drives it; None leaves it to the policy.
+        keys: Actions that wait for their steps, oldest first.
+        order: Sector in which the policy works; None leaves it free.
     """
 
     person: int | None = None
@@ -55,10 +55,10 @@ class Seat:
 class Crew:
     """The seats of a team, in a match of one world.
 
-    A driven vehicle does what its person asked for, one act a step in the order of the keys, and idles without one. All
-    others do what the policy proposes, under the mask of their order if they have one. Before an act of a kind in
-    ``asks`` the policy needs a person's word. Where its most likely action is less likely than ``unsure_below`` a
-    person chooses the action: what the policy proposes, or another.
+    A driven vehicle does what its person chose, one action per step in the order of the keys, and idles without one.
+    All other vehicles do what the policy proposes, under the mask of their order if they have one. An action of a kind
+    in ``asks`` needs a person's permission. Where the policy's most likely action is less likely than ``unsure_below``,
+    a person chooses the action: the proposal, or another.
 
     Args:
         team: The vehicles.
@@ -97,7 +97,7 @@ class Crew:
         self.seats[agent] = Seat()
 
     def leave(self, person: int) -> list[str]:
-        """Give all vehicles of a person who has gone back to the policy; return their names."""
+        """Give all vehicles of a person that left back to the policy; return their names."""
         left = [agent for agent, seat in enumerate(self.seats) if seat.person == person]
         for agent in left:
             self.seats[agent] = Seat()
@@ -138,7 +138,7 @@ class Crew:
         self.asks = names
 
     def ask_where_unsure(self, below: float | None) -> None:
-        """Choose how likely the policy's most likely action must be for no person to be asked; None asks nobody.
+        """Set the probability of the policy's most likely action below which a person chooses; None: nobody does.
 
         Raises:
             Refused: If it is no probability.
@@ -148,18 +148,18 @@ class Crew:
         self.unsure_below = below
 
     def answer(self, question: Question, allow: bool) -> None:
-        """Give a person's word on an act; to allow one of which the policy was unsure is to choose it."""
+        """Answer a question; if the policy was unsure of the action, allowing it chooses it."""
         if allow and question.chance is not None:
             self._chosen[question.agent] = question.action
         else:
             self._answers[question.agent, question.action] = allow
 
     def choose(self, question: Question, action: int, possible: Tensor) -> None:
-        """Choose the action of a vehicle whose policy is unsure; also its own, if that is what a person would do.
+        """Choose the action of a vehicle whose policy is unsure; it may be the policy's proposal.
 
         Args:
-            question: Which asked for it.
-            action: What it does instead of, or as, the policy proposes.
+            question: The open question of the vehicle.
+            action: Index of the chosen action.
             possible: Which actions would do something, bool [A, actions].
 
         Raises:
@@ -171,7 +171,7 @@ class Crew:
         self._chosen[agent] = action
 
     def restart(self) -> None:
-        """Forget acts and answers of an episode that is over; who drives what, and the orders, stay."""
+        """Forget actions and answers of an episode that is over; drivers and orders stay."""
         self._forget()
         for seat in self.seats:
             seat.keys.clear()
@@ -223,7 +223,7 @@ class Crew:
     def decide(
         self, proposed: Tensor, mask: Tensor, possible: Tensor, position: Tensor
     ) -> tuple[Tensor, list[Mover], list[str]]:
-        """Return what each vehicle does in a step that has no open question, and forget what was asked for it.
+        """Return each vehicle's action in a step without open questions, and forget the actions that people chose.
 
         Args:
             proposed: The policy's actions, int64 [A].
@@ -232,7 +232,7 @@ class Crew:
             position: (row, column) of each vehicle, int64 [A, 2] [cells].
 
         Returns:
-            Actions, int64 [A], whose each is, and a line for each act of a person that was refused.
+            Actions, int64 [A], the mover of each vehicle, and a line for each action of a person that was refused.
         """
         action, idle, told = proposed.clone(), idle_action(possible, self.team), []
         movers = [Mover.POLICY] * self.team.n_agents
@@ -254,7 +254,7 @@ class Crew:
     def _asked_for(
         self, wanted: int | None, agent: int, possible: Tensor, idle: Tensor
     ) -> tuple[int, Mover, list[str]]:
-        """Return what a vehicle does for a person who asked for an action or none, whose it is, and what to tell."""
+        """Return a driven vehicle's action, its mover, and the lines that report a refused action."""
         if wanted is None:
             return int(idle), Mover.WAITING, []
         if possible[wanted] or wanted == int(idle):

@@ -1,7 +1,7 @@
 """Connection filter of a page's server: requests and messages are checked before viser receives them.
 
-viser lets in whoever connects, and acts on whatever they send. It hands its server no check of ours; so its call to
-``websockets`` is given a socket that listens already, and connections that check requests and messages.
+viser accepts every connection and acts on every message, and has no option for a check. So its call to ``websockets``
+receives a socket that listens already, and connections that check requests and messages.
 """
 
 import asyncio
@@ -40,13 +40,13 @@ _starting = threading.Lock()
 
 
 class Door:
-    """The door of one server.
+    """Connection filter of one server.
 
     Args:
         listener: A socket that is bound.
-        access: Who is let in.
-        screen: Takes a connection and a message of it, in the server's thread, and returns whether viser gets it. It
-            raises nothing.
+        access: Access rule.
+        screen: Takes a connection and one message of it, in the server's thread, and returns whether viser receives the
+            message. It raises nothing.
     """
 
     def __init__(self, listener: socket.socket, access: Access, screen: Callable[[object, bytes], bool]) -> None:
@@ -135,7 +135,7 @@ def _arriving(handler: _Handler) -> _Handler:
 
 
 def _page_headers(asked: str) -> dict[str, str]:
-    """Return what a browser is told of a page: it shows no other server's things, and stands in no other's page."""
+    """Return a page's headers: it loads nothing from other servers, and no other page can embed it."""
     own = f"'self' ws://{asked} data: blob:"
     return {
         "Content-Security-Policy": f"default-src {own} 'unsafe-inline' 'unsafe-eval'; frame-src 'none'; "
@@ -147,7 +147,7 @@ def _page_headers(asked: str) -> dict[str, str]:
 
 
 def _quiet_logger() -> logging.Logger:
-    """Return a logger that tells in one line what failed after a browser was let in, and nothing of noise before."""
+    """Return a logger that reports, in one line, failures of accepted connections, and nothing of refused ones."""
     logger = LOG.getChild("connections")
     logger.setLevel(logging.ERROR)
     if not logger.filters:

@@ -49,7 +49,7 @@ class Instances:
 def tiles(state: WorldState, ground: Ground) -> np.ndarray:
     """Return the colours of the tiles of world 0, uint8 [H W, 3].
 
-    They are those of the pictures of ``env.render``, darker under trees: they tell cover, tree age, fire by stage, ash,
+    They are the colours of ``env.render``, darker under trees. They show cover, tree age, fire by stage, ash,
     firebreaks and wet cells.
     """
     colours = render(state[:1], None, scale=1)[0].flatten(0, 1)
@@ -60,9 +60,9 @@ def tiles(state: WorldState, ground: Ground) -> np.ndarray:
 
 
 def trees(state: WorldState, ground: Ground) -> Instances:
-    """Return the trees of world 0, one for each of the cells that ``ground`` names; a cell without has one of size 0.
+    """Return the trees of world 0: one for each cell of ``ground.trees``, with size 0 where the cell has no tree.
 
-    A tree's height tells its age, and its colour cover, age, fire and wetness, as the ground's does.
+    A tree's height shows its age. Its colour shows cover, age, fire and wetness, as the colour of the ground does.
     """
     cells = state.cells[0].flatten()[ground.trees]
     age = torch.where(is_burning(cells), state.age[0].flatten()[ground.trees], cells).float()

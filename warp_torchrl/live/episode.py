@@ -1,7 +1,7 @@
-"""An episode as one file that plays in a browser: scene, picture by picture, and the program that shows it.
+"""An episode as one HTML file: the scene, its pictures, and the program that shows them.
 
-The file needs neither Python nor a network. It plays by itself and starts anew at its end; the bar below has pause,
-the time and the speed, and the mouse turns the scene.
+The file needs neither Python nor a network. It plays by itself in a loop; the bar below has pause, the time and the
+speed, and the mouse turns the scene.
 """
 
 from collections.abc import Mapping, Sequence
@@ -54,10 +54,10 @@ class Film:
         self._pictures = 0
 
     def add(self, titles: Sequence[str] | None = None) -> None:
-        """Record the sides as they are.
+        """Record the present state of the sides.
 
         Args:
-            titles: What stands above each; by default where its episode is, and what became of the forest.
+            titles: Title of each side; by default the step, and the forest saved and burning.
         """
         if self._pictures:
             self._film.insert_sleep(STEP_SECONDS)
@@ -106,7 +106,7 @@ def _framed(page: str, lines: Sequence[str], colours: Mapping[str, Sequence[int]
 
 @dataclass
 class _Watched:
-    """A team that nobody but its policy moves."""
+    """A team whose vehicles are all moved by its policy."""
 
     env: WildfireEnv
     crew: Crew

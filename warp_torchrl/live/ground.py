@@ -1,7 +1,6 @@
-"""The ground of a world in three dimensions: what stays as it is for an episode.
+"""Ground of a world in three dimensions, constant during an episode.
 
-One cell is one unit: x is east, y is north, z is up, and the middle of the map is at the origin. Heights are drawn
-twice as large as they are.
+One cell is one unit: x is east, y is north, z is up, and the middle of the map is at the origin. Heights are doubled.
 """
 
 import math
@@ -23,7 +22,7 @@ MOST_TREES = 128 * 128
 
 @dataclass(frozen=True)
 class Ground:
-    """What stays as it is for an episode.
+    """Arrays that are constant during an episode.
 
     Attributes:
         height: Of each cell's middle, float32 [H, W] [cells].

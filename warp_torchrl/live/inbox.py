@@ -29,13 +29,13 @@ class Inbox:
         return True
 
     def put_alone(self, person: int, act: Act) -> None:
-        """Let an act wait in place of all that wait of a person's."""
+        """Let an act wait, and drop all other waiting acts of the person."""
         with self._changed:
             self._waiting[person] = deque([act])
             self._changed.notify()
 
     def until(self, end: float) -> Iterator[Act]:
-        """Take acts as they come until a time of ``time.monotonic``, and beyond it one of each person who waits."""
+        """Yield acts until a time of ``time.monotonic``; after it, one act of each person that waits."""
         with self._changed:
             turns = len(self._waiting)
         while (act := self._next(end if turns <= 0 else max(end, time.monotonic()))) is not None:

@@ -23,11 +23,11 @@ _FARTHEST = 1e9  # number of a camera or a click
 
 
 class Misfit(Refused):
-    """A value that its control cannot have.
+    """A value that does not fit its control.
 
     Args:
-        line: Says so.
-        control: The control, which stays as it is.
+        line: Error message.
+        control: The control, which keeps its value.
     """
 
     def __init__(self, line: str, control: Any) -> None:
@@ -72,7 +72,7 @@ def check(message: bytes, gui: viser.GuiApi | None) -> None:
 
 
 def put_back(control: Any) -> None:
-    """Let a browser that shows a value of its own show the control's again."""
+    """Send a control's value to the browser again, which replaces the value that the browser shows."""
     if not isinstance(control, viser.GuiButtonHandle | viser.GuiButtonGroupHandle):
         control._queue_update("value", control.value)
 

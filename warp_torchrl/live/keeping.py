@@ -14,7 +14,7 @@ _Written = tuple[int, int, int]
 
 
 class Keeper:
-    """Saves episodes, each once: what is saved of an episode later takes the place of what was saved of it before.
+    """Saves episodes. A later save of the same episode replaces the earlier one.
 
     Args:
         folder: Of the recordings; it is made when the first is saved.
@@ -68,10 +68,11 @@ class Keeper:
         return self.save(side)
 
     def recordings(self) -> tuple[dict[str, Summary | str], int]:
-        """Return the recordings by the paths of their folders in this one, and how many have names that are refused.
+        """Return the recordings of this folder, and the number of recordings whose names are refused.
 
         Returns:
-            Of each its numbers, or why it is broken; and the number of those that are left out.
+            The summary of each recording, or why it is broken, by its path in this folder; and the number that is left
+            out.
         """
         found, (folders, left_out) = {}, self._folders()
         for name, folder in folders.items():
@@ -103,7 +104,7 @@ class Keeper:
 
 
 def _written(folder: Path) -> _Written | None:
-    """Return what tells whether a recording is the one that was written, or another of its name; None without one."""
+    """Return the identity of a recording's manifest, which changes when it is written again; None without one."""
     try:
         found = (folder / MANIFEST).stat()
     except OSError:

@@ -1,4 +1,4 @@
-"""A training that learns from a page's recordings, in a process of its own."""
+"""Training that a page starts from its recordings, in a separate process."""
 
 import csv
 import re
@@ -36,11 +36,11 @@ _ENDS_WITHIN = 30.0  # seconds in which a training saves
 def arguments(
     policy: str, record: SavedConfig, overrides: Sequence[str], recordings: Path, folder: Path, total_frames: int
 ) -> list[str]:
-    """Return the arguments of ``train.py`` that let a policy go on learning, from recordings too.
+    """Return the arguments of ``train.py`` that continue the training of a policy, from recordings too.
 
     Args:
         policy: A shipped policy or a run folder.
-        record: Of its training: networks, algorithm and all else are its own, but for ``GENTLY``.
+        record: Of its training: networks, algorithm and all else stay, except the learning rate (``GENTLY``).
         overrides: Of the scenario that is played.
         recordings: Folder of recordings.
         folder: Run folder of the new training.
@@ -65,7 +65,7 @@ def arguments(
 
 
 class Learning:
-    """The training that a page has started; one at a time.
+    """The training that a page started; one at a time.
 
     Args:
         recordings: Folder of recordings; run folders are made in its folder ``runs``.
@@ -82,14 +82,14 @@ class Learning:
 
     @property
     def goes_on(self) -> bool:
-        """Return whether a training goes on."""
+        """Return whether a training is running."""
         return self._process is not None and self._process.poll() is None
 
     def start(self, side: Side, setting: Setting, total_frames: int) -> Path:
         """Train the policy of a side from the recordings, and return the run folder.
 
         Raises:
-            Refused: If a training goes on, or the policy does not learn from recordings.
+            Refused: If a training is running, or the policy does not learn from recordings.
             ConfigError: If an override does not fit.
         """
         found = side.player.checkpoint
@@ -115,14 +115,14 @@ class Learning:
         """Let the training save and end.
 
         Raises:
-            Refused: If none goes on.
+            Refused: If no training is running.
         """
         if self._process is None or not self.goes_on:
             raise Refused("no training goes on")
         self._process.stop()
 
     def close(self) -> None:
-        """End the training, if one goes on, when it has saved."""
+        """Stop a training that is running, and wait until it has saved."""
         if self._process is None or not self.goes_on:
             return
         self._process.stop()
@@ -138,7 +138,7 @@ class Learning:
         return max(saved, default=None)
 
     def setting(self, seed: int) -> Setting:
-        """Return what shows the newest policy, of which a match follows the training.
+        """Return a setting that plays the newest policy, and loads newer weights while the training is running.
 
         Raises:
             Refused: If there is none yet.
@@ -167,7 +167,7 @@ class Learning:
 
 
 def _configuration(record: SavedConfig, overrides: Sequence[str]) -> list[str]:
-    """Return what composes the configuration of a record under overrides anew, but for what the page sets itself."""
+    """Return the overrides that compose a saved configuration again, without the keys that the page sets."""
     touched = {each.partition("=")[0].lstrip("+~") for each in overrides}
     if "scenario" in touched:
         touched |= set(WORLD_KEYS)

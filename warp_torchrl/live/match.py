@@ -55,10 +55,10 @@ class Setting:
 
 
 class Match:
-    """A fire and those who fight it.
+    """A fire and the teams that fight it.
 
     Args:
-        setting: What it is of.
+        setting: Scenario, policies and seed.
 
     Raises:
         ConfigError: If a policy is unknown or does not fit, or an override is wrong.
@@ -87,10 +87,10 @@ class Match:
         """Set the sides, and the fire without a team beside them, at the start of the episode.
 
         Args:
-            setting: What the match is of.
+            setting: Scenario, policies and seed.
             config: The composed configuration, as plain values.
-            parts: What was built of it.
-            sides: Who fights the fire.
+            parts: Components built from the configuration.
+            sides: The teams.
         """
         self.setting, self.sides = setting, sides
         self.scenario: str = config["scenario"]
@@ -111,7 +111,7 @@ class Match:
         return all(side.ended for side in self.everywhere)
 
     def restart(self, seed: int | None = None) -> None:
-        """Start the episode anew, or that of another seed.
+        """Restart the episode, or start that of another seed.
 
         Raises:
             ValueError: If the seed is out of range.
@@ -140,7 +140,7 @@ class Match:
         return told
 
     def follow(self) -> list[str]:
-        """Let policies of runs that go on training have their newest weights; return what there is to tell."""
+        """Load the newest weights of runs that are still training; return a line for each change."""
         told = (side.player.follow(side.env) for side in self.sides)
         return [line for line in told if line is not None]
 

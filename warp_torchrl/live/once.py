@@ -7,18 +7,18 @@ Made = TypeVar("Made")
 
 
 class Once:
-    """Values by what they are of. A page with many browsers makes its texts and pictures for one of them."""
+    """Values by their keys. A page with many browsers makes its texts and pictures once for all."""
 
     def __init__(self) -> None:
         self._made: dict[Hashable, Any] = {}
 
     def __call__(self, what: Hashable, make: Callable[[], Made]) -> Made:
-        """Return a value, which is made where it is not there yet."""
+        """Return the value of a key; make it if it is missing."""
         if what not in self._made:
             self._made[what] = make()
         value: Made = self._made[what]
         return value
 
     def forget(self) -> None:
-        """Let all be made anew: the match has changed."""
+        """Drop all values: the match has changed."""
         self._made.clear()

@@ -1,4 +1,4 @@
-"""Orders: a place that a vehicle is sent to, and works at by its policy."""
+"""Orders: sectors to which people send vehicles."""
 
 from dataclasses import dataclass
 
@@ -61,12 +61,12 @@ class Order:
         return left if left.any() else open_actions
 
     def nearest_move(self, left: Tensor, position: Tensor, stride: int) -> int | None:
-        """Return the move of those that are left which ends nearest to the place; None if no move is left.
+        """Return the open move that ends nearest to the place; None if no move is open.
 
         Args:
-            left: bool [actions].
+            left: Open actions, bool [actions].
             position: (row, column), int64 [2] [cells].
-            stride: Cells that a move goes.
+            stride: Length of a move [cells].
         """
         gap = (position + torch.tensor(DIRECTIONS) * stride - torch.tensor([self.row, self.column])).abs().float()
         way = (gap.amax(dim=-1) + 0.01 * gap.sum(dim=-1)).masked_fill(~left[: len(DIRECTIONS)], torch.inf)

@@ -35,12 +35,12 @@ _MOST_TOLD = 20  # refused messages of one connection that are told
 class Page:
     """A match on a page. ``with`` serves it; ``play`` runs it until it is interrupted.
 
-    ``play`` does all that people ask for, in the thread that plays. What changes the match elsewhere holds ``lock``.
+    ``play`` carries out people's acts in the thread that plays. Code that changes the match elsewhere holds ``lock``.
 
     Args:
-        setting: What is played first.
-        address: Where it is served.
-        recordings: Folder of what is saved.
+        setting: The first match.
+        address: Host, port and token.
+        recordings: Folder of saved recordings.
 
     Raises:
         ConfigError: If the setting or the address does not fit.
@@ -90,7 +90,7 @@ class Page:
         return self.address.url
 
     def play(self) -> None:
-        """Play the match at its pace, and do what people ask for, until ``stop`` or a signal."""
+        """Play the match at its pace, and carry out people's acts, until ``stop`` or a signal."""
         while not self._stopped.is_set():
             began = time.monotonic()
             with self.lock:
@@ -105,9 +105,9 @@ class Page:
         self.inbox.close()
 
     def ask(self, person: int, act: Act) -> None:
-        """Let an act of a person wait for its turn; too many are left out, which the person is told once.
+        """Let an act of a person wait for its turn. If too many wait, drop it and inform the person once.
 
-        It is called in the server's thread. Who has left asks for nothing.
+        It runs in the server's thread. Acts of people that have left are dropped.
         """
         client = next((each for each in self._clients.values() if each.client_id == person), None)
         if client is None:
@@ -119,7 +119,7 @@ class Page:
             tell(client, "the page cannot keep up: some of what you asked for is left out", mistake=True)
 
     def set_pace(self, pace: float) -> None:
-        """Play so many steps a second.
+        """Set the pace [steps / s].
 
         Raises:
             ValueError: If it is out of ``PACES``.
@@ -157,7 +157,7 @@ class Page:
                 self._keep()
 
     def restart(self, seed: int | None = None) -> None:
-        """Start the episode anew; of another seed on its own ground.
+        """Restart the episode; another seed has another ground.
 
         Raises:
             ValueError: If the seed is out of range.
@@ -170,7 +170,7 @@ class Page:
         self.show()
 
     def show(self) -> None:
-        """Draw the match as it is, here and on every panel; while it plays pictures and curves follow less often."""
+        """Draw the match, here and on every panel; while it plays, pictures and curves are drawn less often."""
         self.once.forget()
         for stage, side in zip(self._stages, self.match.sides):
             stage.show(f"{words.title(side)}: {side.curves.saved[-1]:.0%} saved")
@@ -183,7 +183,7 @@ class Page:
             self._painted, self._painting_took = began, time.monotonic() - began
 
     def tell(self, line: str, mistake: bool = False) -> None:
-        """Tell everybody something."""
+        """Show a message to all people."""
         for panel in list(self._panels.values()):
             panel.tell(line, mistake)
 
@@ -253,7 +253,7 @@ class Page:
             self.ask(event.client_id, partial(panel.click, stage, event.ray_origin, event.ray_direction))
 
     def _screen(self, connection: object, message: bytes) -> bool:
-        """Return whether viser gets a message; of one that it does not get its browser is told."""
+        """Return whether viser receives a message; the browser is informed of a refused one."""
         client = self._clients.get(connection)
         try:
             incoming.check(message, None if client is None else client.gui)

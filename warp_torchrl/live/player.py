@@ -1,4 +1,4 @@
-"""A policy as a match plays it: acting with its own draws, and newer where its run goes on training."""
+"""Policy of a match, with random draws per player; it loads newer weights while its run is training."""
 
 from pathlib import Path
 
@@ -18,14 +18,14 @@ from warp_torchrl.runs.policies.trained import MODES, TrainedPolicy
 
 
 class Player:
-    """A policy that acts in one world, with draws of its own: those that an evaluation of the same seed has.
+    """A policy that acts in one world. Its random draws equal those of an evaluation with the same seed.
 
     Args:
-        name: What people call it.
+        name: Name that the page shows.
         policy: Acts in an environment of one world.
         mode: ``sampled`` or ``deterministic``.
         seed: Of its draws.
-        checkpoint: Of which it was loaded; None for a baseline.
+        checkpoint: Checkpoint from which it was loaded; None for a baseline.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class Player:
         return None if self.checkpoint is None else self.checkpoint.manifest.frames
 
     def restart(self, seed: int) -> None:
-        """Begin its draws anew."""
+        """Restart its random draws."""
         self._draws = torch.Generator().manual_seed(seed).get_state()
 
     def act(self, shown: TensorDictBase) -> tuple[Tensor, Tensor | None]:
@@ -68,10 +68,10 @@ class Player:
         return None if found is None else found[0]
 
     def follow(self, env: WildfireEnv) -> str | None:
-        """Go on with the newest checkpoint of its run folder.
+        """Load the newest checkpoint of its run folder.
 
         Returns:
-            What there is to tell: that it has newer weights, or why it keeps those that it has; None if nothing.
+            A line that says that it has newer weights, or why it keeps the present ones; None if nothing changed.
         """
         if self.checkpoint is None or not _is_run(self.name):
             return None
@@ -87,7 +87,7 @@ class Player:
 
 
 def player_of(named: NamedPolicy, env: WildfireEnv, seed: int) -> Player:
-    """Return a policy as it plays in an environment.
+    """Return a policy as a player in an environment.
 
     Raises:
         ConfigError: If it does not fit there.

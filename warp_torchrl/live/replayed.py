@@ -48,10 +48,10 @@ class ReplayedMatch(Match):
         return self.sides[0].ended
 
     def restart(self, seed: int | None = None) -> None:
-        """Start the recording anew.
+        """Restart the recording.
 
         Raises:
-            Refused: If another seed is asked for.
+            Refused: If the seed is another one.
         """
         if seed not in (None, self.recording.seed):
             raise Refused(f"the recording is of seed {self.recording.seed}: load a match to play another")
@@ -111,7 +111,7 @@ class ReplayedSide(Side):
         return self._is_broken or len(self.curves.saved) > self._count_of_steps
 
     def questions(self) -> list[Question]:
-        """Return none: what was answered then is played."""
+        """Return no question: the recording holds the answers."""
         return []
 
     def step(self) -> list[str]:
@@ -164,7 +164,7 @@ class _Spectators(Crew):
 
 
 class _Recorded(Player):
-    """The name of who played; it proposes nothing."""
+    """The name of the recorded policy; it proposes nothing."""
 
     def __init__(self, env: WildfireEnv, recording: Recording) -> None:
         super().__init__(f"recorded: {recording.policy}", HEURISTICS["noop"](env), "sampled", recording.seed)

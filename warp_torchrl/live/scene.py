@@ -1,4 +1,4 @@
-"""What all scenes stand in: a server, sky and sun, and where one looks from."""
+"""Parts that all scenes share: the server, sky and sun, and the camera."""
 
 import contextlib
 import io
@@ -13,7 +13,7 @@ _SKY = np.linspace((13, 19, 33), (52, 50, 62), 64).round().astype(np.uint8)[:, N
 
 
 class _LocalServer(viser.ViserServer):
-    """A server that stays local: viser's own would open a public tunnel when a browser asks for one."""
+    """A server that stays local: viser's would open a public tunnel if a browser sends a request for one."""
 
     def request_share_url(self, verbose: bool = True) -> str | None:
         """Return None: nothing is shared."""
@@ -29,7 +29,7 @@ def local_server(door: Door | None = None) -> viser.ViserServer:
     """Return a server that shares nothing.
 
     Args:
-        door: What it listens at, and who is let in; None lets in nobody.
+        door: Socket and access rule; None refuses all connections.
     """
     if door is None:
         listener, _, access = Address(port=0).listen()

@@ -81,7 +81,7 @@ def puff() -> Shape:
 
 @lru_cache(maxsize=1)
 def bulldozer() -> dict[str, Shape]:
-    """Return the parts of a bulldozer that faces east: ``body`` in its own colour, ``iron`` in that of all."""
+    """Return the parts of a bulldozer that faces east: ``body`` in the vehicle's colour, ``iron`` in a common one."""
     body = joined(
         box((0.86, 0.5, 0.3), (-0.02, 0.0, 0.36)),
         box((0.4, 0.44, 0.34), (-0.2, 0.0, 0.66)),
@@ -94,7 +94,7 @@ def bulldozer() -> dict[str, Shape]:
 
 @lru_cache(maxsize=1)
 def drone() -> dict[str, Shape]:
-    """Return the parts of an aircraft that faces east: ``body`` in its own colour, ``iron`` in that of all."""
+    """Return the parts of an aircraft that faces east: ``body`` in the vehicle's colour, ``iron`` in a common one."""
     disc, rotors = spindle((0.32, 0.32), (0.12, 0.17), 10), [(x, y) for x in (-0.5, 0.5) for y in (-0.5, 0.5)]
     placed = [Shape(disc.vertices + np.array([x, y, 0.0], dtype=np.float32), disc.faces) for x, y in rotors]
     body = joined(box((0.7, 0.34, 0.26), (0.0, 0.0, 0.0)), box((0.2, 0.2, 0.12), (0.42, 0.0, 0.02)))

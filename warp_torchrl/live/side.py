@@ -1,4 +1,4 @@
-"""One team on a fire, or the fire without a team: an environment of one world, who acts in it, and its curves."""
+"""One team on a fire, or the fire without a team: an environment of one world, its player and its curves."""
 
 from dataclasses import dataclass, field
 
@@ -20,7 +20,7 @@ from warp_torchrl.world.state.state import Transition, WorldState
 
 @dataclass
 class Curves:
-    """What became of an episode, a number for its start and one for each step since.
+    """Results of an episode: one number for its start and one for each step since.
 
     Attributes:
         saved: Share of the initial trees that stand, in 0..1.
@@ -55,7 +55,7 @@ class Side:
 
     @property
     def state(self) -> WorldState:
-        """Return the world as it is, batch size [1]."""
+        """Return the state of the world, batch size [1]."""
         return self.env.shared_state
 
     @property
@@ -97,7 +97,7 @@ class Side:
         return self.crew.questions(self._proposed, self.chances)
 
     def ask_where_unsure(self, below: float | None) -> None:
-        """Let a person be asked for an action where the policy's most likely one is less likely; None asks nobody.
+        """Let a person choose where the policy's most likely action is less likely than this; None: nobody does.
 
         Raises:
             Refused: If it is no probability, or the policy has none.
@@ -128,7 +128,7 @@ class Side:
         return told
 
     def order(self, agent: int, order: Order | None) -> None:
-        """Send a vehicle to a sector, or set it free: what the policy had proposed under the former order is forgotten.
+        """Send a vehicle to a sector, or free it; drop the policy's proposal under the former order.
 
         Raises:
             Refused: If a person drives it.

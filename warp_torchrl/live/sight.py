@@ -40,7 +40,7 @@ def pictures(side: Side, agent: int, tile: int = 84) -> dict[str, np.ndarray]:
 
 
 def numbers(side: Side, agent: int) -> dict[str, float]:
-    """Return what an agent is told as numbers with names, such as those of ``status``."""
+    """Return the numbers of an agent's observation by name, such as those of ``status``."""
     found: dict[str, float] = {}
     for name, value in entries(side, agent).items():
         names = side.env.channel_names.get(name, ())

@@ -1,4 +1,4 @@
-"""Draws a side of a match in viser's scene, and changes what has changed."""
+"""One side of a match in viser's scene; only changes are sent."""
 
 from typing import Any, Protocol
 
@@ -60,17 +60,17 @@ class Shown(Protocol):
 
     @property
     def env(self) -> WildfireEnv:
-        """Return whose team and names it has."""
+        """Return the environment, which has the team and its names."""
         ...
 
     @property
     def crew(self) -> Crew:
-        """Return who moves the vehicles."""
+        """Return the crew, which controls the vehicles."""
         ...
 
     @property
     def state(self) -> WorldState:
-        """Return the world as it is, batch size [1]."""
+        """Return the state of the world, batch size [1]."""
         ...
 
     facing: Tensor
@@ -118,7 +118,7 @@ class Stage:
         self.show("")
 
     def show(self, title: str) -> None:
-        """Draw the side as it is now, with what stands above it."""
+        """Draw the present state of the side, under a title."""
         ground, state = self.ground, self._side.state
         with self._server.atomic():
             change(self.tiles, batched_colors=_light(drawing.tiles(state, ground)))
@@ -188,7 +188,7 @@ class Stage:
 
 
 def change(handle: Any, **values: Any) -> None:
-    """Give a node's or control's properties new values, and send only those that differ."""
+    """Set properties of a node or control, and send only the values that differ."""
     for name, value in values.items():
         if not np.array_equal(getattr(handle, name), value):
             setattr(handle, name, value)

@@ -1,6 +1,6 @@
-"""What the page says: tables and short lines as Markdown, and bars and the legend as HTML.
+"""Texts of the page: tables and short lines as Markdown, bars and the legend as HTML.
 
-Names are of others: of recordings, policies, scenarios, vehicles and actions. All are escaped here.
+Names of recordings, policies, scenarios, vehicles and actions come from outside. All are escaped here.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ _STYLE = "font-family:inherit;font-size:12px;line-height:1.35"
 
 
 def headline(match: Match) -> str:
-    """Return what is played, and where it is."""
+    """Return the scenario, the policies and the progress of a match."""
     step, horizon = int(match.alone.state.step[0]), match.world.horizon
     step = max(step, *(int(side.state.step[0]) for side in match.sides))
     end = ", over" if match.ended else ""
@@ -38,7 +38,7 @@ def numbers(match: Match) -> str:
 
 
 def title(side: Side) -> str:
-    """Return what a side's policy is called, short, as plain text; of a run with how far it is trained."""
+    """Return the short name of a side's policy, as plain text; of a run also its training steps."""
     name, frames = plain_text(side.player.name), side.player.frames
     short = name if len(name) <= 26 else f"...{name[-23:]}"
     return short if frames is None else f"{short} ({frames / 1e6:.1f} M)"
@@ -93,7 +93,7 @@ def training(told: str, newest: int | None) -> str:
 
 
 def acts(side: Side) -> str:
-    """Return the table of a team's vehicles: who moves each, its water, and its acts."""
+    """Return the table of a team's vehicles: the mover of each, its water, and its acts."""
     curves, tank = side.curves, side.state.vehicles.tank[0].tolist()
     full = side.env.world.team.tank
     rows = ["| vehicle | moved by | put out | cleared | water |", "|---|---|---:|---:|---:|"]
@@ -105,7 +105,7 @@ def acts(side: Side) -> str:
 
 
 def moved_by(side: Side, agent: int, person: int | None = None) -> str:
-    """Return who moves a vehicle, as a person reads it; None reads as nobody in particular."""
+    """Return the mover of a vehicle, as ``person`` reads it; None is no particular person."""
     seat = side.crew.seats[agent]
     if seat.person is not None:
         return "you" if seat.person == person else "a person"
@@ -115,7 +115,7 @@ def moved_by(side: Side, agent: int, person: int | None = None) -> str:
 
 
 def questions(side: Side, asked: Sequence[Question]) -> str:
-    """Return what a person is asked; of an action that the policy is unsure of with how to answer."""
+    """Return the text of the open questions; an unsure policy's also says how to answer."""
     names = [escaped(name) for name in side.env.agent_names]
     actions = [escaped(name) for name in side.env.action_names]
     lines = [
@@ -149,13 +149,13 @@ def actions(side: Side, agent: int) -> str:
 
 
 def told(numbers: Mapping[str, float]) -> str:
-    """Return the numbers that an agent is told, those that are not 0, as HTML."""
+    """Return the numbers of an agent's observation that are not 0, as HTML."""
     rows = [f"{escaped(name)} <b>{value:.2f}</b>" for name, value in numbers.items() if abs(value) >= 0.005]
     return f"<div style='{_STYLE};padding:0 12px'>{', '.join(rows) or 'nothing else'}</div>"
 
 
 def legend(side: Side) -> str:
-    """Return what the colours mean, and whose each vehicle's is, as HTML."""
+    """Return the meaning of the colours, and the colour of each vehicle, as HTML."""
     spans = chips({**legend_colours(), **vehicle_colours(side.env.agent_names)})
     return f"<div style='{_STYLE};padding:2px 12px'>{spans}</div>"
 
@@ -166,7 +166,7 @@ def vehicle_colours(names: Sequence[str]) -> dict[str, Sequence[int]]:
 
 
 def chips(colours: Mapping[str, Sequence[int]]) -> str:
-    """Return colours and what they are called, as HTML."""
+    """Return colours with their names, as HTML."""
     return "".join(
         f"<span style='white-space:nowrap;margin-right:10px'><span style='display:inline-block;width:11px;height:11px;"
         f"border:1px solid #888;border-radius:2px;vertical-align:-1px;margin-right:4px;"

@@ -36,7 +36,7 @@ class AgentTab(Tab):
 
 
 def _shown(side: Side, agent: int) -> tuple[str, str, str, dict[str, bytes]]:
-    """Return whose sight it is, how likely it acts, what it is told, and the pictures of its maps."""
+    """Return the heading of an agent's observation, its action probabilities, its numbers, and pictures of its maps."""
     return (
         f"What **{escaped_markdown(side.env.agent_names[agent])}** sees, and how likely it acts:",
         words.actions(side, agent),

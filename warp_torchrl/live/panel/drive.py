@@ -1,4 +1,4 @@
-"""The tab Drive: the vehicle, who moves it, orders, and what people are asked before."""
+"""The tab Drive: the vehicle and its driver, orders, and the policy's questions."""
 
 from functools import partial
 
@@ -63,7 +63,7 @@ class DriveTab(Tab):
         self._vehicle.on_update(self.guarded(lambda _: self.panel.show()))
 
     def paint(self) -> None:
-        """Show who moves the chosen vehicle."""
+        """Show whether the policy or a person moves the chosen vehicle."""
         mover = words.moved_by(self.side, self.agent, self.panel.person)
         change(self._mover, content=f"Moved by: **{mover}**")
 
@@ -73,7 +73,7 @@ class DriveTab(Tab):
         return self.side.env.agent_names.index(self._vehicle.value)
 
     def press(self, action: str) -> None:
-        """Do an act with the vehicle that is asked about, else with the chosen one.
+        """Do an action with the vehicle of the open question, else with the chosen one.
 
         Where the clock stands still an act is a step.
 

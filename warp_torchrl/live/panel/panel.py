@@ -1,4 +1,4 @@
-"""One person's controls on the page; each browser has its own."""
+"""One browser's controls on the page."""
 
 from collections.abc import Callable
 from functools import partial
@@ -25,7 +25,7 @@ PACES = (1, 30)
 
 
 def tell(client: viser.ClientHandle, line: str, mistake: bool = False) -> None:
-    """Tell the person at a browser something."""
+    """Show a message at one browser."""
     title = "This cannot be done" if mistake else "Told"
     client.add_notification(title, plain_text(line), auto_close_seconds=7.0, color="red" if mistake else None)
 
@@ -94,7 +94,7 @@ class Panel:
     # What is shown
 
     def show(self, paints: bool = True) -> None:
-        """Show the match as it is.
+        """Show the present state of the match.
 
         Args:
             paints: Whether the tabs are painted too, which takes longer.
@@ -109,16 +109,16 @@ class Panel:
                     tab.paint()
 
     def tell(self, line: str, mistake: bool = False) -> None:
-        """Tell the person something."""
+        """Show a message to the person."""
         tell(self._client, line, mistake)
 
     # What is done, in turn with other people's; told in one line where it cannot be
 
     def guarded(self, do: Callable[[Any], object]) -> Callback:
-        """Return a callback that lets an act wait for its turn; what is refused then is told.
+        """Return a callback that queues an act, and shows the reason if the act is refused.
 
         Args:
-            do: Does the act. It is given the control's value as the person has set it; of a command None.
+            do: Does the act. Its argument is the control's value as the person set it, or None for a command.
         """
 
         def act(value: object) -> None:

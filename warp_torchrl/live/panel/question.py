@@ -1,4 +1,4 @@
-"""The questions that a match waits with: what the policy is about to do, and whether a person lets it."""
+"""The open questions of a match: actions of the policy that need a person's permission or choice."""
 
 from warp_torchrl.live import words
 from warp_torchrl.live.crew import Question
@@ -29,7 +29,7 @@ class QuestionBox:
         word.on_click(panel.guarded(lambda value: self.answer(value == ANSWERS[0])))
 
     def show(self) -> None:
-        """Show what is asked now."""
+        """Show the open questions."""
         side = self._panel.page.match.sides[0]
         # The policy proposes: its probabilities are of what it sees.
         self._asked = self._panel.page.once("asked", self._panel.page.match.questions)
@@ -43,7 +43,7 @@ class QuestionBox:
         change(self.folder, visible=bool(self._asked))
 
     def answer(self, allow: bool) -> None:
-        """Give the person's word on what is shown; without a question it says nothing."""
+        """Answer the question that is shown; without one it does nothing."""
         if not self._asked:
             return
         for question in self._asked:

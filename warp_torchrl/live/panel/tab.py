@@ -1,4 +1,4 @@
-"""Base class of the tabs, and the report of what is refused."""
+"""Tabs of a panel, and callbacks that show why an act was refused."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
@@ -15,10 +15,10 @@ from warp_torchrl.system.sealed import Unsound
 
 
 class Tab(ABC):
-    """A tab of a panel; it is made anew for every match.
+    """A tab of a panel; every match makes new tabs.
 
     Args:
-        panel: What it is part of; the page's lock is held when it is made or painted.
+        panel: The panel; the page's lock is held when the tab is made or painted.
     """
 
     title: str
@@ -71,9 +71,9 @@ class Tab(ABC):
 
 @contextmanager
 def told_if_refused(tell: Callable[[str, bool], object]) -> Iterator[None]:
-    """Tell an error in one line: a page must not fall silent, and the match goes on as it was.
+    """Catch every error in this context and show it in one line, so that the match continues.
 
-    One that nobody meant to raise is logged in one line too. No error leaves this context.
+    An unexpected error is also logged in one line.
     """
     try:
         yield
@@ -93,7 +93,7 @@ def _tell(tell: Callable[[str, bool], object], line: str) -> None:
 
 
 def chosen(dropdown: Any) -> str:
-    """Return what is chosen, which a browser may not make up: it could name a file of this machine.
+    """Return a dropdown's value. It must be one of the options: an invented one could name a file of this machine.
 
     Raises:
         ValueError: If it is none of the options.
