@@ -1,1 +1,1 @@
-"""Fires alone in metres and minutes: predicted, mapped and told in numbers."""
+"""Prediction of fires without vehicles, in metres and minutes: maps and numbers."""

@@ -22,7 +22,7 @@ _FLAME, _ASH = (226, 74, 20), (62, 54, 52)
 def write_animation(
     path: Path, arrival: Tensor, ground: Landscape, cell_size: float, minutes: float, residence: float
 ) -> None:
-    """Write the fire as frames at even times, the last at its end.
+    """Write the fire as frames at even times, the last one at its end.
 
     Args:
         path: The file.

@@ -1,4 +1,4 @@
-"""What is predicted: one map, where and when its fires start, and in which weather."""
+"""Case of a prediction: one map, the place and time of ignition, and the weather."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ _NEAR = 0.005  # share by which a cell's side may be off
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Case:
-    """Everything that ``predict`` asks for, read and checked."""
+    """Inputs of ``predict``, read and checked."""
 
     ground: Landscape  # batch size [1]
     place: Place

@@ -1,4 +1,4 @@
-"""Counts of some fires: what each burned and by when, in their window of the map."""
+"""Counts of some fires in their window of the map: area, reach and burned cells by time."""
 
 import math
 from dataclasses import dataclass
@@ -39,13 +39,13 @@ class Count:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Counter:
-    """Counts fires that have burned.
+    """Counts of fires that have burned.
 
     Attributes:
-        fires: Of which map, in which weather.
+        fires: Map and weather of the fires.
         lit: Where they start, bool [H, W].
-        minutes: How long fires are followed.
-        area: Area at which they stop [ha]; None lets them go on.
+        minutes: Time for which fires are followed [minutes].
+        area: Area at which they stop [ha]; None for no limit.
     """
 
     fires: Fires
@@ -157,7 +157,7 @@ def _around(arrival: Tensor, cells: Tensor) -> Tensor:
 
 
 def _left(came: Tensor, window: Window) -> Tensor:
-    """Return which fires came to the map's edge, bool [b]."""
+    """Return which fires reached the map's edge, bool [b]."""
     inside = window.on_map
     ends = (
         (came[:, 0], inside.top == 0),

@@ -55,7 +55,7 @@ def write_layers(folder: Path, prediction: Prediction, place: Place) -> list[str
 
 
 def write_perimeters(path: Path, prediction: Prediction, place: Place, every: float) -> None:
-    """Write the outline of the cells that at least half of the fires had reached, every so many hours, as GeoJSON.
+    """Write, as GeoJSON, the outlines of the cells that half of the fires had reached at multiples of ``every`` hours.
 
     Raises:
         ValueError: If rasterio is not installed.

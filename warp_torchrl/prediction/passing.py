@@ -1,4 +1,4 @@
-"""How a fire passed through each cell: its rate, intensity and flame length when it came.
+"""Passing of a fire through each cell: its rate, intensity and flame length on arrival.
 
 The rate of spread of a front, across itself, is 1 / |grad T| of its arrival times T. Byram's intensity goes with that
 rate along the whole perimeter (Catchpole, de Mestre and Gill 1982), and the flame length with its power of 0.46 (Byram
@@ -20,7 +20,7 @@ _LEAST = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Behaviour:
-    """What the heads of fires do in some cells in the weather in which they come; float32 of one shape."""
+    """Behaviour of the heads of fires in some cells, in the weather of their arrival; float32 of one shape."""
 
     head: Tensor  # rate of spread of the head [m/min]
     backing: Tensor  # and of the rear
@@ -29,15 +29,15 @@ class Behaviour:
 
 
 def passing(steep: Tensor, pace: Tensor, then: Behaviour, cell_size: float) -> tuple[Tensor, Tensor, Tensor]:
-    """Return rate [m/min], intensity [kW/m] and flame length [m] of fires as they came, float32 of one shape.
+    """Return rate [m/min], intensity [kW/m] and flame length [m] of fires on arrival, float32 of one shape.
 
-    The rate is held between those of the rear and of the head in the weather in which the fire came: near its start a
-    fire is smaller than a cell, and differences between cells do not tell its rate.
+    The rate is held between those of the rear and of the head in the weather of the arrival: near its start a fire is
+    smaller than a cell, and differences between cells do not give its rate.
 
     Args:
         steep: |grad T| [minutes a cell], see ``steepness``.
         pace: Factor on the fire's times.
-        then: Of the heads.
+        then: Behaviour of the heads.
         cell_size: Side of a cell [m].
     """
     rate = cell_size / steep.clamp(min=_LEAST)

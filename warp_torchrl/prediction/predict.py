@@ -1,4 +1,4 @@
-"""Many fires on one map under law ``rate``, and what is read off them."""
+"""Prediction of many fires on one map under law ``rate``: its maps and curves."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -47,7 +47,7 @@ class Prediction:
 
     @property
     def arrival_minutes(self) -> Tensor:
-        """Return when fires came, the median over those that did, float32 [H, W] [min]; NaN where none did."""
+        """Return the median arrival time over the fires that arrived, float32 [H, W] [min]; NaN where none did."""
         return self._map("arrival_minutes")
 
     @property
@@ -67,7 +67,7 @@ class Prediction:
 
     @property
     def rate(self) -> Tensor:
-        """Return the rate of spread as fires came, mean over those that did, float32 [H, W] [m/min]; NaN for none."""
+        """Return the mean rate of spread on arrival over the fires that did, float32 [H, W] [m/min]; NaN for none."""
         return self._map("rate")
 
     @property
@@ -114,7 +114,7 @@ def predict(
     convergence: float = 0.0,
     progress: Callable[[int], object] | None = None,
 ) -> Prediction:
-    """Burn many fires on one map, in weather by the hour, and return what a fire scientist reads off them.
+    """Burn many fires on one map, in hourly weather, and return their maps and curves.
 
     The fires differ in the rates that are drawn for their cells (``RateFire.cell_deviation``) and for themselves
     (``fire_deviation``). Without both they are all alike, and one is enough.
@@ -126,8 +126,8 @@ def predict(
         fire: The law with its fuel model; None is ``RateFire()``.
         cell_size: Side of a cell [m].
         hours: How long fires are followed; None: to the end of the weather.
-        area: Area at which a fire stops, even before [ha]; None lets it go on.
-        fires: How many.
+        area: Area at which a fire stops, even before [ha]; None for no limit.
+        fires: Number of fires.
         seed: Fire i has seed ``seed + i``.
         start: When the fires start, since the weather's first row began [minutes].
         convergence: Angle from true north, of the weather's bearings, to the map's grid north, clockwise [degrees].

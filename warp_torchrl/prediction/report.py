@@ -1,4 +1,4 @@
-"""A prediction in numbers: for a machine, for a page, for a terminal."""
+"""Report of a prediction: JSON, Markdown and lines for a terminal."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -61,7 +61,7 @@ def page(found: Mapping[str, Any]) -> str:
 
 
 def warnings(found: Mapping[str, Any], weather_minutes: float) -> list[str]:
-    """Return what a reader of the maps must know: fires that left the map, weather that ended before them."""
+    """Return warnings about the maps: fires that left the map, weather that ended before the fires."""
     said = []
     if found["left_map"] > 0.0:
         said.append(

@@ -41,7 +41,7 @@ def simulate(
         cover: Land cover, uint8 [B, H, W]: 0 lake, 1 wetland, 2 grassland, 3 forest, 4 bare.
         elevation: In metres, float32 [B, H, W]; None is flat.
         wind: (u east, v north) of the air's motion [m/s], or a wind component.
-        fire: One of ``conf/fire``, ``paper`` being the complete automaton, or a law of one's own numbers.
+        fire: One of ``conf/fire``, ``paper`` being the complete automaton, or a law.
         ticks: Fire ticks to run.
         first_tick: Ticks already run, to continue a simulation.
         seed: World i has seed ``seed + i``.
@@ -49,8 +49,8 @@ def simulate(
         stage_age: Ticks that each burning cell has spent in its stage, uint8 [B, H, W]; None is 0. Needed to continue a
             simulation under law ``hazard``, where a stage lasts several ticks. ``fire_history`` returns it.
         fuel: Fuel codes of the law's fuel model, int16 [B, H, W], for law ``rate``; None takes those of the cover.
-        weather: Weather by the hour in place of ``wind``, as a table or its CSV file, for law ``rate``; its bearings
-            are from the map's north.
+        weather: Hourly weather, as a table or its CSV file, for law ``rate``; it replaces ``wind``. Its bearings are
+            from the map's north.
 
     Returns:
         The codes after the ticks, uint8 [B, H, W].
@@ -169,7 +169,7 @@ def _start(
 
 @dataclass(frozen=True)
 class _Given:
-    """Landscapes that are there already, as a source."""
+    """Given landscapes as a source."""
 
     landscape: Landscape
 
@@ -192,7 +192,7 @@ def _air(wind: tuple[float, float] | Wind, weather: WeatherTable | str | Path | 
 
 
 def _check_rate(automaton: Automaton, first_tick: int, fuel: Tensor | None, cells: Tensor) -> None:
-    """Refuse what law ``rate`` cannot do, and fuel codes that others do not read."""
+    """Refuse inputs that law ``rate`` does not support, and fuel codes that other laws do not read."""
     if isinstance(automaton, RateFire) and first_tick > 0:
         raise ValueError(f"first_tick must be 0 under law rate, whose arrival times are not kept, got {first_tick}")
     if fuel is None:

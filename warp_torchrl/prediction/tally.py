@@ -25,7 +25,7 @@ class Arrivals:
 
 
 class Tally:
-    """Adds up the counts of fires; of each only its arrival times are kept, in 16 bits.
+    """Sums of the counts of fires; of single fires it keeps only the arrival times, in 16 bits.
 
     Args:
         fires: How many there will be.
@@ -71,7 +71,7 @@ class Tally:
         return torch.cat([getattr(count, name) for count in self._counts])
 
     def burn_probability(self) -> Tensor:
-        """Return the share of the fires that came to each cell, float32 [h, w]."""
+        """Return the share of the fires that reached each cell, float32 [h, w]."""
         return self._came / sum(len(count.left) for count in self._counts)
 
     def means(self) -> list[Tensor]:

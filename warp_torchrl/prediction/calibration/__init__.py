@@ -1,1 +1,1 @@
-"""Calibration: how well fires alone agree with fires that happened, and parameters fitted to those."""
+"""Calibration: agreement of simulated with real fires, and parameters fitted to real fires."""

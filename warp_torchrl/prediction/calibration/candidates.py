@@ -32,7 +32,7 @@ def arrivals(fires: Sequence[RateFire], case: FireCase, pace: Tensor) -> Tensor:
 
 
 def grouped(fires: Sequence[RateFire], case: FireCase, spell: Spell, fuel: Tensor) -> Hour:
-    """Return the times of ways of each law in a spell, in ticks as short as the fastest law asks for."""
+    """Return the travel times of each law in a spell, with the shortest tick that any of the laws needs."""
     hours = [hour_of(fire, case.landscape, case.cell_size, spell, fuel) for fire in fires]
     ticks = max(hour.ticks for hour in hours)
     return Hour(torch.stack([hour.travel for hour in hours]), spell.minutes / ticks, ticks)

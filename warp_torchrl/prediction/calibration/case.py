@@ -1,4 +1,4 @@
-"""A fire that happened: its ground, its weather, where it started, and what is known of where it burned by when."""
+"""A real fire: its ground, weather and ignition, and the cells known to have burned by known times."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -149,7 +149,7 @@ def _read(folder: Path, hours: float | None, units: Mapping[str, str] | None) ->
 
 @dataclass(frozen=True)
 class _Placed:
-    """What a wind asks of a landscape to turn its bearings."""
+    """The part of a landscape that a wind reads to turn its bearings."""
 
     grid: Grid
 
@@ -167,7 +167,7 @@ def _end(rows: WeatherTable) -> float:
 
 
 def _landscape(folder: Path, header: Header) -> tuple[Landscape, list[str]]:
-    """Return the ground, and what is said of its elevation."""
+    """Return the ground, and the source of its elevation."""
     codes, known = read_layer("fuel", header.path, header.number)
     fuel = to_fuel(codes, known & is_code(codes, {}))
     cover = torch.full((1, *header.grid.shape), int(Cover.FOREST), dtype=torch.uint8)
@@ -198,7 +198,7 @@ def _elevation(path: Path | None, grid: Grid) -> tuple[Tensor | None, list[str]]
 
 
 def _outcome(folder: Path, grid: Grid, hours: float | None, end: float) -> tuple[Outcome, Path]:
-    """Return what burned by when, and the file that says so; the end of the weather is in minutes."""
+    """Return the cells that burned by known times, and their file; the end of the weather is in minutes."""
     last = end if hours is None else hours * 60.0
     path = _found("perimeters", folder)
     if path is not None:
@@ -220,7 +220,7 @@ def _only(name: str, folder: Path) -> Path:
 
 
 def _found(name: str, folder: Path) -> Path | None:
-    """Return the one file of a name in a folder; None where there is none.
+    """Return the only file of a name in a folder; None without one.
 
     Raises:
         ValueError: If there are several.

@@ -1,7 +1,7 @@
-"""Fits by evolution: the covariance matrix adaptation of Hansen (2016, arXiv:1604.00772), of the package ``cma``.
+"""Fits by evolution: covariance matrix adaptation (Hansen 2016, arXiv:1604.00772), from the package ``cma``.
 
-The paper that this project builds on fits Rothermel's model by genetic algorithms; this is their descendant. It asks
-for scores alone, so that any of them can be fitted, deviations of rates among them.
+The paper that this project builds on fits Rothermel's model by genetic algorithms, the ancestors of this method. It
+needs scores only, so it can fit any parameter, deviations of rates included.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,7 +26,7 @@ _DRAWS = 16  # fires of a candidate, where deviations are fitted
 
 @dataclass(frozen=True, kw_only=True)
 class Evolution:
-    """Evolution of candidates, a generation at once on each fire.
+    """Evolution of candidates; all candidates of a generation burn each fire in one batch.
 
     Attributes:
         generations: How many.
@@ -57,16 +57,16 @@ class Evolution:
         cases: Sequence[FireCase],
         tell: Callable[[int, float], None] = lambda step, loss: None,
     ) -> Tensor:
-        """Return the best z of all, float32 [P].
+        """Return the best z, float32 [P].
 
         Args:
             fire: The law at z = 0.
-            parameters: What moves.
+            parameters: Parameters to fit.
             cases: The fires.
-            tell: Is told the number and the least loss of each generation.
+            tell: Called with the number and the least loss of each generation.
 
         Raises:
-            ValueError: If the package cma is not installed, or the loss tells nothing of a parameter.
+            ValueError: If the package cma is not installed, or the loss does not depend on a parameter.
         """
         self._check(parameters)
         strategy = self._strategy(fire, parameters)

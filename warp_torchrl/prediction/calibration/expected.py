@@ -1,4 +1,4 @@
-"""Expected burning: how surely a cell burns by an hour, with its gradient by the parameters.
+"""Expected burning: the probability that a cell has burned by an hour, with its gradient by the parameters.
 
 Let all rates of a fire have an unknown factor exp(x), x normal with deviation sigma. A cell burns by hour T if x is at
 least x*, the logarithm of the least factor at which the fire comes in time:

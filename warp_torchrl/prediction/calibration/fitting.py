@@ -1,4 +1,4 @@
-"""Scores of laws on fires, and fits: to all fires, and to all but one, which then judges."""
+"""Scores of laws on fires, fits to all fires, and leave-one-out cross-validation."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol
@@ -18,7 +18,7 @@ from warp_torchrl.world.law.rate import RateFire
 
 
 class Method(Protocol):
-    """What fits: ``Gradients`` or ``Evolution``."""
+    """A fitting method: ``Gradients`` or ``Evolution``."""
 
     def __call__(
         self,
@@ -32,7 +32,7 @@ class Method(Protocol):
 
 
 def score(fire: RateFire, case: FireCase, draws: int = 64, seed: int = 1) -> Scores:
-    """Return the scores of a law on a fire, of so many fires with its own deviations of rates."""
+    """Return the scores of a law on one real fire, from ``draws`` simulated fires with drawn rates."""
     key = world_key(torch.arange(draws) + seed)
     parts = arrival_minutes(fire, case.landscape, case.lit, key, case.spells, case.cell_size)
     return scores_of(torch.cat(list(parts)), case.scar, case.last, case.arrival)
@@ -49,7 +49,7 @@ def null_scores(fire: RateFire, case: FireCase) -> dict[str, Scores]:
 
 
 def check_told(parameters: Sequence[Parameter], cases: Sequence[FireCase]) -> None:
-    """Refuse a moisture that the weather of a fire tells: the law's own is not read there.
+    """Refuse to fit a moisture that a fire's weather file states: the law's value is not used there.
 
     Raises:
         ValueError: With the parameter and the fire.

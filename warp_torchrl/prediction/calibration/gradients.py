@@ -19,10 +19,10 @@ _ENOUGH = 0.02  # a step that moves no z by more ends the fit
 
 @dataclass(frozen=True, kw_only=True)
 class Gradients:
-    """Steps that the gradient and the expected curvature of the loss ask for; halved where they do not help.
+    """Fisher scoring steps, damped by halving where a step does not reduce the loss.
 
     Attributes:
-        steps: Most of them.
+        steps: Maximum number of steps.
         loss: ``cross_entropy`` or ``brier``.
         softness: Deviation of the logarithm of a fire's rates, which makes burning uncertain.
         prior_weight: Weight of z^2 / 2 against the mean loss of the fires.
@@ -48,16 +48,16 @@ class Gradients:
         cases: Sequence[FireCase],
         tell: Callable[[int, float], None] = lambda step, loss: None,
     ) -> Tensor:
-        """Return the best z of all, float32 [P].
+        """Return the best z, float32 [P].
 
         Args:
             fire: The law at z = 0.
-            parameters: What moves.
+            parameters: Parameters to fit.
             cases: The fires.
-            tell: Is told the number and the least loss of each step.
+            tell: Called with the number and the least loss of each step.
 
         Raises:
-            ValueError: If a deviation is among the parameters: times of arrival at median rates tell nothing of it.
+            ValueError: If a deviation is among the parameters: arrival times at median rates do not depend on it.
         """
         for each in parameters:
             if each.name in DEVIATIONS:

@@ -1,4 +1,4 @@
-"""What a fit makes small: how far expected burning, or the fire of median rates, is from what burned."""
+"""Losses of a fit: the difference of expected burning, or of the fire of median rates, from the observed scar."""
 
 from typing import Literal
 

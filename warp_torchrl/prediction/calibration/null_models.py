@@ -1,4 +1,4 @@
-"""Null models: the circle, and the ellipse of the mean wind. What a law of fire must at least be better than.
+"""Null models: the circle, and the ellipse of the mean wind. A law of fire must score better than both.
 
 Both start at the ignition and grow over fuel alone, without fuels, slopes or hours, until they have a number of cells.
 """
@@ -51,7 +51,7 @@ def length_to_breadth(speed: float) -> float:
 
 
 def mean_wind(winds: Tensor, minutes: Tensor) -> Tensor:
-    """Return the mean of some winds as vectors, each by how long it blew, float32 [2] [m/s].
+    """Return the mean of winds as vectors, weighted by duration, float32 [2] [m/s].
 
     Args:
         winds: float32 [T, 2] [m/s].

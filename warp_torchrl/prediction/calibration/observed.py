@@ -1,4 +1,4 @@
-"""What is known of where a fire burned by when: perimeters by hour, times of arrival, or a scar."""
+"""Observations of a fire: perimeters by hour, times of arrival, or a scar."""
 
 import math
 import re
@@ -22,7 +22,7 @@ _OTHER_TIMES = re.compile(r"hour|hrs?$|time|date|days?$|minute|mins?$", re.IGNOR
 
 
 class Outcome(NamedTuple):
-    """What had burned by some times, and when each cell burned."""
+    """The cells that had burned by some times, and the time when each cell burned."""
 
     minutes: Tensor  # float32 [K], growing
     burned: Tensor  # bool [K, H, W]
@@ -97,7 +97,7 @@ def read_scar(path: Path, grid: Grid, end: float) -> Outcome:
 
 
 def _check_other_times(shapes: Sequence[Shape], path: Path) -> None:
-    """Refuse features that tell different times by a property that is not read: they would pass for one."""
+    """Refuse features that differ in a time property that is not read: they would count as one time."""
     names = {str(name) for shape in shapes for name in shape.properties if _OTHER_TIMES.search(str(name))}
     for name in sorted(names):
         values = {str(shape.properties.get(name)) for shape in shapes}
@@ -122,6 +122,6 @@ def _minutes(told: Mapping[str, Any], path: Path, end: float | None) -> float:
 
 
 def _times(told: Mapping[str, Any]) -> list[tuple[Any, float]]:
-    """Return the times that properties tell, and the minutes in their unit."""
+    """Return the times in a feature's properties, each with the minutes of its unit."""
     named = {str(name).lower(): value for name, value in told.items() if value is not None}
     return [(named[name], factor) for name, factor in (("minutes", 1.0), ("hours", 60.0)) if name in named]

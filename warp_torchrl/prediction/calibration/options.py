@@ -1,4 +1,4 @@
-"""What a calibration asks for beside the law."""
+"""Options of a calibration, besides the law."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,18 +13,18 @@ from warp_torchrl.validation import check_fields
 
 @dataclass(frozen=True, kw_only=True)
 class CalibrationOptions:
-    """What ``warp calibrate`` is told beside ``fire``.
+    """Options of ``warp calibrate``, besides ``fire``.
 
     Attributes:
-        fires: Folders of fires that happened, see ``warp_torchrl.prediction.calibration.case.read_case``.
+        fires: Folders of real fires, see ``warp_torchrl.prediction.calibration.case.read_case``.
         hours: When their scars are known [h]; None is the end of each one's weather.
-        units: Unit of a quantity or column of their weather where files state none, ``units.wind_speed=km/h``; of
+        units: Unit of a quantity or column of their weather where files state none, ``units.wind_speed=km/h``; for
             ``datetime`` the order of its dates, ``units.datetime=d/m/y``.
-        parameters: What is fitted, see ``prediction.calibration.parameters``; none scores the law as it is.
-        bounds: Lowest and highest value by parameter, in place of the usual.
-        scales: Deviation of the prior by parameter, in place of the usual.
+        parameters: Parameters to fit, see ``prediction.calibration.parameters``; none scores the law without a fit.
+        bounds: Lowest and highest value by parameter; default: the usual ones.
+        scales: Deviation of the prior by parameter; default: the usual ones.
         method: ``gradients`` or ``evolution``.
-        loss: What is made small; None is ``cross_entropy`` of gradients, ``jaccard`` of evolution.
+        loss: Loss of the fit; None is ``cross_entropy`` for gradients, ``jaccard`` for evolution.
         prior_weight: Weight of the priors against the mean loss of the fires.
         steps: Steps of gradients or generations of evolution; None is 8 or 15.
         population: Candidates of each generation.

@@ -4,8 +4,8 @@ A fit moves z, one number for each parameter, whose prior is normal with mean 0 
 
     gain or deviation = usual exp(scale z),    moisture = usual + scale z
 
-The usual value is that of the law which the fit starts from. Few fires tell little of a parameter; what they do not
-tell stays as it was.
+The usual value is that of the law from which the fit starts. Where the fires say nothing about a parameter, it keeps
+its usual value.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""What a calibration found: a table, and the law as a yaml that ``fire=`` takes."""
+"""Report of a calibration: a table, and the law as a yaml that ``fire=`` takes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, asdict, fields

@@ -1,6 +1,6 @@
-"""How well a fire that was told agrees with one that happened.
+"""Agreement of a predicted with an observed fire.
 
-A and S are sets of cells: those that were told to burn, and the scar.
+A and S are sets of cells: the cells predicted to burn, and the scar.
 """
 
 from dataclasses import dataclass
@@ -16,16 +16,16 @@ BURNS = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class Scores:
-    """Agreement of one map of fires with one scar; None where nothing could be compared.
+    """Agreement of one map of fires with one scar; None where no comparison is possible.
 
     Attributes:
-        jaccard_at_area: |A and S| / |A or S|, A being as many cells as the scar has, those that burn first.
-        sorensen_at_area: 2 |A and S| / (|A| + |S|) of the same.
-        jaccard: Of the cells with a burn probability of ``BURNS`` or more by the known hour.
-        sorensen: Of the same.
-        area_error: |A| / |S| - 1 of the same.
-        arrival_bias: Mean of told less observed times of arrival, over cells that burned in both [minutes].
-        arrival_error: Root of the mean square of the same [minutes].
+        jaccard_at_area: |A and S| / |A or S|, where A holds the first cells to burn, as many as the scar has.
+        sorensen_at_area: 2 |A and S| / (|A| + |S|) of the same sets.
+        jaccard: Jaccard index of the cells with a burn probability of ``BURNS`` or more by the known hour.
+        sorensen: Sorensen index of the same sets.
+        area_error: |A| / |S| - 1 of the same sets.
+        arrival_bias: Mean of predicted minus observed times of arrival, over cells that burned in both [minutes].
+        arrival_error: Root mean square of the same difference [minutes].
     """
 
     jaccard_at_area: float
@@ -82,7 +82,7 @@ def order_of_burning(arrival: Tensor, minutes: float) -> Tensor:
 
 
 def first_cells(order: Tensor, count: int) -> Tensor:
-    """Return so many cells of the least order, fewer where fewer burn, bool [H, W]."""
+    """Return the ``count`` cells of least order, fewer where fewer burn, bool [H, W]."""
     ranked = order.flatten().argsort(stable=True)[:count]
     chosen = torch.zeros(order.numel(), dtype=torch.bool, device=order.device)
     chosen[ranked] = True
