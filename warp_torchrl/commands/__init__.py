@@ -1,1 +1,1 @@
-"""Commands and their sweeps."""
+"""Commands of the program ``warp``, and sweeps."""

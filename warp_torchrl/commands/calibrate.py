@@ -1,4 +1,4 @@
-"""The command calibrate: the law of fires scored on fires that happened, beside null models, and fitted to them."""
+"""The command calibrate: scores of the law on real fires, beside null models, and fits of its parameters."""
 
 import json
 import logging
@@ -35,7 +35,7 @@ OUTPUTS = (LAW, "calibration.md")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Score and fit what the command line asks for, and return the exit code."""
+    """Score and fit on the command line's fires, and return the exit code."""
     return run_program(arguments, f"{USAGE}\n\n{CalibrationOptions.__doc__}\nfire.KEY as for train.py.", _run)
 
 
@@ -81,7 +81,7 @@ def _check_names(cases: Sequence[FireCase]) -> None:
 
 
 def _of_map(case: FireCase, fire: RateFire) -> Provenance:
-    """Return what is read of the map of a fire, and the cells of its fuels."""
+    """Return the files of a fire's map, and the number of cells of each fuel."""
     notes = (*case.files, f"cells of fuels: {fire.told_fuel(case.landscape)}")
     return Provenance(key=case.name, file="map", notes=notes)
 

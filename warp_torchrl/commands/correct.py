@@ -1,4 +1,4 @@
-"""The command correct: a scripted person corrects a policy, and is recorded."""
+"""The command correct: a scripted person corrects a policy, and both are recorded."""
 
 from collections.abc import Sequence
 from dataclasses import fields
@@ -23,13 +23,13 @@ _TEXTS = ("policy", "out", "by")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Record what the command line asks for, and return the exit code."""
+    """Record the corrections that the command line names, and return the exit code."""
     about = f"{USAGE}\n\n{Session.__doc__}\n{Person.__doc__}"
     return run_program(arguments, about, lambda given: _record(*read(given)))
 
 
 def read(arguments: Sequence[str]) -> tuple[Session, Person]:
-    """Return what a command line asks for.
+    """Return the session and the person of a command line.
 
     Raises:
         ConfigError: If a word is no ``key=value``, or a value does not fit.

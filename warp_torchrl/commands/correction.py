@@ -1,4 +1,4 @@
-"""A scripted person corrects a policy on the worlds of a training seed, and what both do is recorded."""
+"""Correction of a policy by a scripted person, recorded on the worlds of a training seed."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -28,16 +28,16 @@ _ABREAST = 32
 
 @dataclass(frozen=True, kw_only=True)
 class Session:
-    """What is recorded.
+    """Episodes to record.
 
     Attributes:
-        policy: A shipped policy, a run folder or a checkpoint folder; it must tell its probabilities, as baselines do
-            not.
+        policy: A shipped policy, a run folder or a checkpoint folder; it must have action probabilities, which
+            baselines lack.
         out: New folder of the recordings.
-        episodes: How many, of the first worlds of the training seed.
-        acts: Acts of the person after which no further episode begins; None plays all.
-        seed: Training seed whose worlds are played: no evaluation has them.
-        overrides: Of the scenario of the policy's training, in the command line's grammar.
+        episodes: Number of episodes, on the first worlds of the training seed.
+        acts: Number of acts of the person after which no further episode begins; None plays all.
+        seed: Training seed of the worlds: no evaluation plays them.
+        overrides: Changes to the scenario of the policy's training, in the command line's grammar.
 
     Raises:
         ValueError: If a value is out of its range.
@@ -56,7 +56,7 @@ class Session:
 
 @dataclass(frozen=True)
 class Corrected:
-    """What became of an episode.
+    """Result of an episode.
 
     Attributes:
         recording: What was played with the person.
@@ -68,14 +68,14 @@ class Corrected:
 
 
 class Correction:
-    """A policy on a scenario, and a scripted person who corrects it, in many worlds at once.
+    """A policy on a scenario, and a scripted person that corrects it, in many worlds at once.
 
     Args:
-        session: What is recorded.
-        person: How they correct.
+        session: Episodes to record.
+        person: Rule of the corrections.
 
     Raises:
-        ConfigError: If the policy is unknown, tells no probabilities or does not fit, or an override is wrong.
+        ConfigError: If the policy is unknown, has no probabilities or does not fit, or an override is wrong.
         CheckpointError: If a run folder holds no sound checkpoint.
     """
 
@@ -97,7 +97,7 @@ class Correction:
         self.baseline = HEURISTICS[person.by](self.env)
 
     def episodes(self) -> Iterator[Corrected]:
-        """Play so many episodes as are asked for, and yield them in the order of their seeds."""
+        """Play the session's episodes, and yield them in the order of their seeds."""
         count, acts = self.env.batch_size[0], 0
         for start in range(0, self.session.episodes, count):
             for played in self._play(start)[: self.session.episodes - start]:
@@ -107,7 +107,7 @@ class Correction:
                     return
 
     def _play(self, start: int) -> list[Corrected]:
-        """Play an episode in each world without the person and with them; ``start`` is the first one's number."""
+        """Play an episode in each world with and without the person; ``start`` is the number of the first."""
         env, first = self.env, first_world_seed(self.session.seed) + start
         alone = play(env, self.policy, first, self.policy.mode)["saved"]
         seeds = range(first, first + env.batch_size[0])
@@ -133,7 +133,7 @@ class Correction:
         ]
 
     def _step(self, shown: TensorDictBase, people: Sequence[ScriptedPerson]) -> tuple[TensorDictBase, TensorDictBase]:
-        """Play a step in every world; return what is recorded of it, and what is shown then."""
+        """Play a step in every world; return the step's record, and the next observations."""
         env = self.env
         out = self.policy(shown.copy())
         proposed = out[ACTION]

@@ -64,7 +64,7 @@ def _numbers(given: str, fits: Callable[[float], bool], what: str) -> list[float
 
 
 def _named(given: str) -> tuple[str, Path]:
-    """Return what runs are called, and their folder; a folder may have the sign in its own name."""
+    """Return the name of some runs, and their folder, which may have the sign in its path."""
     name, sign, folder = given.partition("=")
     return (name, Path(folder)) if sign and not Path(given).exists() else ("", Path(given))
 

@@ -1,4 +1,4 @@
-"""The command demonstrations: recordings in numbers, played again, as NumPy arrays, and as a page to look at."""
+"""The command demonstrations: recordings as a table, checked by replay, as NumPy arrays, and as an HTML page."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,13 +22,13 @@ USAGE = "warp demonstrations FOLDER [check=true] [export=FILE.npz] [html=FILE.ht
 
 @dataclass(frozen=True, kw_only=True)
 class DemonstrationOptions:
-    """What ``warp demonstrations`` is told.
+    """Options of ``warp demonstrations``.
 
     Attributes:
         folder: A recording, or a folder of recordings.
-        check: Play each again, and hold it against what was recorded.
-        export: File to write the steps of all of them into, as NumPy arrays; None writes none.
-        html: File to write the one recording into, as a page that plays in a browser by itself, extra ``live``.
+        check: Replay each recording, and compare the result with what was recorded.
+        export: File for the steps of all of them, as NumPy arrays; None writes none.
+        html: File for the one recording, as a page that plays in a browser by itself, extra ``live``.
         overwrite: Write over a file that is there.
         debug: Print a traceback when something fails.
 
@@ -58,12 +58,12 @@ class DemonstrationOptions:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """List, check and export what the command line asks for, and return the exit code."""
+    """List, check and export the recordings of the command line, and return the exit code."""
     return run_program(arguments, f"{USAGE}\n\n{DemonstrationOptions.__doc__}", lambda given: _run(_read(given)))
 
 
 def _read(arguments: Sequence[str]) -> DemonstrationOptions:
-    """Return what the command line asks for.
+    """Return the options of a command line.
 
     Raises:
         ConfigError: If a word does not fit, in one line.
@@ -105,7 +105,7 @@ def _run(options: DemonstrationOptions) -> int:
 
 
 def _film(recording: Recording, path: Path) -> None:
-    """Write a recording as a page that plays in a browser, verified as it is played for it."""
+    """Write a recording as a page that plays in a browser; replay verifies it."""
     from warp_torchrl.live.episode import SceneRecorder  # the extra live
 
     replay = Replay(recording)

@@ -72,7 +72,7 @@ def _mean(found: Sequence[checkpoints.Checkpoint]) -> dict[str, torch.Tensor]:
 
 
 def _fits(found: checkpoints.Checkpoint, policy: Mapping[str, torch.Tensor]) -> tuple[object, ...]:
-    """Return what policies must share to have a mean: what agents read and may do, and the shapes of their networks."""
+    """Return what policies of a mean must share: their agents' inputs and actions, and the shapes of their networks."""
     signature = found.manifest.signature.bare()
     shapes = {name: value.shape for name, value in policy.items()}
     return signature.observation, signature.actions, signature.roles, signature.agencies, signature.is_late, shapes

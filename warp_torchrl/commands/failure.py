@@ -25,7 +25,7 @@ _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 def fail(error: Exception, debug: bool) -> tuple[int, str]:
     """Print the error as the last line of stderr; return the exit code and the line.
 
-    An error that a signal has brought about is told as the signal was, and no line follows that one's.
+    If a signal caused the error, it prints nothing: the signal was reported already.
     """
     if left_by():
         return SIGNALED + left_by(), f"stopped by signal {Signals(left_by()).name}"

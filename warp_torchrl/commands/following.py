@@ -1,4 +1,4 @@
-"""What the processes of a training do that are not the first one: they learn with it, and leave the files to it."""
+"""Work of the other processes of a training: they learn with the first one, which alone writes files."""
 
 import logging
 import os
@@ -27,7 +27,7 @@ FOLLOWING = "warp_torchrl.commands.following"
 def follow(values: dict[str, Any]) -> None:
     """Train as one of the other processes, with the first one's configuration, until it ends.
 
-    What stops the run is told by the first one.
+    The first process reports what stops the run.
     """
     keep_freed_memory()
     for name in ("warp_torchrl", "torchrl"):

@@ -1,4 +1,4 @@
-"""Shows a team fighting a fire on a local page: ``warp live``. It needs the extra ``live``."""
+"""The command live: a team fighting a fire on a local page. It needs the extra ``live``."""
 
 import gc
 import importlib.util
@@ -22,7 +22,7 @@ _TEXTS = ("policy", "beside", "host", "token", _RECORDINGS)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Serve what the command line asks for until it is interrupted, and return the exit code."""
+    """Serve the page of the command line until it is interrupted, and return the exit code."""
     about = f"{USAGE}\n\n{Setting.__doc__}\nOther keys are those of train.py, such as team.n_agents."
     return run_program(arguments, about, _serve)
 
@@ -52,7 +52,7 @@ def _serve(arguments: Sequence[str]) -> None:
 
 
 def _read(arguments: Sequence[str]) -> tuple[Setting, dict[str, object], Path]:
-    """Return what the command line asks for: a setting, the address's values, and the folder of recordings.
+    """Return a command line's setting, the values of the address, and the folder of recordings.
 
     Raises:
         ConfigError: If a word is no ``key=value``, or a value does not fit.

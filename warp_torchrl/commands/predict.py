@@ -1,4 +1,4 @@
-"""The command predict: fires alone on one map, in weather by the hour, as maps and a report."""
+"""The command predict: fires without vehicles on one map, in hourly weather, as maps and a report."""
 
 import json
 import logging
@@ -41,7 +41,7 @@ USAGE = "warp predict landscape.path=FOLDER weather=FILE.csv ignition=FILE [hour
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Predict what the command line asks for, and return the exit code."""
+    """Predict the fires of the command line, and return the exit code."""
     return run_program(
         arguments, f"{USAGE}\n\n{PredictionOptions.__doc__}\nlandscape.KEY and fire.KEY as for train.py.", _run
     )
@@ -107,7 +107,7 @@ def _law(node: Mapping[str, Any]) -> RateFire:
 
 
 def _burn(case: Case, options: PredictionOptions) -> tuple[Prediction, float]:
-    """Burn the fires behind a progress bar; return what they did and the seconds that they took."""
+    """Burn the fires behind a progress bar; return the prediction and the seconds that it took."""
     began = time.perf_counter()
     with tqdm(total=options.fires, unit="fire", disable=None, dynamic_ncols=True) as bar:
         found = predict(

@@ -1,4 +1,4 @@
-"""The command probe: what can be read from the messages of a policy."""
+"""The command probe: linear probes of the messages of a policy."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ USAGE = "warp probe policy=NAME or FOLDER [episodes=64] [KEY=VALUE ...]"
 
 @dataclass(frozen=True, kw_only=True)
 class Probe:
-    """What is probed.
+    """Options of a probe.
 
     Attributes:
         policy: A run folder, or a checkpoint, of a team that talks.
@@ -38,12 +38,12 @@ class Probe:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print what can be read from the messages of the policy that the command line names; return the exit code."""
+    """Print the linear probes of the policy that the command line names; return the exit code."""
     return run_program(arguments, f"{USAGE}\n\n{Probe.__doc__}", lambda given: _probe(read(given)))
 
 
 def read(arguments: Sequence[str]) -> Probe:
-    """Return what a command line asks for.
+    """Return the options of a command line.
 
     Raises:
         ConfigError: If a word is no ``key=value``, or a value does not fit.
@@ -68,7 +68,7 @@ def _probe(asked: Probe) -> None:
 
 
 def table(found: Sequence[Reading], scenario: str) -> str:
-    """Return a Markdown table of what can be read."""
+    """Return a Markdown table of probes."""
     return "\n".join(
         [
             f"| what a message tells on `{scenario}` (R^2) | trained | weights drawn anew | messages |",

@@ -9,12 +9,12 @@ from warp_torchrl.system.signals import exit_on_signal
 
 
 def run_program(arguments: Sequence[str] | None, about: str, do: Callable[[list[str]], int | None]) -> int:
-    """Run a command, and return its exit code; an error is told in one line, and a signal ends the process with one.
+    """Run a command, and return its exit code; an error prints one line, and a signal ends the process with one.
 
     Args:
-        arguments: Of the command line; None takes the program's own.
+        arguments: Of the command line; None reads those of the process.
         about: What ``--help`` prints.
-        do: Does what the arguments ask for, and returns the exit code; None stands for success.
+        do: Runs the command with these arguments, and returns the exit code; None stands for success.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     if any(each in ("-h", "--help") for each in given):

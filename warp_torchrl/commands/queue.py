@@ -25,7 +25,7 @@ class Ended(Stopped):
 
 
 class Queue:
-    """What a queue's warning does to a job.
+    """Effect of a queue's warning on a job.
 
     Args:
         number: Of the signal that it warns by; 0 where no queue has started the job.

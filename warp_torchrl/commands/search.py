@@ -1,4 +1,4 @@
-"""The command search: values for keys of a training, found by training with many of them."""
+"""The command search: values for keys of a training, found by many trainings."""
 
 import json
 import logging
@@ -52,7 +52,7 @@ _MAY_CHANGE = ("trials", "jobs", "out")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Search what the command line asks for, and return the exit code."""
+    """Run the search of the command line, and return the exit code."""
     about = f"{USAGE}\n\n{SearchOptions.__doc__}\nEvery other KEY as for train.py; several values are searched."
     return run_program(arguments, about, _run_to_its_end)
 
@@ -146,7 +146,7 @@ def check_points(space: Sequence[Dimension], fixed: Sequence[str]) -> dict[str, 
 def _record(
     space: Sequence[Dimension], fixed: Sequence[str], options: SearchOptions, base: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return what a search is: with another record it is another one."""
+    """Return the record that identifies a search; a search with another record is another one."""
     from warp_torchrl import __version__
 
     names = [each.name for each in fields(SearchOptions) if each.name not in ("space", "fixed")]
@@ -227,7 +227,7 @@ def _search(
 
 
 def _first(study: "optuna.Study", space: Sequence[Dimension], base: Mapping[str, Any]) -> None:
-    """Let the first trial of a new search have the values that the configuration has, where the space holds them."""
+    """Give the first trial of a new search the configuration's values, where the space holds them."""
     if study.get_trials(deepcopy=False):
         return
     values = {each.key: each.holding(_at(base, each.key)) for each in space}
@@ -236,7 +236,7 @@ def _first(study: "optuna.Study", space: Sequence[Dimension], base: Mapping[str,
 
 
 def _at(values: Mapping[str, Any], key: str) -> Any:
-    """Return a value of a configuration; what is equal to none where it has no such key."""
+    """Return a value of a configuration, or a value equal to no other if the key is missing."""
     found: Any = values
     for part in key.split("."):
         found = found.get(part, _MISSING) if isinstance(found, Mapping) else _MISSING

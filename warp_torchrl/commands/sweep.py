@@ -107,7 +107,7 @@ class SweepSummary(Callback):
     folder: ClassVar[Path | None] = None
 
     def on_multirun_start(self, config: DictConfig, **kwargs: Any) -> None:
-        """Keep the sweep's folder: a launcher that gives up never calls ``on_multirun_end``."""
+        """Keep the sweep's folder: a launcher that stops early never calls ``on_multirun_end``."""
         SweepSummary.folder = Path(str(config.hydra.sweep.dir))
         if _JOBLIB in str(config.hydra.launcher._target_):
             _let_workers_end_with_us()
@@ -120,7 +120,7 @@ class SweepSummary(Callback):
 
 
 def _let_workers_end_with_us() -> None:
-    """Let joblib's workers watch this process: by themselves they work on, and wait for minutes for more."""
+    """Let joblib's workers watch this process: otherwise they work on, and then wait for minutes for more."""
     from joblib import register_parallel_backend
     from joblib._parallel_backends import LokyBackend
 
@@ -130,7 +130,7 @@ def _let_workers_end_with_us() -> None:
 
 
 def summarise_unfinished() -> None:
-    """Summarise a sweep whose launcher gave up, as joblib's and submitit's do when a worker is killed."""
+    """Summarise a sweep whose launcher stopped early, as joblib's and submitit's do when a worker is killed."""
     folder, SweepSummary.folder = SweepSummary.folder, None
     if folder is None or not folder.is_dir():
         return

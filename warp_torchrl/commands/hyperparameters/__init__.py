@@ -1,1 +1,1 @@
-"""Hyperparameter search with Optuna: trials are trainings in processes of their own, each a run folder."""
+"""Hyperparameter search with Optuna: each trial is a training in a separate process, with a run folder."""

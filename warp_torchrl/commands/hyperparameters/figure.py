@@ -1,4 +1,4 @@
-"""The figure of a search: what its trials saved one after another, how they came there, and by each key's values."""
+"""Figure of a search: results of the trials in order, their progress, and results by the values of each key."""
 
 import math
 from collections.abc import Sequence

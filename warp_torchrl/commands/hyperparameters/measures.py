@@ -1,4 +1,4 @@
-"""What a search reads in a run folder: how much forest was saved by which share of a training, and what it is worth."""
+"""Results of a search's runs: forest saved by share of the training, and the objective."""
 
 import csv
 import math

@@ -1,4 +1,4 @@
-"""The end of a search: a table, a CSV, and the best values as an experiment and as overrides."""
+"""Report of a search: a table, a CSV, and the best values as an experiment and as overrides."""
 
 import csv
 import io
@@ -93,7 +93,7 @@ def _shown(value: Any) -> str:
 
 
 def _importance(study: optuna.Study) -> Mapping[str, float]:
-    """Return the share of each key in what tells the best trials from the others, by PED-ANOVA (Watanabe et al. 2023).
+    """Return the importance of each key for the best trials, by PED-ANOVA (Watanabe et al. 2023).
 
     It is empty where fewer than ten trials were trained to their end.
     """
@@ -184,12 +184,12 @@ def _best_overrides(best: FrozenTrial, space: Sequence[Dimension], fixed: Sequen
 def experiment(overrides: Sequence[str], says: str) -> str:
     """Return a training's overrides as the yaml of an experiment.
 
-    An experiment among them is resolved: its options and values are written out, without those that the overrides
-    replace.
+    An experiment among them is resolved: its options and values are written out, without the ones that the
+    overrides replace.
 
     Args:
         overrides: In Hydra's grammar, each with one value.
-        says: What it is, for the file's comment.
+        says: Description for the file's comment.
     """
     chosen = choices(overrides)
     scenario = f"scenario={chosen['scenario']}"

@@ -1,4 +1,4 @@
-"""The loop of a search: starts trials, compares them while they train, ends some early, and tells Optuna the rest."""
+"""The loop of a search: starts trials, compares them while they train, prunes some, and reports results to Optuna."""
 
 import logging
 import signal
@@ -45,19 +45,19 @@ class _Running:
 
 @dataclass(kw_only=True)
 class Search:
-    """A search, as far as it does not depend on what a training is.
+    """A search over trainings of any kind.
 
     Attributes:
         study: Optuna's.
-        space: What is searched.
+        space: Dimensions of the search.
         options: Of the search.
-        folder: Its folder.
+        folder: Folder of the search.
         start: Starts a training with these values and the number of its seed, from 0, in a run folder, and returns it;
-            where the folder holds a checkpoint, it goes on from there.
+            if the folder holds a checkpoint, it resumes from there.
         total: Returns the frames of a training with these values.
         after: Called after each trial that has ended.
-        received: Returns the number of the signal that asks the search to stop, 0 where none does.
-        seconds: Between two looks at what trains.
+        received: Returns the number of the signal that stops the search, 0 without one.
+        seconds: Interval between two checks of the running trials [s].
     """
 
     study: optuna.Study
@@ -73,7 +73,7 @@ class Search:
     _running: list[_Running] = field(default_factory=list, init=False)
 
     def run(self) -> None:
-        """Train until so many trials as are asked for have ended; those that a former search began go on first.
+        """Train until the number of trials in the options have ended; trials of an interrupted search resume first.
 
         Raises:
             SearchEnded: If a signal, a full disk or several failed trials ended it.
@@ -90,7 +90,7 @@ class Search:
             self._stop()
 
     def _fill(self) -> None:
-        """Start trials until so many train as may side by side, or as are still needed."""
+        """Start trials up to the number of parallel jobs, or of trials left."""
         begun = {each.trial.number for each in self._running}
         waiting = [each.number for each in self._trials(TrialState.RUNNING) if each.number not in begun]
         while len(self._running) < self.options.jobs:
@@ -120,7 +120,7 @@ class Search:
         log.info("trial %d %s: %s", trial.number, verb, told)
 
     def _look(self) -> None:
-        """Look at what trains once: compare, end, and tell Optuna what has ended."""
+        """Check the running trials once: compare them, end some, and report ended ones to Optuna."""
         received = self.received()
         if received:
             name = signal.Signals(received).name
@@ -138,7 +138,7 @@ class Search:
             self.after()
 
     def _compare(self, each: _Running, may_prune: bool) -> None:
-        """Report how far a trial has come, over all its seeds, and end it where it is not worth its time."""
+        """Report the progress of a trial, over all its seeds, and prune it if it is not worth its time."""
         if each.is_pruned:
             return
         paths = [saved_by_share(folder / "metrics.csv", each.total) for folder in each.folders]
@@ -151,7 +151,7 @@ class Search:
                 return
 
     def _tell(self, each: _Running, codes: Sequence[int]) -> None:
-        """Tell Optuna how a trial has ended."""
+        """Report the end of a trial to Optuna."""
         number = each.trial.number
         failed = next((place for place, code in enumerate(codes) if code not in (DONE, STOPPED)), None)
         by_evaluation = self.options.objective == "evaluation"
@@ -183,7 +183,7 @@ class Search:
         self._fail(each, reason, 1 if failed is None else codes[failed])
 
     def _drop_training(self, each: _Running) -> None:
-        """Keep the policies alone of a trial that has ended, unless it failed."""
+        """Keep only the policies of a trial that has ended, unless it failed."""
         state = self.study.get_trials(deepcopy=False)[each.trial.number].state
         for folder in each.folders:
             if state in ENDED and not self.options.keep_training and holds_any(folder):
@@ -212,7 +212,7 @@ class Search:
         return f"the same command with search.out={self.folder} goes on"
 
     def _stop(self) -> None:
-        """End what trains, which saves; Optuna has it as running, and the next search goes on with it."""
+        """Stop the running trials, which save; for Optuna they are still running, and the next search resumes them."""
         for each in self._running:
             each.stop()
         while any(training.poll() is None for each in self._running for training in each.trainings):

@@ -1,6 +1,7 @@
-"""Optuna's record of a search: one line of JSON for each event, which a kill can cut and nothing but text is read from.
+"""Optuna's storage of a search: one line of JSON for each event.
 
-Optuna's other storage, SQLite, would need a file system with locks, and a search has one writer.
+A kill can cut only the last line, and reading the file runs no code. Optuna's other storage, SQLite, would need a file
+system with locks, and a search has one writer.
 """
 
 import warnings
@@ -75,8 +76,7 @@ def _pruner(options: SearchOptions) -> optuna.pruners.BasePruner:
 def ask(study: optuna.Study, space: Sequence[Dimension], options: SearchOptions) -> optuna.Trial:
     """Return a new trial with its values drawn.
 
-    The draws are of the search's seed and the trial's number, so that a search that was stopped goes on as one that was
-    not.
+    The draws depend on the search's seed and the trial's number only, so a resumed search draws the same values.
     """
     study.sampler = _sampler(options, len(study.get_trials(deepcopy=False)))
     trial = study.ask()
@@ -85,7 +85,7 @@ def ask(study: optuna.Study, space: Sequence[Dimension], options: SearchOptions)
 
 
 def goes_on(study: optuna.Study, number: int, space: Sequence[Dimension], options: SearchOptions) -> optuna.Trial:
-    """Return a trial that was begun, with the values that it has; what a kill kept from being drawn is drawn."""
+    """Return a trial that was begun, with its values; values that a kill left undrawn are drawn."""
     study.sampler = _sampler(options, number)
     trial = optuna.Trial(study, study.get_trials(deepcopy=False)[number]._trial_id)
     draw(trial, space)
