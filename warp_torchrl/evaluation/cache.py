@@ -1,9 +1,9 @@
-"""Episodes of baselines that were played before, kept on the disk by all that they follow from.
+"""Disk cache of baselines' episodes, by the digest of everything that determines them.
 
 A file's name is a digest of the world and the reward (every field of every component, layers of rasters and arrays
-too), the seeds, the heuristic, the sources of what plays them, torch, and the kind of device. So a world that differs
-in anything has another file, and a change of the code makes old ones unread. A file tells its own sha256: one that was
-cut or altered is played again and replaced. It is JSON, and is written whole or not at all.
+too), the seeds, the heuristic, the sources of the code that plays them, torch, and the kind of device. So a world that
+differs in anything has another file, and after a change of the code old files are not read. Each file holds the sha256
+of its content: a cut or altered file is played again and replaced. It is JSON, and is written whole or not at all.
 """
 
 import json
@@ -36,7 +36,7 @@ _MOST_EPISODES = 65_536
 
 
 class Unknown(Exception):  # noqa: N818
-    """What episodes follow from cannot be told: there is something in it that is not ours, or not plain."""
+    """The episodes have no digest: a component or a value is not of this package, or not plain."""
 
 
 def folder() -> Path:
@@ -45,13 +45,13 @@ def folder() -> Path:
 
 
 def kept(plan: RunConfig, names: Sequence[str]) -> dict[str, Episodes]:
-    """Return those episodes of heuristics that are kept, by name."""
+    """Return the cached episodes of heuristics, by name."""
     found = {name: _read(path) for name, path in _paths(plan, names).items()}
     return {name: episodes for name, episodes in found.items() if episodes is not None}
 
 
 def keep(plan: RunConfig, played: dict[str, Episodes]) -> None:
-    """Keep episodes of heuristics; where the folder cannot be written, they are not kept."""
+    """Cache episodes of heuristics; if the folder cannot be written, they are not cached."""
     for name, path in _paths(plan, list(played)).items():
         episodes = {metric: values.tolist() for metric, values in played[name].items()}
         content = json.dumps(episodes)
@@ -65,7 +65,7 @@ def keep(plan: RunConfig, played: dict[str, Episodes]) -> None:
 
 
 def _paths(plan: RunConfig, names: Sequence[str]) -> dict[str, Path]:
-    """Return the file of each heuristic's episodes; none where it cannot be told what they follow from."""
+    """Return the file of each heuristic's episodes; none where they have no digest."""
     if not plan.evaluation.cache or plan.evaluation.episodes > _MOST_EPISODES:
         return {}
     try:
@@ -78,7 +78,7 @@ def _paths(plan: RunConfig, names: Sequence[str]) -> dict[str, Path]:
 
 
 def _of_worlds(plan: RunConfig) -> list[Any]:
-    """Return what the episodes of every heuristic follow from."""
+    """Return everything that determines the episodes of all heuristics."""
     roles = [ROLES[role] for role in plan.world.team.roles]
     abilities = [ABILITIES[name] for role in roles for name in role.abilities]
     seeds = plan.evaluation.first_seed, plan.evaluation.episodes
@@ -100,7 +100,7 @@ def digest(thing: Any) -> str:
 
 
 def _parts(thing: Any) -> Iterator[bytes]:
-    """Yield what a value is made of, each part with its kind."""
+    """Yield the parts of a value, each with its kind."""
     if thing is None or isinstance(thing, bool | int | float | str | Path):
         yield f"{type(thing).__name__} {thing!r}".encode()
         yield from _of_file(thing)
@@ -143,7 +143,7 @@ def _name_of(kind: type) -> str:
 
 @lru_cache(maxsize=1)
 def _code() -> str:
-    """Return a digest of the sources of what plays the episodes."""
+    """Return a digest of the sources of the code that plays the episodes."""
     rooms = (path for room in _SOURCES for path in (_PACKAGE / room).rglob("*.py"))
     paths = sorted({*rooms, *_PACKAGE.glob("*.py")})
     return digest([[path.relative_to(_PACKAGE).as_posix(), sha256(path.read_bytes()).hexdigest()] for path in paths])

@@ -1,4 +1,4 @@
-"""What policies of a team are compared by."""
+"""The metric by which policies of a team are compared."""
 
 from typing import Literal
 
@@ -11,6 +11,6 @@ Goal = Literal["saved", "watched"]
 
 
 def goal(world: World) -> Goal:
-    """Return what policies are compared by: the trees saved, or the front watched where nobody of the team can act."""
+    """Return the metric of a comparison: the trees saved, or the front watched where no member of the team can act."""
     acts = any(not ABILITIES[name].moves for role in world.team.agent_roles for name in ROLES[role].abilities)
     return "watched" if world.sensing.is_limited and not acts else "saved"

@@ -1,10 +1,10 @@
-"""Maps of a policy: where one ground burns without the team, and where with it, over many fires.
+"""Burn probability of one ground over many fires, without the team and with it.
 
-The ground, its trees and its relief are those of one seed. From fire to fire differ where it starts, the wind, what the
-fire draws and where the team starts, as the scenario has them. Both arms play the same fires: the same seeds, and so
-the same draws cell by cell and tick by tick. A cell counts as burned in a fire where its tree has burned to ash, or
-still burns, at the end of the episode: at the horizon, or earlier where the fire is out. A tree that was put out stands
-and does not count, nor does one that the team cleared.
+Ground, trees and relief are those of one seed. The place of ignition, the wind, the fire's draws and the team's start
+differ from fire to fire, as the scenario defines them. Both arms play the same fires: the same seeds, and so the same
+draws cell by cell and tick by tick. A cell counts as burned in a fire if its tree has burned to ash, or still burns, at
+the end of the episode: at the horizon, or earlier when the fire is out. A tree that was extinguished stands and does
+not count, nor does one that the team cleared.
 """
 
 from collections.abc import Callable
@@ -39,7 +39,7 @@ _MOST_WORLDS = 256
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PolicyMaps:
-    """What fires on one ground burned, without the team and with it.
+    """Burned cells of fires on one ground, without the team and with it.
 
     Attributes:
         ground: The ground, batch size [1].
@@ -126,7 +126,7 @@ def play_maps(plan: RunConfig, actor: Actor, mode: str, fires: int) -> PolicyMap
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _End:
-    """How some fires ended: [H, W] over the fires, and [n] by fire [cells]."""
+    """Ends of some fires: [H, W] over the fires, and [n] by fire [cells]."""
 
     burned: Tensor
     lit: Tensor
@@ -169,10 +169,10 @@ def write_maps(folder: Path, maps: PolicyMaps, grid: Grid | None, title: str, po
     """Write the maps as GeoTIFF, on the landscape's grid where it has one, and as ``maps.png``.
 
     Args:
-        folder: Where to.
+        folder: Folder of the files.
         maps: The maps.
-        grid: The grid of which the ground is a window; None writes metres from the south-west corner.
-        title: Of the figure.
+        grid: The grid that the ground is a window of; None writes metres from the south-west corner.
+        title: Title of the figure.
         policy: The policy's name.
 
     Raises:

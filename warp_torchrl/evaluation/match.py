@@ -1,4 +1,4 @@
-"""Worlds that are played to their ends: those that have ended, and what nobody reads, are not computed."""
+"""Episodes of many worlds in one batch, without the worlds that have ended and outputs that nobody reads."""
 
 from collections.abc import Callable, Sequence
 
@@ -24,12 +24,12 @@ _PART = 16
 
 
 class Match:
-    """One episode of each world of an environment, as a loop over its steps plays it, number for number.
+    """One episode of each world of an environment, equal to a loop over its steps, number for number.
 
     Args:
-        env: Its worlds, at the start of their episodes.
-        policies: Of which ``fits`` is true: one, or heuristics that play equal shares of the worlds, in order.
-        watcher: Sees the steps.
+        env: Environment, at the start of its episodes.
+        policies: Policies that pass ``fits``: one, or heuristics that play equal shares of the worlds, in order.
+        watcher: Called at each step.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class Match:
         """Play to the end and return the metrics of ``info`` by name, float32 [B] each.
 
         Args:
-            shown: What the policy was shown of the worlds' starts.
+            shown: The first observations.
         """
         self._leave_ended()
         for _ in range(self.world.horizon):
@@ -59,7 +59,7 @@ class Match:
         return found | {"episode_reward": self.paid, "episode_length": self.ended.step.to(torch.float32)}
 
     def _actions(self, shown: TensorDict) -> Tensor:
-        """Return the actions in the worlds that go on, int64 [n, A].
+        """Return the actions in the worlds that continue, int64 [n, A].
 
         A trained policy acts in all worlds, so that its draws are those of a loop over all.
         """
@@ -83,7 +83,7 @@ class Match:
         self.state, self.counts = transition.after, transition.counts_after
 
     def _leave_ended(self) -> None:
-        """Keep the worlds that have ended, and go on without them, once a few have: to move the others takes time."""
+        """Store ended worlds and drop them from the batch, once they are a sixteenth: moving the others takes time."""
         done = self.state.done
         count = int(done.sum())
         if count < len(done) and count * _PART < len(done):
@@ -93,7 +93,7 @@ class Match:
         self.state, self.counts, self.rows = self.state[going], self.counts[going], self.rows[going]
 
     def _show(self, shown: TensorDict) -> None:
-        """Write what is seen of the worlds that go on."""
+        """Write the observations of the worlds that continue."""
         if not len(self.rows):
             return
         seen = self.env.observation(self.state, self.world, self.world.forecast(self.state))

@@ -57,7 +57,7 @@ def _written(value: Any) -> str:
 
 
 def teacher_label(record: SavedConfig) -> list[str]:
-    """Return the part of a policy's name that says whom it learned from beside rewards; empty where from nobody."""
+    """Return the part of a policy's name that lists its teachers besides rewards; empty without any."""
     imitation = record.values.get("imitation", {})
     people = ["people"] if imitation.get("demonstrations") else []
     taught = [imitation["teacher"]] if imitation.get("teacher") else []

@@ -1,4 +1,4 @@
-"""An episode as a file that others can look at: a GIF, an MP4, or an HTML document that plays in a browser."""
+"""An episode as a file: a GIF, an MP4, or an HTML document that plays in a browser."""
 
 from collections.abc import Sequence
 from fractions import Fraction
@@ -49,11 +49,11 @@ def record_episode(
 
 
 def write_video(path: Path, frames: Sequence[tuple[Image.Image, int]]) -> None:
-    """Write pictures as an MP4 (H.264), twice as large as they are; the file appears whole or not at all.
+    """Write pictures as an MP4 (H.264), at twice their size; the file appears whole or not at all.
 
     Args:
         path: The file.
-        frames: Each picture, all of one size, and for how long it stands, a multiple of the first one's time [ms].
+        frames: Pictures, all of one size, each with its duration, a multiple of the first one's [ms].
     """
     import av  # the extra video
 

@@ -37,7 +37,7 @@ Episodes = dict[str, np.ndarray]
 
 
 class Recorder(Protocol):
-    """What looks at an episode while it is played."""
+    """Recorder of an episode."""
 
     def add(self, state: WorldState) -> None:
         """Append world 0 of a batch."""
@@ -45,7 +45,7 @@ class Recorder(Protocol):
 
 
 def baselines_of(world: World) -> tuple[str, ...]:
-    """Return the baselines that stand beside a policy in a world."""
+    """Return the baselines to which a policy is compared in a world."""
     searching = SEARCHING if world.sensing.is_limited else ()
     return (*BASELINES, *searching, *(AGENCIES if world.agencies.names else ()))
 

@@ -1,8 +1,8 @@
-"""What can be read from the messages of a team: linear probes (Alain and Bengio 2016).
+"""Linear probes of the messages of a team (Alain and Bengio 2016).
 
-A linear map is fitted from messages to what their senders know, on some worlds, and judged on others. The same is done
-for the messages of the same networks with weights drawn anew: what can be read from those is in the observation, and
-was not learnt to be told.
+A linear map is fitted from messages to what their senders know, on some worlds, and scored on others. The same is done
+for the messages of the same networks with random weights: whatever those contain comes from the observation, and was
+not learned.
 """
 
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ _RIDGE = 1e-3
 
 
 class Reading(NamedTuple):
-    """How well something can be read from messages: R^2 on other worlds, 1 all of it, 0 no more than its mean."""
+    """Quality of a probe: R^2 on other worlds; 1 explains everything, 0 no more than the mean."""
 
     what: str
     trained: float
@@ -37,14 +37,14 @@ class Reading(NamedTuple):
 
 @dataclass(frozen=True)
 class _Heard:
-    """Messages of some steps, with what their senders knew."""
+    """Messages of some steps, with their senders' knowledge."""
 
     messages: Tensor  # float32 [n, M]
     known: dict[str, Tensor]  # float32 [n] each; NaN where it does not apply
 
 
 def probe(policy: TrainedPolicy, env: WildfireEnv, first_seed: int) -> list[Reading]:
-    """Return what can be read from the messages of a policy's first round, one row for each thing.
+    """Return the probes of a policy's first round of messages, one row for each quantity.
 
     Args:
         policy: Whose agents talk, fitted to the environment.
@@ -64,7 +64,7 @@ def probe(policy: TrainedPolicy, env: WildfireEnv, first_seed: int) -> list[Read
 
 
 def _collect(policy: TrainedPolicy, env: WildfireEnv, first_seed: int) -> tuple[list[_Heard], list[_Heard]]:
-    """Return what a policy says, and the same networks with other weights in its place, by the half of the worlds."""
+    """Return the messages of a policy, and of the same networks with random weights, by the half of the worlds."""
     other, worlds = drawn_anew(policy), torch.arange(env.batch_size[0], device=env.device)
     halves = worlds < len(worlds) // 2, worlds >= len(worlds) // 2
     trained: list[list[_Heard]] = [[], []]
@@ -96,7 +96,7 @@ def _joined(parts: list[_Heard]) -> _Heard:
 
 
 def _known(state: WorldState, env: WildfireEnv) -> dict[str, Tensor]:
-    """Return what each agent knows and might tell, float32 [B, A] each; NaN where it knows of no fire."""
+    """Return the quantities that each agent knows, float32 [B, A] each; NaN where it knows of no fire."""
     knows, index = nearest_marked(state, known_fire(state, env.world))
     fire = place(index, state).to(torch.float32).masked_fill(~knows[..., None], torch.nan)
     offset = fire - state.vehicles.position
@@ -146,7 +146,7 @@ def _listening(policy: TensorDictModuleBase) -> Iterator[list[Tensor]]:
 
 
 def drawn_anew(policy: TrainedPolicy) -> TrainedPolicy:
-    """Return a copy of a policy whose linear layers have weights drawn anew, always the same ones."""
+    """Return a copy of a policy whose linear layers have random weights, always the same."""
     other = deepcopy(policy)
     with torch.random.fork_rng(), torch.no_grad():
         torch.manual_seed(0)

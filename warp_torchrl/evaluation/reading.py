@@ -20,7 +20,7 @@ def read_evaluation(path: Path) -> dict[str, Any]:
     """Return the content of an ``evaluation.json``, its names as plain lines.
 
     Raises:
-        ConfigError: If it is none, in one line.
+        ConfigError: If it is no evaluation, in one line.
         OSError: If it cannot be opened.
     """
     try:

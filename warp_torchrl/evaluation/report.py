@@ -91,7 +91,7 @@ def _number(value: float) -> float | None:
 
 
 def table(content: Mapping[str, Any]) -> str:
-    """Return the report as a table for the terminal; of a team that cannot act, what it watches alone."""
+    """Return the report as a table for the terminal; for a team that cannot act, only the metrics of watching."""
     lines = [f"{place(content)}: {len(content['seeds'])} fires, seeds from {content['seeds'][0]}"]
     rows = {**content["baselines"], **content["other_modes"], content["policy"]: content["metrics"]}
     if content["goal"] == "saved":
@@ -105,7 +105,7 @@ def table(content: Mapping[str, Any]) -> str:
 
 
 def _saved_lines(rows: Mapping[str, Any]) -> list[str]:
-    """Return what each policy saves, a line for each."""
+    """Return a line for each policy: the forest that it saves."""
     lines = [
         f"{'policy':<22}{'saved %':>8}{'95 % interval':>16}{'iqm %':>8}{'success %':>11}{'control':>9}{'cleared %':>11}"
     ]
@@ -120,7 +120,7 @@ def _saved_lines(rows: Mapping[str, Any]) -> list[str]:
 
 
 def _watching_lines(rows: Mapping[str, Any]) -> list[str]:
-    """Return what each policy watches, a line for each."""
+    """Return a line for each policy: the front that it watches."""
     lines = [
         f"{'policy':<22}{'watched %':>10}{'95 % interval':>16}{'found %':>9}{'uncertainty':>13}{'near misses %':>15}"
     ]
@@ -138,7 +138,7 @@ def _interval(summary: Mapping[str, Any]) -> str:
 
 
 def _difference_lines(policy: str, differences: Mapping[str, Any], metric: str) -> list[str]:
-    """Return what the policy has more of a metric than each of the others, a line for each."""
+    """Return a line for each other policy: the paired difference of a metric."""
     lines = []
     for name, difference in differences.items():
         low, high = (100.0 * bound for bound in difference["ci95"])
@@ -150,7 +150,7 @@ def _difference_lines(policy: str, differences: Mapping[str, Any], metric: str) 
 
 
 def _agency_lines(rows: Mapping[str, Any], names: Sequence[str]) -> list[str]:
-    """Return what each agency has saved of its land, a line for each policy; none where there is but one agency."""
+    """Return a line for each policy: the share of its land that each agency saved; none for a single agency."""
     if not names:
         return []
     lines = [f"{'saved %, by agency':<22}" + "".join(f"{name.removeprefix(SAVED_BY):>24}" for name in names)]
@@ -181,7 +181,7 @@ def _behaviour_lines(content: Mapping[str, Any]) -> list[str]:
 
 
 def _left_out_lines(content: Mapping[str, Any]) -> list[str]:
-    """Return what the team reaches without each agent less what it reaches with it, a line for each."""
+    """Return a line for each agent: the team's metric without the agent, minus that with it."""
     lines, key = [], f"{content['goal']}_difference"
     for agent, loss in content["left_out"].items():
         low, high = (100.0 * bound for bound in loss["ci95"])

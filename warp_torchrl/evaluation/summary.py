@@ -1,4 +1,4 @@
-"""Summarises runs: one table and one figure from their ``evaluation.json`` files.
+"""Summary of runs: one table and one figure from their ``evaluation.json`` files.
 
 A sweep writes both at its end; ``warp summary FOLDER ...`` makes them for any runs.
 """
@@ -147,7 +147,7 @@ def _table(goal: str, entries: Sequence[Entry], against: str | None) -> str:
 
 
 def _cell(text: str) -> str:
-    """Return a text in which no part is a cell of its own."""
+    """Return a text without separators of cells."""
     return text.replace("|", "\\|")
 
 

@@ -1,4 +1,4 @@
-"""Learning curves of runs, from their ``metrics.csv``: those that the WARP-CA paper shows, and the forest saved.
+"""Learning curves of runs, from their ``metrics.csv``: the curves of the WARP-CA paper, and the forest saved.
 
 Runs that differ in their seed only are one line, their mean, with a band from minimum to maximum. Values are not
 smoothed; files of many rows are averaged over bins, and the figure says so.
@@ -52,7 +52,7 @@ MULTI = (
 
 
 class Line(NamedTuple):
-    """Runs that differ in their seed alone, and how they are drawn."""
+    """Runs that differ in their seed only, and their style."""
 
     label: str
     look: dict[str, Any]
@@ -95,10 +95,11 @@ def curve_figures(lines: Sequence[Line]) -> dict[str, Callable[[], "Figure"]]:
 def band(runs: Sequence[Run], x: str, y: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
     """Return a column's mean over runs, its minimum and its maximum, by another column.
 
-    Each run is interpolated linearly between its own rows at the places of all runs, as far as all of them reach.
+    Each run is interpolated linearly between its rows at the places of all runs, within the range that all of them
+    cover.
 
     Returns:
-        (places, mean, minimum, maximum), [n] each; None where there is nothing that the runs share.
+        (places, mean, minimum, maximum), [n] each; None where the runs share no range.
     """
     paths = []
     for run in runs:
@@ -265,6 +266,6 @@ def _legend_columns(lines: Sequence[Line], width: float) -> int:
 
 
 def _plain(label: str) -> str:
-    """Return a label that Matplotlib shows as it is: no mathematics, not hidden, and not too long."""
+    """Return a label that Matplotlib shows unchanged: no mathematics, not hidden, and not too long."""
     short = label if len(label) <= 60 else f"{label[:57]}..."
     return (" " if short.startswith("_") else "") + short.replace("$", r"\$")

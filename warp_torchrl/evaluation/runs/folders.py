@@ -1,4 +1,4 @@
-"""Reads run folders for learning curves, without instantiating anything from their configuration."""
+"""Run folders for learning curves, read without instantiating anything from their configuration."""
 
 import csv
 import math
@@ -29,17 +29,17 @@ class Run:
     """Configuration and metrics of a run folder.
 
     Attributes:
-        folder: Where it is.
+        folder: Path.
         rows: Columns of ``metrics.csv``, [rows] each, NaN where a value is missing.
-        columns: The same as means over bins, [bins] each, of at most ``MOST_ROWS``.
-        rows_per_bin: Rows that a bin stands for.
-        names: Algorithm and teacher, reward, observation and scenario; the folder's own name where nothing is recorded.
+        columns: The same as means over bins, [bins] each, at most ``MOST_ROWS``.
+        rows_per_bin: Rows in a bin.
+        names: Algorithm and teacher, reward, observation and scenario; the folder's name where nothing is recorded.
         alike: Equal for runs that differ in their seed only.
         mark: Distinguishes runs of the same names.
-        scenario: Its name.
+        scenario: Name of the scenario.
         n_agents: A; None where it is not recorded.
         seed: None where it is not recorded.
-        called: What the figure calls it, if it was told.
+        called: Name in the figure, if the user gave one.
     """
 
     folder: Path
@@ -70,7 +70,7 @@ def run_folders(paths: Sequence[Path]) -> list[Path]:
 
 
 def read_run(folder: Path) -> Run:
-    """Return what a run folder holds, without instantiating anything."""
+    """Return the content of a run folder, without instantiating anything."""
     rows = read_metrics(folder / "metrics.csv")
     rows_per_bin = math.ceil(len(rows[FRAMES]) / MOST_ROWS)
     columns = {name: bin_means(values, rows_per_bin) for name, values in rows.items()}
@@ -143,7 +143,7 @@ def _recorded(found: Checkpoint, record: SavedConfig) -> dict[str, Any]:
 
 
 def _completed(record: SavedConfig) -> SavedConfig:
-    """Return a record with this version's keys, or as it is where it has others."""
+    """Return a configuration with this version's keys, or unchanged if its keys are others."""
     try:
         return completed(record)
     except ConfigError:
@@ -151,7 +151,7 @@ def _completed(record: SavedConfig) -> SavedConfig:
 
 
 def _not_recorded(folder: Path) -> dict[str, Any]:
-    """Return what is known of a run without a checkpoint: its name, and what its ``config.yaml`` says."""
+    """Return the description of a run without a checkpoint: its name, and its ``config.yaml``."""
     content, path = {}, folder / "config.yaml"
     if path.exists():
         try:
@@ -167,7 +167,7 @@ def _not_recorded(folder: Path) -> dict[str, Any]:
 
 
 def bin_means(values: np.ndarray, size: int) -> np.ndarray:
-    """Return the means over bins of so many rows, the last of what is left; NaN where a bin has no value."""
+    """Return the means over bins of ``size`` rows, the last of the rest; NaN where a bin has no value."""
     if size == 1:
         return values
     starts, there = np.arange(0, len(values), size), np.isfinite(values)

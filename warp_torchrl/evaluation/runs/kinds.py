@@ -1,4 +1,4 @@
-"""The forest that runs save in their last evaluation in training, by kind of worlds, beside other runs of one seed."""
+"""Forest saved in the last evaluation of each run in training, by kind of worlds, beside other runs of one seed."""
 
 from collections.abc import Mapping, Sequence
 

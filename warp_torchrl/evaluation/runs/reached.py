@@ -1,4 +1,4 @@
-"""When runs first save a share of their training worlds' forest: by world steps and by the clock."""
+"""World steps and time until runs first save a share of their training worlds' forest."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""The forest that runs save in training by world steps, and how fast they were."""
+"""Forest saved by runs in training, by world steps, and their speed."""
 
 from collections.abc import Sequence
 
