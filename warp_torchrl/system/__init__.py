@@ -1,1 +1,1 @@
-"""What is asked of the machine: files, processes, signals, memory, devices."""
+"""Access to the machine: files, processes, signals, memory, devices."""

@@ -81,7 +81,7 @@ def named_separator(text: str) -> tuple[str | None, str]:
 
 
 def to_points(header: str, cells: Sequence[str], separator: str) -> list[str]:
-    """Return the cells of a column with decimal points in place of decimal commas.
+    """Return the cells of a column, with decimal commas replaced by decimal points.
 
     Raises:
         ValueError: If the column has commas and points, or its commas may be those of thousands.

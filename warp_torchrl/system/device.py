@@ -1,7 +1,7 @@
-"""Whether a program may read back from the device that it computes on.
+"""Cost of reading results back from the device.
 
-A CPU's memory is read for nothing. A GPU computes while the program goes on, and to read from it is to wait until all
-is done that was asked of it; so what is computed there has sizes that no result decides.
+Reading from a CPU's memory is free. A GPU computes while the program continues, and reading from it waits until all of
+its queued work is done (a synchronisation); so on a GPU no result decides the size of a later tensor.
 """
 
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ def reads_freely(device: torch.device) -> bool:
 
 
 def is_same(one: torch.device, other: torch.device | None) -> bool:
-    """Return whether two devices are one: of a CPU torch tells no index, whatever it was given."""
+    """Return whether two devices are the same; torch gives a CPU no index, whatever index was given."""
     return one == other or (one.type == "cpu" and other is not None and other.type == "cpu")
 
 

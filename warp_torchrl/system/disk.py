@@ -24,7 +24,7 @@ def replace(path: Path, content: str | bytes) -> None:
 
     Args:
         path: The file.
-        content: Its new content; a text is written as UTF-8, line ends as they are.
+        content: New content; a text is written as UTF-8, its line ends unchanged.
 
     Raises:
         OSError: If the write fails, with the path; the old file stays.
@@ -58,7 +58,7 @@ def drafted(path: Path) -> Iterator[Path]:
 
 
 def save_tensors(path: Path, content: Any) -> None:
-    """Write tensors and plain values with ``torch.save``; of a view, only its own elements.
+    """Write tensors and plain values with ``torch.save``; a view is written without the rest of its storage.
 
     Raises:
         OSError: If the write fails, with the path; torch itself reports only an unexpected file position.

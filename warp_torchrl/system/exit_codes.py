@@ -1,3 +1,3 @@
-"""What the exit code of a command says: docs/reliability.md. A signal's is 128 + its number, a fault of ours 1."""
+"""Exit codes of the commands: docs/reliability.md. A signal's is 128 + its number, an internal error's 1."""
 
 DONE, MISTAKE, IN_USE, UNSOUND, NUMERICAL, DISK = 0, 2, 3, 4, 5, 6

@@ -11,11 +11,11 @@ LARGEST = 1.8e19
 
 
 class NumericalFailure(Exception):  # noqa: N818
-    """A number that is shown, earned, learned or acted by is not finite; no weights were touched."""
+    """An observation, reward, loss or action score that is not finite; no weights were changed."""
 
 
 def are_unsound(tensors: Iterable[Tensor]) -> Tensor:
-    """Return whether any number of some tensors of floats is NaN or infinite, bool [], without reading it."""
+    """Return whether any number of some float tensors is NaN or infinite, bool [], without a synchronisation."""
     ends = [each.to(torch.float64) for tensor in tensors if tensor.numel() for each in tensor.detach().aminmax()]
     return ~torch.stack(ends).isfinite().all() if ends else torch.zeros((), dtype=torch.bool)
 

@@ -13,7 +13,7 @@ _LONGEST = 4000  # characters of a line
 
 
 def whole(low: int, high: int) -> Callable[[str], int]:
-    """Return what reads a whole number in a range, for ``type`` of a flag."""
+    """Return a ``type`` for a flag that is a whole number in a range."""
 
     def number(given: str) -> int:
         if not (given.isascii() and given.isdigit() and len(given) <= len(str(high)) and low <= int(given) <= high):
@@ -24,7 +24,7 @@ def whole(low: int, high: int) -> Callable[[str], int]:
 
 
 def file_to_write(given: str) -> Path:
-    """Return the path of a file that can be made, for ``type`` of a flag: known before hours are spent on its content.
+    """Return the path of a file that can be made; a ``type`` for a flag, so that it fails before hours of work.
 
     Raises:
         argparse.ArgumentTypeError: If it is a folder, or in none.
@@ -36,7 +36,7 @@ def file_to_write(given: str) -> Path:
 
 
 class FlagParser(argparse.ArgumentParser):
-    """A parser that tells a mistake in one line; flags are written in full."""
+    """A parser that reports an error in one line; flags cannot be abbreviated."""
 
     def __init__(self, *, prog: str, description: str | None = None) -> None:
         super().__init__(prog=prog, description=description, allow_abbrev=False)

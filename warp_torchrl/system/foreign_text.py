@@ -1,6 +1,6 @@
 """Untrusted text: names of folders, policies and vehicles, and error messages that quote them.
 
-A terminal obeys escape sequences and a browser obeys markup, so neither gets such text as it is.
+A terminal obeys escape sequences and a browser obeys markup, so such text is escaped for both.
 """
 
 import re
@@ -25,7 +25,7 @@ _MARKUP = re.compile(
 
 
 def plain_text(value: str, most: int = MOST) -> str:
-    """Return a text as one line that a terminal cannot obey.
+    """Return a text as one line without control characters.
 
     Escape sequences, control characters and characters that turn the direction of writing are taken out, and white
     space of any kind and length is one space.
@@ -41,14 +41,14 @@ def plain_text(value: str, most: int = MOST) -> str:
 
 
 def escaped_markdown(value: object, most: int = MOST) -> str:
-    """Return the plain text of a value for Markdown, MDX or HTML, in which nothing of it is markup.
+    """Return the plain text of a value for Markdown, MDX or HTML, without any markup.
 
-    What may be markup becomes character references, which those three read alike. So does a first character with which
-    a list begins, or ``import``, with which a program begins in MDX. An invisible joiner breaks addresses, of which
-    GitHub's Markdown makes links even where they are references.
+    Characters of markup become character references, which those three read alike. So does a first character with which
+    a list begins, or ``import``, with which a program begins in MDX. An invisible joiner breaks addresses, which
+    GitHub's Markdown makes links even as references.
 
     Args:
-        value: Its text is shown.
+        value: Value whose text is shown.
         most: Length above which the end is left out [characters].
     """
     line = _LINK.sub(_JOINER, plain_text(str(value), most))

@@ -16,7 +16,7 @@ _FILES = ("inactive_file ", "total_inactive_file ")
 
 
 def available() -> int:
-    """Return the bytes that this process may still take: of the machine's, of its container's, of its own limit."""
+    """Return the bytes that this process may still use: the least of the machine's, container's and own limits."""
     return max(0, min(_limits()))
 
 
@@ -45,7 +45,7 @@ def _limits() -> Iterator[int]:
 
 
 def _of_machine() -> int:
-    """Return what the machine has free or gives back when asked; half of what it has where it does not say."""
+    """Return the machine's free and reclaimable memory; half of its memory where it does not say."""
     with suppress(OSError, ValueError, IndexError):
         lines = Path("/proc/meminfo").read_text().splitlines()
         return 1024 * int(next(line for line in lines if line.startswith("MemAvailable:")).split()[1])

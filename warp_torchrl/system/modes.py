@@ -1,7 +1,7 @@
 """Isolation from torch's global modes: default dtype and device, inference mode, autocast.
 
-Worlds are float32 whatever torch's default type is, and live where they were put whatever its default device is. What
-is kept from one call to the next is made outside of inference mode: it can be written to, and learned from, later.
+Worlds are float32 whatever torch's default type, and stay on their device whatever the default device. Tensors that are
+kept between calls are made outside of inference mode, so that later code can write to them and learn from them.
 """
 
 from collections.abc import Callable, Iterator
@@ -18,9 +18,9 @@ _CPU = torch.device("cpu")
 
 
 def apart(function: Callable[P, T]) -> Callable[P, T]:
-    """Return a function that computes as if no mode were set: the default type and device, inference mode, autocast.
+    """Return a function that ignores torch's modes: the default type and device, inference mode, autocast.
 
-    Whether gradients are recorded stays as it is; in inference mode they are not.
+    Whether gradients are recorded does not change; in inference mode they are not.
     """
 
     @wraps(function)
@@ -39,7 +39,7 @@ def kept(maxsize: int) -> Callable[[Callable[..., T]], Callable[..., T]]:
 
 
 def _is_plain() -> bool:
-    """Return whether no mode is set, in a few microseconds: a new tensor tells most of them."""
+    """Return whether no mode is set, in a few microseconds: a new tensor shows most modes."""
     new = torch.empty(0)
     return (
         new.dtype is torch.float32

@@ -58,7 +58,7 @@ def bind_workers(seconds_to_save: float = 0.0) -> None:
 
 
 def end_with_binder() -> None:
-    """Let this process end with its parent, if that has called ``bind_workers``, or now, if it has ended already."""
+    """Let this process end with its parent, if that called ``bind_workers``; now, if the parent has ended."""
     bound, _, seconds_to_save = os.environ.get(_BOUND, "").partition(" ")
     parent = int(bound) if bound.isdigit() else None
     if parent is not None and (parent == os.getppid() or not _exists(parent)):

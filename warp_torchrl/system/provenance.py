@@ -1,6 +1,6 @@
 """Provenance of input data: columns and bands read from each file, their units, and those ignored.
 
-Readers of files report here; a command gathers the reports for its own.
+Readers of files report here; a command collects the reports of its files.
 """
 
 import logging
@@ -20,7 +20,7 @@ _log = logging.getLogger("warp_torchrl")
 
 @dataclass(frozen=True, kw_only=True)
 class Provenance:
-    """What was read of one file.
+    """Report on one file that was read.
 
     Attributes:
         key: What the file is to us, by its configuration key: ``weather``, ``landscape.elevation``.
@@ -39,7 +39,7 @@ class Provenance:
 
     @property
     def line(self) -> str:
-        """Return all of it in one line."""
+        """Return the report in one line."""
         read = [_name(name) + (f" [{_text(unit)}]" if unit else "") for name, unit in self.read.items()]
         taken = [f"read {_listed(read)}"] if read or not self.notes else []
         left = [f"left {_listed([_name(name) for name in self.left])}"] if self.left else []
@@ -47,7 +47,7 @@ class Provenance:
 
     @property
     def as_values(self) -> dict[str, Any]:
-        """Return all of it as plain values."""
+        """Return the report as plain values."""
         return {
             "key": self.key,
             "file": self.file,
@@ -58,7 +58,7 @@ class Provenance:
 
     @classmethod
     def of_values(cls, values: Mapping[str, Any]) -> "Provenance":
-        """Return what ``as_values`` made these values of."""
+        """Return the report of plain values from ``as_values``."""
         return cls(**{**values, "left": tuple(values["left"]), "notes": tuple(values["notes"])})
 
 
@@ -66,7 +66,7 @@ _gathered: ContextVar[list[Provenance] | None] = ContextVar("gathered", default=
 
 
 def tell(provenance: Provenance) -> None:
-    """Report what was read of a file: to whoever gathers, and in one line of the log, once a process."""
+    """Report a file that was read: to ``gathered`` blocks, and in one line of the log, once per process."""
     gathering = _gathered.get()
     if gathering is not None and provenance not in gathering:
         gathering.append(provenance)
@@ -75,7 +75,7 @@ def tell(provenance: Provenance) -> None:
 
 @contextmanager
 def gathered() -> Iterator[list[Provenance]]:
-    """Yield a list, to which everything that is told in the block is added, each file once."""
+    """Yield a list that receives every report in the block, each file once."""
     found: list[Provenance] = []
     token = _gathered.set(found)
     try:

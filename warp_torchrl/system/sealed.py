@@ -1,4 +1,4 @@
-"""Folders that say of themselves what belongs in them: sizes and sha256 of files, in JSON with a sha256 of its own."""
+"""Manifests of folders: sizes and sha256 of their files, in JSON that holds the sha256 of its content."""
 
 import hashlib
 import json

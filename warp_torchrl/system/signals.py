@@ -71,7 +71,7 @@ def left_by() -> int:
 
 
 class _Left:
-    """The signal that ends the command, and the clock that ends it where it does not by itself."""
+    """The signal that ends the command, and the timer that ends it if it does not end by itself."""
 
     number = 0
     clock: threading.Timer | None = None

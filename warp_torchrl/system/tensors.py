@@ -23,15 +23,15 @@ _SHARED = 8
 
 
 def largest() -> int:
-    """Return the size that files of tensors may have, that of this machine's memory [bytes]."""
+    """Return the largest size of a file of tensors that is read, this machine's memory [bytes]."""
     return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
 
 
 def load_tensors(path: Path) -> Any:
     """Return the tensors and plain values of a file that ``torch.save`` wrote, on the CPU.
 
-    What the file says is checked before memory is made for it: its parts are stored as they are and as large as the
-    file, so that none unpacks to more, and no tensor has more numbers than its storage.
+    The file is checked before memory is allocated for it: its parts are uncompressed and no larger than the file, so
+    that none unpacks to more, and no tensor has more numbers than its storage.
 
     Raises:
         Unsound: If the file is none of these, or cannot be read.
@@ -50,7 +50,7 @@ def load_tensors(path: Path) -> Any:
 
 
 def _check_archive(file: BinaryIO, length: int) -> None:
-    """Check that a ZIP archive's parts are stored as they are, and are no larger than the archive.
+    """Check that a ZIP archive's parts are uncompressed, and are no larger than the archive.
 
     Raises:
         ValueError: If they are not.
