@@ -1,4 +1,4 @@
-"""What people did in a folder of recordings, as the networks of a run learn from it."""
+"""Acts of people in a folder of recordings, as training data for the networks of a run."""
 
 import json
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ from warp_torchrl.system.sealed import Unsound
 
 
 def demonstrations(plan: RunConfig, env: WildfireEnv) -> Demonstrations | None:
-    """Return what people did in the folder that a run learns from, on the environment's device; None without one.
+    """Return the acts of people in a run's folder of recordings, on the environment's device; None without one.
 
     Args:
         plan: Of the run.
@@ -76,7 +76,7 @@ def acts_of(recording: Recording, wanted: Signature) -> TensorDictBase:
 
 
 def _signature(recording: Recording, known: dict[str, Signature]) -> Signature:
-    """Return what a recording's environment shows; ``known`` keeps it for the next one from there."""
+    """Return the signature of a recording's environment; ``known`` caches it for the next recording."""
     key = json.dumps(asdict(recording.environment), sort_keys=True)
     if key not in known:
         known[key] = signature(Replay(recording).env)
@@ -120,7 +120,7 @@ def _check_fits(
 
 
 def _differs(path: Path, what: str, there: object, here: object) -> str:
-    """Return the line that tells what a recording and a run do not have in common."""
+    """Return the line that names the difference between a recording and a run."""
     if not (isinstance(there, tuple) and isinstance(here, tuple) and isinstance((*there, "")[0], str)):
         return f"{path} was recorded with the {what} {there}, and the run has {here}"
     more, less = ([each for each in one if each not in other] for one, other in ((there, here), (here, there)))

@@ -1,4 +1,4 @@
-"""What people do to a world in the middle of an episode."""
+"""Events: people's changes to a world in the middle of an episode."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -40,7 +40,7 @@ class Event:
 
 
 def carry_out(env: WildfireEnv, event: Event) -> TensorDictBase:
-    """Let an event happen in every world of an environment, where it can, and return what it shows then.
+    """Apply an event to every world of an environment, where possible, and return the new observations.
 
     Raises:
         ValueError: If a wind is out of its range, or a cell is not on the map.

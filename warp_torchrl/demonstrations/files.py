@@ -1,7 +1,7 @@
-"""Recordings in folders: memory-mapped tensors, as tensordict writes them, and a manifest that vouches for them.
+"""Recordings in folders: memory-mapped tensors, as tensordict writes them, and a manifest with their checksums.
 
-``steps`` holds what ``TensorDict.load_memmap`` reads. Here it is read by what the manifest says of each entry: nothing
-in a folder is executed or unpickled, and no file is opened that is not below it.
+``steps`` holds what ``TensorDict.load_memmap`` reads. Here the manifest defines how each entry is read: nothing in a
+folder is executed or unpickled, and no file outside of it is opened.
 """
 
 import logging
@@ -124,10 +124,10 @@ def find(folder: Path) -> list[Path]:
 
 
 def search(folder: Path) -> tuple[list[Path], list[Path]]:
-    """Return the folders of recordings in a folder, by name, and those that are left out for their names.
+    """Return the folders of recordings in a folder, by name, and the folders that are left out for their names.
 
-    No link is followed. A folder whose name begins with a dot is a draft, or somebody's own; one whose name has
-    anything but ``A-Za-z0-9._-`` is left out, and a line of the log says so.
+    No link is followed. A folder whose name begins with a dot is a draft, or belongs to another program; one whose name
+    has anything but ``A-Za-z0-9._-`` is left out, and a line of the log says so.
 
     Raises:
         OSError: If a folder cannot be read.
@@ -224,7 +224,7 @@ def _check_listed(files: Files, entries: Mapping[str, tuple[torch.dtype, tuple[i
 
 
 def _mapped(folder: Path, entries: Mapping[str, tuple[torch.dtype, tuple[int, ...]]], layout: Layout) -> TensorDictBase:
-    """Map the tensors of a folder by what the manifest says of each."""
+    """Map the tensors of a folder, by the manifest's entries."""
     steps = TensorDict({}, batch_size=[layout.steps])
     for name, (dtype, shape) in entries.items():
         path = below(folder, f"{_STEPS}/{name}.memmap")

@@ -1,4 +1,4 @@
-"""A recording: the steps of one episode as TorchRL data, and where they were."""
+"""A recording: the steps of one episode as TorchRL data, with their configuration."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ _ENDS = (REWARD, "done", "terminated", "truncated")
 
 
 class Mover(IntEnum):
-    """Whose an agent's action was."""
+    """Source of an agent's action."""
 
     POLICY = 0
     ORDER = 1
@@ -76,7 +76,7 @@ class Recording:
 
 
 def recorded(shown: TensorDictBase, proposed: Tensor, mover: Tensor, after: TensorDictBase) -> TensorDictBase:
-    """Return what is recorded of a step of any number of worlds, batch size [B].
+    """Return the record of a step of any number of worlds, batch size [B].
 
     Args:
         shown: Of an environment, with the actions done.
@@ -96,10 +96,10 @@ class OpenRecording:
 
     Attributes:
         rows: A TensorDict of batch size [], or [B], for each step.
-        events: What people have done to the world.
+        events: People's changes to the world.
         acts: Actions of people so far.
-        corrections: Those of them that the policy had not proposed.
-        words: Actions under an order, or in place of a forbidden one.
+        corrections: Actions of people that the policy had not proposed.
+        words: Actions under an order, or instead of a forbidden one.
     """
 
     rows: list[TensorDictBase] = field(default_factory=list)
@@ -131,7 +131,7 @@ class OpenRecording:
         self.words += sum(each in (Mover.ORDER, Mover.FORBIDDEN) for each in movers)
 
     def steps(self) -> TensorDictBase:
-        """Return the steps, of which there is one at least, batch size [T] or [T, B]."""
+        """Return the steps, at least one, batch size [T] or [T, B]."""
         steps = torch.stack(self.rows)
         if not isinstance(steps, TensorDict):
             raise TypeError(f"the steps of a recording must be of one kind, got {type(steps).__name__}")

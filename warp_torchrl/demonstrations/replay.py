@@ -1,4 +1,4 @@
-"""A recording played again, step by step, and held against what was recorded."""
+"""Replay of a recording, step by step, compared with the recorded steps."""
 
 from collections.abc import Iterable, Iterator
 
@@ -22,14 +22,14 @@ _MOST_CELLS = 2**22
 
 
 class Replay:
-    """Plays a recording in an environment of its own.
+    """Plays a recording in a new environment.
 
     Args:
-        recording: What was played.
+        recording: Recording to play.
 
     Raises:
-        ConfigError: If its configuration is none of this version.
-        Unsound: If its map is larger than is played again, or its agents or actions are not its configuration's.
+        ConfigError: If its configuration does not fit this version.
+        Unsound: If its map is too large to be replayed, or its agents or actions are not those of its configuration.
     """
 
     def __init__(self, recording: Recording) -> None:
@@ -63,7 +63,7 @@ class Replay:
             yield self.env.shared_state
 
     def shown(self) -> Iterator[TensorDictBase]:
-        """Play, and yield what the environment shows at its start and after every step, batch size [1].
+        """Play, and yield the observations at the start and after every step, batch size [1].
 
         Raises:
             Unsound: If an entry that was recorded is missing, or is another here.
@@ -85,7 +85,7 @@ class Replay:
             yield shown
 
     def check(self) -> WorldState:
-        """Play it all, and return the last world.
+        """Play all steps, and return the last world.
 
         Raises:
             Unsound: If an entry that was recorded is missing, or is another here.

@@ -1,4 +1,4 @@
-"""A scripted person: a stand-in for one at a keyboard, whom anyone can repeat."""
+"""Scripted person: a repeatable stand-in for a person at a keyboard."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -12,16 +12,16 @@ from warp_torchrl.validation import check_fields, did_you_mean
 
 @dataclass(frozen=True, kw_only=True)
 class Person:
-    """How a scripted person corrects a policy.
+    """Rule by which a scripted person corrects a policy.
 
-    They take over the vehicle whose policy is least sure, one at a time since they have one keyboard, drive it as a
-    baseline would with a delay and with errors, and hand it back when its policy is sure again.
+    The person takes over the vehicle whose policy is least sure, one at a time, drives it as a baseline would with a
+    delay and with errors, and hands it back when its policy is sure again.
 
     Attributes:
-        by: The baseline that they act as, one of ``TEACHERS``.
-        delay: Steps until they do what they saw fit; a vehicle that they have just taken over waits for as long.
-        error: Probability of a random open act in place of the baseline's.
-        threshold: Probability of its likeliest act below which a policy is not sure; at 1 they always drive.
+        by: The baseline that drives, one of ``TEACHERS``.
+        delay: Reaction time [steps]; a vehicle that was just taken over waits for as long.
+        error: Probability of a random open act instead of the baseline's.
+        threshold: Probability of its likeliest act below which a policy is not sure; at 1 the person always drives.
 
     Raises:
         ValueError: If the baseline is unknown or a value is out of its range.
@@ -55,11 +55,11 @@ class ScriptedPerson:
         self._draws = torch.Generator().manual_seed(seed)
 
     def drive(self, chances: Tensor, advice: Tensor, is_open: Tensor) -> int | None:
-        """Choose the vehicle that they drive in a step, and return the act that they ask for; None asks for nothing.
+        """Choose the vehicle to drive in a step, and return its act; None for no act.
 
         Args:
             chances: Probability of each act by the policy, float32 [A, actions].
-            advice: What the baseline would do now, int64 [A].
+            advice: The baseline's actions, int64 [A].
             is_open: Acts that do something, bool [A, actions].
         """
         sure = torch.where(is_open.any(-1), chances.amax(-1), 1.0)  # one that can do nothing needs nobody

@@ -1,4 +1,4 @@
-"""Recordings in numbers: whose their actions were, and how much forest each saved."""
+"""Summaries of recordings: actions by mover, and forest saved."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -11,7 +11,7 @@ _LONGEST = 80  # characters of a cell
 
 
 class Summary(NamedTuple):
-    """A recording in numbers.
+    """Summary of a recording.
 
     Attributes:
         name: Of its folder.
@@ -35,7 +35,7 @@ class Summary(NamedTuple):
 
 
 def summary(folder: Path, recording: Recording) -> Summary:
-    """Return the numbers of the recording in a folder."""
+    """Return the summary of the recording in a folder."""
     return Summary(
         name=folder.name,
         scenario=recording.scenario,
