@@ -1,1 +1,1 @@
-"""Measures how fast the software is, and how hard its scenarios are."""
+"""Benchmarks of speed, and of the difficulty of scenarios."""

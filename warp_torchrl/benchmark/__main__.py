@@ -1,7 +1,7 @@
-"""Measures speed, calibrates scenarios and checks fires: ``warp benchmark WHAT``.
+"""Speed, calibration of scenarios and checks of fires: ``warp benchmark WHAT``.
 
-WHAT is tick, env, train, scaling, tasks, rewards, generalist, fires, ellipses or predict; several are measured one
-after the other. Alone, gpu measures all that a card is asked, in under five minutes, and writes it to a file.
+WHAT is tick, env, train, scaling, tasks, rewards, generalist, fires, ellipses or predict; several run one after the
+other. gpu runs alone: it measures everything on a card in under five minutes, and writes it to a file.
 """
 
 import argparse
@@ -52,7 +52,7 @@ _WORLDS = 256
 
 
 def _speed(measure: Callable[..., Rows], options: Namespace, **more: Any) -> Rows:
-    """Measure each scenario asked for, or ``large`` as the targets have it."""
+    """Measure the scenarios of the command line; without one, ``large`` with the settings of the speed targets."""
     asked: list[tuple[str, Sequence[str]]] = [(name, ()) for name in options.scenario or ()] or [LARGE]
     return [
         row
@@ -219,7 +219,7 @@ def _gpu(parser: argparse.ArgumentParser, options: Namespace) -> None:
 
 @one_line_end()
 def main(arguments: list[str] | None = None) -> None:
-    """Measure what the command line asks for, and print it."""
+    """Run the benchmarks that the command line names, and print the results."""
     parser = _parser()
     options = parser.parse_args(arguments)
     if options.plot is not None and find_spec("matplotlib") is None:

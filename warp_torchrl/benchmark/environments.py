@@ -1,4 +1,4 @@
-"""How fast the environment is, and the paper's stack: a PettingZoo environment of one world in NumPy."""
+"""Speed of the environment, and of the paper's stack: a PettingZoo environment of one world in NumPy."""
 
 from collections.abc import Callable, Sequence
 from functools import partial

@@ -1,4 +1,4 @@
-"""Fires alone: how long a thousand take under each law, and how true the ellipses of law ``rate`` are."""
+"""Fires without vehicles: time of a thousand under each law, and errors of the ellipses of law ``rate``."""
 
 import math
 import time
@@ -31,10 +31,10 @@ RATIOS = {1.0: 0.0, 2.3: 17.8 / 3.6, 4.6: 36.3 / 3.6}
 
 
 def law_times(fires: int) -> list[dict[str, Any]]:
-    """Return the seconds that so many fires on one map of 126 x 127 cells take under each law, one row a law.
+    """Return the seconds of ``fires`` fires on one map of 126 x 127 cells under each law, one row per law.
 
-    Law ``rate`` burns for 24 hours of the weather ``august``, the others for so many ticks as their fires cross the map
-    in, in a wind of 6 m/s.
+    Law ``rate`` burns for 24 hours of the weather ``august``, the others for the ticks in which their fires cross the
+    map, in a wind of 6 m/s.
     """
     ground = Perlin(size=_SIZE, relief=200.0, ages="oldest")(world_key(torch.zeros(1, dtype=torch.int64)))
     lit = torch.zeros(_SIZE, dtype=torch.bool)
@@ -53,7 +53,7 @@ def law_times(fires: int) -> list[dict[str, Any]]:
 
 
 def ellipse_errors(reach: int, deviations: Sequence[float]) -> list[dict[str, Any]]:
-    """Return how fires on uniform ground differ from the told ellipse after their heads should have gone so many cells.
+    """Return the differences of fires on uniform ground from the expected ellipse whose head travels ``reach`` cells.
 
     A row for each ratio of length to breadth, bearing of the wind against the grid, and ``cell_deviation``.
     """
@@ -67,7 +67,7 @@ def ellipse_errors(reach: int, deviations: Sequence[float]) -> list[dict[str, An
 
 
 def fire_table(rows: list[dict[str, Any]]) -> str:
-    """Return what ``law_times`` or ``ellipse_errors`` returned as a table."""
+    """Return the rows of ``law_times`` or ``ellipse_errors`` as a table."""
     return table([entry(heading) for heading in rows[0]], rows)
 
 

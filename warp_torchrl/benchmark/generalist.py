@@ -1,4 +1,4 @@
-"""One policy on every kind of fire, beside the best baseline of each, or a policy that knows that kind alone."""
+"""One policy on every kind of fire, beside the best baseline of each, or a policy trained on that kind only."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -16,7 +16,7 @@ from warp_torchrl.runs.policies.trained import TrainedPolicy
 
 
 class Place(NamedTuple):
-    """Where a policy is played: a scenario with what differs from it.
+    """A scenario with its overrides, on which a policy plays.
 
     Attributes:
         name: Of its row.
@@ -114,7 +114,7 @@ def _device(policy: TrainedPolicy) -> torch.device:
 
 
 def _batches(place: Place, policy: TrainedPolicy, episodes: int) -> Iterator[tuple[WildfireEnv, int]]:
-    """Yield worlds that play at once, and the seed of their first, until there are so many fires."""
+    """Yield the worlds of each batch, and the seed of their first, for ``episodes`` fires in all."""
     height, width = _env(place, policy, FIRST_SEED, n_worlds=1).world.size
     most = max(1, _CELLS // (height * width))
     for start in range(0, episodes, most):
@@ -123,7 +123,7 @@ def _batches(place: Place, policy: TrainedPolicy, episodes: int) -> Iterator[tup
 
 
 def _saved(place: Place, policy: TrainedPolicy, episodes: int) -> np.ndarray:
-    """Return what a policy saves of each fire, float64 [episodes]."""
+    """Return the trees that a policy saves in each fire, float64 [episodes]."""
     batches = _batches(place, policy, episodes)
     return np.concatenate([play(env, policy.fitted(env), first, policy.mode)["saved"] for env, first in batches])
 
@@ -131,7 +131,7 @@ def _saved(place: Place, policy: TrainedPolicy, episodes: int) -> np.ndarray:
 def _saved_by_baselines(
     place: Place, policy: TrainedPolicy, names: Sequence[str], episodes: int
 ) -> dict[str, np.ndarray]:
-    """Return what baselines save of each fire, float64 [episodes] by name."""
+    """Return the trees that baselines save in each fire, float64 [episodes] by name."""
     parts = [play_heuristics(env, first, names) for env, first in _batches(place, policy, episodes)]
     return {name: np.concatenate([part[name]["saved"] for part in parts]) for name in names}
 
@@ -162,5 +162,5 @@ def table_line(row: Mapping[str, Any]) -> str:
 
 
 def _count(rows: Sequence[Mapping[str, Any]], key: str, sign: int) -> int:
-    """Return on how many places a difference has a sign that its interval does not doubt."""
+    """Return the number of places where a difference, with its whole interval, has a sign."""
     return sum(min(sign * bound for bound in row[key]["ci95"]) > 0.0 for row in rows)

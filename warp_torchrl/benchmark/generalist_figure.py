@@ -1,4 +1,4 @@
-"""The figure of a policy on every kind of fire, beside its rival on each."""
+"""Figure of a policy on every kind of fire, beside its rival on each."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +11,7 @@ _DRAWN = {"policy": ("policy", BLUE, -0.15), "beside": ("rival, named on the rig
 
 
 def draw_generalist(rows: Sequence[dict[str, Any]], path: Path) -> None:
-    """Draw what the policy and its rival save of each kind of fire, with 95 % intervals.
+    """Draw the trees saved by the policy and its rival for each kind of fire, with 95 % intervals.
 
     Args:
         rows: What ``generalise`` yields.

@@ -1,6 +1,6 @@
-"""All that a GPU is asked, in under five minutes, as one JSON: speed, waits, memory, and equality with a CPU's worlds.
+"""Benchmark of a GPU in under five minutes, as one JSON: speed, waits, memory, and equality with a CPU's worlds.
 
-Each part is written when it is done; what fails is told in its place, so that the others are not lost.
+Each part is written when it is done; a part that fails is replaced by its error, so that the others are not lost.
 """
 
 import gc
@@ -36,17 +36,17 @@ _WAYS: dict[str, dict[str, Any]] = {"eager": {}, "graph": {"graph": True}, "comp
 
 @dataclass(frozen=True, kw_only=True)
 class Size:
-    """How much is measured.
+    """Size of the benchmark.
 
     Attributes:
-        worlds: Numbers of worlds whose ticks and steps are timed.
-        steps: Steps in a repeat.
-        repeats: Times that each speed is measured.
-        compared: Worlds that are compared with the CPU's, and for how many steps.
-        starts: Worlds whose starts are compared.
+        worlds: Numbers of worlds for ticks and steps.
+        steps: Steps per repeat.
+        repeats: Repeats of each speed.
+        compared: Number of worlds that are compared with the CPU's, and number of steps.
+        starts: Number of worlds whose starts are compared.
         training: Overrides of the recipe.
-        ways: Of ``_WAYS``.
-        seconds: After so many no further part begins.
+        ways: Some of ``_WAYS``.
+        seconds: Time after which no further part begins [s].
     """
 
     worlds: tuple[int, ...] = (256, 1024, 4096, 8192, 16384)
@@ -75,9 +75,9 @@ def measure_gpu(device: str, path: Path, size: Size, tell: Callable[[str], objec
     """Measure everything, write it to a file as JSON, and return whether every part was measured.
 
     Args:
-        device: ``cuda``, or ``cpu``, which takes a GPU's roads.
+        device: ``cuda``, or ``cpu``, which runs the GPU's code.
         path: The file.
-        size: How much is measured.
+        size: Size of the benchmark.
         tell: Called with a line about each part.
     """
     begin = time.perf_counter()
@@ -103,7 +103,7 @@ def measure_gpu(device: str, path: Path, size: Size, tell: Callable[[str], objec
 
 
 def _told(part: Callable[[], Any], device: str) -> dict[str, Any]:
-    """Return what a part found, or why it failed: on a borrowed card the other parts are worth their figures."""
+    """Return the result of a part, or its error: on a borrowed card the other parts are still worth their figures."""
     try:
         with unread() if device == "cpu" else nullcontext():
             return part()
@@ -129,7 +129,7 @@ def _machine(device: str) -> dict[str, Any]:
 
 
 def _equality(device: str, n_worlds: int, steps: int) -> dict[str, Any]:
-    """Play the same actions on the device and on the CPU, and return where the worlds and what is seen differ."""
+    """Play the same actions on the device and on the CPU, and return the differences of worlds and observations."""
     here = make_env(_SCENARIO, n_worlds=n_worlds, device="cpu")
     there = make_env(_SCENARIO, n_worlds=n_worlds, device=device)
     one, other, seen = here.reset(), there.reset(), {"reward": 0.0, "observation": 0.0}
@@ -146,7 +146,7 @@ def _equality(device: str, n_worlds: int, steps: int) -> dict[str, Any]:
 
 
 def _starts(device: str, n_worlds: int) -> dict[str, Any]:
-    """Return in how many of many worlds the device starts otherwise than the CPU, and in what."""
+    """Return the number of worlds that start differently on the device and on the CPU, and the fields that differ."""
     here, there = (make_env(_SCENARIO, n_worlds=n_worlds, device=each) for each in ("cpu", device))
     here.reset()
     there.reset()
@@ -161,7 +161,7 @@ def _furthest(gaps: Any) -> float:
 
 
 def _waits(device: str, overrides: tuple[str, ...]) -> dict[str, Any]:
-    """Return how often steps, and an iteration of training, wait for the device, and where."""
+    """Return the synchronisations of steps, and of an iteration of training, by line."""
     with _trained(device, [*overrides]) as (training, batches):
         training._learn(next(batches))
         shown, policy = training.env.reset(), training.learner.explore
@@ -206,7 +206,7 @@ def _ticks(device: str, n_worlds: int, size: Size) -> dict[str, Any]:
 
 
 def _training(device: str, way: str, size: Size) -> dict[str, Any]:
-    """Return the rate at which the recipe collects and learns."""
+    """Return the rate of collection and learning of the recipe."""
     _forget_peak(device)
     extra = [f"{name}={str(name in _WAYS[way]).lower()}" for name in ("graph", "compile")]
     with _trained(device, [*size.training, *extra]) as (training, batches):
@@ -243,5 +243,5 @@ def _forget_peak(device: str) -> None:
 
 
 def _peak(device: str) -> float:
-    """Return the most memory that was held [GiB]: of the device, or of the process on a CPU."""
+    """Return the peak memory [GiB]: of the device, or of the process on a CPU."""
     return peak_memory() if device == "cpu" else torch.cuda.max_memory_allocated(device) / 2**30

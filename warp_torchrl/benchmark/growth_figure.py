@@ -1,4 +1,4 @@
-"""The picture of how the cost of a step grows."""
+"""Figure of the cost of a step by worlds, agents and cells."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -75,7 +75,7 @@ def _share_y(row: list["Axes"]) -> None:
 
 
 def _fixed(row: dict[str, Any], varies: str) -> str:
-    """Return what does not vary."""
+    """Return the constant numbers of a sweep."""
     parts = {
         "worlds": f"{row['worlds']} worlds",
         "agents": f"{row['agents']} agents",

@@ -18,7 +18,7 @@ from warp_torchrl.world.arrays.compile import vectors
 
 
 def machine(device: str) -> dict[str, Any]:
-    """Return the machine's properties that a comparison of figures needs."""
+    """Return the machine's properties that matter for a comparison of figures."""
     return {
         "platform": platform.platform(),
         "processor": _processor(),

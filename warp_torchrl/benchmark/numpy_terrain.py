@@ -32,7 +32,7 @@ def new_ground(rng: np.random.Generator, size: tuple[int, int]) -> tuple[np.ndar
 
 
 def light(rng: np.random.Generator, fuel: np.ndarray, n_fires: int) -> np.ndarray:
-    """Return which cells to light, bool [H, W]: 3 x 3 patches of fuel round cells of the middle.
+    """Return the cells to light, bool [H, W]: 3 x 3 patches of fuel round cells of the middle.
 
     A map with too few trees there is lit elsewhere.
 

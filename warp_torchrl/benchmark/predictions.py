@@ -24,7 +24,7 @@ _START = datetime(2024, 7, 1)
 
 
 def prediction_costs(sides: Sequence[int], hours: int) -> list[dict[str, Any]]:
-    """Return what one fire costs on square maps of hills and mixed fuels, one row a map.
+    """Return the cost of one fire on square maps of hills and mixed fuels, one row per map.
 
     Args:
         sides: Cells of a side of each map.
@@ -37,7 +37,7 @@ def prediction_costs(sides: Sequence[int], hours: int) -> list[dict[str, Any]]:
 
 
 def prediction_table(rows: Sequence[dict[str, Any]]) -> str:
-    """Return what ``prediction_costs`` returned as a table."""
+    """Return the rows of ``prediction_costs`` as a table."""
     return table([entry(heading) for heading in rows[0]], rows)
 
 

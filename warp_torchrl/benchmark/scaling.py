@@ -1,4 +1,4 @@
-"""How the cost of a step grows with worlds, agents and cells, and how much memory a world takes."""
+"""Growth of the cost of a step with worlds, agents and cells, and memory of a world."""
 
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any

@@ -35,16 +35,16 @@ class Stopwatch:
 
 
 def training_shares(training: Training, batches: Iterator[list[TensorDictBase]], count: int) -> list[dict[str, Any]]:
-    """Measure where the time of some batches goes.
+    """Measure the shares of parts of the training loop in the time of some batches.
 
     Args:
         training: The run; it learns from the batches.
-        batches: Its own, one of each kind of worlds at a time.
+        batches: Batches of the run, one of each kind of worlds at a time.
         count: Batches to measure.
 
     Returns:
-        A row for each part, with ``seconds`` a batch and its ``share``. The collector's are what the environment and
-        the policy leave to it; backward ends before the gradients are clipped, which is the optimiser's.
+        A row for each part, with ``seconds`` per batch and its ``share``. The collector's share excludes the
+        environment and the policy; backward ends before the gradients are clipped, which belongs to the optimiser.
     """
     with _watched(training, clock(training.env.device.type)) as watch:
         for _ in range(count):
@@ -80,7 +80,7 @@ def share_table(rows: list[dict[str, Any]]) -> str:
 
 @contextmanager
 def _watched(training: Training, now: Clock) -> Iterator[Stopwatch]:
-    """Let a stopwatch run over a training's parts; all is as it was when the context ends."""
+    """Let a stopwatch run over a training's parts, until the context ends."""
     watch, learner = Stopwatch(now), training.learner
     samples = learner.samples
 
@@ -109,7 +109,7 @@ def _watched(training: Training, now: Clock) -> Iterator[Stopwatch]:
 
 
 def _timed(watch: Stopwatch, call: Callable[..., Any], before: str, after: str) -> Callable[..., Any]:
-    """Return a function whose time counts as ``after``, and the time until then as ``before``."""
+    """Return a function whose time counts as ``after``, and the time before the call as ``before``."""
 
     def timed(*args: Any, **kwargs: Any) -> Any:
         watch.lap(before)

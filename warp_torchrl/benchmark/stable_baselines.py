@@ -26,7 +26,8 @@ def reason_against(plan: RunConfig) -> str | None:
 def open_stable_baselines(plan: RunConfig) -> tuple[Callable[[], object], Callable[[], None]]:
     """Return a function that learns from one batch of the settings' size, and a function that closes the worlds.
 
-    Networks, epochs, minibatch, worlds and steps are the plan's; each agent has its own sample, as SB3 counts them.
+    Networks, epochs, minibatch, worlds and steps are those of the run; each agent has a sample per step, as SB3
+    counts them.
 
     Args:
         plan: Of an algorithm ``Ppo`` and a model ``Mlp``.

@@ -8,9 +8,9 @@ Column = tuple[str, Callable[[Mapping[str, Any]], str]]
 
 
 def table(columns: Sequence[Column], rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return rows under headings, the first column to the left and the others to the right.
+    """Return rows under headings, the first column left-aligned and the others right-aligned.
 
-    A row with ``skipped`` has its reason in place of figures, below the others.
+    A row with ``skipped`` stands below the others, with its reason.
     """
     shown = [row for row in rows if "skipped" not in row]
     lines = [[heading for heading, _ in columns], *([show(row) for _, show in columns] for row in shown)]

@@ -47,7 +47,7 @@ def calibrate(scenario: str, device: str, episodes: int, overrides: Sequence[str
 def pair(
     scenario: str, device: str, episodes: int, policies: Sequence[str], overrides: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """Return the trees saved by some heuristics, how many the last saves more, and the time that each takes.
+    """Return the trees saved by some heuristics, the gain of the last, and the time of each.
 
     Returns:
         ``calibrate``'s row for these heuristics, with ``differences``, of the last to each other one by name, on the
@@ -88,7 +88,7 @@ def rank_rewards(scenario: str, device: str, episodes: int, overrides: Sequence[
 
 
 def mean_returns(row: dict[str, Any]) -> dict[str, Any]:
-    """Return a row of ``rank_rewards`` with the mean over its episodes."""
+    """Return a row of ``rank_rewards`` averaged over its episodes."""
     means = {
         name: {policy: float(values.mean()) for policy, values in returns.items()}
         for name, returns in row["returns"].items()

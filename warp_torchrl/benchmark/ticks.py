@@ -72,7 +72,7 @@ def tick_cost(
 
 
 def numpy_copy(state: WorldState, index: int, fire: Fire, cell_size: float) -> NumpyWorld:
-    """Return one of some worlds as it is now, in NumPy."""
+    """Return one of some worlds in its present state, in NumPy."""
 
     def plane(name: str) -> np.ndarray:
         return getattr(state, name)[index].numpy(force=True)

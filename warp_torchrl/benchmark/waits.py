@@ -1,7 +1,7 @@
-"""Counts where the program waits for a GPU: where a result is read back, or a size depends on it.
+"""Synchronisations with a GPU: reads of results, and sizes that depend on results.
 
-On CUDA torch tells of them by itself (``torch.cuda.set_sync_debug_mode``). On a CPU nothing waits, so the operations
-that would are counted: what is found there is the same but for copies between devices, which a CPU has none of.
+On CUDA torch reports them itself (``torch.cuda.set_sync_debug_mode``). On a CPU nothing waits, so the operations that
+would wait on a GPU are counted; only copies between devices are missing there.
 """
 
 import traceback
@@ -38,7 +38,7 @@ _SYNCHRONISES = "called a synchronizing CUDA operation"
 
 
 class Waits:
-    """The waits that were counted, by the line of this package that asked for each."""
+    """Counted synchronisations, by the line of this package that caused each."""
 
     def __init__(self) -> None:
         self.places: Counter[str] = Counter()
@@ -46,20 +46,20 @@ class Waits:
 
     @property
     def count(self) -> int:
-        """Return how many there were."""
+        """Return their number."""
         return self.places.total()
 
     def add(self, what: str) -> None:
-        """Count a wait of the line that runs now."""
+        """Count one for the line that runs now."""
         self.places[f"{_place()}: {what}"] += 1
 
 
 @contextmanager
 def counted_waits(device: torch.device | str) -> Iterator[Waits]:
-    """Count the waits of what runs inside, for a GPU, or that there would be for one in place of the CPU.
+    """Count the synchronisations of a block on a GPU; on a CPU, the ones that it would cause on a GPU.
 
     Args:
-        device: Where the worlds live. If that is a CPU, what a GPU would compute must run inside
+        device: Device of the worlds. If it is a CPU, the code that a GPU would run must be inside
             ``warp_torchrl.system.device.unread()``.
     """
     found = Waits()
