@@ -1,4 +1,4 @@
-"""What a baseline reaches in the worlds of a training, to judge the team by."""
+"""Results of a baseline in the worlds of a training, for comparison with the team."""
 
 from collections.abc import Sequence
 
@@ -9,13 +9,13 @@ from warp_torchrl.world.world import World
 
 
 def reached(plan: RunConfig, worlds: Sequence[World], name: str, count: int, measure: str) -> list[float]:
-    """Return what a heuristic reaches in each of several worlds, the mean of a measure over so many training fires.
+    """Return a heuristic's mean of a measure in each of several worlds, over ``count`` training fires each.
 
     Args:
         plan: Of the training.
-        worlds: Their rules.
-        name: Of the heuristic.
-        count: Fires of each.
+        worlds: Rules of the worlds.
+        name: Name of the heuristic.
+        count: Number of fires in each world.
         measure: One of an episode's metrics.
     """
     first = first_world_seed(plan.seed)

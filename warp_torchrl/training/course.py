@@ -1,4 +1,4 @@
-"""A training's way through its curriculum: how the team stands at each level, and what its worlds draw from that."""
+"""Levels of a curriculum in a training: the team's results at each level, and the draws of the next levels."""
 
 import logging
 from collections.abc import Mapping
@@ -17,12 +17,12 @@ log = logging.getLogger("warp_torchrl")
 
 
 class Course:
-    """What a curriculum makes of a training's episodes; the same in each of its processes.
+    """Draws the levels of a training's episodes; the draws are the same in each of its processes.
 
     Args:
         curriculum: The rule.
-        env: Whose worlds draw their levels by it.
-        baseline: What a baseline reached at each level, where the rule asks for one.
+        env: Worlds whose levels are drawn.
+        baseline: Result of a baseline at each level, if the rule uses one.
     """
 
     def __init__(self, curriculum: Curriculum, env: LeveledEnv, baseline: tuple[float, ...] = ()) -> None:
@@ -36,7 +36,7 @@ class Course:
         self.env.draw_by(self.chances)
 
     def columns(self, batch: TensorDictBase) -> dict[str, float | None]:
-        """Judge the team by the episodes that ended in a batch [B, T] of all processes.
+        """Update the team's results with the episodes that ended in a batch [B, T] of all processes.
 
         Returns:
             The columns of ``metrics.csv``: the mean level of the draws while the batch was played, each level's chance,
@@ -57,23 +57,23 @@ class Course:
         }
 
     def state_dict(self) -> dict[str, Any]:
-        """Return how the team stands."""
+        """Return the results at each level."""
         return self.standing.state_dict()
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Restore what ``state_dict`` returned; ``draw`` lets it be drawn by."""
+        """Restore the results of ``state_dict``; ``draw`` then uses them."""
         self.standing = Standing.of(state)
 
 
 def course(plan: RunConfig, env: WildfireEnv) -> Course | None:
-    """Return a run's course, for which its baseline plays if there is one; None where it has no curriculum."""
+    """Return the sampler of a run's levels, after its baseline has played; None without a curriculum."""
     if not isinstance(env, LeveledEnv):
         return None
     return Course(plan.curriculum, env, _baseline(plan))
 
 
 def _baseline(plan: RunConfig) -> tuple[float, ...]:
-    """Return what the curriculum's baseline reaches at each level, on worlds of the training."""
+    """Return the results of the curriculum's baseline at each level, on worlds of the training."""
     if plan.curriculum.asks_for is None:
         return ()
     name, count = plan.curriculum.asks_for

@@ -1,4 +1,4 @@
-"""Optimiser steps that are taken with finite numbers alone, and what a batch's steps came to."""
+"""Optimiser steps with finite losses and gradients only, and sums over a batch's steps."""
 
 from collections.abc import Mapping
 
@@ -12,10 +12,10 @@ __all__ = ["FiniteSteps", "NumericalFailure"]
 
 
 class FiniteSteps:
-    """Takes optimiser steps, but none from the first loss or gradient on that is not finite.
+    """Takes optimiser steps until the first loss or gradient that is not finite.
 
-    A CPU is asked before each step. On a GPU that would be a wait at each: there a flag stays on the device, by which
-    a fused optimiser leaves the weights as they are, and it is read once a batch.
+    On a CPU every step is checked. On a GPU each check would be a synchronisation: there a flag stays on the device,
+    with which a fused optimiser leaves the weights unchanged, and it is read once per batch.
 
     Args:
         optimizer: A fused one: it reads ``found_inf``, as torch's ``GradScaler`` has it.
@@ -51,7 +51,7 @@ class FiniteSteps:
         self._first.copy_(torch.where(self._first[0] > 0.0, self._first, now))  # in its place: it may be recorded
 
     def read(self, sums: Mapping[str, Tensor], frames: int) -> dict[str, float]:
-        """Return what the steps of a batch came to, read from the device at once.
+        """Return the sums of a batch's steps, read from the device at once.
 
         Args:
             sums: Numbers by name, [] each.

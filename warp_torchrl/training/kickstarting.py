@@ -1,6 +1,6 @@
 """Kickstarting: a behaviour-cloning term in the loss, whose weight falls to 0 during training.
 
-The student acts; a teacher, a heuristic or a trained policy, labels the visited states with its own actions (Schmitt et
+The student acts; a teacher, a heuristic or a trained policy, labels the visited states with its actions (Schmitt et
 al., "Kickstarting Deep Reinforcement Learning", 2018).
 """
 
@@ -25,9 +25,9 @@ def kickstart(learner: Learner, plan: Imitation, env: WildfireEnv, factor: float
 
     Args:
         learner: A learner whose policy writes logits first.
-        plan: Names the teacher, who may see more than the team does.
+        plan: Names the teacher, which may see more than the team does.
         env: The training environment.
-        factor: By what the plan's weight is multiplied.
+        factor: Factor on the plan's weight.
 
     Raises:
         ConfigError: If the teacher is a trained policy that does not fit, remembers or talks.

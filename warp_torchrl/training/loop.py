@@ -232,7 +232,7 @@ class Training(Learning):
         return disk.size(self.state_dict()) + (parallel.size() - 1) * disk.size(self._own())
 
     def _is_regular(self, frames: int) -> bool:
-        """Return whether ``checkpoint.interval`` asks for a checkpoint at this number of frames."""
+        """Return whether a checkpoint is due at this number of frames, by ``checkpoint.interval``."""
         return passes(self.run_config.checkpoint.interval, frames, self.last_batch)
 
     def state_dict(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The rows of ``metrics.csv`` and the lines of the log."""
+"""Rows of ``metrics.csv``, and lines of the log."""
 
 from collections.abc import Mapping, Sequence
 
@@ -32,7 +32,7 @@ TRAIN_COLUMNS = (
 def episode_columns(
     batches: Sequence[TensorDictBase], kinds: Sequence[str] = ("",)
 ) -> tuple[dict[str, float | None], list[str]]:
-    """Return what batches [B, T] of all processes hold, read from the device at once.
+    """Return the metrics of batches [B, T] of all processes, read from the device at once.
 
     Args:
         batches: One of each kind of worlds.
@@ -69,7 +69,7 @@ def _sums(batch: TensorDictBase, names: Sequence[str]) -> Tensor:
 
 
 def _unsound(batch: TensorDictBase) -> list[Tensor]:
-    """Return which ``NUMBERS`` of a batch are not finite, bool [] each, without reading them."""
+    """Return which ``NUMBERS`` of a batch are not finite, bool [] each, without a synchronisation."""
     held: dict[str, list[Tensor]] = {what: [] for what in NUMBERS}
     for key, value in batch.items(include_nested=True, leaves_only=True):
         way = key if isinstance(key, tuple) else (key,)
@@ -80,7 +80,7 @@ def _unsound(batch: TensorDictBase) -> list[Tensor]:
 
 
 def _what(key: Key) -> str:
-    """Return which of ``NUMBERS`` an entry of a batch is."""
+    """Return the item of ``NUMBERS`` to which an entry of a batch belongs."""
     if key == REWARD:
         return NUMBERS[0]
     seen = key[:2] in (OBSERVATION, SENT, RADIO) or key[-1].startswith((STATE, CANONICAL[-1]))

@@ -1,4 +1,4 @@
-"""An optimiser step as one recording of a GPU."""
+"""An optimiser step as a CUDA graph."""
 
 from collections.abc import Callable
 
@@ -12,14 +12,14 @@ Update = Callable[[TensorDictBase], dict[str, Tensor]]
 
 
 class RecordedUpdate:
-    """A function that learns from a sample, recorded.
+    """A function that learns from a sample, recorded as a CUDA graph.
 
-    Numbers that a schedule changes must be tensors: so the learning rate becomes one. Samples of each size, as batches
-    grow or the last of a pass is smaller, have a recording of their own.
+    Numbers that a schedule changes must be tensors: so the learning rate becomes one. There is one graph for each size
+    of samples: batches grow, and the last sample of a pass may be smaller.
 
     Args:
         update: Learns from a sample and returns numbers by name, [] each.
-        optimizer: With which it learns.
+        optimizer: Optimiser of the function.
     """
 
     def __init__(self, update: Update, optimizer: torch.optim.Optimizer) -> None:
@@ -29,7 +29,7 @@ class RecordedUpdate:
         self._names: list[str] = []
 
     def __call__(self, sample: TensorDictBase) -> dict[str, Tensor]:
-        """Learn from a sample, and return what the update does."""
+        """Learn from a sample, and return the numbers of the update."""
         if self._like is None:
             _make_capturable(self._optimizer)
         self._like = sample
@@ -53,7 +53,7 @@ def _leaves(sample: TensorDictBase) -> list[Tensor]:
 
 
 def _make_capturable(optimizer: torch.optim.Optimizer) -> None:
-    """Let an optimiser's steps be recorded, with a learning rate that may change after."""
+    """Let a CUDA graph record an optimiser's steps, with a learning rate that may change later."""
     for group in optimizer.param_groups:
         device = group["params"][0].device
         rate = group["lr"]

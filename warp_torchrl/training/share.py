@@ -1,4 +1,4 @@
-"""The shares of a training: what it plays of each kind of worlds, and learns of that."""
+"""Worlds of each kind in a training, with their learners and collections."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,9 +21,9 @@ class Played:
     """The worlds of one kind that this process plays.
 
     Attributes:
-        kind: Their rules.
+        kind: Rules of the worlds.
         env: The worlds.
-        first_seed: Of the first.
+        first_seed: Seed of the first world.
         weight: Their share of this process's worlds.
     """
 
@@ -34,7 +34,7 @@ class Played:
 
 
 def played(plan: RunConfig) -> list[Played]:
-    """Return what this process plays: the worlds of each kind, with seeds one after the other."""
+    """Return this process's worlds of each kind, with consecutive seeds."""
     worlds = plan.n_worlds // parallel.size()
     seed, found = first_world_seed(plan.seed) + worlds * parallel.rank(), []
     for kind, count in zip(plan.kinds, plan.worlds_of_kinds(worlds), strict=True):
@@ -57,12 +57,12 @@ def learners(plan: RunConfig, played: Sequence[Played]) -> list[Learner]:
 
 
 class Share:
-    """What this process plays of one kind of worlds, and learns of that.
+    """One kind of worlds that this process collects and learns from.
 
     Args:
         played: The worlds.
-        learner: Learns of them.
-        collector: Says how they are played.
+        learner: Learner of these worlds.
+        collector: Configuration of the collection.
         plan: Of the training.
     """
 
@@ -72,7 +72,7 @@ class Share:
         self.collection: Collection = collector.open(played.env, learner, plan.make_training_env, played.first_seed)
 
     def state_dict(self) -> dict[str, Any]:
-        """Return everything that an exact resume needs of it."""
+        """Return the state that an exact resume needs."""
         return {
             "keeps": {name: each.state_dict() for name, each in self.learner.keeps.items()},
             "collection": self.collection.state_dict(),

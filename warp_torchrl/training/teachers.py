@@ -1,4 +1,4 @@
-"""Who labels what a team visits: a heuristic, or a trained policy, which sees the worlds as it was trained to."""
+"""Teachers: heuristics, or trained policies with the observation of their own training."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -22,12 +22,12 @@ from warp_torchrl.runs.policies.trained import MODES
 
 
 class TrainedTeacher:
-    """A trained policy that tells what it would do, in its own mode, of worlds that it sees as it was trained to.
+    """A trained policy that labels worlds with its actions, in its mode and with the observation of its training.
 
     Args:
-        found: Its checkpoint.
-        name: By which it was called.
-        env: The training environment, whose worlds it looks at.
+        found: Checkpoint.
+        name: Name in the configuration.
+        env: The training environment.
 
     Raises:
         ConfigError: If it does not fit the worlds, or remembers or talks, so that it cannot judge a state by itself.
@@ -52,11 +52,11 @@ class TrainedTeacher:
             return self._policy(shown)
 
     def state_dict(self) -> dict[str, Any]:
-        """Return what tells it from another."""
+        """Return the digest of its weights."""
         return {"digest": self._digest}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Check that it is who taught before.
+        """Check that it has the weights of the teacher before.
 
         Raises:
             ConfigError: If it is not.
@@ -66,7 +66,7 @@ class TrainedTeacher:
 
 
 def teacher(name: str, env: WildfireEnv) -> Heuristic | TrainedTeacher:
-    """Return who teaches, by name: a heuristic, a shipped policy, a run folder or a checkpoint.
+    """Return the teacher of a name: a heuristic, a shipped policy, a run folder or a checkpoint.
 
     Raises:
         ConfigError: See ``TrainedTeacher``.

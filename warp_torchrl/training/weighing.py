@@ -1,4 +1,4 @@
-"""How much the losses of a mixture's kinds count in a training, by what is left to learn."""
+"""Weights of a mixture's kinds in the loss, by the trees that remain to be saved."""
 
 import logging
 from collections.abc import Mapping, Sequence
@@ -15,12 +15,12 @@ _MEMORY = 0.8
 
 
 class Weighing:
-    """What each kind counts, by what the team saves of it and what a baseline does.
+    """Weights of the kinds, from the trees saved by the team and by a baseline.
 
     Args:
-        mixture: Says how.
-        names: Of the kinds.
-        shares: Of the worlds.
+        mixture: Configuration.
+        names: Names of the kinds.
+        shares: Shares of the worlds.
         baseline: Shares of trees that the baseline saves.
     """
 
@@ -36,7 +36,7 @@ class Weighing:
         return weights(self.shares, self.saved, self.baseline, self.mixture.floor)
 
     def columns(self, row: Mapping[str, float | None]) -> dict[str, float | None]:
-        """Return the columns of the weights by which a batch was learned, and learn what was saved from its row."""
+        """Return the columns of the weights of a batch, and update the team's results from its row."""
         found: dict[str, float | None] = {
             f"mixture/weight_{name}": weight for name, weight in zip(self.names, self.weights(), strict=True)
         }
@@ -56,7 +56,7 @@ class Weighing:
 
 
 def weighing(plan: RunConfig, shares: Sequence[float]) -> Weighing | None:
-    """Return how a run weighs its kinds, for which the baseline plays first; None where their shares stand."""
+    """Return the weights of a run's kinds, after the baseline has played; None if the shares are the weights."""
     if not isinstance(plan.mixture, Mixture) or plan.mixture.weigh == "share":
         return None
     names, baseline = [kind.name for kind in plan.kinds], plan.mixture.baseline
