@@ -23,12 +23,12 @@ AGENT = ("agents", "agent")
 
 @dataclass(frozen=True)
 class Demonstrations:
-    """Acts of people as networks learn from them.
+    """Acts of people, for networks to learn from.
 
     Attributes:
         acts: Batch size [n], each a team of one: the entries that the actor reads, the action mask, the action and
             ``AGENT``.
-        digest: Of the recordings: with others a run does not go on.
+        digest: Digest of the recordings; a run does not resume with others.
     """
 
     acts: TensorDictBase
@@ -36,7 +36,7 @@ class Demonstrations:
 
 
 def clone(learner: Learner, plan: Imitation, given: Demonstrations | None, n_networks: int, seed: int) -> Learner:
-    """Return the learner with the loss on what people did added; unchanged where nobody did anything.
+    """Return the learner with the cloning loss on people's acts added; unchanged without any.
 
     Args:
         learner: An on-policy learner.
@@ -95,10 +95,10 @@ class _CloningLoss:
 
 
 class _Minibatches:
-    """Draws minibatches of acts, with draws of its own, which a checkpoint keeps.
+    """Random minibatches of acts; a checkpoint keeps the generator.
 
     Args:
-        given: What people did.
+        given: Acts of people.
         size: Acts in a minibatch, of all processes.
         seed: Of the draws.
     """
@@ -113,7 +113,7 @@ class _Minibatches:
         return acts[torch.randint(len(acts), (self.size,), generator=self._draws).to(acts.device)]
 
     def state_dict(self) -> dict[str, Any]:
-        """Return the state of the draws, and what they are of."""
+        """Return the state of the generator, and the digest of the recordings."""
         return {"random": self._draws.get_state(), "recordings": self.given.digest}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
@@ -128,5 +128,5 @@ class _Minibatches:
 
 
 def _repeated(acts: TensorDictBase, times: int) -> TensorDictBase:
-    """Return acts [n] of teams of one as those of teams whose agents all see and do the same."""
+    """Return acts [n] of teams of one as acts of teams whose agents all see and do the same."""
     return acts.apply(lambda each: each.expand(-1, times, *each.shape[2:]))

@@ -1,4 +1,4 @@
-"""Where batches are collected, by TorchRL's collectors: in this process, in several, or on a Ray cluster."""
+"""Collectors of TorchRL: in this process, in several, or on a Ray cluster."""
 
 import os
 from collections.abc import Callable
@@ -84,7 +84,7 @@ class InProcess:
 class MultiProcess(InProcess):
     """Collects in worker processes, each with an equal share of the worlds; they wait while the learner learns.
 
-    World i has the same seed as in-process. A resumed run goes on with new episodes.
+    World i has the same seed as in-process. A resumed run continues with new episodes.
 
     Attributes:
         workers: Number of processes.
@@ -177,7 +177,7 @@ class Ray(MultiProcess):
 def _worlds(make_env: MakeEnv, count: int, seed: int, first_episode: int, parent: int | None) -> WildfireEnv:
     """Return a worker's environment, and seed the worker's generator for sampled actions.
 
-    A worker in the middle of a batch would go on with it when its parent has ended, so it watches that.
+    A worker would otherwise continue its batch after its parent has ended, so it watches the parent.
     """
     if parent is not None:
         end_with(parent)

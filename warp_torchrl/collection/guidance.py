@@ -1,4 +1,4 @@
-"""Exploration by a heuristic: where a learner would act at random, it does what the heuristic does.
+"""Exploration by a heuristic: where a learner would act at random, it takes the heuristic's action.
 
 Haksar and Schwager, "Distributed Deep Reinforcement Learning for Fighting Forest Fires with a Network of Aerial
 Robots", IROS 2018, explore so.
@@ -23,7 +23,7 @@ def guided(learner: Learner, plan: Imitation, env: WildfireEnv) -> Learner:
 
     Args:
         learner: A learner that explores by TorchRL's epsilon-greedy module, the last of its collector's policy.
-        plan: Names the guide, who may see more than the team does.
+        plan: Names the guide, which may see more than the team does.
         env: The training environment.
     """
     if plan.guide is None:
@@ -33,7 +33,7 @@ def guided(learner: Learner, plan: Imitation, env: WildfireEnv) -> Learner:
 
 
 class _Guided(TensorDictModuleBase):
-    """A policy whose epsilon-greedy module is shown the guide's action as the only one that is open."""
+    """A policy whose epsilon-greedy module receives the guide's action as the only open one."""
 
     def __init__(self, policy: TensorDictSequential, explores: EGreedyModule, guide: Heuristic) -> None:
         super().__init__()

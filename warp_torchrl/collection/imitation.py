@@ -1,4 +1,4 @@
-"""The configuration of learning from others: a teacher, people, or both."""
+"""Configuration of imitation: a teacher, people, or both."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,21 +18,21 @@ CLONING_LOSS, CLONING_COLUMN = "loss_bc", "train/cloning_loss"
 
 @dataclass(frozen=True, kw_only=True)
 class Imitation:
-    """Whom a team learns from beside its rewards: a teacher, people, or both.
+    """Sources of imitation besides the rewards: a teacher, people, or both.
 
-    The two losses add up, each a mean over its own samples, under the same weight. Reports of such a policy should say
-    whom it learned from.
+    The two losses add up, each a mean over its samples, under the same weight. Reports of such a policy should name
+    its sources.
 
     Attributes:
-        teacher: Labels what the team visits: one of ``TEACHERS``, a shipped policy, a run folder or a checkpoint; None
-            has no teacher.
-        demonstrations: Folder of recordings, of which the acts of people are cloned; None clones nobody's.
+        teacher: Labels the states that the team visits: one of ``TEACHERS``, a shipped policy, a run folder or a
+            checkpoint; None has no teacher.
+        demonstrations: Folder of recordings, whose acts of people are cloned; None clones nothing.
         minibatch_size: Acts of people in an optimiser step, of all processes.
         weight: Weight of the cloning losses at the start; it falls linearly.
-        weight_end: Weight that stays. A little keeps a team near its teacher where its rewards tell it nothing.
+        weight_end: Weight that stays. A little keeps a team near its teacher where its rewards carry no signal.
         until: Share of the training after which the weight is ``weight_end``.
-        guide: One of ``TEACHERS``, whose actions ``dqn``, ``vdn`` and ``qmix`` take where they would explore at random;
-            None has them explore at random.
+        guide: One of ``TEACHERS``, whose actions ``dqn``, ``vdn`` and ``qmix`` take when they explore; None explores at
+            random.
 
     Raises:
         ValueError: If the teacher or the guide is unknown or a value is out of its range.
@@ -59,12 +59,11 @@ class Imitation:
         return self.weight_end + (self.weight - self.weight_end) * max(0.0, 1.0 - progress / self.until)
 
     def check_fits(self, algorithm: Algorithm, collector: InProcess, model: Mlp) -> None:
-        """Check that the algorithm, the collector and the networks allow whom is learned from.
+        """Check that the algorithm, the collector and the networks allow the sources of imitation.
 
         Raises:
-            ValueError: If the algorithm is off-policy, or not one that a guide helps, a teacher or a guide should act
-                where workers collect, or networks that remember, talk or are an agency's should learn from single
-                acts.
+            ValueError: If the algorithm is off-policy, or does not explore by a guide, workers collect for a teacher
+                or a guide, or networks that remember, talk or belong to an agency would learn from single acts.
         """
         given = [name for name in ("teacher", "demonstrations") if getattr(self, name) is not None]
         if given and not isinstance(algorithm, OnPolicy):

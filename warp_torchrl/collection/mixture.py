@@ -20,9 +20,9 @@ class Kind:
     Attributes:
         scenario: One of ``conf/scenario``.
         over: Keys of its worlds that have other values: ``{team: {n_agents: 2}, wind: wandering}``.
-        share: Of the worlds, in proportion to the shares of the others.
-        teacher: Who labels its worlds, in place of ``imitation.teacher``; None takes that one.
-        teacher_weight: By what ``imitation.weight`` and ``weight_end`` are multiplied in its worlds.
+        share: Share of the worlds, in proportion to the shares of the others.
+        teacher: Teacher of its worlds; None takes ``imitation.teacher``.
+        teacher_weight: Factor on ``imitation.weight`` and ``weight_end`` in its worlds.
 
     Raises:
         ValueError: If the share or the weight is out of its range.
@@ -44,10 +44,10 @@ class Mixture:
 
     Attributes:
         kinds: By name, each with the fields of ``Kind``; the scenario is that of the name where it is left out.
-        weigh: What each kind's loss counts: its ``share`` of the worlds, or what is ``left`` to learn, see ``weights``.
-        baseline: The heuristic from which what is left is told.
-        worlds: Of each kind that the baseline plays before the training.
-        floor: Of what is left, which a kind that is learned keeps.
+        weigh: Weight of each kind's loss: its ``share`` of the worlds, or what is ``left`` to learn, see ``weights``.
+        baseline: The heuristic whose results define what is left to learn.
+        worlds: Number of worlds of each kind that the baseline plays before the training.
+        floor: Least of what is left; a kind that is learned keeps it.
 
     Raises:
         ValueError: If a value is out of its range, or the baseline is unknown.
@@ -69,15 +69,15 @@ class Mixture:
 def weights(
     shares: Sequence[float], saved: Sequence[float | None], baseline: Sequence[float], floor: float
 ) -> list[float]:
-    """Return what each kind's loss counts by what is left to learn.
+    """Return the weight of each kind's loss, from what is left to learn.
 
         w_k = share_k left_k / sum_j share_j left_j,   left_k = floor + max(0, 1 - saved_k / baseline_k)
 
     Args:
-        shares: Of the worlds, by kind.
+        shares: Shares of the worlds, by kind.
         saved: Shares of trees that the team saves; None where no episode has ended yet, which counts as 0.
-        baseline: Those that the baseline saves.
-        floor: What is left at least.
+        baseline: Shares of trees that the baseline saves.
+        floor: Least of what is left.
     """
     left = [floor + max(0.0, 1.0 - (its or 0.0) / max(best, 1e-6)) for its, best in zip(saved, baseline, strict=True)]
     whole = sum(share * its for share, its in zip(shares, left, strict=True))
@@ -85,7 +85,7 @@ def weights(
 
 
 def apportioned(shares: Sequence[float], count: int) -> list[int]:
-    """Return how many of so many worlds each of the shares has: one at least, and the largest remainders the rest.
+    """Return the number of worlds of each share: one at least, and the rest by largest remainder.
 
     Raises:
         ValueError: If there are fewer worlds than shares.

@@ -1,4 +1,4 @@
-"""Running collections: batches without end, and what a checkpoint keeps of where they come from."""
+"""Running collections: batches without end, and their state in a checkpoint."""
 
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Protocol
@@ -24,7 +24,7 @@ class Collection(Protocol):
         ...
 
     def state_dict(self) -> dict[str, Any]:
-        """Return what a checkpoint keeps."""
+        """Return the state for a checkpoint."""
         ...
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
@@ -32,7 +32,7 @@ class Collection(Protocol):
         ...
 
     def start_anew(self, steps: int) -> None:
-        """Let every world start a new episode, with a number that it has not had in so many steps."""
+        """Start a new episode in every world, with a number that no episode of ``steps`` steps has had."""
         ...
 
     def close(self) -> None:
@@ -82,7 +82,7 @@ class InProcessCollection:
         self._collector._carrier = shaped.update(carrier.to(self.env.device))
 
     def start_anew(self, steps: int) -> None:
-        """Let every world start a new episode: a world has had at most as many as steps."""
+        """Start a new episode in every world: a world has had at most one episode per step."""
         self.env.set_seeds(self.env.seeds.tolist(), steps)
         self._collector.reset()
 
@@ -134,7 +134,7 @@ class MultiProcessCollection:
 
 
 def _reason(collector: BaseCollector | None, error: Exception) -> str:
-    """Return one line: which worker ended and how, where the backend knows it."""
+    """Return one line that names the worker that ended and its exit, if the backend knows it."""
     ended = []
     for index, process in enumerate(getattr(collector, "procs", ())):
         try:

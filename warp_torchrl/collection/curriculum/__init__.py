@@ -1,4 +1,4 @@
-"""Auto-curricula: which level of its scenario a training plays, by how well the team does."""
+"""Automatic curricula: levels of a scenario, drawn by the team's results."""
 
 from warp_torchrl.collection.curriculum.curriculum import Curriculum, NoCurriculum
 from warp_torchrl.collection.curriculum.regret import Regret

@@ -1,4 +1,4 @@
-"""What auto-curricula have in common: their levels, and the shares of episodes that the scenario itself has."""
+"""Base of automatic curricula: levels, and the share of episodes of the target."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,12 +10,12 @@ from warp_torchrl.validation import check_fields
 
 @dataclass(frozen=True, kw_only=True)
 class NoCurriculum:
-    """Every episode is of the scenario as it stands."""
+    """Every episode is of the scenario itself."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Curriculum:
-    """Base of the rules. The last of L levels is the scenario as it stands, the target.
+    """Base of the rules. The last of L levels is the scenario itself, the target.
 
     Each episode draws its level when it starts:
 
@@ -27,9 +27,9 @@ class Curriculum:
     Attributes:
         over: Keys of the scenario, as the configuration has them, with a list of L values each, easy to hard:
             ``{steps_per_tick: [20, 10, 5], ignition: {count: [1, 1, 2]}}``. The last is the scenario's own.
-        measure: How well an episode went: ``saved``, the share of trees, or ``success``, 1 where the fire is out and
-            enough is saved.
-        episodes: That end at a level, at least, before it is judged by their mean.
+        measure: Result of an episode: ``saved``, the share of trees, or ``success``, 1 where the fire is out and enough
+            is saved.
+        episodes: Episodes that must end at a level, at least, before it is judged by their mean.
         floor: Share of episodes that is always of the target.
         until: Share of the training after which every episode is of the target.
 
@@ -64,7 +64,7 @@ class Curriculum:
 
     @property
     def asks_for(self) -> tuple[str, int] | None:
-        """Return the heuristic whose episodes the rule compares with, and how many of each level; None for none."""
+        """Return the baseline of the rule, and its number of episodes at each level; None without one."""
         return None
 
     @property
@@ -83,11 +83,11 @@ class Curriculum:
         )
 
     def after(self, standing: Standing, counts: Sequence[float], sums: Sequence[float]) -> Standing:
-        """Return the standing after episodes that ended, ``counts`` at each level with ``sums`` of the measure."""
+        """Return the state after episodes that ended, ``counts`` at each level with ``sums`` of the measure."""
         return standing.after(counts, sums, self.episodes)
 
     def shares(self, standing: Standing) -> Sequence[float]:
-        """Return the share of each level in the episodes that are not the floor's; they add up to 1."""
+        """Return the share of each level in the episodes outside of the floor; they add up to 1."""
         raise TypeError(f"{type(self).__name__} does not say what it draws: define shares()")
 
 

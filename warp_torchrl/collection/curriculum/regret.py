@@ -18,13 +18,13 @@ class Regret(Curriculum):
     with the means of the measure over the baseline's ``worlds`` episodes, played before the first batch, and over the
     team's last ``episodes``; 0 for the team where these have not ended yet. Without any regret the target has all.
 
-    Regret against another policy, in place of the unknown best one, is that of Dennis et al., "Emergent Complexity and
-    Zero-shot Transfer via Unsupervised Environment Design", 2020; here the other policy is a heuristic. Prioritized
+    Dennis et al., "Emergent Complexity and Zero-shot Transfer via Unsupervised Environment Design", 2020, use the
+    regret against another policy, since the best one is unknown; here the other policy is a heuristic. Prioritized
     level replay (Jiang et al. 2021) draws levels by an estimate of regret too.
 
     Attributes:
         baseline: A heuristic policy.
-        worlds: Episodes that it plays of each level, on worlds of the training.
+        worlds: Number of its episodes at each level, on worlds of the training.
 
     Raises:
         ValueError: If a value is out of its range.
@@ -41,11 +41,11 @@ class Regret(Curriculum):
 
     @property
     def asks_for(self) -> tuple[str, int] | None:
-        """Return the baseline, and how many episodes it plays of each level."""
+        """Return the baseline, and its number of episodes at each level."""
         return self.baseline, self.worlds
 
     def shares(self, standing: Standing) -> Sequence[float]:
-        """Return the shares of the levels in the regret."""
+        """Return each level's share of the total regret."""
         pairs = zip(standing.baseline, standing.judged, strict=True)
         regrets = [max(0.0, theirs - (ours or 0.0)) for theirs, ours in pairs]
         total = sum(regrets)

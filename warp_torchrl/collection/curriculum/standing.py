@@ -1,4 +1,4 @@
-"""How a team stands at each level of a curriculum."""
+"""State of a curriculum: the team's results at each level."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,16 +12,16 @@ _LISTS = ("counts", "sums", "judged", "baseline")
 
 @dataclass(frozen=True, kw_only=True)
 class Standing:
-    """What a curriculum knows of its L levels, easy to hard.
+    """The team's results at the L levels of a curriculum, easy to hard.
 
     A level is judged by groups of episodes: when one is full, its mean is kept and the next one begins.
 
     Attributes:
         counts: Episodes in the open group of each level.
         sums: Sums of the measure over them.
-        judged: Mean of the last full group of each level; None where there is none yet.
-        baseline: Mean of the measure that a baseline reached at each level; empty where the rule asks for none.
-        level: Index of the level that is learned now; of rules that learn one at a time.
+        judged: Mean of the last full group of each level; None before the first.
+        baseline: Mean of a baseline's measure at each level; empty if the rule uses none.
+        level: Index of the present level; for rules that learn one level at a time.
     """
 
     counts: tuple[float, ...]
@@ -32,7 +32,7 @@ class Standing:
 
     @classmethod
     def first(cls, n_levels: int, baseline: Sequence[float] = ()) -> "Standing":
-        """Return the standing of a team that has played nothing yet."""
+        """Return the state before the first episode."""
         none = (0.0,) * n_levels
         return cls(counts=none, sums=none, judged=(None,) * n_levels, baseline=tuple(baseline))
 
@@ -54,7 +54,7 @@ class Standing:
         return replace(self, counts=counts, sums=sums, judged=tuple(judged))
 
     def at(self, level: int) -> "Standing":
-        """Return the same, but at a level that is learned from now on, and judged by what is played from now on."""
+        """Return the same state at another level, whose results are empty."""
 
         def anew(values: Sequence[Any], value: float | None) -> tuple[Any, ...]:
             return (*values[:level], value, *values[level + 1 :])
@@ -63,12 +63,12 @@ class Standing:
         return replace(self, counts=counts, sums=sums, judged=anew(self.judged, None), level=level)
 
     def state_dict(self) -> dict[str, Any]:
-        """Return plain values."""
+        """Return the state as plain values."""
         return {name: list(getattr(self, name)) for name in _LISTS} | {"level": self.level}
 
     @classmethod
     def of(cls, state: Mapping[str, Any]) -> "Standing":
-        """Return the standing whose ``state_dict`` this is."""
+        """Return the state of a ``state_dict``."""
         lists = {name: tuple(state[name]) for name in _LISTS}
         return cls(level=int(state["level"]), **lists)
 

@@ -15,7 +15,7 @@ class Success(Curriculum):
 
         S > high: the next harder level;   S < low: the next easier one;   else the same again.
 
-    Success between bounds tells a goal of intermediate difficulty (Florensa et al., "Automatic Goal Generation for
+    Success between bounds marks a goal of intermediate difficulty (Florensa et al., "Automatic Goal Generation for
     Reinforcement Learning Agents", 2018). Judging a level by a buffer of episodes against two thresholds, and emptying
     it, is automatic domain randomization (OpenAI, "Solving Rubik's Cube with a Robot Hand", 2019, algorithm 1).
 
@@ -36,11 +36,11 @@ class Success(Curriculum):
             raise ValueError(f"low must be below high, {self.high}, got {self.low}")
 
     def shares(self, standing: Standing) -> Sequence[float]:
-        """Return 1 at the level that is learned."""
+        """Return 1 at the present level."""
         return [float(level == standing.level) for level in range(self.n_levels)]
 
     def after(self, standing: Standing, counts: Sequence[float], sums: Sequence[float]) -> Standing:
-        """Return the standing after episodes that ended, at the next level where the present one was judged so."""
+        """Return the state after episodes that ended: at another level, if the present one is too easy or too hard."""
         now = super().after(standing, counts, sums)
         success = now.judged[now.level]  # of the last full group since the level was entered, which kept it
         if success is None:
