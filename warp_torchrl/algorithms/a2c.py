@@ -16,7 +16,7 @@ from warp_torchrl.algorithms.on_policy import KEYS, OnPolicy
 
 
 class ExplainedA2c(A2CLoss):
-    """TorchRL's A2C loss, which tells how much of the targets' variance the critic explains, as its PPO loss does.
+    """TorchRL's A2C loss, with the share of the targets' variance that the critic explains, as in its PPO loss.
 
     explained_variance = 1 - Var(target - value) / Var(target),     float32 [A, 1], over the sample
     """
@@ -38,7 +38,7 @@ class ExplainedA2c(A2CLoss):
 
 @dataclass(frozen=True, kw_only=True)
 class A2c(OnPolicy):
-    """A2C with multi-agent generalised advantage estimation: each batch is seen once.
+    """A2C with multi-agent generalised advantage estimation: each batch is used once.
 
     Its minibatches are as many optimiser steps: small ones or short batches of the collector are best.
 

@@ -1,4 +1,4 @@
-"""What all algorithms share: their numbers' ranges, the decentralised actor, and the falling learning rate."""
+"""Base of all algorithms: ranges of their numbers, the decentralised actor, and the falling learning rate."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ _RANGES = {
 
 @dataclass(frozen=True, kw_only=True)
 class Algorithm:
-    """What on-policy and off-policy algorithms have in common.
+    """Base class of on-policy and off-policy algorithms.
 
     Attributes:
         gamma: Discount.
@@ -75,10 +75,10 @@ def falling(start: float, end: float, progress: float) -> float:
 
 
 class MaskedChoice(MaskedCategorical):
-    """TorchRL's distribution of masked actions, which draws where chances are NaN too.
+    """TorchRL's distribution of masked actions, which also samples where probabilities are NaN.
 
-    A GPU that is asked for such a draw ends the program. Any action is drawn instead, and the logits, which stay as
-    they are, tell: who learns or plays asks whether they are finite.
+    On a GPU such a sample would abort the program. Here an arbitrary action is drawn, and the logits keep their NaN:
+    training and evaluation check that logits are finite.
     """
 
     def sample(self, sample_shape: torch.Size | Sequence[int] | None = None) -> Tensor:
@@ -92,10 +92,10 @@ class MaskedChoice(MaskedCategorical):
 
 
 def masked_actor(shape: Signature, model: Mlp, **distribution: float | bool) -> ProbabilisticActor:
-    """Return a team's decentralised policy: each agent's action drawn from its own observation and mask.
+    """Return a team's decentralised policy: each agent's action is drawn from its observation and mask.
 
     Args:
-        shape: What it fits.
+        shape: Signature of the team.
         model: Makes the network.
         distribution: Options of TorchRL's ``MaskedCategorical``.
     """

@@ -64,7 +64,7 @@ class _OneHot(nn.Module):
 
 
 class PenalisedDdpg(DDPGLoss):
-    """TorchRL's DDPG loss with a penalty on the actor's logits, which tells the actor's entropy too.
+    """TorchRL's DDPG loss with a penalty on the actor's logits, and the actor's entropy.
 
         loss_actor = -mean Q + penalty * mean (logit^2 of the open actions)
 
@@ -74,7 +74,7 @@ class PenalisedDdpg(DDPGLoss):
 
     Args:
         actor: Writes logits float32 [..., actions], and reads masks bool of their shape and order.
-        critic: Writes the value of what the actor chose.
+        critic: Writes the value of the actor's choice.
         logit_penalty: Weight of the penalty.
         options: Of TorchRL's loss.
     """
@@ -128,7 +128,7 @@ class Ddpg(EpsilonGreedy):
         super().check(temperature=(1e-3, 100.0), logit_penalty=(0.0, 1000.0), **ranges)
 
     def policy(self, shape: Signature, model: Mlp) -> TensorDictSequential:
-        """Return the team's decentralised policy: each agent's action from its own observation and mask."""
+        """Return the team's decentralised policy: each agent's action depends on its observation and mask."""
         choose = TensorDictModule(
             OneHotChoice(self.temperature), in_keys=[LOGITS, ACTION_MASK], out_keys=[ACTION, ACTION_ONE_HOT]
         )

@@ -32,11 +32,11 @@ class Dqn(EpsilonGreedy):
     """Q-learning with epsilon-greedy exploration; in mode ``sampled`` an evaluated policy uses ``epsilon_end``.
 
     Attributes:
-        mixer: ``none``, each agent learns its own values from its own reward (double DQN); ``vdn``, their sum is
-            learned from the team's mean reward; ``qmix``, a monotonic network that reads the whole state mixes them.
+        mixer: ``none``: each agent learns its values from its reward (double DQN); ``vdn``: their sum is learned from
+            the team's mean reward; ``qmix``: a monotonic network that reads the whole state mixes them.
         mixer_hidden: Width of QMIX's mixing layer.
-        double_q: Whether the network that learns chooses the next action, which the target network judges (van
-            Hasselt et al. 2016); else the target network does both. Of ``mixer`` none.
+        double_q: Whether the online network chooses the next action, which the target network judges (van Hasselt et
+            al. 2016); else the target network does both. Only for ``mixer`` none.
 
     Raises:
         ValueError: If a value is out of its range, prioritised replay does not work here, or ``double_q`` is false
@@ -55,7 +55,7 @@ class Dqn(EpsilonGreedy):
             raise ValueError(f"double_q must be true where values are mixed, got false with mixer={self.mixer}")
 
     def check_model(self, model: Mlp) -> None:
-        """Check what an off-policy algorithm does, and that agents trust no adviser: their actions have no chances.
+        """Check the model as off-policy algorithms do, and that agents trust no adviser: actions have no probabilities.
 
         Raises:
             ValueError: If it cannot train the networks.

@@ -1,4 +1,4 @@
-"""The batch that an on-policy learner learns from, with its advantages, and its minibatches."""
+"""Buffer of an on-policy learner: one batch with its advantages, and its minibatches."""
 
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
@@ -28,7 +28,7 @@ VALUE_TARGET = ("agents", "value_target")
 
 
 class HeldBatch:
-    """One batch at a time, in TorchRL's buffer: each batch that is stored takes the place of the former.
+    """One batch at a time, in TorchRL's buffer: each stored batch replaces the one before.
 
     Args:
         loss: Whose critic and estimator give the advantages; its ``value_norm``, if it has one, learns the targets.
@@ -73,7 +73,7 @@ class HeldBatch:
         self.buffer.extend(narrowed(valued, self.dtype))
 
     def samples(self) -> Iterator[TensorDictBase]:
-        """Yield the minibatches of all passes, each pass in an order of its own."""
+        """Yield the minibatches of all passes, each pass in another order."""
         size = max(1, self.largest * len(self.buffer) // self.rows.max_size)
         norm = getattr(self.loss, "value_norm", None)
         for _ in range(self.passes):
@@ -85,7 +85,7 @@ class HeldBatch:
 
 
 def minibatches(buffer: TensorDictReplayBuffer, size: int) -> Iterator[Tensor]:
-    """Yield which rows of a buffer are a minibatch, int64 [size], until all have been; the last may be smaller."""
+    """Yield the rows of a buffer in minibatches, int64 [size], each row once; the last may be smaller."""
     buffer.sampler.ran_out = False
     while not buffer.sampler.ran_out:
         yield buffer.sampler.sample(buffer.storage, size)[0]
@@ -128,7 +128,7 @@ def with_advantages(
 
 
 def narrowed(batch: TensorDictBase, dtype: torch.dtype) -> TensorDictBase:
-    """Return a batch whose state, and observation where it is one vector, have the type that networks compute in.
+    """Return a batch whose state, and observation if it is one vector, have the networks' floating-point type.
 
     They would be made so at every pass, and most of what a minibatch copies is the state.
     """

@@ -172,7 +172,7 @@ class OffPolicy(Algorithm):
         return SoftUpdate(loss, tau=self.tau)
 
     def policy(self, shape: Signature, model: Mlp) -> TensorDictModuleBase:
-        """Return the team's decentralised policy: each agent's action from its own observation and mask."""
+        """Return the team's decentralised policy: each agent's action depends on its observation and mask."""
         raise TypeError(f"{type(self).__name__} does not say how it acts: define policy()")
 
     def explorer(self, policy: TensorDictModuleBase, shape: Signature) -> TensorDictModuleBase:

@@ -44,13 +44,13 @@ class OnPolicy(Algorithm):
     """Base class of PPO and A2C.
 
     Attributes:
-        central_critic: Values of the state and each agent's observation, or of the latter alone.
+        central_critic: Whether values depend on the state and each agent's observation, or on the latter only.
         lmbda: GAE's lambda.
         entropy_coeff: Weight of the entropy bonus at the start.
         entropy_coeff_end: At the end; it falls linearly.
         critic_coeff: Weight of the value loss.
-        critic_first: Share of the training in which the critic learns alone, and the actor stays as it is: for a team
-            that starts from an exported policy, whose critic is new.
+        critic_first: Share of the training in which only the critic learns, and the actor is frozen: for a team that
+            starts from an exported policy, whose critic is new.
         minibatch_size: World steps in a minibatch of the largest batch (each has one sample an agent), and in
             proportion of a smaller one; where actors remember, in as many whole sequences as fit, one at least.
 
@@ -72,7 +72,7 @@ class OnPolicy(Algorithm):
         super().check(minibatch_size=(1, 1_000_000), critic_coeff=(0.0, 100.0), **shares, **ranges)
 
     def policy(self, shape: Signature, model: Mlp) -> ProbabilisticActor:
-        """Return the team's decentralised policy: each agent's action from its own observation and mask."""
+        """Return the team's decentralised policy: each agent's action depends on its observation and mask."""
         return masked_actor(shape, model)
 
     def build(
@@ -140,7 +140,7 @@ class OnPolicy(Algorithm):
     def _held(
         self, loss: LossModule, env: EnvBase, model: Mlp, frames: int, shape: Signature, share: float
     ) -> HeldBatch:
-        """Return what holds an environment's batches."""
+        """Return the buffer of an environment's batches."""
         remembers = bool(model.memory)
         return HeldBatch(
             loss,
@@ -159,7 +159,7 @@ class OnPolicy(Algorithm):
         raise TypeError(f"{type(self).__name__} does not say what it minimises: define loss()")
 
     def standardises(self) -> Literal["minibatch", "batch"] | None:
-        """Return of what advantages are standardised: over all processes, if there are several, else by the loss."""
+        """Return the set over which advantages are standardised, of all processes; None leaves it to the loss."""
         return None
 
     def passes(self) -> int:

@@ -20,12 +20,12 @@ from warp_torchrl.algorithms.on_policy import KEYS, OnPolicy
 class SharedValueNorm(PopArtValueNorm):
     """TorchRL's running statistics of value targets, over those of all processes.
 
-    The loss asks for an update at each minibatch, when all processes would have to wait for each other. So that does
-    nothing, and ``learn`` is told the moments, which ``moments`` finds for many minibatches with one message.
+    The loss calls ``update`` at each minibatch, when all processes would have to wait for each other. So ``update``
+    does nothing, and ``learn`` takes the moments, which ``moments`` computes for many minibatches with one message.
     """
 
     def update(self, value_target: Tensor) -> None:
-        """Do nothing: ``learn`` has it."""
+        """Do nothing: ``learn`` updates the statistics."""
 
     def moments(self, targets: Sequence[Tensor]) -> Tensor:
         """Return the mean and the mean square of value targets, float32 [..., 1], over all processes, [n, 2, 1]."""
@@ -41,7 +41,10 @@ class SharedValueNorm(PopArtValueNorm):
 
 
 class _MaskedEntropy:
-    """The entropy of masked actions as it is: TorchRL's losses ask at each update whether it is finite, and wait."""
+    """The entropy of masked actions, without a check that it is finite.
+
+    TorchRL's losses check it at each update, which is a synchronisation.
+    """
 
     def _get_entropy(self, dist: MaskedCategorical, adv_shape: torch.Size) -> Tensor:
         return dist.entropy().unsqueeze(-1)

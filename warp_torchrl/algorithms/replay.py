@@ -1,4 +1,4 @@
-"""The replay memory: TorchRL's buffers, uniform or prioritised, and how checkpoints keep them."""
+"""Replay memory: TorchRL's buffers, uniform or prioritised, and their state in checkpoints."""
 
 from dataclasses import dataclass
 from typing import Any

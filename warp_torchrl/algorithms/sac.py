@@ -35,7 +35,7 @@ class Sac(OffPolicy):
         super().check(temperature=(1e-6, 100.0), target_entropy=(0.0, 1.0), **ranges)
 
     def policy(self, shape: Signature, model: Mlp) -> ProbabilisticActor:
-        """Return the team's decentralised policy: each agent's action drawn from its own observation and mask."""
+        """Return the team's decentralised policy: each agent's action is drawn from its observation and mask."""
         # The loss multiplies log-probabilities by probabilities: -inf for a masked action would give nan.
         return masked_actor(shape, model, neg_inf=-1e4)
 

@@ -1,4 +1,4 @@
-"""Processes that learn together: how they start, and what they tell each other."""
+"""Processes that learn together: their start, and their messages."""
 
 from warp_torchrl.algorithms.parallel.group import WorkerDied, gather, mean_, rank, share, size, standardised, sum_
 from warp_torchrl.algorithms.parallel.launch import automatic, follow, join, processes

@@ -1,4 +1,4 @@
-"""What the processes of a run tell each other: sums, means and values.
+"""Collectives between the processes of a run: sums, means and values.
 
 A run of one process has no group, and then these functions do nothing. Every process must call them in the same order.
 """
@@ -21,7 +21,7 @@ class WorkerDied(Exception):  # noqa: N818
 
 
 class Group(Protocol):
-    """The processes of a run, and what they talk by.
+    """The processes of a run, and their connection.
 
     Attributes:
         rank: Number of this process; process 0 writes the run folder.
@@ -44,7 +44,7 @@ class Group(Protocol):
         ...
 
     def close(self) -> None:
-        """Leave it."""
+        """Leave the group."""
         ...
 
 
@@ -76,7 +76,7 @@ def rank() -> int:
 
 
 def _collective(operation: Callable[Given, Told]) -> Callable[Given, Told]:
-    """Let an operation tell that another process has ended; torch has no type of its own for that."""
+    """Convert errors of an operation to ``WorkerDied``; torch has no type for the end of another process."""
 
     @wraps(operation)
     def told(*args: Given.args, **kwargs: Given.kwargs) -> Told:

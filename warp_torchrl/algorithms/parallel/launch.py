@@ -1,4 +1,4 @@
-"""The start and the end of the processes that learn together, on this machine or under ``torchrun``."""
+"""Start and end of the processes that learn together, on this machine or under ``torchrun``."""
 
 import os
 import subprocess
@@ -24,7 +24,7 @@ _SECONDS_TO_BREAK = 2.0  # in which a process whose connection has broken off ma
 
 
 def automatic(n_worlds: int, device: torch.device) -> int:
-    """Return how many processes ``processes=auto`` takes.
+    """Return the number of processes of ``processes=auto``.
 
     As many as torch has threads (or, on CUDA, devices), as long as they share the worlds equally and have 64 each.
     ``OMP_NUM_THREADS`` sets the threads.
@@ -38,12 +38,12 @@ def automatic(n_worlds: int, device: torch.device) -> int:
 
 @contextmanager
 def processes(count: int, values: Mapping[str, Any], module: str) -> Iterator[None]:
-    """Run a block as process 0 of so many; the others do their work beside it, and end with it.
+    """Run a block as process 0 of ``count``; the others work beside it, and end with it.
 
     Args:
         count: Processes in all.
-        values: The configuration that the others are told.
-        module: What they run: it calls ``follow``.
+        values: The configuration, which is sent to the others.
+        module: Module that they run: it calls ``follow``.
 
     Raises:
         WorkerDied: If one of the others ends before the block does.
@@ -130,7 +130,7 @@ def _how(code: int) -> str:
 
 
 def _code_of(process: subprocess.Popen[bytes], seconds: float) -> int | None:
-    """Return a process's exit code; None if it has not ended in so many seconds."""
+    """Return a process's exit code; None if it does not end within ``seconds``."""
     try:
         return process.wait(seconds)
     except subprocess.TimeoutExpired:

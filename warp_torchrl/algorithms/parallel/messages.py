@@ -39,7 +39,7 @@ def announced(head: bytes | bytearray) -> int:
     """Return the size that a header announces.
 
     Raises:
-        RuntimeError: If no message has so many bytes.
+        RuntimeError: If a message must not be that large.
     """
     size = int.from_bytes(head, "little")
     if size > MOST_BYTES:

@@ -1,7 +1,7 @@
 """Collectives over inherited socket pairs, between processes of one machine.
 
 A process inherits its end when it is started. Nothing listens, so no other user and no other machine can join or listen
-in. The first process has a pair with each of the others, and all that is told goes through it.
+in. The first process has a pair with each of the others, and all messages pass through it.
 """
 
 import os
@@ -92,13 +92,13 @@ class Sockets:
 
 
 def pairs(count: int) -> tuple[list[socket.socket], list[socket.socket]]:
-    """Return the ends of so many pairs: those that the first process keeps, and those that it gives away."""
+    """Return the ends of ``count`` pairs: the ends of the first process, and the ends of the others."""
     made = [socket.socketpair() for _ in range(count)]
     return [own for own, _ in made], [given for _, given in made]
 
 
 def inherited(number: int) -> socket.socket:
-    """Return the end of a pair that this process has inherited under a number, which its own children do not get."""
+    """Return the socket that this process inherited under a number; its children do not inherit it."""
     end = socket.socket(fileno=number)
     end.set_inheritable(False)
     return end
@@ -140,7 +140,7 @@ def _next_size(end: socket.socket) -> int:
 
 
 def _fill(end: socket.socket, place: memoryview) -> None:
-    """Fill a place with what comes.
+    """Fill a buffer with received bytes.
 
     Raises:
         ConnectionError: If the other process has ended.
