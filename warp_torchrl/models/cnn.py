@@ -1,4 +1,4 @@
-"""The model whose networks read pictures by convolutions."""
+"""Model with convolutions over pictures."""
 
 from dataclasses import dataclass
 from typing import ClassVar, Literal
@@ -10,7 +10,7 @@ from warp_torchrl.models.signature import Entry
 
 @dataclass(frozen=True, kw_only=True)
 class Cnn(Mlp):
-    """Convolutions over what is a picture (the view, the map pooled to 8 x 8, the state), then as ``Mlp``.
+    """Convolutions over pictures (the view, the map pooled to 8 x 8, the state), then as ``Mlp``.
 
     Attributes:
         channels: Output channels of each convolution.

@@ -1,4 +1,4 @@
-"""What networks read of an observation and a state: as they are, or in canonical orientation, at once or late."""
+"""Inputs of networks from observation and state: in canonical orientation or north up, at once or late."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -33,7 +33,7 @@ from warp_torchrl.symmetry import TIME_LEFT, Vector
 
 
 class Inputs:
-    """Where the networks of a team find what they read, and what makes it.
+    """Keys that the networks of a team read, and the modules that write them.
 
     Args:
         signature: What they fit.
@@ -49,11 +49,11 @@ class Inputs:
         """Of the action that is judged."""
 
     def key(self, name: str, sent: bool = False) -> Key:
-        """Return the key of an entry of the observation, or of what was observed when messages were sent."""
+        """Return the key of an entry of the observation, present or at the time of sending."""
         return canonical_key(name, sent) if self.is_canonical else observation_key(name, sent)
 
     def turned(self, sent: bool = False) -> list[Key]:
-        """Return the key of the orientation of what is read; none where it is read as it is."""
+        """Return the key of the inputs' orientation; none for inputs that are north up."""
         return [SENT_ORIENTATION if sent else ORIENTATION] if self.is_canonical else []
 
     def observed(self, names: Sequence[str], sent: bool = False) -> list[Key]:
@@ -61,24 +61,24 @@ class Inputs:
         return [*(self.key(name, sent) for name in names), *self.turned(sent)]
 
     def clock(self) -> tuple[Key, int] | None:
-        """Return the key of the entry that tells the time left, and its place there; None where none does."""
+        """Return the key of the entry with the time left, and its index there; None without one."""
         found = self._telling([TIME_LEFT])
         return None if found is None else (found[0], found[1].index(TIME_LEFT))
 
     def _telling(self, wanted: Sequence[str]) -> tuple[Key, tuple[str, ...]] | None:
-        """Return the key of the vector that tells all numbers of some names, and the names of its numbers, or None."""
+        """Return the key of the vector with all of some named numbers, and the names of its numbers, or None."""
         for name, entry in self.signature.observation.items():
             if isinstance(entry.symmetry, Vector) and set(wanted) <= set(entry.symmetry.names):
                 return self.key(name), entry.symmetry.names
         return None
 
     def batch(self, state: bool, restored: bool, packed: bool) -> CanonicalBatch:
-        """Return what makes the batches that are learned from.
+        """Return the module that prepares batches for learning.
 
         Args:
-            state: Whether the state is read.
-            restored: Whether actions are read as they are on the map.
-            packed: Whether planes that the world cannot fill are left out.
+            state: Whether networks read the state.
+            restored: Whether actions are in the order of the map.
+            packed: Whether planes that the world cannot fill are dropped.
         """
         shape, packings = self.signature, self._packings() if packed else None
         if not self.is_canonical:
@@ -96,10 +96,10 @@ class Inputs:
         return Packings({**entries, self.state_key: self.signature.state})
 
     def _trusting(self, trust: float) -> list[TensorDictModuleBase]:
-        """Return what raises the logits of advised actions; nothing where the trust is 0.
+        """Return the module that raises the logits of advised actions; none if the trust is 0.
 
         Raises:
-            ValueError: If agents are not advised, or not told the rules.
+            ValueError: If observations lack the advice or the rules.
         """
         if not trust:
             return []
@@ -115,7 +115,7 @@ class Inputs:
     def around(
         self, module: TensorDictModuleBase, state: bool, action: bool, sent: bool, trust: float
     ) -> TensorDictModuleBase:
-        """Return a module with what makes its inputs before it, and what restores the order of actions after it.
+        """Return a module after the module that makes its inputs, and before the one that restores actions' order.
 
         Args:
             module: Reads by these keys.

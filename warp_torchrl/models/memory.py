@@ -1,4 +1,4 @@
-"""Actors with a memory: a recurrent layer, and what is remembered from one step to the next."""
+"""Actors with a memory: a recurrent layer, and its state from one step to the next."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -40,16 +40,16 @@ class RecurrentNetwork(nn.Module):
 
     @property
     def entries(self) -> list[Entry]:
-        """What it reads: what its network does, whether an episode begins, its orientation, and the memory."""
+        """Entries that it reads: those of its network, whether an episode begins, its orientation, and the memory."""
         return [*self.network.entries, Entry((), "bool"), Entry((), "int64"), Entry((self.memory,), "float32")]
 
     def forward(self, *inputs: Tensor) -> Tensor:
-        """Return its output and what is remembered then, float32 [..., out + M].
+        """Return its output and the new memory, float32 [..., out + M].
 
         Args:
-            inputs: Entries [...], whether an episode begins bool [...], the index of their ``Orientation``
-                int64 [...], and the memory before, float32 [..., M], of the map as it is; or, for a sequence, the
-                former with time as dimension 1 and the memory before the first.
+            inputs: Entries [...], whether an episode begins bool [...], the index of their ``Orientation`` int64 [...],
+                and the memory before, float32 [..., M], in the map's orientation; or, for a sequence, the former with
+                time as dimension 1 and the memory before the first step.
         """
         *seen, fresh, index, memory = inputs
         device, network = fresh.device.type, self.network
@@ -62,7 +62,7 @@ class RecurrentNetwork(nn.Module):
         return torch.cat((out.to(torch.float32), Orientation(index).units_back(remembered)), dim=-1)
 
     def _remember(self, features: Tensor, kept: Tensor, index: Tensor, memory: Tensor) -> Tensor:
-        """Return the memory after each step, in its orientation; of what was before only what is ``kept`` goes on."""
+        """Return the memory after each step, in its orientation; where ``kept`` is 0, the memory before is dropped."""
         if features.ndim == memory.ndim:
             return self._step(features, Orientation(index).units(kept * memory))
         after = []
@@ -77,19 +77,19 @@ class RecurrentNetwork(nn.Module):
 
 
 class RecurrentActor(TensorDictModuleBase):
-    """The module of a team whose agents remember, each for itself, what they saw since their episode began.
+    """The module of a team whose agents each remember their observations since the episode began.
 
-    Called with the tensordict [B] of one step it goes on from the step before, which must have been of the same
-    worlds, and forgets where an episode begins, as the agents' own clock tells. Called with sequences [B, T] it goes on
-    from the memory that each of them was recorded with, and leaves its own as it was.
+    Called with the tensordict [B] of one step it continues from the step before, which must have been of the same
+    worlds; it forgets where an episode begins, which the agents' clock shows. Called with sequences [B, T] it continues
+    from the memory that was recorded with each, and the stored memory does not change.
 
     Args:
-        network: Reads the entries, whether an episode begins, the orientation and the memory, and the role if there is
-            one for each; writes logits and memory, float32 [..., A, actions + M].
+        network: Reads the entries, whether an episode begins, the orientation and the memory, and the role if each role
+            has a network; writes logits and memory, float32 [..., A, actions + M].
         keys: Of the entries, of the orientation where they have one, and of the role.
         n_actions: Entries of the logits.
         memory: M.
-        clock: Key of the vector that tells the share of the episode that is left, and its place there.
+        clock: Key of the vector with the share of the episode that is left, and its index there.
     """
 
     def __init__(
@@ -118,17 +118,17 @@ class RecurrentActor(TensorDictModuleBase):
         return tensordict.set(LOGITS, logits)
 
     def _before(self, fresh: Tensor) -> Tensor:
-        """Return what is remembered of the step before by these agents, float32 [B, A, M]; 0 by others."""
+        """Return these agents' memory of the step before, float32 [B, A, M]; 0 for other agents."""
         if self.remembered.shape[:-1] != fresh.shape:
             return torch.zeros(*fresh.shape, self.size[1], device=fresh.device)
         return self.remembered.to(fresh.device)  # where a policy was moved, its memory is still where it was
 
 
 class Memories:
-    """What the recurrent actors of a policy remember, float32 [B, A, M] each.
+    """Memories of the recurrent actors of a policy, float32 [B, A, M] each.
 
     Args:
-        policy: Of which they are a part; none need be.
+        policy: Policy with any number of recurrent actors.
     """
 
     def __init__(self, policy: nn.Module) -> None:
@@ -146,10 +146,10 @@ class Memories:
 
 
 class RemembersApart(TensorDictModuleBase):
-    """A policy that remembers what it saw in worlds of one kind, whatever it plays in between.
+    """A policy that keeps the memory of one kind of worlds, whatever it plays in between.
 
     Args:
-        policy: Some parts of which remember; others of its kind may share it.
+        policy: Policy with recurrent actors, which several such modules may share.
     """
 
     def __init__(self, policy: TensorDictModuleBase) -> None:
@@ -167,10 +167,10 @@ class RemembersApart(TensorDictModuleBase):
 
 
 class Recollection:
-    """What a checkpoint keeps of the memory of a policy, besides its weights.
+    """A policy's memory in a checkpoint, besides its weights.
 
     Args:
-        policy: Some parts of which may remember, or that remembers apart.
+        policy: Policy with any number of recurrent actors, or one that remembers apart.
     """
 
     def __init__(self, policy: nn.Module) -> None:
@@ -194,7 +194,7 @@ def recurrent_actors(policy: nn.Module) -> list[RecurrentActor]:
 
 @contextmanager
 def memory_apart(policy: nn.Module) -> Iterator[None]:
-    """Let a policy act elsewhere for a while, and remember then what it did before."""
+    """Let a policy act elsewhere within a context, and restore its memory after it."""
     memory = Recollection(policy)
     before = memory.state_dict()
     try:

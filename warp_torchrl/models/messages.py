@@ -1,4 +1,4 @@
-"""Networks whose agents talk: attention over the messages of those whom each of them hears."""
+"""Networks whose agents talk: attention over the messages that each agent hears."""
 
 import torch
 from torch import Tensor, nn
@@ -12,13 +12,14 @@ RADIO_SCALE = 1.0 / 16.0
 
 
 class Round(nn.Module):
-    """One round of talk: each agent sends a message, and attends to those that it hears.
+    """One round of messages: each agent sends one, and attends to those that it hears.
 
-    The graph is who hears whom, and changes every step; it is small and dense, so that torch's own attention over all
-    pairs with a mask needs no lists of edges, no scatter and no copies of a batch.
+    The communication graph changes every step; it is small and dense, so torch's attention over all pairs with a mask
+    needs no lists of edges, no scatter and no copies of a batch.
 
-    A message is told in the orientation of the map (``Orientation.units_back``), and heard in that of its receiver,
-    with the place of its sender about the receiver; so what a team does turns with the map as each of its agents does.
+    A message is sent in the orientation of the map (``Orientation.units_back``), and received in that of its receiver,
+    with the sender's place relative to the receiver. So turning the map turns the actions of the team as it turns each
+    agent's.
 
     Args:
         size: Features of an agent.
@@ -49,14 +50,14 @@ class Round(nn.Module):
     def forward(
         self, features: Tensor, radio: Tensor, index: Tensor, sent: tuple[Tensor, Tensor] | None = None
     ) -> Tensor:
-        """Return features with what was heard added, [..., A, F].
+        """Return features with the attention over received messages added, [..., A, F].
 
         Args:
             features: [..., A, F].
-            radio: Of each agent and each other: 1 where it hears it, else 0; rows and columns from it to the other
+            radio: For each agent and each other: 1 if it hears the other, else 0; rows and columns from it to the other
                 [cells]; float32 [..., A, A, 3].
             index: Of the agents' ``Orientation``, int64 [..., A].
-            sent: Features and index of which the messages are made that arrive now; None: those given.
+            sent: Features and index of the messages that arrive now; None: those given.
         """
         told = self.told(*((features, index) if sent is None else sent))
         team = radio.shape[-2]
@@ -77,21 +78,21 @@ class Round(nn.Module):
 
 
 class TalkingNetwork(nn.Module):
-    """A network whose agents exchange messages beside its first layer, in some rounds, and decide then.
+    """A network whose agents exchange messages beside its first layer, in some rounds, before they act.
 
-    Run by each agent for itself it needs the agent's own entries, and the messages of those whom it hears: one in each
-    round. Gradients flow from what an agent does into what the others told it (Sukhbaatar et al. 2016, "Learning
-    multiagent communication with backpropagation"; over graphs by attention, as in Das et al. 2019, "TarMAC").
+    Decentralised, an agent needs its entries, and the messages that it hears: one per sender and round. Gradients flow
+    from an agent's output into the messages that it received (Sukhbaatar et al. 2016, "Learning multiagent
+    communication with backpropagation"; over graphs by attention, as in Das et al. 2019, "TarMAC").
 
-    Messages that come late are made of what their senders observed when they sent them, in one round: those of a second
-    would answer what was heard then.
+    Late messages are made from their senders' observations at the time of sending, in one round: a second round would
+    answer messages that have not arrived.
 
     Args:
         network: The network without talk; rounds are computed in float32 whatever its arithmetic.
         size: Features of its first layer.
         message: Numbers of a message, a multiple of 8.
-        rounds: Of talk in a step, 1 where messages come late.
-        is_late: Whether messages come late.
+        rounds: Rounds of messages in a step, 1 if messages arrive late.
+        is_late: Whether messages arrive late.
         heads: Of the attention.
     """
 
@@ -104,7 +105,7 @@ class TalkingNetwork(nn.Module):
 
     @property
     def entries(self) -> list[Entry]:
-        """What it reads of each agent, beside the radio and the orientation."""
+        """Entries that it reads for each agent, besides the radio and the orientation."""
         return self.network.entries
 
     def forward(self, radio: Tensor, *inputs: Tensor) -> Tensor:

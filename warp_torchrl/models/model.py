@@ -1,4 +1,4 @@
-"""Models: which networks an algorithm's actors and critics are, and what they read and write."""
+"""Models: the networks of actors and critics, and the keys that they read and write."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -46,33 +46,32 @@ class Mlp:
     """Multilayer perceptrons over flattened observations.
 
     Attributes:
-        sharing: ``team`` gives all agents one network, ``role`` one to each role (chosen by the role index, so that
-            it fits any team), ``agency`` one to each agency, which drives the vehicles that serve it, ``none`` one to
-            each agent (which fits teams of the same size only).
-        actor_hidden: Sizes of the hidden layers of actors and of the action values that act.
+        sharing: ``team`` gives all agents one network, ``role`` one to each role (chosen by the role index, so that it
+            fits any team), ``agency`` one to each agency, for the vehicles that serve it, ``none`` one to each agent
+            (which fits teams of the same size only).
+        actor_hidden: Sizes of the hidden layers of actors, and of action values that act.
         critic_hidden: Sizes of the critics'.
         activation: ``tanh`` or ``relu``.
-        symmetry: ``canonical``, networks read what an agent sees turned and mirrored so that the fire lies between its
-            east and its south-east, see ``Canonicalise``: what they learn of one case they know of all eight symmetries
-            of the square. ``none``, they read it as it is, north up.
-        memory: Units of the recurrent layer by which actors remember what they saw since their episode began, see
-            ``RecurrentNetwork``, a multiple of 8; 0, they act on what they see now. On-policy algorithms learn it.
-        messages: ``graph``, actors tell each other what helps, see ``TalkingNetwork``: those that hear each other by
-            ``team.radio.range``. On-policy algorithms learn it. ``map``, they tell what they know of the fire, which
-            the world does for them; ``both``, or ``none``.
+        symmetry: ``canonical``: networks read an agent's observation turned and mirrored so that the fire lies between
+            its east and its south-east, see ``Canonicalise``; one learned case then covers all eight symmetries of the
+            square. ``none``: north up.
+        memory: Units of the recurrent layer by which actors remember since their episode began, see
+            ``RecurrentNetwork``, a multiple of 8; 0: no memory. Only on-policy algorithms train it.
+        messages: ``graph``: actors send each other learned messages, see ``TalkingNetwork``, within
+            ``team.radio.range``; only on-policy algorithms train it. ``map``: they share their maps of the fire, a rule
+            of the world; ``both``, or ``none``.
         message_size: Numbers of a message, a multiple of 8.
-        message_rounds: Messages that each agent sends in a step, each after hearing those before; 1 where messages come
-            late (``team.radio.delay``).
-        trust: How much agents trust their adviser, ``observation.advice``: what is added to the logit of the advised
-            action, times log2 of the team's size, see ``Trust``.
+        message_rounds: Messages that each agent sends in a step, each after receiving the ones before; 1 where messages
+            arrive late (``team.radio.delay``).
+        trust: Trust of agents in their adviser, ``observation.advice``: added to the logit of the advised action, times
+            log2 of the team's size, see ``Trust``.
         dtype: ``bfloat16`` computes the layers in half precision (weights stay float32), several times faster on
-            processors that have it and several times slower on those that have not; ``auto`` takes it where they do.
+            processors with bfloat16 and several times slower on others; ``auto`` uses it on processors with it.
 
     Raises:
         ValueError: If a size is out of range or there is no hidden layer, if agents that talk have a memory or do not
-            share one network, or, when networks are made, if observations do not say how they turn and should be
-            canonical, or have no clock and should be remembered, or tell no advice and should be trusted, or if
-            messages come late in several rounds.
+            share one network, or, when networks are made, if canonical observations do not declare their symmetry,
+            a memory lacks a clock, trust lacks advice, or late messages have several rounds.
     """
 
     sharing: Literal["team", "role", "agency", "none"] = "team"
@@ -102,16 +101,16 @@ class Mlp:
 
     @property
     def talks(self) -> bool:
-        """Return whether actors exchange messages of their own making."""
+        """Return whether actors exchange learned messages."""
         return self.messages in ("graph", "both")
 
     def actor(self, signature: Signature) -> TensorDictModuleBase:
-        """Return the module that writes logits [..., A, actions] from each agent's own observation, and memory."""
+        """Return the module that writes logits [..., A, actions] from each agent's observation and memory."""
         n_actions, talks = signature.n_actions, self.talks
         return self._of_agents(signature, self.actor_hidden, n_actions, 0.01, LOGITS, memory=self.memory, talks=talks)
 
     def action_value(self, signature: Signature) -> TensorDictModuleBase:
-        """Return the module that writes each action's value [..., A, actions] from each agent's own observation."""
+        """Return the module that writes each action's value [..., A, actions] from each agent's observation."""
         return self._of_agents(signature, self.actor_hidden, signature.n_actions, 0.01, ACTION_VALUE)
 
     def critic(self, signature: Signature, central: bool) -> TensorDictModuleBase:
@@ -130,19 +129,19 @@ class Mlp:
 
     @property
     def state_key(self) -> str:
-        """Return the key of the state as these networks read it."""
+        """Return the key of the state that these networks read."""
         return CANONICAL_STATE if self.symmetry == "canonical" else STATE
 
     def canonical_batch(
         self, signature: Signature, state: bool = True, restored: bool = False, packed: bool = False
     ) -> CanonicalBatch:
-        """Return what makes the batches from which these networks learn.
+        """Return the module that prepares batches for these networks.
 
         Args:
-            signature: What they fit.
+            signature: Signature of the environment.
             state: Whether they read the state.
-            restored: Whether they learn from actions as they are on the map.
-            packed: Whether to leave out the planes that the world cannot fill.
+            restored: Whether actions are in the order of the map.
+            packed: Whether to drop the planes that the world cannot fill.
         """
         return self._inputs(signature).batch(state, restored, self._packs and packed)
 
@@ -150,7 +149,7 @@ class Mlp:
     """Whether they can leave planes out."""
 
     def _inputs(self, signature: Signature) -> Inputs:
-        """Return what these networks read.
+        """Return the inputs of these networks.
 
         Raises:
             ValueError: If messages come late in several rounds.
@@ -260,7 +259,7 @@ class Mlp:
 
 
 def _read(names: list[str], has_state: bool) -> list[str]:
-    """Return the entries that a network reads: a critic that has the state and a picture does without the view."""
+    """Return the entries that a network reads: a critic with the state and a picture does not read the view."""
     return [name for name in names if name != "view"] if has_state and {"view", "picture"} <= set(names) else names
 
 

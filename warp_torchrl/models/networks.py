@@ -1,4 +1,4 @@
-"""Networks: encoders of observations, heads, and who of a team shares which."""
+"""Networks: encoders of observations, heads, and sharing of networks in a team."""
 
 import operator
 from collections.abc import Sequence
@@ -65,7 +65,7 @@ class ConvolutionalEncoder(nn.Module):
     """The first layers over several entries: convolutions over those of three dimensions, then a linear map of all.
 
     Args:
-        entries: What is read; those [C, V, V] as images, the others as they are.
+        entries: Entries that are read; those [C, V, V] as images, the others as vectors.
         size: Features out.
         channels: Output channels of each convolution.
         kernel_size: Of each; the borders are padded, so that an image keeps its size.
@@ -109,7 +109,7 @@ def count(entry: Entry) -> int:
 
 
 def _sum(bias: Tensor | None, added: Tensor | None, unit: float) -> Tensor | None:
-    """Return a bias with what else is added to it, in its unit."""
+    """Return the sum of a bias and another term, in the bias's unit."""
     if added is None:
         return bias
     return added * unit if bias is None else bias + added * unit
@@ -153,7 +153,7 @@ class Network(nn.Module):
 
     @property
     def entries(self) -> list[Entry]:
-        """What it reads."""
+        """Entries that it reads."""
         return self.encoder.entries
 
     def forward(self, *inputs: Tensor) -> Tensor:
@@ -172,7 +172,7 @@ class Network(nn.Module):
 
 @torch.compiler.assume_constant_result
 def computes_in_half(device: str) -> bool:
-    """Return whether a kind of device computes in bfloat16 itself; where it does not, emulation is far slower."""
+    """Return whether a kind of device has bfloat16; without it, emulation is far slower."""
     return _computes_in_half(device)
 
 
@@ -185,13 +185,13 @@ def _computes_in_half(device: str) -> bool:
 
 
 def arithmetic_of(module: nn.Module, device: str) -> torch.dtype:
-    """Return the type that all networks of a module compute in on a kind of device."""
+    """Return the type in which all networks of a module compute on a kind of device."""
     networks = [each for each in module.modules() if isinstance(each, Network)]
     return torch.bfloat16 if networks and all(each.is_half(device) for each in networks) else torch.float32
 
 
 class Central(nn.Module):
-    """What a central critic adds to networks of agents: the state that they all are in, and all that they do.
+    """Inputs of a central critic besides those of agents' networks: the common state, and all actions.
 
     Args:
         network: Reads the state, the joint action where there is one, and then each agent's own entries.

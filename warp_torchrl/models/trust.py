@@ -1,4 +1,4 @@
-"""Trust in an adviser: agents whose own judgement is not sure do what they are advised."""
+"""Trust in an adviser: unsure agents follow the advice."""
 
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
@@ -17,14 +17,14 @@ class Trust(TensorDictModuleBase):
 
         logit_a += trust log2(A) [a is advised]
 
-    So an agent does otherwise where its logit of another action is higher by as much. In a larger team each agent has a
-    smaller part in what the team earns, and what it learned of that part is noisier.
+    So an agent acts otherwise where its logit of another action is higher by as much. In a larger team each agent has a
+    smaller part in the team's reward, and learns that part with more noise.
 
     Args:
-        key: Of the vector that tells what ``told_to_trust`` names.
-        names: Of the numbers of that vector, in order.
+        key: Key of the vector with the numbers of ``told_to_trust``.
+        names: Names of that vector's numbers, in order.
         actions: Names of the actions, in the order of the logits.
-        trust: What is added for each doubling of the team.
+        trust: Added for each doubling of the team.
     """
 
     def __init__(self, key: Key, names: tuple[str, ...], actions: tuple[str, ...], trust: float) -> None:

@@ -1,4 +1,4 @@
-"""Canonical inputs: what agents observe is turned by one of the eight symmetries of the square before networks read it.
+"""Canonical inputs: one of the eight symmetries of the square turns agents' observations before networks read them.
 
 ``orientation`` is the group, ``entries`` and ``state`` turn what an observation declares in ``warp_torchrl.symmetry``,
 ``modules`` is the sequence of canonicalise, network and restore, ``batch`` is what is learnt from.

@@ -1,4 +1,4 @@
-"""What is learnt from: a collected batch whose entries are turned once, when it was acted on."""
+"""Batches in canonical orientation: their entries are turned once, when the policy acts."""
 
 from dataclasses import dataclass
 
@@ -12,14 +12,13 @@ from warp_torchrl.models.signature import ACTION, ACTION_MASK, OBSERVATION, ORIE
 
 @dataclass(frozen=True)
 class CanonicalBatch:
-    """Replaces what was observed by its canonical entries, packed where that is asked for.
+    """Replaces observations by their canonical entries, packed where ``packings`` says so.
 
     Attributes:
-        observation: ``Canonicalise``; None where networks read maps as they are, which leaves batches as they are.
+        observation: ``Canonicalise``; None leaves batches unchanged, for networks that read maps north up.
         state: ``CanonicaliseState``, where networks read the state.
-        actions: Names of the actions where actions and masks are turned too; none where networks restore what they
-            write.
-        packings: What packs the entries; None leaves them whole.
+        actions: Names of the actions if actions and masks are turned too; empty if networks restore their outputs.
+        packings: Packing of the entries; None leaves them whole.
     """
 
     observation: TensorDictModuleBase | None
@@ -28,10 +27,10 @@ class CanonicalBatch:
     packings: Packings | None = None
 
     def __call__(self, batch: TensorDictBase) -> TensorDictBase:
-        """Return a batch [...] without observation and state, with their canonical entries; or packed as it is.
+        """Return a batch [...] with canonical entries instead of observation and state, packed if there is a packing.
 
-        The entries that the policy wrote when it acted are kept; those of a batch without them are made. Entries of
-        its ``next`` stay as they are.
+        Canonical entries that the policy wrote when it acted are kept; missing ones are made. Entries of its ``next``
+        are not changed.
         """
         turned = batch if self.observation is None else self._turned(batch, self.observation)
         return turned if self.packings is None else self.packings(turned)

@@ -1,8 +1,8 @@
 """Canonical inputs: each agent's entries are turned so that its target lies between its east and its south-east.
 
-What is learnt of one case then holds for all eight (canonical inputs, as in Kaba et al., "Equivariance with learned
-canonicalization functions", 2023, with a rule in place of the learnt function). The orientation follows from the
-agent's own observation, so that a policy stays decentralised.
+Whatever is learnt of one case then holds for all eight (canonical inputs, as in Kaba et al., "Equivariance with learned
+canonicalization functions", 2023, with a rule instead of the learnt function). The orientation follows from the agent's
+observation, so that a policy stays decentralised.
 """
 
 import math
@@ -62,13 +62,13 @@ def targets(symmetries: Symmetries) -> list[tuple[str, Target, Planes]]:
 
 
 def place_of(symmetries: Symmetries) -> tuple[str, slice] | None:
-    """Return the entry, and the numbers in it, that tell an agent's place on the map; None where none do."""
+    """Return the entry, and the slice in it, with an agent's place on the map; None without one."""
     found = ((name, each.place()) for name, each in symmetries.items() if isinstance(each, Vector))
     return next(((name, place) for name, place in found if place is not None), None)
 
 
 def pull_from(place: Tensor, weight: Tensor, near: float) -> Tensor:
-    """Return which way the weights of cells [..., S, S] pull from places [cells] [..., 2], int64 [..., 2]."""
+    """Return the direction in which weights of cells [..., S, S] pull from places [cells] [..., 2], int64 [..., 2]."""
     side = weight.shape[-1]
     along = torch.arange(side, device=weight.device) + 0.5
     down, across = along - place[..., :1], along - place[..., 1:]
@@ -79,7 +79,7 @@ def pull_from(place: Tensor, weight: Tensor, near: float) -> Tensor:
 
 
 def _pull(entries: Mapping[str, Tensor], symmetries: Symmetries, target: Target, planes: Tensor) -> Tensor:
-    """Return which way the targets that planes [..., C, S, S] show pull each agent, int64 [..., 2]."""
+    """Return the direction in which targets in planes [..., C, S, S] pull each agent, int64 [..., 2]."""
     plane = planes[..., target.channel, :, :]
     weight = plane if target.is_share else plane > 0
     place = None if target.in_middle else place_of(symmetries)
@@ -106,7 +106,7 @@ def _planes(entry: Tensor, symmetry: Planes) -> Tensor:
 
 @kept(16)
 def _offsets(side: int, near: float, device: torch.device) -> Tensor:
-    """Return how a target at each cell about the middle pulls, whole numbers, float64 [S S, 2]."""
+    """Return the pull of a target at each cell about the middle, whole numbers, float64 [S S, 2]."""
     along = torch.arange(side, dtype=torch.float64) - side // 2
     away = torch.cartesian_prod(along, along)
     return (away * _UNITS / (away.abs().amax(-1, keepdim=True) + near) ** 3).round().to(device)

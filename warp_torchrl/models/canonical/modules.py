@@ -1,4 +1,4 @@
-"""Canonicalise, network, restore: the modules of a sequence that acts and values in canonical orientation."""
+"""Canonicalise, network, restore: the modules of a sequence in canonical orientation."""
 
 from collections.abc import Mapping
 
@@ -24,7 +24,7 @@ from warp_torchrl.symmetry import Planes, TeamPlanes, Vector
 
 
 class Canonicalise(TensorDictModuleBase):
-    """Turns what each agent observes, and writes its orientation, int64 [..., A].
+    """Turns each agent's observation, and writes its orientation, int64 [..., A].
 
     Args:
         observation: The entries, by name.
@@ -101,10 +101,10 @@ class CanonicaliseAction(TensorDictModuleBase):
 
 
 class Restore(TensorDictModuleBase):
-    """Turns numbers of which there is one for each action, [..., A, actions], back to the map.
+    """Turns entries with one number per action, [..., A, actions], back to the map's orientation.
 
     Args:
-        key: Where they are.
+        key: Key of the entries.
         actions: Names of the actions.
     """
 
@@ -114,7 +114,7 @@ class Restore(TensorDictModuleBase):
         self.in_keys, self.out_keys = [key, ORIENTATION], [key]
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Write them in the order of the map's actions."""
+        """Write the entries in the order of the map's actions."""
         key, orientation = self.out_keys[0], Orientation(tensordict.get(ORIENTATION))
         return tensordict.set(key, orientation.by_action_back(tensordict.get(key), self._actions))
 
@@ -123,7 +123,8 @@ def over_canonical(module: TensorDictModuleBase, restored: bool = False) -> Tens
     """Return the modules of a sequence that read canonical entries, the same objects, to learn from stored batches.
 
     Args:
-        module: A sequence, or a part of one, which may begin with ``Canonicalise``; others are returned as they are.
+        module: A sequence, or a part of one, which may begin with ``Canonicalise``; other modules are returned
+            unchanged.
         restored: Whether it writes numbers in the order of the map's actions.
     """
     if not any(isinstance(each, (Canonicalise, CanonicaliseState)) for each in module.modules()):
@@ -136,7 +137,7 @@ def over_canonical(module: TensorDictModuleBase, restored: bool = False) -> Tens
 
 
 def _declared(observation: Mapping[str, Entry]) -> Symmetries:
-    """Return what the entries declare, checked."""
+    """Return the symmetries that the entries declare, checked."""
     declared: dict[str, Planes | Vector] = {}
     for name, entry in observation.items():
         if not isinstance(entry.symmetry, (Planes, Vector)):

@@ -1,4 +1,4 @@
-"""The eight symmetries of the square (the dihedral group D4), and what each does to vectors, planes and actions."""
+"""The eight symmetries of the square (the dihedral group D4), and their effect on vectors, planes and actions."""
 
 from dataclasses import dataclass
 
@@ -13,11 +13,11 @@ _SYMMETRIES = 8
 
 @dataclass(frozen=True, eq=False)
 class Orientation:
-    """How maps are turned and mirrored, by one of the eight symmetries of the square each.
+    """One of the eight symmetries of the square for each map.
 
     Attributes:
-        index: int64 [...]: 4 where rows are mirrored, and 2 where columns are, and 1 where rows and columns change
-            places after that; 0 leaves a map as it is.
+        index: int64 [...]: the sum of 4 if rows are mirrored, 2 if columns are mirrored, and 1 if rows and columns
+            change places after that; 0 changes nothing.
     """
 
     index: Tensor
@@ -39,7 +39,7 @@ class Orientation:
         return planes.flatten(-2).gather(-1, cell).view(planes.shape)
 
     def by_action(self, entries: Tensor, names: tuple[str, ...]) -> Tensor:
-        """Turn entries [..., n] of which there is one for each action by name."""
+        """Turn entries [..., n] with one number per action, by the actions' names."""
         return entries.gather(-1, _actions(names, True, entries.device)[self.index])
 
     def by_action_back(self, entries: Tensor, names: tuple[str, ...]) -> Tensor:
@@ -93,7 +93,7 @@ def _signs(device: torch.device) -> Tensor:
 
 @kept(8)
 def _products(into: bool, device: torch.device) -> Tensor:
-    """Return the orientation that each one of a turned map is of the map itself, or back, int64 [8, 8]."""
+    """Return the orientation of the map for each orientation of a turned map, or back, int64 [8, 8]."""
     ways = Orientation(torch.arange(_SYMMETRIES)[:, None].expand(-1, 2))
     matrix = ways.offsets(torch.eye(2, dtype=torch.int64).expand(_SYMMETRIES, -1, -1))  # [way, of the map's axis, axis]
     product = torch.einsum("gij,kjl->gkil", matrix, matrix)
@@ -104,7 +104,7 @@ def _products(into: bool, device: torch.device) -> Tensor:
 
 @kept(32)
 def _actions(names: tuple[str, ...], into: bool, device: torch.device) -> Tensor:
-    """Return the index of the action on the map that each action is in each orientation, or back, int64 [8, n]."""
+    """Return the index of each action on the map in each orientation, or back, int64 [8, n]."""
     compass = [COMPASS.get(name.removeprefix(LAST).removeprefix(ADVICE)) for name in names]
     moves = [place for place, offset in enumerate(compass) if offset is not None]
     index = torch.arange(len(names)).repeat(_SYMMETRIES, 1)

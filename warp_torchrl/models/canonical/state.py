@@ -1,4 +1,4 @@
-"""The central critic's state, turned towards the fire and moved so that what happens is in its middle."""
+"""The central critic's state, turned towards the fire and moved so that the fire is in its middle."""
 
 import torch
 from torch import Tensor
@@ -33,7 +33,7 @@ def canonical_state(state: Tensor, symmetry: TeamPlanes) -> Tensor:
 
 
 def _corner(marked: Tensor) -> Tensor:
-    """Return the row and column, int64 [..., 2], from which on a map shows the box of what is marked in its middle.
+    """Return the row and column, int64 [..., 2], of the map's corner that puts the box of marked cells in the middle.
 
     Args:
         marked: bool [..., S, S].
