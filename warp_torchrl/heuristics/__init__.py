@@ -1,4 +1,4 @@
-"""Heuristic policies, the baselines. Each is a TensorDictModule like any policy.
+"""Heuristic policies, the baselines. Each is a TensorDictModule.
 
 They read the state through the environment. ``local``, ``oldest``, ``lawnmower``, ``follower`` and ``clockwise`` know
 of the fire what their agents know or see; the others see every cell, which no learned policy does.

@@ -21,7 +21,7 @@ from warp_torchrl.world.world import World
 
 
 class Worlds(Protocol):
-    """What a heuristic reads of an environment."""
+    """The part of an environment that a heuristic reads."""
 
     @property
     def world(self) -> World:
@@ -29,7 +29,7 @@ class Worlds(Protocol):
 
     @property
     def shared_state(self) -> WorldState:
-        """Return the worlds as they are now, to be read alone."""
+        """Return the present state of the worlds; it must not be changed."""
 
 
 class Heuristic(TensorDictModuleBase):
@@ -116,7 +116,7 @@ def chebyshev_distance(state: WorldState, cells: Tensor) -> Tensor:
 
 
 def _rows_and_columns(cells: Tensor, state: WorldState) -> tuple[Tensor, Tensor]:
-    """Return the rows and the columns of flat indices, float32, each in memory of its own, which is fast to read."""
+    """Return the rows and the columns of flat indices, float32, each contiguous, which is fast to read."""
     width = state.cells.shape[2]
     return (cells // width).to(torch.float32), (cells % width).to(torch.float32)
 
@@ -124,7 +124,7 @@ def _rows_and_columns(cells: Tensor, state: WorldState) -> tuple[Tensor, Tensor]
 def nearest_fire(state: WorldState, fire: Tensor) -> tuple[Tensor, Tensor]:
     """Return each agent's distance to the nearest fire, float32 [B, A], ``FAR`` where none burns, and its flat index.
 
-    Each agent breaks ties by its own random draw: agents in one cell would otherwise act alike for ever.
+    Each agent breaks ties by a random draw: agents in one cell would otherwise act alike forever.
     """
     cells, valid = list_cells(fire)
     agents = torch.arange(state.vehicles.position.shape[1], device=cells.device)[:, None]
@@ -193,7 +193,7 @@ def move_towards(state: WorldState, world: World, target: Tensor) -> Tensor:
 
 
 def target_or_base(state: WorldState, world: World, target: Tensor) -> Tensor:
-    """Return the given targets, but the base for aircraft whose charge runs out, with two steps to spare.
+    """Return the given targets, or the base for aircraft whose charge runs out, with two steps to spare.
 
     int64 [B, A, 2].
     """
@@ -207,7 +207,7 @@ def target_or_base(state: WorldState, world: World, target: Tensor) -> Tensor:
 
 
 def target_or_supply(state: WorldState, world: World, target: Tensor) -> Tensor:
-    """Return the given targets, but the nearest lake or the base for agents whom water or charge runs out.
+    """Return the given targets, or the nearest lake or the base for agents that run out of water or charge.
 
     int64 [B, A, 2].
     """
@@ -223,7 +223,7 @@ def claim_cells(state: WorldState, cells: Tensor, value: Tensor, spacing: int, d
     """Assign a cell to each agent by greedy matching of value minus distance, int64 [B, A, 2].
 
     Each round assigns the best pair of a cell and an agent without one, then lowers the value of the cells near it for
-    the other agents. An agent for which every cell has value -inf keeps its own position.
+    the other agents. An agent for which every cell has value -inf keeps its position.
 
     Args:
         state: The worlds.
@@ -237,7 +237,7 @@ def claim_cells(state: WorldState, cells: Tensor, value: Tensor, spacing: int, d
 
 
 def match_cells(state: WorldState, cells: Tensor, gain: Tensor, spacing: int, discount: float, taken: float) -> Tensor:
-    """Return what ``claim_cells`` does, int64 [B, A, 2], of each agent's gain by each cell.
+    """Return the assignment of ``claim_cells``, int64 [B, A, 2], from each agent's gain by each cell.
 
     Args:
         state: The worlds.

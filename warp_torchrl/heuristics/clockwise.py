@@ -14,18 +14,19 @@ _MANY = 6
 
 
 class Clockwise(Heuristic):
-    """Flies to the middle of the map until it is over the fire, then clockwise round the middle along the fire's edge
-    (Haksar and Schwager, "Distributed Deep Reinforcement Learning for Fighting Forest Fires with a Network of Aerial
-    Robots", IROS 2018, and the authors' public code).
+    """Flies to the middle of the map until it is over the fire, then clockwise round the middle along the fire's edge.
+
+    Source: Haksar and Schwager, "Distributed Deep Reinforcement Learning for Fighting Forest Fires with a Network of
+    Aerial Robots", IROS 2018, and the authors' public code.
 
     Of the eight moves it takes the one that turns most clockwise, with two exceptions. If one of the two moves next to
-    it on the left, which lead outwards, comes to a burning tree, or else to a burnt one, it takes that. If it would
-    come to a healthy tree among six others or more, it takes the move next to it on the right. It stays where it would
-    come within a cell of the team-mate nearest to it, if that has a lower number. It sees the 5 x 5 cells about it, its
-    team-mates, and where the middle of the map is; beyond the map all is healthy.
+    it on the left, which lead outwards, reaches a burning tree, or else a burnt one, it takes that move. If it would
+    reach a healthy tree among six others or more, it takes the move next to it on the right. It stays where it would be
+    within a cell of the team-mate nearest to it, if that has a lower number. It sees the 5 x 5 cells about it, its
+    team-mates, and the middle of the map; beyond the map all is healthy.
 
-    A move that leads off the map, where the authors' aircraft can go, is made along the border. Vehicles that can put
-    fire out do so first.
+    A move that leads off the map, where the authors' aircraft can go, is made along the border. Vehicles that can
+    extinguish do so first.
     """
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
@@ -65,7 +66,7 @@ class Clockwise(Heuristic):
         return move % 8
 
     def _on_map(self, state: WorldState, way: Tensor, mask: Tensor, idle: Tensor) -> Tensor:
-        """Return moves as they are where they are open, else along the border, else none, int64 [B, A]."""
+        """Return moves unchanged where they are open, else along the border, else none, int64 [B, A]."""
         height, width = state.cells.shape[1:]
         stride = self.world.team.table(way.device).stride[:, None]
         at, toward = state.vehicles.position, offsets(way.device)

@@ -1,4 +1,4 @@
-"""The baseline in which agents divide the fire front among themselves."""
+"""Baseline in which agents divide the fire front among themselves."""
 
 import math
 

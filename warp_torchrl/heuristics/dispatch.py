@@ -1,4 +1,4 @@
-"""The baseline that sends agents by the ways that they can go."""
+"""Baseline that assigns agents by the length of their paths."""
 
 import math
 
@@ -32,10 +32,10 @@ _LAST = 4096.0
 class Dispatch(Coordinated):
     """Assigns the fire front as ``Coordinated`` does, but by the moves that agents need, around lakes and fire.
 
-    Where team-mates would extinguish one cell in the same step, the first does so and the others go on. Agents with
-    empty tanks claim no fire: they go where the way to water, and from there to the fire, is shortest. Agents that can
-    clear and never extinguish, as in teams without water, shut the fire in with firebreaks (``cells_to_clear``). Agents
-    that have nothing to go to wait.
+    Where team-mates would extinguish one cell in the same step, the first does so and the others move on. Agents with
+    empty tanks claim no fire: they go where the path to water, and from there to the fire, is shortest. Agents that can
+    clear and never extinguish, as in teams without water, enclose the fire with firebreaks (``cells_to_clear``). Agents
+    without a target wait.
     """
 
     effort = 2.0  # steps for each cell of a firebreak: move, clear
@@ -71,7 +71,7 @@ class Dispatch(Coordinated):
         return torch.where(second, move, extinguish_or(move, mask))
 
     def _clear(self, state: WorldState, mask: Tensor, who: Tensor) -> Tensor:
-        """Return the actions of agents that clear firebreaks, int64 [B, A]; ``who`` does, bool [A]."""
+        """Return the actions of some agents, bool [A], that clear firebreaks, int64 [B, A]."""
         todo = cells_to_clear(state, self.world, who, self.effort)
         cells, valid = list_cells(todo)
         gain = (-self._distance(state, cells)).masked_fill(~(valid[:, None] & who[:, None]), -math.inf)
@@ -82,11 +82,11 @@ class Dispatch(Coordinated):
         return torch.where(here & ~is_second(own, here), int(Action.CLEAR), move)
 
     def _open(self, state: WorldState) -> Tensor:
-        """Return where each agent can go now, bool [B, A, H, W]: not into lakes or fire, unless it flies."""
+        """Return the cells that each agent can enter now, bool [B, A, H, W]: no lakes or fire, unless it flies."""
         return _is_open(state)[:, None] | self.world.team.table(state.cells.device).flies[:, None, None]
 
     def _distance(self, state: WorldState, cells: Tensor) -> Tensor:
-        """Return the way of each agent to cells [B, K], float32 [B, A, K] [cells]; ``FAR`` and more where none leads.
+        """Return each agent's path length to cells [B, K], float32 [B, A, K] [cells]; ``FAR`` or more without a path.
 
         Aircraft, whose moves are longer, have no advantage by it: they would claim what others are at already.
         """
@@ -94,7 +94,7 @@ class Dispatch(Coordinated):
         return torch.where(moves == FAR, FAR + chebyshev_distance(state, cells), moves)
 
     def _target_or_water(self, state: WorldState, target: Tensor, front: Tensor) -> Tensor:
-        """Return the given targets, but water for agents whose tank is empty, or the base where charge runs out.
+        """Return the given targets, or water for agents whose tank is empty, or the base where charge runs out.
 
         int64 [B, A, 2].
         """
@@ -108,7 +108,7 @@ class Dispatch(Coordinated):
         return torch.where(is_empty, place(water.gather(1, nearest), state), target)
 
     def _move(self, state: WorldState, mask: Tensor, target: Tensor) -> Tensor:
-        """Return the first move of a shortest way to each agent's target, int64 [B, A]; at the target, wait.
+        """Return the first move of a shortest path to each agent's target, int64 [B, A]; at the target, wait.
 
         Of ways that are as short, the one whose first move leads nearest to the target, by rows and columns together.
         """
@@ -126,5 +126,5 @@ class Dispatch(Coordinated):
 
 
 def _is_open(state: WorldState) -> Tensor:
-    """Return the cells that vehicles on the ground can go to now, bool [B, H, W]: not lakes, and not fire."""
+    """Return the cells that ground vehicles can enter now, bool [B, H, W]: no lakes, and no fire."""
     return ~((state.cover == int(Cover.LAKE)) | is_burning(state.cells))

@@ -1,4 +1,4 @@
-"""Where teams without water cut firebreaks, by the present state alone."""
+"""Firebreaks of teams without water, planned from the present state only."""
 
 import torch
 from torch import Tensor
@@ -15,20 +15,19 @@ _SLOWEST = 1e-3
 
 
 def cells_to_clear(state: WorldState, world: World, clears: Tensor, effort: float) -> Tensor:
-    """Return the trees to be cleared, bool [B, H, W]: those to which fire has the same way, the shortest in time.
+    """Return the trees to be cleared, bool [B, H, W]: the smallest ring that the team can finish in time.
 
-    The trees to which fire has d cells to go (``way_of_fire``) shut it in. The team takes the smallest such ring that
-    it can finish in time:
+    The trees at distance d from the fire (``way_of_fire``) enclose it. The team takes the smallest such ring with
 
         way + effort n_d / agents <= ((d - 1) / pace + 1) S - steps since the last tick
 
-    n_d trees are in the ring. What was cleared is part of it and takes no time, so a later state goes on with it. A
+    n_d trees are in the ring. Cleared cells are part of it and take no time, so later states continue the same ring. A
     ring off the map has no trees, so a team that can finish no other clears nothing.
 
     Args:
         state: The worlds.
-        world: Their rules; S is its steps to a tick.
-        clears: Which agents clear, bool [A], one at least.
+        world: Their rules; S is its steps per tick.
+        clears: Agents that clear, bool [A], at least one.
         effort: Steps that one agent takes for a cell of the ring.
     """
     away = way_of_fire(state, world).to(torch.int64)
@@ -46,7 +45,7 @@ def cells_to_clear(state: WorldState, world: World, clears: Tensor, effort: floa
 
 
 def pace_of_fire(state: WorldState, world: World) -> Tensor:
-    """Return how far the fire is expected to go, float32 [B] [cells a tick]: the mean chance of the trees beside it."""
+    """Return the expected pace of the fire, float32 [B] [cells / tick]: the mean chance of the trees beside it."""
     chance = world.forecast(state).ignition_probability.flatten(1)
     beside = chance > _THREATENED
     return ((chance * beside).sum(dim=1) / beside.sum(dim=1).clamp(min=1)).clamp(min=_SLOWEST)

@@ -1,4 +1,4 @@
-"""A baseline that watches: it follows the fire's front by what its agents know."""
+"""Baseline that watches: it follows the known fire front."""
 
 import torch
 from torch import Tensor
@@ -22,12 +22,12 @@ _ANOTHERS = 1e6
 
 
 class Follower(Oldest):
-    """Goes to the cell of the front that it knows of and saw longest ago, and leaves to others what they are nearer to.
+    """Goes to the known cell of the front that it saw longest ago, and leaves to others the cells nearer to them.
 
         score = steps since the cell was seen - steps to go there + draw
 
-    Where it knows of no such cell it searches as ``Oldest`` does; where it cannot move at all it does nothing. It never
-    extinguishes. Of the others it knows those whom it hears or sees.
+    If it knows no such cell it searches as ``Oldest`` does; if it cannot move at all it does nothing. It never
+    extinguishes. It knows the other agents that it hears or sees.
     """
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
@@ -38,7 +38,7 @@ class Follower(Oldest):
         return torch.where(mask.gather(-1, move[..., None])[..., 0], move, idle_action(mask, self.world.team))
 
     def _oldest_of_front(self, state: WorldState) -> tuple[Tensor, Tensor]:
-        """Return whether each agent has a cell of the front to go to, bool [B, A], and which, int64 [B, A, 2]."""
+        """Return whether each agent has a target cell of the front, bool [B, A], and the cell, int64 [B, A, 2]."""
         agents, (height, width) = state.vehicles.position.shape[1], state.cells.shape[1:]
         device, team = state.cells.device, self.world.team
         codes = state.cells[:, None].expand(-1, agents, -1, -1) if state.knowledge is None else known_codes(state)

@@ -1,4 +1,4 @@
-"""The baseline of agencies that each look after their own."""
+"""Baseline of agencies that each protect their own land."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Baselines without coordination: each agent acts on its own."""
+"""Baselines without coordination between agents."""
 
 import torch
 from torch import Tensor
@@ -45,7 +45,7 @@ class Local(Heuristic):
     """Sees only cells within Chebyshev distance ``radius``: extinguishes what it can reach, else goes to the nearest
     fire in sight, else searches the map: first the agents fan out, then each goes from one random point to the next.
 
-    Where sight is limited (``sensing=sight``) its own sight is its radius, with all that hinders it.
+    Where sight is limited (``sensing=sight``), its radius is the vehicle's sight, with all that hinders it.
     """
 
     sees_all = False

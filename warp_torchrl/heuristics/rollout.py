@@ -1,4 +1,4 @@
-"""The planner: it plays each choice in imagined fires before it chooses."""
+"""Planner that simulates each choice before it acts."""
 
 from typing import ClassVar
 
@@ -19,13 +19,13 @@ _PART = 8
 class Rollout(Heuristic):
     """Improves a base policy by simulation: the rollout algorithm, agent by agent.
 
-    Agents decide one after the other. Each considers all actions that its mask allows, while those before it do what
-    they chose and those after it act by the base policy. An action is played in imagined worlds, the same ``samples``
-    futures for each action, for ``horizon`` steps: after the first all agents act by the base policy. Its gain is the
-    trees that stand in the end less those that stand if the agent, too, acts by the base policy. An action is chosen
-    over that of the base policy if its mean gain is more than ``errors`` standard errors above 0, by the most.
+    Agents decide one after the other. Each considers all actions that its mask allows, while the agents before it take
+    their chosen actions and the agents after it follow the base policy. An action is simulated in the same ``samples``
+    futures as the others, for ``horizon`` steps: after the first step all agents follow the base policy. Its gain is
+    the number of trees that stand in the end, less the number if the agent, too, follows the base policy. An action
+    replaces that of the base policy if its mean gain is more than ``errors`` standard errors above 0, by the most.
 
-    All are played in the first half of the futures, and only those with a gain there in the second.
+    All actions are simulated in the first half of the futures, and only those with a gain there in the second.
 
     References: Tesauro and Galperin, "On-line policy improvement using Monte-Carlo search", NIPS 1996; Bertsekas,
     "Multiagent rollout algorithms and reinforcement learning", IEEE/CAA J. Autom. Sinica 2021.
@@ -55,7 +55,7 @@ class Rollout(Heuristic):
         return action.index_copy(0, going, self._plan(state[going], mask[going], action[going]))
 
     def _plan(self, state: WorldState, mask: Tensor, action: Tensor) -> Tensor:
-        """Return better actions than those of the base policy, int64 [B, A], where there are."""
+        """Return better actions than those of the base policy where there are any, int64 [B, A]."""
         keys = imagined_keys(state.key, state.step, self.samples)
         saved = self._imagine(state, torch.arange(len(action), device=action.device), action, keys)
         for agent in range(action.shape[1]):  # one after the other: each knows what those before it chose
@@ -116,11 +116,11 @@ class Rollout(Heuristic):
         return torch.cat(saved).view(-1, count)
 
     def _at_once(self, state: WorldState) -> int:
-        """Return how many worlds are imagined at once."""
+        """Return the number of worlds that are simulated in one batch."""
         return max(1, self.cells // state.cells[0].numel())
 
     def _play(self, world: World, state: WorldState, action: Tensor) -> Tensor:
-        """Return the trees that stand in each world after ``horizon`` steps, of which the first is given, int32 [n]."""
+        """Return the trees that stand in each world after ``horizon`` steps, the first with ``action``, int32 [n]."""
         rows = torch.arange(len(action), device=action.device)
         saved, counts = torch.zeros_like(state.step), None
         for step in range(self.horizon):  # over time alone: all worlds that are imagined are one batch

@@ -1,4 +1,4 @@
-"""Baselines that search: they act on what their agents know, as learned policies do.
+"""Baselines that search: they act on their agents' knowledge, as learned policies do.
 
 Where sight is not limited (``sensing=full``) they know all, and go straight to the fire.
 """
@@ -24,7 +24,7 @@ from warp_torchrl.world.state.state import WorldState
 
 
 class Searching(Heuristic):
-    """Extinguishes what it can reach, else goes to the nearest fire that it knows of, else searches.
+    """Extinguishes where it can, else goes to the nearest fire that it knows of, else searches.
 
     Agents whose role cannot extinguish always search.
     """
@@ -45,7 +45,7 @@ class Searching(Heuristic):
 
 
 class Oldest(Searching):
-    """Searches where it has not looked for longest: greedy in staleness, distance, and the agent's own sector.
+    """Searches the cells that it has not seen for longest: greedy in staleness, distance, and the agent's sector.
 
         score = (1 - freshness) - 2 distance / max(H, W) - |sector of the cell - own sector| + draw / 10
 
@@ -69,7 +69,7 @@ class Oldest(Searching):
 
 
 class Lawnmower(Searching):
-    """Searches in lanes: each agent mows its own strip of the map, back and forth, as wide as it sees."""
+    """Searches in lanes: each agent sweeps a strip of the map, back and forth, with its sight as the lanes' width."""
 
     def search(self, state: WorldState) -> Tensor:
         """Return the point of its lanes where each agent should be by now, int64 [B, A, 2]."""
