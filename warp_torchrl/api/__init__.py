@@ -1,1 +1,1 @@
-"""Environments by name, and their views for other libraries."""
+"""Environments by name, and their adapters for other libraries."""

@@ -32,14 +32,14 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
             pygame, else pictures in the terminal.
         layout: ``dict``; or ``flat``, in every preset ``observation``, one float32 vector, beside ``action_mask``: the
             entries in the order of their names, bytes divided by 255.
-        device: Where the world lives; observations come back as numpy.
+        device: Device of the world; observations are numpy arrays.
         max_cycles: Steps to an episode, ``horizon``; None leaves the scenario's.
         overrides: In the command line's grammar, ``["fire=paper", "team.n_agents=3"]``.
         more: Further overrides by name, ``observation="paper"``.
 
     Attributes:
         possible_agents: ``bulldozer_0``, ``uav_0`` and so on, numbered within their role.
-        agents: Those whose episode goes on.
+        agents: Agents whose episode continues.
         observation_spaces: By agent.
         action_spaces: By agent.
         state_space: Of ``state()``.

@@ -17,10 +17,10 @@ from warp_torchrl.api.adapters.worlds import NumpyStep, Worlds, whole_number
 class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
     """A batch of worlds with one agent each, stepped at once; also ``gymnasium.make_vec("Wildfire-v0", num_envs=B)``.
 
-    Finished worlds start anew by Gymnasium's rules. ``AutoresetMode.NEXT_STEP``: the step that ends an episode shows
-    its last observation; the next step ignores the world's action and shows the first observation of its next episode,
-    with reward 0 and neither flag set. ``SAME_STEP``: the step that ends an episode shows the first observation of the
-    next, and has the last observation and infos in ``final_obs`` and ``final_info``.
+    Finished worlds are reset by Gymnasium's rules. ``AutoresetMode.NEXT_STEP``: the step that ends an episode returns
+    its last observation; the next step ignores the world's action and returns the first observation of its next
+    episode, with reward 0 and neither flag set. ``SAME_STEP``: the step that ends an episode returns the first
+    observation of the next, and has the last observation and infos in ``final_obs`` and ``final_info``.
 
     Args:
         num_envs: B.
@@ -30,7 +30,7 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
         autoreset_mode: ``NEXT_STEP`` or ``SAME_STEP``, or its value, ``"SameStep"``.
         layout: ``dict``; or ``flat``, in every preset ``observation``, one float32 vector, beside ``action_mask``: the
             entries in the order of their names, bytes divided by 255.
-        device: Where the worlds live; observations come back as numpy.
+        device: Device of the worlds; observations are numpy arrays.
         overrides: In the command line's grammar.
         more: Further overrides by name.
 
@@ -98,7 +98,7 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
         return now.of_agent(slice(None), 0), self._info(now)
 
     def step(self, actions: np.ndarray) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Step every world; reset those that ended in this step or the last, by ``autoreset_mode``.
+        """Step every world; reset worlds that ended in this step or the last, by ``autoreset_mode``.
 
         Args:
             actions: Whole numbers, [B].
@@ -108,7 +108,7 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
 
         Raises:
             RuntimeError: Before the first reset.
-            ValueError: If actions are not whole numbers in range, one a world.
+            ValueError: If actions are not whole numbers in range, one per world.
         """
         in_same_step, ended_before = self.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP, self._worlds.ended
         last = self._worlds.step(self._checked(actions)[:, None])

@@ -40,9 +40,9 @@ class NumpyStep(NamedTuple):
         return entries.get("", {**entries, "action_mask": mask})
 
     def info_of_agent(self, world: int | slice, agent: int) -> dict[str, np.ndarray]:
-        """Return the world's metrics, whom the agent hears if it talks, and its mask if its observation has none.
+        """Return the world's metrics, the agent's radio if it talks, and its mask if its observation has none.
 
-        Where messages come late, ``sent`` is what the agent observed when it sent what arrives now. TorchRL's
+        Where messages arrive late, ``sent`` is the agent's observation when it sent what arrives now. TorchRL's
         ``PettingZooWrapper`` fails if both have the mask.
         """
         info = {name: value[world] for name, value in self.info.items()}
@@ -161,7 +161,7 @@ class Worlds:
         return self._to_numpy(np.zeros((n_worlds, self.env.n_agents), np.float32))
 
     def step(self, action: np.ndarray) -> NumpyStep:
-        """Advance every world by one step; a finished one stays as it is, with reward 0.
+        """Advance every world by one step; a finished one does not change, with reward 0.
 
         Args:
             action: Valid actions, int64 [B, A].
