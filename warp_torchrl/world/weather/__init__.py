@@ -1,1 +1,1 @@
-"""The weather that a fire burns in: tables by the hour, and the moisture of fuels that follows from them."""
+"""Weather of a fire: hourly tables, and fuel moistures computed from them."""

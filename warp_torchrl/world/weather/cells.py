@@ -29,7 +29,7 @@ def is_missing(cell: str) -> bool:
 
 
 def column_values(name: str, column: Column, sheet: Sheet) -> list[float] | None:
-    """Return a column's values in our unit; None where no cell holds one and the quantity may be left out.
+    """Return a column's values in our unit; None if all cells are empty and the quantity is optional.
 
     Raises:
         ValueError: If a cell is missing, no number, or out of the quantity's range, with the row.
@@ -46,7 +46,7 @@ def column_values(name: str, column: Column, sheet: Sheet) -> list[float] | None
 
 
 def bearings(column: Column, sheet: Sheet, speeds: Sequence[float]) -> list[float]:
-    """Return where the wind comes from in each row [degrees]; 0 where there is no wind, and so no direction.
+    """Return the direction from which the wind blows in each row [degrees]; 0 without wind.
 
     Raises:
         ValueError: If a wind has no direction, or one that cannot be read, with the row.

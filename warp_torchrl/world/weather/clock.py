@@ -15,11 +15,11 @@ class Clock:
 
     Attributes:
         hours: From the first row to each; falling where the last row is the first in time.
-        columns: The columns that tell them.
-        warnings: What a user must know of them.
+        columns: Columns of dates and times.
+        warnings: Warnings for the user.
         moments: Hours of each row since 1970 on one clock, in every order of dates that makes these hours.
-        texts: Of each row, as messages show them.
-        offsets: Hours ahead of UTC that rows state; None of a row that states none.
+        texts: Date and time of each row, as messages show them.
+        offsets: Hours ahead of UTC that rows state; None for a row without an offset.
     """
 
     hours: list[float]
@@ -30,7 +30,7 @@ class Clock:
     offsets: set[float | None]
 
     def reversed(self) -> "Clock":
-        """Return the clock of rows in the order of time, where the last row is the first."""
+        """Return the clock of rows in the order of time, for a table whose last row is the first."""
         moments = {order: hours[::-1] for order, hours in self.moments.items()}
         hours = [hour - self.hours[-1] for hour in self.hours[::-1]]
         told = (*self.warnings, "its last row is the first in time; it is read from there")
@@ -41,12 +41,12 @@ def hours_until(moment: str, clock: Clock, zone: float | None) -> float:
     """Return the hours from the first row to a date and time.
 
     Args:
-        moment: The text. With an offset it is on the clock of the world, without one on that of the rows.
+        moment: The text. With an offset it is converted to the rows' clock, without one it is on that clock.
         clock: Of the rows.
         zone: Hours that the rows' clock is ahead of UTC, where their offsets do not say it.
 
     Raises:
-        ValueError: If the rows tell no times, or the moment is not written as they are.
+        ValueError: If the rows have no times, or the moment has another form.
     """
     if not clock.moments:
         raise ValueError(f"start must be in minutes where rows tell no dates and times of their own, got {moment!r}")
@@ -80,7 +80,7 @@ def _own_orders(stamp: Stamp, order: str) -> tuple[str, ...]:
 
 
 def _shift(moment: str, stamp: Stamp, clock: Clock, zone: float | None) -> float:
-    """Return the hours that a moment, on the clock of its own offset, is ahead of the rows' clock."""
+    """Return the hours that a moment, with its offset, is ahead of the rows' clock."""
     has_own, rows = stamp.offset is not None, clock.offsets
     if has_own and None in rows:
         if zone is None:
@@ -94,12 +94,12 @@ def _shift(moment: str, stamp: Stamp, clock: Clock, zone: float | None) -> float
 
 
 def dated_clock(texts: list[str], columns: tuple[str, ...], order: str | None) -> Clock:
-    """Return the clock of texts in the reading that suits them.
+    """Return the clock of texts, in the order of dates that fits them.
 
     Args:
-        texts: Of dates and times, a text a row.
-        columns: That they come from.
-        order: Of the numbers of dates, as the user says it; None goes by the rows.
+        texts: Dates and times, one text per row.
+        columns: Columns of the texts.
+        order: Order of day, month and year, given by the user; None finds it from the rows.
 
     Raises:
         ValueError: If a text cannot be read, or all of them in two ways.
@@ -166,10 +166,10 @@ def _rolling(stamps: Sequence[Stamp], texts: Sequence[str]) -> list[float]:
 def _chosen(
     stamps: Sequence[Stamp], texts: list[str], columns: tuple[str, ...], order: str | None, offsets: set[float | None]
 ) -> Clock:
-    """Return the clock in the order of dates that suits all rows.
+    """Return the clock in the order of dates that fits all rows.
 
     Raises:
-        ValueError: If none does, or two do that tell different hours.
+        ValueError: If no order fits, or two orders fit with different hours.
     """
     readings = _readings(stamps, texts, order)
     forward = {each: hours for each, hours in readings.items() if hours == sorted(hours)}

@@ -1,14 +1,15 @@
-"""Which columns of a table of weather are read, by what names, and in what units.
+"""Columns of a table of weather: names and units.
 
-Names are read in any case, with or without accents; only their letters and digits count. A unit is what the file
-states: in the name, as in "WindSpeed (km/h)", "temperature [C]", "Temp - °F", `wind_speed_ms` and `tmpf`, or in a row
-of units below it. Without one it is what the user says (`units.wind_speed=km/h`), or that of the file's source where
-its names tell the source (`warp_torchrl.world.weather.sources`): `WS`, for one, is Canadian and so in km/h. What nobody
-states is asked for. A height behind a name, as in `windspeed_10m`, says how high the wind was measured; of others than
-10 m, 20 ft and 6 m, and of air above 2 m, nothing is read.
+Names are read in any case, with or without accents; only their letters and digits count. A unit is stated by the file:
+in the name, as in "WindSpeed (km/h)", "temperature [C]", "Temp - °F", `wind_speed_ms` and `tmpf`, or in a row of units
+below it. Otherwise it is stated by the user (`units.wind_speed=km/h`), or by the documents of the file's source,
+recognised by its names (`warp_torchrl.world.weather.sources`): `WS`, for example, is Canadian and so in km/h. A unit
+that nobody states is an error. A height behind a name, as in `windspeed_10m`, is that of the wind's measurement; only
+10 m, 20 ft and 6 m are read, and air only up to 2 m.
 
-Bearings are in degrees from true north, where the wind comes from, or points of the compass; humidity and moistures are
-in per cent; the codes of the Canadian system have no unit. ISI and FWI follow from the codes and are left unread.
+Bearings are in degrees from true north, the direction from which the wind blows, or points of the compass; humidity and
+moistures are in per cent; the codes of the Canadian system have no unit. ISI and FWI follow from the codes and are not
+read.
 """
 
 import re
@@ -32,7 +33,7 @@ _NOTE = re.compile(
 
 @dataclass(frozen=True)
 class Header:
-    """What the first row says of a column."""
+    """Meaning of a column's first cell."""
 
     text: str
     quantity: str | None  # None: nothing that is read
@@ -43,7 +44,7 @@ class Header:
 
 @dataclass(frozen=True)
 class Column:
-    """Where a quantity stands in a table, and how its numbers become values in our unit."""
+    """Place of a quantity in a table, and its conversion to our unit."""
 
     header: str
     place: int
@@ -59,7 +60,7 @@ def plain(text: str) -> str:
 
 
 def read_header(text: str) -> Header:
-    """Return what the text above a column says."""
+    """Return the meaning of the text above a column."""
     name, *inside = (part.strip() for part in re.split(r"[\[\]()]", ascii_text(text)))
     unit, odd = None, [part for part in inside if not _NOTE.fullmatch(part)]
     for part in odd:
@@ -80,7 +81,7 @@ def read_header(text: str) -> Header:
 
 
 def _known(name: str) -> tuple[str | None, str | None, str | None]:
-    """Return the name that a column's name is without unit, height and the like; then the unit and the height."""
+    """Return a column's name without unit, height and the like; then the unit and the height."""
     unit = height = None
     for _ in range(5):
         if name in OWNER:
@@ -124,13 +125,13 @@ def find_columns(
     below: Sequence[str] = (),
     told: Mapping[str, str] | None = None,
 ) -> tuple[dict[str, Column], Source | None]:
-    """Return the column of each quantity that a table has, and the source that its names are those of.
+    """Return the column of each quantity in a table, and the source whose names it has.
 
     Args:
         headers: The table's first row.
-        rows: The rows below it; they tell whether names of RAWS may be taken for its units.
-        below: What a row of units below the names states, empty where there is none.
-        told: Units by quantity or header, as the user says them.
+        rows: The rows below it, by which names of RAWS are recognised.
+        below: Units in a row below the names, empty without one.
+        told: Units by quantity or header, given by the user.
 
     Raises:
         ValueError: If a quantity has two columns, no unit or one that is not known, or the wind has no column.
@@ -162,7 +163,7 @@ def _places(name: str, heads: Sequence[Header]) -> list[int]:
 
 
 def _unread(places: Mapping[str, list[int]]) -> list[str]:
-    """Return the quantities that say what others say already."""
+    """Return the quantities that other quantities make redundant."""
     has_wind = places["wind_speed"] and places["wind_bearing"]
     unread = ["wind_u", "wind_v"] if has_wind else ["wind_speed", "wind_bearing"]
     return unread + ([] if places["temperature"] and not places["humidity"] else ["dew_point"])
@@ -180,7 +181,7 @@ def _check_wind(places: Mapping[str, list[int]], heads: Sequence[Header]) -> Non
 
 
 def _said(told: Mapping[str, str], heads: Sequence[Header]) -> dict[str, str]:
-    """Return the units that the user says, by quantity.
+    """Return the user's units, by quantity.
 
     Raises:
         ValueError: If one names no column or no unit.

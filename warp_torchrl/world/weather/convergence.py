@@ -1,4 +1,4 @@
-"""How far a map's grid north is turned from true north: weather has bearings from the one, fire from the other.
+"""Grid convergence: the angle from true north, for weather's bearings, to a map's grid north, for fire.
 
 bearing from grid north = bearing from true north - convergence
 """

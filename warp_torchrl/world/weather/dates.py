@@ -59,7 +59,7 @@ class Stamp:
         return self._days(order) * 24.0 + self.clock(is_clock) - (self.offset or 0.0)
 
     def clock(self, is_clock: bool = False) -> float:
-        """Return the hours since midnight, 0 where the text tells none; 24 is the next day's 0."""
+        """Return the hours since midnight, 0 in a text without a time; 24 is the next day's 0."""
         if self.digits is not None:
             hour, minute = divmod(int(self.digits), 100) if is_clock else (int(self.digits), 0)
             hours = hour + minute / 60.0

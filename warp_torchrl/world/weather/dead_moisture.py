@@ -1,4 +1,4 @@
-"""Moisture of dead fuel where only the air is known, for rates of spread that ask for it by size of fuel."""
+"""Moisture of dead fuel from temperature and humidity, for rates of spread that depend on it by size of fuel."""
 
 import torch
 from torch import Tensor
@@ -8,7 +8,7 @@ RAINING = 35.0
 
 
 def equilibrium_moisture(temperature: Tensor, humidity: Tensor) -> Tensor:
-    """Return the moisture that wood comes to in air [per cent] (Simard 1968, FF-X-14).
+    """Return the equilibrium moisture of wood in air [per cent] (Simard 1968, FF-X-14).
 
     Args:
         temperature: Of the air [C].

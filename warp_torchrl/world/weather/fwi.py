@@ -1,4 +1,4 @@
-"""The codes of the Canadian Forest Fire Weather Index (FWI) System, by the day and by the hour.
+"""Codes of the Canadian Forest Fire Weather Index (FWI) System, by the day and by the hour.
 
 Equations: Van Wagner 1987, "Development and structure of the Canadian Forest Fire Weather Index System", Forestry
 Technical Report 35 (as programmed by Van Wagner and Pickett 1985, Report 33); by the hour: Van Wagner 1977, PS-X-69.
@@ -100,7 +100,7 @@ def daily_ffmc(ffmc: Tensor, temperature: Tensor, humidity: Tensor, wind_speed: 
 def hourly_ffmc(
     ffmc: Tensor, temperature: Tensor, humidity: Tensor, wind_speed: Tensor, rain: Tensor, hours: Number = 1.0
 ) -> Tensor:
-    """Return the fine fuel moisture code some hours later, in weather that stays the same (Van Wagner 1977).
+    """Return the fine fuel moisture code some hours later, in constant weather (Van Wagner 1977).
 
     Args:
         ffmc: The code before.

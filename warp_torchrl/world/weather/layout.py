@@ -105,7 +105,7 @@ def _uncommented(row: Sequence[str]) -> list[str]:
 
 
 def _body(table: Sequence[list[str]], headers: Sequence[str]) -> tuple[list[list[str]], list[str]]:
-    """Return the rows until another table begins, and what was left."""
+    """Return the rows until another table begins, and a note on the rest."""
     rows: list[list[str]] = []
     for number, row in enumerate(table):
         if not row or row[0].startswith("#") or row == [*headers]:

@@ -12,15 +12,15 @@ from warp_torchrl.world.weather.units import Units
 
 @dataclass(frozen=True, kw_only=True)
 class Quantity:
-    """One thing that a table may tell.
+    """A quantity of a weather table.
 
     Attributes:
-        names: Of columns; of several columns, one of the first names is taken before those of later ones.
-        lowest: Of values, in our unit.
-        highest: The same.
-        unit: Ours.
-        units: That a column may have.
-        usual: The unit of a column that states none; None is asked for.
+        names: Names of its columns; of several columns, a name in an earlier set is taken.
+        lowest: Lowest value, in our unit.
+        highest: Highest value, in our unit.
+        unit: Our unit.
+        units: Units that a column may have.
+        usual: Unit of a column that states none; None is an error.
     """
 
     names: tuple[frozenset[str], ...]
@@ -32,7 +32,7 @@ class Quantity:
 
 
 def _quantity(names: str, limits: tuple[float, float], unit: str, units: Units, usual: str | None = None) -> Quantity:
-    """Return a quantity; a stroke between names parts those that are taken first from later ones."""
+    """Return a quantity; a stroke in the names separates preferred names from later ones."""
     tiers = tuple(frozenset(tier.split()) for tier in names.split("/"))
     return Quantity(names=tiers, lowest=limits[0], highest=limits[1], unit=unit, units=units, usual=usual)
 

@@ -15,16 +15,16 @@ _COLD_IN_F = 50.0
 
 @dataclass(frozen=True, kw_only=True)
 class Source:
-    """Who wrote a file, and the units that it writes.
+    """The program that wrote a file, and its units.
 
     Attributes:
-        title: What it is called.
-        needs: Names of columns that it has, all of them; of some separated by a stroke, one.
+        title: Its name.
+        needs: Names of columns that it always has; of some separated by a stroke, one.
         units: Unit by quantity.
-        height: Of its wind, ``10m`` or ``20ft``.
+        height: Height of its wind, ``10m`` or ``20ft``.
         names: Quantity by a plain name that is no word elsewhere.
-        zone: Hours that its clock is ahead of UTC, where its documents say so.
-        excludes: Names that it does not have.
+        zone: Hours that its clock is ahead of UTC, if its documents say so.
+        excludes: Names that it never has.
         is_warm: Whether temperatures must be those of a day of fire in Fahrenheit.
     """
 
@@ -97,7 +97,7 @@ SOURCES = (
 
 
 def find_source(names: Sequence[str], rows: Sequence[Sequence[str]]) -> Source | None:
-    """Return whose file a table is by the plain names of its columns and its rows, None where that is not known."""
+    """Return the source of a table, from the plain names of its columns and its rows; None if it is not known."""
     return next((each for each in SOURCES if each.wrote(names, rows)), None)
 
 

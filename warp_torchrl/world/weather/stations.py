@@ -1,4 +1,4 @@
-"""Files of fire weather stations that are no CSV: FARSITE's streams (.wxs, .wnd), and WIMS's fixed columns (FW13, FW9).
+"""Files of fire weather stations other than CSV: FARSITE's streams (.wxs, .wnd), and WIMS's fixed columns (FW13, FW9).
 
 Sources: FlamMap's help, "Weather Stream File" and "Wind File"; "Weather Observation Data Transfer Format, 2013" (W13)
 and "1998" (W98) of wildfire.gov. English files have miles an hour at 20 ft, Fahrenheit and inches; metric ones have
@@ -18,7 +18,7 @@ _HUMIDITY = {"1": None, "2": "RH (%)", "3": "DewPoint"}  # code of moisture: wet
 
 
 def read_station(text: str) -> dict[str, Any] | None:
-    """Return the fields of a ``Sheet`` of such a file, None for a text that is none.
+    """Return the fields of a ``Sheet`` of such a file, None for other texts.
 
     Raises:
         ValueError: If it is one and cannot be read.
@@ -53,7 +53,7 @@ def _read_stream(lines: list[str]) -> dict[str, Any]:
 
 
 def _read_wind(lines: list[str]) -> dict[str, Any]:
-    """Return winds (.wnd), whose rows tell no year: it is taken to be 2000, a leap year."""
+    """Return winds (.wnd), whose rows have no year: it is taken to be 2000, a leap year."""
     system = lines[0].strip().lower()
     rows = [line.split() for line in lines[1:]]
     if any(len(row) > 9 for row in rows):
@@ -90,7 +90,7 @@ def _check_cells(rows: list[list[str]], count: int) -> None:
 
 
 def _read_wims(lines: list[str]) -> dict[str, Any]:
-    """Return observations (types O and R) of fixed columns; of two of one hour the published one (O)."""
+    """Return observations (types O and R) of fixed columns; of two in one hour the published one (O)."""
     kept: dict[str, str] = {}
     kinds = {line[61:63] for line in lines}
     if len(kinds) > 1 or len({line[3:9] for line in lines}) > 1:

@@ -1,4 +1,4 @@
-"""Weather by the hour: a table read from a CSV file, with the moistures that follow from it."""
+"""Hourly weather: a table read from a CSV file, with fuel moistures computed from it."""
 
 import logging
 from collections.abc import Mapping
@@ -72,19 +72,19 @@ def read_weather(
     bui: float | None = None,
     units: Mapping[str, str] | None = None,
 ) -> WeatherTable:
-    """Return the weather of a file, a row an hour or as its times say.
+    """Return the weather of a file, one row per hour or at the rows' times.
 
-    What is read, by what names and in what units, `world.weather.columns` says; how times are read,
-    `world.weather.times`; which files, `world.weather.layout`. What is not in the file is computed where
-    it can be: FFMC by the hour from temperature, humidity, wind and rain; BUI from DMC and DC; humidity from the dew
-    point; dead moistures from temperature and humidity. A line of the log says what was read and what was left.
+    Names and units of columns: `world.weather.columns`; times: `world.weather.times`; kinds of files:
+    `world.weather.layout`. Missing quantities are computed where possible: FFMC by the hour from temperature, humidity,
+    wind and rain; BUI from DMC and DC; humidity from the dew point; dead moistures from temperature and humidity. A
+    line of the log lists the columns that were read and ignored.
 
     Args:
         path: The file; or the name of one that comes with the package: ``august``, three hot dry days, made up.
-        wind_height: At what height the wind was measured; None goes by the file: 20ft for speeds in mph whose height
-            nobody states, else 10m.
-        start_ffmc: Fine fuel moisture code an hour before the first row, where it is to be computed.
-        bui: Buildup index of every row, where the file has none and neither DMC nor DC; None leaves it unknown.
+        wind_height: Height at which the wind was measured; None takes the file's: 20ft for speeds in mph without a
+            stated height, else 10m.
+        start_ffmc: Fine fuel moisture code an hour before the first row, for a file without FFMC.
+        bui: Buildup index of every row, for a file without BUI, DMC and DC; None leaves it unknown.
         units: Unit by quantity or column, where the file states none; of ``datetime`` the order of its dates.
 
     Raises:
@@ -137,7 +137,7 @@ def minutes_until(moment: str, path: str | Path, units: Mapping[str, str] | None
 
 
 def _in_time(sheet: Sheet, units: Mapping[str, str]) -> tuple[Sheet, Clock]:
-    """Return the table and its times with the first row first; stations often write the newest above."""
+    """Return the table and its times with the first row first; stations often write the newest row on top."""
     clock = read_clock(sheet, next((str(unit) for key, unit in units.items() if plain(key) == "datetime"), None))
     if clock.hours[-1] >= 0.0:
         return sheet, clock
@@ -159,7 +159,7 @@ def _known(columns: Mapping[str, Column], sheet: Sheet) -> tuple[dict[str, list[
 
 
 def _height(columns: Mapping[str, Column], sheet: Sheet, source: Source | None) -> WindHeight:
-    """Return the height of the wind: as the column's name, the kind of file or its source says, or as is the custom."""
+    """Return the height of the wind: stated by the column's name, the kind of file or its source, or the usual one."""
     name = "wind_speed" if "wind_speed" in columns else "wind_u"
     column = columns[name]
     is_theirs = source is not None and source.units.get(name, column.unit) == column.unit
@@ -170,7 +170,7 @@ def _height(columns: Mapping[str, Column], sheet: Sheet, source: Source | None) 
 def _tell(
     path: Path, columns: Mapping[str, Column], clock: Clock, sheet: Sheet, source: Source | None, height: WindHeight
 ) -> None:
-    """Report what was read and what was left, and warn of times that a user must know of."""
+    """Report the columns that were read and ignored, and log warnings about times."""
     for warning in clock.warnings:
         _log.warning("weather: %s", warning)
     read = dict.fromkeys(clock.columns, "time")
@@ -192,7 +192,7 @@ def _tell(
 def _complete(
     known: dict[str, Tensor], hours: Tensor, height: WindHeight, start_ffmc: float, bui: float | None
 ) -> dict[str, Tensor]:
-    """Return the values with what follows from them: FFMC, BUI and the moisture of dead fuel."""
+    """Return the values with computed ones: FFMC, BUI and the moisture of dead fuel."""
     if "ffmc" not in known and {"temperature", "humidity", "rain"} <= known.keys():
         known["ffmc"] = _ffmc_by_row(known, hours, height, start_ffmc)
     if "bui" not in known and {"dmc", "dc"} <= known.keys():

@@ -1,12 +1,12 @@
-"""When each row of a table of weather holds: hours since the first.
+"""Times of the rows of a weather table: hours since the first.
 
-Read are, by name: `hours` (numbers); a date and time in one column (`datetime`, `time`, `valid_time`, and others); a
-date (`date`, `hourly`, or year, month and day, or year and day of the year) with an hour (`hour`, `time`, and others)
-as 13, 1300, 13:00 or 1:00 PM. Hour 24 is hour 0 of the next day. Offsets such as Z, +02:00 or PDT make times of one
-clock. Seconds and milliseconds since 1970 are read too. Rows that fall in time are read from the last.
+Read by name: `hours` (numbers); a date and time in one column (`datetime`, `time`, `valid_time`, and others); a date
+(`date`, `hourly`, or year, month and day, or year and day of the year) with an hour (`hour`, `time`, and others) as 13,
+1300, 13:00 or 1:00 PM. Hour 24 is hour 0 of the next day. Offsets such as Z, +02:00 or PDT are converted to one clock.
+Seconds and milliseconds since 1970 are read too. Rows in falling order are reversed.
 
-Which number of a date is the day all rows tell together: the order in which rows grow, over the shortest time. Where
-another order makes a time that is not ten times as long, the table is refused: `units.datetime=d/m/y` says it.
+The order of day and month is found from all rows together: the order in which times grow, over the shortest span. If
+another order gives a span less than ten times as long, the table is refused, and the user sets `units.datetime=d/m/y`.
 """
 
 import re
@@ -38,7 +38,7 @@ _ORDERS = {"y/m/d": "ymd", "d/m/y": "dmy", "m/d/y": "mdy"}
 
 
 def read_clock(sheet: Sheet, order: str | None = None) -> Clock:
-    """Return when the rows of a table hold.
+    """Return the times of the rows of a table.
 
     Args:
         sheet: The table.
@@ -73,7 +73,7 @@ def _elapsed(sheet: Sheet, place: int) -> Clock:
 
 
 def _hourly(sheet: Sheet, clock: Clock | None) -> Clock:
-    """Return rows an hour apart where none or all of them tell one time."""
+    """Return rows an hour apart, for a table without times or with one time in all rows."""
     what = "every row has the same time" if clock else "no column tells the time"
     told = f"{what}; its rows are taken to be an hour apart"
     hours = [float(row) for row in range(len(sheet.rows))]
@@ -89,7 +89,7 @@ def _hourly(sheet: Sheet, clock: Clock | None) -> Clock:
 
 
 def _texts(sheet: Sheet, names: Sequence[str]) -> tuple[tuple[str, ...], list[str]]:
-    """Return the columns that tell dates and times, and one text of them for each row; empty where there are none."""
+    """Return the columns of dates and times, and one text of them for each row; empty without any."""
     rows = sheet.rows
     place = next((names.index(name) for name in _MOMENTS if name in names and _is_dated(rows, names.index(name))), None)
     if place is None:
@@ -117,7 +117,7 @@ def _texts(sheet: Sheet, names: Sequence[str]) -> tuple[tuple[str, ...], list[st
 
 
 def _refusable(sheet: Sheet, names: Sequence[str]) -> tuple[tuple[str, ...], list[str]]:
-    """Return a column whose name is that of times, though its first cell is none; a message shows it."""
+    """Return a column with a name of times, though its first cell is no time; a message shows it."""
     place = _first(names, _MOMENTS)
     if place is None:
         return (), [""] * len(sheet.rows)
@@ -146,14 +146,14 @@ def _joined(dates: list[str], rows: Sequence[Sequence[str]], clock: Sequence[int
 
 
 def _is_dated(rows: Sequence[Sequence[str]], place: int) -> bool:
-    """Return whether the first cell of a column tells a date."""
+    """Return whether the first cell of a column is a date."""
     text = next((row[place].strip() for row in rows if row[place].strip()), "")
     stamp = read_stamp(text)
     return epoch_hours(text) is not None or (stamp is not None and stamp.numbers is not None)
 
 
 def _is_midnight(rows: Sequence[Sequence[str]], place: int) -> bool:
-    """Return whether a column tells dates alone."""
+    """Return whether a column has dates without times."""
     stamps = [read_stamp(row[place]) for row in rows]
     return all(stamp is not None and not stamp.hour and stamp.digits is None for stamp in stamps)
 

@@ -1,4 +1,4 @@
-"""Units of weather, and the words that files have for them."""
+"""Units of weather, and their names in files."""
 
 import re
 import unicodedata
