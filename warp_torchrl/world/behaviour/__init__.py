@@ -1,1 +1,1 @@
-"""How fast surface fires spread: Rothermel's model and the Canadian one, in metres and minutes."""
+"""Rates of spread of surface fires: Rothermel's model and the Canadian one, in metres and minutes."""

@@ -1,9 +1,9 @@
-"""The Canadian Forest Fire Behavior Prediction (FBP) System: what a fire's head does in each fuel type.
+"""The Canadian Forest Fire Behavior Prediction (FBP) System: behaviour of a fire's head in each fuel type.
 
 Equations: Forestry Canada Fire Danger Group 1992, "Development and structure of the Canadian Forest Fire Behavior
 Prediction System", ST-X-3; with the corrections of Wotton, Alexander and Taylor 2009, GLC-X-10. Numbers of equations
-are those of ST-X-3 unless GLC-X-10 is named. What is told is the steady state: a fire's first minutes are slower.
-Crowning is in: where the head is fast enough, crowns burn, and C-6 spreads faster for it.
+are those of ST-X-3 unless GLC-X-10 is named. Results are for the steady state: a fire's first minutes are slower.
+Crowning is included: where the head is fast enough, crowns burn, and C-6 then spreads faster.
 """
 
 import torch
@@ -35,7 +35,7 @@ def fbp_spread(
     green: bool = False,
     foliar_moisture: Number = 97.0,
 ) -> Spread:
-    """Return what the head of a fire does, in tensors of the shape that all arguments broadcast to.
+    """Return the behaviour of a fire's head, in tensors of the shape to which all arguments broadcast.
 
     Everything can be differentiated by weather and moisture; at thresholds of the system the derivative is one-sided.
     Without wind and slope the head goes where the wind of zero speed would blow to. At a buildup index of 0
@@ -115,7 +115,7 @@ def initial_rate(fuel: FbpFuels, index: Tensor) -> Tensor:
 
 
 def buildup_effect(fuel: FbpFuels, bui: Tensor) -> Tensor:
-    """Return how much faster or slower fire spreads at a buildup index (eq. 54; GLC-X-10 for D-2: nothing below 80)."""
+    """Return the factor of a buildup index on the rate of spread (eq. 54; GLC-X-10 for D-2: 0 below 80)."""
     bui = bui.clamp(min=1)  # exp(50 ln 0.9 / 1) is 0.005, and less in all other fuels
     effect = torch.exp(50 * torch.log(fuel.q) * (1 / bui - 1 / fuel.bui0))
     return torch.where(fuel.is_d2 & (bui < 80), 0.0, effect)
@@ -124,7 +124,7 @@ def buildup_effect(fuel: FbpFuels, bui: Tensor) -> Tensor:
 def _net_wind(
     fuel: FbpFuels, fine: Tensor, speed: Tensor, bearing: Tensor, slope: Tensor, aspect: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """Return the speed [km/h] of wind and slope together, and where it goes [degrees] (eqs. 47 to 51)."""
+    """Return the speed [km/h] of wind and slope together, and its direction [degrees] (eqs. 47 to 51)."""
     wind, uphill = KMH * speed + _CALM, slope_wind(fuel, fine, slope)
     blows, climbs = torch.deg2rad(bearing + 180), torch.deg2rad(aspect + 180)
     east = wind * torch.sin(blows) + uphill * torch.sin(climbs)
@@ -133,7 +133,7 @@ def _net_wind(
 
 
 def slope_wind(fuel: FbpFuels, fine: Tensor, slope: Tensor) -> Tensor:
-    """Return the wind [km/h] that speeds a fire up as much as a slope [degrees] does.
+    """Return the wind [km/h] with the same effect on the rate as a slope [degrees].
 
     Eqs. 39 and 40; GLC-X-10 eqs. 41 to 44. The index at which level ground spreads as fast as the slope in calm is eq.
     41a, -ln(1 - (SF RSZ / a)^(1/c)) / b. As RSZ = a (1 - exp(-b ISZ))^c, the rate a drops out.
@@ -156,7 +156,7 @@ def _slope_index(factor: Tensor, calm: Tensor, b: Tensor, c: Tensor) -> Tensor:
 
 
 def surface_consumption(fuel: FbpFuels, ffmc: Tensor, bui: Tensor) -> Tensor:
-    """Return what burns on the surface [kg/m2] (eqs. 9 to 25; GLC-X-10 eqs. 9a and 9b)."""
+    """Return the surface fuel consumption [kg/m2] (eqs. 9 to 25; GLC-X-10 eqs. 9a and 9b)."""
     first = fuel.load * (-torch.expm1(-fuel.load_rate * bui)) ** fuel.load_power
     second = fuel.second_load * -torch.expm1(-fuel.second_load_rate * bui)
     drier = ffmc - 84

@@ -93,10 +93,10 @@ _LEAFLESS, _GREEN = _codes(green=False), _codes(green=True)
 
 @dataclass(frozen=True)
 class FbpFuels:
-    """The constants of the fuel in each cell; all fields of the map's shape, float32 where nothing else is said.
+    """The constants of the fuel in each cell; all fields of the map's shape, float32 unless stated otherwise.
 
-    Every fuel is a mixture of two: `share` of a first one, and the rest leafless aspen (D-1) that spreads at `aspen` of
-    its own rate. A fuel that is not mixed has a share of 1.
+    Every fuel is a mixture of two: `share` of a first one, and the rest leafless aspen (D-1) that spreads at `aspen`
+    times its rate. An unmixed fuel has a share of 1.
     """
 
     a: Tensor  # rate of the first fuel in an endless wind, times the curing of grass [m/min]

@@ -1,4 +1,4 @@
-"""Fuel as users give it: codes of a map or names, of a standard set, of the Canadian system or of their own."""
+"""Fuel as users give it: codes of a map or names, of a standard set, the Canadian system or the user's own set."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -1,4 +1,4 @@
-"""What a fuel bed is made of: one fuel model, and tables of them as tensors.
+"""Fuel models: the parameters of a fuel bed, and tables of them as tensors.
 
 Units are those in which fuel models are published, in standard tables and in files of custom models alike: short tons
 per acre, feet, square feet of surface per cubic foot of fuel, per cent, British thermal units per pound.

@@ -1,4 +1,4 @@
-"""Rates of spread as users ask for them: one call for all fuel models."""
+"""Rates of spread for users: one call for all fuel models."""
 
 from collections.abc import Mapping
 from dataclasses import fields
@@ -41,7 +41,7 @@ def rate_of_spread(
     canopy_height: object = None,
     crown_ratio: object = None,
 ) -> Spread:
-    """Return what the head of a surface fire does.
+    """Return the behaviour of the head of a surface fire.
 
     Numbers, arrays and tensors are broadcast to one shape; the fields are float32 tensors of it. Gradients flow back
     to tensors of wind, slope and moisture. Rates are steady and along the ground, not the map. See
@@ -158,7 +158,7 @@ def _to_midflame(table: FuelTable, row: Tensor, wind_height: str, canopy: dict[s
 
 
 def _canopy(cover: object, height: object, ratio: object) -> dict[str, Tensor]:
-    """Return what is given of the canopy."""
+    """Return the canopy arguments that are given."""
     if cover is None and (height is not None or ratio is not None):
         raise ValueError("canopy_cover must be given with canopy_height and crown_ratio, got none")
     if cover is None:

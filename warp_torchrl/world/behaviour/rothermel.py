@@ -1,4 +1,4 @@
-"""Rothermel's surface fire spread model: what a fuel bed does without wind and slope, and how it answers to them.
+"""Rothermel's surface fire spread model: response of a fuel bed without wind and slope, and its factors for both.
 
 Equations: Rothermel 1972 (INT-115), as revised by Albini 1976 (INT-30) and put together by Andrews 2018
 (RMRS-GTR-371). They are in the sources' units: feet, pounds, minutes, British thermal units; what leaves is metric.
@@ -26,7 +26,7 @@ _KILOJOULES = 1.055056 / FOOT**2
 
 @dataclass(frozen=True)
 class BedResponse:
-    """What one fuel bed does at one moisture; all fields of one shape."""
+    """Response of one fuel bed at one moisture; all fields of one shape."""
 
     rate: Tensor  # of spread without wind and slope [m/min]
     heat: Tensor  # released by a unit of area as the front passes [kJ/m2]
@@ -44,7 +44,7 @@ class BedResponse:
 
 
 def bed_response(fuels: Fuels, moisture: Tensor) -> BedResponse:
-    """Return what fuel beds do at a moisture; ground without fuel has a rate and a heat of 0.
+    """Return the responses of fuel beds at a moisture; ground without fuel has a rate and a heat of 0.
 
     Args:
         fuels: Fuel models of leading shape [...].
@@ -110,7 +110,7 @@ def reaction_velocity(sav: Tensor, relative: Tensor) -> Tensor:
 
 
 def moisture_damping(moisture: Tensor, extinction: Tensor) -> Tensor:
-    """Return the share of the reaction intensity that moisture leaves, 1 to 0 (Rothermel 1972 eq. 29)."""
+    """Return the factor of moisture on the reaction intensity, 1 to 0 (Rothermel 1972 eq. 29)."""
     ratio = (moisture / _positive(extinction)).clamp(max=1.0)
     share = 1.0 - 2.59 * ratio + 5.11 * ratio**2 - 3.52 * ratio**3
     return torch.where(ratio < 1.0, share.clamp(min=0.0), 0.0)  # at 1 the rounded sum is not quite 0
@@ -152,5 +152,5 @@ def _live(classes: Tensor) -> Tensor:
 
 
 def _positive(value: Tensor, otherwise: float = 1e-3) -> Tensor:
-    """Return what is safe to divide by: where nothing is there, the numerator is 0 too."""
+    """Return a divisor that is never 0; where it was 0 the numerator is 0 too."""
     return torch.where(value > 0.0, value, otherwise)

@@ -1,4 +1,4 @@
-"""What every model of fire spread tells of a fire's head."""
+"""Common result of all models of fire spread: the fire's head."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""The head of a surface fire in wind and on slopes, from what its fuel bed does without them.
+"""Head of a surface fire in wind and on slopes, from its fuel bed's response without them.
 
 Wind and slope factors are added as vectors on the slope (Rothermel 1983; Finney 1998, RMRS-RP-4). Three choices follow
 the package pyretechnics, which is the witness in the tests:
@@ -37,18 +37,18 @@ def surface_spread(
     aspect: Tensor,
     moisture: Tensor,
 ) -> Spread:
-    """Return what the head of a surface fire does in each cell; nothing is checked.
+    """Return the behaviour of the head of a surface fire in each cell; arguments are not checked.
 
-    What does not hang on wind and slope is computed once for each fuel model and world, and looked up in each cell,
-    unless moisture is told for each cell.
+    Terms without wind and slope are computed once for each fuel model and world, and looked up in each cell, unless
+    moisture is given per cell.
 
     Args:
         table: Fuel models.
         row: Row of each cell's model in the table, int64 [H, W] or [B, H, W]; ``table.index(codes)``.
         wind_speed: Wind at midflame height, broadcast with the cells [m/s].
-        wind_bearing: Where it comes from, the same [degrees clockwise from grid north].
+        wind_bearing: Direction from which it blows, the same [degrees clockwise from grid north].
         slope: Steepness, the same [degrees].
-        aspect: Where downhill is, the same [degrees clockwise from grid north].
+        aspect: Downhill direction, the same [degrees clockwise from grid north].
         moisture: Of dead fuel of 1, 10 and 100 hours, live herbaceous and live woody fuel: [5], [B, 5] by world, or
             [..., H, W, 5] by cell [%].
     """
@@ -64,7 +64,7 @@ def surface_spread(
 
 
 def head_of_fire(beds: BedResponse, wind: Tensor, wind_bearing: Tensor, slope: Tensor, aspect: Tensor) -> Spread:
-    """Return what the head does on fuel beds, in tensors of the shape that all arguments broadcast to.
+    """Return the behaviour of the head on fuel beds, in tensors of the shape to which all arguments broadcast.
 
     Without wind and slope the direction is 0.
 
@@ -95,7 +95,7 @@ def head_of_fire(beds: BedResponse, wind: Tensor, wind_bearing: Tensor, slope: T
 def _wind_and_slope(
     beds: BedResponse, wind: Tensor, wind_bearing: Tensor, slope: Tensor, aspect: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """Return the factor of wind and slope together, and where it points to [degrees]."""
+    """Return the factor of wind and slope together, and its direction [degrees]."""
     steep = torch.tan(torch.deg2rad(slope))
     from_wind, from_slope = torch.deg2rad(wind_bearing), torch.deg2rad(aspect)
     rise = steep * torch.cos(from_wind - from_slope)  # of the wind, per unit of map
@@ -115,7 +115,7 @@ def _wind_and_slope(
 
 
 def length_to_breadth(effective_wind: Tensor) -> Tensor:
-    """Return how long the ellipse of a fire is for its breadth, in [1, 8] (Anderson 1983; Finney 1998).
+    """Return the ratio of length to breadth of a fire's ellipse, in [1, 8] (Anderson 1983; Finney 1998).
 
     Finney's form is 1 without wind, which Anderson's is not.
 

@@ -1,4 +1,4 @@
-"""From the wind of a weather station to the wind at midflame height.
+"""Wind adjustment: from the wind of a weather station to the wind at midflame height.
 
 Sources: Albini and Baughman 1979 (INT-221); Andrews 2012 (RMRS-GTR-266), "Modeling wind adjustment factor and midflame
 wind speed for Rothermel's surface fire spread model".
