@@ -1,4 +1,4 @@
-"""Landscapes from arrays that a user has: passed as they are, or from an ``.npz`` file."""
+"""Landscapes from a user's arrays, passed directly or in an ``.npz`` file."""
 
 import math
 import zipfile
@@ -43,7 +43,7 @@ _REAL = {
 
 @dataclass(frozen=True, kw_only=True)
 class Array(Cropped):
-    """A landscape that the user has: cover, and optionally elevation, tree age, fuel and canopy.
+    """A landscape from arrays: cover, and optionally elevation, tree age, fuel and canopy.
 
     Two are equal where their layers, window and cell size are, wherever the layers come from.
 
@@ -53,13 +53,13 @@ class Array(Cropped):
         cover: Land cover codes [H, W], anything ``numpy.asarray`` takes.
         elevation: In metres, [H, W]; None makes a flat world.
         age: Tree age 0..10 [H, W]; None leaves it to ``ages``.
-        ages: Where ``age`` does not tell them: ``drawn`` draws the trees' ages for each episode, as the paper does;
-            ``oldest`` gives all the oldest, 10, so that every cell of fuel can burn, as on real ground.
-        assets: What each cell is worth [H, W], 0 or more in any unit, for rewards that ask; None leaves all alike.
+        ages: Ages if ``age`` is None: ``drawn`` draws the trees' ages for each episode, as the paper does; ``oldest``
+            gives all the oldest, 10, so that every cell of fuel can burn, as on real ground.
+        assets: Worth of each cell [H, W], 0 or more in any unit, for rewards that use it; None leaves all alike.
         fuel: Class codes of a fuel model [H, W], which laws of rates of spread read; None leaves them to the cover.
         canopy_cover: Canopy cover [%], [H, W], and
-        canopy_height: height of the canopy's top [m], [H, W], by which such laws slow the wind down; None: not told.
-        size: Side of the world, or (rows, columns) [cells]: a window of the array. None, or the array's own shape,
+        canopy_height: height of the canopy's top [m], [H, W], by which such laws slow the wind down; None: not known.
+        size: Side of the world, or (rows, columns) [cells]: a window of the array. None, or the array's shape,
             takes the whole array, whatever its fuel.
         row: Top row of the window in the array. None, with ``column``, draws a window for each episode.
         column: Left column of the window in the array.

@@ -1,4 +1,4 @@
-"""Bands of a raster: which one a layer is, by its number or by its description, and the unit that it states."""
+"""Bands of a raster: the band of a layer, by number or description, and its unit."""
 
 import re
 from collections.abc import Mapping
@@ -43,7 +43,7 @@ _VERTICAL = re.compile(r'VERT(?:_CS|CRS|ICALCRS)\[.*?UNIT\["[^"]*",\s*([\d.eE+-]
 
 
 def choose_band(name: str, path: object, layer: Any, wanted: int | str | None, key: str) -> int:
-    """Return the number of the band, from 1, that a layer is in an open raster.
+    """Return the number of a layer's band, from 1, in an open raster.
 
     Args:
         name: What the layer is: a key of ``_LAYERS`` is looked for among the descriptions.
@@ -74,7 +74,7 @@ def band_names(layer: Any) -> list[str]:
 
 
 def unit_of(layer: Any, number: int) -> str:
-    """Return the unit that a band of an open raster states, in lower case, or its vertical CRS; else nothing."""
+    """Return the unit of a band of an open raster, in lower case, or of its vertical CRS; else nothing."""
     stated = str(layer.units[number - 1] or "").strip().lower()
     vertical = _VERTICAL.search(layer.crs.to_wkt()) if layer.crs and not stated else None
     if vertical is None:
@@ -84,7 +84,7 @@ def unit_of(layer: Any, number: int) -> str:
 
 
 def factor_of(name: str, path: object, unit: str, units: Mapping[str, float], given: float | None = None) -> float:
-    """Return what a stated unit is worth, 1 where nothing is stated; what the user gives must be the same.
+    """Return the factor of a stated unit, 1 without one; the user's unit must be the same.
 
     Raises:
         ValueError: If the unit is not known, or contradicts what is given.

@@ -30,15 +30,15 @@ _log = logging.getLogger("warp_torchrl")
 
 
 def read_cells(name: str, path: str | PathLike[str], grid: Grid) -> np.ndarray:
-    """Return the cells of a grid that a file marks, bool [rows, columns]; one at least.
+    """Return the cells of a grid that a file marks, bool [rows, columns]; at least one.
 
-    Shapes mark cells as ``vector.mark`` says, a point of a CSV the cell that it lies in, and a raster those that are
-    over 0 and not nodata. What lies off the grid is left out, and counted in a warning.
+    Shapes mark cells as ``vector.mark`` says, a point of a CSV the cell that contains it, and a raster the cells over 0
+    and not nodata. Marks off the grid are ignored, and counted in a warning.
 
     Args:
-        name: What the file is, for messages.
+        name: Name of the file in messages.
         path: A CSV of ``row,column`` (from 0), ``x,y`` (in the grid's CRS) or ``longitude,latitude``, with any
-            separator and, where that is a semicolon, decimal commas; a raster (.tif, .asc) on the grid; GeoJSON or a
+            separator and, with semicolons, decimal commas; a raster (.tif, .asc) on the grid; GeoJSON or a
             shapefile (see ``read_shapes``).
         grid: The grid; its transform is None where the landscape has no place on Earth.
 
@@ -94,7 +94,7 @@ def read_on_grid(name: str, path: Path, grid: Grid) -> tuple[np.ndarray, np.ndar
 
 
 def check_lies_on(name: str, own: Grid, grid: Grid) -> None:
-    """Refuse a raster's grid that is not the landscape's; a CRS that either does not state is taken to be the other's.
+    """Refuse a raster whose grid is not the landscape's; if one has no CRS, it is assumed to be the other's.
 
     Raises:
         ValueError: With what differs.
@@ -130,7 +130,7 @@ def _read_points(name: str, path: Path, grid: Grid) -> np.ndarray:
 
 
 def _read_pairs(name: str, path: Path) -> tuple[np.ndarray, np.ndarray, str]:
-    """Return the two columns of a CSV that tell places, and what they count in."""
+    """Return the two columns of coordinates of a CSV, and their unit."""
     named, text = named_separator(read_text(name, path))
     headers: list[str] = []
     for separator in [named] if named else SEPARATORS:
@@ -190,7 +190,7 @@ def _numbers(name: str, path: Path, table: list[list[str]], lines: list[int], pl
 
 
 def _tell(name: str, path: Path, headers: list[str], places: tuple[int, int], unit: str) -> None:
-    """Report which columns were read, in which unit, and which were left."""
+    """Report the columns that were read, their unit, and the ignored columns."""
     units = {"cells": "cells of the map, from 0", "map": "the map's coordinates"}
     read = {headers[place]: units.get(unit, f"degrees of {unit}") for place in places}
     left = tuple(header for place, header in enumerate(headers) if place not in places and header)

@@ -1,4 +1,4 @@
-"""Windows of a map that is bigger than the world: which ones qualify, and the one that a world gets."""
+"""Windows of a map that is larger than the world: the windows that qualify, and the one of each world."""
 
 import math
 from dataclasses import dataclass, field
@@ -26,15 +26,15 @@ class Crop:
         cover: Land cover, uint8 [rows, columns], ``Cover`` codes.
         elevation: Elevation [m], float32 [rows, columns]; None makes flat worlds.
         age: Tree age, uint8 [rows, columns], 0..10, or ``DRAWN``; None draws it everywhere.
-        assets: What each cell is worth, float32 [rows, columns]; None leaves all alike.
+        assets: Worth of each cell, float32 [rows, columns]; None leaves all alike.
         fuel: Class codes of the fuel layer, int16 [rows, columns]; None where there is none.
-        canopy_cover: Canopy cover [%], float32 [rows, columns]; None where it is not told.
-        canopy_height: Height of the canopy's top [m], float32 [rows, columns]; None where it is not told.
+        canopy_cover: Canopy cover [%], float32 [rows, columns]; None if not known.
+        canopy_height: Height of the canopy's top [m], float32 [rows, columns]; None if not known.
         known: Where the map is known, bool [rows, columns]; None is everywhere.
         size: Side of a window, or (rows, columns) [cells].
         row: Top row of the only window; None, with ``column``, leaves it to the draw.
         column: Left column of the only window.
-        min_fuel: Lowest share of a drawn window where trees can stand; one cell of it is always asked for.
+        min_fuel: Lowest share of a drawn window where trees can stand; one cell at least is always required.
 
     Raises:
         ValueError: If no window qualifies, or ``row`` and ``column`` name none without unknown cells.
@@ -201,7 +201,7 @@ class Cropped:
 
 
 def whereabouts(unknown: np.ndarray, inside: np.ndarray | None = None) -> str:
-    """Return in words where cells are not known, bool [rows, columns], of those inside; nothing where all are."""
+    """Return in words where cells are not known, bool [rows, columns], of those inside; empty if all are."""
     lies = unknown if inside is None else unknown & inside
     if not lies.any():
         return ""

@@ -125,7 +125,7 @@ def ground_cells(crs: Any, transform: Any, shape: tuple[int, int]) -> GroundCell
 
 
 def _on_ground(crs: Any, transform: Any, column: np.ndarray, row: np.ndarray, across: float, down: float) -> np.ndarray:
-    """Return the ways on the ground, [east, north] x places [m], from so many cells on one side to the other."""
+    """Return distances on the ground, [east, north] x places [m], between points on both sides of a place."""
     ends = []
     for sign in (-1.0, 1.0):
         at, below = column + sign * across, row + sign * down
@@ -140,7 +140,7 @@ def _on_ground(crs: Any, transform: Any, column: np.ndarray, row: np.ndarray, ac
 
 
 def distortion(cells: GroundCells, side: float) -> str:
-    """Return in words why cells are not on the ground what they are on the map; nothing where they are.
+    """Return in words why cells differ on the ground from the map; empty if they do not.
 
     Args:
         cells: On the ground.

@@ -30,7 +30,7 @@ class Part(NamedTuple):
 
 
 class Feature(NamedTuple):
-    """What a file says of one place."""
+    """Content of a file about one place."""
 
     parts: list[Part]
     properties: Mapping[str, Any]
@@ -67,7 +67,7 @@ def read_features(name: str, path: Path, placed: bool = True) -> tuple[list[Feat
 
 
 def _check_size(name: str, path: Path, is_shapefile: bool) -> None:
-    """Refuse enormous files before anything is made of them."""
+    """Refuse enormous files before they are parsed."""
     sizes = [each.stat().st_size for each in (path, path.with_suffix(".dbf")) if each.is_file()]
     if max(sizes) > _LARGEST_FILE:
         raise ValueError(f"{name} must have at most {_LARGEST_FILE} bytes, {path} has {max(sizes)}")
@@ -77,7 +77,7 @@ def _check_size(name: str, path: Path, is_shapefile: bool) -> None:
 
 
 def _check_degrees(name: str, path: Path, corners: list[np.ndarray]) -> None:
-    """Refuse metres that pass for degrees."""
+    """Refuse degrees that are metres in fact."""
     x, y = np.abs(np.concatenate(corners)).max(0)
     if x > 360.0 or y > 90.0:
         rule = 'longitude and latitude where it states no CRS, as GeoJSON does by its member "crs"'

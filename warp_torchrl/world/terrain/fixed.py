@@ -1,4 +1,4 @@
-"""One ground for every world, while all else differs."""
+"""One ground for every world, with all else drawn."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +14,7 @@ from warp_torchrl.world.terrain.landscape import LandscapeSource
 
 @dataclass(frozen=True, kw_only=True)
 class Fixed:
-    """The landscape that another source makes for one seed, in every world.
+    """The landscape of another source for one seed, in every world.
 
     Cover, elevation, trees' ages and the window of a raster are those of the seed's first episode. Ignition, wind, fire
     and the team's place still follow each world's own key. What else the other source knows of its map, such as its
@@ -45,7 +45,7 @@ class Fixed:
         return self.source.size
 
     def __getattr__(self, name: str) -> Any:
-        """Return what the source has beyond a landscape's protocol: grid, extent, reach, cell size."""
+        """Return the source's attributes beyond the protocol: grid, extent, reach, cell size."""
         if name == "source" or name.startswith("__"):  # asked for by copy and pickle before there is a source
             raise AttributeError(name)
         return getattr(self.source, name)

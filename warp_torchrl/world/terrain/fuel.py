@@ -1,4 +1,4 @@
-"""What the codes of a fuel or land-cover layer are to the world: presets, tables of a user's own, and the covers."""
+"""Cover of the codes of a fuel or land-cover layer: presets, and users' tables."""
 
 from collections.abc import Mapping
 from os import PathLike
@@ -143,7 +143,7 @@ def _given_pairs(table: object) -> list[tuple[object, object]]:
 
 
 def _read_pairs(path: object) -> list[tuple[object, object]]:
-    """Return what a yaml file maps to what, in its own words."""
+    """Return the pairs of a yaml file's mapping, as texts."""
     try:
         content = read_words(Path(str(path)))
     except (OSError, Foreign) as error:
@@ -153,7 +153,7 @@ def _read_pairs(path: object) -> list[tuple[object, object]]:
 
 
 def is_code(codes: np.ndarray, table: Mapping[int, int]) -> np.ndarray:
-    """Return where codes may be classes, bool: numbers below 0 that the table has not say that none is known."""
+    """Return which codes may be classes, bool: negative numbers outside of the table mean unknown."""
     below = codes < 0
     return ~below | np.isin(codes, list(table)) if below.any() else ~below
 

@@ -18,7 +18,7 @@ _ALONE = {
 
 @contextmanager
 def reading(rule: str, **options: str) -> Iterator[Any]:
-    """Yield rasterio while GDAL and PROJ read nothing but what is named.
+    """Yield rasterio while GDAL and PROJ read only named files.
 
     Args:
         rule: How the line begins that an error of theirs becomes.

@@ -1,4 +1,4 @@
-"""Maps as GeoTIFF: named bands, on the grid that the landscape came from."""
+"""Maps as GeoTIFF: named bands, on the landscape's grid."""
 
 from collections.abc import Mapping
 from pathlib import Path

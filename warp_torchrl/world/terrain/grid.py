@@ -1,4 +1,4 @@
-"""Where the cells of a layer lie: shape, coordinate reference system and place, and whether two layers agree."""
+"""Grid of a layer: shape, coordinate reference system and place, and comparison of two grids."""
 
 from typing import Any, NamedTuple
 
@@ -8,7 +8,7 @@ from warp_torchrl.world.terrain.crs import distortion, ground_cells
 
 
 class Grid(NamedTuple):
-    """Where the cells of a layer lie.
+    """Shape and place of the cells of a layer.
 
     Attributes:
         shape: (rows, columns).
@@ -42,7 +42,7 @@ class Grid(NamedTuple):
 
     @property
     def distortion(self) -> str:
-        """Return in words why the cells of a metric grid are not on the ground what they are on the map; else nothing.
+        """Return in words why the cells of a metric grid differ on the ground from the map; else nothing.
 
         In Web Mercator, or far from the parallels of a conic projection, a metre of the map is none of the ground.
         """

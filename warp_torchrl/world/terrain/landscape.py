@@ -27,7 +27,7 @@ TALLEST = 150.0
 
 @runtime_checkable
 class LandscapeSource(Protocol):
-    """What the world needs of a landscape component."""
+    """Interface of a landscape component."""
 
     @property
     def size(self) -> tuple[int, int] | int:
@@ -100,12 +100,12 @@ class Perlin:
     The noise n is scaled to [0, 1] on each map; low ground is water, high ground forest:
     lake n < L, wetland L <= n < W, grassland W <= n < G, forest n >= G.
 
-    ``scale``, ``octaves``, ``persistence``, ``lacunarity`` and ``relief`` take a number, or a pair from low to high of
-    which each episode draws its own, uniformly (the paper's conclusion regrets that they are fixed).
+    ``scale``, ``octaves``, ``persistence``, ``lacunarity`` and ``relief`` take a number, or a pair from low to high
+    between which each episode draws a value, uniformly (the paper's conclusion regrets that they are fixed).
 
     Attributes:
         size: Side of the map, or (rows, columns) [cells].
-        scale: sigma, cells to a lattice step of the first octave.
+        scale: sigma, cells per lattice step of the first octave.
         octaves: Terms of the sum.
         persistence: Amplitude of each octave relative to the one before.
         lacunarity: lambda, ratio of the octaves' frequencies.
@@ -116,7 +116,7 @@ class Perlin:
             the paper prints them, which leaves no grassland.
         levels: (L, W, G); not read by ``printed``.
         relief: Height of n = 1 over n = 0 [m]; 0 makes a flat world.
-        independent_elevation: Draw the elevation from a noise of its own, not the one that made the cover.
+        independent_elevation: Draw the elevation from another noise than that of the cover.
         ages: ``drawn`` draws the trees' ages, as the paper does; ``oldest`` gives all the oldest, 10.
 
     Raises:
@@ -227,7 +227,7 @@ class Perlin:
 
 
 def _in_order_at(values: Tensor, ranks: list[int]) -> Tensor:
-    """Return rows of numbers, float32 [B, n], in order as far as these ranks hold what a sort would put there."""
+    """Return rows of numbers, float32 [B, n], sorted only as far as these ranks hold a sort's values."""
     if not reads_freely(values.device):
         return values.sort(dim=1).values
     return torch.from_numpy(np.partition(values.numpy(), ranks, axis=1))  # a quarter of the time of torch's sort

@@ -1,7 +1,7 @@
 """One raster layer: its file, its grid from the header, its values, and where they are known.
 
-A layer is a band of real numbers in a GeoTIFF (.tif, .tiff) or an ESRI ASCII grid (.asc). What is wrong with a file is
-one line that begins with the name of the layer; what the header tells is refused before a value is read.
+A layer is a band of real numbers in a GeoTIFF (.tif, .tiff) or an ESRI ASCII grid (.asc). An error is one line that
+begins with the name of the layer; the header is checked before a value is read.
 """
 
 import re
@@ -37,7 +37,7 @@ _LARGEST_PRJ = 100_000  # bytes
 
 
 class Header(NamedTuple):
-    """What the header of a layer tells."""
+    """Header of a layer."""
 
     path: Path
     grid: Grid
@@ -54,7 +54,7 @@ class Header(NamedTuple):
 
 
 def find_layer(name: str, folder: Path, pattern: str) -> Path:
-    """Return the one raster of a folder that a file name, or a pattern such as ``*Elev*``, names.
+    """Return the only raster of a folder that matches a file name, or a pattern such as ``*Elev*``.
 
     Raises:
         ValueError: If none does, or several do, or the folder cannot be read.
@@ -81,14 +81,14 @@ def read_header(
     band: int | str | None = None,
     key: str = ALONE,
 ) -> Header:
-    """Return what a layer's header tells.
+    """Return a layer's header.
 
     Args:
-        name: What the layer is, for messages.
+        name: Name of the layer in messages.
         path: Its file.
-        metric: Refuse cells that are not squares in metres, north up, and on the ground. False for a layer that is to
-            be resampled.
-        remedy: What the user gives to have it resampled, for messages.
+        metric: Refuse cells that are not squares in metres, north up, and on the ground. False for a layer that will be
+            resampled.
+        remedy: Option that resamples the layer, for messages.
         band: Number or description of its band; None takes the only one, or the one whose description is the layer's.
         key: How the user chooses the band, for messages.
 
@@ -152,7 +152,7 @@ def read_layer(name: str, path: Path, number: int | None = None) -> tuple[np.nda
 
 
 def _states_nodata(path: Path) -> bool:
-    """Return whether the header of an ASCII grid says what nodata is."""
+    """Return whether the header of an ASCII grid defines nodata."""
     with path.open("rb") as lines:
         return any(re.match(_NODATA_LINE, line) for _, line in zip(range(_HEADER_LINES), lines))
 

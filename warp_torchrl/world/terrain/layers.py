@@ -113,7 +113,7 @@ def _values(name: str, header: Header, grid: Grid, resample: str) -> tuple[np.nd
 
 
 def elevation_unit(header: Header, given: float | None) -> float:
-    """Return the metres in the unit of an elevation layer: what the file states, or the user gives; else 1.
+    """Return the metres in the unit of an elevation layer: stated by the file, or given by the user; else 1.
 
     Raises:
         ValueError: If neither does where the map itself is in feet, or both do and differ.
@@ -127,7 +127,7 @@ def elevation_unit(header: Header, given: float | None) -> float:
 
 
 def height_unit(header: Header, given: float | None) -> float:
-    """Return the metres in the unit of a layer of canopy heights: what the user gives, or the file states.
+    """Return the metres in the unit of a layer of canopy heights: given by the user, or stated by the file.
 
     Raises:
         ValueError: If neither does, or both do and differ.
@@ -139,7 +139,7 @@ def height_unit(header: Header, given: float | None) -> float:
 
 
 def unread(folder: Path, read: Iterable[Path]) -> list[str]:
-    """Return the names of a folder's rasters and vector files that are not among those that are read."""
+    """Return the names of a folder's rasters and vector files that are not read."""
     there = {each.resolve() for each in read}
     kinds = (*RASTERS, *SUFFIXES)
     found = sorted(each for each in folder.iterdir() if each.suffix.lower() in kinds and each.is_file())

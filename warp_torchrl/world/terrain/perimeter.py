@@ -1,4 +1,4 @@
-"""Perimeters of a fire as GeoJSON (RFC 7946), from when each cell burned."""
+"""Perimeters of a fire as GeoJSON (RFC 7946), from the times when cells burned."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ def perimeters(
     minutes: Sequence[float] | None = None,
     corner: tuple[int, int] = (0, 0),
 ) -> dict[str, Any]:
-    """Return the outlines of what had burned by some times, as a GeoJSON FeatureCollection.
+    """Return the outlines of the cells burned by some times, as a GeoJSON FeatureCollection.
 
     Each time is one feature, a MultiPolygon of the burned cells' outer edges, islands cut out; cells that touch at a
     corner only are apart. A time at which nothing had burned has no feature. Its properties are ``minutes``, ``hours``

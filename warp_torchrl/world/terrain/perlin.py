@@ -22,7 +22,7 @@ def fractal_noise(
     stream: Stream,
     finest: list[float] | None = None,
 ) -> Tensor:
-    """Return a weighted sum of gradient-noise octaves, each with its own random offset.
+    """Return a weighted sum of gradient-noise octaves, each with another random offset.
 
         n(x, y) = sum_i a_i noise_i(x f_i + o_i, y f_i + o'_i)      (WARP-CA, terrain)
 
@@ -33,7 +33,7 @@ def fractal_noise(
         size: (H, W) [cells].
         frequencies: f_i of each octave, for all worlds, or float32 [B, O] [1 / cell].
         amplitudes: a_i of each octave, for all worlds, or float32 [B, O].
-        stream: The stream that its gradients are drawn from.
+        stream: The stream of its gradients' draws.
         finest: The highest f_i of each octave in any world of any batch, where worlds differ [1 / cell].
 
     Returns:

@@ -1,4 +1,4 @@
-"""What the values of raster layers are to the world: metres, ages, canopies, worth, and where there are none."""
+"""Planes of a landscape from the values of raster layers: metres, ages, canopies, worth, and unknown cells."""
 
 import math
 from collections.abc import Mapping
@@ -53,7 +53,7 @@ def check_slopes(metres: np.ndarray, known: np.ndarray, cell_size: float) -> Non
 
 
 def to_worth(values: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Return what each cell is worth, float32 [H, W]; 0 where it is not known.
+    """Return the worth of each cell, float32 [H, W]; 0 where it is not known.
 
     Raises:
         ValueError: If a value is not finite, or below 0.
@@ -65,7 +65,7 @@ def to_worth(values: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 
 def read_worth(path: Path, grid: Grid) -> np.ndarray:
-    """Return what each cell of a grid is worth by the shapes of a vector file, float64 [rows, columns].
+    """Return the worth of each cell of a grid from the shapes of a vector file, float64 [rows, columns].
 
     Raises:
         ValueError: If the file cannot be read or placed, or a property is not a number of 0 or more.

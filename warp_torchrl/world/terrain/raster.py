@@ -36,45 +36,44 @@ class Raster(Cropped):
     """Real ground: the cover from a fuel or land-cover layer and the elevation, read once and cropped from one grid.
 
     A layer is a band of a GeoTIFF (.tif, .tiff) or an ESRI ASCII grid (.asc). The grid is the fuel layer's, which must
-    have square cells in metres of the ground, north up, or one of cells of ``resolution``. Where it has no CRS, as
-    ASCII grids have none, its unit is taken to be the metre, and a warning says so.
+    have square cells in metres of the ground, north up, or a grid with cells of ``resolution``. Without a CRS, as in
+    ASCII grids, its unit is assumed to be the metre, with a warning.
 
     Attributes:
         path: Folder of the layers; or the fuel layer's file, with the others beside it. None is an error.
         size: Side of the crop, or (rows, columns) [cells].
         elevation: File name of the elevation layer, or a pattern that one raster in the folder matches; None makes a
             flat world.
-        elevation_unit: Metres to a unit of that layer, 0.3048 for feet; None takes the unit that the file states, of
-            its band or its vertical CRS, else metres. It must be told where the map is in feet and the file states
-            none, or where metres are too steep to be true.
+        elevation_unit: Metres per unit of that layer, 0.3048 for feet; None takes the unit that the file states, of its
+            band or its vertical CRS, else metres. It is required if the map is in feet and the file states no unit, or
+            if metres are too steep to be true.
         fuel: The same for the layer of class codes; not used where ``path`` is a file. Laws of rates of spread read the
-            codes as they stand there.
+            codes unchanged.
         table: Cover of each class code: a preset of ``fuel.TABLES``, or a mapping to ``Cover`` codes or names, or a
             yaml file of one.
-        nodata: What cells are where the fuel or the elevation is not known: ``refuse`` leaves no world there;
-            ``unburnable`` makes cells without fuel of them, ``fuel.NO_FUEL`` and bare, and gives cells without
-            elevation that of the cells around.
-        ages: ``drawn`` draws the trees' ages for each episode where no layer tells them, as the paper does;
+        nodata: Cells whose fuel or elevation is not known: ``refuse`` leaves no world there; ``unburnable`` gives cells
+            without fuel ``fuel.NO_FUEL`` and bare cover, and cells without elevation that of the cells around.
+        ages: Ages without a layer of ages: ``drawn`` draws the trees' ages for each episode, as the paper does;
             ``oldest`` gives all the oldest, 10, so that every cell of fuel can burn.
         age: The same for a layer of tree ages, in any unit; None leaves them to ``ages``. A tree's code is
             10 x value / ``full_age``, 10 at most, halves up; where it is 0 nothing stands. Where the layer has
             nodata, as age maps have outside of forests, the age is drawn.
         full_age: Value of the age layer from which a tree counts as oldest [its unit].
-        canopy: The same for a layer of canopy cover [%]. Where ages are drawn it makes those of the trees of forest
-            cells: code = canopy / 10, halves up, 1 at least. It tells nothing of grass, shrub or wetland, where
-            LANDFIRE has 0 over grass and a mixture over shrub, so there, and under nodata, the age is drawn. A forest
-            cell without canopy keeps a young tree, code 1, since its fuel is timber and code 0 is bare ground or ash.
+        canopy: The same for a layer of canopy cover [%]. Where ages are drawn it determines those of forest cells: code
+            = canopy / 10, halves up, 1 at least. It says nothing about grass, shrub or wetland, where LANDFIRE has 0
+            over grass and a mixture over shrub, so there, and under nodata, the age is drawn. A forest cell without
+            canopy keeps a young tree, code 1, since its fuel is timber and code 0 is bare ground or ash.
         canopy_height: The same for a layer of the height of the canopy's top; nodata is 0.
-        height_unit: Metres to a unit of that layer, which must be told where the file does not state it: 0.1 for
-            LANDFIRE's CH, 1 for metres.
-        assets: The same for a layer of what each cell is worth, 0 or more in any unit, for rewards that ask; nodata is
-            0. Or for GeoJSON or a shapefile, where a cell is worth the sum of what lies in it, each shape's property
-            ``worth`` or ``value``, or 1. None leaves all alike.
-        bands: Number or description of the band that a layer is, by the layer's name: ``{fuel: 4, elevation: 1}``.
-            Of a file with several bands others are found by their descriptions, as LANDFIRE and FlamMap write them.
-        resample: What becomes of layers on another grid: ``refuse`` makes them an error; ``nearest`` and ``mode``
-            (the most frequent class) are how class codes are put on the grid, elevation, age and canopy being
-            interpolated (bilinear) in both. See ``resample_layer``.
+        height_unit: Metres per unit of that layer, required if the file does not state it: 0.1 for LANDFIRE's CH, 1 for
+            metres.
+        assets: The same for a layer of the worth of each cell, 0 or more in any unit, for rewards that use it; nodata
+            is 0. Or GeoJSON or a shapefile: a cell's worth is the sum over the shapes in it of their property ``worth``
+            or ``value``, or 1. None leaves all alike.
+        bands: Number or description of a layer's band, by the layer's name: ``{fuel: 4, elevation: 1}``. In a file with
+            several bands the others are found by their descriptions, as LANDFIRE and FlamMap write them.
+        resample: Layers on another grid: ``refuse`` makes them an error; ``nearest`` and ``mode`` (the most frequent
+            class) put class codes on the grid, and both interpolate elevation, age and canopy (bilinear). See
+            ``resample_layer``.
         resolution: Side of the grid's cells [m], a grid over the fuel layer from its north-west corner on, in the
             fuel layer's CRS; in the UTM zone of its middle where that is in degrees, as ESA WorldCover is, or has other
             metres than the ground, as Web Mercator. None keeps the fuel layer's grid. It needs ``resample``.
@@ -136,7 +135,7 @@ class Raster(Cropped):
 
     @property
     def grid(self) -> Grid:
-        """Return the grid in force, of which every world is a window."""
+        """Return the grid of the map; every world is a window of it."""
         return self._grid
 
     @property
@@ -146,11 +145,11 @@ class Raster(Cropped):
 
     @property
     def files(self) -> tuple[str, ...]:
-        """Return a line for each file: which layer it is, in which unit, and which of its bands are left unread."""
+        """Return a line for each file: its layer, its unit, and the bands that are not read."""
         return self._files
 
     def unread(self, *others: str | PathLike[str]) -> list[str]:
-        """Return the names of the rasters and vector files beside the fuel layer that are read by nobody.
+        """Return the names of the rasters and vector files beside the fuel layer that are not read.
 
         Args:
             others: Files that are read for something else, such as the ignition.
@@ -196,7 +195,7 @@ class Raster(Cropped):
         return {**planes, "known": whole if self.nodata == "refuse" else None}, units
 
     def _told(self, layers: Layers, units: Mapping[str, str]) -> tuple[str, ...]:
-        """Return what is read of each file, and which bands are left."""
+        """Return a line for each file, with the bands that are not read."""
         named = self.table if isinstance(self.table, str) else "a table of your own"
         units = {"fuel": f"codes of {named}", **units}
         lines = []

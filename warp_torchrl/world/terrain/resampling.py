@@ -80,7 +80,7 @@ def resample(
 
 
 def fill(values: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Return values [H, W] with what is not known interpolated from the known cells around, 100 cells off at most.
+    """Return values [H, W] with unknown cells interpolated from the known cells around, at most 100 cells off.
 
     Cells farther off get the mean of all that are known.
     """

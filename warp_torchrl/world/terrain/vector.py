@@ -19,7 +19,7 @@ _log = logging.getLogger("warp_torchrl")
 
 
 class Shape(NamedTuple):
-    """One point, line or polygon in a grid's coordinates, and what its file says of it."""
+    """One point, line or polygon in a grid's coordinates, with its properties."""
 
     part: Part
     properties: Mapping[str, Any]
@@ -77,9 +77,10 @@ def burn_in(shapes: Iterable[Shape], values: Iterable[float], grid: Grid) -> np.
 def mark(shapes: Iterable[Shape], grid: Grid) -> np.ndarray:
     """Return the cells that shapes mark, bool [rows, columns].
 
-    A point marks the cell that it lies in, a line those that it touches, a polygon those whose middle is in it. Where
-    these do not come within a cell of all of a polygon, or fall apart, it is narrower than a cell somewhere. Then it
-    marks those that it touches too, but for the edge of its wide parts, beside four such cells in a square.
+    A point marks its cell, a line the cells that it touches, a polygon the cells whose middle is inside. If these leave
+    a part of the polygon more than a cell away, or are not connected, the polygon is narrower than a cell somewhere.
+    Then it also marks the cells that it touches, except at the edge of its wide parts, next to four marked cells in a
+    square.
     """
     cells = np.zeros(_beyond(grid), bool)
     for shape in shapes:
@@ -89,10 +90,10 @@ def mark(shapes: Iterable[Shape], grid: Grid) -> np.ndarray:
 
 
 def in_grid(name: str, x: np.ndarray, y: np.ndarray, crs: Any, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
-    """Return coordinates of a CRS, None for the grid's own, in the grid's; infinite where they are none there.
+    """Return coordinates of a CRS, None for the grid's, in the grid's CRS; infinite where they have none there.
 
     Raises:
-        ValueError: If the grid has no CRS to come to, or no way leads there.
+        ValueError: If the grid has no CRS, or no transformation leads there.
     """
     if grid.transform is None:
         raise ValueError(f"{name} must be a CSV of row,column where the landscape has no place on Earth")
@@ -121,7 +122,7 @@ def _touches(shape: Shape, grid: Grid) -> bool:
 
 
 def _beyond(grid: Grid) -> tuple[int, int]:
-    """Return the shape of a grid with some cells beyond each edge: a polygon reaches its cells from there too."""
+    """Return the shape of a grid with some cells beyond each edge: polygons there can mark cells inside."""
     return grid.shape[0] + 2 * _EDGE, grid.shape[1] + 2 * _EDGE
 
 
@@ -162,7 +163,7 @@ def _cells_of(shape: Shape, size: tuple[int, int], place: Any, all_touched: bool
 
 
 def _whole(inside: np.ndarray, touched: np.ndarray) -> np.ndarray:
-    """Return the cells of a polygon from those whose middle it holds and those that it touches; see ``mark``."""
+    """Return the cells of a polygon from cells with their middle inside and cells that it touches; see ``mark``."""
     if not (touched & ~_near(inside)).any() and _is_one_piece(inside):
         return inside
     cells = inside | (touched & ~_near(_blocks(inside)))
@@ -184,14 +185,14 @@ def _blocks(cells: np.ndarray) -> np.ndarray:
 
 
 def _parts_sides(cells: np.ndarray) -> np.ndarray:
-    """Return the cells that have others on their left and right, one row off at most, and none above, at or below."""
+    """Return the cells that connect cells on both sides, one row off at most, with none above, at or below."""
     padded = np.pad(cells, 1)
     along = padded[:-2] | padded[1:-1] | padded[2:]
     return along[:, :-2] & along[:, 2:] & ~along[:, 1:-1]
 
 
 def _is_one_piece(cells: np.ndarray) -> bool:
-    """Return whether cells hang together, by sides or corners."""
+    """Return whether cells are connected, by sides or corners."""
     from rasterio.features import shapes
 
     pieces = shapes(cells.astype(np.uint8), mask=cells, connectivity=8)
