@@ -1,1 +1,1 @@
-"""Fires without vehicles, and imagined ones."""
+"""Fires without vehicles, and simulated futures."""

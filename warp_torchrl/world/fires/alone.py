@@ -1,4 +1,4 @@
-"""Fires alone under law ``rate``: many on one map, in weather by the hour, from their ignition to an end."""
+"""Fires without vehicles under law ``rate``: many on one map, in hourly weather, from ignition to an end."""
 
 import math
 import threading
@@ -35,7 +35,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class Spell:
-    """A time in which the weather stays as it is."""
+    """A time of constant weather."""
 
     wind: Tensor  # (u east, v north) of the air's motion at 10 m, float32 [2] [m/s]
     minutes: float  # how long it lasts
@@ -45,7 +45,7 @@ class Spell:
 def spread_in(
     fire: RateFire, landscape: Landscape, cell_size: float, spell: Spell, window: Window | None = None
 ) -> Spread:
-    """Return what a fire's head does in each cell of one landscape in a spell, [1, H, W], or of a window of it."""
+    """Return the behaviour of a fire's head in each cell of a landscape in a spell, [1, H, W], or of a window."""
     row = moisture_row(fire.moisture)
     moisture = row if spell.moisture is None else torch.where(spell.moisture.isnan(), row, spell.moisture)
     air = spell.wind[None, :, None, None], moisture[None], cell_size
@@ -61,7 +61,7 @@ def can_ignite(fire: RateFire, landscape: Landscape) -> Tensor:
 
 @dataclass(frozen=True, eq=False)
 class Burned:
-    """What some fires have burned, in a window of the map."""
+    """Cells burned by some fires, in a window of the map."""
 
     window: Window
     minutes: Tensor  # when each fire reached each cell, float32 [b, h, w]; ``travel.NEVER`` where it does not come
@@ -70,9 +70,9 @@ class Burned:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fires:
-    """Fires alone on one map, in weather by the spell. Nothing is computed before it is asked for.
+    """Fires without vehicles on one map, in weather by the spell. Everything is computed on demand.
 
-    Ticks are as short in each spell as its fastest cells ask for; ``fire.minutes_per_tick`` is not read.
+    In each spell, ticks are as short as its fastest cells need; ``fire.minutes_per_tick`` is not read.
 
     Attributes:
         fire: The automaton.
@@ -98,7 +98,7 @@ class Fires:
 
     @property
     def n_met(self) -> int:
-        """Return how many spells fires have met: from the first to the last in which one burned."""
+        """Return the number of spells from the first to the last in which a fire burned."""
         return len(self._fastest)
 
     @cached_property
@@ -108,7 +108,7 @@ class Fires:
 
     @cached_property
     def planes(self) -> Planes:
-        """Return what tells the planes of a spell in a window: times of ways, then ``Heads``, float32 [7, h, w]."""
+        """Return the function of a spell and a window that gives travel times and then ``Heads``, float32 [7, h, w]."""
         return Planes(lambda number, window: in_window(partial(self._planes, number), window))
 
     def fastest(self, number: int) -> tuple[float, float]:
@@ -122,7 +122,7 @@ class Fires:
             return self._fastest[number]
 
     def spell(self, number: int) -> SpellInWindows:
-        """Return a spell in ticks as short as its fastest cells but one in a thousand ask for."""
+        """Return a spell, in ticks as short as its fastest cells but one in a thousand need."""
         minutes = self.spells[number].minutes
         ticks = ticks_of(minutes, self.fastest(number)[0], self.cell_size)
         return SpellInWindows(lambda window: self.planes(number, window)[:3], minutes / ticks, ticks)
@@ -132,8 +132,8 @@ class Fires:
 
         Args:
             lit: The cells that burn at minute 0, bool [H, W], or of each fire [b, H, W].
-            key: Of the fires, int64 [b]: their draws of rates.
-            most: Cells that each burns before it stops; None lets it go on.
+            key: Keys of the fires' draws of rates, int64 [b].
+            most: Cells that each burns before it stops; None for no limit.
 
         Raises:
             ValueError: If their window does not fit in memory.
@@ -144,12 +144,12 @@ class Fires:
         return Burned(fires.window, fires.arrival(), self.pace(key, fires.window))
 
     def in_parts(self, lit: Tensor, key: Tensor, then: Callable[[Burned], T], most: int | None = None) -> Iterator[T]:
-        """Burn many fires, some at a time, and yield what becomes of each part, in order.
+        """Burn many fires, some at a time, and yield the result of each part, in order.
 
         Args:
             lit: The cells that burn at minute 0, bool [H, W], or of each fire [B, H, W].
-            key: Of the fires, int64 [B].
-            then: Is handed each part in a thread of its own, and its result is yielded.
+            key: Keys of the fires, int64 [B].
+            then: Called with each part in a worker thread; its results are yielded.
             most: See ``burn``.
 
         Raises:
@@ -182,11 +182,11 @@ class Fires:
         return self.spell(number)
 
     def _check(self, fires: int, window: Window) -> None:
-        """Refuse a window that is too large for so many fires.
+        """Refuse a window that is too large for ``fires`` fires at once.
 
         Raises:
-            _TooMany: If it may do for less of them.
-            ValueError: If it does not do for one.
+            _TooMany: If fewer fires may fit.
+            ValueError: If not even one fits.
         """
         wanted = window.cells * (fires * _BYTES_A_FIRE + _BYTES_A_CELL)
         there = memory.available()
@@ -250,7 +250,7 @@ def _on_map(burned: Burned) -> Tensor:
 
 
 def hour_of(fire: RateFire, landscape: Landscape, cell_size: float, spell: Spell, fuel: Tensor) -> Hour:
-    """Return the times of ways in a spell, and ticks as short as its fastest cells but one in a thousand ask for.
+    """Return the travel times in a spell, and ticks as short as its fastest cells but one in a thousand need.
 
     Args:
         fire: The automaton.
@@ -273,7 +273,7 @@ def ticks_of(minutes: float, fastest: float, cell_size: float) -> int:
 
 
 def _rise(landscape: Landscape, window: Window, cell_size: float) -> Tensor:
-    """Return how steeply the ground of a window rises, float32 [1, 2, h, w]."""
+    """Return the gradient of a window's ground, float32 [1, 2, h, w]."""
     cover = window.around(landscape.cover)
     if landscape.elevation is None:
         return gradient(None, cover, cell_size)
@@ -281,9 +281,9 @@ def _rise(landscape: Landscape, window: Window, cell_size: float) -> Tensor:
 
 
 def _heads(spread: Spread) -> Tensor:
-    """Return what ``Behaviour`` tells of the heads of a spread [1, h, w], float32 [4, h, w].
+    """Return the fields of ``Behaviour`` for a spread [1, h, w], float32 [4, h, w].
 
-    The rear goes at R_head (1 - e) / (1 + e), e the eccentricity of the ellipse.
+    The rear spreads at R_head (1 - e) / (1 + e), e the eccentricity of the ellipse.
     """
     focus = (1.0 - spread.length_to_breadth.pow(-2)).clamp(min=0.0).sqrt()
     backing = spread.head * (1.0 - focus) / (1.0 + focus)
@@ -291,7 +291,7 @@ def _heads(spread: Spread) -> Tensor:
 
 
 class _TooMany(Exception):  # noqa: N818
-    """So many fires do not burn at once in their window."""
+    """Too many fires to burn at once in their window."""
 
 
 class _Ended(Exception):  # noqa: N818
@@ -299,7 +299,7 @@ class _Ended(Exception):  # noqa: N818
 
 
 def _parts(key: Tensor, lit: Tensor, size: int) -> Iterator[tuple[Tensor, Tensor]]:
-    """Yield the keys of so many fires at a time, and where they start, bool [H, W] or [b, H, W]."""
+    """Yield the keys of ``size`` fires at a time, and where they start, bool [H, W] or [b, H, W]."""
     parts = key.split(size)
     yield from zip(parts, lit.split(size) if lit.dim() == 3 else [lit] * len(parts), strict=True)
 
@@ -310,9 +310,9 @@ def _side_by_side(
     workers: int,
     ended: threading.Event,
 ) -> Iterator[T]:
-    """Yield a function of each part, in order, computed by so many threads, which an event ends early.
+    """Yield a function of each part, in order, computed by ``workers`` threads; an event ends it early.
 
-    Few operations of a fire are large enough for torch's own threads, so fires take one each.
+    Few operations of a fire are large enough for torch's own threads, so each fire takes one thread.
     """
     if workers == 1:
         yield from map(function, parts)

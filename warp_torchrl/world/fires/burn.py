@@ -1,4 +1,4 @@
-"""The fire alone: worlds without vehicles that burn from given cells, and what a fire scientist reads off them."""
+"""Fire without vehicles: worlds that burn from given cells, and statistics of their fires."""
 
 from dataclasses import dataclass
 
@@ -55,7 +55,7 @@ def start_burning(
     cell_size: float,
     fuel: Tensor | None = None,
 ) -> WorldState:
-    """Return worlds without vehicles that are about to make their tick number ``first_tick`` + 1.
+    """Return worlds without vehicles that are ready for their tick number ``first_tick`` + 1.
 
     The arguments are those of ``warp_torchrl.simulate``.
     """
@@ -75,7 +75,7 @@ def start_burning(
 
 
 def burn(state: WorldState, fire: Automaton, wind: Wind, ticks: int) -> WorldState:
-    """Return the worlds after so many ticks."""
+    """Return the worlds after ``ticks`` ticks."""
     everywhere = torch.ones_like(state.terminated)
     for _ in range(ticks):
         state = advance(state, fire, wind, everywhere)
@@ -83,7 +83,7 @@ def burn(state: WorldState, fire: Automaton, wind: Wind, ticks: int) -> WorldSta
 
 
 def trace(state: WorldState, fire: Automaton, wind: Wind, ticks: int, cell_size: float) -> FireHistory:
-    """Burn for so many ticks and keep when each cell caught fire."""
+    """Burn for ``ticks`` ticks and record when each cell caught fire."""
     burning = is_burning(state.cells)
     arrival = torch.where(burning, 0, -1).to(torch.int32)
     minutes = None if state.arrivals is None else torch.where(burning, 0.0, torch.nan)

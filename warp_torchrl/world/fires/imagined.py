@@ -1,4 +1,4 @@
-"""Worlds that are imagined: copies of true ones that go on by other draws."""
+"""Simulated futures: copies of worlds that continue with other draws."""
 
 from dataclasses import replace
 
@@ -11,14 +11,14 @@ from warp_torchrl.world.world import World
 
 
 def rules_in_sight(world: World) -> World:
-    """Return the rules of a world for those who see all of it: without limits of sight, and without a radio."""
+    """Return the rules of a world with full sight, and without a radio."""
     if not world.sensing.is_limited and not world.team.radio.delay:
         return world
     return replace(world, sensing=Full(), team=replace(world.team, radio=Radio()))
 
 
 def imagined(state: WorldState, key: Tensor) -> WorldState:
-    """Return worlds whose draws from now on are another key's, int64 [B], under ``rules_in_sight``.
+    """Return worlds whose future draws have another key, int64 [B], under ``rules_in_sight``.
 
     What was drawn at the start of the episode stays: the ground, the prevailing wind, the hour of the weather.
     """
