@@ -1,1 +1,1 @@
-"""Where fires start, and how people intervene."""
+"""Ignition of fires, and interventions of people."""

@@ -1,4 +1,4 @@
-"""Fires that start where a file says: points, lines, a perimeter or a raster."""
+"""Ignition from a file: points, lines, a perimeter or a raster."""
 
 import logging
 from copy import copy
@@ -36,10 +36,10 @@ def read_ignition(path: str | PathLike[str], grid: Grid) -> np.ndarray:
 
 
 def on_fuel(lit: np.ndarray, fuel: np.ndarray, path: str | PathLike[str]) -> np.ndarray:
-    """Return those cells to light that can burn, bool [rows, columns]; a warning counts those that cannot.
+    """Return the cells to light that can burn, bool [rows, columns]; a warning counts the others.
 
     Raises:
-        ValueError: If none can.
+        ValueError: If no cell can burn.
     """
     wet, count = lit & ~fuel, int(lit.sum())
     if not (lit & fuel).any():
@@ -55,7 +55,7 @@ def on_fuel(lit: np.ndarray, fuel: np.ndarray, path: str | PathLike[str]) -> np.
 
 @dataclass(frozen=True, kw_only=True)
 class IgnitionFile(IgnitionSource):
-    """Fire in the same cells of every world: those that a file marks on the landscape's map, where they can burn.
+    """Fire in the same cells of every world: the cells that a file marks on the landscape's map, where they can burn.
 
     Every world must have the same window of the map.
 
@@ -63,7 +63,7 @@ class IgnitionFile(IgnitionSource):
         path: A CSV of ``row,column`` (of the landscape's map, from 0), ``x,y`` (in its CRS) or
             ``longitude,latitude``; a raster (.tif, .asc) on its grid, not 0 where it burns; GeoJSON or a shapefile of
             points, lines or perimeters, whose inside burns too. None is an error.
-        radius: Cells about those of the file that are lit too (1: a point is a 3 x 3 patch).
+        radius: Distance around the file's cells within which cells are lit too (1: a point is a 3 x 3 patch).
         head_start: Fire ticks before the team's first step.
 
     Raises:
@@ -128,7 +128,7 @@ class IgnitionFile(IgnitionSource):
 
     @property
     def why_dark(self) -> str:
-        """Return what is said where no cell of a world can be lit."""
+        """Return the message for a world without a cell to light."""
         return f"{_NAME} must light a tree that can burn, in some world {self.path} lights none; see landscape.ages"
 
     def _read(self, landscape: LandscapeSource) -> np.ndarray:

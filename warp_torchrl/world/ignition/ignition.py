@@ -1,4 +1,4 @@
-"""Where the fire starts."""
+"""Ignition sources: the cells where fires start."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ _FEW = 4  # fires, whose places are found faster one by one than by topk
 
 
 class IgnitionSource(ABC):
-    """What the world needs of an ignition component."""
+    """Interface of an ignition component."""
 
     @property
     @abstractmethod
@@ -42,7 +42,7 @@ class IgnitionSource(ABC):
 
     @property
     def why_dark(self) -> str:
-        """Return what is said where no cell of a world can be lit."""
+        """Return the message for a world without a cell to light."""
         return "landscape: a map has no tree that can burn, so there is no fire to start"
 
 
@@ -108,7 +108,7 @@ class Ignition(IgnitionSource):
 
 
 def _largest(scores: Tensor, count: int) -> Tensor:
-    """Return the largest numbers of each row, int64 [B, count], of numbers of which no two are alike, int64 [B, n]."""
+    """Return the ``count`` largest numbers of each row, int64 [B, count], of distinct numbers, int64 [B, n]."""
     if count > _FEW:
         return scores.topk(count, dim=1).values
     found = [scores.amax(dim=1, keepdim=True)]

@@ -1,6 +1,6 @@
-"""What people do to a world from outside of the rules: they light a cell, cut a firebreak, or change the wind.
+"""Interventions of people, outside of the rules: lighting a cell, cutting a firebreak, changing the wind.
 
-Each function is pure. It changes cells that allow it and leaves all others as they are.
+Each function is pure. It changes the cells that allow it and no others.
 """
 
 import torch
@@ -16,12 +16,12 @@ def can_be_lit(state: WorldState, fire: Automaton) -> Tensor:
 
 
 def ignited(state: WorldState, fire: Automaton, where: Tensor) -> WorldState:
-    """Return worlds in which marked cells have caught fire; a world that had ended without fire goes on.
+    """Return worlds in which marked cells have caught fire; a world that had ended without fire continues.
 
     Args:
         state: The worlds.
         fire: Their automaton.
-        where: bool [B, H, W]; cells that cannot be lit stay as they are.
+        where: bool [B, H, W]; cells that cannot be lit are not changed.
     """
     lit = where & can_be_lit(state, fire)
     changes = {
@@ -35,11 +35,11 @@ def ignited(state: WorldState, fire: Automaton, where: Tensor) -> WorldState:
 
 
 def cleared(state: WorldState, where: Tensor) -> WorldState:
-    """Return worlds in which the trees of marked cells have become firebreaks, as a vehicle that clears makes them.
+    """Return worlds in which trees of marked cells are firebreaks, as a vehicle that clears makes them.
 
     Args:
         state: The worlds.
-        where: bool [B, H, W]; cells without a tree, and those that burn, stay as they are.
+        where: bool [B, H, W]; cells without a tree, and burning cells, are not changed.
     """
     cut = where & is_tree(state.cells)
     return state.replace(cells=state.cells.masked_fill(cut, 0), firebreak=state.firebreak | cut)

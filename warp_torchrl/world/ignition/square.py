@@ -48,5 +48,5 @@ class MiddleSquare(IgnitionSource):
 
     @property
     def why_dark(self) -> str:
-        """Return what is said where no cell of a world can be lit."""
+        """Return the message for a world without a cell to light."""
         return f"ignition.side must reach a tree that can burn, a map has none in its middle {self.side} x {self.side}"
