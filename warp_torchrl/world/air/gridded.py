@@ -1,4 +1,4 @@
-"""Winds that a user has: from arrays, an ``.npz`` file or rasters, steady or changing in time."""
+"""Winds from a user's arrays, an ``.npz`` file or rasters, steady or changing in time."""
 
 from collections.abc import Sequence
 from copy import copy
@@ -28,7 +28,7 @@ Numbers = Sequence[Any] | np.ndarray | Tensor
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Gridded(Wind):
-    """A wind field on the landscape's map, of which each world has the window that its ground has.
+    """A wind field on the landscape's map; each world has the window of its ground.
 
     Attributes:
         path: An ``.npz`` file with ``u`` and ``v``; or a folder of raster layers; None where arrays are passed.
@@ -37,10 +37,10 @@ class Gridded(Wind):
         v: The same for the north component [m/s].
         speed: Pattern of a layer of wind speeds [m/s], which with ``bearing`` stands for ``u`` and ``v``, as WindNinja
             and weather services write them; None reads ``u`` and ``v``.
-        bearing: Pattern of a layer of directions that the wind comes from [degrees clockwise from north].
+        bearing: Pattern of a layer of directions from which the wind blows [degrees clockwise from north].
         ticks_per_field: Ticks that each field of a series in time lasts; the last stays for good.
-        resample: What becomes of layers on another grid than the landscape's: ``refuse`` makes them an error,
-            ``bilinear`` interpolates u and v.
+        resample: Layers on another grid than the landscape's: ``refuse`` makes them an error, ``bilinear`` interpolates
+            u and v.
 
     Raises:
         ValueError: If there is no wind, a layer is missing, damaged or on another grid, or a component is not in
@@ -144,14 +144,14 @@ class Gridded(Wind):
 
 
 def _read_unit(name: str, header: Header, is_bearing: bool) -> np.ndarray:
-    """Return a layer in metres a second or degrees, NaN where it is not known, by the unit that its file states."""
+    """Return a layer in metres per second or degrees, NaN where it is not known, by its file's unit."""
     values, known = read_layer(name, header.path, header.number)
     factor = factor_of(name, header.path, header.unit, DEGREES if is_bearing else SPEEDS)
     return np.where(known, values * factor if factor != 1.0 else values, np.nan)
 
 
 def _to_components(speed: np.ndarray, bearing: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return u and v of a wind that comes from a bearing, degrees clockwise from north."""
+    """Return u and v of a wind from a bearing, degrees clockwise from north."""
     angle = np.radians(bearing)
     return -speed * np.sin(angle), -speed * np.cos(angle)
 

@@ -25,15 +25,15 @@ _MINUTES = 60.0  # of an hour
 class Weather(Wind):
     """One wind over the whole map that changes with the rows of a table, and with it the moisture of fuel.
 
-    Speeds are made those at 10 m in the open, bearings those from grid north.
+    Speeds are converted to 10 m in the open, bearings to grid north.
 
     Attributes:
         path: A CSV file, or ``august``, see ``world.weather.table.read_weather``; None where a table is passed.
         table: The table.
         start: Hours into the table at which episodes begin; None draws the row that each episode begins with.
-        wind_height: At what height the wind was measured; None goes by the file.
+        wind_height: Height at which the wind was measured; None takes the file's.
         units: Unit by quantity or column where the file states none, see ``read_weather``.
-        true_north: Whether bearings are from true north, and are turned where the landscape has a place on Earth; else
+        true_north: Whether bearings are from true north, and are turned if the landscape has a place on Earth; else
             they are from grid north.
         convergence: Angle from true north to grid north [degrees]; None is that at the middle of the landscape.
         minutes_per_tick: Minutes of a tick; None takes those of the fire.
@@ -79,10 +79,10 @@ class Weather(Wind):
         return replace(self, path=None, table=self._rows, convergence=grid_convergence(grid.crs.to_wkt(), x, y))
 
     def paced(self, minutes: float | None) -> "Weather":
-        """Return this weather for ticks of so many minutes, unless it says itself how many they have.
+        """Return this weather for ticks of ``minutes``, unless it has minutes per tick itself.
 
         Raises:
-            ValueError: If nobody says.
+            ValueError: If both are None.
         """
         if self.minutes_per_tick is not None:
             return self
@@ -99,7 +99,7 @@ class Weather(Wind):
         return self._wind.to(state.key.device)[self._row(state.episode_key, state.tick)][:, :, None, None]
 
     def moisture(self, key: Tensor, tick: Tensor) -> Tensor:
-        """See ``Wind``; NaN where the table tells nothing."""
+        """See ``Wind``; NaN where the table has no value."""
         return self._moisture.to(key.device)[self._row(key, tick)]
 
     def hours(

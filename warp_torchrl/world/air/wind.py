@@ -1,4 +1,4 @@
-"""Wind fields: calm, uniform, the paper's, and one that wanders.
+"""Wind fields: calm, uniform, the paper's, and a wandering one.
 
 A wind is a vector (u east, v north) in m/s that points where the air goes. Each component makes the field at the start
 of an episode, [B, 2, 1, 1] where it is the same over the map and [B, 2, H, W] where it is not, and then the next.
@@ -21,7 +21,7 @@ _FASTEST = 60.0  # m/s
 
 
 class Wind(ABC):
-    """What the world needs of a wind component."""
+    """Interface of a wind component."""
 
     @property
     def changes(self) -> bool:
@@ -43,7 +43,7 @@ class Wind(ABC):
         return state.wind
 
     def moisture(self, key: Tensor, tick: Tensor) -> Tensor | None:
-        """Return the moisture of dead and live fuel after tick number ``tick``, int [B], or None where it says none.
+        """Return the moisture of dead and live fuel after tick number ``tick``, int [B], or None without one.
 
         Returns:
             float32 [B, 7] [%]: dead fuel of 1, 10 and 100 hours, live herbaceous and woody; the codes FFMC and BUI.
@@ -57,10 +57,10 @@ class Wind(ABC):
         yield self(key, size, corner), self.moisture(key, torch.zeros_like(key))
 
     def paced(self, minutes: float | None) -> "Wind":
-        """Return the wind for ticks of so many minutes; None where they have none.
+        """Return the wind for ticks of ``minutes``; None where ticks have no minutes.
 
         Raises:
-            ValueError: If it asks for minutes and there are none.
+            ValueError: If it needs minutes and there are none.
         """
         return self
 
@@ -112,8 +112,7 @@ class Paper(Wind):
 
         U = -1 - X^2 + X + Y,   V = (1 + X^2 - Y^2) / 10      (WARP-CA, wind)
 
-    The range is that of the plot that the formula comes from; with cell numbers in place of X and Y it would give
-    speeds of thousands of m/s.
+    The range is that of the formula's plot; with cell numbers for X and Y it would give speeds of thousands of m/s.
 
     Attributes:
         scale: Factor on both components.
