@@ -1,1 +1,1 @@
-"""Maps for a geographic information system and for the eye: GeoTIFF, GeoJSON perimeters, figures."""
+"""Figures and map files: GeoTIFF, GeoJSON perimeters, pictures and animations."""

@@ -215,7 +215,7 @@ def round_length(length: float) -> float:
 
 
 def cover_legend(figure: "Figure", covers: Sequence[Cover], marks: dict[str, dict[str, Any]]) -> None:
-    """Write below a figure what the colours of land cover mean, and what its lines and marks do.
+    """Write below a figure the meaning of its colours of land cover, lines and marks.
 
     Args:
         figure: The figure.
@@ -229,7 +229,7 @@ def cover_legend(figure: "Figure", covers: Sequence[Cover], marks: dict[str, dic
 
 
 def line_legend(figure: "Figure", lines: dict[str, dict[str, Any]], before: Sequence[Any] = ()) -> None:
-    """Write below a figure what its lines mean, by Matplotlib's properties of each."""
+    """Write below a figure the meaning of its lines, by Matplotlib's properties of each."""
     from matplotlib.lines import Line2D
 
     handles = [*before, *(Line2D([], [], label=name, **look) for name, look in lines.items())]
@@ -244,12 +244,12 @@ def fire_image(state: WorldState) -> np.ndarray:
 def fire_legend(
     figure: "Figure", covers: Sequence[Cover] = (Cover.FOREST,), lines: dict[str, Any] | None = None
 ) -> None:
-    """Write below a figure what the colours of ``fire_image`` mean, and what its lines and arrows do.
+    """Write below a figure the meaning of the colours of ``fire_image``, and of its lines and arrows.
 
     Args:
         figure: The figure.
-        covers: Those that its worlds have; trees get darker with their age, from 1 to 10.
-        lines: Matplotlib's properties of each kind of line, by what it means.
+        covers: Covers of its worlds; trees get darker with their age, from 1 to 10.
+        lines: Matplotlib's properties of each kind of line, by its meaning.
     """
     from matplotlib.legend_handler import HandlerTuple
     from matplotlib.lines import Line2D

@@ -23,7 +23,7 @@ def check_matplotlib() -> None:
 
 
 def draw_figure(draw: Callable[[], "Figure"], path: Path) -> Path:
-    """Draw a figure and write it as PNG; its folder is made where it is missing."""
+    """Draw a figure and write it as PNG; a missing folder is made."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with style():
         save(draw(), path)

@@ -42,12 +42,12 @@ class Panel:
     """One map of a figure.
 
     Attributes:
-        title: What is seen.
+        title: Title of the map.
         values: float [H, W]; NaN shows the ground.
-        label: What the colours count, with its unit.
+        label: Quantity of the colours, with its unit.
         kind: ``chance`` runs from 0 to 1; ``change`` from blue, less, over white to red, more; ``amount`` from 0 to
             the largest value. Where a chance or a change is 0, the ground shows.
-        top: The largest value that the colours tell apart; None is the largest of the map.
+        top: Largest value of the colour scale; None is the largest of the map.
     """
 
     title: str

@@ -66,7 +66,7 @@ def fire_colours() -> Tensor:
 
 
 def legend_colours() -> dict[str, tuple[int, int, int]]:
-    """Return a colour of each thing that is drawn on a map, by its name."""
+    """Return a colour of each item that is drawn on a map, by its name."""
     covers = {cover.name.lower(): _GROUND[cover][-1] for cover in Cover}
     return {**covers, "fire": _FIRE[2], "ember": _FIRE[4], "ash": _ASH, "firebreak": _FIREBREAK, "wet": _WATER}
 
@@ -108,7 +108,7 @@ class EpisodeRecorder:
         return canvas
 
     def frames(self) -> list[tuple[Image.Image, int]]:
-        """Return each frame, with a palette, and for how long it stands [ms]; at most 130.
+        """Return each frame, with a palette, and its duration [ms]; at most 130.
 
         Raises:
             ValueError: If no frame was added.
@@ -232,7 +232,7 @@ def _write(panel: Image.Image, place: tuple[int, int], text: str, size: int, col
 
 @lru_cache(maxsize=8)
 def _legend(title: str, roles: tuple[int, ...]) -> Image.Image:
-    """Return the part of the panel that stays: title and legend."""
+    """Return the constant part of the panel: title and legend."""
     panel = Image.new("RGB", _PANEL, _PAPER)
     for line, y, size, colour in zip(title.splitlines(), (9, 36), (22, 15), (_INK, _SOFT)):
         _write(panel, (0, y), line, size, colour)
