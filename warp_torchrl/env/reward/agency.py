@@ -1,4 +1,4 @@
-"""What the vehicles of several agencies earn."""
+"""Reward of the vehicles of several agencies."""
 
 from dataclasses import dataclass
 

@@ -22,8 +22,9 @@ class Reward:
     Such shaping leaves optimal policies unchanged (Ng, Harada and Russell 1999).
 
     Attributes:
-        team_share: 1 gives every agent the team's reward, 0 each its own.
-        team_reward: The team's reward: the ``mean`` of its agents' own, or their ``sum``, A times as much.
+        team_share: 1 gives every agent the team's reward, 0 its individual one.
+        team_reward: The team's reward: the ``mean`` of its agents' individual rewards, or their ``sum``, A times as
+            much.
         scale: Factor on everything.
         shaping: Weight of the potential; 0 switches it off.
         potential: ``distance``, Phi_i = -0.5 x agent i's distance to the nearest fire / H; or ``exposure``, Phi = -0.5

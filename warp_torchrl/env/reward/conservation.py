@@ -2,9 +2,9 @@
 
     Q = (w_p T_p + w_e T_e - w_c T_c - w_b T_b) / N0      (WARP-CA, conservation metric)
 
-is the value of the forest, and A_total counts extinguish and clear, each of which costs c = w_a / N0. Each reward
+is the value of the forest, and A_total counts extinguish and clear, at c = w_a / N0 each. Each reward
 computes a value R from them, and pays its difference, r_t = R(t) - R(t-1), so that the return of an episode is
-R(end) - R(start). All agents share the value of the trees; each agent pays A times for its own acts, so that the team's
+R(end) - R(start). All agents share the value of the trees; each agent pays A times for its acts, so that the team's
 mean is R.
 """
 
@@ -27,10 +27,9 @@ from warp_torchrl.world.state.state import Transition, TreeCounts, WorldState, i
 class Conservation(Reward):
     """Base class of the five conservation rewards.
 
-    By default each agent pays for its own acts and earns its own shaping, at a tenth of the weight, by which a team
-    learns sooner. The sum over the team is what it is with ``team_share`` 1, and an agent's own potential leaves the
-    equilibria as they are (Devlin and Kudenko 2011); but an agent feels each of its acts A times as much as the team's
-    mean does.
+    By default each agent pays for its acts and earns the shaping of its potential, at a tenth of the weight, by which a
+    team learns sooner. The sum over the team equals that with ``team_share`` 1, and potentials of single agents do not
+    change the equilibria (Devlin and Kudenko 2011); but each act costs its agent A times as much as the team's mean.
 
     Attributes:
         preserved: w_p, weight of each tree untouched by fire or agents [1 / initial tree].
@@ -38,8 +37,8 @@ class Conservation(Reward):
         cleared: w_c, weight of each cleared tree.
         burned: w_b, weight of each tree that burned to ash.
         act: w_a, cost of each extinguish or clear action [``act_per``].
-        act_per: ``tree``, c = w_a / N0, by which an act costs as many trees on any map; ``forest``, c = w_a, by which
-            it costs more trees on a larger one, and teams that do not know yet what they can save learn to do nothing.
+        act_per: ``tree``: c = w_a / N0, an act costs as many trees on any map; ``forest``: c = w_a, an act costs more
+            trees on a larger map, and teams that cannot save trees yet learn to do nothing.
     """
 
     team_share: float = 0.0
@@ -61,7 +60,7 @@ class Conservation(Reward):
         return gained[:, None] - self.cost_of_an_act(transition.counts_before.initial[:, None]) * acts.shape[1] * acts
 
     def cost_of_an_act(self, initial: Tensor) -> Tensor | float:
-        """Return c where there were so many initial trees, float32 of the same shape; one number where it is w_a."""
+        """Return c for numbers of initial trees, float32 of the same shape; one number where it is w_a."""
         return self.act / initial if self.act_per == "tree" else self.act
 
     def worth(self, counts: TreeCounts) -> Tensor:

@@ -1,4 +1,4 @@
-"""The reward of Haksar and Schwager."""
+"""Reward of Haksar and Schwager for flying along the fire's edge."""
 
 from dataclasses import dataclass
 
@@ -14,20 +14,20 @@ from warp_torchrl.world.state.state import Transition, WorldState, is_burning, i
 
 @dataclass(frozen=True, kw_only=True)
 class RoundFire(Reward):
-    """Each aircraft's own reward for its place at the fire's edge (Haksar and Schwager, IROS 2018; the numbers are
-    those of the authors' public code).
+    """Individual reward of each aircraft for its place at the fire's edge.
 
-    All of it reads the forest before the step, and the cell to which the aircraft comes. Neighbours beyond the map
-    count as healthy. A move is taken to lead one cell far.
+    Source: Haksar and Schwager, IROS 2018, with the numbers of the authors' public code. All terms read the forest
+    before the step, and the cell that the aircraft enters. Neighbours beyond the map count as healthy. A move counts as
+    one cell.
 
     Attributes:
-        edge: Of a burning tree with a healthy one among its four neighbours.
-        interior: Of a burning tree without.
-        beside: Of a healthy tree with a burning or burnt one among its eight neighbours.
-        far: Of a healthy tree without.
-        crowded: Where it comes within a cell of the team-mate that was nearest to it, if that has a lower number.
-        parted: Where it was within a cell of that one, and now is not.
-        turn: Where the move does not lead counter-clockwise round the middle of the map.
+        edge: For a burning tree with a healthy one among its four neighbours.
+        interior: For another burning tree.
+        beside: For a healthy tree with a burning or burnt one among its eight neighbours.
+        far: For another healthy tree.
+        crowded: For a move to within a cell of the team-mate that was nearest, if that has a lower number.
+        parted: For a move away from within a cell of that team-mate.
+        turn: For a move that is not counter-clockwise round the middle of the map.
     """
 
     team_share: float = 0.0
@@ -49,7 +49,7 @@ class RoundFire(Reward):
         return self._place(before, comes) + self._company(before, comes) + self._turn(before, step)
 
     def _place(self, before: WorldState, comes: Tensor) -> Tensor:
-        """Return what a cell (row, column) is worth, int64 [B, A, 2], float32 [B, A]."""
+        """Return the worth of a cell (row, column), int64 [B, A, 2], float32 [B, A]."""
         burns, stands = is_burning(before.cells), is_tree(before.cells)
         codes = burns.to(torch.uint8) + (~burns & ~stands).to(torch.uint8) * 2
         seen = window(comes, before.cells.shape[1:], 1).of(codes).flatten(2)
@@ -60,7 +60,7 @@ class RoundFire(Reward):
         return burning * (here == 1) + healthy * (here == 0)
 
     def _company(self, before: WorldState, comes: Tensor) -> Tensor:
-        """Return what the way to the team-mate that was nearest is worth, float32 [B, A]."""
+        """Return the worth of the direction to the nearest team-mate, float32 [B, A]."""
         position, mate = before.vehicles.position, nearest_mate(before)
         theirs = position.gather(1, mate[..., None].expand(-1, -1, 2))
         was, now = ((each - theirs).square().sum(-1) <= 1 for each in (position, comes))
@@ -68,6 +68,6 @@ class RoundFire(Reward):
         return (self.crowded * now + self.parted * (was & ~now)) * is_later
 
     def _turn(self, before: WorldState, step: Tensor) -> Tensor:
-        """Return what the direction of a step (rows, columns) is worth, int64 [B, A, 2], float32 [B, A]."""
+        """Return the worth of the direction of a step (rows, columns), int64 [B, A, 2], float32 [B, A]."""
         east, north = from_middle(before).unbind(-1)
         return self.turn * (east * -step[..., 0] - north * step[..., 1] <= 0.0)

@@ -1,4 +1,4 @@
-"""Terms r_i of the adaptive reward: a table that a configuration picks from, and that a module of a user's own extends.
+"""Terms r_i of the adaptive reward: a table from which a configuration chooses, and which users' modules extend.
 
 @term("burnt_out")
 def burnt_out(transition: Transition) -> Tensor:
@@ -23,7 +23,7 @@ _SECTORS = 8
 
 
 def term(name: str) -> Callable[[Term], Term]:
-    """Return what adds a term to the table under a name.
+    """Return a decorator that adds a term to the table under a name.
 
     Raises:
         ValueError: If the table has another term of that name.
