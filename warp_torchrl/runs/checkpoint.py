@@ -165,19 +165,19 @@ def export(
     policy: Mapping[str, torch.Tensor] | None = None,
     check: Callable[[Checkpoint], object] = lambda made: None,
 ) -> None:
-    """Write a checkpoint without its training state into a new folder, which appears when what it holds was loaded.
+    """Write a checkpoint without its training state into a new folder, which appears once its content was loaded.
 
-    Its record does not tell from which run the training started, a path that others do not have.
+    Its configuration does not name the run from which the training started: other machines do not have that path.
 
     Args:
         found: The checkpoint.
-        folder: What to make.
-        record: Of its configuration; None takes its own.
-        policy: The policy's parameters; None takes its own.
-        check: Called with what was written, before the folder has its name; what it raises leaves nothing.
+        folder: New folder.
+        record: Configuration; None takes the checkpoint's.
+        policy: The policy's parameters; None takes the checkpoint's.
+        check: Called with the new checkpoint before the folder has its name; an error leaves nothing.
 
     Raises:
-        CheckpointError: If its own files cannot be read, or what was written is not what is read.
+        CheckpointError: If its files cannot be read, or the copy differs from the original.
         FileExistsError: If the folder exists.
         OSError: If a write fails.
     """
@@ -210,7 +210,7 @@ def _write_record(folder: Path, record: SavedConfig) -> None:
 
 
 def leave_policy(run: Path) -> None:
-    """Leave of a run's checkpoints the newest one's policy alone, from which nothing goes on.
+    """Delete a run's checkpoints except the policy of the newest, from which no training can resume.
 
     Raises:
         CheckpointError: If no checkpoint is sound.

@@ -31,8 +31,8 @@ _GIVEN = re.compile(rf"[0-9a-z]{{{_DIGITS}}}")
 class MetricsFile:
     """``metrics.csv``: one row for each iteration, complete after a crash, truncated on resume.
 
-    The first row sets the columns; a resumed run of a former version goes on with those that it has. A missing value is
-    an empty cell.
+    The first row sets the columns; a resumed run of a former version keeps its columns. A missing value is an empty
+    cell.
 
     Args:
         path: The file.
@@ -132,12 +132,12 @@ class _TorchRlTracker:
     """One of TorchRL's loggers; its first error ends the tracking, never the training.
 
     Args:
-        name: TorchRL's name of it.
+        name: Its name in TorchRL.
         run: The run folder.
-        title: What the run is called; None takes the folder's name.
-        told: Frames up to which it has its rows already.
-        begin: What is done with it at first.
-        options: TorchRL's.
+        title: Name of the run; None takes the folder's name.
+        told: Frames of the last row that the tracker has already.
+        begin: Called with the new logger.
+        options: Options of TorchRL's logger.
     """
 
     def __init__(
@@ -194,7 +194,7 @@ class CsvOnly:
 
 @dataclass(frozen=True, kw_only=True)
 class Wandb:
-    """Weights & Biases. A resumed run goes on in its own run there, whose number is kept in the run folder.
+    """Weights & Biases. A resumed run continues its Weights & Biases run, whose number is in the run folder.
 
     Attributes:
         project: Name of the project.
@@ -228,7 +228,7 @@ class Tensorboard:
 
         Args:
             run: The folder.
-            frames: Of the checkpoint from which the run goes on; 0 for a new one.
+            frames: Frames of the checkpoint from which the run resumes; 0 for a new one.
             told: Frames of the last row that the run wrote before that; 0 if none is after the checkpoint.
         """
         before = sorted(path.parent.name for path in run.glob("*/*tfevents*"))
@@ -241,7 +241,7 @@ class Tensorboard:
 
 
 def _drop_after(frames: int, writer: Any) -> None:
-    """Let TensorBoard leave out the points that earlier files of a folder have after so many frames."""
+    """Let TensorBoard drop the points of a folder's earlier files after ``frames``."""
     from tensorboard.compat.proto.event_pb2 import Event, SessionLog
 
     start = SessionLog(status=SessionLog.START)
@@ -249,7 +249,7 @@ def _drop_after(frames: int, writer: Any) -> None:
 
 
 def _own_id(path: Path, is_new: bool) -> str:
-    """Return the number of a run in the tracker: of a resumed one that which its folder holds, else a new one."""
+    """Return the number of a run in the tracker: for a resumed run the one in its folder, else a new one."""
     if path.is_file() and not is_new:
         with path.open("rb") as file:
             held = file.read(_DIGITS + 1).decode("ascii", errors="replace")

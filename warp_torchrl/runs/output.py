@@ -21,7 +21,7 @@ _TAKEN = (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR)
 def output_folder(
     folder: Path, key: str, *, overwrite: bool, last: str, replaced: Iterable[str] = ()
 ) -> Iterator[Path]:
-    """Lock an output folder, and yield a draft in it; what the block writes there becomes the folder's at the end.
+    """Lock an output folder, and yield a draft in it; the block's files are moved into the folder at the end.
 
     The folder is made first, so that a long computation begins only where its result can be written, and a second
     command is refused at once. If the block fails, the folder is as it was before.
@@ -60,7 +60,7 @@ def output_folder(
 
 @contextmanager
 def draft_in(parent: Path) -> Iterator[Path]:
-    """Yield a new empty folder below another, under a name that no other process has; nothing of it stays.
+    """Yield a new empty folder below another, with a name that no other process uses; it is deleted at the end.
 
     Drafts that killed processes left there are removed first.
 
@@ -123,7 +123,7 @@ def sync_all(folder: Path) -> None:
 
 
 def remove_if_empty(folder: Path) -> None:
-    """Remove a folder that holds nothing but its lock; what others wrote into it stays."""
+    """Remove a folder that holds nothing but its lock; files of others stay."""
     with suppress(OSError):
         if {each.name for each in folder.iterdir()} <= {".lock"}:
             (folder / ".lock").unlink(missing_ok=True)
@@ -131,7 +131,7 @@ def remove_if_empty(folder: Path) -> None:
 
 
 def _fill(folder: Path, draft: Path, last: str, replaced: Iterable[str]) -> None:
-    """Move what a draft holds into a folder, the last file after all others are on the disk."""
+    """Move a draft's files into a folder, the last file after all others are on the disk."""
     if not (draft / last).is_file():
         raise FileNotFoundError(errno.ENOENT, "the output has no such file", str(draft / last))
     sync_all(draft)
@@ -157,7 +157,7 @@ def _remove(path: Path) -> None:
 
 
 def _locked_folder(parent: Path) -> tuple[Path, int]:
-    """Make a folder and lock it; another one where a process that looks for left drafts was in between."""
+    """Make a folder and lock it; make another if a process that removes old drafts interfered."""
     while True:
         apart = Path(tempfile.mkdtemp(prefix=DRAFT, dir=parent))
         with suppress(FileNotFoundError, BlockingIOError):
@@ -178,7 +178,7 @@ def _lock(folder: Path) -> int:
 
 
 def _remove_left(parent: Path) -> None:
-    """Remove drafts whose processes have ended, which has released their locks."""
+    """Remove drafts without a lock: their processes have ended."""
     for left in parent.glob(f"{DRAFT}*"):
         with suppress(OSError):  # it is in use, or is no folder of ours
             descriptor = _lock(left)

@@ -1,4 +1,4 @@
-"""A training as a process of its own, which ends when the search does, or the live page that started it."""
+"""Training in a separate process, which ends with the search or live page that started it."""
 
 import signal
 import subprocess
@@ -28,14 +28,14 @@ class SearchEnded(Exception):  # noqa: N818
 
 
 class Training(Protocol):
-    """A training that was started."""
+    """A started training."""
 
     def poll(self) -> int | None:
-        """Return its exit code; None while it goes on."""
+        """Return its exit code; None while it runs."""
         ...
 
     def stop(self) -> None:
-        """Ask it to save and end; a second time ends it at once."""
+        """Let it save and end; a second call ends it at once."""
         ...
 
     def reason(self) -> str:
@@ -46,13 +46,13 @@ class Training(Protocol):
 class TrainingProcess:
     """A training in a run folder.
 
-    Its group is its own, so that a terminal's Ctrl-C reaches it through the search alone. When the search ends, however
-    that ends, it saves and ends too.
+    It has a separate process group, so that a terminal's Ctrl-C reaches it only through the search. When the search
+    ends, in any way, it saves and ends too.
 
     Args:
         overrides: As for ``train.py``.
         folder: Its run folder.
-        threads: For torch; None leaves it to the machine.
+        threads: Threads of torch; None leaves it to the machine.
     """
 
     def __init__(self, overrides: Sequence[str], folder: Path, threads: int | None) -> None:
@@ -69,12 +69,12 @@ class TrainingProcess:
             )
 
     def poll(self) -> int | None:
-        """Return its exit code; None while it goes on. Of a process that a signal killed it is 128 + the signal."""
+        """Return its exit code; None while it runs. If a signal killed the process it is 128 + the signal."""
         code = self._process.poll()
         return 128 - code if code is not None and code < 0 else code
 
     def stop(self) -> None:
-        """Ask it to save and end; a second time ends it at once."""
+        """Let it save and end; a second call ends it at once."""
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGTERM)
 

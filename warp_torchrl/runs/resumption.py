@@ -1,4 +1,4 @@
-"""Resumption: a run goes on with its checkpoint's configuration, in which only ``total_frames`` may change."""
+"""Resumption of a run with its checkpoint's configuration, in which only ``total_frames`` may change."""
 
 import reprlib
 from collections.abc import Mapping
@@ -85,7 +85,7 @@ def resumption(folder: Path, total_frames: Any = None) -> Resumption:
 
 
 def is_run_of(folder: Path, config: str) -> bool:
-    """Return whether a folder holds the run that a configuration begins: all values are the same, ``debug`` aside.
+    """Return whether a folder holds the run of a configuration: all values are the same, ``debug`` aside.
 
     ``processes=auto`` is what the run was begun with: a queue may start it again where there are other cores.
 

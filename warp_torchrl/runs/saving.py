@@ -1,4 +1,4 @@
-"""When a run saves: at intervals of frames, and at intervals of time that cost at most 1 % of the run."""
+"""Times of checkpoints: at intervals of frames, and at intervals of time that cost at most 1 % of the run."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -14,7 +14,7 @@ def passes(interval: int, frames: int, batch: int) -> bool:
 
 
 class SaveClock:
-    """Decides by the clock when a run should save.
+    """Decides by the clock when a run saves.
 
     The first save is due at once, each later one ``minutes`` after the last. A save waits while all saves, with the
     expected time of the next one, would take more than 1 % of the time since the start; so slow saves, of a large

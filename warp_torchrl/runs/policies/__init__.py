@@ -1,1 +1,1 @@
-"""Trained policies: found, loaded, and played."""
+"""Trained policies: their folders, loading and acting."""

@@ -1,4 +1,4 @@
-"""A policy by the name that a command gives it: a baseline, a shipped policy, a run folder or a checkpoint."""
+"""A policy by its name in a command: a baseline, a shipped policy, a run folder or a checkpoint."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,7 +19,7 @@ from warp_torchrl.validation import did_you_mean
 
 
 class NamedPolicy:
-    """What a policy's name stands for: a baseline, or a verified checkpoint.
+    """The policy of a name: a baseline, or a verified checkpoint.
 
     Args:
         name: A baseline, a shipped policy, a run folder or a checkpoint folder.
@@ -42,7 +42,7 @@ class NamedPolicy:
         self.checkpoint, _ = checkpoints.newest(find_policy(name))
 
     def config(self, overrides: Sequence[str]) -> dict[str, Any]:
-        """Return the configuration that it plays in: of a checkpoint that of its training, under the overrides.
+        """Return the configuration in which it plays: for a checkpoint that of its training, under the overrides.
 
         Raises:
             ConfigError: If an override does not fit, in one line.

@@ -43,21 +43,21 @@ AgentObservation = np.ndarray | Mapping[str, np.ndarray]
 
 
 def scores(acted: TensorDictBase) -> Tensor | None:
-    """Return the logits or values by which actions were chosen, float32 [..., actions]; None of other policies."""
+    """Return the logits or values that chose the actions, float32 [..., actions]; None for other policies."""
     logits = acted.get(LOGITS, None)
     return acted.get(ACTION_VALUE, None) if logits is None else logits
 
 
 class TrainedPolicy(TensorDictModuleBase):
-    """A decentralised policy that acts in its own mode, unless TorchRL's exploration type is set.
+    """A decentralised policy that acts in its mode, unless TorchRL's exploration type is set.
 
     Args:
         module: Reads observation and mask, writes the action.
         mode: ``sampled`` or ``deterministic``.
-        trained: Inputs and outputs that it was trained with.
-        overrides: Give any environment the observation that the policy was trained with, but for what the critic
-            alone reads: ``make_env("large", overrides=policy.overrides)``.
-        shown: What the environment shows that it acts in; None, what it was trained to see.
+        trained: Inputs and outputs of its training.
+        overrides: Give any environment the observation of the policy's training, except the critic's inputs:
+            ``make_env("large", overrides=policy.overrides)``.
+        shown: Signature of the environment in which it acts; None: that of its training.
     """
 
     def __init__(
@@ -118,7 +118,7 @@ class TrainedPolicy(TensorDictModuleBase):
 
     @apart
     def probabilities(self, acted: TensorDictBase) -> Tensor | None:
-        """Return how likely each action was; None of a policy that acts by values.
+        """Return the probability of each action; None for a policy that acts by values.
 
         Args:
             acted: What ``forward`` returned, with the mask.
@@ -142,16 +142,16 @@ class TrainedPolicy(TensorDictModuleBase):
 class NumpyPolicy:
     """A trained policy on the numpy observations of ``warp_torchrl.api.adapters``, in either layout.
 
-    Each agent's action depends on its own observation and mask alone, so it takes one agent, a team, or a batch of
-    worlds. A policy whose agents talk (``model.messages``) needs the whole team, in the order of ``possible_agents``,
-    and infos, which tell whom each hears, and what each observed when it sent what comes late. A policy with a network
-    for each agent (``sharing: none``) needs the whole team likewise. A policy with a network for each role (``sharing:
-    role``) reads the role from the agent's name (``bulldozer_0``), or from its ``status`` if it has no name; one with a
-    network for each agency (``sharing: agency``) reads the agency from ``status``. A recurrent policy (``memory``)
-    keeps a hidden state for each name; agents without names need a ``numpy_policy()`` each.
+    Each agent's action depends on its observation and mask only, so it takes one agent, a team, or a batch of worlds. A
+    policy whose agents talk (``model.messages``) needs the whole team, in the order of ``possible_agents``, and infos,
+    which hold each agent's radio, and its observation at the time of sending where messages arrive late. A policy with
+    a network for each agent (``sharing: none``) needs the whole team likewise. A policy with a network for each role
+    (``sharing: role``) reads the role from the agent's name (``bulldozer_0``), or from its ``status`` if it has no
+    name; one with a network for each agency (``sharing: agency``) reads the agency from ``status``. A recurrent policy
+    (``memory``) keeps a hidden state for each name; agents without names need a ``numpy_policy()`` each.
 
     Args:
-        policy: Acts in its own mode; sampled actions use torch's generator.
+        policy: Acts in its mode; sampled actions use torch's generator.
     """
 
     def __init__(self, policy: TrainedPolicy) -> None:
@@ -244,7 +244,7 @@ class NumpyPolicy:
         return read
 
     def _of_radio(self, who: str, info: Mapping[str, Any]) -> dict[Any, np.ndarray]:
-        """Return whom an agent hears, and what it observed when it sent what comes late, by key."""
+        """Return an agent's radio, and its observation at the time of sending if messages arrive late, by key."""
         missing = [name for name in ("radio", *(["sent"] if self._is_late else [])) if name not in info]
         if missing:
             what = ", ".join(missing)
