@@ -1,8 +1,8 @@
-"""What the planes of an entry can hold in a world: an observation declares it, and networks leave the rest out.
+"""Content of the planes of an entry: numbers that they cannot hold in a world, declared by an observation.
 
-A team without aircraft has none on its map, and flat ground shows no heights. What a plane can hold follows from the
-rules of the world, never from what was seen, so that a plane is left out of products where it cannot differ, and read
-where it can. It is no part of a checkpoint: weights for all planes are kept.
+A team without aircraft has none on its map, and flat ground shows no heights. The content of a plane follows from the
+rules of the world, never from observations, so networks skip a plane if it cannot vary, and read it if it can.
+Checkpoints do not store contents: they keep weights for all planes.
 """
 
 from dataclasses import dataclass
@@ -20,12 +20,12 @@ class Quarters:
 
 @dataclass(frozen=True)
 class Follows:
-    """A plane that another one tells: offset + factor x that plane, cell by cell.
+    """A plane that is a linear function of another, cell by cell: offset + factor x that plane.
 
     Attributes:
         of: Index of the other plane, which may hold anything.
-        factor: In the entry's own numbers.
-        offset: In the entry's own numbers.
+        factor: In the entry's numbers.
+        offset: In the entry's numbers.
     """
 
     of: int

@@ -1,4 +1,4 @@
-"""How the entries of an observation turn with the map: an observation declares it, and networks read it.
+"""Symmetry of the entries of an observation: their change when the map is turned, declared for networks.
 
 A square map has eight symmetries: it may be mirrored north to south, east to west, and along its diagonal (the
 dihedral group D4). The laws of fire and of the team are the same on all eight. Networks may therefore read each
@@ -34,16 +34,15 @@ TIME_LEFT = "time_left"
 
 
 class Target(NamedTuple):
-    """A channel that agents turn towards: the canonical orientation has it between east and south-east.
+    """A channel towards which agents turn: the canonical orientation has it between east and south-east.
 
     Attributes:
         channel: Its index.
-        order: Of the planes of an observation, those of the lowest order tell the orientation; where they show no
-            target, the next do.
-        near: Distance that is added to that of each target, so that targets at hand count alike [cells of the plane].
+        order: Planes of the lowest order in an observation define the orientation; if they show no target, the next do.
+        near: Added to each target's distance, so that all near targets count alike [cells of the plane].
         is_share: Whether targets count by their number; else all numbers over 0 count alike.
-        in_middle: Whether the agent is in the middle of the planes; else the observation's part of kind ``place``
-            tells where it is.
+        in_middle: Whether the agent is in the middle of the planes; else the observation's part of kind ``place`` has
+            its place.
     """
 
     channel: int
@@ -54,7 +53,7 @@ class Target(NamedTuple):
 
 
 class Planes(NamedTuple):
-    """Square maps [C, S, S], or the same flattened [C S S]: each number moves with its cell and stays what it is.
+    """Square maps [C, S, S], or the same flattened [C S S]: each number moves with its cell and does not change.
 
     Attributes:
         channels: C.
@@ -77,10 +76,10 @@ class Part(NamedTuple):
     """Consecutive numbers of a vector.
 
     Attributes:
-        kind: ``scalar``, which do not change; ``place``, row and column as shares 0..1 of the map's height and width;
-            ``vector``, components to the east and to the north; ``actions``, one number for each action or direction,
-            of which those with a name of ``COMPASS``, alone or after ``LAST`` or ``ADVICE``, change places.
-        names: Of the numbers, in order.
+        kind: ``scalar``, numbers that do not change; ``place``, row and column as shares 0..1 of the map's height and
+            width; ``vector``, components to the east and to the north; ``actions``, one number for each action or
+            direction; numbers with a name of ``COMPASS``, alone or after ``LAST`` or ``ADVICE``, change places.
+        names: Names of the numbers, in order.
     """
 
     kind: str
@@ -118,15 +117,15 @@ class Vector(NamedTuple):
 
 
 class TeamPlanes(NamedTuple):
-    """Square maps [C, S, S] of the whole world with the team on them: what a central critic reads.
+    """Square maps [C, S, S] of the whole world with the team on them, for a central critic.
 
-    They are turned as the middle of the team would see them, and moved so that the box of all targets and agents is in
-    the middle. The quarters of the last plane hold one number each: two scalars, and a vector to east and north.
+    They are turned as an agent in the middle of the team would turn them, and moved so that the box of all targets and
+    agents is in the middle. The quarters of the last plane hold one number each: two scalars, and a vector to east and north.
 
     Attributes:
         channels: C.
-        target: Channel of what the team turns towards, in shares.
-        agents: First of the channels that tell where agents are, and how many there are.
+        target: Channel of the targets, in shares.
+        agents: First of the channels with the places of agents, and the number of such channels.
     """
 
     channels: int

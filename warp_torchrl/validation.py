@@ -1,4 +1,4 @@
-"""Validation of what users give: values against type hints and ranges, and names against known ones."""
+"""Validation of users' input: values against type hints and ranges, and names against known ones."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
@@ -35,13 +35,13 @@ def check_fields(component: Any, **ranges: tuple[float, float]) -> None:
 
 
 def check_new_name(what: str, name: str, made: Any, known: Any) -> None:
-    """Check that what a module adds to a table under a name is not another module's; its own may be defined again.
+    """Check that a name in a table belongs to no other module; the same module may define it again.
 
     Args:
-        what: What the table holds, for the message.
+        what: Content of the table, for the message.
         name: The name.
-        made: What is added.
-        known: What the table has under the name; None if nothing.
+        made: The new object.
+        known: The table's object of that name; None if there is none.
 
     Raises:
         ValueError: If another module has the name.
@@ -63,10 +63,10 @@ def _check_range(name: str, value: Any, low: float, high: float) -> None:
 
 
 def fit(value: object, hint: object, name: str) -> object:
-    """Return a value in the form of a type hint; of a mapping each value, in that of its own.
+    """Return a value in the form of a type hint; in a mapping each value in the form of the mapping's hint.
 
     Raises:
-        ValueError: With the name, what the hint asks for and the value.
+        ValueError: With the name, the kind of the hint and the value.
     """
     if get_origin(hint) is Mapping and isinstance(value, Mapping):
         return _fit_mapping(value, get_args(hint)[1], name)
@@ -160,7 +160,7 @@ def nearest(name: str, known: Iterable[str]) -> list[str]:
 
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:
-    """Return the end of a message, ``: did you mean gamma?``; nothing where no known name is near."""
+    """Return the end of a message, ``: did you mean gamma?``; empty if no known name is near."""
     found = nearest(str(name), known)
     return f": did you mean {' or '.join(found)}?" if found else ""
 
@@ -170,12 +170,12 @@ def _last(key: str) -> str:
 
 
 def _close(name: str, named: dict[str, list[str]]) -> list[str]:
-    """Return what the name that is closest names."""
+    """Return the values of the closest name."""
     return [each for close in get_close_matches(name, named, n=1, cutoff=0.65) for each in named[close]]
 
 
 def dotted(node: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Return what stands in a mapping and in the mappings in it, by dotted key: ``{"a": {"b": 1}}`` as ``a.b``.
+    """Return the leaves of nested mappings by dotted key: ``{"a": {"b": 1}}`` as ``a.b``.
 
     Args:
         node: The mapping.
