@@ -120,7 +120,8 @@ class TeamPlanes(NamedTuple):
     """Square maps [C, S, S] of the whole world with the team on them, for a central critic.
 
     They are turned as an agent in the middle of the team would turn them, and moved so that the box of all targets and
-    agents is in the middle. The quarters of the last plane hold one number each: two scalars, and a vector to east and north.
+    agents is in the middle. The quarters of the last plane hold one number each: two scalars, and a vector to east and
+    north.
 
     Attributes:
         channels: C.
