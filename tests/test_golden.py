@@ -24,7 +24,7 @@ RELEASES = sorted(path.name for path in GOLDEN.iterdir() if path.is_dir())
 def found_now(release):
     """What a golden policy does on four fires."""
     run = GOLDEN / release
-    plan = run_config(plain(restore(newest(run)[0].record())))
+    plan = run_config(plain(restore(newest(run)[0].saved_config())))
     policy, env = load_policy(run), plan.make_env(plan.evaluation.episodes, plan.evaluation.first_seed)
     episodes = play(env, policy, plan.evaluation.first_seed, policy.mode)
     actions = load_policy(run, "deterministic")(env.reset())[ACTION]
@@ -42,7 +42,9 @@ def test_a_golden_policy_acts_as_it_did(release):
 def test_a_golden_run_goes_on_or_is_refused_by_the_name_of_what_is_missing(release, tmp_path):
     run = shutil.copytree(GOLDEN / release, tmp_path / "run")
     found, skipped = newest(run)
-    training = Training(run_config(plain(restore(found.record(), ["total_frames=96"]))), found.record(), run)
+    training = Training(
+        run_config(plain(restore(found.saved_config(), ["total_frames=96"]))), found.saved_config(), run
+    )
     try:
         training.load_state_dict(found.training())
     except CheckpointError as error:  # a later world has other entries; the policy must still act

@@ -357,7 +357,7 @@ def test_a_run_that_was_stopped_goes_on_to_a_new_total_even_if_killed_at_once(ru
     code, errors, _ = run_here("train.py", "resume=run")
     assert code == 0, errors
     found = checkpoint.newest(tmp_path / "run")[0]
-    assert found.manifest.frames == 96 and found.record().values["total_frames"] == 96
+    assert found.manifest.frames == 96 and found.saved_config().values["total_frames"] == 96
 
 
 @pytest.mark.parametrize("total", [128, 100, 0, "many"])

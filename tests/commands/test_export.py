@@ -45,7 +45,7 @@ def test_it_acts_as_it_did(run, exported):
 def test_it_holds_nothing_of_training_and_says_so(exported):
     assert sorted(each.name for each in exported.iterdir()) == ["config.json", "manifest.json", "policy.pt"]
     found, _ = newest(exported)
-    assert found.record().values["total_frames"] == 64 and found.manifest.signature != SIGNATURE
+    assert found.saved_config().values["total_frames"] == 64 and found.manifest.signature != SIGNATURE
     with pytest.raises(CheckpointError, match="holds a policy alone: it acts, and nothing goes on from it"):
         found.training()
 
@@ -55,7 +55,7 @@ def test_it_does_not_tell_where_its_run_started(run, tmp_path, capsys):
     training = tiny(tmp_path / "later", "total_frames=64", f"start_from={run}")
     training.train()
     main([str(tmp_path / "later"), str(tmp_path / "policy")])
-    records = [newest(tmp_path / each)[0].record() for each in ("later", "policy")]
+    records = [newest(tmp_path / each)[0].saved_config() for each in ("later", "policy")]
     assert [each.values["start_from"] for each in records] == [str(run), None]
     assert records[0].values | {"start_from": None} == records[1].values and records[0].choices == records[1].choices
 
@@ -95,7 +95,7 @@ def test_a_disk_that_refuses_leaves_nothing(run, tmp_path, monkeypatch):
 
 def test_its_agents_may_trust_their_adviser_more(tmp_path):
     main(["generalist", str(tmp_path / "trusting"), "--trust", "0.25"])
-    values = [newest(find_policy(each))[0].record().values for each in (tmp_path / "trusting", "generalist")]
+    values = [newest(find_policy(each))[0].saved_config().values for each in (tmp_path / "trusting", "generalist")]
     assert values[0]["model"] == values[1]["model"] | {"trust": 0.25}
     (trust,) = (each for each in load_policy(tmp_path / "trusting").modules() if isinstance(each, Trust))
     assert trust._gain == 2.0

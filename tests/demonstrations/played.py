@@ -9,7 +9,7 @@ from warp_torchrl.models import ACTION
 from warp_torchrl.runs.config.components import build_components
 from warp_torchrl.runs.config.compose import compose_config, plain
 from warp_torchrl.runs.config.groups import ENVIRONMENT
-from warp_torchrl.runs.config.saved_config import environment_record
+from warp_torchrl.runs.config.saved_config import environment_config
 
 SMALL = ("landscape.size=12", "horizon=20")
 
@@ -28,7 +28,7 @@ def played(*overrides, mover=Mover.PERSON, seed=7, steps=16, by="greedy"):
         shown = after
     return Recording(
         steps=open_recording.steps(),
-        environment=environment_record(config),
+        environment=environment_config(config),
         seed=seed,
         events=(),
         policy="nobody",

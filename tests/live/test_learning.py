@@ -29,7 +29,7 @@ def composed(given):
 @pytest.mark.parametrize("policy", ["default", "generalist", "single", "skirmish"])
 @pytest.mark.parametrize("overrides", [(), ("scenario=large", "team.n_agents=3", "seed=5")])
 def test_the_policy_s_own_configuration_is_trained_in_the_scenario_that_is_played(policy, overrides):
-    record = NamedPolicy(policy).checkpoint.record()
+    record = NamedPolicy(policy).checkpoint.saved_config()
     values = composed(arguments(policy, record, overrides, PEOPLE, RUN, 200_000))
     wanted = plain(restore(record, overrides))
     assert values["algorithm"].pop("learning_rate") == pytest.approx(0.2 * wanted["algorithm"].pop("learning_rate"))
@@ -41,7 +41,7 @@ def test_the_policy_s_own_configuration_is_trained_in_the_scenario_that_is_playe
 
 def test_a_training_may_start_from_the_run_of_which_it_is_made(trained):
     found = newest(trained)[0]
-    values = composed(arguments(str(trained), found.record(), ("scenario=default",), PEOPLE, RUN, 200))
+    values = composed(arguments(str(trained), found.saved_config(), ("scenario=default",), PEOPLE, RUN, 200))
     assert values["model"]["actor_hidden"] == [16] and values["scenario"] == "default"
     check_start(run_config(values), found)
 
@@ -49,12 +49,12 @@ def test_a_training_may_start_from_the_run_of_which_it_is_made(trained):
 @pytest.mark.parametrize("policy", ["default", "generalist", "single", "skirmish"])
 def test_the_shipped_policies_may_be_trained_too(policy):
     found = NamedPolicy(policy).checkpoint
-    values = composed(arguments(policy, found.record(), (), PEOPLE, RUN, 200))
+    values = composed(arguments(policy, found.saved_config(), (), PEOPLE, RUN, 200))
     check_start(run_config(values), found)
 
 
 def test_recordings_and_folder_are_named_in_hydra_s_grammar():
-    record = NamedPolicy("skirmish").checkpoint.record()
+    record = NamedPolicy("skirmish").checkpoint.saved_config()
     given = arguments("out puts/run", record, (), Path("it's, mine"), RUN, 10)
     assert "imitation.demonstrations='it\\'s, mine'" in given and "start_from='out puts/run'" in given
     assert f"hydra.run.dir={RUN}" in given
@@ -62,7 +62,7 @@ def test_recordings_and_folder_are_named_in_hydra_s_grammar():
 
 
 def test_what_is_of_another_machine_is_not_asked_for():
-    old = NamedPolicy("skirmish").checkpoint.record()
+    old = NamedPolicy("skirmish").checkpoint.saved_config()
     values = {**old.values, "device": "cuda:7", "processes": 8, "compile": True, "total_frames": 10**12}
     choices = {**old.choices, "collector": "process", "logger": "wandb"}
     values["collector"] = {"steps": 16, "workers": 4}
@@ -133,7 +133,7 @@ def test_a_training_is_started_followed_and_stopped(learning, match):
     with pytest.raises(Refused, match="no training goes on"):
         learning.stop()
     given = (folder / "arguments.txt").read_text().splitlines()
-    name, record = match.setting.policy, match.sides[0].player.checkpoint.record()
+    name, record = match.setting.policy, match.sides[0].player.checkpoint.saved_config()
     assert given == arguments(name, record, match.setting.overrides, learning.recordings, folder, 5000)
 
 
@@ -162,9 +162,9 @@ def test_what_does_not_learn_is_told(learning, make_match, match, monkeypatch):
         learning.start(baseline.sides[0], baseline.setting, 10)
     with pytest.raises(Refused, match="steps must be in"):
         learning.start(match.sides[0], match.setting, 0)
-    record = match.sides[0].player.checkpoint.record()
+    record = match.sides[0].player.checkpoint.saved_config()
     other = SavedConfig(choices={**record.choices, "algorithm": "qmix"}, values=record.values)
-    monkeypatch.setattr("warp_torchrl.runs.checkpoint.Checkpoint.record", lambda self: other)
+    monkeypatch.setattr("warp_torchrl.runs.checkpoint.Checkpoint.saved_config", lambda self: other)
     with pytest.raises(Refused, match="was trained by qmix: from recordings learn mappo"):
         learning.start(match.sides[0], match.setting, 10)
     assert not learning.recordings.exists()

@@ -31,7 +31,7 @@ def saved(run, frames, keep=3, signature=SIGNATURE, **options):
         scenario="tiny",
         signature=signature,
         mode="sampled",
-        record=SavedConfig(choices={"algorithm": "mappo"}, values={"seed": 3}),
+        saved_config=SavedConfig(choices={"algorithm": "mappo"}, values={"seed": 3}),
         policy={"weight": torch.arange(4.0)},
         training={"frames": frames, "random": torch.get_rng_state()},
         keep=keep,
@@ -51,7 +51,7 @@ def test_what_was_saved_comes_back(tmp_path):
     found, skipped = newest(run)
     assert not skipped and found.manifest.frames == 100 and found.manifest.signature == SIGNATURE
     assert found.policy()["weight"].tolist() == [0, 1, 2, 3] and found.training()["frames"] == 100
-    assert found.record() == SavedConfig(choices={"algorithm": "mappo"}, values={"seed": 3})
+    assert found.saved_config() == SavedConfig(choices={"algorithm": "mappo"}, values={"seed": 3})
 
 
 def test_the_newest_is_found_by_number_and_old_ones_go(tmp_path):
@@ -152,7 +152,7 @@ class Poison:
 
 def read_all(run):
     found, _ = newest(run)
-    return found.record(), found.policy(), found.training()
+    return found.saved_config(), found.policy(), found.training()
 
 
 @pytest.mark.parametrize("name", ["policy.pt", "training.pt", "config.json", "manifest.json"])
@@ -225,7 +225,7 @@ def test_a_forged_configuration_is_refused_in_one_line(tmp_path, content):
     (folder / "config.json").write_bytes(content.encode("latin-1"))
     forge(folder)
     with pytest.raises(CheckpointError, match=r"config\.json") as error:
-        newest(tmp_path)[0].record()
+        newest(tmp_path)[0].saved_config()
     assert "\n" not in str(error.value)
 
 

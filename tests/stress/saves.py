@@ -41,7 +41,7 @@ def left(folder: Path) -> list[Path]:
 def _checkpoints(run: Path) -> set[int]:
     found, skipped = newest(run)
     assert not skipped, skipped
-    found.policy(), found.training(), found.record()
+    found.policy(), found.training(), found.saved_config()
     return {found.manifest.frames // 100, *(int(each.name) // 100 for each in (run / "checkpoints").glob("[0-9]*"))}
 
 

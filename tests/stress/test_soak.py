@@ -37,7 +37,7 @@ def test_nothing_grows(tmp_path):
         for name in ("mappo", "dqn")
     }
     for name, run in runs.items():
-        run.record = replace(run.record, choices={"algorithm": name})
+        run.saved_config = replace(run.saved_config, choices={"algorithm": name})
         run.run.mkdir()
     batches = {name: iter(run.collection) for name, run in runs.items()}
     while (minutes := (time.monotonic() - start) / 60) < MINUTES:

@@ -226,9 +226,9 @@ def _training(device: str, way: str, size: Size) -> dict[str, Any]:
 
 @contextmanager
 def _trained(device: str, overrides: list[str]) -> Iterator[tuple[Training, Iterator[Any]]]:
-    plan = run_config(plain(compose_config("train", [*overrides, "processes=1", f"device={device}"])))
+    built = run_config(plain(compose_config("train", [*overrides, "processes=1", f"device={device}"])))
     with tempfile.TemporaryDirectory() as folder:
-        training = Training(plan, SavedConfig(), Path(folder))
+        training = Training(built, SavedConfig(), Path(folder))
         try:
             yield training, training.batches()
         finally:

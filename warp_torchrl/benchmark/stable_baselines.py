@@ -13,38 +13,38 @@ from warp_torchrl.runs.config.run_config import RunConfig
 NAME = "SuperSuit + SB3 PPO"
 
 
-def reason_against(plan: RunConfig) -> str | None:
+def reason_against(run_config: RunConfig) -> str | None:
     """Return why Stable-Baselines3 cannot train these settings; None if it can."""
     missing = [name for name in ("supersuit", "stable_baselines3") if find_spec(name) is None]
     if missing:
         return f"{' and '.join(missing)} not installed (extra interop)"
-    if not isinstance(plan.algorithm, Ppo) or type(plan.model) is not Mlp:
+    if not isinstance(run_config.algorithm, Ppo) or type(run_config.model) is not Mlp:
         return "it trains algorithms mappo, ippo and ppo with model mlp"
     return None
 
 
-def open_stable_baselines(plan: RunConfig) -> tuple[Callable[[], object], Callable[[], None]]:
+def open_stable_baselines(run_config: RunConfig) -> tuple[Callable[[], object], Callable[[], None]]:
     """Return a function that learns from one batch of the settings' size, and a function that closes the worlds.
 
     Networks, epochs, minibatch, worlds and steps are those of the run; each agent has a sample per step, as SB3
     counts them.
 
     Args:
-        plan: Of an algorithm ``Ppo`` and a model ``Mlp``.
+        run_config: Configuration with an algorithm ``Ppo`` and a model ``Mlp``.
     """
     import stable_baselines3
     import supersuit
 
-    algorithm, model, n_agents = plan.algorithm, plan.model, plan.world.team.n_agents
-    one = supersuit.pettingzoo_env_to_vec_env_v1(paper_stack(plan.world, plan.observation.radius))
-    processes = min(torch.get_num_threads(), plan.n_worlds)  # 1: in this process
-    worlds = supersuit.concat_vec_envs_v1(one, plan.n_worlds, num_cpus=processes, base_class="stable_baselines3")
+    algorithm, model, n_agents = run_config.algorithm, run_config.model, run_config.world.team.n_agents
+    one = supersuit.pettingzoo_env_to_vec_env_v1(paper_stack(run_config.world, run_config.observation.radius))
+    processes = min(torch.get_num_threads(), run_config.n_worlds)  # 1: in this process
+    worlds = supersuit.concat_vec_envs_v1(one, run_config.n_worlds, num_cpus=processes, base_class="stable_baselines3")
     learner = stable_baselines3.PPO(
         "MlpPolicy",
         worlds,
         learning_rate=algorithm.learning_rate,
-        n_steps=plan.collector.steps,
-        batch_size=min(algorithm.minibatch_size * n_agents, plan.collector.steps * worlds.num_envs),
+        n_steps=run_config.collector.steps,
+        batch_size=min(algorithm.minibatch_size * n_agents, run_config.collector.steps * worlds.num_envs),
         n_epochs=algorithm.epochs,
         gamma=algorithm.gamma,
         gae_lambda=algorithm.lmbda,
@@ -57,9 +57,9 @@ def open_stable_baselines(plan: RunConfig) -> tuple[Callable[[], object], Callab
             "activation_fn": {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}[model.activation],
         },
         seed=None,
-        device=plan.device,
+        device=run_config.device,
     )
-    total = plan.collector.steps * worlds.num_envs
+    total = run_config.collector.steps * worlds.num_envs
 
     def learn() -> object:
         return learner.learn(total, reset_num_timesteps=False)

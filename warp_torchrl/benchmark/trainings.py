@@ -32,14 +32,14 @@ def training_speed(
         A row for each way to train, with ``agent_steps_per_second``; and the shares of our training loop.
     """
     values = plain(compose_config("train", [*overrides, "collector.grows_at=0", f"device={device}"]))
-    plan = run_config(values)
-    agents = plan.world.team.n_agents
-    common = {"scenario": plan.scenario, "size": "{} x {}".format(*plan.world.size), "agents": agents}
-    common |= {"worlds": plan.n_worlds, "processes": plan.n_processes()}
-    reason = reason_against(plan) if with_peer else None
+    built = run_config(values)
+    agents = built.world.team.n_agents
+    common = {"scenario": built.scenario, "size": "{} x {}".format(*built.world.size), "agents": agents}
+    common |= {"worlds": built.n_worlds, "processes": built.n_processes()}
+    reason = reason_against(built) if with_peer else None
     with ExitStack() as stack:
-        stack.enter_context(parallel.processes(plan.n_processes(), values, FOLLOWING))
-        training = Training(plan, SavedConfig(), Path(stack.enter_context(tempfile.TemporaryDirectory())))
+        stack.enter_context(parallel.processes(built.n_processes(), values, FOLLOWING))
+        training = Training(built, SavedConfig(), Path(stack.enter_context(tempfile.TemporaryDirectory())))
         stack.callback(training.close)
         training.join()
         batches = training.batches()
@@ -50,7 +50,7 @@ def training_speed(
 
         contenders: dict[str, Callable[[], object]] = {"training": learn}
         if with_peer and reason is None:
-            contenders[NAME], close = open_stable_baselines(plan)
+            contenders[NAME], close = open_stable_baselines(built)
             stack.callback(close)
         agent_steps = training.frames_per_batch * agents
         rows: list[dict[str, Any]] = [
@@ -61,4 +61,4 @@ def training_speed(
     if len(rows) > 1:
         rows = [row | {"ratio": row["agent_steps_per_second"] / rows[1]["agent_steps_per_second"]} for row in rows]
     skipped = [{"what": NAME, "skipped": reason}] if reason else []
-    return rows + skipped, [{"scenario": plan.scenario, **row} for row in shares]
+    return rows + skipped, [{"scenario": built.scenario, **row} for row in shares]

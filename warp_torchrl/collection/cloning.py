@@ -35,19 +35,19 @@ class Demonstrations:
     digest: str
 
 
-def clone(learner: Learner, plan: Imitation, given: Demonstrations | None, n_networks: int, seed: int) -> Learner:
+def clone(learner: Learner, imitation: Imitation, given: Demonstrations | None, n_networks: int, seed: int) -> Learner:
     """Return the learner with the cloning loss on people's acts added; unchanged without any.
 
     Args:
         learner: An on-policy learner.
-        plan: How much is cloned, and for how long.
+        imitation: How much is cloned, and for how long.
         given: What people did, on the learner's device.
         n_networks: How many agents have an actor of their own; 1 where they share one, or one for each role.
         seed: Of this process's draws of minibatches.
     """
     if given is None:
         return learner
-    cloning = _CloningLoss(plan, learner, _Minibatches(given, plan.minibatch_size, seed), n_networks)
+    cloning = _CloningLoss(imitation, learner, _Minibatches(given, imitation.minibatch_size, seed), n_networks)
     has_teacher = CLONING_LOSS in learner.loss_keys
     return replace(
         learner,
@@ -66,9 +66,9 @@ class _CloningLoss:
     under their key, which is the action that it drew.
     """
 
-    def __init__(self, plan: Imitation, learner: Learner, minibatches: "_Minibatches", n_networks: int) -> None:
-        self.plan, self.learner, self.minibatches, self.n_networks = plan, learner, minibatches, n_networks
-        self.weight = plan.weight
+    def __init__(self, imitation: Imitation, learner: Learner, minibatches: "_Minibatches", n_networks: int) -> None:
+        self.imitation, self.learner, self.minibatches, self.n_networks = imitation, learner, minibatches, n_networks
+        self.weight = imitation.weight
 
     def terms(self, sample: TensorDictBase) -> TensorDictBase:
         """Return the learner's loss terms, the cloning loss among them."""
@@ -90,7 +90,7 @@ class _CloningLoss:
 
     def schedule(self, progress: float) -> dict[str, float]:
         """Set the weight for progress in 0..1, and return the learner's scheduled columns."""
-        self.weight = self.plan.weight_at(progress)
+        self.weight = self.imitation.weight_at(progress)
         return self.learner.schedule(progress)
 
 

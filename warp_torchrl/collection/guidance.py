@@ -18,18 +18,18 @@ from warp_torchrl.heuristics import HEURISTICS, Heuristic
 from warp_torchrl.models import ACTION, ACTION_MASK
 
 
-def guided(learner: Learner, plan: Imitation, env: WildfireEnv) -> Learner:
+def guided(learner: Learner, imitation: Imitation, env: WildfireEnv) -> Learner:
     """Return the learner whose collector's policy explores by the guide's actions; unchanged without a guide.
 
     Args:
         learner: A learner that explores by TorchRL's epsilon-greedy module, the last of its collector's policy.
-        plan: Names the guide, which may see more than the team does.
+        imitation: Names the guide, which may see more than the team does.
         env: The training environment.
     """
-    if plan.guide is None:
+    if imitation.guide is None:
         return learner
     *acts, explores = learner.explore.module
-    return replace(learner, explore=_Guided(TensorDictSequential(*acts), explores, HEURISTICS[plan.guide](env)))
+    return replace(learner, explore=_Guided(TensorDictSequential(*acts), explores, HEURISTICS[imitation.guide](env)))
 
 
 class _Guided(TensorDictModuleBase):

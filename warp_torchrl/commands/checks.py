@@ -148,7 +148,7 @@ def _check_evaluation(values: Mapping[str, Any], overrides: Sequence[str]) -> No
         plan, found = run_config(without_checkpoint(values)), policy
     else:
         found, _ = checkpoints.newest(find_policy(str(checkpoint)))
-        plan = run_config(plain(restore(found.record(), of_worlds(overrides))))
+        plan = run_config(plain(restore(found.saved_config(), of_worlds(overrides))))
     check_maps(plan, fires)
     check_policy(plan, found)
 

@@ -112,12 +112,12 @@ def _resume_from(folder: Path, run: Resumption) -> None:
         log.info("%s is finished; total_frames=MORE trains it longer", folder)
         return
     with parallel.processes(run.run_config.n_processes(), run.values, FOLLOWING):
-        training = Training(run.run_config, run.record, folder)
+        training = Training(run.run_config, run.saved_config, folder)
         training.load_state_dict(run.found.training())
         log.info("resumed %s at %d frames", run.found.path, training.frames)
         if run.run_config.total_frames != run.total_before:
             # Before the next checkpoint: a run that is killed now must resume with the new total too.
-            disk.replace(folder / "config.yaml", OmegaConf.to_yaml(restore(run.record), resolve=True))
+            disk.replace(folder / "config.yaml", OmegaConf.to_yaml(restore(run.saved_config), resolve=True))
             training.log_new_total(run.total_before)
         _train(training)
     _evaluate(training, world_overrides(run.values))
@@ -168,7 +168,7 @@ def _evaluate_into(folder: Path, config: DictConfig) -> None:
         evaluate_policy(run_config(values), folder, name, world_overrides(values), fires, kind)
         return
     found = _newest(find_policy(given))
-    values = plain(restore(found.record(), of_worlds(HydraConfig.get().overrides.task)))
+    values = plain(restore(found.saved_config(), of_worlds(HydraConfig.get().overrides.task)))
     evaluate_policy(run_config(values), folder, found, world_overrides(values), fires, kind)
 
 

@@ -16,7 +16,7 @@ from warp_torchrl.models import ACTION, ACTION_MASK, memory_apart
 from warp_torchrl.runs.config.components import build_components
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.groups import ENVIRONMENT
-from warp_torchrl.runs.config.saved_config import environment_record
+from warp_torchrl.runs.config.saved_config import environment_config
 from warp_torchrl.runs.config.seeds import SEEDS, WORLDS, first_world_seed
 from warp_torchrl.runs.policies.named_policy import NamedPolicy, fitted_policy
 from warp_torchrl.runs.policies.trained import MODES
@@ -86,7 +86,7 @@ class Correction:
         config = found.config(session.overrides)
         parts = build_components(config, ENVIRONMENT)
         self.session, self.person, self.scenario = session, person, str(config["scenario"])
-        self.frames, self.environment = found.checkpoint.manifest.frames, environment_record(config)
+        self.frames, self.environment = found.checkpoint.manifest.frames, environment_config(config)
         self.env = WildfireEnv(
             parts["world"],
             observation=parts["observation"],

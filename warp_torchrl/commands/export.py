@@ -41,14 +41,14 @@ def main(arguments: list[str] | None = None) -> None:
     found, skipped = checkpoints.newest(find_policy(options.run))
     for line in skipped:
         print(f"skipped: {line}", file=sys.stderr)
-    record = found.record()
+    saved_config = found.saved_config()
     if options.trust is not None:
-        record = _trusting(record, options.trust)
+        saved_config = _trusting(saved_config, options.trust)
     if options.mode is not None:
         found = replace(found, manifest=replace(found.manifest, mode=options.mode))
     others = [checkpoints.newest(find_policy(each))[0] for each in options.average]
     policy = _mean([found, *others]) if others else None
-    checkpoints.export(found, options.folder, record, policy, check=policy_of)
+    checkpoints.export(found, options.folder, saved_config, policy, check=policy_of)
     print(f"{options.folder}: {found.manifest.scenario}, {found.manifest.frames} frames, {found.manifest.mode}")
 
 
@@ -78,9 +78,11 @@ def _fits(found: checkpoints.Checkpoint, policy: Mapping[str, torch.Tensor]) -> 
     return signature.observation, signature.actions, signature.roles, signature.agencies, signature.is_late, shapes
 
 
-def _trusting(record: SavedConfig, trust: float) -> SavedConfig:
-    """Return the record of a policy whose agents trust their adviser so much."""
-    return replace(record, values={**record.values, "model": {**record.values["model"], "trust": trust}})
+def _trusting(saved_config: SavedConfig, trust: float) -> SavedConfig:
+    """Return the configuration of a policy with another trust in its adviser."""
+    return replace(
+        saved_config, values={**saved_config.values, "model": {**saved_config.values["model"], "trust": trust}}
+    )
 
 
 if __name__ == "__main__":

@@ -21,21 +21,21 @@ from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.system.sealed import Unsound
 
 
-def demonstrations(plan: RunConfig, env: WildfireEnv) -> Demonstrations | None:
+def demonstrations(run_config: RunConfig, env: WildfireEnv) -> Demonstrations | None:
     """Return the acts of people in a run's folder of recordings, on the environment's device; None without one.
 
     Args:
-        plan: Of the run.
+        run_config: Configuration of the run.
         env: Its environment.
 
     Raises:
         ConfigError: If the folder holds no act of a person, a recording is not sound, or one does not fit the run.
     """
-    if plan.imitation.demonstrations is None:
+    if run_config.imitation.demonstrations is None:
         return None
-    folder = Path(plan.imitation.demonstrations)
+    folder = Path(run_config.imitation.demonstrations)
     wanted, digest = signature(env), sha256()
-    agents = env.agent_names if plan.model.sharing == "none" else None
+    agents = env.agent_names if run_config.model.sharing == "none" else None
     known: dict[str, Signature] = {}
     found = []
     try:
@@ -43,13 +43,13 @@ def demonstrations(plan: RunConfig, env: WildfireEnv) -> Demonstrations | None:
             recording = read(path)
             digest.update((path / MANIFEST).read_bytes())
             if recording.by(Mover.PERSON).any():
-                _check_fits(path, recording, wanted, _signature(recording, known), plan.model.sharing, agents)
+                _check_fits(path, recording, wanted, _signature(recording, known), run_config.model.sharing, agents)
                 found.append(acts_of(recording, wanted))
     except (Unsound, ConfigError, OSError) as error:
         raise ConfigError(f"imitation.demonstrations: {error}") from None
     if not sum(map(len, found)):
         raise ConfigError(f"imitation.demonstrations: {folder} holds no act of a person, in none of its recordings")
-    canonical = plan.model.canonical_batch(wanted, state=False)
+    canonical = run_config.model.canonical_batch(wanted, state=False)
     return Demonstrations(canonical(torch.cat(found)).to(env.device), digest.hexdigest())
 
 

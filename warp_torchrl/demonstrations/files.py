@@ -24,7 +24,7 @@ from warp_torchrl.demonstrations.recording import Recording
 from warp_torchrl.env.observation import renamed
 from warp_torchrl.models import OBSERVATION
 from warp_torchrl.runs.config.compose import OPTION
-from warp_torchrl.runs.config.saved_config import saved_config
+from warp_torchrl.runs.config.saved_config import read_saved_config
 from warp_torchrl.runs.output import draft_in, publish
 from warp_torchrl.system import disk
 from warp_torchrl.system.foreign import below
@@ -93,7 +93,7 @@ def read(folder: Path) -> Recording:
         check_files(folder, files, _LARGEST)
         recording = Recording(
             steps=_mapped(folder, entries, layout),
-            environment=saved_config(content["environment"]),
+            environment=read_saved_config(content["environment"]),
             seed=_whole(content["seed"], 2**62),
             events=_events(content["events"], steps),
             policy=_text(content["policy"]),

@@ -44,15 +44,15 @@ def folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "warp_torchrl" / "episodes"
 
 
-def kept(plan: RunConfig, names: Sequence[str]) -> dict[str, Episodes]:
+def kept(run_config: RunConfig, names: Sequence[str]) -> dict[str, Episodes]:
     """Return the cached episodes of heuristics, by name."""
-    found = {name: _read(path) for name, path in _paths(plan, names).items()}
+    found = {name: _read(path) for name, path in _paths(run_config, names).items()}
     return {name: episodes for name, episodes in found.items() if episodes is not None}
 
 
-def keep(plan: RunConfig, played: dict[str, Episodes]) -> None:
+def keep(run_config: RunConfig, played: dict[str, Episodes]) -> None:
     """Cache episodes of heuristics; if the folder cannot be written, they are not cached."""
-    for name, path in _paths(plan, list(played)).items():
+    for name, path in _paths(run_config, list(played)).items():
         episodes = {metric: values.tolist() for metric, values in played[name].items()}
         content = json.dumps(episodes)
         try:
@@ -64,12 +64,12 @@ def keep(plan: RunConfig, played: dict[str, Episodes]) -> None:
             return
 
 
-def _paths(plan: RunConfig, names: Sequence[str]) -> dict[str, Path]:
+def _paths(run_config: RunConfig, names: Sequence[str]) -> dict[str, Path]:
     """Return the file of each heuristic's episodes; none where they have no digest."""
-    if not plan.evaluation.cache or plan.evaluation.episodes > _MOST_EPISODES:
+    if not run_config.evaluation.cache or run_config.evaluation.episodes > _MOST_EPISODES:
         return {}
     try:
-        worlds = digest(_of_worlds(plan))
+        worlds = digest(_of_worlds(run_config))
         kinds = {name: _name_of(HEURISTICS[name]) for name in names}
         return {name: folder() / f"{digest([worlds, kind])}.json" for name, kind in kinds.items()}
     except (Unknown, OSError, RuntimeError) as reason:  # there may be no home, or no sources
@@ -77,14 +77,14 @@ def _paths(plan: RunConfig, names: Sequence[str]) -> dict[str, Path]:
         return {}
 
 
-def _of_worlds(plan: RunConfig) -> list[Any]:
+def _of_worlds(run_config: RunConfig) -> list[Any]:
     """Return everything that determines the episodes of all heuristics."""
-    roles = [ROLES[role] for role in plan.world.team.roles]
+    roles = [ROLES[role] for role in run_config.world.team.roles]
     abilities = [ABILITIES[name] for role in roles for name in role.abilities]
-    seeds = plan.evaluation.first_seed, plan.evaluation.episodes
-    machine = torch.device(plan.device).type, torch.backends.cpu.get_cpu_capability(), torch.__version__
-    made = plan.world.lighting, plan.world.air  # for this landscape
-    return [plan.world, *made, plan.reward, roles, abilities, *seeds, *machine, _code()]
+    seeds = run_config.evaluation.first_seed, run_config.evaluation.episodes
+    machine = torch.device(run_config.device).type, torch.backends.cpu.get_cpu_capability(), torch.__version__
+    made = run_config.world.lighting, run_config.world.air  # for this landscape
+    return [run_config.world, *made, run_config.reward, roles, abilities, *seeds, *machine, _code()]
 
 
 def digest(thing: Any) -> str:

@@ -27,7 +27,7 @@ log = logging.getLogger("warp_torchrl")
 
 
 def evaluate_policy(
-    plan: RunConfig,
+    run_config: RunConfig,
     folder: Path,
     found: checkpoints.Checkpoint | str,
     worlds: Sequence[str],
@@ -37,30 +37,30 @@ def evaluate_policy(
     """Evaluate a checkpoint or a heuristic beside the baselines: table, ``evaluation.json``, ``episode.gif``.
 
     Args:
-        plan: RunConfig of the worlds and the evaluation.
+        run_config: Configuration of the worlds and the evaluation.
         folder: The output folder.
         found: The checkpoint, or the heuristic's name.
         worlds: Overrides by which the worlds differ from their scenario.
         map_fires: Fires of the maps; None makes no maps.
         picture: As what the first fire is written, ``episode.<picture>``; None writes none.
     """
-    first, folder = plan.evaluation.first_seed, folder.resolve()
-    env, one = plan.make_env(plan.evaluation.episodes, first), plan.make_env(1, first)
-    name, mode, actor, filmed = _actors(plan, found, env, one)
-    others = _baselines(plan, env, [each for each in baselines_of(plan.world) if each != found])
+    first, folder = run_config.evaluation.first_seed, folder.resolve()
+    env, one = run_config.make_env(run_config.evaluation.episodes, first), run_config.make_env(1, first)
+    name, mode, actor, filmed = _actors(run_config, found, env, one)
+    others = _baselines(run_config, env, [each for each in baselines_of(run_config.world) if each != found])
     episodes = play(env, actor, first, mode, watch=True)
     learner, digest, frames, other_modes, left_out = None, "", None, {}, {}
     if isinstance(found, checkpoints.Checkpoint):
-        learner, digest = method(completed(found.record()))
+        learner, digest = method(completed(found.saved_config()))
         frames = found.manifest.frames
         other_modes = {f"trained, {other}": play(env, actor, first, other) for other in MODES if other != mode}
-    if plan.evaluation.leave_one_out:
+    if run_config.evaluation.leave_one_out:
         left_out = {
             agent: play(env, WithoutAgent(actor, index, env.world.team), first, mode)
             for index, agent in enumerate(env.agent_names)
         }
     content = report(
-        plan.scenario,
+        run_config.scenario,
         name,
         first,
         episodes,
@@ -71,11 +71,11 @@ def evaluate_policy(
         configuration=digest,
         world_overrides=worlds,
         frames=frames,
-        goal=goal(plan.world),
+        goal=goal(run_config.world),
     )
     if map_fires is not None:
         log.info("playing %d fires on one ground for the maps, without the team and with it", map_fires)
-    maps = None if map_fires is None else play_maps(plan, lambda env: _actor(found, env, actor), mode, map_fires)
+    maps = None if map_fires is None else play_maps(run_config, lambda env: _actor(found, env, actor), mode, map_fires)
     if maps is not None:
         content["maps"] = maps.numbers()
     folder.mkdir(parents=True, exist_ok=True)
@@ -83,38 +83,38 @@ def evaluate_policy(
     print(table(content), flush=True)
     if maps is not None:
         print(described(content["maps"]), flush=True)
-        title = f"{plan.scenario}: {maps.seeds[1]} fires on one ground, {maps.horizon} steps"
-        write_maps(folder, maps, getattr(plan.world.landscape, "grid", None), title, name)
+        title = f"{run_config.scenario}: {maps.seeds[1]} fires on one ground, {maps.horizon} steps"
+        write_maps(folder, maps, getattr(run_config.world.landscape, "grid", None), title, name)
     wrote = ["evaluation.json"]
     for kind in KINDS:  # a former evaluation's picture would show another policy
         (folder / f"episode.{kind}").unlink(missing_ok=True)
     if picture is not None:
         wrote += [f"episode.{picture}"]
         with disk.with_path(folder / wrote[-1]):
-            record_episode(folder / wrote[-1], picture, one, filmed, f"{plan.scenario}\n{name}", first, mode)
+            record_episode(folder / wrote[-1], picture, one, filmed, f"{run_config.scenario}\n{name}", first, mode)
     wrote += [] if maps is None else ["maps"]
     log.info("wrote %s into %s", " and ".join(filter(None, (", ".join(wrote[:-1]), wrote[-1]))), folder)
 
 
-def check_policy(plan: RunConfig, found: checkpoints.Checkpoint | str) -> None:
+def check_policy(run_config: RunConfig, found: checkpoints.Checkpoint | str) -> None:
     """Check that a checkpoint or a heuristic can be evaluated, before any output is written.
 
     Raises:
         CheckpointError: If the weights do not fit the networks.
         ConfigError: If the policy does not fit the environment.
     """
-    one = plan.make_env(1, plan.evaluation.first_seed)
-    _actors(plan, found, one, one)
+    one = run_config.make_env(1, run_config.evaluation.first_seed)
+    _actors(run_config, found, one, one)
 
 
 def _actors(
-    plan: RunConfig, found: checkpoints.Checkpoint | str, env: WildfireEnv, one: WildfireEnv
+    run_config: RunConfig, found: checkpoints.Checkpoint | str, env: WildfireEnv, one: WildfireEnv
 ) -> tuple[str, str, TensorDictModuleBase, TensorDictModuleBase]:
     """Return the policy's name and mode, the policy for many worlds, and the policy for one."""
     if isinstance(found, str):
         return found, "sampled", HEURISTICS[found](env), HEURISTICS[found](one)
     try:
-        policy = policy_of(found, plan.evaluation.mode).to(plan.device).fitted(env)
+        policy = policy_of(found, run_config.evaluation.mode).to(run_config.device).fitted(env)
     except ValueError as error:
         raise ConfigError(f"the policy in {found.path} does not fit here: {error}") from None
     return f"trained, {policy.mode}", policy.mode, policy, policy
@@ -130,12 +130,15 @@ def _actor(
 _PLAYED: dict[str, tuple[RunConfig, dict[str, Episodes]]] = {}
 
 
-def _baselines(plan: RunConfig, env: WildfireEnv, names: Sequence[str]) -> dict[str, Episodes]:
+def _baselines(run_config: RunConfig, env: WildfireEnv, names: Sequence[str]) -> dict[str, Episodes]:
     """Return the episodes of heuristics; jobs of a sweep with the same worlds play them once, and so do later ones."""
-    worlds = repr((plan.world, plan.observation, plan.reward, plan.evaluation, plan.device))
-    _, played = _PLAYED.setdefault(worlds, (plan, {}))  # keeps the plan alive: a repr may hold addresses of objects
-    played |= cache.kept(plan, [name for name in names if name not in played])
-    new = play_heuristics(env, plan.evaluation.first_seed, [name for name in names if name not in played])
-    cache.keep(plan, new)
+    worlds = repr(
+        (run_config.world, run_config.observation, run_config.reward, run_config.evaluation, run_config.device)
+    )
+    # It keeps the configuration alive: a repr may hold addresses of objects.
+    _, played = _PLAYED.setdefault(worlds, (run_config, {}))
+    played |= cache.kept(run_config, [name for name in names if name not in played])
+    new = play_heuristics(env, run_config.evaluation.first_seed, [name for name in names if name not in played])
+    cache.keep(run_config, new)
     played |= new
     return {name: played[name] for name in names}

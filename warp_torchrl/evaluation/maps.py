@@ -88,33 +88,33 @@ class PolicyMaps:
         }
 
 
-def play_maps(plan: RunConfig, actor: Actor, mode: str, fires: int) -> PolicyMaps:
+def play_maps(run_config: RunConfig, actor: Actor, mode: str, fires: int) -> PolicyMaps:
     """Play fires on the ground of the first evaluated seed, each once without the team and once with it.
 
     Args:
-        plan: The scenario and the evaluation, whose ``first_seed`` is the ground's and the first fire's.
+        run_config: The scenario and the evaluation, whose ``first_seed`` is the ground's and the first fire's.
         actor: The policy.
         mode: ``sampled`` or ``deterministic``.
         fires: How many.
     """
-    first = plan.evaluation.first_seed
-    source = Fixed(source=plan.world.landscape, seed=first)
-    plan = replace(plan, world=replace(plan.world, landscape=source))
-    at_once = max(1, min(_MOST_WORLDS, _CELLS_AT_ONCE // int(np.prod(plan.world.size))))
+    first = run_config.evaluation.first_seed
+    source = Fixed(source=run_config.world.landscape, seed=first)
+    run_config = replace(run_config, world=replace(run_config.world, landscape=source))
+    at_once = max(1, min(_MOST_WORLDS, _CELLS_AT_ONCE // int(np.prod(run_config.world.size))))
     ends: dict[str, list[_End]] = {"without": [], "with": []}
     for seed in range(first, first + fires, at_once):
-        env = plan.make_env(min(at_once, first + fires - seed), seed)
+        env = run_config.make_env(min(at_once, first + fires - seed), seed)
         ends["without"].append(_play(env, NoOp(env), seed, "sampled"))
         ends["with"].append(_play(env, actor(env), seed, mode))
     without, together = (_joined(parts) for parts in ends.values())
     ground = source(world_key(torch.tensor([first])))
-    hectares = plan.world.side_of_cell**2 / 10_000.0
+    hectares = run_config.world.side_of_cell**2 / 10_000.0
     bare = ~without.trees
     return PolicyMaps(
         ground=ground,
-        cell_size=plan.world.side_of_cell,
+        cell_size=run_config.world.side_of_cell,
         seeds=(first, fires),
-        horizon=plan.world.horizon,
+        horizon=run_config.world.horizon,
         without=(without.burned / fires).masked_fill(bare, torch.nan),
         with_team=(together.burned / fires).masked_fill(bare, torch.nan),
         lit=without.lit,

@@ -10,14 +10,14 @@ from warp_torchrl.runs.config.saved_config import SavedConfig
 _NOT_TRAINED_BY = ("seed", "device", "evaluation", "checkpoint")
 
 
-def method(record: SavedConfig) -> tuple[str, str]:
+def method(saved_config: SavedConfig) -> tuple[str, str]:
     """Return a trained policy's name in tables, and a digest of its configuration without the seed.
 
     Runs of several versions are alike by it if their records are ``completed``.
     """
-    names = [record.choices[group] for group in ("algorithm", "reward", "observation")]
-    names += [*unusual(record), *teacher_label(record)]
-    values = {key: value for key, value in record.values.items() if key not in _NOT_TRAINED_BY}
+    names = [saved_config.choices[group] for group in ("algorithm", "reward", "observation")]
+    names += [*unusual(saved_config), *teacher_label(saved_config)]
+    values = {key: value for key, value in saved_config.values.items() if key not in _NOT_TRAINED_BY}
     return " ".join(names), sha256(json.dumps(_with_floats(values), sort_keys=True).encode()).hexdigest()
 
 
@@ -39,12 +39,14 @@ _USUAL = {
 _PAPERS_RADIUS = 3
 
 
-def unusual(record: SavedConfig) -> list[str]:
+def unusual(saved_config: SavedConfig) -> list[str]:
     """Return a policy's unusual settings, and the curriculum and the mixture if it had one, as overrides."""
-    usual = _USUAL | ({("observation", "radius"): _PAPERS_RADIUS} if record.choices["observation"] == "paper" else {})
-    found = {(group, key): record.values.get(group, {}).get(key) for group, key in usual}
+    usual = _USUAL | (
+        {("observation", "radius"): _PAPERS_RADIUS} if saved_config.choices["observation"] == "paper" else {}
+    )
+    found = {(group, key): saved_config.values.get(group, {}).get(key) for group, key in usual}
     settings = {key: value for (group, key), value in found.items() if value not in (None, usual[group, key])}
-    groups = {group: record.choices.get(group, "none") for group in ("curriculum", "mixture")}
+    groups = {group: saved_config.choices.get(group, "none") for group in ("curriculum", "mixture")}
     settings |= {group: choice for group, choice in groups.items() if choice != "none"}
     return [f"{key}={_written(value)}" for key, value in settings.items()]
 
@@ -56,9 +58,9 @@ def _written(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def teacher_label(record: SavedConfig) -> list[str]:
+def teacher_label(saved_config: SavedConfig) -> list[str]:
     """Return the part of a policy's name that lists its teachers besides rewards; empty without any."""
-    imitation = record.values.get("imitation", {})
+    imitation = saved_config.values.get("imitation", {})
     people = ["people"] if imitation.get("demonstrations") else []
     taught = [imitation["teacher"]] if imitation.get("teacher") else []
     guided = [f"guided by {imitation['guide']}"] if imitation.get("guide") else []

@@ -34,13 +34,13 @@ _ENDS_WITHIN = 30.0  # seconds in which a training saves
 
 
 def arguments(
-    policy: str, record: SavedConfig, overrides: Sequence[str], recordings: Path, folder: Path, total_frames: int
+    policy: str, saved_config: SavedConfig, overrides: Sequence[str], recordings: Path, folder: Path, total_frames: int
 ) -> list[str]:
     """Return the arguments of ``train.py`` that continue the training of a policy, from recordings too.
 
     Args:
         policy: A shipped policy or a run folder.
-        record: Of its training: networks, algorithm and all else stay, except the learning rate (``GENTLY``).
+        saved_config: Of its training: networks, algorithm and all else stay, except the learning rate (``GENTLY``).
         overrides: Of the scenario that is played.
         recordings: Folder of recordings.
         folder: Run folder of the new training.
@@ -49,10 +49,10 @@ def arguments(
     Raises:
         ConfigError: If an override does not fit.
     """
-    device = str(record.values.get("device", "cpu"))
-    rate = GENTLY * float(plain(restore(record, overrides))["algorithm"]["learning_rate"])
+    device = str(saved_config.values.get("device", "cpu"))
+    rate = GENTLY * float(plain(restore(saved_config, overrides))["algorithm"]["learning_rate"])
     return [
-        *_configuration(record, overrides),
+        *_configuration(saved_config, overrides),
         *((f"device={device}",) if device.startswith("cuda") and torch.cuda.is_available() else ()),
         f"algorithm.learning_rate={rate:g}",
         f"start_from={_literal(policy)}",
@@ -97,8 +97,8 @@ class Learning:
             raise Refused(f"{self.folder} trains: stop it first")
         if found is None:
             raise Refused(f"{side.player.name} does not learn: load a trained policy in the tab Match")
-        record = found.record()
-        algorithm = record.choices.get("algorithm")
+        saved_config = found.saved_config()
+        algorithm = saved_config.choices.get("algorithm")
         if algorithm not in ON_POLICY:
             raise Refused(
                 f"{side.player.name} was trained by {algorithm}: from recordings learn {', '.join(ON_POLICY)}"
@@ -106,7 +106,7 @@ class Learning:
         if not 1 <= total_frames <= MOST_FRAMES:
             raise Refused(f"steps must be in 1..{MOST_FRAMES}, got {total_frames}")
         folder = self.recordings / "runs" / datetime.now().strftime("%Y-%m-%d_%H-%M-%S")
-        given = arguments(side.player.name, record, setting.overrides, self.recordings, folder, total_frames)
+        given = arguments(side.player.name, saved_config, setting.overrides, self.recordings, folder, total_frames)
         self._process = TrainingProcess(given, folder, threads=None)
         self.folder, self.overrides, self._total = folder, setting.overrides, total_frames
         return folder
@@ -166,15 +166,15 @@ class Learning:
         return f"{self.folder} failed: {self._process.reason()}"
 
 
-def _configuration(record: SavedConfig, overrides: Sequence[str]) -> list[str]:
+def _configuration(saved_config: SavedConfig, overrides: Sequence[str]) -> list[str]:
     """Return the overrides that compose a saved configuration again, without the keys that the page sets."""
     touched = {each.partition("=")[0].lstrip("+~") for each in overrides}
     if "scenario" in touched:
         touched |= set(WORLD_KEYS)
-    chosen = record.choices | {"collector": "direct", "curriculum": "none", "logger": "csv", "mixture": "none"}
+    chosen = saved_config.choices | {"collector": "direct", "curriculum": "none", "logger": "csv", "mixture": "none"}
     given = [*(f"{group}={option}" for group, option in chosen.items() if group not in touched), *overrides]
     usual = dotted(plain(compose_config("train", given)))
-    wanted = dotted(plain(restore(record, overrides))).items()
+    wanted = dotted(plain(restore(saved_config, overrides))).items()
     return given + [
         f"{'' if path in usual else '+'}{path}={_literal(value)}"
         for path, value in wanted

@@ -18,7 +18,7 @@ from warp_torchrl.live.player import Player, player_of
 from warp_torchrl.live.side import Side
 from warp_torchrl.runs.config.components import build_components
 from warp_torchrl.runs.config.groups import ENVIRONMENT
-from warp_torchrl.runs.config.saved_config import environment_record
+from warp_torchrl.runs.config.saved_config import environment_config
 from warp_torchrl.runs.config.seeds import FIRST_EVALUATED
 from warp_torchrl.runs.policies.named_policy import NamedPolicy
 from warp_torchrl.validation import check_fields
@@ -78,7 +78,7 @@ class Match:
                 parts["world"], observation=seen["observation"], reward=parts["reward"], seed=setting.seed
             )
             env.reset()
-            sides.append(Side(env, player_of(each, env, setting.seed), environment_record(values)))
+            sides.append(Side(env, player_of(each, env, setting.seed), environment_config(values)))
         self._set(setting, config, parts, sides)
 
     def _set(
@@ -97,7 +97,7 @@ class Match:
         self.world: World = parts["world"]
         alone = WildfireEnv(self.world, observation=parts["observation"], reward=parts["reward"], seed=setting.seed)
         nobody = Player("without a team", HEURISTICS["noop"](alone), "sampled", setting.seed)
-        self.alone = Side(alone, nobody, environment_record(config))
+        self.alone = Side(alone, nobody, environment_config(config))
         self.restart()
 
     @property

@@ -16,7 +16,7 @@ import torch
 
 from warp_torchrl.env.observation import with_renamed
 from warp_torchrl.models import Signature
-from warp_torchrl.runs.config.saved_config import SavedConfig, saved_config
+from warp_torchrl.runs.config.saved_config import SavedConfig, read_saved_config
 from warp_torchrl.runs.manifest import (
     MANIFEST,
     POLICY,
@@ -59,13 +59,13 @@ class Checkpoint:
     path: Path
     manifest: Manifest
 
-    def record(self) -> SavedConfig:
+    def saved_config(self) -> SavedConfig:
         """Return the training's configuration."""
         path = self.path / "config.json"
         with of_a_checkpoint():
             content = read_json(path)
         try:
-            return saved_config(content)
+            return read_saved_config(content)
         except ValueError as error:
             raise CheckpointError(f"{path} is not a run's configuration: {error}") from None
 
@@ -113,7 +113,7 @@ def save(
     scenario: str,
     signature: Signature,
     mode: str | None,
-    record: SavedConfig,
+    saved_config: SavedConfig,
     policy: Mapping[str, torch.Tensor],
     training: Mapping[str, Any],
     keep: int,
@@ -130,7 +130,7 @@ def save(
         scenario: See ``Manifest``.
         signature: See ``Manifest``.
         mode: See ``Manifest``.
-        record: The configuration.
+        saved_config: The configuration.
         policy: The policy's parameters.
         training: The training state.
         keep: Number of checkpoints to keep, at least two.
@@ -149,7 +149,7 @@ def save(
             with disk.with_path(draft):
                 disk.save_tensors(draft / "policy.pt", dict(policy))
                 disk.save_tensors(draft / TRAINING, dict(training))
-                _write_record(draft, record)
+                _write_saved_config(draft, saved_config)
                 write_manifest(draft, frames, scenario, signature, mode)
             shutil.rmtree(final, ignore_errors=True)  # an unsound one
             publish(draft, parent, [final.name])
@@ -161,7 +161,7 @@ def save(
 def export(
     found: Checkpoint,
     folder: Path,
-    record: SavedConfig | None = None,
+    saved_config: SavedConfig | None = None,
     policy: Mapping[str, torch.Tensor] | None = None,
     check: Callable[[Checkpoint], object] = lambda made: None,
 ) -> None:
@@ -172,7 +172,7 @@ def export(
     Args:
         found: The checkpoint.
         folder: New folder.
-        record: Configuration; None takes the checkpoint's.
+        saved_config: Configuration; None takes the checkpoint's.
         policy: The policy's parameters; None takes the checkpoint's.
         check: Called with the new checkpoint before the folder has its name; an error leaves nothing.
 
@@ -183,19 +183,19 @@ def export(
     """
     if folder.exists():
         raise FileExistsError(errno.EEXIST, "it is there already", str(folder))
-    record = found.record() if record is None else record
-    record = replace(record, values={**record.values, "start_from": None})
+    saved_config = found.saved_config() if saved_config is None else saved_config
+    saved_config = replace(saved_config, values={**saved_config.values, "start_from": None})
     parameters = found.policy() if policy is None else policy
     with draft_in(folder.parent) as draft, disk.with_path(folder):
         if policy is None:
             shutil.copyfile(found.path / "policy.pt", draft / "policy.pt")
         else:
             disk.save_tensors(draft / "policy.pt", dict(policy))
-        _write_record(draft, record)
+        _write_saved_config(draft, saved_config)
         of = found.manifest
         write_manifest(draft, of.frames, of.scenario, of.signature, of.mode)
         made = _verified(draft)
-        if made.record() != record or not _is_equal(made.policy(), parameters):
+        if made.saved_config() != saved_config or not _is_equal(made.policy(), parameters):
             raise CheckpointError(f"{folder} cannot be written: what is read there is not what was written")
         check(made)
         publish(draft, folder.parent, [folder.name])
@@ -205,8 +205,8 @@ def _is_equal(one: Mapping[str, torch.Tensor], other: Mapping[str, torch.Tensor]
     return one.keys() == other.keys() and all(torch.equal(one[name], other[name].cpu()) for name in one)
 
 
-def _write_record(folder: Path, record: SavedConfig) -> None:
-    (folder / "config.json").write_text(json.dumps(asdict(record), indent=1), encoding="utf-8")
+def _write_saved_config(folder: Path, saved_config: SavedConfig) -> None:
+    (folder / "config.json").write_text(json.dumps(asdict(saved_config), indent=1), encoding="utf-8")
 
 
 def leave_policy(run: Path) -> None:

@@ -33,7 +33,7 @@ class Resumption:
     Attributes:
         found: The newest sound checkpoint.
         skipped: For each newer unsound checkpoint a line with the reason.
-        record: The saved configuration, with the new ``total_frames``.
+        saved_config: The saved configuration, with the new ``total_frames``.
         values: The full configuration as plain values.
         run_config: Its components, built.
         total_before: ``total_frames`` of the checkpoint.
@@ -42,7 +42,7 @@ class Resumption:
 
     found: Checkpoint
     skipped: list[str]
-    record: SavedConfig
+    saved_config: SavedConfig
     values: dict[str, Any]
     run_config: RunConfig
     total_before: int
@@ -62,12 +62,12 @@ def resumption(folder: Path, total_frames: Any = None) -> Resumption:
             reached.
     """
     found, skipped = newest(folder)
-    record = found.record()
-    held, trained = read_config(folder / "config.yaml"), plain(restore(record))
-    _check_unedited(folder, held, record, trained)
+    saved_config = found.saved_config()
+    held, trained = read_config(folder / "config.yaml"), plain(restore(saved_config))
+    _check_unedited(folder, held, saved_config, trained)
     before = trained["total_frames"]
     asked = total_frames if total_frames is not None else held.get("total_frames", before)
-    values = plain(restore(replace(record, values={**record.values, "total_frames": asked})))
+    values = plain(restore(replace(saved_config, values={**saved_config.values, "total_frames": asked})))
     made = run_config(values)
     frames, is_new = found.manifest.frames, total_frames is not None or made.total_frames != before
     if is_new and made.total_frames <= frames:
@@ -76,7 +76,7 @@ def resumption(folder: Path, total_frames: Any = None) -> Resumption:
     return Resumption(
         found=found,
         skipped=skipped,
-        record=replace(record, values={**record.values, "total_frames": made.total_frames}),
+        saved_config=replace(saved_config, values={**saved_config.values, "total_frames": made.total_frames}),
         values=values,
         run_config=made,
         total_before=before,
@@ -132,8 +132,10 @@ def read_config(path: Path) -> dict[str, Any]:
     return renamed_values({str(key): value for key, value in content.items()})
 
 
-def _check_unedited(folder: Path, held: Mapping[str, Any], record: SavedConfig, trained: Mapping[str, Any]) -> None:
-    found = edits(held, record.values) + _other_classes(held, trained) if held else []
+def _check_unedited(
+    folder: Path, held: Mapping[str, Any], saved_config: SavedConfig, trained: Mapping[str, Any]
+) -> None:
+    found = edits(held, saved_config.values) + _other_classes(held, trained) if held else []
     if found:
         more = f", and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
         raise ConfigError(

@@ -20,7 +20,7 @@ def check_start(run_config: RunConfig, found: Checkpoint) -> None:
     if not isinstance(run_config.algorithm, OnPolicy):
         found.check_goes_on()
     symmetry = getattr(run_config.model, "symmetry", "none")  # networks of either have the same names and shapes
-    if found.record().values.get("model", {}).get("symmetry", "none") != symmetry:
+    if found.saved_config().values.get("model", {}).get("symmetry", "none") != symmetry:
         raise CheckpointError(f"{found.path} was trained by another algorithm or other networks")
     batch = run_config.collector.steps * run_config.n_worlds
     learner = run_config.algorithm.build(run_config.make_env(1, 0), run_config.model, batch)

@@ -8,16 +8,16 @@ from warp_torchrl.runs.config.seeds import first_world_seed
 from warp_torchrl.world.world import World
 
 
-def reached(plan: RunConfig, worlds: Sequence[World], name: str, count: int, measure: str) -> list[float]:
+def reached(run_config: RunConfig, worlds: Sequence[World], name: str, count: int, measure: str) -> list[float]:
     """Return a heuristic's mean of a measure in each of several worlds, over ``count`` training fires each.
 
     Args:
-        plan: Of the training.
+        run_config: Configuration of the training.
         worlds: Rules of the worlds.
         name: Name of the heuristic.
         count: Number of fires in each world.
         measure: One of an episode's metrics.
     """
-    first = first_world_seed(plan.seed)
-    envs = [plan.make_env(count, first, world=world) for world in worlds]
+    first = first_world_seed(run_config.seed)
+    envs = [run_config.make_env(count, first, world=world) for world in worlds]
     return [float(play_heuristics(env, first, (name,))[name][measure].mean()) for env in envs]

@@ -65,19 +65,19 @@ class Course:
         self.standing = Standing.of(state)
 
 
-def course(plan: RunConfig, env: WildfireEnv) -> Course | None:
+def course(run_config: RunConfig, env: WildfireEnv) -> Course | None:
     """Return the sampler of a run's levels, after its baseline has played; None without a curriculum."""
     if not isinstance(env, LeveledEnv):
         return None
-    return Course(plan.curriculum, env, _baseline(plan))
+    return Course(run_config.curriculum, env, _baseline(run_config))
 
 
-def _baseline(plan: RunConfig) -> tuple[float, ...]:
+def _baseline(run_config: RunConfig) -> tuple[float, ...]:
     """Return the results of the curriculum's baseline at each level, on worlds of the training."""
-    if plan.curriculum.asks_for is None:
+    if run_config.curriculum.asks_for is None:
         return ()
-    name, count = plan.curriculum.asks_for
-    found = reached(plan, plan.levels, name, count, plan.curriculum.measure)
+    name, count = run_config.curriculum.asks_for
+    found = reached(run_config, run_config.levels, name, count, run_config.curriculum.measure)
     told = ", ".join(f"{value:.3f}" for value in found)
-    log.info("curriculum: %s reaches %s of %s, level by level", name, told, plan.curriculum.measure)
+    log.info("curriculum: %s reaches %s of %s, level by level", name, told, run_config.curriculum.measure)
     return tuple(found)

@@ -20,22 +20,22 @@ from warp_torchrl.models import ACTION, LOGITS, TEACHER_ACTION
 from warp_torchrl.training.teachers import TrainedTeacher, teacher
 
 
-def kickstart(learner: Learner, plan: Imitation, env: WildfireEnv, factor: float = 1.0) -> Learner:
+def kickstart(learner: Learner, imitation: Imitation, env: WildfireEnv, factor: float = 1.0) -> Learner:
     """Return the learner with the cloning loss and the teacher added; unchanged without a teacher.
 
     Args:
         learner: A learner whose policy writes logits first.
-        plan: Names the teacher, which may see more than the team does.
+        imitation: Names the teacher, which may see more than the team does.
         env: The training environment.
-        factor: Factor on the plan's weight.
+        factor: Factor on the weight.
 
     Raises:
         ConfigError: If the teacher is a trained policy that does not fit, remembers or talks.
         CheckpointError: If a folder holds no sound checkpoint.
     """
-    if plan.teacher is None:
+    if imitation.teacher is None:
         return learner
-    cloning, taught_by = _KickstartingLoss(plan, learner, factor), teacher(plan.teacher, env)
+    cloning, taught_by = _KickstartingLoss(imitation, learner, factor), teacher(imitation.teacher, env)
     keeps = {"teacher": taught_by} if isinstance(taught_by, TrainedTeacher) else {}
     return replace(
         learner,
@@ -54,8 +54,8 @@ class _KickstartingLoss:
     It reuses the logits that the learner's loss has just computed on the same sample, and saves a forward pass.
     """
 
-    def __init__(self, plan: Imitation, learner: Learner, factor: float) -> None:
-        self.plan, self.learner, self.factor, self.weight = plan, learner, factor, factor * plan.weight
+    def __init__(self, imitation: Imitation, learner: Learner, factor: float) -> None:
+        self.imitation, self.learner, self.factor, self.weight = imitation, learner, factor, factor * imitation.weight
         learner.loss.actor_network[0].register_forward_hook(self._keep_logits)
 
     def _keep_logits(self, actor: nn.Module, given: object, said: TensorDictBase) -> None:
@@ -70,7 +70,7 @@ class _KickstartingLoss:
 
     def schedule(self, progress: float) -> dict[str, float]:
         """Set the weight for progress in 0..1, and return the learner's scheduled columns."""
-        self.weight = self.factor * self.plan.weight_at(progress)
+        self.weight = self.factor * self.imitation.weight_at(progress)
         return self.learner.schedule(progress)
 
 

@@ -41,13 +41,13 @@ class Training(Learning):
 
     Args:
         run_config: What to train.
-        record: The configuration that checkpoints keep.
+        saved_config: The configuration that checkpoints keep.
         run: The run folder, which the first process alone writes.
     """
 
-    def __init__(self, run_config: RunConfig, record: SavedConfig, run: Path) -> None:
+    def __init__(self, run_config: RunConfig, saved_config: SavedConfig, run: Path) -> None:
         super().__init__(run_config)
-        self.record, self.run = record, run
+        self.saved_config, self.run = saved_config, run
         self.is_first = parallel.rank() == 0
         self.seconds = 0.0
         self.saved_at = 0
@@ -168,14 +168,14 @@ class Training(Learning):
 
     def _evaluate(self) -> dict[str, float | None]:
         """Return the columns of an evaluation on the way: the share saved, and of each kind if there are several."""
-        plan, kinds = self.run_config.evaluation, self.run_config.kinds
+        options, kinds = self.run_config.evaluation, self.run_config.kinds
         names = ["saved"] if len(kinds) == 1 else ["saved", *(f"saved_{kind.name}" for kind in kinds)]
-        if not plan.interval or not passes(plan.interval, self.frames, self.last_batch):
+        if not options.interval or not passes(options.interval, self.frames, self.last_batch):
             return {f"evaluation/{name}": None for name in names}
         saved = []
         for kind in kinds:
-            env = self.run_config.make_env(plan.episodes, plan.first_seed, world=kind.world)
-            saved.append(float(play(env, self.learner.policy, plan.first_seed)["saved"].mean()))
+            env = self.run_config.make_env(options.episodes, options.first_seed, world=kind.world)
+            saved.append(float(play(env, self.learner.policy, options.first_seed)["saved"].mean()))
         values = saved if len(kinds) == 1 else [sum(saved) / len(saved), *saved]
         return {f"evaluation/{name}": value for name, value in zip(names, values, strict=True)}
 
@@ -218,7 +218,7 @@ class Training(Learning):
                 scenario=self.run_config.scenario,
                 signature=signature(self.env),
                 mode=self.mode,
-                record=self.record,
+                saved_config=self.saved_config,
                 policy=policy,
                 training=training,
                 keep=self.run_config.checkpoint.keep,

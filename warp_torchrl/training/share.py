@@ -33,27 +33,30 @@ class Played:
     weight: float
 
 
-def played(plan: RunConfig) -> list[Played]:
+def played(run_config: RunConfig) -> list[Played]:
     """Return this process's worlds of each kind, with consecutive seeds."""
-    worlds = plan.n_worlds // parallel.size()
-    seed, found = first_world_seed(plan.seed) + worlds * parallel.rank(), []
-    for kind, count in zip(plan.kinds, plan.worlds_of_kinds(worlds), strict=True):
-        env = plan.make_training_env(count, seed, kind.world)
+    worlds = run_config.n_worlds // parallel.size()
+    seed, found = first_world_seed(run_config.seed) + worlds * parallel.rank(), []
+    for kind, count in zip(run_config.kinds, run_config.worlds_of_kinds(worlds), strict=True):
+        env = run_config.make_training_env(count, seed, kind.world)
         found.append(Played(kind=kind, env=env, first_seed=seed, weight=count / worlds))
         seed += count
     return found
 
 
-def learners(plan: RunConfig, played: Sequence[Played]) -> list[Learner]:
+def learners(run_config: RunConfig, played: Sequence[Played]) -> list[Learner]:
     """Return a learner for each kind of worlds; all have the same networks, loss and optimiser."""
-    frames = [plan.collector.steps * each.env.batch_size[0] for each in played]
-    first, model = played[0], plan.model
+    frames = [run_config.collector.steps * each.env.batch_size[0] for each in played]
+    first, model = played[0], run_config.model
     if len(played) == 1:
-        return [plan.algorithm.build(first.env, model, frames[0])]
+        return [run_config.algorithm.build(first.env, model, frames[0])]
     shape = joint([signature(each.env) for each in played])
-    made = plan.algorithm.build(first.env, model, frames[0], shape, first.weight)
+    made = run_config.algorithm.build(first.env, model, frames[0], shape, first.weight)
     further = zip(played[1:], frames[1:], strict=True)
-    return [made, *(plan.algorithm.beside(made, its.env, model, count, shape, its.weight) for its, count in further)]
+    return [
+        made,
+        *(run_config.algorithm.beside(made, its.env, model, count, shape, its.weight) for its, count in further),
+    ]
 
 
 class Share:
@@ -63,13 +66,15 @@ class Share:
         played: The worlds.
         learner: Learner of these worlds.
         collector: Configuration of the collection.
-        plan: Of the training.
+        run_config: Configuration of the training.
     """
 
-    def __init__(self, played: Played, learner: Learner, collector: InProcess, plan: RunConfig) -> None:
+    def __init__(self, played: Played, learner: Learner, collector: InProcess, run_config: RunConfig) -> None:
         self.name, self.env, self.weight, self.learner = played.kind.name, played.env, played.weight, learner
-        self.reward_scale = RewardScale(plan.reward.gamma) if plan.reward.normalise else None
-        self.collection: Collection = collector.open(played.env, learner, plan.make_training_env, played.first_seed)
+        self.reward_scale = RewardScale(run_config.reward.gamma) if run_config.reward.normalise else None
+        self.collection: Collection = collector.open(
+            played.env, learner, run_config.make_training_env, played.first_seed
+        )
 
     def state_dict(self) -> dict[str, Any]:
         """Return the state that an exact resume needs."""

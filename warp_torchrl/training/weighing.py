@@ -55,12 +55,12 @@ class Weighing:
         self.saved, self.baseline = list(state["saved"]), tuple(state["baseline"])
 
 
-def weighing(plan: RunConfig, shares: Sequence[float]) -> Weighing | None:
+def weighing(run_config: RunConfig, shares: Sequence[float]) -> Weighing | None:
     """Return the weights of a run's kinds, after the baseline has played; None if the shares are the weights."""
-    if not isinstance(plan.mixture, Mixture) or plan.mixture.weigh == "share":
+    if not isinstance(run_config.mixture, Mixture) or run_config.mixture.weigh == "share":
         return None
-    names, baseline = [kind.name for kind in plan.kinds], plan.mixture.baseline
-    found = reached(plan, [kind.world for kind in plan.kinds], baseline, plan.mixture.worlds, "saved")
+    names, baseline = [kind.name for kind in run_config.kinds], run_config.mixture.baseline
+    found = reached(run_config, [kind.world for kind in run_config.kinds], baseline, run_config.mixture.worlds, "saved")
     told = ", ".join(f"{name} {value:.3f}" for name, value in zip(names, found, strict=True))
     log.info("mixture: %s saves of each kind: %s", baseline, told)
-    return Weighing(plan.mixture, names, shares, found)
+    return Weighing(run_config.mixture, names, shares, found)

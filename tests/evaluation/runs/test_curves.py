@@ -48,7 +48,9 @@ def write_run(folder, seed=0, n_agents=2, scenario="skirmish", steps=32, frames=
         scenario=scenario,
         signature=SIGNATURE,
         mode="sampled",
-        record=SavedConfig(choices=choices, values={"seed": seed, "team": {"n_agents": n_agents}, "steps": steps}),
+        saved_config=SavedConfig(
+            choices=choices, values={"seed": seed, "team": {"n_agents": n_agents}, "steps": steps}
+        ),
         policy={},
         training={},
         keep=2,
@@ -323,7 +325,7 @@ def test_a_config_that_is_not_one_is_told_in_one_line(content, tmp_path, capsys,
 
 
 def test_a_checkpoint_without_a_configuration_is_told_in_one_line(tmp_path, capsys, matplotlib, monkeypatch):
-    monkeypatch.setattr(checkpoints.Checkpoint, "record", lambda self: SavedConfig(choices={}, values={}))
+    monkeypatch.setattr(checkpoints.Checkpoint, "saved_config", lambda self: SavedConfig(choices={}, values={}))
     assert "config.json does not hold" in the_one_line(capsys, write_run(tmp_path))
 
 

@@ -88,10 +88,10 @@ def test_a_former_team_is_restored_and_an_override_by_an_old_name_counts():
 
 
 def test_shipped_and_former_runs_are_read_by_the_names_of_now(tmp_path):
-    record = newest(find_policy("skirmish"))[0].record()
+    record = newest(find_policy("skirmish"))[0].saved_config()
     assert record.values["model"]["symmetry"] == "canonical" and "facing" not in record.values["model"]
     assert plain(restore(record))["model"]["symmetry"] == "canonical"
-    former = newest(shutil.copytree(GOLDEN / "0.1.0", tmp_path / "run"))[0].record()
+    former = newest(shutil.copytree(GOLDEN / "0.1.0", tmp_path / "run"))[0].saved_config()
     assert plain(restore(former))["model"]["symmetry"] == "none", "there was no symmetry in 0.1.0"
     (tmp_path / "config.yaml").write_text(json.dumps({"model": {"facing": "fire"}}))
     assert read_config(tmp_path / "config.yaml") == {"model": {"symmetry": "canonical"}}

@@ -70,7 +70,7 @@ def test_it_is_small_and_tells_of_no_machine(name, scenario):
 
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_it_is_trained_by_its_experiment(name):
-    record = newest(SHIPPED / name)[0].record()
+    record = newest(SHIPPED / name)[0].saved_config()
     config = compose_config("train", [f"experiment={LAST.get(name, name)}", f"seed={record.values['seed']}"])
     expected, values = (without_targets(plain(each)) for each in (config, restore(record)))
     assert {name: values[name] for name in record.values} == {name: expected[name] for name in record.values}
@@ -81,7 +81,7 @@ def test_it_is_trained_by_its_experiment(name):
 def test_it_saves_far_more_than_local(name):
     """On 12 fires the difference's standard error is below 6 points; its expectation is 27 and more."""
     policy, found = load_policy(SHIPPED / name), newest(SHIPPED / name)[0]
-    env = run_config(plain(restore(found.record()))).make_env(12, 1_000_000)
+    env = run_config(plain(restore(found.saved_config()))).make_env(12, 1_000_000)
     saved = play(env, policy, 1_000_000, policy.mode)["saved"].mean()
     local = play_heuristics(env, 1_000_000, ["local"])["local"]["saved"].mean()
     assert saved > local + 0.12, (saved, local)
@@ -91,6 +91,6 @@ def test_it_saves_far_more_than_local(name):
 def test_any_environment_shows_it_what_it_reads(name):
     policy = load_policy(SHIPPED / name)
     env = make_env("water", n_worlds=3, overrides=policy.overrides)
-    trained_in = run_config(plain(restore(newest(SHIPPED / name)[0].record()))).make_env(1, 0)
+    trained_in = run_config(plain(restore(newest(SHIPPED / name)[0].saved_config()))).make_env(1, 0)
     assert env.observation == replace(trained_in.observation, reach=False), "what the critic reads is not for playing"
     assert env.rollout(3, policy)["agents", "action"].shape == (3, 3, 4)

@@ -76,7 +76,7 @@ def read_run(folder: Path) -> Run:
     columns = {name: bin_means(values, rows_per_bin) for name, values in rows.items()}
     try:
         found, _ = newest(folder)
-        trained = _recorded(found, found.record())
+        trained = _recorded(found, found.saved_config())
     except CheckpointError:  # none was saved yet
         trained = _not_recorded(folder.resolve())
     return Run(folder=folder, rows=rows, columns=columns, rows_per_bin=rows_per_bin, **trained)
@@ -126,14 +126,14 @@ def _check_time(columns: Mapping[str, np.ndarray]) -> None:
             raise ValueError(f"{name} must be in every row, positive, and grow")
 
 
-def _recorded(found: Checkpoint, record: SavedConfig) -> dict[str, Any]:
+def _recorded(found: Checkpoint, saved_config: SavedConfig) -> dict[str, Any]:
     try:
         algorithm, reward, observation = (
-            str(record.choices[group]) for group in ("algorithm", "reward", "observation")
+            str(saved_config.choices[group]) for group in ("algorithm", "reward", "observation")
         )
-        names = (" ".join((algorithm, *unusual(record), *teacher_label(record))), reward, observation)
-        _, digest = method(_completed(record))
-        n_agents, seed = record.values["team"]["n_agents"], str(record.values["seed"])
+        names = (" ".join((algorithm, *unusual(saved_config), *teacher_label(saved_config))), reward, observation)
+        _, digest = method(_completed(saved_config))
+        n_agents, seed = saved_config.values["team"]["n_agents"], str(saved_config.values["seed"])
     except (KeyError, TypeError, AttributeError):
         raise ValueError(f"{found.path / 'config.json'} does not hold a run's configuration") from None
     scenario = str(found.manifest.scenario)
@@ -142,12 +142,12 @@ def _recorded(found: Checkpoint, record: SavedConfig) -> dict[str, Any]:
     return fields | {"scenario": scenario, "n_agents": n_agents, "seed": seed}
 
 
-def _completed(record: SavedConfig) -> SavedConfig:
+def _completed(saved_config: SavedConfig) -> SavedConfig:
     """Return a configuration with this version's keys, or unchanged if its keys are others."""
     try:
-        return completed(record)
+        return completed(saved_config)
     except ConfigError:
-        return record
+        return saved_config
 
 
 def _not_recorded(folder: Path) -> dict[str, Any]:

@@ -25,7 +25,7 @@ _BEFORE = {
     "algorithm.logit_penalty": 0.0,
     "reward.act_per": "forest",
 }
-"""What runs did whose record has none of a key yet."""
+"""Values of keys that configurations of former runs lack."""
 _DEEPEST = 20
 """How deep what is recorded may be nested; a configuration is 5 deep."""
 _LONGEST = 4096
@@ -47,7 +47,7 @@ class SavedConfig:
     values: dict[str, Any] = field(default_factory=dict)
 
 
-def saved_config(content: object) -> SavedConfig:
+def read_saved_config(content: object) -> SavedConfig:
     """Return the configuration that a JSON file holds, with the names of now.
 
     Args:
@@ -81,7 +81,7 @@ def _parts(node: Any) -> list[Any]:
     return node if isinstance(node, list) else []
 
 
-def environment_record(values: Mapping[str, Any]) -> SavedConfig:
+def environment_config(values: Mapping[str, Any]) -> SavedConfig:
     """Return what a composed configuration, as plain values, says of its environment.
 
     Raises:
@@ -92,30 +92,30 @@ def environment_record(values: Mapping[str, Any]) -> SavedConfig:
     return SavedConfig(choices={"scenario": values["scenario"], **choices}, values=without_targets(kept))
 
 
-def restore(record: SavedConfig, overrides: Sequence[str] = ()) -> DictConfig:
-    """Compose the configuration of a record anew from this package's own files, and lay its values over it.
+def restore(saved_config: SavedConfig, overrides: Sequence[str] = ()) -> DictConfig:
+    """Compose a saved configuration again from this package's files, and set its values.
 
-    Classes come from our yaml files alone. Values that an override touches are the override's; an override of
+    Classes come from our yaml files only. Values that an override touches are the override's; an override of
     ``scenario`` takes the whole world from that scenario.
 
     Args:
-        record: From a run folder: not trusted.
+        saved_config: From a run folder: not trusted.
         overrides: In Hydra's grammar.
 
     Raises:
         ConfigError: If a choice or a value does not fit.
     """
     overrides = renamed_overrides(overrides)
-    for group, option in record.choices.items():
+    for group, option in saved_config.choices.items():
         if group not in (*COMPONENTS, "scenario") or not OPTION.fullmatch(str(option)):
             raise ConfigError(f"{group}={option!r} in the run folder is not one of our options")
     touched = [override.split("=", 1)[0].lstrip("+~") for override in overrides]
     if "scenario" in touched:
         touched += WORLD_KEYS
-    choices = [f"{group}={option}" for group, option in record.choices.items() if group not in touched]
+    choices = [f"{group}={option}" for group, option in saved_config.choices.items() if group not in touched]
     config = compose_config("train", [*choices, *overrides])
-    recorded = _recorded(record, config, touched)
-    groups = {*record.values, "processes"}
+    recorded = _recorded(saved_config, config, touched)
+    groups = {*saved_config.values, "processes"}
     before = {
         key: value
         for key, value in _BEFORE.items()
@@ -134,27 +134,27 @@ def restore(record: SavedConfig, overrides: Sequence[str] = ()) -> DictConfig:
     return config
 
 
-def completed(record: SavedConfig) -> SavedConfig:
-    """Return a record with every key of this version: those that came after it have the value that it was run by.
+def completed(saved_config: SavedConfig) -> SavedConfig:
+    """Return a saved configuration with every key of this version; newer keys have the value of its run.
 
     Raises:
         ConfigError: If a choice or a value does not fit.
     """
-    return SavedConfig(choices=record.choices, values=without_targets(plain(restore(record))))
+    return SavedConfig(choices=saved_config.choices, values=without_targets(plain(restore(saved_config))))
 
 
-def _recorded(record: SavedConfig, config: DictConfig, touched: Sequence[str]) -> dict[str, Any]:
-    """Return the values of a record by dotted key; a mapping of any keys is one value, unless a key in it is touched.
+def _recorded(saved_config: SavedConfig, config: DictConfig, touched: Sequence[str]) -> dict[str, Any]:
+    """Return the saved values by dotted key; a mapping of any keys is one value, unless a key in it is touched.
 
     So it has the keys that it had, and no others that our files have.
     """
     whole: dict[str, Any] = {}
-    for group in (each for each in COMPONENTS if isinstance(record.values.get(each), Mapping)):
-        kind, values = component(config[group]["_target_"]), record.values[group]
+    for group in (each for each in COMPONENTS if isinstance(saved_config.values.get(each), Mapping)):
+        kind, values = component(config[group]["_target_"]), saved_config.values[group]
         for name in sorted(free_mappings(kind) & values.keys()) if kind is not None else ():
             whole[f"{group}.{name}"] = values[name]
     whole = {path: value for path, value in whole.items() if not any(_is_in(key, path) for key in touched)}
-    leaves = dotted(record.values).items()
+    leaves = dotted(saved_config.values).items()
     return {**{key: value for key, value in leaves if not any(_is_in(key, path) for path in whole)}, **whole}
 
 

@@ -42,16 +42,18 @@ def load_policy(path: str | Path = "generalist", mode: str = "best") -> TrainedP
 
 
 @apart
-def policy_of(found: checkpoints.Checkpoint, mode: str = "best", record: SavedConfig | None = None) -> TrainedPolicy:
-    """Return the policy of a verified checkpoint, by its record or another one; see ``load_policy``."""
+def policy_of(
+    found: checkpoints.Checkpoint, mode: str = "best", saved_config: SavedConfig | None = None
+) -> TrainedPolicy:
+    """Return the policy of a verified checkpoint, with its configuration or another one; see ``load_policy``."""
     if mode not in ("best", "sampled", "deterministic"):
         raise ValueError(f"mode must be best, sampled or deterministic, got {mode}")
-    record = found.record() if record is None else record
-    config = plain(restore(record))
+    saved_config = found.saved_config() if saved_config is None else saved_config
+    config = plain(restore(saved_config))
     algorithm, model = build(config["algorithm"], "algorithm"), build(config["model"], "model")
     weights = found.policy()
     try:
-        with torch.device("meta"):  # without memory: a record may ask for networks that are larger than the machine
+        with torch.device("meta"):  # without memory: a configuration may name networks larger than the machine
             shapes = _shapes(algorithm.policy(found.manifest.signature, model).state_dict())
         if shapes != _shapes(former.parameters(weights, shapes)):
             raise ValueError("the parameters have other names or shapes than the networks that it is said to have")
@@ -62,9 +64,11 @@ def policy_of(found: checkpoints.Checkpoint, mode: str = "best", record: SavedCo
         raise checkpoints.CheckpointError(f"{found.path} is of another architecture: {reason}") from None
     chosen = (found.manifest.mode or "sampled") if mode == "best" else mode
     seen = {name: value for name, value in config["observation"].items() if name not in ("_target_", *OF_CRITIC)}
-    overrides = [f"observation={name}" for group, name in record.choices.items() if group == "observation"]
+    overrides = [f"observation={name}" for group, name in saved_config.choices.items() if group == "observation"]
     overrides += [f"observation.{name}={json.dumps(value)}" for name, value in seen.items()]
-    overrides += [f"team.radio.carries={record.values['team']['radio']['carries']}"] if RADIO in policy.in_keys else []
+    overrides += (
+        [f"team.radio.carries={saved_config.values['team']['radio']['carries']}"] if RADIO in policy.in_keys else []
+    )
     return TrainedPolicy(policy.requires_grad_(False).eval(), chosen, found.manifest.signature, overrides)
 
 

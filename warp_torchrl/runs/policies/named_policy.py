@@ -50,7 +50,7 @@ class NamedPolicy:
         if self.checkpoint is None:
             values = plain(compose_config("train", overrides))
         else:
-            values = plain(restore(self.checkpoint.record(), overrides))
+            values = plain(restore(self.checkpoint.saved_config(), overrides))
         run_config(values)  # so that every key is checked, whoever reads it
         return values
 
