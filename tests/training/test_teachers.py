@@ -45,11 +45,11 @@ def test_what_it_says_is_cloned(tmp_path):
 
 def test_a_run_goes_on_with_the_teacher_that_it_had(tmp_path):
     training = student(tmp_path)
-    kept = training.shares[0].state_dict()
-    training.shares[0].load_state_dict(kept)
+    kept = training.tasks[0].state_dict()
+    training.tasks[0].load_state_dict(kept)
     kept["keeps"]["teacher"]["digest"] = "0" * 64
     with pytest.raises(ConfigError, match=r"imitation\.teacher has other weights than when this run began"):
-        training.shares[0].load_state_dict(kept)
+        training.tasks[0].load_state_dict(kept)
 
 
 def test_a_run_folder_may_teach_and_a_heuristic_is_itself(weak_run):

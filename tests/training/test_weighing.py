@@ -3,7 +3,7 @@
 import pytest
 
 from tests.training.test_loop import rows, tiny
-from tests.training.test_share import THREE
+from tests.training.test_tasks import THREE
 from warp_torchrl.collection.mixture import Mixture, weights
 from warp_torchrl.evaluation.play import play_heuristics
 from warp_torchrl.runs.config.seeds import first_world_seed
@@ -30,7 +30,7 @@ def test_weights_follow_what_was_saved_before_a_batch(tmp_path):
     found = [[float(row[f"mixture/weight_{name}"]) for name in NAMES] for row in rows(tmp_path)]
     assert len(found) == 4
     assert all(now == pytest.approx(then) for now, then in zip(found, expected, strict=True))
-    assert [share.weight for share in training.shares] == pytest.approx(training.weighing.weights())
+    assert [task.weight for task in training.tasks] == pytest.approx(training.weighing.weights())
     assert found[0] == [0.25, 0.5, 0.25] and found[1] != pytest.approx(found[0])
 
 

@@ -61,6 +61,6 @@ def weighing(run_config: RunConfig, shares: Sequence[float]) -> Weighing | None:
         return None
     names, baseline = [kind.name for kind in run_config.kinds], run_config.mixture.baseline
     found = reached(run_config, [kind.world for kind in run_config.kinds], baseline, run_config.mixture.worlds, "saved")
-    told = ", ".join(f"{name} {value:.3f}" for name, value in zip(names, found, strict=True))
-    log.info("mixture: %s saves of each kind: %s", baseline, told)
+    values = ", ".join(f"{name} {value:.3f}" for name, value in zip(names, found, strict=True))
+    log.info("mixture: %s saves of each kind: %s", baseline, values)
     return Weighing(run_config.mixture, names, shares, found)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from warp_torchrl.collection.curriculum import Curriculum, Regret, Standing, Success
+from warp_torchrl.collection.curriculum import Curriculum, CurriculumState, Regret, Success
 
 OVER = {"steps_per_tick": [20, 10, 5], "ignition": {"count": [1, 1, 2]}}
 
@@ -17,16 +17,16 @@ def test_levels_are_the_values_of_each_key_at_one_place():
     ("progress", "chances"), [(0.0, (0.75, 0.0, 0.25)), (0.49, (0.75, 0.0, 0.25)), (0.5, (0.0, 0.0, 1.0))]
 )
 def test_the_target_has_its_floor_and_from_until_on_everything(progress, chances):
-    assert Success(over=OVER, floor=0.25, until=0.5).chances(Standing.first(3), progress) == chances
+    assert Success(over=OVER, floor=0.25, until=0.5).chances(CurriculumState.first(3), progress) == chances
 
 
 def test_a_floor_at_the_target_adds_up():
-    assert Success(over=OVER, floor=0.25).chances(Standing.first(3).at(2), 0.0) == (0.0, 0.0, 1.0)
+    assert Success(over=OVER, floor=0.25).chances(CurriculumState.first(3).at(2), 0.0) == (0.0, 0.0, 1.0)
 
 
 def test_a_rule_without_shares_is_told():
     with pytest.raises(TypeError, match="Curriculum does not say what it draws"):
-        Curriculum(over=OVER).chances(Standing.first(3), 0.0)
+        Curriculum(over=OVER).chances(CurriculumState.first(3), 0.0)
 
 
 @pytest.mark.parametrize("rule", [Success, Regret])

@@ -2,15 +2,15 @@
 
 import pytest
 
-from warp_torchrl.collection.curriculum import Regret, Standing
+from warp_torchrl.collection.curriculum import CurriculumState, Regret
 
 OVER = {"steps_per_tick": [20, 10, 5]}
 
 
 def judged(*successes, baseline=(0.9, 0.6, 0.2)):
     counts = [0.0 if each is None else 10.0 for each in successes]
-    standing = Standing.first(3, baseline)
-    return Regret(over=OVER, episodes=10).after(standing, counts, [10.0 * (each or 0.0) for each in successes])
+    state = CurriculumState.first(3, baseline)
+    return Regret(over=OVER, episodes=10).after(state, counts, [10.0 * (each or 0.0) for each in successes])
 
 
 @pytest.mark.parametrize(
@@ -23,9 +23,9 @@ def judged(*successes, baseline=(0.9, 0.6, 0.2)):
     ],
 )
 def test_shares_are_the_regrets(successes, shares):
-    standing = judged(*successes)
-    assert Regret(over=OVER).shares(standing) == pytest.approx(shares)
-    with_floor = Regret(over=OVER, floor=0.5).chances(standing, 0.0)
+    state = judged(*successes)
+    assert Regret(over=OVER).shares(state) == pytest.approx(shares)
+    with_floor = Regret(over=OVER, floor=0.5).chances(state, 0.0)
     assert with_floor == pytest.approx([0.5 * each + 0.5 * (at == 2) for at, each in enumerate(shares)])
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from warp_torchrl.collection.curriculum import Standing, Success
+from warp_torchrl.collection.curriculum import CurriculumState, Success
 
 OVER = {"steps_per_tick": [20, 10, 5]}
 
@@ -21,26 +21,26 @@ def rule(**values):
 )
 def test_success_above_the_bounds_leads_on_and_below_them_back(level, success, then):
     counts = [10.0 * (each == level) for each in range(3)]
-    after = rule().after(Standing.first(3).at(level), counts, [count * success for count in counts])
+    after = rule().after(CurriculumState.first(3).at(level), counts, [count * success for count in counts])
     assert after.level == then
     assert rule().chances(after, 0.0) == tuple(float(each == then) for each in range(3))
 
 
 def test_a_level_is_left_on_a_full_group_of_its_own_episodes_alone():
-    standing = Standing.first(3)
-    standing = rule().after(standing, [9.0, 50.0, 50.0], [9.0, 0.0, 0.0])
-    assert standing.level == 0
-    standing = rule().after(standing, [1.0, 0.0, 0.0], [1.0, 0.0, 0.0])
-    assert standing.level == 1 and standing.judged == (1.0, None, 0.0)  # of level 1 what was before does not count
-    standing = rule().after(standing, [10.0, 0.0, 10.0], [10.0, 0.0, 10.0])
-    assert standing.level == 1  # others were judged, this one was not
+    state = CurriculumState.first(3)
+    state = rule().after(state, [9.0, 50.0, 50.0], [9.0, 0.0, 0.0])
+    assert state.level == 0
+    state = rule().after(state, [1.0, 0.0, 0.0], [1.0, 0.0, 0.0])
+    assert state.level == 1 and state.judged == (1.0, None, 0.0)  # of level 1 what was before does not count
+    state = rule().after(state, [10.0, 0.0, 10.0], [10.0, 0.0, 10.0])
+    assert state.level == 1  # others were judged, this one was not
 
 
 def test_a_judgement_moves_once():
-    standing = rule().after(Standing.first(3), [10.0, 0.0, 0.0], [10.0, 0.0, 0.0])
-    standing = rule().after(standing, [0.0, 10.0, 0.0], [0.0, 5.0, 0.0])
-    standing = rule().after(standing, [0.0, 0.0, 3.0], [0.0, 0.0, 3.0])
-    assert standing.level == 1
+    state = rule().after(CurriculumState.first(3), [10.0, 0.0, 0.0], [10.0, 0.0, 0.0])
+    state = rule().after(state, [0.0, 10.0, 0.0], [0.0, 5.0, 0.0])
+    state = rule().after(state, [0.0, 0.0, 3.0], [0.0, 0.0, 3.0])
+    assert state.level == 1
 
 
 @pytest.mark.parametrize(

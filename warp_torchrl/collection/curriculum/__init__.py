@@ -2,7 +2,7 @@
 
 from warp_torchrl.collection.curriculum.curriculum import Curriculum, NoCurriculum
 from warp_torchrl.collection.curriculum.regret import Regret
-from warp_torchrl.collection.curriculum.standing import Standing
+from warp_torchrl.collection.curriculum.state import CurriculumState
 from warp_torchrl.collection.curriculum.success import Success
 
-__all__ = ["Curriculum", "NoCurriculum", "Regret", "Standing", "Success"]
+__all__ = ["Curriculum", "CurriculumState", "NoCurriculum", "Regret", "Success"]

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from warp_torchrl.collection.curriculum.standing import Standing
+from warp_torchrl.collection.curriculum.state import CurriculumState
 from warp_torchrl.validation import check_fields
 
 
@@ -72,21 +72,21 @@ class Curriculum:
         """Return L; 1 where there are no lists."""
         return len(next(iter(self.values().values()), [None]))
 
-    def chances(self, standing: Standing, progress: float) -> tuple[float, ...]:
+    def chances(self, state: CurriculumState, progress: float) -> tuple[float, ...]:
         """Return the chance of each level for the next episodes, at progress in 0..1."""
         target = [0.0] * (self.n_levels - 1) + [1.0]
         if progress >= self.until:
             return tuple(target)
-        shares = self.shares(standing)
+        shares = self.shares(state)
         return tuple(
             self.floor * is_target + (1.0 - self.floor) * share for is_target, share in zip(target, shares, strict=True)
         )
 
-    def after(self, standing: Standing, counts: Sequence[float], sums: Sequence[float]) -> Standing:
+    def after(self, state: CurriculumState, counts: Sequence[float], sums: Sequence[float]) -> CurriculumState:
         """Return the state after episodes that ended, ``counts`` at each level with ``sums`` of the measure."""
-        return standing.after(counts, sums, self.episodes)
+        return state.after(counts, sums, self.episodes)
 
-    def shares(self, standing: Standing) -> Sequence[float]:
+    def shares(self, state: CurriculumState) -> Sequence[float]:
         """Return the share of each level in the episodes outside of the floor; they add up to 1."""
         raise TypeError(f"{type(self).__name__} does not say what it draws: define shares()")
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from warp_torchrl.collection.curriculum.curriculum import Curriculum
-from warp_torchrl.collection.curriculum.standing import Standing
+from warp_torchrl.collection.curriculum.state import CurriculumState
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.validation import did_you_mean
 
@@ -44,9 +44,9 @@ class Regret(Curriculum):
         """Return the baseline, and its number of episodes at each level."""
         return self.baseline, self.worlds
 
-    def shares(self, standing: Standing) -> Sequence[float]:
+    def shares(self, state: CurriculumState) -> Sequence[float]:
         """Return each level's share of the total regret."""
-        pairs = zip(standing.baseline, standing.judged, strict=True)
+        pairs = zip(state.baseline, state.judged, strict=True)
         regrets = [max(0.0, theirs - (ours or 0.0)) for theirs, ours in pairs]
         total = sum(regrets)
         return [each / total for each in regrets] if total else [0.0] * (self.n_levels - 1) + [1.0]

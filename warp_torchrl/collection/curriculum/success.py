@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from warp_torchrl.collection.curriculum.curriculum import Curriculum
-from warp_torchrl.collection.curriculum.standing import Standing
+from warp_torchrl.collection.curriculum.state import CurriculumState
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,13 +35,13 @@ class Success(Curriculum):
         if self.low >= self.high:
             raise ValueError(f"low must be below high, {self.high}, got {self.low}")
 
-    def shares(self, standing: Standing) -> Sequence[float]:
+    def shares(self, state: CurriculumState) -> Sequence[float]:
         """Return 1 at the present level."""
-        return [float(level == standing.level) for level in range(self.n_levels)]
+        return [float(level == state.level) for level in range(self.n_levels)]
 
-    def after(self, standing: Standing, counts: Sequence[float], sums: Sequence[float]) -> Standing:
+    def after(self, state: CurriculumState, counts: Sequence[float], sums: Sequence[float]) -> CurriculumState:
         """Return the state after episodes that ended: at another level, if the present one is too easy or too hard."""
-        now = super().after(standing, counts, sums)
+        now = super().after(state, counts, sums)
         success = now.judged[now.level]  # of the last full group since the level was entered, which kept it
         if success is None:
             return now

@@ -17,7 +17,7 @@ from warp_torchrl.training.reward_scale import RewardScale
 
 
 @dataclass(frozen=True, kw_only=True)
-class Played:
+class TaskWorlds:
     """The worlds of one kind that this process plays.
 
     Attributes:
@@ -33,47 +33,47 @@ class Played:
     weight: float
 
 
-def played(run_config: RunConfig) -> list[Played]:
+def task_worlds(run_config: RunConfig) -> list[TaskWorlds]:
     """Return this process's worlds of each kind, with consecutive seeds."""
     worlds = run_config.n_worlds // parallel.size()
     seed, found = first_world_seed(run_config.seed) + worlds * parallel.rank(), []
     for kind, count in zip(run_config.kinds, run_config.worlds_of_kinds(worlds), strict=True):
         env = run_config.make_training_env(count, seed, kind.world)
-        found.append(Played(kind=kind, env=env, first_seed=seed, weight=count / worlds))
+        found.append(TaskWorlds(kind=kind, env=env, first_seed=seed, weight=count / worlds))
         seed += count
     return found
 
 
-def learners(run_config: RunConfig, played: Sequence[Played]) -> list[Learner]:
+def learners(run_config: RunConfig, worlds: Sequence[TaskWorlds]) -> list[Learner]:
     """Return a learner for each kind of worlds; all have the same networks, loss and optimiser."""
-    frames = [run_config.collector.steps * each.env.batch_size[0] for each in played]
-    first, model = played[0], run_config.model
-    if len(played) == 1:
+    frames = [run_config.collector.steps * each.env.batch_size[0] for each in worlds]
+    first, model = worlds[0], run_config.model
+    if len(worlds) == 1:
         return [run_config.algorithm.build(first.env, model, frames[0])]
-    shape = joint([signature(each.env) for each in played])
+    shape = joint([signature(each.env) for each in worlds])
     made = run_config.algorithm.build(first.env, model, frames[0], shape, first.weight)
-    further = zip(played[1:], frames[1:], strict=True)
+    further = zip(worlds[1:], frames[1:], strict=True)
     return [
         made,
         *(run_config.algorithm.beside(made, its.env, model, count, shape, its.weight) for its, count in further),
     ]
 
 
-class Share:
+class Task:
     """One kind of worlds that this process collects and learns from.
 
     Args:
-        played: The worlds.
+        worlds: The worlds.
         learner: Learner of these worlds.
         collector: Configuration of the collection.
         run_config: Configuration of the training.
     """
 
-    def __init__(self, played: Played, learner: Learner, collector: InProcess, run_config: RunConfig) -> None:
-        self.name, self.env, self.weight, self.learner = played.kind.name, played.env, played.weight, learner
+    def __init__(self, worlds: TaskWorlds, learner: Learner, collector: InProcess, run_config: RunConfig) -> None:
+        self.name, self.env, self.weight, self.learner = worlds.kind.name, worlds.env, worlds.weight, learner
         self.reward_scale = RewardScale(run_config.reward.gamma) if run_config.reward.normalise else None
         self.collection: Collection = collector.open(
-            played.env, learner, run_config.make_training_env, played.first_seed
+            worlds.env, learner, run_config.make_training_env, worlds.first_seed
         )
 
     def state_dict(self) -> dict[str, Any]:

@@ -27,26 +27,26 @@ def gradients(training):
 
 def test_kinds_have_their_share_of_the_worlds_and_seeds_of_their_own(tmp_path):
     training = tiny(tmp_path, *THREE, "seed=3")
-    assert [share.name for share in training.shares] == ["one", "two", "large"]
-    assert [share.weight for share in training.shares] == [0.25, 0.5, 0.25]
-    seeds = torch.cat([share.env.seeds for share in training.shares])
+    assert [task.name for task in training.tasks] == ["one", "two", "large"]
+    assert [task.weight for task in training.tasks] == [0.25, 0.5, 0.25]
+    seeds = torch.cat([task.env.seeds for task in training.tasks])
     assert seeds.tolist() == list(range(first_world_seed(3), first_world_seed(3) + 8))
-    assert [share.env.n_agents for share in training.shares] == [1, 2, 4]
-    assert len({id(share.learner.loss) for share in training.shares}) == 1
-    assert len({id(share.learner.optimizer) for share in training.shares}) == 1
+    assert [task.env.n_agents for task in training.tasks] == [1, 2, 4]
+    assert len({id(task.learner.loss) for task in training.tasks}) == 1
+    assert len({id(task.learner.optimizer) for task in training.tasks}) == 1
 
 
 def test_the_gradient_is_the_mean_of_the_kinds_gradients_by_their_shares(tmp_path, monkeypatch):
     training = tiny(tmp_path, *THREE, "algorithm.value_norm=false")
     optimizer = training.learner.optimizer
-    for share, batch in zip(training.shares, next(training.batches()), strict=True):
-        share.learner.store(batch)
-    samples = [next(iter(share.learner.samples())) for share in training.shares]
+    for task, batch in zip(training.tasks, next(training.batches()), strict=True):
+        task.learner.store(batch)
+    samples = [next(iter(task.learner.samples())) for task in training.tasks]
     alone = []
-    for share, sample in zip(training.shares, samples, strict=True):
-        terms = share.learner.terms(sample.clone())
+    for task, sample in zip(training.tasks, samples, strict=True):
+        terms = task.learner.terms(sample.clone())
         optimizer.zero_grad()
-        sum(terms[key] for key in share.learner.loss_keys).backward()
+        sum(terms[key] for key in task.learner.loss_keys).backward()
         alone.append(gradients(training))
     optimizer.zero_grad()
     monkeypatch.setattr(torch.nn.utils, "clip_grad_norm_", lambda *_: torch.ones(()))
@@ -60,9 +60,9 @@ def test_the_gradient_is_the_mean_of_the_kinds_gradients_by_their_shares(tmp_pat
 
 def test_every_sample_of_every_kind_is_learned_from_once_a_pass(tmp_path):
     training = tiny(tmp_path, *THREE, "algorithm.epochs=1")
-    for share, batch in zip(training.shares, next(training.batches()), strict=True):
-        share.learner.store(batch)
-    counts = [[len(sample) for sample in share.learner.samples()] for share in training.shares]
+    for task, batch in zip(training.tasks, next(training.batches()), strict=True):
+        task.learner.store(batch)
+    counts = [[len(sample) for sample in task.learner.samples()] for task in training.tasks]
     assert counts == [[16], [32], [16]]  # of 8 steps of 2, 4 and 2 worlds, in minibatches of 64 steps of all
 
 
@@ -85,7 +85,7 @@ def test_rewards_are_normalised_kind_by_kind(tmp_path):
     batches = next(training.batches())
     expected = []
     for batch in batches:
-        scale = type(training.shares[0].reward_scale)(training.run_config.reward.gamma)
+        scale = type(training.tasks[0].reward_scale)(training.run_config.reward.gamma)
         scale(other := batch.clone())
         expected.append(other["next", *REWARD])
     training._learn(batches)
@@ -119,10 +119,10 @@ def test_actors_remember_each_kind_apart(tmp_path, index):
     def second_batch(name, beside):
         (tmp_path / name).mkdir()
         training = tiny(tmp_path / name, "mixture=several", kinds, "model.memory=8", "algorithm.minibatch_size=32")
-        its, other, found = training.shares[index], training.shares[1 - index], []
-        for share in (its, *([other] if beside else []), its):
+        its, other, found = training.tasks[index], training.tasks[1 - index], []
+        for task in (its, *([other] if beside else []), its):
             torch.manual_seed(0)
-            found.append(training._batch(iter(share.collection)).clone())
+            found.append(training._batch(iter(task.collection)).clone())
         return found[-1]
 
     alone, beside = second_batch("alone", False), second_batch("beside", True)
@@ -141,9 +141,9 @@ def test_a_kind_s_teacher_may_weigh_more(tmp_path):
             "imitation.teacher=local",
             "imitation.weight=0.5",
         )
-        for share, batch in zip(training.shares, next(training.batches()), strict=True):
-            share.learner.store(batch)
-        samples = [next(iter(share.learner.samples())) for share in training.shares]
-        losses.append([float(a.learner.terms(b)["loss_bc"]) for a, b in zip(training.shares, samples, strict=True)])
+        for task, batch in zip(training.tasks, next(training.batches()), strict=True):
+            task.learner.store(batch)
+        samples = [next(iter(task.learner.samples())) for task in training.tasks]
+        losses.append([float(a.learner.terms(b)["loss_bc"]) for a, b in zip(training.tasks, samples, strict=True)])
     one, two, large = losses[0]
     assert losses[1] == pytest.approx([one, 3.0 * two, large], rel=1e-5)

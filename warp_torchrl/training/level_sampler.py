@@ -7,8 +7,8 @@ from typing import Any
 from tensordict import TensorDictBase
 
 from warp_torchrl.algorithms import parallel
-from warp_torchrl.collection.curriculum import Curriculum, Standing
-from warp_torchrl.collection.curriculum.standing import episodes_by_level
+from warp_torchrl.collection.curriculum import Curriculum, CurriculumState
+from warp_torchrl.collection.curriculum.state import episodes_by_level
 from warp_torchrl.env import LeveledEnv, WildfireEnv
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.training.baseline import reached
@@ -16,7 +16,7 @@ from warp_torchrl.training.baseline import reached
 log = logging.getLogger("warp_torchrl")
 
 
-class Course:
+class LevelSampler:
     """Draws the levels of a training's episodes; the draws are the same in each of its processes.
 
     Args:
@@ -27,12 +27,12 @@ class Course:
 
     def __init__(self, curriculum: Curriculum, env: LeveledEnv, baseline: tuple[float, ...] = ()) -> None:
         self.curriculum, self.env = curriculum, env
-        self.standing = Standing.first(len(env.levels), baseline)
+        self.state = CurriculumState.first(len(env.levels), baseline)
         self.draw(0.0)
 
     def draw(self, progress: float) -> None:
         """Let episodes that start from now on draw their levels by the rule, at progress in 0..1."""
-        self.chances = self.curriculum.chances(self.standing, progress)
+        self.chances = self.curriculum.chances(self.state, progress)
         self.env.draw_by(self.chances)
 
     def columns(self, batch: TensorDictBase) -> dict[str, float | None]:
@@ -46,10 +46,10 @@ class Course:
         measure, n_levels = self.curriculum.measure, len(self.env.levels)
         ended = parallel.sum_(episodes_by_level(info["level"], done, info[measure], n_levels))
         counts, sums = ended.tolist()
-        before, self.standing = self.standing.level, self.curriculum.after(self.standing, counts, sums)
-        if self.standing.level != before:
-            log.info("curriculum: from level %d to level %d", before, self.standing.level)
-        chances, judged = self.chances, self.standing.judged
+        before, self.state = self.state.level, self.curriculum.after(self.state, counts, sums)
+        if self.state.level != before:
+            log.info("curriculum: from level %d to level %d", before, self.state.level)
+        chances, judged = self.chances, self.state.judged
         return {
             "curriculum/level": sum(level * chance for level, chance in enumerate(chances)),
             **{f"curriculum/chance_{level}": chance for level, chance in enumerate(chances)},
@@ -58,18 +58,18 @@ class Course:
 
     def state_dict(self) -> dict[str, Any]:
         """Return the results at each level."""
-        return self.standing.state_dict()
+        return self.state.state_dict()
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore the results of ``state_dict``; ``draw`` then uses them."""
-        self.standing = Standing.of(state)
+        self.state = CurriculumState.of(state)
 
 
-def course(run_config: RunConfig, env: WildfireEnv) -> Course | None:
+def level_sampler(run_config: RunConfig, env: WildfireEnv) -> LevelSampler | None:
     """Return the sampler of a run's levels, after its baseline has played; None without a curriculum."""
     if not isinstance(env, LeveledEnv):
         return None
-    return Course(run_config.curriculum, env, _baseline(run_config))
+    return LevelSampler(run_config.curriculum, env, _baseline(run_config))
 
 
 def _baseline(run_config: RunConfig) -> tuple[float, ...]:
@@ -78,6 +78,6 @@ def _baseline(run_config: RunConfig) -> tuple[float, ...]:
         return ()
     name, count = run_config.curriculum.asks_for
     found = reached(run_config, run_config.levels, name, count, run_config.curriculum.measure)
-    told = ", ".join(f"{value:.3f}" for value in found)
-    log.info("curriculum: %s reaches %s of %s, level by level", name, told, run_config.curriculum.measure)
+    values = ", ".join(f"{value:.3f}" for value in found)
+    log.info("curriculum: %s reaches %s of %s, level by level", name, values, run_config.curriculum.measure)
     return tuple(found)

@@ -11,7 +11,7 @@ _LISTS = ("counts", "sums", "judged", "baseline")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Standing:
+class CurriculumState:
     """The team's results at the L levels of a curriculum, easy to hard.
 
     A level is judged by groups of episodes: when one is full, its mean is kept and the next one begins.
@@ -31,12 +31,12 @@ class Standing:
     level: int = 0
 
     @classmethod
-    def first(cls, n_levels: int, baseline: Sequence[float] = ()) -> "Standing":
+    def first(cls, n_levels: int, baseline: Sequence[float] = ()) -> "CurriculumState":
         """Return the state before the first episode."""
         none = (0.0,) * n_levels
         return cls(counts=none, sums=none, judged=(None,) * n_levels, baseline=tuple(baseline))
 
-    def after(self, counts: Sequence[float], sums: Sequence[float], group: int) -> "Standing":
+    def after(self, counts: Sequence[float], sums: Sequence[float], group: int) -> "CurriculumState":
         """Add episodes that ended.
 
         Args:
@@ -53,21 +53,21 @@ class Standing:
         counts, sums = zip(*open_, strict=True)
         return replace(self, counts=counts, sums=sums, judged=tuple(judged))
 
-    def at(self, level: int) -> "Standing":
+    def at(self, level: int) -> "CurriculumState":
         """Return the same state at another level, whose results are empty."""
 
-        def anew(values: Sequence[Any], value: float | None) -> tuple[Any, ...]:
+        def with_value(values: Sequence[Any], value: float | None) -> tuple[Any, ...]:
             return (*values[:level], value, *values[level + 1 :])
 
-        counts, sums = anew(self.counts, 0.0), anew(self.sums, 0.0)
-        return replace(self, counts=counts, sums=sums, judged=anew(self.judged, None), level=level)
+        counts, sums = with_value(self.counts, 0.0), with_value(self.sums, 0.0)
+        return replace(self, counts=counts, sums=sums, judged=with_value(self.judged, None), level=level)
 
     def state_dict(self) -> dict[str, Any]:
         """Return the state as plain values."""
         return {name: list(getattr(self, name)) for name in _LISTS} | {"level": self.level}
 
     @classmethod
-    def of(cls, state: Mapping[str, Any]) -> "Standing":
+    def of(cls, state: Mapping[str, Any]) -> "CurriculumState":
         """Return the state of a ``state_dict``."""
         lists = {name: tuple(state[name]) for name in _LISTS}
         return cls(level=int(state["level"]), **lists)

@@ -38,7 +38,7 @@ def test_a_run_without_a_curriculum_has_neither_columns_nor_state(tmp_path):
     training = tiny(tmp_path, "total_frames=32")
     training.train()
     assert not [name for name in rows(tmp_path)[0] if name.startswith("curriculum/")]
-    assert "curriculum" not in training.state_dict() and training.course is None
+    assert "curriculum" not in training.state_dict() and training.level_sampler is None
 
 
 def test_the_last_share_of_a_training_is_of_the_target_alone(tmp_path):
@@ -78,10 +78,10 @@ def test_evaluation_plays_the_scenario_whatever_is_learned(tmp_path):
 def test_a_baseline_plays_each_level_once_and_is_kept(tmp_path):
     overrides = ["curriculum=regret", "curriculum.over.steps_per_tick=[30,4]", "curriculum.worlds=8", "total_frames=32"]
     training = tiny(tmp_path, *overrides, "curriculum.floor=0")
-    easy, target = training.course.standing.baseline
+    easy, target = training.level_sampler.state.baseline
     assert easy > target + 0.02, "the fire of level 0 is seven times slower"
     total = easy + target  # nothing is known of the team
-    assert training.course.chances == pytest.approx((easy / total, target / total))
+    assert training.level_sampler.chances == pytest.approx((easy / total, target / total))
     training.train()
     assert newest(tmp_path)[0].training()["curriculum"]["baseline"] == [easy, target]
 
