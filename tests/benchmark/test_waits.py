@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from warp_torchrl.benchmark.waits import counted_waits
-from warp_torchrl.system.device import reads_freely, unread
+from warp_torchrl.system.device import needs_no_sync, unread
 
 NUMBERS = torch.arange(6.0)
 MASK = NUMBERS > 2.0
@@ -59,7 +59,7 @@ def test_what_a_gpu_computes_by_itself_is_none(compute):
 
 
 def test_a_cpu_is_read_unless_it_stands_for_a_gpu():
-    assert reads_freely(CPU) and not reads_freely(torch.device("cuda"))
+    assert needs_no_sync(CPU) and not needs_no_sync(torch.device("cuda"))
     with unread():
-        assert not reads_freely(CPU)
-    assert reads_freely(CPU)
+        assert not needs_no_sync(CPU)
+    assert needs_no_sync(CPU)

@@ -11,7 +11,7 @@ from warp_torchrl.commands.demonstrations import main
 from warp_torchrl.commands.failure import DISK, DONE, MISTAKE, UNSOUND
 from warp_torchrl.demonstrations.files import MANIFEST, save
 from warp_torchrl.live.match import Match, Setting
-from warp_torchrl.system.sealed import Unsound
+from warp_torchrl.system.checksummed import Unsound
 from warp_torchrl.world.state.state import Action
 
 

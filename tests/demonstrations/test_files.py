@@ -13,7 +13,7 @@ import torch
 from tensordict import TensorDict
 
 from warp_torchrl.demonstrations.files import MANIFEST, find, read, save
-from warp_torchrl.system.sealed import Unsound, described, sealed
+from warp_torchrl.system.checksummed import Unsound, checksummed, described
 
 
 @pytest.fixture
@@ -27,7 +27,7 @@ def reseal(folder, **changes):
     content.pop("sha256")
     ours = [name for name in content["files"] if name.startswith("steps/") and (folder / name).is_file()]
     content["files"] |= described(folder, ours)
-    (folder / MANIFEST).write_bytes(sealed(content))
+    (folder / MANIFEST).write_bytes(checksummed(content))
 
 
 def test_what_is_read_is_what_was_saved(recording, folder):
@@ -228,7 +228,7 @@ def test_files_larger_than_a_recording_may_be_are_not_read(folder):
     content["entries"]["agents/observation/view"] = {"dtype": "uint8", "shape": [12, 3, size // 36 + 1]}
     content["files"]["steps/agents/observation/view.memmap"]["size"] = 12 * 3 * (size // 36 + 1)
     content.pop("sha256")
-    (folder / MANIFEST).write_bytes(sealed(content))
+    (folder / MANIFEST).write_bytes(checksummed(content))
     with pytest.raises(Unsound, match="at most 4294967296 are read"):
         read(folder)
 

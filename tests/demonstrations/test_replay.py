@@ -8,7 +8,7 @@ import torch
 from warp_torchrl.demonstrations.events import Event
 from warp_torchrl.demonstrations.files import read, save
 from warp_torchrl.demonstrations.replay import Replay
-from warp_torchrl.system.sealed import Unsound
+from warp_torchrl.system.checksummed import Unsound
 from warp_torchrl.world.state.state import is_tree
 
 

@@ -7,7 +7,7 @@ import pytest
 from warp_torchrl.demonstrations.files import MANIFEST, read
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.keeping import Keeper
-from warp_torchrl.system.sealed import Unsound
+from warp_torchrl.system.checksummed import Unsound
 from warp_torchrl.world.state.state import Action
 
 

@@ -8,7 +8,7 @@ from warp_torchrl.live import words
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.live.replayed import ReplayedMatch
-from warp_torchrl.system.sealed import Unsound
+from warp_torchrl.system.checksummed import Unsound
 from warp_torchrl.world.ignition.intervention import can_be_lit
 from warp_torchrl.world.state.state import Action
 

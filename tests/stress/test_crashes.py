@@ -11,7 +11,7 @@ from tests.stress.saves import KINDS, left
 from warp_torchrl.demonstrations import files
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs import output
-from warp_torchrl.system.sealed import Unsound
+from warp_torchrl.system.checksummed import Unsound
 
 pytestmark = pytest.mark.stress
 

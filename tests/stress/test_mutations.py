@@ -17,7 +17,7 @@ from warp_torchrl.demonstrations.files import MANIFEST, find, read
 from warp_torchrl.demonstrations.replay import Replay
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
 from warp_torchrl.runs.config.construction import ConfigError
-from warp_torchrl.system.sealed import Unsound, described, sealed
+from warp_torchrl.system.checksummed import Unsound, checksummed, described
 
 pytestmark = pytest.mark.stress
 MUTATIONS = 200
@@ -149,7 +149,7 @@ def test_no_forged_recording_is_more_than_an_error_in_one_line(recorded, tmp_pat
             content = json.loads((folder / MANIFEST).read_text())
             content.pop("sha256")
             content["files"] |= described(folder, [each for each in content["files"] if (folder / each).exists()])
-            (folder / MANIFEST).write_bytes(sealed(content))
+            (folder / MANIFEST).write_bytes(checksummed(content))
         except (OSError, ValueError, KeyError):
             continue  # the manifest itself is gone
         try:

@@ -12,7 +12,7 @@ import torch
 from tests.forgery import forge
 from tests.runs.test_checkpoint import saved
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
-from warp_torchrl.system.sealed import Unsound
+from warp_torchrl.system.checksummed import Unsound
 from warp_torchrl.system.tensors import check_finite, load_tensors
 
 NAN, INF = math.nan, math.inf

@@ -21,7 +21,7 @@ from warp_torchrl.models import (
     VALUE,
     CanonicalBatch,
 )
-from warp_torchrl.system.device import reads_freely
+from warp_torchrl.system.device import needs_no_sync
 
 ADVANTAGE = ("agents", "advantage")
 VALUE_TARGET = ("agents", "value_target")
@@ -148,7 +148,7 @@ def _add_values(loss: LossModule, batch: TensorDictBase, canonical: CanonicalBat
     with loss.critic_network_params.to_module(loss.critic_network):
         value = loss.critic_network(batch.select(*keys))[VALUE]
         following = value.roll(-1, dims=1)
-        if reads_freely(ends.device):
+        if needs_no_sync(ends.device):
             following[ends] = loss.critic_network(canonical(batch["next"][ends]))[VALUE]
         else:  # of every step, one after the other: how many ends there are would have to be read
             last = [loss.critic_network(canonical(each))[VALUE] for each in batch["next"].unbind(1)]

@@ -14,7 +14,7 @@ from warp_torchrl.demonstrations.replay import Replay
 from warp_torchrl.demonstrations.summary import summary, table
 from warp_torchrl.runs.config.construction import ConfigError, construct
 from warp_torchrl.runs.config.grammar import check_flags, own_values
-from warp_torchrl.system.sealed import Unsound
+from warp_torchrl.system.checksummed import Unsound
 from warp_torchrl.validation import check_fields
 
 USAGE = "warp demonstrations FOLDER [check=true] [export=FILE.npz] [html=FILE.html]"

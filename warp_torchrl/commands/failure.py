@@ -9,11 +9,11 @@ from signal import Signals
 from warp_torchrl.algorithms.parallel import WorkerDied
 from warp_torchrl.runs.config.compose import HYDRA_ERRORS, one_line
 from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.system.checksummed import Unsound
 from warp_torchrl.system.exit_codes import DISK, DONE, IN_USE, MISTAKE, NUMERICAL, UNSOUND
 from warp_torchrl.system.foreign_text import plain_text
 from warp_torchrl.system.interruption import SIGNALED
 from warp_torchrl.system.lock import RunFolderInUse
-from warp_torchrl.system.sealed import Unsound
 from warp_torchrl.system.signals import Stopped, left_by
 from warp_torchrl.training.finite import NumericalFailure
 

@@ -18,7 +18,7 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.models import ACTION, ACTION_MASK, ROLE, Signature, signature
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.run_config import RunConfig
-from warp_torchrl.system.sealed import Unsound
+from warp_torchrl.system.checksummed import Unsound
 
 
 def demonstrations(run_config: RunConfig, env: WildfireEnv) -> Demonstrations | None:

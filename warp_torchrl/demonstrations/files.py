@@ -27,18 +27,18 @@ from warp_torchrl.runs.config.compose import OPTION
 from warp_torchrl.runs.config.saved_config import read_saved_config
 from warp_torchrl.runs.output import draft_in, publish
 from warp_torchrl.system import disk
-from warp_torchrl.system.foreign import below
-from warp_torchrl.system.foreign_text import plain_text
-from warp_torchrl.system.sealed import (
+from warp_torchrl.system.checksummed import (
     Files,
     Unsound,
+    check_checksum,
     check_files,
-    check_seal,
     checked_files,
+    checksummed,
     described,
     read_json,
-    sealed,
 )
+from warp_torchrl.system.foreign import below
+from warp_torchrl.system.foreign_text import plain_text
 
 log = logging.getLogger("warp_torchrl")
 FORMAT = 1
@@ -65,7 +65,7 @@ def save(recording: Recording, parent: Path) -> Path:
     with draft_in(parent) as draft, disk.with_path(parent):
         _check_room(draft / ".room", recording.steps)
         _write(recording.steps, draft / _STEPS)
-        (draft / MANIFEST).write_bytes(sealed(_content(recording, draft)))
+        (draft / MANIFEST).write_bytes(checksummed(_content(recording, draft)))
         read(draft)
         return publish(draft, parent, (f"{recording.scenario}-{recording.seed}-{n}" for n in range(1, _MOST_STEPS)))
 
@@ -82,7 +82,7 @@ def read(folder: Path) -> Recording:
     content = read_json(path)
     if content.get("format") != FORMAT:
         raise Unsound(f"{path} has format {content.get('format')!r:.80}, this version reads {FORMAT}")
-    check_seal(path, content)
+    check_checksum(path, content)
     try:
         agents, actions = _names(content, "agents", _MOST_AGENTS), _names(content, "actions", _MOST_ACTIONS)
         steps = _whole(content["steps"], _MOST_STEPS)

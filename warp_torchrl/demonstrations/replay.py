@@ -14,7 +14,7 @@ from warp_torchrl.runs.config.components import build_components
 from warp_torchrl.runs.config.compose import plain
 from warp_torchrl.runs.config.groups import ENVIRONMENT
 from warp_torchrl.runs.config.saved_config import restore
-from warp_torchrl.system.sealed import Unsound
+from warp_torchrl.system.checksummed import Unsound
 from warp_torchrl.world.state.state import WorldState
 
 _Key = str | tuple[str, ...]

@@ -20,7 +20,7 @@ from warp_torchrl.env.reward import Efficiency, Reward
 from warp_torchrl.env.scene import Observations, Scene, Step, why_not_compiled
 from warp_torchrl.env.specs import make_specs
 from warp_torchrl.system import memory
-from warp_torchrl.system.device import reads_freely
+from warp_torchrl.system.device import needs_no_sync
 from warp_torchrl.system.modes import apart
 from warp_torchrl.world.state.role import ROLES
 from warp_torchrl.world.state.saved import filled
@@ -134,7 +134,7 @@ class WildfireEnv(EnvBase):
     def _settle(self) -> None:
         """Set what depends on the device: how actions are checked, steps are computed, and starts are kept ready."""
         asked = self._asked
-        self.validate = reads_freely(self.device) if asked.validate is None else asked.validate
+        self.validate = needs_no_sync(self.device) if asked.validate is None else asked.validate
         self.why_eager = (
             why_not_compiled(self.world, self.observation, self.device, self.batch_size[0]) if asked.fuse else None
         )
@@ -145,7 +145,7 @@ class WildfireEnv(EnvBase):
 
     def _no_resets(self) -> ResetCache | ResetPool:
         """Return where starts are kept ready, empty."""
-        if reads_freely(self.device):
+        if needs_no_sync(self.device):
             return ResetCache(self._sound_start)
         return ResetPool(self._start, self.world.check)
 

@@ -57,8 +57,8 @@ def keep(run_config: RunConfig, played: dict[str, Episodes]) -> None:
         content = json.dumps(episodes)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            sealed = {"sha256": sha256(content.encode()).hexdigest(), "episodes": episodes}
-            disk.replace(path, json.dumps(sealed))  # others may write the same one
+            checksummed = {"sha256": sha256(content.encode()).hexdigest(), "episodes": episodes}
+            disk.replace(path, json.dumps(checksummed))  # others may write the same one
         except OSError as error:
             log.debug("the baselines' episodes are not kept: %s", error)
             return
@@ -155,7 +155,7 @@ def _read(path: Path) -> Episodes | None:
         content = foreign.read_json(path, LARGEST)
         episodes = content["episodes"]
         if content["sha256"] != sha256(json.dumps(episodes).encode()).hexdigest():
-            raise ValueError("its sha256 is not its own")
+            raise ValueError("its sha256 does not match")
         return {metric: np.array(values, dtype=np.float64) for metric, values in episodes.items()}
     except FileNotFoundError:
         return None

@@ -8,7 +8,7 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
-from warp_torchrl.system.device import reads_freely
+from warp_torchrl.system.device import needs_no_sync
 from warp_torchrl.system.modes import apart
 from warp_torchrl.world.arrays.distances import FAR, nearest
 from warp_torchrl.world.arrays.geometry import offsets
@@ -99,7 +99,7 @@ def list_cells(mask: Tensor) -> tuple[Tensor, Tensor]:
         padding, bool [B, K]. On a device that is not read freely, every cell: K = H W, and the mask.
     """
     marked = mask.flatten(1)
-    if not reads_freely(mask.device):
+    if not needs_no_sync(mask.device):
         return torch.arange(marked.shape[1], device=mask.device).expand_as(marked), marked
     counts = marked.sum(dim=1)
     world, cell = marked.nonzero().unbind(dim=1)

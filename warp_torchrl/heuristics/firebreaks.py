@@ -4,7 +4,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.arrays.distances import distance_to_nearest
-from warp_torchrl.world.fires.reach import way_of_fire
+from warp_torchrl.world.fires.reach import distance_from_fire
 from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.world import World
 
@@ -17,7 +17,7 @@ _SLOWEST = 1e-3
 def cells_to_clear(state: WorldState, world: World, clears: Tensor, effort: float) -> Tensor:
     """Return the trees to be cleared, bool [B, H, W]: the smallest ring that the team can finish in time.
 
-    The trees at distance d from the fire (``way_of_fire``) enclose it. The team takes the smallest such ring with
+    The trees at distance d (``distance_from_fire``) enclose the fire. The team takes the smallest such ring with
 
         way + effort n_d / agents <= ((d - 1) / pace + 1) S - steps since the last tick
 
@@ -30,7 +30,7 @@ def cells_to_clear(state: WorldState, world: World, clears: Tensor, effort: floa
         clears: Agents that clear, bool [A], at least one.
         effort: Steps that one agent takes for a cell of the ring.
     """
-    away = way_of_fire(state, world).to(torch.int64)
+    away = distance_from_fire(state, world).to(torch.int64)
     distance = torch.arange(1, max(away.shape[1:]), device=away.device)
     count = torch.zeros(len(away), len(distance) + 2, device=away.device)
     count.scatter_add_(1, away.flatten(1), (away > 0).flatten(1).to(count.dtype))

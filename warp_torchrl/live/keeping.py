@@ -8,7 +8,7 @@ from warp_torchrl.demonstrations.recording import OpenRecording, Recording
 from warp_torchrl.demonstrations.summary import Summary, summary
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.side import Side
-from warp_torchrl.system.sealed import Unsound
+from warp_torchrl.system.checksummed import Unsound
 
 _Written = tuple[int, int, int]
 

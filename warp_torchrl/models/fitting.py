@@ -1,4 +1,4 @@
-"""A policy in an environment that shows more than it was trained to see, or lets it do more: found by name."""
+"""A trained policy in an environment with further channels or actions, matched by name."""
 
 import torch
 from tensordict import TensorDictBase
@@ -19,11 +19,11 @@ from warp_torchrl.models.signature import (
 )
 
 
-class Prompt(TensorDictModuleBase):
-    """A policy whose messages come late, where they come at once: what was sent is what is observed.
+class DelayedMessages(TensorDictModuleBase):
+    """A policy with delayed messages in an environment without delay: messages are made from present observations.
 
     Args:
-        policy: Reads what was sent beside what is observed.
+        policy: Reads senders' observations beside the present one.
     """
 
     def __init__(self, policy: TensorDictModuleBase) -> None:
@@ -32,20 +32,21 @@ class Prompt(TensorDictModuleBase):
         self.out_keys, self.policy = policy.out_keys, policy
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Write what the policy writes."""
+        """Write the policy's outputs."""
         seen = tensordict.select(*self.in_keys, strict=False)
         out = self.policy(seen.set(SENT, seen.get(OBSERVATION)))
         return tensordict.update(out.select(*self.out_keys, strict=False))
 
 
 class Fitted(TensorDictModuleBase):
-    """A policy that is given the channels and actions that it knows, of those that an environment has.
+    """A policy with only the channels and actions of an environment that it knows.
 
     Args:
         policy: Observation and mask in, action out.
-        channels: Of each entry that shows more, by key, the dimension to choose along and what to choose, int64 [C].
+        channels: For each entry with further channels, by key: the dimension, and the indices of known channels, int64
+            [C].
         actions: The environment's code of each action that it knows, int64 [actions].
-        fallback: The action of its own that is opened where none of those does anything.
+        fallback: The policy's action that is opened where none of the known ones does anything.
     """
 
     def __init__(
@@ -60,7 +61,7 @@ class Fitted(TensorDictModuleBase):
         self.policy, self.channels, self.actions, self.fallback = policy, channels, actions, fallback
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Write the team's actions, int64 [B, A], and what else the policy writes."""
+        """Write the team's actions, int64 [B, A], and the policy's other outputs."""
         seen = tensordict.select(*self.in_keys, strict=False)
         for key, (dim, index) in self.channels.items():
             entry = seen.get(key)
@@ -76,17 +77,17 @@ class Fitted(TensorDictModuleBase):
 
 
 def fitted(policy: TensorDictModuleBase, trained: Signature, here: Signature, fallback: int) -> TensorDictModuleBase:
-    """Return a policy for an environment in which it knows its way by name.
+    """Return a policy for an environment, whose channels and actions are matched by name.
 
     Args:
         policy: Observation and mask in, action out.
-        trained: What it was trained to see and do.
-        here: What the environment shows, and lets it do.
-        fallback: The action of its own that is opened where none that it knows does anything.
+        trained: Signature of its training.
+        here: Signature of the environment.
+        fallback: The policy's action that is opened where none of the known ones does anything.
 
     Raises:
-        ValueError: If the environment lacks an entry, a channel or an action, or has it in another form, or has a role
-            or agencies that a policy with a network for each does not know; which one.
+        ValueError: If the environment lacks an entry, a channel or an action, has another shape or type, or has a role
+            or agencies without a network in the policy; the message names it.
     """
     trained, here = trained.bare(), here.bare()
     if AGENCY in policy.in_keys and here.agencies != trained.agencies:
@@ -95,7 +96,7 @@ def fitted(policy: TensorDictModuleBase, trained: Signature, here: Signature, fa
             f"{len(here.agencies) or 1}"
         )
     if trained.is_late and not here.is_late and any(key[: len(SENT)] == SENT for key in policy.in_keys):
-        policy = Prompt(policy)
+        policy = DelayedMessages(policy)
     if (trained.observation, trained.actions, trained.roles) == (here.observation, here.actions, here.roles):
         return policy
     lacking = [name for name in trained.actions if name not in here.actions]
@@ -121,7 +122,7 @@ def fitted(policy: TensorDictModuleBase, trained: Signature, here: Signature, fa
 
 
 def _places(name: str, trained: Entry, here: Entry) -> Tensor | None:
-    """Return where the channels that were trained with are among those that are here; None where they are the same."""
+    """Return the indices of the trained channels among those of the environment; None where both are the same."""
     if trained[:3] == here[:3]:
         return None
     lacking = [each for each in trained.names if each not in here.names]

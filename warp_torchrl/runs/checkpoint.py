@@ -30,8 +30,8 @@ from warp_torchrl.runs.manifest import (
 )
 from warp_torchrl.runs.output import draft_in, publish
 from warp_torchrl.system import disk
+from warp_torchrl.system.checksummed import read_json
 from warp_torchrl.system.foreign_text import plain_text
-from warp_torchrl.system.sealed import read_json
 from warp_torchrl.system.tensors import check_finite, load_tensors
 
 __all__ = [

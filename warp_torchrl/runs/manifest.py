@@ -16,15 +16,15 @@ from warp_torchrl.env.observation.status import IDENTITY, STATUS
 from warp_torchrl.models import Entry, Signature
 from warp_torchrl.runs.config.compose import OPTION
 from warp_torchrl.symmetry import Symmetry, from_plain, to_plain
-from warp_torchrl.system.sealed import (
+from warp_torchrl.system.checksummed import (
     Files,
     Unsound,
+    check_checksum,
     check_files,
-    check_seal,
     checked_files,
+    checksummed,
     described,
     read_json,
-    sealed,
 )
 from warp_torchrl.system.tensors import largest
 from warp_torchrl.world.state.role import PAPER_ROLES
@@ -110,7 +110,7 @@ def _parse_manifest(folder: Path) -> Manifest:
             f"{folder} has format {content.get('format')!r}, this version reads {', '.join(map(str, _READ))}"
         )
     if content["format"] == FORMAT:
-        check_seal(path, content)
+        check_checksum(path, content)
     try:
         signature = _signature_from_json(content.pop("signature"))
         manifest = Manifest(signature=signature, **content)
@@ -142,7 +142,7 @@ def manifest_bytes(
         versions={name: library.__version__ for name, library in libraries.items()},
         files=described(folder, names),
     )
-    return sealed(asdict(manifest) | {"signature": _signature_to_json(signature)})
+    return checksummed(asdict(manifest) | {"signature": _signature_to_json(signature)})
 
 
 def _signature_to_json(signature: Signature) -> dict[str, Any]:

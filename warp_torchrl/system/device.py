@@ -12,8 +12,8 @@ import torch
 _unread = False
 
 
-def reads_freely(device: torch.device) -> bool:
-    """Return whether to read from a device costs nothing, which it does on a CPU alone."""
+def needs_no_sync(device: torch.device) -> bool:
+    """Return whether reading from a device needs no synchronisation, as on a CPU."""
     return device.type == "cpu" and not _unread
 
 

@@ -11,8 +11,8 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.system import foreign
+from warp_torchrl.system.checksummed import Unsound
 from warp_torchrl.system.finite import not_finite
-from warp_torchrl.system.sealed import Unsound
 
 _LARGEST_DIRECTORY = 2**24  # bytes
 _END, _END_64, _LOCATOR_64 = struct.Struct("<4s4H2LH"), struct.Struct("<4sQ2H2L4Q"), struct.Struct("<4sLQL")

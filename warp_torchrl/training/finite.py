@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import torch
 from torch import Tensor
 
-from warp_torchrl.system.device import reads_freely
+from warp_torchrl.system.device import needs_no_sync
 from warp_torchrl.system.finite import NumericalFailure
 
 __all__ = ["FiniteSteps", "NumericalFailure"]
@@ -36,7 +36,7 @@ class FiniteSteps:
         Raises:
             NumericalFailure: If the loss or the norm is not finite, and the device is read freely.
         """
-        if reads_freely(loss.device):
+        if needs_no_sync(loss.device):
             if not torch.isfinite(norm + loss):
                 raise _failure(frames, float(loss), float(norm))
         else:

@@ -4,13 +4,13 @@ import torch
 
 from tests.heuristics.drawing import scene
 from warp_torchrl.world.arrays.geometry import grow
-from warp_torchrl.world.fires.reach import way_of_fire
+from warp_torchrl.world.fires.reach import distance_from_fire
 from warp_torchrl.world.state.state import is_tree
 
 
 def ways(drawing: str) -> list[list[int]]:
     env, state = scene(drawing, at=[(0, 0)])
-    return way_of_fire(state, env.world)[0].tolist()
+    return distance_from_fire(state, env.world)[0].tolist()
 
 
 def test_fire_goes_around_a_line_and_through_the_cell_that_it_lacks() -> None:
@@ -42,4 +42,4 @@ def test_on_a_random_map_the_way_counts_the_rounds_of_growth() -> None:
         new = grow(reached) & fuel & ~reached
         away[new], reached = turn, reached | new
     assert away.max() > 10, "ways that wind"
-    assert torch.equal(way_of_fire(state, env.world), away)
+    assert torch.equal(distance_from_fire(state, env.world), away)

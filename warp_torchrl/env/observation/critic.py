@@ -12,7 +12,7 @@ from warp_torchrl.env.observation.channels import ELEVATION_SCALE, LAST_SEEN
 from warp_torchrl.env.observation.status import WIND_SCALE, steps_to_tick, time_left
 from warp_torchrl.symmetry import TeamPlanes
 from warp_torchrl.world.arrays.blocks import block_means
-from warp_torchrl.world.fires.reach import way_of_fire
+from warp_torchrl.world.fires.reach import distance_from_fire
 from warp_torchrl.world.mechanics.agencies.agencies import land_of_each
 from warp_torchrl.world.mechanics.sensing.records import freshness, known_codes
 from warp_torchrl.world.state.role import PAPER_ROLES
@@ -110,12 +110,12 @@ def reach_of_fire_and_team(state: WorldState, world: World) -> tuple[Tensor, Ten
     """Return how soon fire, and how soon the team, can be where, float32 [B, 16, 16] each, in 0..1.
 
     With m moves to go it is e^(-m / 2b), b the block's side: for fire the mean over the block, m its way to each tree
-    (``way_of_fire``), and nothing where it cannot go, as behind a closed firebreak; for the team m from the nearest
-    vehicle to the middle of the block.
+    (``distance_from_fire``), and nothing where it cannot go, as behind a closed firebreak; for the team m from the
+    nearest vehicle to the middle of the block.
     """
     height, width = state.cells.shape[1:]
     side = max(height, width) / STATE_SIDE
-    away = way_of_fire(state, world)
+    away = distance_from_fire(state, world)
     fire = block_means((away > 0) * torch.exp(away / (-2.0 * side)), STATE_SIDE)
     middle = torch.arange(STATE_SIDE, device=away.device) + 0.5
     row, column = (state.vehicles.position + 0.5).unbind(-1)

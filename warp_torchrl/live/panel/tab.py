@@ -10,8 +10,8 @@ from warp_torchrl.live.match import Match
 from warp_torchrl.live.once import Once
 from warp_torchrl.live.panel.controls import Callback, Controls, Window
 from warp_torchrl.live.side import Side
+from warp_torchrl.system.checksummed import Unsound
 from warp_torchrl.system.foreign_text import plain_text
-from warp_torchrl.system.sealed import Unsound
 
 
 class Tab(ABC):

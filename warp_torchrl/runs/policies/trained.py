@@ -31,7 +31,7 @@ from warp_torchrl.models.canonical import Canonicalise
 from warp_torchrl.models.fitting import fitted
 from warp_torchrl.models.networks import AgentNetworks
 from warp_torchrl.models.signature import observation_key
-from warp_torchrl.system.device import reads_freely
+from warp_torchrl.system.device import needs_no_sync
 from warp_torchrl.system.finite import check_scores
 from warp_torchrl.system.modes import apart
 from warp_torchrl.world.state.role import ROLES
@@ -112,7 +112,7 @@ class TrainedPolicy(TensorDictModuleBase):
         own = set_exploration_type(MODES[self.mode]) if exploration_type() is None else nullcontext()
         with own:
             acted = self.module(tensordict.copy()).select(*self.out_keys, strict=False)
-        if reads_freely(acted[ACTION].device):
+        if needs_no_sync(acted[ACTION].device):
             check_scores(scores(acted))
         return tensordict.update(acted)
 

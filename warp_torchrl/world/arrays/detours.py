@@ -10,7 +10,7 @@ that a round writes one plane of bits, of all cells that it has not reached.
 import torch
 from torch import Tensor
 
-from warp_torchrl.system.device import reads_freely
+from warp_torchrl.system.device import needs_no_sync
 from warp_torchrl.world.arrays.distances import FAR
 from warp_torchrl.world.arrays.row_layout import in_a_row
 
@@ -63,7 +63,7 @@ def _counted(start: Tensor, passable: Tensor, cells: Tensor, bit: Tensor) -> Ten
     Nothing is read back from a device where that is not free: there the search takes as many rounds as it may.
     """
     worlds, height, width = start.shape
-    reads, most, wide = reads_freely(start.device), 2 * (height + width), width + 1
+    reads, most, wide = needs_no_sync(start.device), 2 * (height + width), width + 1
     first = torch.arange(worlds, device=start.device)[:, None, None] * (height + 1) * wide
     index = first + cells + cells // width
     grow = _Round(in_a_row(passable | start), wide)

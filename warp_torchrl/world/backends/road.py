@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 from torch.compiler import is_compiling
 
-from warp_torchrl.system.device import reads_freely
+from warp_torchrl.system.device import needs_no_sync
 from warp_torchrl.world.arrays.bytes import number
 from warp_torchrl.world.arrays.compile import vectors
 from warp_torchrl.world.arrays.random import Stream, uniform
@@ -80,7 +80,7 @@ def fastest(fire: Automaton, device: torch.device) -> Road:
 
 
 def _may_read(device: torch.device) -> bool:
-    return reads_freely(device) and not is_compiling()
+    return needs_no_sync(device) and not is_compiling()
 
 
 def why_eager(fire: Automaton, device: torch.device, cells: int) -> str | None:

@@ -1,4 +1,4 @@
-"""Where fire can go from where it burns."""
+"""Distance from the fire along cells that can burn."""
 
 import torch
 from torch import Tensor
@@ -8,11 +8,11 @@ from warp_torchrl.world.state.state import WorldState, is_tree
 from warp_torchrl.world.world import World
 
 
-def way_of_fire(state: WorldState, world: World) -> Tensor:
-    """Return the cells that fire has to go to each tree that it can reach, int32 [B, H, W], else 0.
+def distance_from_fire(state: WorldState, world: World) -> Tensor:
+    """Return the number of cells from the fire to each tree that it can reach, int32 [B, H, W], else 0.
 
-    Fire goes over trees that can burn, around firebreaks, lakes and young trees, to its eight neighbours. Ways are
-    followed for as many cells as the map's longer side has.
+    Fire spreads over trees that can burn, around firebreaks, lakes and young trees, to its eight neighbours. Distances
+    above the map's longer side count as out of reach.
     """
     youngest = 1 if world.fire.growth else world.fire.youngest_fuel
     fuel = is_tree(state.cells) & (state.cells >= youngest) & (state.alpha > 0.0)

@@ -3,7 +3,7 @@
 import torch
 from torch import Tensor
 
-from warp_torchrl.system.device import reads_freely
+from warp_torchrl.system.device import needs_no_sync
 from warp_torchrl.world.arrays.constants import whole_numbers
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.state.state import Cover
@@ -48,7 +48,7 @@ def nearest_free(taken: Tensor, base: Tensor, n_agents: int) -> Tensor:
     """
     height, width = taken.shape[1:]
     side = 2 * n_agents
-    if side < min(height, width) and reads_freely(taken.device):  # most find theirs in a small square, ten times faster
+    if side < min(height, width) and needs_no_sync(taken.device):  # most are in a small square, ten times faster
         near = torch.where(base[:, None] == 0, 0, base[:, None] - side + 1)
         cells = torch.arange(side, device=taken.device)
         rows, columns = near[..., 0] + cells, near[..., 1] + cells

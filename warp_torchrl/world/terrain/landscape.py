@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from warp_torchrl.system.device import reads_freely
+from warp_torchrl.system.device import needs_no_sync
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.bytes import byte, equal
 from warp_torchrl.world.arrays.random import Stream, uniform
@@ -228,6 +228,6 @@ class Perlin:
 
 def _in_order_at(values: Tensor, ranks: list[int]) -> Tensor:
     """Return rows of numbers, float32 [B, n], sorted only as far as these ranks hold a sort's values."""
-    if not reads_freely(values.device):
+    if not needs_no_sync(values.device):
         return values.sort(dim=1).values
     return torch.from_numpy(np.partition(values.numpy(), ranks, axis=1))  # a quarter of the time of torch's sort

@@ -18,7 +18,7 @@ Files = dict[str, dict[str, Any]]
 
 
 class Unsound(Exception):  # noqa: N818
-    """A folder lacks a part, or was altered; the message is one line."""
+    """A folder without a part, or with an altered one; the message is one line."""
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -36,20 +36,20 @@ def read_json(path: Path) -> dict[str, Any]:
     return content
 
 
-def sealed(content: Mapping[str, Any]) -> bytes:
+def checksummed(content: Mapping[str, Any]) -> bytes:
     """Return the exact bytes of a JSON file with this content and its sha256."""
     digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()
     return json.dumps({**content, "sha256": digest}, indent=1).encode()
 
 
-def check_seal(path: Path, content: dict[str, Any]) -> None:
-    """Take the sha256 out of what a JSON file holds, and check that the file is what ``sealed`` makes of the rest.
+def check_checksum(path: Path, content: dict[str, Any]) -> None:
+    """Remove the sha256 from a JSON file's content, and check that ``checksummed`` gives the file's bytes.
 
     Raises:
         Unsound: If it is not.
     """
     content.pop("sha256", None)
-    if foreign.read_bytes(path, _LARGEST_JSON) != sealed(content):
+    if foreign.read_bytes(path, _LARGEST_JSON) != checksummed(content):
         raise Unsound(f"{path} was altered: its sha256 is not its own")
 
 
@@ -59,7 +59,7 @@ def described(folder: Path, names: Iterable[str]) -> Files:
 
 
 def checked_files(value: object) -> Files:
-    """Return what a manifest says of its files, where it is sizes and sha256 by name.
+    """Return a manifest's sizes and sha256 of files by name, checked.
 
     Raises:
         ValueError: If it is anything else.
