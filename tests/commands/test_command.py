@@ -6,6 +6,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -18,9 +19,11 @@ from warp_torchrl import load_policy, make_env
 from warp_torchrl.commands import checks as checks_module
 from warp_torchrl.commands import command as command_module
 from warp_torchrl.commands.command import evaluate, train
+from warp_torchrl.commands.queue import Queue
 from warp_torchrl.commands.sweep import SweepSummary
 from warp_torchrl.runs import checkpoint
 from warp_torchrl.system.lock import RunFolderLock
+from warp_torchrl.system.signals import Stopped
 from warp_torchrl.training.loop import Training
 
 ROOT = Path(__file__).parents[2]
@@ -478,12 +481,23 @@ def test_a_signal_anywhere_leaves_sound_checkpoints_and_the_way_on(
     assert (tmp_path / "run" / "evaluation.json").exists()
 
 
-@pytest.mark.stress
-def test_a_signal_ends_a_sweep(tmp_path, run_here, monkeypatch):
-    monkeypatch.setattr(Training, "_learn", signalled(Training._learn, signal.SIGTERM))
+@pytest.mark.parametrize(
+    ("number", "jobs"),
+    [(signal.SIGTERM, ["0"]), pytest.param(signal.SIGUSR2, ["0", "1"], marks=pytest.mark.stress)],
+)
+def test_a_signal_ends_a_sweep_and_a_queue_s_warning_its_job(tmp_path, run_here, monkeypatch, number, jobs):
+    def stopped(folder, config):
+        raise Stopped(number, folder)
+
+    def refuse(number, frame):
+        raise RuntimeError("timed-out too many times")
+
+    queue = Queue(signal.SIGUSR2, refuse)
+    monkeypatch.setattr(command_module, "_start", stopped)
+    monkeypatch.setattr(command_module, "queued", lambda: nullcontext(queue))
     code, *_ = run_here("train.py", *SHORT[:-1], "-m", "seed=0,1", "hydra.sweep.dir=sweep")
-    assert code == 128 + signal.SIGTERM
-    assert (tmp_path / "sweep" / "0" / "checkpoints" / "32").is_dir() and not (tmp_path / "sweep" / "1").exists()
+    assert code == 128 + number
+    assert [each.name for each in sorted((tmp_path / "sweep").iterdir()) if each.is_dir()] == jobs
 
 
 @pytest.mark.parametrize("more", [[], ["overwrite=true"]])

@@ -3,9 +3,12 @@
 import pytest
 import yaml
 
+from tests.runs.test_checkpoint import SIGNATURE
+from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
 from warp_torchrl.runs.config.construction import ConfigError
-from warp_torchrl.runs.resumption import _other_classes, edits, read_config
+from warp_torchrl.runs.config.saved_config import SavedConfig
+from warp_torchrl.runs.resumption import _other_classes, edits, read_config, resumption
 
 NOT_RECORDED = ("resume", "debug")
 
@@ -87,3 +90,22 @@ def test_what_is_no_configuration_is_refused_in_one_line(tmp_path, text):
         read_config(tmp_path / "config.yaml")
     assert "\n" not in str(error.value)
     assert read_config(tmp_path / "none.yaml") == {}
+
+
+def test_a_new_total_must_be_more_than_what_was_trained_and_the_former_one_is_none(tmp_path):
+    config = plain(compose_config("train", ["total_frames=64"]))
+    values = {key: value for key, value in without_targets(config).items() if key not in NOT_RECORDED}
+    record, path = SavedConfig(choices={}, values=values), tmp_path / "config.yaml"
+    path.write_text(text := yaml.safe_dump(config))
+    options = {"scenario": "skirmish", "signature": SIGNATURE, "policy": {}, "training": {}, "keep": 3}
+    checkpoints.save(tmp_path, frames=64, mode="sampled", record=record, **options)
+    assert resumption(tmp_path).total_before == 64, "its own total is reached, and it goes on to its evaluation"
+    told = "total_frames must be more than the 64 that .* has had, got 64"
+    with pytest.raises(ConfigError, match=told):
+        resumption(tmp_path, 64)
+    for total in (32, 96):
+        path.write_text(text.replace("total_frames: 64", f"total_frames: {total}"))
+        if total == 32:
+            with pytest.raises(ConfigError, match=told.replace("got 64", "got 32")):
+                resumption(tmp_path)
+    assert resumption(tmp_path).run_config.total_frames == 96

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import torch
 
+from warp_torchrl.algorithms import parallel
 from warp_torchrl.models import ACTION
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.checkpoint import CheckpointError, export, newest
@@ -20,6 +21,7 @@ from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import compose_config, conf_folder, plain, without_targets
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.runs.policies.load import policy_of
+from warp_torchrl.system import disk
 from warp_torchrl.system.signals import Stopped
 from warp_torchrl.training import loop
 from warp_torchrl.training.finite import NumericalFailure
@@ -545,3 +547,32 @@ def test_a_policy_acts_in_the_mode_that_reaches_more_of_what_its_team_is_for(mon
     for scenario, mode in (("skirmish", "sampled"), ("scouts", "sampled"), ("front", "deterministic")):
         plan = run_config(plain(compose_config("train", [f"scenario={scenario}", "evaluation.episodes=2"])))
         assert Training._better_mode(SimpleNamespace(run_config=plan, learner=SimpleNamespace(policy=None))) == mode
+
+
+def test_the_size_of_a_checkpoint_counts_what_every_process_has_of_its_own(tmp_path, monkeypatch):
+    training = tiny(tmp_path)
+    whole, own = disk.size(training.state_dict()), disk.size(training._own())
+    assert training._size() == whole > own > 0
+    monkeypatch.setattr(parallel, "size", lambda: 3)
+    assert training._size() == whole + 2 * own
+
+
+@pytest.mark.parametrize("had_ended", [False, True])
+def test_another_process_goes_on_with_its_own_worlds_or_with_new_ones(tmp_path, monkeypatch, had_ended):
+    training, theirs = tiny(tmp_path), tiny(tmp_path, "seed=5")
+    batches = theirs.batches()
+    for _ in range(2):
+        theirs._learn(next(batches))
+    saved = {**theirs.state_dict(), "others": None if had_ended else [{}, deepcopy(theirs._own())]}
+    for name, value in (("rank", 2), ("size", 3), ("share", saved)):
+        monkeypatch.setattr(parallel, name, lambda *given, value=value: value)
+    training.join()
+    assert training.frames == 64
+    for name, value in flattened(theirs.learner.loss.state_dict()).items():
+        assert torch.equal(training.learner.loss.state_dict()[name.removeprefix("/")], value)
+    if had_ended:  # a world has had one episode a step at most
+        assert training.env.state_dict()["episodes"].tolist() == [64 // 4 + 1] * 4, "of the next ones"
+        return
+    ours = flattened(training._own())
+    for name, value in flattened(theirs._own()).items():
+        assert torch.equal(ours[name], value) if isinstance(value, torch.Tensor) else ours[name] == value, name

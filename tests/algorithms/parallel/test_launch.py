@@ -1,12 +1,15 @@
 """The start of processes that learn together."""
 
+import subprocess
 import threading
+from types import SimpleNamespace
 
 import pytest
 import torch
 
 from tests.algorithms.parallel.other import addresses
 from warp_torchrl.algorithms import parallel
+from warp_torchrl.algorithms.parallel import launch, torchrun
 from warp_torchrl.algorithms.parallel.messages import MOST_BYTES, header, packed, unpacked
 from warp_torchrl.algorithms.parallel.sockets import Sockets, pairs
 
@@ -34,6 +37,33 @@ def test_a_process_that_ends_before_it_is_there_is_told_at_once():
 def test_one_process_starts_no_other():
     with parallel.processes(1, {}, "warp_torchrl.no_such_module"):
         assert parallel.size() == 1
+        untold = threading.Lock()  # cannot be packed, and need not be: there is nobody to be told
+        assert parallel.share(untold) is untold
+
+
+def test_those_that_have_ended_are_named_with_how(monkeypatch):
+    monkeypatch.setattr(launch, "_SECONDS_TO_BREAK", 0.2)
+    ends = ("kill -9 $$", "exit 3", "exit 0", "exec sleep 60")
+    others = [subprocess.Popen(["sh", "-c", each]) for each in ends]
+    for each in others[:3]:
+        each.wait()
+    told = launch._ended(others)
+    others[3].kill()
+    others[3].wait()
+    assert told == "a process of the run has ended: process 1 by signal 9, process 2 by exit code 3"
+
+
+def test_under_torchrun_messages_go_to_the_first_process(monkeypatch):
+    sent = {0: []}
+    fake = SimpleNamespace(
+        send=lambda tensor, to: sent[to].append(tensor),
+        recv=lambda place, rank: place.copy_(sent[0].pop(0)),
+    )
+    monkeypatch.setattr(torchrun, "dist", fake)
+    first, second = object.__new__(torchrun.Torchrun), object.__new__(torchrun.Torchrun)
+    (first.rank, first.size), (second.rank, second.size) = (0, 2), (1, 2)
+    assert second.gather(memoryview(b"from the second")) == []
+    assert [bytes(each) for each in first.gather(memoryview(b"own"))] == [b"own", b"from the second"]
 
 
 class Payload:

@@ -168,6 +168,15 @@ def test_the_critic_sees_where_fire_is_about_to_grow():
     assert seen["threat"].count_nonzero() == 8 and seen["threat"][4, 6] == 0.0
 
 
+def test_the_critic_sees_how_high_a_block_lies_over_the_mean_of_the_map():
+    # Rows of 32 cells at 500, 504 ... 624 m, of mean 562: blocks of two rows at 502, 510 ... 622.
+    slope = (500.0 + 4.0 * torch.arange(32.0))[:, None].expand(32, 32)
+    state, world = drawn([[5] * 32] * 32, [[0, 0]], elevation=slope)
+    seen = CriticState(world)(state, world.forecast(state))[0, STATE.index("elevation")]
+    expected = (502.0 + 8.0 * torch.arange(16.0) - 562.0) / 100.0
+    torch.testing.assert_close(seen, expected[:, None].expand(16, 16))
+
+
 @pytest.mark.parametrize("size", [16, 32, 20])
 def test_a_centred_picture_is_the_picture_seen_from_the_agent(size):
     cells = torch.full((size, size), 5)
