@@ -5,6 +5,7 @@ import pytest
 import torch
 
 from tests.conftest import small_world
+from tests.heuristics.drawing import chosen, scene
 from warp_torchrl import make_env
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation.play import play, play_heuristics
@@ -63,6 +64,20 @@ def test_heuristics_do_the_same_where_masks_are_off(make_small_env, name):
     assert (side_by_side["saved"] == without["saved"]).all()
 
 
+@pytest.mark.parametrize("name", HEURISTICS)
+def test_who_sees_all_alone_acts_on_a_fire_that_no_agent_sees(make_small_env, name):
+    env = make_small_env(16, small_world(sensing=Sight(radius=1), team=Team(n_agents=2, start="anywhere")))
+    env.reset()
+    state, vehicles = env.world_state, env.world_state.vehicles
+    trees = torch.full_like(state.cells, 5)
+    unseen = chebyshev_distance(vehicles.position, trees > 0).amin(dim=1) > 1
+    burns = unseen & (torch.rand(trees.shape, generator=torch.Generator().manual_seed(0)) < 0.5)
+    vehicles = vehicles.replace(acts=torch.ones_like(vehicles.acts))  # all have been at the fire
+    states = [state.replace(cells=each, vehicles=vehicles) for each in (trees, trees.masked_fill(burns, 11))]
+    acts = [HEURISTICS[name](env).choose(each, env.world.possible_actions(each)) for each in states]
+    assert torch.equal(*acts) != HEURISTICS[name].sees_all
+
+
 def test_fighters_put_out_a_fire_beside_them(make_small_env):
     env = make_small_env(1)
     now = env.reset()
@@ -117,6 +132,15 @@ def test_coordinated_agents_claim_different_fires():
     for world in range(8):
         assert len(set(index[world].tolist())) == 4
         assert (state.cells[world].flatten()[index[world]] > 10).all()
+
+
+@pytest.mark.parametrize(("west", "way"), [(9, "SOUTH_WEST"), (10, "SOUTH_EAST")])
+def test_a_second_agent_goes_up_to_six_cells_farther_to_a_fire_of_its_own(west, way):
+    # Both are 4 cells north of a fire; a second one is 3 east of that, as far away; a third is 9 or 10 west.
+    rows = [["T"] * 24 for _ in range(16)]
+    rows[8][14] = rows[8][17] = rows[12][14 - west] = "a"
+    env, state = scene(" ".join(map("".join, rows)), at=[(4, 14), (4, 14)])
+    assert chosen(env, state, "coordinated") == ["SOUTH", way]
 
 
 def one_fire(team, side=19, steps_per_tick=12, **options):
