@@ -8,7 +8,7 @@ from tests.world.rasters import LANDFIRE, needs_landfire, rasterio
 from warp_torchrl.evaluation import maps as maps_module
 from warp_torchrl.evaluation.maps import described, play_maps, write_maps
 from warp_torchrl.evaluation.play import play
-from warp_torchrl.heuristics import Coordinated, NoOp
+from warp_torchrl.heuristics import Coordinated, Dispatch, NoOp
 from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import compose_config, plain
 from warp_torchrl.world.terrain.fixed import Fixed
@@ -55,6 +55,17 @@ def test_the_maps_count_what_the_metrics_count(maps):
         episodes = play(env, policy, 2_000_000)
         trees = int((~maps.without.isnan()).sum())
         assert area == pytest.approx(0.09 * trees * (episodes["burned"] + episodes["burning"]), rel=1e-5)
+
+
+def test_what_a_team_clears_is_counted_as_the_metrics_count_it():
+    plan = plan_of("team.tank=0")
+    maps = play_maps(plan, Dispatch, "sampled", 4)
+    landscape = Fixed(source=plan.world.landscape, seed=2_000_000)
+    env = maps_module.replace(plan, world=maps_module.replace(plan.world, landscape=landscape)).make_env(4, 2_000_000)
+    cleared = play(env, Dispatch(env), 2_000_000)["cleared"]
+    trees = int((~maps.without.isnan()).sum())
+    assert maps.cleared == pytest.approx(0.09 * trees * cleared, rel=1e-5) and maps.cleared.max() > 0.0
+    assert maps.numbers()["cleared_ha"]["mean"] == pytest.approx(maps.cleared.mean())
 
 
 def test_only_cells_that_had_a_tree_have_a_probability(maps):

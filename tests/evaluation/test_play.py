@@ -8,6 +8,7 @@ import torch
 from tests.conftest import small_world
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.reward import Monitor
+from warp_torchrl.evaluation import play as play_module
 from warp_torchrl.evaluation.behaviour import BEHAVIOUR
 from warp_torchrl.evaluation.goal import goal
 from warp_torchrl.evaluation.play import BASELINES, WithoutAgent, baselines_of, play
@@ -86,6 +87,16 @@ def test_the_agent_left_out_stays_where_it_is(make_small_env):
         now = env.step(policy(now))["next"]
     after = env.world_state.vehicles.position
     assert (after[:, 0] == start[:, 0]).all() and (after[:, 1] != start[:, 1]).any()
+
+
+@pytest.mark.parametrize("fits_abreast", [True, False])
+def test_heuristics_play_side_by_side_while_their_cells_fit(make_small_env, monkeypatch, fits_abreast):
+    env, asked = make_small_env(3, small_world(horizon=4)), []
+    abreast = play_module.play_abreast
+    monkeypatch.setattr(play_module, "play_abreast", lambda *given: asked.append(given[2]) or abreast(*given))
+    monkeypatch.setattr(play_module, "_CELLS_ABREAST", 2 * 3 * 12 * 12 - (not fits_abreast))
+    play_module.play_heuristics(env, 5, ["noop", "greedy"])
+    assert asked == ([["noop", "greedy"]] if fits_abreast else [])
 
 
 def test_those_that_search_are_baselines_where_sight_is_limited():

@@ -44,6 +44,19 @@ def test_what_agencies_save_has_a_table_of_its_own():
     assert " 30.0 (2" in line
 
 
+def test_a_line_has_the_shares_saved_and_cleared_in_per_cent():
+    values = {
+        "saved": np.array([0.0, 0.5, 0.5, 0.6]),  # mean 0.4; the middle half's mean is 0.5
+        "success": np.array([0.0, 0.0, 1.0, 0.0]),
+        "control_time": np.full(4, 0.75),
+        "cleared": np.full(4, 0.0125),
+    }
+    lines = table(report("skirmish", "mine", 7, episodes(0.0) | values, {})).splitlines()
+    (line,) = (line for line in lines if line.startswith("mine "))
+    mean, _, _, _, iqm, success, control, cleared = line.split()[1:]
+    assert (mean, iqm, success, control, cleared) == ("40.0", "50.0", "25.0", "0.75", "1.25")
+
+
 def test_elsewhere_it_has_none():
     content = report("skirmish", "mine", 7, episodes(0.0), {"noop": episodes(0.0)})
     assert content["watching"] == {} and "watched" not in table(content) and "agency" not in table(content)

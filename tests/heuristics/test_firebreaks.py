@@ -40,6 +40,15 @@ def test_the_ring_is_the_first_that_is_closed_in_time(agents: int, step: int, di
     assert torch.equal(planned(env, state), square(distance))
 
 
+def test_the_ring_of_a_tall_map_is_that_of_the_same_map_lying_down() -> None:
+    rows = ["T" * 13, "a" + "T" * 12, "T" * 13, "T" * 13]
+    wide, tall = (
+        planned(*scene(" ".join(drawing), at=[place]))
+        for drawing, place in ((rows, (1, 2)), (map("".join, zip(*rows, strict=True)), (2, 1)))
+    )
+    assert torch.equal(wide, tall.T) and wide.any(dim=1).all() and wide.any(dim=0).sum() == 1
+
+
 def test_the_way_to_the_ring_takes_time() -> None:
     # Of four, one has 4 moves to the fire: 3 and 4 of 5 steps at 1, 2 and 8 of 10.9 at 2.
     env, state = scene(MEADOW, at=[(4, 3)] * 3 + [(0, 0)])

@@ -232,6 +232,15 @@ def test_an_act_that_fails_is_told_to_who_asked_for_it_and_the_page_goes_on(page
     assert is_well(page, browser)
 
 
+@pytest.mark.parametrize("button", ["Pause", "Step"])
+def test_a_match_stands_still_after_pause_and_after_a_step(page, browser, button):
+    one = browser()
+    one.press("Play")
+    until(lambda: page.playing)
+    one.press(button)
+    until(lambda: not page.playing)
+
+
 def test_keys_in_quick_order_are_done_in_that_order(page, browser):
     one, side = browser(), page.match.sides[0]
     one.press("Take over")

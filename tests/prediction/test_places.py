@@ -1,12 +1,14 @@
 """Predictions in metres of the ground, and what their report says of the files of the map."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from tests.world.rasters import rasterio
 from warp_torchrl.commands.predict import main
+from warp_torchrl.prediction.case import _check_cell_size
 
 warp = pytest.importorskip("rasterio.warp")
 SIDE = 61
@@ -62,3 +64,6 @@ def test_a_cell_size_that_is_not_the_map_s_is_refused(folder, capsys):
     onto = {"landscape.resolution": 20, "landscape.resample": "mode"}
     assert predicted(folder, cell_size=30, **onto) == (2, None)
     assert "cell_size must be that of the landscape, 20 m, or null, got 30" in capsys.readouterr().err
+    grid = SimpleNamespace(is_on_earth=True, is_placed=True, cell_size=20.0)
+    for rounded in (None, 19.92, 20.0, 20.08):  # by less than half a per cent
+        _check_cell_size(rounded, grid)

@@ -13,6 +13,7 @@ from tests.commands.hyperparameters.training import TOTAL, Quick
 from tests.runs.test_checkpoint import saved
 from warp_torchrl.commands.hyperparameters.search import Search, best_of, wait_until_free
 from warp_torchrl.commands.hyperparameters.storage import JOURNAL, open_study
+from warp_torchrl.runs import process
 from warp_torchrl.runs.checkpoint import newest
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.search_options import SearchOptions
@@ -279,6 +280,15 @@ def test_the_policies_alone_are_kept_of_trials_that_have_ended(tmp_path, keep):
     assert states(search) == ["COMPLETE", "COMPLETE", "PRUNED"]
     found = [newest(tmp_path / "trials" / str(number))[0] for number in range(3)]
     assert ["training.pt" in each.manifest.files for each in found] == [keep] * 3
+
+
+@pytest.mark.parametrize(("does", "code"), [("kill -9 $$", 128 + 9), ("exit 3", 3)])
+def test_a_training_that_a_signal_killed_has_the_exit_code_of_a_shell(tmp_path, monkeypatch, does, code):
+    line = ["sh", "-c", f"echo 'error: no room' >&2; {does}"]
+    monkeypatch.setattr(process, "command", lambda *given: line)
+    training = process.TrainingProcess([], tmp_path / "run", threads=None)
+    training._process.wait(10)
+    assert training.poll() == code and training.reason() == "no room"
 
 
 def test_a_folder_into_which_another_process_trains_is_waited_for(tmp_path):

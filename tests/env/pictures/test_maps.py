@@ -9,7 +9,7 @@ from PIL import Image
 
 pytest.importorskip("matplotlib", reason="maps are drawn with Matplotlib (extra figures)")
 
-from warp_torchrl.env.pictures.drawing import style
+from warp_torchrl.env.pictures.drawing import cover_image, hillshade, style
 from warp_torchrl.env.pictures.maps import Panel, draw_maps, save_maps, without_holes
 from warp_torchrl.world.state.state import Cover, Landscape
 
@@ -88,3 +88,11 @@ def test_every_number_of_maps_finds_its_place(count, tmp_path):
     titles = [axes.get_title() for axes in figure.axes]
     assert [f"map {number}" in titles for number in range(count)] == [True] * count
     assert "land cover and relief, 0 to 90 m" in titles
+
+
+def test_level_ground_has_the_colour_of_its_cover_and_a_slope_away_from_the_sun_is_darker():
+    cover = ground().cover[0]
+    plain, level = cover_image(cover), cover_image(cover, hillshade(torch.zeros(20, 30)))
+    torch.testing.assert_close(level, plain, rtol=0.01, atol=0.01)
+    falls_to_the_east = torch.linspace(900.0, 0.0, 30).expand(20, 30)
+    assert (cover_image(cover, hillshade(falls_to_the_east)) < 0.95 * plain).all()

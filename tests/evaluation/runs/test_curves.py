@@ -243,6 +243,20 @@ def test_forest_saved_has_a_row_for_each_scenario_and_its_own_minutes(tmp_path, 
     assert np.allclose(minutes, [[1, 20], [2, 50]])
 
 
+@pytest.mark.parametrize(
+    ("last", "drawn", "label"),
+    [
+        (1_999, 1_999, "world steps"),
+        (2_000, 2, "world steps [thousand]"),
+        (999_999, 999.999, "world steps [thousand]"),
+        (1_000_000, 1, "world steps [million]"),
+    ],
+)
+def test_steps_are_counted_in_units_that_are_read_easily(tmp_path, last, drawn, label):
+    factor, told = curves._steps(lines(write_metrics(tmp_path, (10, last))))
+    assert (factor * last, told) == (pytest.approx(drawn), label)
+
+
 def test_means_over_bins_are_said(tmp_path, matplotlib):
     frames = range(10, 9010, 10)
     run = write_run(tmp_path, frames=frames, columns={"train__loss": frames})

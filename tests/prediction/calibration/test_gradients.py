@@ -1,5 +1,6 @@
 """The loss that gradients go down: the mean of the fires, and the prior."""
 
+from statistics import NormalDist
 from types import SimpleNamespace
 
 import pytest
@@ -56,3 +57,16 @@ def test_the_gradient_is_that_of_the_loss_by_the_margins(slope, monkeypatch, los
             monkeypatch.setitem(FACTORS, "a", each)
             losses.append(slope("a", [0.0, 0.0], prior_weight=0.0, loss=loss)[0])
         assert (losses[0] - losses[1]) / 2e-3 == pytest.approx(float(gradient[place]), rel=2e-2, abs=1e-3)
+
+
+@pytest.mark.parametrize("loss", ["cross_entropy", "brier"])
+def test_the_curvature_is_what_is_expected_of_the_loss_s_where_cells_burn_by_their_chances(slope, loss):
+    # A cell's loss bends by x* as phi^2 / (p (1 - p)), Fisher's information of a Bernoulli trial, or 2 phi^2; over the
+    # two cells that burned. Parameters move x* by their slopes.
+    _, _, curvature = slope("a", [0.0, 0.0], prior_weight=0.0, softness=0.5, loss=loss)
+    bends = torch.zeros(2, 2)
+    for x, by in zip(FACTORS["a"].flatten().tolist(), SLOPES.flatten(1).T, strict=True):
+        chance, density = NormalDist(0.0, 0.5).cdf(-x), NormalDist(0.0, 0.5).pdf(x)
+        bend = 2.0 * density**2 if loss == "brier" else density**2 / (chance * (1.0 - chance))
+        bends += bend / 2 * torch.outer(by, by)
+    assert torch.allclose(curvature, bends, rtol=1e-4, atol=1e-5)

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from tests.prediction.calibration.ground import fire
-from warp_torchrl.prediction.calibration.parameters import fire_at, parameters_of
+from warp_torchrl.prediction.calibration.parameters import fire_at, parameter, parameters_of
 
 NAMES = ("rate_gain", "slope_gain", "fuel_gain.2", "moisture.bui", "cell_deviation")
 
@@ -14,6 +14,24 @@ def test_at_zero_the_law_is_as_it_was():
     law = fire_at(start, parameters_of(NAMES, start), torch.zeros(5))
     assert (law.rate_gain, law.fuel_gain[2], law.moisture["bui"]) == pytest.approx((1.3, 0.5, 60.0))
     assert law.moisture["ffmc"] == 86.0
+
+
+@pytest.mark.parametrize(
+    ("name", "usual"),
+    [
+        ("rate_gain", (0.2, 5.0, 0.3)),
+        ("fuel_gain.2", (0.2, 5.0, 0.3)),
+        ("moisture.ffmc", (50.0, 100.0, 3.0)),
+        ("moisture.bui", (1.0, 300.0, 20.0)),
+        ("moisture.dead_1h", (1.0, 60.0, 2.0)),
+        ("moisture.live_herbaceous", (30.0, 300.0, 30.0)),
+        ("moisture.live_woody", (30.0, 300.0, 30.0)),
+        ("cell_deviation", (0.02, 1.0, 0.5)),
+    ],
+)
+def test_bounds_and_priors_are_those_of_the_docs(name, usual):
+    made = parameter(name)
+    assert (made.low, made.high, made.scale) == usual
 
 
 def test_gains_move_by_their_logarithm_and_moistures_by_their_value():

@@ -1,6 +1,8 @@
 """Times of rows: three rows an hour apart in the forms in which weather comes, and what cannot be read in one way."""
 
 import logging
+from datetime import datetime
+from zoneinfo import ZoneInfo, available_timezones
 
 import pytest
 
@@ -77,6 +79,19 @@ HOURLY = {  # header, three rows an hour apart
 def test_rows_an_hour_apart_are_an_hour_apart_in_every_form(write, form, caplog):
     assert read_weather(write(*HOURLY[form])).hours.tolist() == [0, 1, 2]
     assert not caplog.records or form == "the newest above"
+
+
+ZONES = ("Europe/Lisbon", "Europe/London", "Europe/Berlin", "Europe/Athens", "Australia/Sydney", "Australia/Adelaide",
+         "Australia/Perth", "America/New_York", "America/Chicago", "America/Denver", "America/Los_Angeles",
+         "America/Anchorage", "America/St_Johns", "America/Halifax", "UTC")  # fmt: skip
+
+
+@pytest.mark.skipif(not available_timezones(), reason="this system has no time zones")
+@pytest.mark.parametrize("zone", ZONES)
+@pytest.mark.parametrize("month", [1, 7])
+def test_words_behind_a_time_are_those_of_their_zones(zone, month):
+    at = datetime(2024, month, 1, 12, tzinfo=ZoneInfo(zone))
+    assert read_stamp(f"2024-{month:02}-01 12:00 {at.tzname()}").offset == at.utcoffset().total_seconds() / 3600.0
 
 
 def test_a_month_first_year_is_not_a_day_first_one(write):
