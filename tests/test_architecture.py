@@ -15,7 +15,7 @@ FILES = {
     for path in PACKAGE.rglob("*.py")
 }
 MODULES = sorted(FILES)
-GROUND = ("content", "symmetry", "system", "validation")
+GROUND = ("entries", "system", "validation")
 """What knows nothing of ours but each other, and every floor may use."""
 FIRE_SCIENCE = ("world/behaviour", "world/weather")
 """What the world is built on: equations of fire and weather, which know torch alone."""

@@ -8,7 +8,7 @@ from torchrl.envs import TransformedEnv
 from tests.conftest import small_world
 from warp_torchrl.algorithms.held_batch import with_advantages
 from warp_torchrl.algorithms.ppo import Ppo
-from warp_torchrl.content import Empty, Follows, Quarters
+from warp_torchrl.entries import Empty, Follows, Quarters
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.models import CANONICAL_STATE, LOGITS, STATE, VALUE, Cnn, Entry, Mlp, signature
 from warp_torchrl.models.networks import LinearEncoder

@@ -12,13 +12,13 @@ import pytest
 import torch
 
 from tests.forgery import forge
+from warp_torchrl.entries import Planes, to_plain
 from warp_torchrl.models import Entry, Signature
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
 from warp_torchrl.runs.output import DRAFT
-from warp_torchrl.symmetry import Planes, to_plain
 
 ACTIONS = tuple(f"action_{code}" for code in range(11))
 SIGNATURE = Signature({"view": Entry((3, 5, 5), "uint8")}, Entry((9, 16, 16), "float32"), 2, ACTIONS, ("ugv", "uav"))

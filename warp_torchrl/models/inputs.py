@@ -5,6 +5,7 @@ from typing import Any
 
 from tensordict.nn import TensorDictModuleBase, TensorDictSequential
 
+from warp_torchrl.entries import TIME_LEFT, Vector
 from warp_torchrl.models.canonical import (
     CanonicalBatch,
     Canonicalise,
@@ -29,7 +30,6 @@ from warp_torchrl.models.signature import (
     observation_key,
 )
 from warp_torchrl.models.trust import Trust, told_to_trust
-from warp_torchrl.symmetry import TIME_LEFT, Vector
 
 
 class Inputs:

@@ -8,7 +8,7 @@ import torch
 from tensordict import TensorDictBase
 from torch import Tensor
 
-from warp_torchrl.content import Follows, Quarters
+from warp_torchrl.entries import Follows, Quarters
 from warp_torchrl.models.signature import Entry
 
 

@@ -6,8 +6,7 @@ from typing import NamedTuple
 from torchrl.data import TensorSpec
 from torchrl.envs import EnvBase, TransformedEnv
 
-from warp_torchrl.content import Content
-from warp_torchrl.symmetry import Symmetry
+from warp_torchrl.entries import Content, Symmetry
 
 ACTION = ("agents", "action")
 AGENCY = ("agents", "agency")

@@ -3,8 +3,8 @@
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 
+from warp_torchrl.entries import ADVICE, LARGEST_TEAM, TEAM_SIZE
 from warp_torchrl.models.signature import LOGITS, Key
-from warp_torchrl.symmetry import ADVICE, LARGEST_TEAM, TEAM_SIZE
 
 
 def told_to_trust(actions: tuple[str, ...]) -> list[str]:

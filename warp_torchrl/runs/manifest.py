@@ -11,11 +11,11 @@ import tensordict
 import torch
 import torchrl
 
+from warp_torchrl.entries import Symmetry, from_plain, to_plain
 from warp_torchrl.env.observation import DEFAULT, PICTURE, STATE, STATE_SYMMETRY, former_symmetry, renamed
 from warp_torchrl.env.observation.status import IDENTITY, STATUS
 from warp_torchrl.models import Entry, Signature
 from warp_torchrl.runs.config.compose import OPTION
-from warp_torchrl.symmetry import Symmetry, from_plain, to_plain
 from warp_torchrl.system.checksummed import (
     Files,
     Unsound,

@@ -4,12 +4,12 @@ import pytest
 import torch
 
 from warp_torchrl.api.make import make_env
+from warp_torchrl.entries import ADVICE
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.observation import Surroundings
 from warp_torchrl.heuristics import HEURISTICS, TEACHERS
 from warp_torchrl.models import signature
 from warp_torchrl.models.canonical.orientation import Orientation
-from warp_torchrl.symmetry import ADVICE
 from warp_torchrl.world.state.state import Action
 
 NAMES = tuple(f"{ADVICE}{action.name.lower()}" for action in Action)

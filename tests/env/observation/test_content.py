@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from tests.conftest import small_world
-from warp_torchrl.content import Empty, Follows, Quarters
+from warp_torchrl.entries import Empty, Follows, Quarters
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.observation import Local, Surroundings
 from warp_torchrl.world.air.wind import Wandering

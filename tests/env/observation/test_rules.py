@@ -6,6 +6,7 @@ import pytest
 import torch
 
 from warp_torchrl.api.make import make_env
+from warp_torchrl.entries import Vector
 from warp_torchrl.env.observation.rules import RULES, rules
 from warp_torchrl.models import signature
 
@@ -66,4 +67,4 @@ def test_rules_are_told_on_request_alone_and_do_not_turn():
         for asked in ("false", "true")
     )
     assert with_rules.names == (*without.names, *RULES.names)
-    assert with_rules.symmetry.parts == (*without.symmetry.parts, RULES) and RULES.kind == "scalar"
+    assert with_rules.symmetry == Vector((*without.symmetry.parts, RULES)) and RULES.kind == "scalar"

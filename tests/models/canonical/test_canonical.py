@@ -17,6 +17,7 @@ from warp_torchrl.algorithms.dqn import Dqn
 from warp_torchrl.algorithms.ppo import Ppo
 from warp_torchrl.algorithms.replay import ReplayMemory
 from warp_torchrl.algorithms.sac import Sac
+from warp_torchrl.entries import Part, Planes, Target, Vector
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.observation import DEFAULT, STATE_SYMMETRY, STATUS_SIZE, Local, Paper, Surroundings
 from warp_torchrl.heuristics import HEURISTICS
@@ -46,7 +47,6 @@ from warp_torchrl.models.canonical import (
 )
 from warp_torchrl.models.fitting import fitted
 from warp_torchrl.runs.policies.trained import TrainedPolicy
-from warp_torchrl.symmetry import Part, Planes, Target, Vector
 from warp_torchrl.world.air.wind import Uniform
 from warp_torchrl.world.arrays.geometry import DIRECTIONS
 from warp_torchrl.world.backends.tick import in_wind

@@ -10,12 +10,12 @@ from torchrl.envs import check_env_specs
 from tests.conftest import small_world
 from tests.world.drawing import draw, drawn
 from warp_torchrl import load_policy, make_env
+from warp_torchrl.entries import ADVICE
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.observation import STATE, Surroundings
 from warp_torchrl.env.observation.status import IDENTITY, STATUS
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION, OBSERVATION
-from warp_torchrl.symmetry import ADVICE
 from warp_torchrl.system.shipped import policy_names
 from warp_torchrl.world.state.role import ROLES, Role, add_role
 from warp_torchrl.world.team.abilities import ABILITIES, Ability, Deed, Situation, ability

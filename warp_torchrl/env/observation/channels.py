@@ -14,7 +14,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from warp_torchrl.content import Content, Empty, Follows
+from warp_torchrl.entries import Content, Empty, Follows
 from warp_torchrl.env.observation.look import Look
 from warp_torchrl.validation import check_new_name
 from warp_torchrl.world.arrays.bytes import byte, to_codes

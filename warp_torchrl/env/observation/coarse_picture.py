@@ -3,10 +3,9 @@
 import torch
 from torch import Tensor
 
-from warp_torchrl.content import Content, Empty
+from warp_torchrl.entries import Content, Empty, Planes, Target
 from warp_torchrl.env.observation.blocks import block_at, block_of
 from warp_torchrl.env.observation.channels import LAST_SEEN, OWN_LAND
-from warp_torchrl.symmetry import Planes, Target
 from warp_torchrl.world.arrays.blocks import block_means
 from warp_torchrl.world.arrays.squares import window
 from warp_torchrl.world.mechanics.agencies.agencies import land_of_each

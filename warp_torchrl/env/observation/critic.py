@@ -6,11 +6,10 @@ import torch
 from torch import Tensor
 from torch.nn.functional import one_hot
 
-from warp_torchrl.content import Content, Empty, Quarters
+from warp_torchrl.entries import Content, Empty, Quarters, TeamPlanes
 from warp_torchrl.env.observation.blocks import block_of
 from warp_torchrl.env.observation.channels import ELEVATION_SCALE, LAST_SEEN
 from warp_torchrl.env.observation.status import WIND_SCALE, steps_to_tick, time_left
-from warp_torchrl.symmetry import TeamPlanes
 from warp_torchrl.world.arrays.blocks import block_means
 from warp_torchrl.world.fires.reach import distance_from_fire
 from warp_torchrl.world.mechanics.agencies.agencies import land_of_each

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from warp_torchrl.content import Content
+from warp_torchrl.entries import Content, Planes, Target, Vector
 from warp_torchrl.env.observation.advice import check_adviser, check_may_advise
 from warp_torchrl.env.observation.channels import CHANNELS, DEFAULT, FIRE, ages, check_channels, stages
 from warp_torchrl.env.observation.coarse_picture import (
@@ -25,7 +25,6 @@ from warp_torchrl.env.observation.coarse_picture import (
 from warp_torchrl.env.observation.critic import CriticState
 from warp_torchrl.env.observation.status import IDENTITY, STATUS, STATUS_SIZE, Told, status_entries, status_vector
 from warp_torchrl.env.observation.view import egocentric_view
-from warp_torchrl.symmetry import Planes, Target, Vector
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.squares import window
 from warp_torchrl.world.mechanics.sensing.records import read

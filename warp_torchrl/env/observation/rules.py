@@ -5,7 +5,7 @@ import math
 import torch
 from torch import Tensor
 
-from warp_torchrl.symmetry import LARGEST_TEAM, TEAM_SIZE, Part
+from warp_torchrl.entries import LARGEST_TEAM, TEAM_SIZE, Part
 from warp_torchrl.world.state.state import FIRST_FIRE
 from warp_torchrl.world.world import World
 

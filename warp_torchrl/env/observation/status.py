@@ -7,10 +7,10 @@ import torch
 from torch import Tensor
 from torch.nn.functional import one_hot
 
+from warp_torchrl.entries import ADVICE, LAST, TIME_LEFT, Part, Vector
 from warp_torchrl.env.observation.advice import advised_actions
 from warp_torchrl.env.observation.rules import RULES, rules
 from warp_torchrl.env.observation.water import WATER, way_to_water
-from warp_torchrl.symmetry import ADVICE, LAST, TIME_LEFT, Part, Vector
 from warp_torchrl.world.state.role import PAPER_ROLES
 from warp_torchrl.world.state.state import Action, WorldState
 from warp_torchrl.world.team.flight import wind_at

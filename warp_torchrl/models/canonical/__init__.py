@@ -1,6 +1,6 @@
 """Canonical inputs: one of the eight symmetries of the square turns agents' observations before networks read them.
 
-``orientation`` is the group, ``entries`` and ``state`` turn what an observation declares in ``warp_torchrl.symmetry``,
+``orientation`` is the group, ``entries`` and ``state`` turn what an observation declares in ``warp_torchrl.entries``,
 ``modules`` is the sequence of canonicalise, network and restore, ``batch`` is what is learnt from.
 """
 

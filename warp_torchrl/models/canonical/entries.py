@@ -11,8 +11,8 @@ from collections.abc import Mapping
 import torch
 from torch import Tensor
 
+from warp_torchrl.entries import Part, Planes, Target, Vector
 from warp_torchrl.models.canonical.orientation import Orientation, orientation_to
-from warp_torchrl.symmetry import Part, Planes, Target, Vector
 from warp_torchrl.system.modes import kept
 
 Symmetries = Mapping[str, Planes | Vector]

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from tensordict import TensorDictBase
 from tensordict.nn import ProbabilisticTensorDictSequential, TensorDictModuleBase, TensorDictSequential
 
+from warp_torchrl.entries import Planes, TeamPlanes, Vector
 from warp_torchrl.models.canonical.entries import Symmetries, orientation_of, place_of, targets, turned
 from warp_torchrl.models.canonical.orientation import Orientation
 from warp_torchrl.models.canonical.state import canonical_state
@@ -20,7 +21,6 @@ from warp_torchrl.models.signature import (
     canonical_key,
     observation_key,
 )
-from warp_torchrl.symmetry import Planes, TeamPlanes, Vector
 
 
 class Canonicalise(TensorDictModuleBase):

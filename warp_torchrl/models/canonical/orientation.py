@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from warp_torchrl.symmetry import ADVICE, COMPASS, LAST
+from warp_torchrl.entries import ADVICE, COMPASS, LAST
 from warp_torchrl.system.modes import kept
 
 _SYMMETRIES = 8

@@ -3,9 +3,9 @@
 import torch
 from torch import Tensor
 
+from warp_torchrl.entries import TeamPlanes
 from warp_torchrl.models.canonical.entries import pull_from
 from warp_torchrl.models.canonical.orientation import Orientation, cells, orientation_to
-from warp_torchrl.symmetry import TeamPlanes
 
 _NEAR = 0.5
 """Distance that is added to that of a target [cells of the state]."""

@@ -1,12 +1,17 @@
-"""Symmetry of the entries of an observation: their change when the map is turned, declared for networks.
+"""Entries of an observation: their change when the map is turned, and their possible content; networks read both.
 
 A square map has eight symmetries: it may be mirrored north to south, east to west, and along its diagonal (the
 dihedral group D4). The laws of fire and of the team are the same on all eight. Networks may therefore read each
 observation in one canonical orientation (``warp_torchrl.models.canonical``), for which every entry must say what a
-symmetry does to it. What is declared here is plain data, and a checkpoint's manifest keeps it.
+symmetry does to it. A checkpoint's manifest keeps what is declared of that.
+
+What a plane can hold follows from the rules of the world, never from what was seen: a team without aircraft has none on
+its map, and flat ground shows no heights. Networks leave a plane out of products where it cannot differ. It is no part
+of a checkpoint: weights for all planes are kept.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from math import isqrt, prod
 from typing import Any, NamedTuple
 
@@ -86,14 +91,24 @@ class Part(NamedTuple):
     names: tuple[str, ...]
 
 
-class Vector(NamedTuple):
+@dataclass(frozen=True)
+class Vector:
     """A vector [F] of parts.
 
     Attributes:
-        parts: In order.
+        parts: In order; neighbours of scalars are one part, so that vectors that turn alike are equal.
     """
 
     parts: tuple[Part, ...]
+
+    def __post_init__(self) -> None:
+        joined: list[Part] = []
+        for part in self.parts:
+            if joined and part.kind == joined[-1].kind == "scalar":
+                joined[-1] = Part("scalar", (*joined[-1].names, *part.names))
+            else:
+                joined.append(part)
+        object.__setattr__(self, "parts", tuple(joined))
 
     def fits(self, shape: tuple[int, ...]) -> bool:
         """Return whether an entry of one agent can be of this kind."""
@@ -145,11 +160,11 @@ Symmetry = Planes | Vector | TeamPlanes
 
 def to_plain(symmetry: Symmetry) -> dict[str, Any]:
     """Return a symmetry as a manifest keeps it."""
+    if isinstance(symmetry, Vector):
+        return {"kind": "Vector", "parts": [part._asdict() for part in symmetry.parts]}
     plain = symmetry._asdict()
     if isinstance(symmetry, Planes) and symmetry.target is not None:
         plain["target"] = symmetry.target._asdict()
-    if isinstance(symmetry, Vector):
-        plain["parts"] = [part._asdict() for part in symmetry.parts]
     return {"kind": type(symmetry).__name__, **plain}
 
 
@@ -170,3 +185,32 @@ def from_plain(plain: Mapping[str, Any]) -> Symmetry:
         first, count = plain["agents"]
         return TeamPlanes(int(plain["channels"]), int(plain["target"]), (int(first), int(count)))
     raise ValueError(f"kind must be Planes, Vector or TeamPlanes, got {kind!r}")
+
+
+@dataclass(frozen=True)
+class Empty:
+    """A plane that is 0 everywhere."""
+
+
+@dataclass(frozen=True)
+class Quarters:
+    """A plane that has one number in each of its four quarters."""
+
+
+@dataclass(frozen=True)
+class Follows:
+    """A plane that another one tells: offset + factor x that plane, cell by cell.
+
+    Attributes:
+        of: Index of the other plane, which may hold anything.
+        factor: In the entry's own numbers.
+        offset: In the entry's own numbers.
+    """
+
+    of: int
+    factor: float
+    offset: float
+
+
+Content = Empty | Quarters | Follows | None
+"""What a plane can hold; None, anything."""

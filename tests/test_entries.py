@@ -5,8 +5,8 @@ import json
 import pytest
 
 from tests.conftest import small_world
+from warp_torchrl.entries import Part, Planes, Target, TeamPlanes, Vector, from_plain, to_plain
 from warp_torchrl.env.observation import STATE, STATE_SIDE, STATE_SYMMETRY, Local, Paper, Surroundings, former_symmetry
-from warp_torchrl.symmetry import Part, Planes, Target, TeamPlanes, Vector, from_plain, to_plain
 
 PRESETS = [Surroundings(), Surroundings(centred=False, identity=False), Local(channels=("age", "threat")), Paper()]
 SPACES = [(name, space) for preset in PRESETS for name, space in preset.spaces(small_world()).items()]
@@ -57,3 +57,11 @@ def test_a_symmetry_fits_entries_of_its_shape(symmetry, shape, fits):
 def test_the_place_of_an_agent_is_found_among_the_parts():
     parts = (Part("scalar", ("a", "b")), Part("place", ("row", "column")), Part("scalar", ("c",)))
     assert Vector(parts).place() == slice(2, 4) and Vector(parts[:1]).place() is None
+
+
+def test_vectors_that_turn_alike_are_equal():
+    tank, battery = Part("scalar", ("tank",)), Part("scalar", ("battery",))
+    wind = Part("vector", ("east", "north"))
+    joined = Vector((wind, Part("scalar", ("tank", "battery")), wind))
+    assert Vector((wind, tank, battery, wind)) == joined and joined.parts[1].names == ("tank", "battery")
+    assert len(Vector((wind, wind)).parts) == 2
