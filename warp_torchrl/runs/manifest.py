@@ -11,9 +11,9 @@ import tensordict
 import torch
 import torchrl
 
-from warp_torchrl.entries import Symmetry, from_plain, to_plain
+from warp_torchrl.entries import Symmetry, Vector, from_plain, to_plain
 from warp_torchrl.env.observation import DEFAULT, PICTURE, STATE, STATE_SYMMETRY, former_symmetry, renamed
-from warp_torchrl.env.observation.status import IDENTITY, STATUS
+from warp_torchrl.env.observation.former import FORMER_STATUS, FORMER_STATUS_AND_IDENTITY
 from warp_torchrl.models import Entry, Signature
 from warp_torchrl.runs.config.compose import OPTION
 from warp_torchrl.system.checksummed import (
@@ -41,7 +41,7 @@ _FILES = ("policy.pt", TRAINING, "config.json")
 _FORMER_NAMES = {
     "view": (DEFAULT,),
     "picture": (PICTURE,),
-    "status": (STATUS.names, (*STATUS.names, *IDENTITY.names)),
+    "status": tuple(Vector(parts).names for parts in (FORMER_STATUS, FORMER_STATUS_AND_IDENTITY)),
     "state": (STATE,),
 }
 _FORMER_ACTIONS = tuple(action.name.lower() for action in Action)

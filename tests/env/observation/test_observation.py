@@ -35,6 +35,10 @@ def drawn(cells, positions, *, elevation=None, roles=("ugv",), wind=None, cover=
     return state, world
 
 
+def own(state, world):
+    return status_vector(state, world, world.forecast(state))
+
+
 def channel(view, name):
     return view[0, 0, DEFAULT.index(name)]
 
@@ -113,7 +117,7 @@ def test_elevation_is_relative_to_the_agent():
 
 def test_an_agent_knows_its_place_the_time_and_the_wind():
     state, world = drawn([[5] * 5] * 5, [[4, 0]])
-    row, column, time_left, east, north, to_tick, tank, has_tank = status_vector(state, world)[0, 0, :8].tolist()
+    row, column, time_left, east, north, to_tick, tank, has_tank = own(state, world)[0, 0, :8].tolist()
     assert (row, column, time_left, to_tick) == (1.0, 0.0, 1.0, 1.0)
     assert (east, north) == pytest.approx((0.5, 0.0), abs=1e-6)  # 10 of 20 m/s
     assert (tank, has_tank) == (1.0, 0.0)
@@ -124,14 +128,14 @@ def test_an_agent_knows_the_wind_of_its_own_cell():
     row, column = torch.meshgrid(torch.arange(5.0), torch.arange(6.0), indexing="ij")
     state, world = drawn([[5] * 6] * 5, [[4, 0], [1, 5], [2, 3]])
     state = in_wind(state, world.fire, torch.stack((column, 2.0 * row))[None])
-    wind = status_vector(state, world)[0, :, 3:5] * 20.0
+    wind = own(state, world)[0, :, 3:5] * 20.0
     torch.testing.assert_close(wind, torch.tensor([[0.0, 8.0], [5.0, 2.0], [3.0, 4.0]]))
 
 
 def test_the_last_action_is_remembered():
     state, world = drawn([[5] * 5] * 5, [[4, 0]])
-    before = status_vector(state, world)[0, 0, -11:]
-    after = status_vector(world.step(state, torch.tensor([[8]])).after, world)[0, 0, -11:]
+    before = own(state, world)[0, 0, -11:]
+    after = own(world.step(state, torch.tensor([[8]])).after, world)[0, 0, -11:]
     assert before.sum() == 0 and after.tolist() == [0] * 8 + [1, 0, 0]
 
 

@@ -7,7 +7,7 @@ import torch
 
 from warp_torchrl.api.make import make_env
 from warp_torchrl.entries import Vector
-from warp_torchrl.env.observation.rules import RULES, rules
+from warp_torchrl.env.observation.rules import RULES, rules_of
 from warp_torchrl.models import signature
 
 FIRST = len(RULES.names)
@@ -17,7 +17,7 @@ def told(scenario, *overrides):
     env = make_env(scenario, n_worlds=2, overrides=["observation.rules=true", *overrides])
     own = env.reset()["agents", "observation", "status"]
     assert env.channel_names["status"][-FIRST:] == RULES.names
-    assert torch.equal(own[:, :, -FIRST:], rules(env.world, env.device).expand(2, -1, -1))
+    assert torch.equal(own[:, :, -FIRST:], rules_of(env.world, env.device).expand(2, -1, -1))
     return [dict(zip(RULES.names, each, strict=True)) for each in own[0, :, -FIRST:].tolist()]
 
 

@@ -19,7 +19,7 @@ from warp_torchrl.algorithms.replay import ReplayMemory
 from warp_torchrl.algorithms.sac import Sac
 from warp_torchrl.entries import Part, Planes, Target, Vector
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.env.observation import DEFAULT, STATE_SYMMETRY, STATUS_SIZE, Local, Paper, Surroundings
+from warp_torchrl.env.observation import DEFAULT, STATE_SYMMETRY, Local, Paper, Surroundings
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import (
     ACTION,
@@ -494,7 +494,7 @@ def test_a_tie_is_a_tie_in_any_batch():
     declared = symmetries(PRESETS["whole map"])
     entries = {
         "picture": picture,
-        "status": torch.full((1000, 1, STATUS_SIZE), 3.5 / 8),
+        "status": torch.full((1000, 1, len(declared["status"].names)), 3.5 / 8),
         "view": torch.zeros(1000, 1, len(DEFAULT), 11, 11, dtype=torch.uint8),
     }
     for n_worlds in (1, 7, 1000):

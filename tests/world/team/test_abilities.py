@@ -13,7 +13,6 @@ from warp_torchrl import load_policy, make_env
 from warp_torchrl.entries import ADVICE
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.observation import STATE, Surroundings
-from warp_torchrl.env.observation.status import IDENTITY, STATUS
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION, OBSERVATION
 from warp_torchrl.system.shipped import policy_names
@@ -111,8 +110,7 @@ def test_a_team_s_own_roles_and_actions_come_last_in_self(allow_stay: bool) -> N
     env = WildfireEnv(small_world(team=crew), observation=Surroundings(identity=True), n_worlds=2)
     names = env.channel_names["status"]
     assert names == (
-        *STATUS.names,
-        *IDENTITY.names,
+        *WildfireEnv(small_world(), observation=Surroundings(identity=True)).channel_names["status"],
         "role_sprinkler",
         "last_sprinkle",
         "last_jump_south_east",

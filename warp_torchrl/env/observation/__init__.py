@@ -3,6 +3,7 @@
 from warp_torchrl.env.observation.channels import CHANNELS, DEFAULT, ELEVATION_SCALE, channel
 from warp_torchrl.env.observation.coarse_picture import PICTURE, PICTURE_SIDE, picture
 from warp_torchrl.env.observation.critic import STATE, STATE_SIDE, STATE_SYMMETRY, CriticState
+from warp_torchrl.env.observation.features import Choice, Context
 from warp_torchrl.env.observation.former import renamed, with_renamed
 from warp_torchrl.env.observation.look import Look
 from warp_torchrl.env.observation.presets import (
@@ -16,7 +17,7 @@ from warp_torchrl.env.observation.presets import (
     former_symmetry,
     searched_for,
 )
-from warp_torchrl.env.observation.status import STATUS_SIZE, WIND_SCALE, status_vector
+from warp_torchrl.env.observation.status import STATUS, WIND_SCALE, number, status_vector
 from warp_torchrl.env.observation.view import egocentric_view
 
 __all__ = [
@@ -29,8 +30,10 @@ __all__ = [
     "STATE",
     "STATE_SIDE",
     "STATE_SYMMETRY",
-    "STATUS_SIZE",
+    "STATUS",
     "WIND_SCALE",
+    "Choice",
+    "Context",
     "CriticState",
     "Local",
     "Look",
@@ -42,6 +45,7 @@ __all__ = [
     "critic_state",
     "egocentric_view",
     "former_symmetry",
+    "number",
     "picture",
     "renamed",
     "searched_for",

@@ -1,11 +1,24 @@
-"""Renamed entries of saved files: old names, and the present ones."""
+"""Entries of saved files of former versions: renamed ones, and a ``status`` without names."""
 
 import re
 from collections.abc import Mapping
 from typing import Any
 
+from warp_torchrl.env.observation.status import STATUS
+from warp_torchrl.world.world import World
+
 _SELF = re.compile(r"(^|[./])((?:canonical_(?:sent_)?)?)self(?=$|[./])")
 """``status`` was once called ``self``, also where it lies in canonical orientation, or late with the radio."""
+
+
+FORMER_STATUS = tuple(
+    part
+    for name in ("place", "clock", "wind", "next_tick", "tank", "has_tank", "may_refill", "role", "last_action")
+    for part in STATUS[name].parts(World())
+)
+"""Numbers of ``status`` in manifests that do not name them."""
+FORMER_STATUS_AND_IDENTITY = (*FORMER_STATUS, *STATUS["identity"].parts(World()))
+"""The same of teams that are told their places."""
 
 
 def renamed(name: str) -> str:

@@ -5,7 +5,8 @@ Its ``spaces`` tell the environment the shape, type and range of each entry, and
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cached_property
+from typing import ClassVar, NamedTuple
 
 import torch
 from torch import Tensor
@@ -23,7 +24,9 @@ from warp_torchrl.env.observation.coarse_picture import (
     picture_symmetry,
 )
 from warp_torchrl.env.observation.critic import CriticState
-from warp_torchrl.env.observation.status import IDENTITY, STATUS, STATUS_SIZE, Told, status_entries, status_vector
+from warp_torchrl.env.observation.features import Choice, Features, check_features, parts_of
+from warp_torchrl.env.observation.former import FORMER_STATUS, FORMER_STATUS_AND_IDENTITY
+from warp_torchrl.env.observation.status import STATUS, status_vector
 from warp_torchrl.env.observation.view import egocentric_view
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.squares import window
@@ -55,23 +58,25 @@ class Local:
     """What an agent sees of its own surroundings, and nothing else.
 
     ``view`` is the square of 2 r + 1 cells about the agent, north up, uint8, in channels that are chosen by name from
-    ``observation.channels.CHANNELS``. ``status`` is what it knows of itself, see ``status_entries``.
+    ``observation.channels.CHANNELS``. ``status`` is what it knows of itself: numbers of ``observation.status.STATUS``.
 
     Attributes:
         radius: r [cells].
         identity: Whether ``status`` tells the agent's place in its team, see ``identity``: agents that stand together
             and see the same can then part.
-        rules: Whether ``status`` tells the rules of the world, see ``rules``: one policy can then play by several.
+        rules: Whether ``status`` tells the rules of the world, see ``rules_of``: one policy can then play by several.
         water: Whether ``status`` tells the way to the nearest water, see ``way_to_water``: else agents whose tanks are
             empty know of lakes within their view alone.
         advice: Name of a heuristic, one of ``TEACHERS``, that tells each agent, in ``status``, the action that it would
             choose for it, see ``advised_actions``: agents may do otherwise; None has no adviser.
         reach: Whether the central critic's ``state`` tells how soon fire and team can be where, see
             ``critic.reach_of_fire_and_team``: else it cannot tell a closed firebreak from one that lacks a cell.
+        features: Names of further numbers of ``status`` and planes of the critic's ``state``, in order, that modules of
+            a user's own add.
         channels: Names of the view's channels, in order.
 
     Raises:
-        ValueError: If the radius is not in 1..32, or a channel or the adviser is unknown.
+        ValueError: If the radius is not in 1..32, or a channel, a feature or the adviser is unknown.
     """
 
     radius: int = 5
@@ -80,11 +85,15 @@ class Local:
     water: bool = False
     advice: str | None = None
     reach: bool = False
+    features: tuple[str, ...] = ()
     channels: tuple[str, ...] = DEFAULT
+    tables: ClassVar[tuple[Features, ...]] = (STATUS,)
+    """Of features that may be chosen."""
 
     def __post_init__(self) -> None:
         check_fields(self, radius=(1, 32))
         check_channels(self.channels)
+        check_features(self.features, self.tables)
         if self.advice is not None:
             check_adviser(self.advice)
 
@@ -93,7 +102,8 @@ class Local:
         side, highs = 2 * self.radius + 1, tuple(CHANNELS[name].high for name in self.channels)
         if self.advice is not None:
             check_may_advise(self.advice, world)
-        own, content = status_entries(world, self.told), self._contents(view_content(self.channels, world))
+        own = Vector(parts_of(STATUS.shown(world, self.choice), world))
+        content = self._contents(view_content(self.channels, world))
         symmetry = view_symmetry(self.channels)
         return {
             "view": Space((len(highs), side, side), torch.uint8, 0, highs, self.channels, symmetry, content),
@@ -102,13 +112,20 @@ class Local:
 
     def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
         """Return ``view`` uint8 [B, A, C, V, V] and ``status`` float32 [B, A, F]."""
-        own = status_vector(state, world, self.told)
+        own = status_vector(state, world, forecast, self.choice)
         return {"view": egocentric_view(state, world, forecast, self.radius, self.channels), "status": own}
 
-    @property
-    def told(self) -> Told:
-        """Return what ``status`` tells beside what it tells every agent."""
-        return Told(identity=self.identity, rules=self.rules, water=self.water, advice=self.advice)
+    @cached_property
+    def choice(self) -> Choice:
+        """Return what is shown beside what every observation shows."""
+        return Choice(
+            identity=self.identity,
+            rules=self.rules,
+            water=self.water,
+            advice=self.advice or "",
+            reach=self.reach,
+            features=self.features,
+        )
 
     def _contents(self, content: tuple[Content, ...]) -> tuple[Content, ...]:
         """Return what is told of channels; nothing for a subclass that shows them in a way of its own."""
@@ -216,10 +233,11 @@ def view_content(channels: Sequence[str], world: World) -> tuple[Content, ...]:
 
 def former_symmetry(name: str, shape: tuple[int, ...], names: tuple[str, ...]) -> Planes | Vector | None:
     """Return how an entry of a preset turns, for manifests that do not tell it; None for an entry of no preset."""
+    former = Vector(FORMER_STATUS)
     of_presets: dict[str, Planes | Vector] = {
         "": PAPER_SYMMETRY,
         "view": view_symmetry(names),
-        "status": STATUS if shape == (STATUS_SIZE,) else Vector((*STATUS.parts, IDENTITY)),
+        "status": former if former.fits(shape) else Vector(FORMER_STATUS_AND_IDENTITY),
         "picture": picture_symmetry(centred=shape[-1] != PICTURE_SIDE),
     }
     found = of_presets.get(name)

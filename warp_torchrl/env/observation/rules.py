@@ -13,10 +13,10 @@ RULES = Part(
     "scalar",
     ("rule_ticks", "rule_burning", "rule_wet", "rule_horizon", "rule_tank", "rule_stride", TEAM_SIZE, "rule_map"),
 )
-"""Entries of ``status`` that tell the rules, see ``rules``."""
+"""Entries of ``status`` that tell the rules, see ``rules_of``."""
 
 
-def rules(world: World, device: torch.device) -> Tensor:
+def rules_of(world: World, device: torch.device) -> Tensor:
     """Return what each agent is told of the rules, float32 [A, 8], numbers in 0..1 in all scenarios.
 
     They are the ticks of the fire a step, 1 / ``steps_per_tick``; the steps for which a cell spreads fire and those for
