@@ -6,13 +6,14 @@ import pytest
 
 from tests.conftest import small_world
 from warp_torchrl.entries import Part, Planes, Target, TeamPlanes, Vector, from_plain, to_plain
-from warp_torchrl.env.observation import STATE, STATE_SIDE, STATE_SYMMETRY, Local, Paper, Surroundings, former_symmetry
+from warp_torchrl.env.observation import STATE_SIDE, CriticState, Local, Paper, Surroundings, former_symmetry
 
+STATE = CriticState(small_world())
 PRESETS = [Surroundings(), Surroundings(centred=False, identity=False), Local(channels=("age", "threat")), Paper()]
 SPACES = [(name, space) for preset in PRESETS for name, space in preset.spaces(small_world()).items()]
 
 
-@pytest.mark.parametrize("symmetry", [*(space.symmetry for _, space in SPACES), STATE_SYMMETRY], ids=repr)
+@pytest.mark.parametrize("symmetry", [*(space.symmetry for _, space in SPACES), STATE.symmetry], ids=repr)
 def test_what_is_declared_is_read_back_from_json(symmetry):
     assert from_plain(json.loads(json.dumps(to_plain(symmetry)))) == symmetry
 
@@ -43,7 +44,7 @@ def test_entries_of_presets_in_manifests_that_do_not_tell_turn_as_they_do_now(na
         (Vector((Part("place", ("row", "column")), Part("scalar", ("tank",)))), (4,), False),
         (Vector((Part("vector", ("east", "north", "up")),)), (3,), False),
         (Vector((Part("spin", ("up",)),)), (1,), False),
-        (STATE_SYMMETRY, (len(STATE), STATE_SIDE, STATE_SIDE), True),
+        (STATE.symmetry, (len(STATE.names), STATE_SIDE, STATE_SIDE), True),
         (TeamPlanes(8, 7, (4, 2)), (8, 16, 16), False),
         (TeamPlanes(8, 0, (7, 2)), (8, 16, 16), False),
         (TeamPlanes(8, 0, (4, 2)), (8, 15, 15), False),

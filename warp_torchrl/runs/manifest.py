@@ -12,8 +12,8 @@ import torch
 import torchrl
 
 from warp_torchrl.entries import Symmetry, Vector, from_plain, to_plain
-from warp_torchrl.env.observation import DEFAULT, PICTURE, STATE, STATE_SYMMETRY, former_symmetry, renamed
-from warp_torchrl.env.observation.former import FORMER_STATUS, FORMER_STATUS_AND_IDENTITY
+from warp_torchrl.env.observation import DEFAULT, former_symmetry, renamed
+from warp_torchrl.env.observation.former import FORMER_STATE, FORMER_STATUS, FORMER_STATUS_AND_IDENTITY
 from warp_torchrl.models import Entry, Signature
 from warp_torchrl.runs.config.compose import OPTION
 from warp_torchrl.system.checksummed import (
@@ -40,9 +40,9 @@ POLICY = ("policy.pt", "config.json")
 _FILES = ("policy.pt", TRAINING, "config.json")
 _FORMER_NAMES = {
     "view": (DEFAULT,),
-    "picture": (PICTURE,),
+    "picture": (("fire", "fuel", "team_mates"),),
     "status": tuple(Vector(parts).names for parts in (FORMER_STATUS, FORMER_STATUS_AND_IDENTITY)),
-    "state": (STATE,),
+    "state": (FORMER_STATE.names,),
 }
 _FORMER_ACTIONS = tuple(action.name.lower() for action in Action)
 """Channels and actions of manifests without names; one entry had two lengths."""
@@ -175,7 +175,9 @@ def _signature_from_json(content: dict[str, Any]) -> Signature:
 
     observed = {renamed(str(name)): node for name, node in content["observation"].items()}
     observation = {name: entry(name, node, partial(former_symmetry, name)) for name, node in observed.items()}
-    state = entry("state", content["state"], lambda shape, _: STATE_SYMMETRY if STATE_SYMMETRY.fits(shape) else None)
+    state = entry(
+        "state", content["state"], lambda shape, _: FORMER_STATE.symmetry if FORMER_STATE.symmetry.fits(shape) else None
+    )
     actions = tuple(str(name) for name in content.get("actions", _FORMER_ACTIONS[: int(content["n_actions"])]))
     roles = tuple(str(name) for name in content.get("roles", PAPER_ROLES))
     agencies = tuple(str(name) for name in content.get("agencies", ()))

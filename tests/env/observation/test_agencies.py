@@ -5,12 +5,12 @@ import torch
 
 from tests.conftest import small_world
 from warp_torchrl.env.observation import CriticState, Local, Surroundings
-from warp_torchrl.env.observation.channels import DEFAULT, OWN_LAND
+from warp_torchrl.env.observation.channels import DEFAULT
 from warp_torchrl.world.mechanics.agencies.agencies import SeveralAgencies
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
 
-CHANNELS = (*DEFAULT, OWN_LAND)
+CHANNELS = (*DEFAULT, "own_land")
 
 
 def worlds(size=16, **options):
@@ -71,7 +71,7 @@ def test_worlds_of_one_agency_show_no_land():
     world = small_world()
     state = world.reset(torch.arange(2), torch.zeros(2, dtype=torch.int64))
     assert not shown(Local(channels=CHANNELS), state, world)["view"][:, :, -1].any()
-    assert OWN_LAND not in Surroundings().spaces(world)["picture"].names
+    assert "own_land" not in Surroundings().spaces(world)["picture"].names
     assert not any("agency" in name for name in CriticState(world).names)
 
 

@@ -7,7 +7,6 @@ from tests.conftest import small_world
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.observation import (
     DEFAULT,
-    STATE,
     CriticState,
     Local,
     Paper,
@@ -16,6 +15,7 @@ from warp_torchrl.env.observation import (
     picture,
     status_vector,
 )
+from warp_torchrl.env.observation.features import NOTHING_MORE
 from warp_torchrl.world.air.wind import Uniform
 from warp_torchrl.world.backends.tick import in_wind
 from warp_torchrl.world.team.team import Team
@@ -37,6 +37,12 @@ def drawn(cells, positions, *, elevation=None, roles=("ugv",), wind=None, cover=
 
 def own(state, world):
     return status_vector(state, world, world.forecast(state))
+
+
+def judged(state, world, choice=NOTHING_MORE):
+    """What the critic sees of the first world, by the plane's name."""
+    shown = CriticState(world, choice)
+    return dict(zip(shown.names, shown(state, world.forecast(state))[0], strict=True))
 
 
 def channel(view, name):
@@ -151,10 +157,10 @@ def test_the_picture_pools_the_whole_map():
 
 def test_the_critic_sees_every_agent_and_the_clock():
     state, world = drawn([[5] * 16] * 16, [[8, 8], [0, 15], [3, 4]], roles=("ugv", "ugv", "uav"))
-    seen = CriticState(world)(state, world.forecast(state))[0]
-    assert seen[STATE.index("ugv")].nonzero().tolist() == [[0, 15], [8, 8]]
-    assert seen[STATE.index("uav")].nonzero().tolist() == [[3, 4]]
-    clock = seen[STATE.index("clock_and_wind")]
+    seen = judged(state, world)
+    assert seen["ugv"].nonzero().tolist() == [[0, 15], [8, 8]]
+    assert seen["uav"].nonzero().tolist() == [[3, 4]]
+    clock = seen["clock_and_wind"]
     assert (clock[:8] == 1).all(), "the time left, the steps to the tick"
     torch.testing.assert_close(clock[8:, :8], torch.full((8, 8), 0.5))  # 10 of 20 m/s to the east
     torch.testing.assert_close(clock[8:, 8:], torch.zeros(8, 8))
@@ -165,7 +171,7 @@ def test_the_critic_sees_where_fire_is_about_to_grow():
     cells = torch.full((16, 16), 5)
     cells[4, 6], cells[10, 10] = 11, 15
     state, world = drawn(cells.tolist(), [[0, 0]], wind=Uniform(speed=0.0))
-    seen = dict(zip(STATE, CriticState(world)(state, world.forecast(state))[0], strict=True))
+    seen = judged(state, world)
     assert seen["fire"].nonzero().tolist() == [[4, 6], [10, 10]]
     assert seen["front"].nonzero().tolist() == [[4, 6]] and seen["front"][4, 6] == 1.0, "an ember spreads no more"
     assert seen["threat"][4, 7] == pytest.approx(0.8) and seen["threat"][5, 7] == pytest.approx(0.8 / 2**0.5)

@@ -6,16 +6,15 @@ import pytest
 import torch
 
 from tests.conftest import small_world
-from tests.env.observation.test_observation import drawn
+from tests.env.observation.test_observation import drawn, judged
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.env.observation import STATE, CriticState, Local
+from warp_torchrl.env.observation import CriticState, Local
 
 REACHING = Local(radius=2, reach=True)
 
 
 def planes(state, world) -> dict[str, torch.Tensor]:
-    shown = CriticState(world, reach=True)
-    return dict(zip(shown.names, shown(state, world.forecast(state))[0], strict=True))
+    return judged(state, world, REACHING.choice)
 
 
 def test_it_tells_how_soon_fire_can_be_where_and_that_a_closed_ring_holds_it() -> None:
@@ -51,7 +50,8 @@ def test_it_tells_how_soon_the_team_can_be_where() -> None:
 
 def test_an_environment_shows_it_where_it_is_asked_for() -> None:
     env = WildfireEnv(small_world(), n_worlds=2, seed=0, observation=REACHING)
-    assert env.state_names == (*STATE[:-1], "fire_reach", "team_reach", STATE[-1])
+    plain = CriticState(small_world()).names
+    assert env.state_names == (*plain[:-1], "fire_reach", "team_reach", plain[-1])
     out = env.rollout(4)
     assert out["state"].shape[2:] == env.observation_spec["state"].shape[1:]
     assert env.state_symmetry.channels == len(env.state_content) == len(env.state_names)

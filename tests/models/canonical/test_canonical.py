@@ -19,7 +19,7 @@ from warp_torchrl.algorithms.replay import ReplayMemory
 from warp_torchrl.algorithms.sac import Sac
 from warp_torchrl.entries import Part, Planes, Target, Vector
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.env.observation import DEFAULT, STATE_SYMMETRY, Local, Paper, Surroundings
+from warp_torchrl.env.observation import DEFAULT, CriticState, Local, Paper, Surroundings
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import (
     ACTION,
@@ -67,6 +67,7 @@ PRESETS = {
 }
 SLOW = {"near": pytest.mark.slow}
 SIZE = 16
+STATE_SYMMETRY = CriticState(small_world()).symmetry
 ACTIONS = tuple(action.name.lower() for action in Action)
 
 

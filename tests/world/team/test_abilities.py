@@ -12,7 +12,7 @@ from tests.world.drawing import draw, drawn
 from warp_torchrl import load_policy, make_env
 from warp_torchrl.entries import ADVICE
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.env.observation import STATE, Surroundings
+from warp_torchrl.env.observation import CriticState, Surroundings
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION, OBSERVATION
 from warp_torchrl.system.shipped import policy_names
@@ -129,7 +129,8 @@ def test_a_team_s_own_roles_and_actions_come_last_in_self(allow_stay: bool) -> N
 def test_a_further_role_has_a_channel_of_its_own_in_the_state() -> None:
     env = WildfireEnv(small_world(team=team(3)), n_worlds=2)
     shown, places = env.reset()["state"], env.state_names
-    assert places == (*STATE[:6], "sprinkler", *STATE[6:]) and shown.shape[1] == len(places)
+    plain = CriticState(small_world()).names
+    assert places == (*plain[:6], "sprinkler", *plain[6:]) and shown.shape[1] == len(places)
     assert [shown[0, places.index(name)].sum().item() for name in env.role_names] == [2.0, 0.0, 1.0]
     check_env_specs(env)
 

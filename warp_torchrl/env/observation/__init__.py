@@ -1,8 +1,8 @@
 """What the agents see, and what the central critic sees."""
 
 from warp_torchrl.env.observation.channels import CHANNELS, DEFAULT, ELEVATION_SCALE, channel
-from warp_torchrl.env.observation.coarse_picture import PICTURE, PICTURE_SIDE, picture
-from warp_torchrl.env.observation.critic import STATE, STATE_SIDE, STATE_SYMMETRY, CriticState
+from warp_torchrl.env.observation.coarse_picture import PICTURE, PICTURE_SIDE, Blocks, picture, picture_channel
+from warp_torchrl.env.observation.critic import STATE, STATE_SIDE, CriticState, state_plane
 from warp_torchrl.env.observation.features import Choice, Context
 from warp_torchrl.env.observation.former import renamed, with_renamed
 from warp_torchrl.env.observation.look import Look
@@ -29,9 +29,9 @@ __all__ = [
     "PICTURE_SIDE",
     "STATE",
     "STATE_SIDE",
-    "STATE_SYMMETRY",
     "STATUS",
     "WIND_SCALE",
+    "Blocks",
     "Choice",
     "Context",
     "CriticState",
@@ -47,8 +47,10 @@ __all__ = [
     "former_symmetry",
     "number",
     "picture",
+    "picture_channel",
     "renamed",
     "searched_for",
+    "state_plane",
     "status_vector",
     "with_renamed",
 ]

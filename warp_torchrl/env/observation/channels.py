@@ -9,14 +9,13 @@ user's own adds one:
 """
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
-from warp_torchrl.entries import Content, Empty, Follows
+from warp_torchrl.entries import Content, Empty, Follows, Part
+from warp_torchrl.env.observation.features import Features, Function, Holds, anything
 from warp_torchrl.env.observation.look import Look
-from warp_torchrl.validation import check_new_name
 from warp_torchrl.world.arrays.bytes import byte, to_codes
 from warp_torchrl.world.state.role import PAPER_ROLES
 from warp_torchrl.world.state.state import FIRST_FIRE, is_burning, is_tree
@@ -24,28 +23,8 @@ from warp_torchrl.world.world import World
 
 ELEVATION_SCALE = 100.0
 """Difference in height that an observation shows as 1 [m]."""
-LAST_SEEN = "last_seen"
-"""The channel that tells how fresh is what an agent knows."""
-OWN_LAND = "own_land"
-"""The channel that tells the land of the agency that a vehicle serves."""
-FIRE = "fire_stage"
-"""The channel that tells where fire is, by which networks turn what an agent sees."""
-
-
-class Channel(NamedTuple):
-    """A channel of the table."""
-
-    show: Callable[[Look], Tensor]
-    """Returns whole numbers [B, A, V, V] of a look."""
-    high: int
-    """The largest number that it returns."""
-    content: Callable[[World, Sequence[str]], Content]
-    """Returns what it can hold in a world, in a view of channels by name."""
-
-
-def _anything(world: World, names: Sequence[str]) -> Content:
-    """Return that a channel may hold anything."""
-    return None
+CHANNELS = Features("channel")
+"""All channels, by name."""
 
 
 def _of_ground(world: World, names: Sequence[str]) -> Content:
@@ -61,33 +40,24 @@ def others_of(role: str, world: World) -> Content:
     return None if role in roles and len(roles) > 1 else Empty()
 
 
-CHANNELS: dict[str, Channel] = {}
-"""All channels, by name."""
-
-
-def channel(
-    high: int = 255, content: Callable[[World, Sequence[str]], Content] = _anything
-) -> Callable[[Callable[[Look], Tensor]], Callable[[Look], Tensor]]:
+def channel(high: int = 255, content: Holds = anything, is_target: bool = False) -> Callable[[Function], Function]:
     """Return what adds a function to the table, under the function's name.
 
     Args:
         high: The largest number that it returns, at most 255.
         content: Returns what it can hold in a world, in a view of channels by name; networks leave out what the rules
             of the world fix. By default anything.
+        is_target: Whether it shows what agents turn towards.
 
     Raises:
         ValueError: If the number is not in 1..255, or the table has another channel of that name.
     """
-    if not 1 <= high <= 255:
-        raise ValueError(f"high must be in 1..255, got {high}")
 
-    def add(show: Callable[[Look], Tensor]) -> Callable[[Look], Tensor]:
-        name, known = show.__name__, CHANNELS.get(show.__name__)
-        check_new_name("channel", name, show, known.show if known else None)
-        CHANNELS[name] = Channel(show, high, content)
-        return show
+    def added(show: Function) -> Function:
+        part = Part("target" if is_target else "plane", (show.__name__,))
+        return CHANNELS.add([part], content, high, None)(show)
 
-    return add
+    return added
 
 
 @channel()
@@ -108,7 +78,7 @@ def age(look: Look) -> Tensor:
     return ages(look.cells)
 
 
-@channel()
+@channel(is_target=True)
 def fire_stage(look: Look) -> Tensor:
     """Return the stages of fires, 51 each."""
     return stages(look.cells)

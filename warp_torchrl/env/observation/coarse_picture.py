@@ -1,123 +1,170 @@
-"""The whole map in blocks: what a dispatcher would radio."""
+"""The whole map in blocks, what a dispatcher would radio: a table of channels by name.
+
+A channel reads ``Blocks``. A module of a user's own adds one, which ``observation.features`` chooses:
+
+    @picture_channel()
+    def assets(now: Blocks) -> Tensor:
+        return now.show(block_means(..., now.side))
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
-from warp_torchrl.entries import Content, Empty, Planes, Target
+from warp_torchrl.entries import Empty, Part
 from warp_torchrl.env.observation.blocks import block_at, block_of
-from warp_torchrl.env.observation.channels import LAST_SEEN, OWN_LAND
+from warp_torchrl.env.observation.features import (
+    NOTHING_MORE,
+    Choice,
+    Features,
+    Function,
+    Holds,
+    IsThere,
+    anything,
+    everywhere,
+)
 from warp_torchrl.world.arrays.blocks import block_means
-from warp_torchrl.world.arrays.squares import window
-from warp_torchrl.world.mechanics.agencies.agencies import land_of_each
-from warp_torchrl.world.mechanics.sensing.records import freshness, known_codes
+from warp_torchrl.world.arrays.squares import Window, window
+from warp_torchrl.world.mechanics.agencies.agencies import land_of_each, lands_of
+from warp_torchrl.world.mechanics.sensing.records import freshness, kept, known_codes
 from warp_torchrl.world.state.state import FIRST_FIRE, OLDEST, Forecast, WorldState, is_burning
 from warp_torchrl.world.world import World
 
-PICTURE = ("fire", "fuel", "team_mates")
-"""Channels of ``picture``."""
 PICTURE_SIDE = 8
+PICTURE = Features("channel of the picture")
+"""All channels of the picture, by name and in order."""
 
 
-def picture_names(world: World) -> tuple[str, ...]:
-    """Return the channels of the picture.
+class Blocks(NamedTuple):
+    """What a channel of the picture reads: the worlds, and how their maps are shown in S x S blocks.
 
-    They are ``PICTURE``, where sight is limited ``last_seen``, how fresh they are, and where there are several agencies
-    ``own_land``, the share of each block that is of the agency that the vehicle serves.
+    Where sight is limited (``world.sensing.Sight``) a channel shows what each agent knows: it reads ``known``.
     """
-    seen = (LAST_SEEN,) if world.sensing.is_limited else ()
-    return (*PICTURE, *seen, *((OWN_LAND,) if world.agencies.names else ()))
+
+    state: WorldState
+    world: World
+    forecast: Forecast
+    side: int  # S
+    about: Window | None  # the 15 x 15 blocks about each agent; None where the whole map is shown
+    known: Tensor | None  # the cells' codes as each agent knows them, [B, A, H, W]; None where all is seen
+
+    def show(self, shares: Tensor, high: int = 255) -> Tensor:
+        """Return what shares in 0..1 show, [B, S, S] of the map or [B, A, S, S] of each agent's own.
+
+        About the agents they are whole numbers 0..``high``, uint8 [B, A, 15, 15], 0 off the map; of the whole map
+        float32 [B, A, S, S].
+        """
+        if self.about is None:
+            return (shares if shares.ndim == 4 else shares[:, None]).expand(-1, self.world.team.n_agents, -1, -1)
+        codes = (shares * high).to(torch.uint8)
+        return self.about.of_own(codes) if codes.ndim == 4 else self.about.of(codes)
 
 
-def picture_highs(world: World) -> tuple[float, ...]:
-    """Return the largest number in each channel of the picture, where it is centred."""
-    return tuple(255 if name != "team_mates" else 252 for name in picture_names(world))
-
-
-def picture_symmetry(centred: bool, channels: int = len(PICTURE), order: int = 1) -> Planes:
-    """Return how the picture turns with the map; agents turn towards its fire where nothing of a lower order shows one.
+def picture_channel(
+    high: int = 255, content: Holds = anything, is_there: IsThere | None = None, is_target: bool = False
+) -> Callable[[Function], Function]:
+    """Return what adds a function to the table, under the function's name; it returns what ``Blocks.show`` does.
 
     Args:
-        centred: Whether the agent is in the middle.
-        channels: How many there are.
-        order: Of its fire among what shows fire; that of the view is 0.
+        high: The largest number that it shows about the agents, at most 255.
+        content: Returns what it can hold in a world, in a picture of channels by name.
+        is_there: Returns whether a world shows it; None where an observation chooses it by name.
+        is_target: Whether it shows what agents turn towards.
+
+    Raises:
+        ValueError: If the number is not in 1..255, or the table has another channel of that name.
     """
-    fire = Target(PICTURE.index("fire"), order=order, near=0.5, is_share=True, in_middle=centred)
-    return Planes(channels, fire)
+
+    def added(show: Function) -> Function:
+        part = Part("target" if is_target else "plane", (show.__name__,))
+        return PICTURE.add([part], content, high, is_there)(show)
+
+    return added
 
 
-def picture_content(world: World) -> tuple[Content, ...]:
-    """Return what each channel of the picture can hold."""
-    alone = {"team_mates": Empty()} if world.team.n_agents == 1 else {}
-    return tuple(alone.get(name) for name in picture_names(world))
+def picture(state: WorldState, world: World, forecast: Forecast, choice: Choice = NOTHING_MORE) -> Tensor:
+    """Return the state of the fire in 8 x 8 blocks of the map, float32 [B, A, C, 8, 8], the channels of ``PICTURE``."""
+    return _shown(Blocks(state, world, forecast, PICTURE_SIDE, None, _known(state)), choice)
 
 
-def picture(state: WorldState, world: World, forecast: Forecast) -> Tensor:
-    """Return the state of the fire in 8 x 8 blocks of the map, float32 [B, A, C, 8, 8], see ``picture_names``."""
-    mates = _mates(state, world).mul_(0.25).clamp_(max=1.0)[:, :, None]
-    seen = _maps(state, forecast).expand(-1, mates.shape[1], -1, -1, -1)
-    land = [each[:, :, None] for each in _land_served(state)]
-    return torch.cat((seen[:, :, :2], mates, seen[:, :, 2:], *land), dim=2)
-
-
-def centred_picture(state: WorldState, world: World, forecast: Forecast, side: int = PICTURE_SIDE) -> Tensor:
+def centred_picture(
+    state: WorldState, world: World, forecast: Forecast, choice: Choice = NOTHING_MORE, side: int = PICTURE_SIDE
+) -> Tensor:
     """Return the picture with the agent's own block in the middle, uint8 [B, A, C, 15, 15]; 0 off the map.
-
-    What it tells is what ``picture`` does; where things are is told from where the agent is.
 
     Args:
         state: The worlds.
         world: Their rules.
         forecast: What the fire is about to do.
+        choice: What is shown beside what every picture shows.
         side: Blocks to a side of the map, of which those within seven blocks of the agent are shown.
     """
-    sides, middle = (side, side), PICTURE_SIDE - 1
-    maps = (_maps(state, forecast, side) * 255.0).to(torch.uint8).unbind(2)
     block = block_of(state, side)
-    about = window(torch.stack((block // side, block % side), dim=-1), sides, middle)
-    land = [about.of_own((each * 255.0).to(torch.uint8)) for each in _land_served(state, side)]
-    if state.knowledge is None:
-        fire, fuel = (about.of(each[:, 0]) for each in maps)
-        counts = block.new_zeros(len(block), side**2).scatter_add_(1, block, torch.ones_like(block))
-        mates = about.of(counts.view(-1, *sides))
-        mates[..., middle, middle] -= 1
-        return torch.stack((fire, fuel, (mates.clamp_(max=4) * 63).to(torch.uint8), *land), dim=2)
-    fire, fuel, fresh = (about.of_own(each) for each in maps)
-    mates = about.of_own(_mates(state, world, side).clamp_(max=4.0).mul_(63.0).to(torch.uint8))
-    return torch.stack((fire, fuel, mates, fresh, *land), dim=2)
+    about = window(torch.stack((block // side, block % side), dim=-1), (side, side), PICTURE_SIDE - 1)
+    return _shown(Blocks(state, world, forecast, side, about, _known(state)), choice)
 
 
-def _maps(state: WorldState, forecast: Forecast, side: int = PICTURE_SIDE) -> Tensor:
-    """Return fire (square root of the share that burns) and fuel in S x S blocks, float32 [B, 1, 2, S, S].
-
-    Where sight is limited they are what each agent knows, with how fresh that is, float32 [B, A, 3, S, S].
-    """
-    if state.knowledge is None:
-        maps = [is_burning(state.cells)[:, None], forecast.fuel[:, None]]
-    else:
-        codes = known_codes(state)
-        fuel = state.alpha[:, None] * ((codes >= 1) & (codes <= OLDEST))
-        maps = [codes >= FIRST_FIRE, fuel, freshness(state.knowledge, state.step)]
-    fire, *others = (block_means(each, side) for each in maps)
-    return torch.stack((fire.sqrt_(), *others), dim=2)
+@picture_channel(is_there=everywhere, is_target=True)
+def fire(now: Blocks) -> Tensor:
+    """Return the square root of the share that burns."""
+    burning = is_burning(now.state.cells) if now.known is None else now.known >= FIRST_FIRE
+    return now.show(block_means(burning, now.side).sqrt_())
 
 
-def _land_served(state: WorldState, side: int = PICTURE_SIDE) -> list[Tensor]:
-    """Return the share of each block that is of the agency that each vehicle serves, float32 [B, A, S, S].
-
-    Nothing where there is but one agency.
-    """
-    if state.lands is None or state.vehicles.serves is None:
-        return []
-    shares, serves = block_means(land_of_each(state.lands), side), state.vehicles.serves
-    index = serves[..., None, None].expand(-1, -1, side, side)
-    return [shares.gather(1, index)]
+@picture_channel(is_there=everywhere)
+def fuel(now: Blocks) -> Tensor:
+    """Return the mean flammability of trees that can burn."""
+    if now.known is None:
+        return now.show(block_means(now.forecast.fuel, now.side))
+    is_fuel = (now.known >= 1) & (now.known <= OLDEST)
+    return now.show(block_means(now.state.alpha[:, None] * is_fuel, now.side))
 
 
-def _mates(state: WorldState, world: World, side: int = PICTURE_SIDE) -> Tensor:
+@picture_channel(
+    high=252,
+    content=lambda world, names: Empty() if world.team.n_agents == 1 else None,
+    is_there=everywhere,
+)
+def team_mates(now: Blocks) -> Tensor:
+    """Return how many others there are, a quarter each, four at most."""
+    if now.about is None or now.known is not None:
+        return now.show(_mates(now).mul_(0.25).clamp_(max=1.0), 252)
+    block, middle = block_of(now.state, now.side), now.about.radius  # all are seen: one map for the whole team
+    counts = block.new_zeros(len(block), now.side**2).scatter_add_(1, block, torch.ones_like(block))
+    mates = now.about.of(counts.view(-1, now.side, now.side))
+    mates[..., middle, middle] -= 1
+    return (mates.clamp_(max=4) * 63).to(torch.uint8)
+
+
+@picture_channel(is_there=lambda world, choice: world.sensing.is_limited)
+def last_seen(now: Blocks) -> Tensor:
+    """Return how fresh is what an agent knows, see ``records.freshness``."""
+    return now.show(block_means(freshness(kept(now.state), now.state.step), now.side))
+
+
+@picture_channel(is_there=lambda world, choice: bool(world.agencies.names))
+def own_land(now: Blocks) -> Tensor:
+    """Return the share that is land of the agency that the vehicle serves."""
+    lands, serves = lands_of(now.state)
+    shares = block_means(land_of_each(lands), now.side)
+    return now.show(shares.gather(1, serves[..., None, None].expand(-1, -1, now.side, now.side)))
+
+
+def _known(state: WorldState) -> Tensor | None:
+    return None if state.knowledge is None else known_codes(state)
+
+
+def _shown(now: Blocks, choice: Choice) -> Tensor:
+    return torch.stack([each.show(now) for each in PICTURE.shown(now.world, choice)], dim=2)
+
+
+def _mates(now: Blocks) -> Tensor:
     """Return how many others each agent takes to be in each block of the map, float32 [B, A, S, S]."""
-    known, place = world.sensing.knows_where(state, world.team)
-    team = state.vehicles.position.shape[:2]
-    index = block_at(place, state, side).expand(*team, -1)
-    count = torch.zeros(*team, side**2, device=index.device)
+    known, place = now.world.sensing.knows_where(now.state, now.world.team)
+    team = now.state.vehicles.position.shape[:2]
+    index = block_at(place, now.state, now.side).expand(*team, -1)
+    count = torch.zeros(*team, now.side**2, device=index.device)
     count = count.scatter_add(2, index, known.to(torch.float32).expand_as(index))
-    return count.unflatten(-1, (side, side))
+    return count.unflatten(-1, (now.side, now.side))

@@ -1,35 +1,74 @@
-"""What the central critic sees: the whole map in blocks, and the team."""
+"""What the central critic sees, the whole map in blocks and the team: a table of planes by name.
 
+A plane reads a ``Context``. A module of a user's own adds one, which ``observation.features`` chooses:
+
+    @state_plane()
+    def assets(now: Context) -> Tensor:
+        return block_means(..., STATE_SIDE)
+"""
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 from torch.nn.functional import one_hot
 
-from warp_torchrl.entries import Content, Empty, Quarters, TeamPlanes
+from warp_torchrl.entries import Content, Empty, Part, Quarters, TeamPlanes
 from warp_torchrl.env.observation.blocks import block_of
-from warp_torchrl.env.observation.channels import ELEVATION_SCALE, LAST_SEEN
+from warp_torchrl.env.observation.channels import ELEVATION_SCALE
+from warp_torchrl.env.observation.features import (
+    NOTHING_MORE,
+    Choice,
+    Context,
+    Feature,
+    Features,
+    Function,
+    Holds,
+    IsThere,
+    anything,
+    content_of,
+    everywhere,
+    first_of,
+    names_of,
+)
 from warp_torchrl.env.observation.status import WIND_SCALE, steps_to_tick, time_left
 from warp_torchrl.world.arrays.blocks import block_means
 from warp_torchrl.world.fires.reach import distance_from_fire
-from warp_torchrl.world.mechanics.agencies.agencies import land_of_each
-from warp_torchrl.world.mechanics.sensing.records import freshness, known_codes
-from warp_torchrl.world.state.role import PAPER_ROLES
+from warp_torchrl.world.mechanics.agencies.agencies import land_of_each, lands_of
+from warp_torchrl.world.mechanics.sensing.records import freshness, kept, known_codes
 from warp_torchrl.world.state.state import FIRST_FIRE, Forecast, WorldState, is_burning
 from warp_torchrl.world.world import World
 
-STATE = ("fire", "fuel", "front", "threat", *PAPER_ROLES, "elevation", "clock_and_wind")
-"""Channels of the critic's ``state``: ``front`` is what fire is expected to ignite in a tick, ``threat`` the chance of
-trees to ignite, and the quarters of ``clock_and_wind`` are filled with the time left, the steps to the tick, and the
-wind to the east and to the north."""
-_FIRST_ROLE = STATE.index(PAPER_ROLES[0])
-KNOWN = ("known_fire", LAST_SEEN)
-"""Channels of the critic's ``state`` where sight is limited."""
-REACH = ("fire_reach", "team_reach")
-"""Channels of the critic's ``state`` where ``observation.reach`` asks for them."""
 STATE_SIDE = 16
-STATE_SYMMETRY = TeamPlanes(len(STATE), STATE.index("fire"), (_FIRST_ROLE, len(PAPER_ROLES)))
-"""How the state turns with the map in teams of the paper's roles."""
+STATE = Features("plane of state")
+"""All planes of the critic's ``state`` but the last, ``clock_and_wind``, by name and in order."""
+
+
+def state_plane(
+    parts: Callable[[World], Sequence[Part]] | Sequence[Part] = (),
+    content: Holds = anything,
+    is_there: IsThere | None = None,
+) -> Callable[[Function], Function]:
+    """Return what adds a function to the table, under the function's name.
+
+    The function returns numbers in -3..256, float32 [B, 16, 16], or [B, n, 16, 16] of several planes, or a number of
+    each world, [B], which fills the plane.
+
+    Args:
+        parts: What the planes are called; a function of the world where it says. By default one plane, which has the
+            function's name.
+        content: Returns what they can hold in a world; networks leave out what the rules of the world fix.
+        is_there: Returns whether a world shows them; None where an observation chooses them by name.
+
+    Raises:
+        ValueError: If the table has another plane of that name.
+    """
+
+    def added(show: Function) -> Function:
+        return STATE.add(parts or [Part("plane", (show.__name__,))], content, 255, is_there)(show)
+
+    return added
 
 
 @dataclass(frozen=True, eq=False)  # torch 2.11 hashes what a compiled function makes before its fields are there
@@ -38,49 +77,39 @@ class CriticState:
 
     Attributes:
         world: The rules of the worlds.
-        reach: Whether it tells how soon fire and team can be where, see ``reach_of_fire_and_team``.
+        choice: What it shows beside what every state shows.
     """
 
     world: World
-    reach: bool = False
+    choice: Choice = NOTHING_MORE
+
+    @property
+    def features(self) -> list[Feature]:
+        """Return its features: those of ``STATE`` that are there, and the clock and the wind."""
+        return [*STATE.shown(self.world, self.choice), CLOCK_AND_WIND]
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return the channels: ``STATE``, with the team's further roles beside the paper's.
-
-        Where sight is limited there are ``KNOWN`` too: the burning cells that agents know of, and how fresh what they
-        know is, both the mean of the agents. Where there are several agencies there is the land of each, and the
-        vehicles that serve it. With ``reach`` there are ``REACH``.
-        """
-        known = KNOWN if self.world.sensing.is_limited else ()
-        land = [f"{what}_of_{name}" for what in ("land", "vehicles") for name in self.world.agencies.names]
-        return (
-            *STATE[:_FIRST_ROLE],
-            *self.world.team.role_names,
-            *STATE[_FIRST_ROLE + len(PAPER_ROLES) : -1],
-            *known,
-            *land,
-            *(REACH if self.reach else ()),
-            STATE[-1],
-        )
+        """Return the names of its planes."""
+        return names_of(self.features, self.world)
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Return the shape of one world's: channels, blocks down and across."""
+        """Return the shape of one world's: planes, blocks down and across."""
         return len(self.names), STATE_SIDE, STATE_SIDE
 
     @property
     def symmetry(self) -> TeamPlanes:
         """Return how it turns with the map."""
-        return TeamPlanes(len(self.names), STATE.index("fire"), (_FIRST_ROLE, len(self.world.team.role_names)))
+        target, agents = (first_of(kind, self.features, self.world) for kind in ("target", "agents"))
+        if target is None or agents is None:
+            raise ValueError("the critic's state must show what the team turns towards, and the team")
+        return TeamPlanes(len(self.names), target[0], agents)
 
     @property
     def content(self) -> tuple[Content, ...]:
-        """Return what each channel can hold."""
-        team = self.world.team
-        held: dict[str, Content] = {role: Empty() for role in team.role_names if role not in team.agent_roles}
-        held |= {"elevation": Empty()} if self.world.is_flat else {}
-        return (*(held.get(name) for name in self.names[:-1]), Quarters())
+        """Return what each plane can hold."""
+        return content_of(self.features, self.world)
 
     def __call__(self, state: WorldState, forecast: Forecast) -> Tensor:
         """Return it, float32 [B, C, 16, 16], see ``names``.
@@ -89,20 +118,118 @@ class CriticState:
             state: The worlds.
             forecast: What the fire is about to do.
         """
-        maps = is_burning(state.cells), forecast.fuel, forecast.expected_ignitions, forecast.ignition_probability
-        agents = _vehicles(state, self.world)
-        return torch.stack(
-            (
-                *(block_means(each, STATE_SIDE) for each in maps),
-                *agents.unbind(1),
-                _elevation(state.landscape.elevation, agents[:, 0]),
-                *_known(state),
-                *_lands(state),
-                *(reach_of_fire_and_team(state, self.world) if self.reach else ()),
-                _clock_and_wind(state, self.world),
-            ),
-            dim=1,
-        )
+        now = Context(state, self.world, forecast, self.choice)
+        return torch.cat([_as_planes(each.show(now)) for each in self.features], dim=1)
+
+
+@state_plane([Part("target", ("fire",))], is_there=everywhere)
+def fire(now: Context) -> Tensor:
+    """Return the share that burns."""
+    return block_means(is_burning(now.state.cells), STATE_SIDE)
+
+
+@state_plane(is_there=everywhere)
+def fuel(now: Context) -> Tensor:
+    """Return the mean flammability of trees that can burn."""
+    return block_means(now.forecast.fuel, STATE_SIDE)
+
+
+@state_plane(is_there=everywhere)
+def front(now: Context) -> Tensor:
+    """Return what fire is expected to ignite in a tick."""
+    return block_means(now.forecast.expected_ignitions, STATE_SIDE)
+
+
+@state_plane(is_there=everywhere)
+def threat(now: Context) -> Tensor:
+    """Return the chance of trees to ignite."""
+    return block_means(now.forecast.ignition_probability, STATE_SIDE)
+
+
+def _of_roles(world: World, names: Sequence[str]) -> tuple[Content, ...]:
+    team = world.team
+    return tuple(None if role in team.agent_roles else Empty() for role in team.role_names)
+
+
+@state_plane(lambda world: [Part("agents", world.team.role_names)], _of_roles, everywhere)
+def vehicles(now: Context) -> Tensor:
+    """Return how many vehicles of each role there are."""
+    cells, team = now.state.cells, now.world.team
+    worlds, roles = cells.shape[0], len(team.role_names)
+    index = team.table(cells.device).index * STATE_SIDE**2 + block_of(now.state, STATE_SIDE)
+    count = torch.zeros(worlds, roles * STATE_SIDE**2, device=cells.device)
+    count = count.scatter_add(1, index, torch.ones_like(index, dtype=torch.float32))
+    return count.view(worlds, roles, STATE_SIDE, STATE_SIDE)
+
+
+@state_plane(content=lambda world, names: Empty() if world.is_flat else None, is_there=everywhere)
+def elevation(now: Context) -> Tensor:
+    """Return the elevation over the map's mean; 0 on a flat map."""
+    heights = now.state.landscape.elevation
+    if heights is None:
+        return torch.zeros(len(now.state.cells), device=now.state.cells.device)
+    relative = (heights - heights.mean((1, 2), keepdim=True)) / ELEVATION_SCALE
+    return block_means(relative, STATE_SIDE).clamp(-3.0, 3.0)
+
+
+@state_plane(is_there=lambda world, choice: world.sensing.is_limited)
+def known_fire(now: Context) -> Tensor:
+    """Return the burning cells that agents know of, mean of the agents."""
+    return block_means((known_codes(now.state) >= FIRST_FIRE).to(torch.float32).mean(dim=1), STATE_SIDE)
+
+
+@state_plane(is_there=lambda world, choice: world.sensing.is_limited)
+def last_seen(now: Context) -> Tensor:
+    """Return how fresh is what agents know, mean of the agents, see ``records.freshness``."""
+    return block_means(freshness(kept(now.state), now.state.step).mean(dim=1), STATE_SIDE)
+
+
+@state_plane(
+    lambda world: [Part("plane", tuple(f"land_of_{name}" for name in world.agencies.names))],
+    is_there=lambda world, choice: bool(world.agencies.names),
+)
+def lands(now: Context) -> Tensor:
+    """Return the land of each agency."""
+    return block_means(land_of_each(lands_of(now.state)[0]), STATE_SIDE)
+
+
+@state_plane(
+    lambda world: [Part("plane", tuple(f"vehicles_of_{name}" for name in world.agencies.names))],
+    is_there=lambda world, choice: bool(world.agencies.names),
+)
+def serving(now: Context) -> Tensor:
+    """Return how many vehicles serve each agency."""
+    place = one_hot(block_of(now.state, STATE_SIDE), STATE_SIDE**2).to(torch.float32)
+    agencies = torch.arange(len(now.world.agencies.names), device=place.device)[:, None]
+    count = (lands_of(now.state)[1][:, None] == agencies).to(torch.float32) @ place
+    return count.unflatten(-1, (STATE_SIDE, STATE_SIDE))
+
+
+@state_plane([Part("plane", ("fire_reach", "team_reach"))], is_there=lambda world, choice: choice.reach)
+def reach(now: Context) -> Tensor:
+    """Return how soon fire, and how soon the team, can be where, see ``reach_of_fire_and_team``."""
+    return torch.stack(reach_of_fire_and_team(now.state, now.world), dim=1)
+
+
+def clock_and_wind(now: Context) -> Tensor:
+    """Return the time left, the steps to the tick, and the wind to east and north, each in a quarter of the plane."""
+    state, half = now.state, STATE_SIDE // 2
+    wind = (state.wind.mean((2, 3)) / WIND_SCALE).clamp(-3.0, 3.0)
+    told = torch.stack((time_left(state, now.world), steps_to_tick(state, now.world), wind[:, 0], wind[:, 1]), dim=1)
+    return told.view(-1, 2, 1, 2, 1).expand(-1, -1, half, -1, half).reshape(-1, STATE_SIDE, STATE_SIDE)
+
+
+CLOCK_AND_WIND = Feature(
+    clock_and_wind, lambda world: [Part("plane", ("clock_and_wind",))], lambda world, names: Quarters(), 255, everywhere
+)
+"""The last plane of every state, where networks find the wind to turn it."""
+
+
+def _as_planes(shown: Tensor) -> Tensor:
+    """Return what a function of the table returned as planes, float32 [B, n, 16, 16]."""
+    if shown.ndim == 1:
+        return shown[:, None, None, None].expand(-1, 1, STATE_SIDE, STATE_SIDE)
+    return shown if shown.ndim == 4 else shown[:, None]
 
 
 def reach_of_fire_and_team(state: WorldState, world: World) -> tuple[Tensor, Tensor]:
@@ -122,47 +249,3 @@ def reach_of_fire_and_team(state: WorldState, world: World) -> tuple[Tensor, Ten
     across = (middle * (width / STATE_SIDE) - column[..., None]).abs()
     nearest = torch.maximum(down[..., :, None], across[..., None, :]).amin(dim=1)
     return fire, torch.exp(nearest / (-2.0 * side))
-
-
-def _vehicles(state: WorldState, world: World) -> Tensor:
-    """Return how many vehicles of each role are in each block, float32 [B, roles, 16, 16]."""
-    worlds, roles = state.cells.shape[0], len(world.team.role_names)
-    index = world.team.table(state.cells.device).index * STATE_SIDE**2 + block_of(state, STATE_SIDE)
-    count = torch.zeros(worlds, roles * STATE_SIDE**2, device=state.cells.device)
-    count = count.scatter_add(1, index, torch.ones_like(index, dtype=torch.float32))
-    return count.view(worlds, roles, STATE_SIDE, STATE_SIDE)
-
-
-def _clock_and_wind(state: WorldState, world: World) -> Tensor:
-    """Return the time left, the steps to the tick and the wind, each in a quarter of the map, float32 [B, 16, 16]."""
-    wind = (state.wind.mean((2, 3)) / WIND_SCALE).clamp(-3.0, 3.0)
-    told = torch.stack((time_left(state, world), steps_to_tick(state, world), wind[:, 0], wind[:, 1]), dim=1)
-    half = STATE_SIDE // 2
-    return told.view(-1, 2, 1, 2, 1).expand(-1, -1, half, -1, half).reshape(-1, STATE_SIDE, STATE_SIDE)
-
-
-def _elevation(elevation: Tensor | None, blocks: Tensor) -> Tensor:
-    """Return the elevation over the map's mean in blocks, float32, shape of the blocks; 0 on a flat map."""
-    if elevation is None:
-        return torch.zeros_like(blocks)
-    relative = (elevation - elevation.mean((1, 2), keepdim=True)) / ELEVATION_SCALE
-    return block_means(relative, STATE_SIDE).clamp(-3.0, 3.0)
-
-
-def _known(state: WorldState) -> list[Tensor]:
-    """Return ``KNOWN`` in blocks, float32 [B, 16, 16] each; nothing where all is seen."""
-    if state.knowledge is None:
-        return []
-    maps = (known_codes(state) >= FIRST_FIRE).to(torch.float32), freshness(state.knowledge, state.step)
-    return [block_means(each.mean(dim=1), STATE_SIDE) for each in maps]
-
-
-def _lands(state: WorldState) -> list[Tensor]:
-    """Return the land of each agency, then the vehicles that serve it, float32 [B, 16, 16] each."""
-    if state.lands is None or state.vehicles.serves is None:
-        return []
-    land = land_of_each(state.lands)
-    place = one_hot(block_of(state, STATE_SIDE), STATE_SIDE**2).to(torch.float32)
-    agencies = torch.arange(land.shape[1], device=land.device)[:, None]
-    serving = (state.vehicles.serves[:, None] == agencies).to(torch.float32) @ place
-    return [*block_means(land, STATE_SIDE).unbind(1), *serving.unflatten(-1, (STATE_SIDE, STATE_SIDE)).unbind(1)]

@@ -16,8 +16,6 @@ from warp_torchrl.world.state.state import Forecast, WorldState
 from warp_torchrl.world.world import World
 
 Function = TypeVar("Function", bound=Callable[..., Tensor])
-Contents = Content | tuple[Content, ...]
-"""What all planes of a feature can hold, or what each can."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +53,9 @@ class Context(NamedTuple):
 
 
 IsThere = Callable[[World, Choice], bool]
+"""Whether a feature is shown in a world."""
+Holds = Callable[[World, Sequence[str]], Content | tuple[Content, ...]]
+"""What planes can hold in a world, all of them or each, beside the planes of the entry by name."""
 
 
 class Feature(NamedTuple):
@@ -64,8 +65,8 @@ class Feature(NamedTuple):
     """Returns the numbers or planes, of what the table's functions read."""
     parts: Callable[[World], Sequence[Part]]
     """Returns their names in a world, and how they turn; planes are of kind ``plane``, ``target`` or ``agents``."""
-    content: Callable[[World, Sequence[str]], Contents]
-    """Returns what its planes can hold in a world, beside the planes of the entry by name."""
+    content: Holds
+    """Returns what its planes can hold."""
     high: int
     """The largest whole number of a plane that is shown in whole numbers."""
     is_there: IsThere | None
@@ -86,7 +87,7 @@ class Features(dict[str, Feature]):
     def add(
         self,
         parts: Callable[[World], Sequence[Part]] | Sequence[Part],
-        content: Callable[[World, Sequence[str]], Contents],
+        content: Holds,
         high: int,
         is_there: IsThere | None,
     ) -> Callable[[Function], Function]:

@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from warp_torchrl.env.observation.critic import CriticState
 from warp_torchrl.env.observation.status import STATUS
 from warp_torchrl.world.world import World
 
@@ -19,6 +20,9 @@ FORMER_STATUS = tuple(
 """Numbers of ``status`` in manifests that do not name them."""
 FORMER_STATUS_AND_IDENTITY = (*FORMER_STATUS, *STATUS["identity"].parts(World()))
 """The same of teams that are told their places."""
+
+FORMER_STATE = CriticState(World())
+"""What the critic saw."""
 
 
 def renamed(name: str) -> str:

@@ -6,25 +6,27 @@ Its ``spaces`` tell the environment the shape, type and range of each entry, and
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import torch
 from torch import Tensor
 
 from warp_torchrl.entries import Content, Planes, Target, Vector
 from warp_torchrl.env.observation.advice import check_adviser, check_may_advise
-from warp_torchrl.env.observation.channels import CHANNELS, DEFAULT, FIRE, ages, check_channels, stages
-from warp_torchrl.env.observation.coarse_picture import (
-    PICTURE_SIDE,
-    centred_picture,
-    picture,
-    picture_content,
-    picture_highs,
-    picture_names,
-    picture_symmetry,
+from warp_torchrl.env.observation.channels import CHANNELS, DEFAULT, ages, check_channels, stages
+from warp_torchrl.env.observation.coarse_picture import PICTURE, PICTURE_SIDE, centred_picture, picture
+from warp_torchrl.env.observation.critic import STATE, CriticState
+from warp_torchrl.env.observation.features import (
+    NOTHING_MORE,
+    Choice,
+    Feature,
+    Features,
+    check_features,
+    content_of,
+    first_of,
+    names_of,
+    parts_of,
 )
-from warp_torchrl.env.observation.critic import CriticState
-from warp_torchrl.env.observation.features import Choice, Features, check_features, parts_of
 from warp_torchrl.env.observation.former import FORMER_STATUS, FORMER_STATUS_AND_IDENTITY
 from warp_torchrl.env.observation.status import STATUS, status_vector
 from warp_torchrl.env.observation.view import egocentric_view
@@ -87,7 +89,7 @@ class Local:
     reach: bool = False
     features: tuple[str, ...] = ()
     channels: tuple[str, ...] = DEFAULT
-    tables: ClassVar[tuple[Features, ...]] = (STATUS,)
+    tables: ClassVar[tuple[Features, ...]] = (STATUS, STATE)
     """Of features that may be chosen."""
 
     def __post_init__(self) -> None:
@@ -99,14 +101,14 @@ class Local:
 
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
-        side, highs = 2 * self.radius + 1, tuple(CHANNELS[name].high for name in self.channels)
+        side, features = 2 * self.radius + 1, [CHANNELS[name] for name in self.channels]
         if self.advice is not None:
             check_may_advise(self.advice, world)
         own = Vector(parts_of(STATUS.shown(world, self.choice), world))
-        content = self._contents(view_content(self.channels, world))
-        symmetry = view_symmetry(self.channels)
+        shape, highs = (len(features), side, side), tuple(each.high for each in features)
+        symmetry, content = Planes(len(features), target_of(features, world)), content_of(features, world)
         return {
-            "view": Space((len(highs), side, side), torch.uint8, 0, highs, self.channels, symmetry, content),
+            "view": Space(shape, torch.uint8, 0, highs, self.channels, symmetry, self._contents(content)),
             "status": Space((len(own.names),), torch.float32, -3.0, 3.0, own.names, own),
         }
 
@@ -137,7 +139,8 @@ class Surroundings(Local):
     """An agent's own surroundings and the state of the fire, as the paper has it: the default.
 
     As ``Local``, and ``picture``: what a dispatcher would radio, the whole map's fire (square root of the share of
-    each block that burns), fuel and team-mates in 8 x 8 blocks.
+    each block that burns), fuel and team-mates in 8 x 8 blocks: channels of ``observation.coarse_picture.PICTURE``.
+    ``features`` may name further ones.
 
     Attributes:
         centred: Whether the agent's own block is the middle of the picture, which then has 15 x 15 blocks, uint8; else
@@ -151,6 +154,7 @@ class Surroundings(Local):
 
     centred: bool = True
     near: int = 0
+    tables: ClassVar[tuple[Features, ...]] = (*Local.tables, PICTURE)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -158,20 +162,9 @@ class Surroundings(Local):
 
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
-        side = 2 * PICTURE_SIDE - 1 if self.centred else PICTURE_SIDE
-        dtype = torch.uint8 if self.centred else torch.float32
-        high: float | tuple[float, ...] = picture_highs(world) if self.centred else 1.0
-        names = picture_names(world)
-        content = self._contents(picture_content(world))
-        symmetry = picture_symmetry(self.centred, len(names), order=2 if self.near else 1)
-        found = {
-            **super().spaces(world),
-            "picture": Space((len(names), side, side), dtype, 0, high, names, symmetry, content),
-        }
+        found = {**super().spaces(world), "picture": self._picture(world, self.centred, order=2 if self.near else 1)}
         if self.near:
-            wide, highs = 2 * PICTURE_SIDE - 1, picture_highs(world)
-            about = picture_symmetry(centred=True, channels=len(names))
-            found["near"] = Space((len(names), wide, wide), torch.uint8, 0, highs, names, about, content)
+            found["near"] = self._picture(world, centred=True, order=1)
         return found
 
     def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
@@ -179,11 +172,28 @@ class Surroundings(Local):
 
         And ``near`` if it is shown, uint8 [B, A, C, 15, 15].
         """
-        shown = centred_picture(state, world, forecast) if self.centred else picture(state, world, forecast)
+        show = centred_picture if self.centred else picture
+        shown = show(state, world, forecast, self.choice)
         found = {**super().__call__(state, world, forecast), "picture": shown}
         if self.near:
-            found["near"] = centred_picture(state, world, forecast, max(1, round(max(world.size) / self.near)))
+            side = max(1, round(max(world.size) / self.near))
+            found["near"] = centred_picture(state, world, forecast, self.choice, side)
         return found
+
+    def _picture(self, world: World, centred: bool, order: int) -> Space:
+        """Return the space of a picture, whose fire is of an order among what shows fire; that of the view is 0."""
+        features = PICTURE.shown(world, self.choice)
+        names, side = names_of(features, world), 2 * PICTURE_SIDE - 1 if centred else PICTURE_SIDE
+        target = target_of(features, world, order=order, near=0.5, is_share=True, in_middle=centred)
+        return Space(
+            (len(names), side, side),
+            torch.uint8 if centred else torch.float32,
+            0,
+            tuple(each.high for each in features) if centred else 1.0,
+            names,
+            Planes(len(names), target),
+            self._contents(content_of(features, world)),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -221,14 +231,10 @@ PAPER_SYMMETRY = Planes(3, Target(2), is_flat=True)
 """How the paper's view turns with the map; its last channel shows fire."""
 
 
-def view_symmetry(channels: Sequence[str]) -> Planes:
-    """Return how a view in channels by name turns with the map; agents turn towards ``FIRE`` if it shows it."""
-    return Planes(len(channels), Target(list(channels).index(FIRE)) if FIRE in channels else None)
-
-
-def view_content(channels: Sequence[str], world: World) -> tuple[Content, ...]:
-    """Return what each channel of a view in channels by name can hold."""
-    return tuple(CHANNELS[name].content(world, channels) for name in channels)
+def target_of(features: Sequence[Feature], world: World, **options: Any) -> Target | None:
+    """Return what agents turn towards among features, None where none shows it; see ``Target`` for the options."""
+    found = first_of("target", features, world)
+    return None if found is None else Target(found[0], **options)
 
 
 def former_symmetry(name: str, shape: tuple[int, ...], names: tuple[str, ...]) -> Planes | Vector | None:
@@ -236,9 +242,9 @@ def former_symmetry(name: str, shape: tuple[int, ...], names: tuple[str, ...]) -
     former = Vector(FORMER_STATUS)
     of_presets: dict[str, Planes | Vector] = {
         "": PAPER_SYMMETRY,
-        "view": view_symmetry(names),
+        "view": Planes(len(names), Target(names.index("fire_stage")) if "fire_stage" in names else None),
         "status": former if former.fits(shape) else Vector(FORMER_STATUS_AND_IDENTITY),
-        "picture": picture_symmetry(centred=shape[-1] != PICTURE_SIDE),
+        "picture": Planes(3, Target(0, order=1, near=0.5, is_share=True, in_middle=shape[-1] != PICTURE_SIDE)),
     }
     found = of_presets.get(name)
     return found if found is not None and found.fits(shape) else None
@@ -261,4 +267,4 @@ OF_CRITIC = ("reach",)
 
 def critic_state(observation: Observation, world: World) -> CriticState:
     """Return what the central critic sees of worlds where agents see this."""
-    return CriticState(world, reach=isinstance(observation, Local) and observation.reach)
+    return CriticState(world, observation.choice if isinstance(observation, Local) else NOTHING_MORE)
