@@ -186,7 +186,7 @@ def extended(tmp_path_factory):
 
 def test_an_extension_is_one_module_one_yaml_and_one_test(extended):
     _, files = extended
-    assert [Path(path).parts[0] for path in files] == ["warp_torchrl", "conf", "tests"] * 7
+    assert [Path(path).parts[0] for path in files] == ["warp_torchrl", "conf", "tests"] * 8
 
 
 @pytest.mark.slow
@@ -211,7 +211,7 @@ def test_the_extensions_are_written_as_the_rest_is(extended):
 
 
 def passes(copy: Path, *tests: str) -> None:
-    new = ["-k", "alight or cold_front or surrogate or sapling or threshold or drip_torch or bearing"]
+    new = ["-k", "alight or cold_front or surrogate or sapling or threshold or drip_torch or bearing or burnt or burned"]
     done = run("-m", "pytest", "-n", "0", "-p", "no:cacheprovider", *tests, *new, folder=copy, PYTHONPATH=str(copy))
     assert done.returncode == 0, done.stdout
     assert " passed" in done.stdout
