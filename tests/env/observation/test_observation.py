@@ -182,7 +182,8 @@ def test_the_critic_sees_how_high_a_block_lies_over_the_mean_of_the_map():
     # Rows of 32 cells at 500, 504 ... 624 m, of mean 562: blocks of two rows at 502, 510 ... 622.
     slope = (500.0 + 4.0 * torch.arange(32.0))[:, None].expand(32, 32)
     state, world = drawn([[5] * 32] * 32, [[0, 0]], elevation=slope)
-    seen = CriticState(world)(state, world.forecast(state))[0, STATE.index("elevation")]
+    shown = CriticState(world)
+    seen = shown(state, world.forecast(state))[0, shown.names.index("elevation")]
     expected = (502.0 + 8.0 * torch.arange(16.0) - 562.0) / 100.0
     torch.testing.assert_close(seen, expected[:, None].expand(16, 16))
 
