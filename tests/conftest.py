@@ -3,6 +3,7 @@
 import gc
 import logging
 import os
+import shutil
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # the tests run side by side; read when torch is imported
@@ -13,7 +14,7 @@ import torch
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import Rollout
 from warp_torchrl.runs.config.building import run_config
-from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
+from warp_torchrl.runs.config.compose import compose_config, conf_folder, plain, without_targets
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.training.loop import Training
 from warp_torchrl.world.air.wind import Uniform
@@ -23,6 +24,8 @@ from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.world import World
 
 TESTS = Path(__file__).parent
+OF_DOCS = TESTS.parent / "docs" / "experiment"
+"""Experiments that serve one table of the docs."""
 QUICK = (
     "algorithms/test_ppo.py",
     "env/reward/test_base.py",
@@ -100,6 +103,19 @@ def make_small_env():
         return WildfireEnv(world or small_world(), n_worlds=n_worlds, **options)
 
     return make
+
+
+@pytest.fixture(scope="session")
+def _conf_with_docs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("all") / "conf"
+    shutil.copytree(conf_folder(), folder)
+    return shutil.copytree(OF_DOCS, folder / "experiment", dirs_exist_ok=True).parent
+
+
+@pytest.fixture
+def all_experiments(_conf_with_docs, monkeypatch):
+    """Let experiments of the docs stand beside those of the package, as ``--config-dir docs`` does."""
+    monkeypatch.setattr("warp_torchrl.runs.config.compose.conf_folder", lambda: _conf_with_docs)
 
 
 @pytest.fixture(autouse=True, scope="session")

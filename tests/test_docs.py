@@ -213,9 +213,6 @@ def test_the_extensions_are_written_as_the_rest_is(extended):
 def passes(copy: Path, *tests: str) -> None:
     mine = "alight cold_front surrogate sapling threshold drip_torch bearing burnt burned"
     new = ["-k", " or ".join(mine.split())]
-        "-k",
-        "alight or cold_front or surrogate or sapling or threshold or drip_torch or bearing or burnt or burned",
-    ]
     done = run("-m", "pytest", "-n", "0", "-p", "no:cacheprovider", *tests, *new, folder=copy, PYTHONPATH=str(copy))
     assert done.returncode == 0, done.stdout
     assert " passed" in done.stdout

@@ -11,6 +11,7 @@ from hydra import compose, initialize_config_dir
 from omegaconf import OmegaConf
 from torch._inductor.exc import InvalidCxxCompiler
 
+from tests.conftest import OF_DOCS
 from warp_torchrl.api.make import make_env
 from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import compose_config, conf_folder, plain, without_targets
@@ -31,7 +32,6 @@ from warp_torchrl.world.world import World
 
 NEED_A_FOLDER = ("landfire", "wildland")
 SCENARIOS = sorted(path.stem for path in (conf_folder() / "scenario").glob("*.yaml") if path.stem not in NEED_A_FOLDER)
-OF_DOCS = Path(__file__).parents[3] / "docs" / "experiment"
 EXPERIMENTS = sorted(path.stem for folder in (conf_folder() / "experiment", OF_DOCS) for path in folder.glob("*.yaml"))
 OPTIONS = [(path.parent.name, path.stem) for path in sorted(conf_folder().glob("*/*.yaml"))]
 LANDFIRE = Path(__file__).parents[4] / "shared" / "landscapes" / "landfire"
@@ -181,19 +181,9 @@ def test_every_scenario_is_a_run(scenario):
     assert plan.scenario == scenario and plan.world.horizon == steps * plan.world.size[0]
 
 
-@pytest.fixture(scope="module")
-def all_experiments(tmp_path_factory):
-    """Experiments of the package and of the docs in one folder of configuration, as ``--config-dir docs`` has them."""
-    folder = tmp_path_factory.mktemp("all") / "conf"
-    shutil.copytree(conf_folder(), folder)
-    shutil.copytree(OF_DOCS, folder / "experiment", dirs_exist_ok=True)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("warp_torchrl.runs.config.compose.conf_folder", lambda: folder)
-        yield
-
-
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
-def test_every_experiment_is_a_run(experiment, all_experiments):
+@pytest.mark.usefixtures("all_experiments")
+def test_every_experiment_is_a_run(experiment):
     values = plain(compose_config("train", [f"experiment={experiment}"]))
     if values["device"] == "cuda" and not torch.cuda.is_available():
         with pytest.raises(

@@ -69,6 +69,7 @@ def test_it_is_small_and_tells_of_no_machine(name, scenario):
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.usefixtures("all_experiments")
 def test_it_is_trained_by_its_experiment(name):
     record = newest(SHIPPED / name)[0].saved_config()
     config = compose_config("train", [f"experiment={LAST.get(name, name)}", f"seed={record.values['seed']}"])
