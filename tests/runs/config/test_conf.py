@@ -19,7 +19,7 @@ from warp_torchrl.runs.config.construction import ConfigError, build, component
 from warp_torchrl.runs.config.defaults import defaults
 from warp_torchrl.runs.config.groups import COMPONENTS
 from warp_torchrl.runs.config.run_config import RunConfig
-from warp_torchrl.runs.config.saved_config import SavedConfig, restore, saved_config, world_overrides
+from warp_torchrl.runs.config.saved_config import SavedConfig, read_saved_config, restore, world_overrides
 from warp_torchrl.world.air.gridded import Gridded
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.ignition.file import IgnitionFile
@@ -460,6 +460,6 @@ def test_only_training_asks_for_a_compiler(monkeypatch):
 @pytest.mark.parametrize("hold", [lambda text: {"path": text}, lambda text: {text: 1}, lambda text: [[text]]])
 def test_a_record_has_texts_as_long_as_a_path_and_no_longer(hold):
     longest, longer = ({"choices": {}, "values": {"a": hold("a" * length)}} for length in (4096, 4097))
-    assert saved_config(longest).values == longest["values"]
+    assert read_saved_config(longest).values == longest["values"]
     with pytest.raises(ValueError, match="texts must have at most 4096 characters"):
-        saved_config(longer)
+        read_saved_config(longer)
