@@ -17,10 +17,14 @@ FILES = {
 MODULES = sorted(FILES)
 GROUND = ("entries", "system", "validation")
 """What knows nothing of ours but each other, and every floor may use."""
+TORCH_ALONE = ("compiler", "device", "disk", "finite", "graph", "modes", "tensors")
+"""Files of ``system`` that know torch."""
 FIRE_SCIENCE = ("world/behaviour", "world/weather")
 """What the world is built on: equations of fire and weather, which know torch alone."""
+COMPILER = "world/arrays/compile"
+"""The one module that speaks of compilers."""
 FENCE = ("world/arrays", "world/backends")
-"""Where alone words of compilers stand."""
+"""What may read it."""
 
 
 def is_in(module: str, rooms: Iterable[str]) -> bool:
@@ -80,6 +84,17 @@ def ours(module: str) -> frozenset[str]:
     return frozenset({name.removeprefix("warp_torchrl.").replace(".", "/") for name in own} & set(MODULES))
 
 
+@cache
+def reached(module: str) -> frozenset[str]:
+    """Every module of ours that a file imports, and that those import, to any depth."""
+    found, left = set(), [module]
+    while left:
+        new = ours(left.pop()) - found
+        found |= new
+        left += new
+    return frozenset(found)
+
+
 def knows_only(module: str, *rooms: str) -> bool:
     """Whether what a file imports of ours is in some rooms, is one of some files, or is of the ground."""
     return all(is_in(name, (*rooms, *GROUND)) for name in ours(module))
@@ -100,7 +115,7 @@ def test_fire_science_knows_torch_and_itself():
 def test_the_ground_floor_knows_the_standard_library_torch_and_yaml():
     known = sys.stdlib_module_names | set(GROUND)
     others = {
-        **{f"system/{module}": {"torch"} for module in ("device", "disk", "finite", "modes", "tensors")},
+        **{f"system/{module}": {"torch"} for module in TORCH_ALONE},
         "system/foreign_yaml": {"yaml"},
     }
     assert not breaks(of_rooms(*GROUND), knows_only)
@@ -262,17 +277,17 @@ def test_viser_is_imported_where_the_live_page_is_put_together():
     assert not breaks(beside, lambda module: not any(is_page(each) for each in ours(module)))
 
 
-def test_compilers_are_spoken_of_behind_the_fence_alone():
-    before = [module for module in MODULES if not is_in(module, FENCE) and module != "system/modes"]  # one is a mode
-    assert not breaks(before, lambda module: not re.search(r"is_compiling|torch\.library|torch\.ops", source(module)))
-    schema = re.compile(r'"\(.*Tensor.*\) -> ')
-    assert not breaks(before, lambda module: not schema.search(source(module))), "a schema of an operator"
+def test_one_module_speaks_of_compilers_and_the_fence_alone_reads_it():
+    words = re.compile(r"is_(dynamo_)?compiling|torch\.library|torch\.ops")
+    assert set(breaks(MODULES, lambda module: not words.search(source(module)))) == {COMPILER, "system/modes"}
+    readers = breaks(MODULES, lambda module: COMPILER not in ours(module))
+    assert readers and not breaks(readers, lambda module: is_in(module, FENCE))
 
 
-def test_the_page_of_the_law_takes_no_fast_road():
-    page = ("world/law/law", "world/law/fire")
+def test_laws_reach_no_backend_by_any_path():
     assert len(source("world/law/law").splitlines()) < 150
-    assert not breaks(page, lambda module: not any(is_in(each, ("world/backends",)) for each in ours(module)))
+    assert not breaks(of_rooms("world/law"), lambda module: not any(is_in(each, FENCE[1:]) for each in reached(module)))
+    assert "world/arrays/compile" in reached("world/law/law"), "the search follows several imports"
 
 
 def test_fields_are_those_of_frozen_dataclasses():

@@ -14,7 +14,7 @@ import torchrl
 
 from warp_torchrl.benchmark.timing import is_alone
 from warp_torchrl.models.networks import computes_in_half
-from warp_torchrl.world.arrays.compile import vectors
+from warp_torchrl.system.compiler import vectors
 
 
 def machine(device: str) -> dict[str, Any]:

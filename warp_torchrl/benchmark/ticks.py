@@ -10,7 +10,7 @@ from warp_torchrl.api.make import make_env
 from warp_torchrl.benchmark.numpy_world import NumpyWorld, plays
 from warp_torchrl.benchmark.tables import entry, spread_of, table
 from warp_torchrl.benchmark.timing import spread, take_turns
-from warp_torchrl.world.arrays.compile import check_compiler, compiled
+from warp_torchrl.system.compiler import check_compiler, compiled
 from warp_torchrl.world.backends.road import in_bytes
 from warp_torchrl.world.backends.tick import advance
 from warp_torchrl.world.fires.burn import burn

@@ -3,7 +3,7 @@
 from torch import Tensor
 
 from warp_torchrl.env.scene import Observations, Scene, Step
-from warp_torchrl.world.arrays.graph import Graph
+from warp_torchrl.system.graph import Graph
 from warp_torchrl.world.state.state import TreeCounts, WorldState
 
 

@@ -14,7 +14,7 @@ from torch import Tensor
 from warp_torchrl.env.metrics import metrics
 from warp_torchrl.env.observation import Observation, critic_state, searched_for
 from warp_torchrl.env.reward import Collaborative, Efficiency, Reward, Time
-from warp_torchrl.world.arrays.compile import check_compiler, compiled
+from warp_torchrl.system.compiler import check_compiler, compiled
 from warp_torchrl.world.backends.road import in_bytes, in_flags, why_eager
 from warp_torchrl.world.state.state import ActionResult, Forecast, Transition, TreeCounts, WorldState, count_trees
 from warp_torchrl.world.world import World

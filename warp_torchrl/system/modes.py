@@ -25,7 +25,7 @@ def apart(function: Callable[P, T]) -> Callable[P, T]:
 
     @wraps(function)
     def call(*given: P.args, **named: P.kwargs) -> T:
-        if torch.compiler.is_compiling() or _is_plain():
+        if torch.compiler.is_dynamo_compiling() or _is_plain():
             return function(*given, **named)
         with _plain():
             return function(*given, **named)

@@ -23,6 +23,7 @@ from warp_torchrl.runs import former
 from warp_torchrl.runs.checkpoint import Checkpoint
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.runs.transfer import actor_parameters, learned_parameters
+from warp_torchrl.system.compiler import compile_function
 from warp_torchrl.training.finite import FiniteSteps, NumericalFailure
 from warp_torchrl.training.kickstarting import kickstart
 from warp_torchrl.training.level_sampler import level_sampler
@@ -30,7 +31,6 @@ from warp_torchrl.training.progress import TRAIN_COLUMNS, episode_columns
 from warp_torchrl.training.recorded import RecordedUpdate
 from warp_torchrl.training.tasks import Task, TaskWorlds, learners, task_worlds
 from warp_torchrl.training.weighing import weighing
-from warp_torchrl.world.arrays.compile import compile_function
 
 
 class Learning:

@@ -6,7 +6,7 @@ import torch
 from tensordict import TensorDictBase
 from torch import Tensor
 
-from warp_torchrl.world.arrays.graph import Graph
+from warp_torchrl.system.graph import Graph
 
 Update = Callable[[TensorDictBase], dict[str, Tensor]]
 

@@ -65,7 +65,7 @@ def test_choices():
 def test_sums_at_places_wrap_around(on_a_compiled_gpu, monkeypatch):
     given, place = torch.tensor([[250, 7, 9]], dtype=torch.uint8), torch.tensor([[0, 0, 2]])
     if on_a_compiled_gpu:
-        monkeypatch.setattr(fast_bytes, "is_compiling", lambda: True)
+        monkeypatch.setattr(fast_bytes, "is_fused", lambda: True)
         monkeypatch.setattr(fast_bytes, "_ADDS_BYTES", ())
     found = scatter_add(given, place, torch.tensor([[5, 4, 255]], dtype=torch.uint8))
     assert found.tolist() == [[3, 7, 8]] and found.dtype == torch.uint8

@@ -6,7 +6,8 @@ from torch._inductor.cpp_builder import get_cpp_compiler
 from torch._inductor.exc import InvalidCxxCompiler
 
 from warp_torchrl import make_env
-from warp_torchrl.world.arrays.compile import compiled, opaque_op
+from warp_torchrl.system.compiler import compiled
+from warp_torchrl.world.arrays.compile import opaque_op
 from warp_torchrl.world.backends.road import in_bytes, in_flags
 from warp_torchrl.world.backends.tick import advance
 from warp_torchrl.world.state.state import count_trees

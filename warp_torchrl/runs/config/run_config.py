@@ -19,8 +19,8 @@ from warp_torchrl.runs.config.evaluation_config import EvaluationConfig
 from warp_torchrl.runs.config.kinds import KindOfWorld, check_kinds
 from warp_torchrl.runs.config.levels import check_alike
 from warp_torchrl.runs.config.seeds import SEEDS, WORLDS
+from warp_torchrl.system.compiler import check_compiler
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.arrays.compile import check_compiler
 from warp_torchrl.world.world import World
 
 

@@ -2,10 +2,10 @@
 
 import torch
 from torch import Tensor
-from torch.compiler import is_compiling
 from torch.nn.functional import adaptive_avg_pool2d
 
 from warp_torchrl.world.arrays.bytes import byte
+from warp_torchrl.world.arrays.compile import is_fused
 
 
 def block_means(maps: Tensor, side: int) -> Tensor:
@@ -26,7 +26,7 @@ def block_means(maps: Tensor, side: int) -> Tensor:
         cells = cells.to(torch.int32) if cells.dtype == torch.uint8 and rows > 255 else cells
         blocks = cells.unflatten(-2, (side, rows))
         # A function that is fused keeps this sum, and would not keep that of the slices.
-        cells = blocks.sum(-2, dtype=blocks.dtype) if is_compiling() else _sum(blocks.unbind(-2))
+        cells = blocks.sum(-2, dtype=blocks.dtype) if is_fused() else _sum(blocks.unbind(-2))
     cells = cells.to(torch.float32)
     if columns > 1:
         cells = _sum(cells.unflatten(-1, (side, columns)).unbind(-1))

@@ -8,8 +8,8 @@ comparisons and ``where`` cost nothing; there bools in memory and arithmetic on 
 
 import torch
 from torch import Tensor
-from torch.compiler import is_compiling
 
+from warp_torchrl.world.arrays.compile import is_fused
 from warp_torchrl.world.arrays.constants import numbers
 
 _WORDS = 128
@@ -19,7 +19,7 @@ _ADDS_BYTES = ("cpu",)
 
 def to_int32(codes: Tensor) -> Tensor:
     """Return uint8 codes in the type to compute in: int32 in a function that is fused, and as they are elsewhere."""
-    return codes.to(torch.int32) if is_compiling() else codes
+    return codes.to(torch.int32) if is_fused() else codes
 
 
 def to_uint8(codes: Tensor) -> Tensor:
@@ -30,14 +30,14 @@ def to_uint8(codes: Tensor) -> Tensor:
 
 def at_least(codes: Tensor, bound: int) -> Tensor:
     """Return ``codes >= bound``, bool; codes are uint8."""
-    if is_compiling():
+    if is_fused():
         return to_int32(codes) >= bound
     return torch.ge(codes, bound, out=torch.empty_like(codes)).view(torch.bool)
 
 
 def between(codes: Tensor, low: int, high: int) -> Tensor:
     """Return which codes, uint8, are at least ``low`` and at most ``high``, bool."""
-    if is_compiling():
+    if is_fused():
         return (to_int32(codes) >= low) & (to_int32(codes) <= high)
     above_low = codes - low  # a lower code wraps round to a high one
     return torch.le(above_low, high - low, out=above_low).view(torch.bool)
@@ -45,21 +45,21 @@ def between(codes: Tensor, low: int, high: int) -> Tensor:
 
 def equal(codes: Tensor, code: int) -> Tensor:
     """Return ``codes == code``, bool; codes are uint8."""
-    if is_compiling():
+    if is_fused():
         return to_int32(codes) == code
     return torch.eq(codes, code, out=torch.empty_like(codes)).view(torch.bool)
 
 
 def below(numbers: Tensor, bounds: Tensor | float) -> Tensor:
     """Return ``numbers < bounds``, bool; both are float32 of one shape, or the bound is one number."""
-    if is_compiling():
+    if is_fused():
         return numbers < bounds
     return _as_flags(torch.lt(numbers, bounds, out=torch.empty_like(numbers)))
 
 
 def above(numbers: Tensor, bound: float) -> Tensor:
     """Return ``numbers > bound``, bool; the numbers are float32."""
-    if is_compiling():
+    if is_fused():
         return numbers > bound
     return _as_flags(torch.gt(numbers, bound, out=torch.empty_like(numbers)))
 
@@ -71,41 +71,41 @@ def _as_flags(numbers: Tensor) -> Tensor:
 
 def byte(mask: Tensor) -> Tensor:
     """Return a bool mask as 0 and 1, uint8 and maybe in the mask's own memory, or ``to_int32`` ones."""
-    return mask.to(torch.int32) if is_compiling() else mask.view(torch.uint8)
+    return mask.to(torch.int32) if is_fused() else mask.view(torch.uint8)
 
 
 def as_mask(codes: Tensor) -> Tensor:
     """Return codes 0 and 1 of ``byte`` as a bool mask, maybe in their own memory."""
-    return codes != 0 if is_compiling() else codes.view(torch.bool)
+    return codes != 0 if is_fused() else codes.view(torch.bool)
 
 
 def view_as(plane: Tensor, codes: Tensor) -> Tensor:
     """Return codes 0 and 1 of ``byte`` in the type of a plane of flags, maybe in their own memory."""
-    return to_uint8(codes) if is_compiling() else codes.view(plane.dtype)
+    return to_uint8(codes) if is_fused() else codes.view(plane.dtype)
 
 
 def number(mask: Tensor) -> Tensor:
     """Return a bool mask as 0 and 1, float32."""
-    return mask.to(torch.float32) if is_compiling() else mask.view(torch.uint8).to(torch.float32)
+    return mask.to(torch.float32) if is_fused() else mask.view(torch.uint8).to(torch.float32)
 
 
 def choose(flags: Tensor, one: Tensor | int, other: Tensor) -> Tensor:
     """Return one, uint8 or ``to_int32``, where flags of ``byte`` are 1 and the other where they are 0."""
-    if is_compiling():
+    if is_fused():
         return torch.where(as_mask(to_int32(flags)), to_int32(one) if isinstance(one, Tensor) else one, to_int32(other))
     return (one - other).mul_(flags).add_(other)
 
 
 def zero_where(flags: Tensor, values: Tensor) -> Tensor:
     """Return values, uint8 or ``to_int32``, but 0 where flags of ``byte`` are 1."""
-    if is_compiling():
+    if is_fused():
         return torch.where(as_mask(to_int32(flags)), 0, to_int32(values))
     return values * (flags ^ 1)
 
 
 def counts(*codes: Tensor) -> tuple[Tensor, ...]:
     """Return how many cells of each map codes 0 and 1 of ``byte``, [B, H, W] each, mark, int32 [B] each."""
-    if is_compiling():
+    if is_fused():
         return tuple(each.sum((-2, -1), dtype=torch.int32) for each in codes)
     maps = torch.stack(codes).flatten(-2)
     if maps.shape[-1] % 8:
@@ -126,7 +126,7 @@ def index_put(plane: Tensor, place: Tensor, values: Tensor | int) -> Tensor:
 
 def scatter_add(codes: Tensor, index: Tensor, changes: Tensor) -> Tensor:
     """Return codes, uint8 [..., N], with changes, uint8 [..., K], added modulo 256 at places, int64 [..., K]."""
-    if is_compiling() and codes.device.type not in _ADDS_BYTES:
+    if is_fused() and codes.device.type not in _ADDS_BYTES:
         return codes.to(torch.int32).scatter_add(-1, index, changes.to(torch.int32)).to(torch.uint8)
     return codes.scatter_add(-1, index, changes)
 
@@ -139,4 +139,4 @@ def look_up(table: tuple[float, ...], codes: Tensor) -> Tensor:
 def to_codes(numbers: Tensor) -> Tensor:
     """Return numbers in 0..255, cut to whole ones, uint8 or ``to_int32``."""
     codes = numbers.to(torch.int32)
-    return codes if is_compiling() else codes.to(torch.uint8)  # at once it takes twice the time
+    return codes if is_fused() else codes.to(torch.uint8)  # at once it takes twice the time

@@ -1,61 +1,20 @@
-"""Fuses pure functions of worlds with ``torch.compile`` for those who ask for it: ``compile=true``.
+"""The compiler's part in functions of tensors: whether one is being fused, and operators that stay as they are.
 
-Eager, each of their operations passes over every cell; fused, one loop does them all. The law and the draws are the
-same, and on the CPU every bit of a world, but for the last places of exponentials: law ``hazard``, changing winds.
+It is the one module that speaks of the compiler; ``system.compiler`` calls it.
 """
 
-import warnings
 from collections.abc import Callable
-from functools import cache, wraps
+from functools import wraps
 from typing import Any, ParamSpec, TypeVar
 
 import torch
-from torch.compiler import is_compiling
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
-_SHAPES = 256  # that one function may be compiled for; torch stops at 8
-_IN_REGISTERS: dict[str, Any] = {
-    "realize_opcount_threshold": 200,
-    "realize_reads_threshold": 1000,
-    "realize_acc_reads_threshold": 1000,
-}
-# Else each element of a stack asks which of its parts it is of.
-_IN_PARTS: dict[str, Any] = {"max_pointwise_cat_inputs": 0}
-_NOISE = (
-    "Dynamo detected a call to a `functools.lru_cache`-wrapped function",  # of constants, which stay what they are
-    "torch._dynamo.config.inline_inbuilt_nn_modules is deprecated",  # in tensordict
-)
-
-
-@cache
-def compiled(function: Callable[P, T], in_parts: bool = False) -> Callable[P, T]:
-    """Return a function of tensors that changes nothing as one loop, compiled for each shape anew when it is called.
-
-    What is computed of a cell is computed again for each who asks, and kept for none: on the CPU a mask in memory costs
-    more than the comparisons that made it. A function that is fused ``in_parts`` keeps what is asked for often.
-    """
-    torch._dynamo.config.recompile_limit = max(torch._dynamo.config.recompile_limit, _SHAPES)
-    return compile_function(function, fullgraph=True, **(_IN_PARTS if in_parts else _IN_REGISTERS))
-
-
-def compile_function(function: Callable[P, T], fullgraph: bool = False, **options: Any) -> Callable[P, T]:
-    """Return a function that is compiled for each shape anew when it is called.
-
-    Names of modules are taken to stay what they are: to look at them at every call takes longer than a loss's sums, and
-    tensordict's list of classes grows, which would have all compiled again.
-
-    Args:
-        function: Of tensors.
-        fullgraph: Whether a part that cannot be compiled is an error.
-        options: Of Inductor.
-    """
-    for message in _NOISE:
-        warnings.filterwarnings("ignore", message=message)
-    options["guard_filter_fn"] = torch.compiler.skip_guard_on_globals_unsafe
-    return torch.compile(function, fullgraph=fullgraph, dynamic=False, options=options)
-
+is_fused = torch.compiler.is_dynamo_compiling
+"""Return whether the present function is being fused. A step of one world looks more than a hundred times, and
+``torch.compiler.is_compiling`` takes twice as long."""
 
 _OPERATORS = torch.library.Library("warp_torchrl", "FRAGMENT")
 _FUNCTIONS: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {}
@@ -85,33 +44,8 @@ def opaque_op(schema: str, like: Callable[..., Any] | None = None) -> Callable[[
 
         @wraps(function)
         def either(*args: P.args, **kwargs: P.kwargs) -> T:
-            return (operator if is_compiling() else function)(*args, **kwargs)
+            return (operator if is_fused() else function)(*args, **kwargs)
 
         return either
 
     return opaque
-
-
-def vectors() -> str:
-    """Return the vector instructions in force on the CPU, ``AVX512``, ``AVX2`` or what else torch names.
-
-    The environment variable ``ATEN_CPU_CAPABILITY`` sets them, for Inductor too.
-    """
-    return torch.backends.cpu.get_cpu_capability()
-
-
-def check_compiler(device: torch.device) -> None:
-    """Check that ``torch.compile`` can work here.
-
-    Raises:
-        ValueError: If it finds no C++ compiler.
-    """
-    from torch._inductor.cpp_builder import get_cpp_compiler
-    from torch._inductor.exc import InvalidCxxCompiler
-
-    if device.type != "cpu":
-        return
-    try:
-        get_cpp_compiler()
-    except InvalidCxxCompiler:
-        raise ValueError("compile must be false here: torch.compile finds no C++ compiler (set CXX)") from None

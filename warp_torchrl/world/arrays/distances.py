@@ -2,9 +2,9 @@
 
 import torch
 from torch import Tensor
-from torch.compiler import is_compiling
 
 from warp_torchrl.world.arrays.bytes import byte
+from warp_torchrl.world.arrays.compile import is_fused
 from warp_torchrl.world.arrays.constants import counting
 
 FAR = 30_000
@@ -45,7 +45,7 @@ def distance_to_nearest(position: Tensor, mask: Tensor) -> Tensor:
     Returns:
         int16 [B, A] [cells]; ``FAR`` where nothing is marked.
     """
-    if is_compiling():
+    if is_fused():
         return _moves(position, mask, torch.int32, FAR).flatten(2).amin(2).to(torch.int16)
     if max(mask.shape[-2:]) > 255:
         return chebyshev_distance(position, mask).flatten(2).amin(2)

@@ -7,10 +7,9 @@ from functools import reduce
 
 import torch
 from torch import Tensor
-from torch.compiler import is_compiling
 
 from warp_torchrl.world.arrays.bytes import byte, to_codes, to_int32, to_uint8
-from warp_torchrl.world.arrays.compile import opaque_op
+from warp_torchrl.world.arrays.compile import is_fused, opaque_op
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +43,7 @@ class Window:
             codes: Planes [B, H, W] of codes 0..255, uint8 or ``to_int32``.
             fractions: Planes [B, H, W] of numbers whose sum is in 0..1, float32; the sum is shown times 255.
         """
-        if not is_compiling():
+        if not is_fused():
             sums = [reduce(Tensor.add_, [self.of(part) for part in parts]) for parts in fractions]
             return [self.of(plane) for plane in codes] + [_share(each) for each in sums]
         planes = [*codes, *(_share(reduce(torch.add, parts)) for parts in fractions)]
@@ -83,7 +82,7 @@ def _squares(plane: Tensor, position: Tensor, radius: int) -> Tensor:
 def stacked(channels: Sequence[Tensor]) -> Tensor:
     """Return channels [B, A, V, V] of whole numbers 0..255 as one tensor, uint8 [B, A, C, V, V]."""
     codes = [to_uint8(channel) for channel in channels]
-    return _stacked([each.contiguous() for each in codes] if is_compiling() else codes)
+    return _stacked([each.contiguous() for each in codes] if is_fused() else codes)
 
 
 # A compiler would write squares of odd sides a few cells at a time.

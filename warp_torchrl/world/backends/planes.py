@@ -2,7 +2,6 @@
 
 import torch
 from torch import Tensor
-from torch.compiler import is_compiling
 
 from warp_torchrl.world.arrays.bytes import (
     above,
@@ -20,6 +19,7 @@ from warp_torchrl.world.arrays.bytes import (
     view_as,
     zero_where,
 )
+from warp_torchrl.world.arrays.compile import is_fused
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.backends.join import in_place
 from warp_torchrl.world.backends.rows import expected_from_rows, probability_from_rows
@@ -84,7 +84,7 @@ class Planes:
 
     def _spread_probability(self, state: WorldState) -> Tensor:
         fire = self.fire
-        if state.air.table is not None and not is_compiling():  # a look-up costs more than what it spares there
+        if state.air.table is not None and not is_fused():  # a look-up costs more than what it spares there
             kind = (state.cover + 1) * byte(is_fuel(fire, state))
             return probability_by_pattern(state.air.table, spreads(fire, state), kind)
         return probability_from_rows(

@@ -9,11 +9,11 @@ from typing import Protocol
 
 import torch
 from torch import Tensor
-from torch.compiler import is_compiling
 
+from warp_torchrl.system.compiler import vectors
 from warp_torchrl.system.device import needs_no_sync
 from warp_torchrl.world.arrays.bytes import number
-from warp_torchrl.world.arrays.compile import vectors
+from warp_torchrl.world.arrays.compile import is_fused
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.backends.band import AtBand
 from warp_torchrl.world.backends.edge import AtEdge
@@ -80,7 +80,7 @@ def fastest(fire: Automaton, device: torch.device) -> Road:
 
 
 def _may_read(device: torch.device) -> bool:
-    return needs_no_sync(device) and not is_compiling()
+    return needs_no_sync(device) and not is_fused()
 
 
 def why_eager(fire: Automaton, device: torch.device, cells: int) -> str | None:

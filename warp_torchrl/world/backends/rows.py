@@ -6,10 +6,10 @@ contiguous slice at a constant offset.
 
 import torch
 from torch import Tensor
-from torch.compiler import is_compiling
 from torch.nn.functional import pad
 
 from warp_torchrl.world.arrays.bytes import byte, number, to_uint8
+from warp_torchrl.world.arrays.compile import is_fused
 from warp_torchrl.world.arrays.geometry import DIRECTIONS
 from warp_torchrl.world.arrays.row_layout import in_a_row
 from warp_torchrl.world.backends.join import Joining
@@ -35,11 +35,11 @@ def probability_from_rows(
         float32 [B, H, W].
     """
     shape, burning = tuple(susceptible.shape), number(spreading)
-    rows = [in_a_row(to_uint8(byte(spreading)) if is_compiling() else burning)]
+    rows = [in_a_row(to_uint8(byte(spreading)) if is_fused() else burning)]
     if gain.shape[2:] != (1, 1):
         rows = [in_a_row(burning * gain[:, direction]) for direction in range(8)]
         gain = torch.ones_like(gain[..., :1, :1])
-    target = susceptible if is_compiling() else _shifted(in_a_row(susceptible), shape, 0)
+    target = susceptible if is_fused() else _shifted(in_a_row(susceptible), shape, 0)
     total, strength, spare = torch.zeros_like(target), torch.empty_like(target), torch.empty_like(target)
     for direction in directions:
         source = _shifted(rows[direction % len(rows)], shape, -_offset(direction, shape)).to(torch.float32)
@@ -49,7 +49,7 @@ def probability_from_rows(
             strength *= _slope(slope, direction, shape, 0)
         law.join(total, strength, spare)
     chance = law.probability(total)
-    return chance if is_compiling() else _on_map(chance).contiguous()
+    return chance if is_fused() else _on_map(chance).contiguous()
 
 
 def expected_from_rows(
@@ -68,7 +68,7 @@ def expected_from_rows(
         float32 [B, H, W].
     """
     shape = tuple(susceptible.shape)
-    if gain.shape[2:] != (1, 1) and not is_compiling():
+    if gain.shape[2:] != (1, 1) and not is_fused():
         gain = pad(gain, (0, 1, 0, 1))
     row = in_a_row(susceptible)
     total = torch.zeros_like(_shifted(row, shape, 0))
@@ -79,7 +79,7 @@ def expected_from_rows(
         if slope is not None:
             strength *= _slope(slope, direction, shape, offset)
         total += law.probability_of(strength)
-    return total if is_compiling() else _on_map(total)
+    return total if is_fused() else _on_map(total)
 
 
 def _offset(direction: int, shape: Shape) -> int:
@@ -106,7 +106,7 @@ def _slope(slope: Tensor, direction: int, shape: Shape, offset: int) -> Tensor:
 
 def _maps(row: Tensor, shape: Shape) -> Tensor:
     maps = row.view(shape[0], shape[1] + 1, shape[2] + 1)
-    return _on_map(maps) if is_compiling() else maps
+    return _on_map(maps) if is_fused() else maps
 
 
 def _on_map(maps: Tensor) -> Tensor:
