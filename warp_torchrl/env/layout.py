@@ -1,5 +1,7 @@
 """TorchRL's layout of what an environment is given and gives: actions checked, observations packed."""
 
+from typing import Any
+
 import torch
 from tensordict import TensorDict
 from torch import Tensor
@@ -49,7 +51,11 @@ def packed(world: World, state: WorldState, observed: Observations, episode_rewa
         episode_reward: Of their episodes so far, float32 [B].
     """
     batch, device = state.batch_size, state.cells.device  # without a device a tensordict copies those that it holds
-    team = [*batch, world.team.n_agents]
+    team = torch.Size([*batch, world.team.n_agents])
+
+    def unchecked(entries: dict[str, Any], shape: torch.Size) -> TensorDict:
+        # Of one world, to check shapes and devices of our own is a sixth of the calls of a step.
+        return TensorDict._new_unsafe(entries, shape, device)
 
     def of_team(entries: dict[str, Tensor]) -> Tensor | TensorDict:
         return entries[""] if "" in entries else TensorDict(entries, batch_size=team, device=device)
@@ -61,15 +67,14 @@ def packed(world: World, state: WorldState, observed: Observations, episode_rewa
     agents |= {"sent": of_team(sent)} if (sent := world.team.radio.shown(state)) else {}
     paid = episode_reward.clone()  # the environment adds to its own
     info = observed.metrics | {"episode_reward": paid, "episode_length": state.step.to(torch.float32)}
-    return TensorDict(
+    return unchecked(
         {
-            "agents": TensorDict(agents, batch_size=team, device=device),
+            "agents": unchecked(agents, team),
             "state": observed.state,
-            "info": TensorDict({name: value[:, None] for name, value in info.items()}, batch, device=device),
+            "info": unchecked({name: value[:, None] for name, value in info.items()}, batch),
             "done": state.done[:, None],
             "terminated": state.terminated[:, None].clone(),
             "truncated": state.truncated[:, None].clone(),
         },
-        batch_size=batch,
-        device=device,
+        batch,
     )

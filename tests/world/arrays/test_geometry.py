@@ -1,12 +1,15 @@
 """Directions and distances on drawn maps."""
 
 import math
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 
 import pytest
 import torch
 from torch import Tensor
 
 from tests.world.drawing import marks
+from warp_torchrl.system.device import unread
 from warp_torchrl.world.arrays.geometry import (
     DIRECTIONS,
     DISTANCES,
@@ -87,6 +90,9 @@ def test_a_seed_that_is_not_open_floods_but_is_not_reached() -> None:
     assert rows_of(flood(marked("x..."), marked("#oo#", "o"))) == ".xx."
 
 
-def test_a_flood_follows_a_long_corridor() -> None:
+@pytest.mark.parametrize("device", [nullcontext, unread], ids=["read freely", "never read"])
+def test_a_flood_follows_a_long_corridor(device: Callable[[], AbstractContextManager[None]]) -> None:
     drawing = "ooooooo ######o ooooooo o###### ooooooo"
-    assert flood(marked("x...... ....... ....... ....... ......."), marked(drawing, "o"))[0, 4, 6]
+    with device():
+        reached = flood(marked("x...... ....... ....... ....... ......."), marked(drawing, "o"))
+    assert rows_of(reached) == "xxxxxxx ......x xxxxxxx x...... xxxxxxx"

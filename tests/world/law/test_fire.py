@@ -14,6 +14,7 @@ from warp_torchrl.world.arrays.batch import concatenated
 from warp_torchrl.world.arrays.random import Stream, uniform, world_key
 from warp_torchrl.world.backends import road
 from warp_torchrl.world.backends.tick import in_wind
+from warp_torchrl.world.law import law
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.law.hazard import HazardFire
 from warp_torchrl.world.law.wind_and_slope import slope_factor
@@ -442,6 +443,17 @@ def test_lightning_and_neighbours_join_as_independent_trials() -> None:
     state = draw("aT", ground="ff")
     assert drawn(tick(fire, state, u=0.8649)) == "ba"
     assert drawn(tick(fire, state, u=0.8651)) == "bT"
+
+
+def test_tables_of_growth_and_lightning_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    fire, state, made = Fire(growth=True, tau=4.5, beta=3.5), draw("a55 555"), []
+    for name in ("growth_probability", "lightning_probability"):
+        rule = getattr(law, name)
+        monkeypatch.setattr(law, name, lambda *given, rule=rule: made.append(rule) or rule(*given))
+    road.fastest(fire, state.cells.device).tick(state, torch.ones(1, dtype=torch.bool))
+    assert len(made) == 2 * 16, "one of each cell code"
+    after_ticks(fire, state, 3)
+    assert len(made) == 2 * 16
 
 
 def test_ash_and_bare_ground_regrow_but_not_firebreaks_lakes_or_rock() -> None:

@@ -5,7 +5,7 @@ tensordicts took a quarter of the time of a step of one world.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Self, TypeVar
 
 import torch
@@ -28,7 +28,7 @@ class Batch:
 
     def replace(self, **changes: Any) -> Self:
         """Return the same batch but for some fields; what is not replaced is shared."""
-        return replace(self, **changes)
+        return type(self)(**(vars(self) | changes))  # half of what ``dataclasses.replace`` takes
 
     def clone(self) -> Self:
         """Return a copy that shares no memory."""

@@ -24,12 +24,12 @@ def block_means(maps: Tensor, side: int) -> Tensor:
     rows, columns = height // side, width // side
     if rows > 1:
         cells = cells.to(torch.int32) if cells.dtype == torch.uint8 and rows > 255 else cells
-        blocks = cells.unflatten(-2, (side, rows))
+        blocks = cells.view(*cells.shape[:-2], side, rows, width)
         # A function that is fused keeps this sum, and would not keep that of the slices.
         cells = blocks.sum(-2, dtype=blocks.dtype) if is_fused() else _sum(blocks.unbind(-2))
     cells = cells.to(torch.float32)
     if columns > 1:
-        cells = _sum(cells.unflatten(-1, (side, columns)).unbind(-1))
+        cells = _sum(cells.view(*cells.shape[:-1], side, columns).unbind(-1))
     return cells * (side * side / (height * width))
 
 

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import pad
 
+from warp_torchrl.system.device import reads_freely
 from warp_torchrl.system.modes import kept
 
 DIRECTIONS = ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1))
@@ -17,6 +18,9 @@ DIRECTIONS = ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -
 
 DISTANCES = tuple(math.hypot(row, column) for row, column in DIRECTIONS)
 """Distance to the neighbour in each direction [cells]: 1 along the axes, sqrt(2) along the diagonals."""
+
+_STEPS = 4
+"""Steps of a walk between two looks at whether it has ended."""
 
 
 @kept(8)
@@ -62,8 +66,8 @@ def grow(mask: Tensor, radius: int = 1) -> Tensor:
 def flood(seeds: Tensor, open_cells: Tensor) -> Tensor:
     """Return the open cells that are reached from the seeds over open cells, eight neighbours each.
 
-    The walk is followed for 2 (H + W) steps, a fixed number, so that no value is ever read back from the device;
-    only a labyrinth holds longer shortest paths.
+    The walk is followed for 2 (H + W) steps: only a labyrinth holds longer shortest paths. Where the device is read
+    freely it ends as soon as nothing new is reached.
 
     Args:
         seeds: bool [B, H, W]; a seed need not be open.
@@ -72,8 +76,10 @@ def flood(seeds: Tensor, open_cells: Tensor) -> Tensor:
     Returns:
         bool [B, H, W].
     """
-    reached = seeds
+    reached, reads = seeds, reads_freely(seeds.device)
     passable = open_cells | seeds
-    for _ in range(2 * sum(seeds.shape[-2:])):
-        reached = grow(reached) & passable
+    for step in range(1, 2 * sum(seeds.shape[-2:]) + 1):
+        before, reached = reached, grow(reached) & passable
+        if reads and step % _STEPS == 0 and torch.equal(before, reached):
+            break
     return reached & open_cells

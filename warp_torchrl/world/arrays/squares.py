@@ -8,6 +8,7 @@ from functools import reduce
 import torch
 from torch import Tensor
 
+from warp_torchrl.system.modes import kept
 from warp_torchrl.world.arrays.bytes import byte, to_codes, to_int32, to_uint8
 from warp_torchrl.world.arrays.compile import is_fused, opaque_op
 
@@ -61,12 +62,24 @@ def window(position: Tensor, size: Sequence[int], radius: int) -> Window:
         radius: r [cells]; V = 2 r + 1.
     """
     height, width = size
-    away = torch.arange(-radius, radius + 1, device=position.device)
-    row, column = position[..., 0, None] + away, position[..., 1, None] + away
-    on_row, on_column = (row >= 0) & (row < height), (column >= 0) & (column < width)
-    index = row.clamp(0, height - 1)[..., None] * width + column.clamp(0, width - 1)[..., None, :]
-    inside = to_uint8(byte(on_row)[..., None] * byte(on_column)[..., None, :])
-    return Window(position, radius, index.flatten(1), inside)
+    lines = position[..., None] + _away(radius, position.device)  # the square's rows, then its columns
+    on_map = torch.clamp(lines, *_bounds(height, width, position.device))
+    row, column = on_map.unbind(-2)
+    has_row, has_column = byte(on_map == lines).unbind(-2)
+    index = torch.add(column[..., None, :], row[..., None], alpha=width)
+    return Window(position, radius, index.flatten(1), to_uint8(has_row[..., None] * has_column[..., None, :]))
+
+
+@kept(32)
+def _away(radius: int, device: torch.device) -> Tensor:
+    return torch.arange(-radius, radius + 1, device=device)
+
+
+@kept(32)
+def _bounds(height: int, width: int, device: torch.device) -> tuple[Tensor, Tensor]:
+    """Return the least and the largest (row, column) of a map, int64 [2, 1] each."""
+    last = torch.tensor([[height - 1], [width - 1]], device=device)
+    return torch.zeros_like(last), last
 
 
 def _square(plane: Tensor, position: Tensor, radius: int) -> Tensor:

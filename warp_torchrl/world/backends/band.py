@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import pad
 
+from warp_torchrl.system.modes import kept
 from warp_torchrl.world.arrays.bytes import byte
 from warp_torchrl.world.arrays.geometry import DIRECTIONS, grow
 from warp_torchrl.world.arrays.random import Stream, uniform
@@ -96,8 +97,15 @@ def _band_of(cell: Tensor, state: WorldState) -> _Band:
     row = place.div(width, rounding_mode="floor")
     column = place - row * width
     here = (world * (height + 2) + row + 1) * (width + 2) + column + 1
-    offsets = torch.tensor([down * (width + 2) + right for down, right in DIRECTIONS], device=cell.device)
-    return _Band(cell, world * (height * width), row.to(torch.int32), column.to(torch.int32), offsets[:, None] + here)
+    return _Band(
+        cell, world * (height * width), row.to(torch.int32), column.to(torch.int32), _around(width, cell.device) + here
+    )
+
+
+@kept(32)
+def _around(width: int, device: torch.device) -> Tensor:
+    """Return how far each neighbour lies along maps of a width with a margin of one cell, int64 [8, 1]."""
+    return torch.tensor([[down * (width + 2) + right] for down, right in DIRECTIONS], device=device)
 
 
 def padded(plane: Tensor, beyond: float) -> Tensor:

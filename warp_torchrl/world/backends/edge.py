@@ -12,12 +12,13 @@ from typing import Protocol
 import torch
 from torch import Tensor
 
+from warp_torchrl.system.modes import kept
 from warp_torchrl.world.arrays.bytes import byte, index_put
 from warp_torchrl.world.arrays.geometry import DIRECTIONS
 from warp_torchrl.world.arrays.random import Stream, uniform_among
 from warp_torchrl.world.backends.join import Joining, in_place
 from warp_torchrl.world.backends.planes import age_fires, is_fuel, spreads
-from warp_torchrl.world.backends.table import BESIDE, bit_of, burning_neighbours
+from warp_torchrl.world.backends.table import BESIDE, bits, burning_neighbours
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.state.state import FIRST_FIRE, WorldState
 
@@ -92,21 +93,29 @@ class Edge:
         """Return what a plane [B, H, W] holds there, [N]."""
         return plane.flatten().index_select(0, self.cell)
 
-    def offset(self, direction: int) -> int:
-        """Return how far before each the neighbour stands that fire in a direction comes from.
+    @cached_property
+    def source(self) -> Tensor:
+        """Return the flat index of the neighbour that fire in each direction comes from, int64 [D, N].
 
-        There is one only where ``burns`` tells so.
+        There is one only where ``burns`` says so.
         """
-        row, column = DIRECTIONS[direction]
-        return row * self.shape[2] + column
+        return self.cell - _offsets(self.directions, self.shape[2], self.cell.device)
 
-    def burns(self, direction: int) -> Tensor:
-        """Return 1.0 where the neighbour that fire in a direction comes from burns and 0.0 elsewhere, float32 [N]."""
-        return (self.pattern >> bit_of(direction)).bitwise_and_(1).to(torch.float32)
+    @cached_property
+    def burns(self) -> Tensor:
+        """Return 1.0 where the neighbour that fire in each direction comes from burns, else 0.0, float32 [D, N]."""
+        return (self.pattern >> bits(self.directions, self.cell.device)).bitwise_and_(1).to(torch.float32)
 
     def on_map(self, values: Tensor) -> Tensor:
         """Return maps [B, H, W] that hold these values there, [N], and 0 elsewhere."""
         return values.new_zeros(self.shape.numel()).scatter_(0, self.cell, values).view(self.shape)
+
+
+@kept(32)
+def _offsets(directions: range, width: int, device: torch.device) -> Tensor:
+    """Return how far before a cell the neighbour lies that fire in each direction comes from, int64 [D, 1]."""
+    ways = [DIRECTIONS[direction] for direction in directions]
+    return torch.tensor([[row * width + column] for row, column in ways], device=device)
 
 
 def edge_of(spreading: Tensor, fuel: Tensor, directions: range) -> Edge:
@@ -131,10 +140,10 @@ class EdgeProbabilities(Protocol):
         """Return the probability that the burning neighbours together ignite the tree, float32 [N]."""
         ...
 
-    def alone(self, direction: int) -> Tensor:
-        """Return the probability that the upstream neighbour would ignite the tree if it burned, float32 [N].
+    def alone(self) -> Tensor:
+        """Return the probability that the neighbour upstream of each direction ignites the tree, float32 [D, N].
 
-        It is undefined where that neighbour is off the map.
+        It is as if that neighbour burned, and undefined where it is off the map.
         """
         ...
 
@@ -157,9 +166,10 @@ class ByPattern:
         """See ``EdgeProbabilities``."""
         return self._table.index_select(0, self._row + self._edge.pattern)
 
-    def alone(self, direction: int) -> Tensor:
+    def alone(self) -> Tensor:
         """See ``EdgeProbabilities``."""
-        return self._table[1 << bit_of(direction) :].index_select(0, self._row)
+        index = self._row + (1 << bits(self._edge.directions, self._row.device))
+        return self._table.index_select(0, index.flatten()).view(index.shape)
 
 
 class ByStrength:
@@ -180,18 +190,20 @@ class ByStrength:
         """See ``EdgeProbabilities``."""
         total = torch.zeros_like(self._susceptible)
         spare = torch.empty_like(total)
-        for direction in self._edge.directions:
-            self._law.join(total, self._strength(direction).mul_(self._edge.burns(direction)), spare)
+        for place in range(len(self._edge.directions)):
+            self._law.join(total, self._strength(place).mul_(self._edge.burns[place]), spare)
         return self._law.probability(total)
 
-    def alone(self, direction: int) -> Tensor:
+    def alone(self) -> Tensor:
         """See ``EdgeProbabilities``."""
-        return self._law.probability_of(self._strength(direction))
+        directions = range(len(self._edge.directions))
+        return torch.stack([self._law.probability_of(self._strength(place)) for place in directions])
 
-    def _strength(self, direction: int) -> Tensor:
-        edge, gain = self._edge, self._gain[:, direction].flatten()
-        differs = self._gain.shape[2:] != (1, 1)
-        source = (edge.cell - edge.offset(direction)).clamp_(0, len(gain) - 1) if differs else edge.world
+    def _strength(self, place: int) -> Tensor:
+        """Return the strength in the direction at a place among the edge's, float32 [N]."""
+        edge, direction = self._edge, self._edge.directions[place]
+        gain, differs = self._gain[:, direction].flatten(), self._gain.shape[2:] != (1, 1)
+        source = edge.source[place].clamp(0, len(gain) - 1) if differs else edge.world
         strength = gain.index_select(0, source).mul_(self._susceptible)
         if self._slope is not None:
             strength.mul_(self._slope[:, direction].flatten().index_select(0, self._target))
@@ -215,9 +227,7 @@ def expected_from_edge(edge: Edge, probabilities: EdgeProbabilities) -> Tensor:
     """
     margin = edge.shape[2] + 1  # where no neighbour burns 0 is added, maybe beside the batch
     total = torch.zeros(edge.shape.numel() + 2 * margin, device=edge.cell.device)
-    for direction in edge.directions:
-        at_source = total[margin - edge.offset(direction) :]
-        at_source.scatter_add_(0, edge.cell, edge.burns(direction).mul_(probabilities.alone(direction)))
+    total.scatter_add_(0, (edge.source + margin).flatten(), (edge.burns * probabilities.alone()).flatten())
     return total[margin:-margin].view(edge.shape)
 
 

@@ -85,6 +85,12 @@ def bit_of(direction: int) -> int:
 
 
 @kept(8)
+def bits(directions: range, device: torch.device) -> Tensor:
+    """Return ``bit_of`` each direction, int64 [D, 1]."""
+    return torch.tensor([[bit_of(direction)] for direction in directions], device=device)
+
+
+@kept(8)
 def _columns(directions: range, device: torch.device) -> Tensor:
     """Return which column each pattern has where the directions double the columns in turn, int64 [256]."""
     pattern = torch.arange(_PATTERNS)

@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Self
 
 import torch
@@ -188,14 +189,20 @@ class Automaton(ABC):
 
     def growing(self) -> tuple[float, ...]:
         """Return p_grow in one tick of each cell code, 0..15."""
-        return self._by_code(lambda age: law.growth_probability(age, self.tau, self.oldest) if self.growth else 0.0)
+        return _by_code(law.growth_probability, (self.tau, self.oldest), self.ticks_per_stage) if self.growth else _NONE
 
     def lightning(self, cells: int) -> tuple[float, ...]:
         """Return p_spont in one tick of each cell code, 0..15, on a map of so many cells."""
-        return self._by_code(lambda age: law.lightning_probability(age, self.beta, cells, self.oldest))
+        return _by_code(law.lightning_probability, (self.beta, cells, self.oldest), self.ticks_per_stage)
 
-    def _by_code(self, rule: Callable[[int], float]) -> tuple[float, ...]:
-        return tuple(law.in_finer_time(rule(code), self.ticks_per_stage) for code in range(EMBER + 1))
+
+_NONE = (0.0,) * (EMBER + 1)
+
+
+@lru_cache(64)
+def _by_code(rule: Callable[..., float], given: tuple[float, ...], ticks: int) -> tuple[float, ...]:
+    """Return a rule's probability in each of so many ticks, of each cell code; kept for the next time."""
+    return tuple(law.in_finer_time(rule(code, *given), ticks) for code in range(EMBER + 1))
 
 
 def of_codes(table: tuple[float, ...], codes: Tensor) -> Tensor:

@@ -164,8 +164,7 @@ class Extinguish(Ability):
         index, inside = neighbourhood(now.state)
         codes = now.at(now.state.cells, index.flatten(1)).view_as(index).to(torch.int64)
         fits = inside & (codes >= FIRST_FIRE) & (codes <= now.last_spreading)
-        order = torch.arange(len(_NEIGHBOURHOOD), device=codes.device)
-        best = torch.where(fits, codes * 16 + order, 1 << 20).argmin(dim=-1, keepdim=True)
+        best = torch.where(fits, codes * 16 + _order(codes.device), 1 << 20).argmin(dim=-1, keepdim=True)
         return index.gather(-1, best)[..., 0], fits.any(dim=-1)
 
 
@@ -215,6 +214,11 @@ def places(state: WorldState, away: Tensor) -> tuple[Tensor, Tensor]:
     row, column = position[..., 0, None] + away[..., 0], position[..., 1, None] + away[..., 1]
     on_row, on_column = row.clamp(0, height - 1), column.clamp(0, width - 1)
     return on_row * width + on_column, (on_row == row) & (on_column == column)
+
+
+@kept(8)
+def _order(device: torch.device) -> Tensor:
+    return torch.arange(len(_NEIGHBOURHOOD), device=device)
 
 
 @kept(8)

@@ -96,7 +96,7 @@ class Team:
         paper = tuple(action for name in PAPER_ABILITIES for action in ABILITIES[name].actions)
         return (*paper, *([STAY] if self.allow_stay else ()), *self.further_actions)
 
-    @property
+    @cached_property
     def further_actions(self) -> tuple[str, ...]:
         """Return the names of the actions that are not the paper's, nor stay."""
         return tuple(action for name in self._further for action in ABILITIES[name].actions)
