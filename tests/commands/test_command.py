@@ -22,9 +22,11 @@ from warp_torchrl.commands.command import evaluate, train
 from warp_torchrl.commands.queue import Queue
 from warp_torchrl.commands.sweep import SweepSummary
 from warp_torchrl.runs import checkpoint
+from warp_torchrl.runs.config import building
 from warp_torchrl.system.lock import RunFolderLock
 from warp_torchrl.system.signals import Stopped
 from warp_torchrl.training.loop import Training
+from warp_torchrl.world.world import World
 
 ROOT = Path(__file__).parents[2]
 TINY = [
@@ -111,6 +113,23 @@ def test_train_leaves_everything_that_the_contract_names(trained):
     content = json.loads((run / "evaluation.json").read_text())
     assert content["seeds"] == list(range(1_000_000, 1_000_006))
     assert set(content["versus"]) == {"noop", "random", "local", "greedy", "coordinated"}
+
+
+@pytest.mark.parametrize("program", ["train.py", "resume", "evaluate.py"])
+def test_what_a_command_runs_is_built_once(program, trained, run_here, tmp_path, monkeypatch):
+    shutil.copytree(trained[0], tmp_path / "before")
+    built, make, begin = [], building.run_config, World.__post_init__
+
+    def end(*given):
+        raise RuntimeError("enough")
+
+    monkeypatch.setattr(building, "run_config", lambda values: built.append("run") or make(values))
+    monkeypatch.setattr(World, "__post_init__", lambda world: built.append("world") or begin(world))
+    monkeypatch.setattr(Training, "train", end)
+    monkeypatch.setattr(command_module, "evaluate_policy", end)
+    given = {"train.py": TINY, "resume": ["resume=before", "total_frames=256"], "evaluate.py": ["checkpoint=before"]}
+    _, errors, _ = run_here(program if program.endswith(".py") else "train.py", *given[program])
+    assert "enough" in errors[-1] and built == ["run", "world"]
 
 
 def test_evaluate_repeats_what_training_found(trained, run_here, tmp_path):

@@ -1,12 +1,12 @@
 """Checks before any work: each job of a command line is checked as Hydra composed it, before a folder is made."""
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 from hydra.conf import HydraConf
 from hydra.core.global_hydra import GlobalHydra
@@ -20,7 +20,7 @@ from warp_torchrl.evaluation.evaluate import check_policy
 from warp_torchrl.evaluation.picture import Kind
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.building import BuildOnce, run_config
 from warp_torchrl.runs.config.compose import HYDRA_ERRORS, check_choices, explain, plain
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.run_config import RunConfig
@@ -32,12 +32,20 @@ from warp_torchrl.runs.resumption import resumption
 from warp_torchrl.runs.transfer import check_start
 from warp_torchrl.validation import did_you_mean, fit
 
+Build = Callable[[Mapping[str, Any]], RunConfig]
+"""Builds a configuration of plain values."""
 _MOST_FIRES = 1_000_000
 _PICTURE_NEEDS = {"html": ("viser", "live"), "mp4": ("av", "video")}  # module, and the extra that has it
 
 
 class CheckFirst(Callback):
-    """Checks a command's jobs when Hydra has composed its configuration; a mistake ends the process."""
+    """Checks a command's jobs when Hydra has composed its configuration; a mistake ends the process.
+
+    Attributes:
+        build: Builds what is checked, and what the command runs.
+    """
+
+    build: ClassVar[BuildOnce] = BuildOnce()
 
     def on_run_start(self, config: DictConfig, config_name: str | None = None, **kwargs: Any) -> None:
         """Check the one job of a command."""
@@ -76,7 +84,7 @@ def _check(name: str | None, config: DictConfig) -> None:
     _check_hydra(list(config.hydra.overrides.hydra))
     if not isinstance(values["debug"], bool):
         raise ConfigError(f"debug must be true or false, got {values['debug']!r}")
-    (_check_evaluation if name == "evaluate" else check_training)(values, overrides)
+    (_check_evaluation if name == "evaluate" else check_training)(values, overrides, CheckFirst.build)
 
 
 def _check_hydra(overrides: Sequence[str]) -> None:
@@ -88,15 +96,20 @@ def _check_hydra(overrides: Sequence[str]) -> None:
             raise ConfigError(f"{key} is not a key of the configuration{did_you_mean(key, known)}")
 
 
-def check_training(values: Mapping[str, Any], overrides: Sequence[str]) -> None:
+def check_training(values: Mapping[str, Any], overrides: Sequence[str], build: Build = run_config) -> None:
     """Check a training as it is composed: all of its values, and what it begins with or resumes.
+
+    Args:
+        values: Composed, as plain values.
+        overrides: Of the command line.
+        build: Builds the configuration.
 
     Raises:
         ConfigError: With key, value and rule.
         CheckpointError: If what it begins with or resumes is not sound.
     """
     if values["resume"] is None:
-        plan = run_config(values)
+        plan = build(values)
         plan.check_training()
         _check_demonstrations(plan)
         if values["start_from"] is not None:
@@ -111,7 +124,7 @@ def check_training(values: Mapping[str, Any], overrides: Sequence[str]) -> None:
     folder = Path(str(values["resume"]))
     if (folder / checkpoints.MANIFEST).exists():
         raise ConfigError(f"resume must be a run folder, got one of its checkpoints: {folder}")
-    plan = resumption(folder, new_total(values, overrides)).run_config
+    plan = resumption(folder, new_total(values, overrides), build).run_config
     plan.check_training()
     _check_demonstrations(plan)
 
@@ -131,7 +144,7 @@ def new_total(values: Mapping[str, Any], overrides: Sequence[str]) -> Any:
     return values["total_frames"] if any(each.startswith("total_frames=") for each in overrides) else None
 
 
-def _check_evaluation(values: Mapping[str, Any], overrides: Sequence[str]) -> None:
+def _check_evaluation(values: Mapping[str, Any], overrides: Sequence[str], build: Build) -> None:
     checkpoint, policy = values["checkpoint"], values["policy"]
     if (checkpoint is None) == (policy is None):
         raise ConfigError("give either checkpoint=PATH or policy=NAME")
@@ -145,10 +158,10 @@ def _check_evaluation(values: Mapping[str, Any], overrides: Sequence[str]) -> No
     if fires is None and any(each.startswith("maps_fires=") for each in overrides):
         raise ConfigError(f"maps_fires must come with maps=true, got {values['maps_fires']} alone")
     if checkpoint is None:
-        plan, found = run_config(without_checkpoint(values)), policy
+        plan, found = build(without_checkpoint(values)), policy
     else:
         found, _ = checkpoints.newest(find_policy(str(checkpoint)))
-        plan = run_config(plain(restore(found.saved_config(), of_worlds(overrides))))
+        plan = build(plain(restore(found.saved_config(), of_worlds(overrides))))
     check_maps(plan, fires)
     check_policy(plan, found)
 

@@ -13,14 +13,14 @@ from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 
 from warp_torchrl.algorithms import parallel
-from warp_torchrl.commands.checks import map_fires, new_total, of_worlds, picture, without_checkpoint
+from warp_torchrl.commands.checks import CheckFirst, map_fires, new_total, of_worlds, picture, without_checkpoint
 from warp_torchrl.commands.failure import fail
 from warp_torchrl.commands.following import FOLLOWING, folder_of_its_own, follow
 from warp_torchrl.commands.queue import queued
 from warp_torchrl.commands.sweep import SweepSummary, remove_failure, save_failure, summarise_unfinished
 from warp_torchrl.evaluation.evaluate import evaluate_policy
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.building import BuildOnce
 from warp_torchrl.runs.config.compose import HYDRA_ERRORS, conf_folder, explain, option_of, plain, without_targets
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.grammar import check_flags, check_overrides, flags_first
@@ -79,9 +79,10 @@ def _start(folder: Path, config: DictConfig) -> None:
         return
     if (folder / "evaluation.json").exists():
         raise ConfigError(f"hydra.run.dir: {folder} holds an evaluation, which training would replace; take another")
-    config.processes = run_config(plain(config)).n_processes()
+    plan = CheckFirst.build(plain(config)).settled()
+    config.processes = plan.processes
     disk.replace(folder / "config.yaml", OmegaConf.to_yaml(config, resolve=True))
-    record, plan = SavedConfig(choices=_choices(config), values=_values(config)), run_config(plain(config))
+    record = SavedConfig(choices=_choices(config), values=_values(config))
     with parallel.processes(plan.n_processes(), plain(config), FOLLOWING):
         training = Training(plan, record, folder)
         if config.start_from is not None:
@@ -96,14 +97,15 @@ def _go_on(folder: Path, config: DictConfig) -> None:
     Raises:
         ConfigError: If the folder holds another run, or this one has come to its end and is no job of a sweep.
     """
-    run = resumption(folder) if is_run_of(folder, OmegaConf.to_yaml(config, resolve=True)) else None
+    is_same = is_run_of(folder, OmegaConf.to_yaml(config, resolve=True))
+    run = resumption(folder, build=CheckFirst.build) if is_same else None
     if run is None or (run.is_finished and HydraConfig.get().mode != RunMode.MULTIRUN):
         raise ConfigError(f"hydra.run.dir: {folder} holds a run already; go on with resume={folder}, or take another")
     _resume_from(folder, run)
 
 
 def _resume(folder: Path, total_frames: Any) -> None:
-    _resume_from(folder, resumption(folder, total_frames))
+    _resume_from(folder, resumption(folder, total_frames, CheckFirst.build))
 
 
 def _resume_from(folder: Path, run: Resumption) -> None:
@@ -165,11 +167,11 @@ def _evaluate_into(folder: Path, config: DictConfig) -> None:
     fires, kind = map_fires(plain(config)), picture(plain(config))
     if given is None:
         values = without_checkpoint(plain(config))
-        evaluate_policy(run_config(values), folder, name, world_overrides(values), fires, kind)
+        evaluate_policy(CheckFirst.build(values), folder, name, world_overrides(values), fires, kind)
         return
     found = _newest(find_policy(given))
     values = plain(restore(found.saved_config(), of_worlds(HydraConfig.get().overrides.task)))
-    evaluate_policy(run_config(values), folder, found, world_overrides(values), fires, kind)
+    evaluate_policy(CheckFirst.build(values), folder, found, world_overrides(values), fires, kind)
 
 
 # The saved configuration
@@ -196,6 +198,7 @@ def _run(name: str, job: Callable[[DictConfig], None]) -> None:
     logging.raiseExceptions = debug  # a full disk must not print a second error
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra then raises its errors instead of printing them
     keep_freed_memory()
+    CheckFirst.build = BuildOnce()
     if not debug:
         logging.getLogger("torchrl").setLevel(logging.WARNING)  # it prints a line for each of its buffers
     if parallel.is_torchrun():

@@ -1,7 +1,7 @@
 """Resumption of a run with its checkpoint's configuration, in which only ``total_frames`` may change."""
 
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -49,12 +49,15 @@ class Resumption:
     is_finished: bool
 
 
-def resumption(folder: Path, total_frames: Any = None) -> Resumption:
+def resumption(
+    folder: Path, total_frames: Any = None, build: Callable[[Mapping[str, Any]], RunConfig] = run_config
+) -> Resumption:
     """Return the checkpoint and the configuration from which a run resumes.
 
     Args:
         folder: The run folder.
         total_frames: The new total; None takes that of ``config.yaml``, or else of the checkpoint.
+        build: Builds the configuration.
 
     Raises:
         CheckpointError: If there is no sound checkpoint.
@@ -68,7 +71,7 @@ def resumption(folder: Path, total_frames: Any = None) -> Resumption:
     before = trained["total_frames"]
     asked = total_frames if total_frames is not None else held.get("total_frames", before)
     values = plain(restore(replace(saved_config, values={**saved_config.values, "total_frames": asked})))
-    made = run_config(values)
+    made = build(values)
     frames, is_new = found.manifest.frames, total_frames is not None or made.total_frames != before
     if is_new and made.total_frames <= frames:
         raise ConfigError(f"total_frames must be more than the {frames} that {folder} has had, got {made.total_frames}")

@@ -28,6 +28,7 @@ from warp_torchrl.env.observation.features import (
 )
 from warp_torchrl.env.observation.rules import RULES, rules_of
 from warp_torchrl.env.observation.water import WATER, way_to_water
+from warp_torchrl.system.modes import kept
 from warp_torchrl.world.mechanics.agencies.agencies import lands_of
 from warp_torchrl.world.state.role import PAPER_ROLES
 from warp_torchrl.world.state.state import Action, Forecast, WorldState
@@ -138,10 +139,14 @@ def identity(now: Context) -> Tensor:
     The place t = (i + 1/2) / A is told as cos 2 pi t, sin 2 pi t, cos 4 pi t, sin 4 pi t, whatever the team's size.
     """
     position = now.state.vehicles.position
-    agents = position.shape[1]
-    turn = 2.0 * math.pi * (torch.arange(agents, device=position.device) + 0.5) / agents
-    each = torch.stack((turn.cos(), turn.sin(), (2.0 * turn).cos(), (2.0 * turn).sin()), dim=-1)
-    return each.expand(len(position), -1, -1)
+    return _places_in_team(position.shape[1], position.device).expand(len(position), -1, -1)
+
+
+@kept(64)
+def _places_in_team(agents: int, device: torch.device) -> Tensor:
+    """Return the numbers of ``identity``, float32 [A, 4]."""
+    turn = 2.0 * math.pi * (torch.arange(agents, device=device) + 0.5) / agents
+    return torch.stack((turn.cos(), turn.sin(), (2.0 * turn).cos(), (2.0 * turn).sin()), dim=-1)
 
 
 @number(

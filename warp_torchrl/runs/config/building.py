@@ -47,6 +47,20 @@ def run_config(config: Mapping[str, Any]) -> RunConfig:
     return made
 
 
+class BuildOnce:
+    """``run_config`` that keeps what it built last: a command checks a run, and then runs what it has checked."""
+
+    def __init__(self) -> None:
+        self._values: Mapping[str, Any] | None = None
+        self._built: RunConfig | None = None
+
+    def __call__(self, config: Mapping[str, Any]) -> RunConfig:
+        """Return what ``run_config`` does; see there for arguments and errors."""
+        if self._built is None or config != self._values:
+            self._built, self._values = run_config(config), config
+        return self._built
+
+
 def check_keys(config: Mapping[str, Any]) -> None:
     """Check that a composed configuration has no key but those that there are: ``+key`` adds whatever one likes.
 

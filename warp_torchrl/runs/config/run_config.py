@@ -1,8 +1,8 @@
 """The configuration of a run: every value checked, every component built, from plain values."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import torch
 
@@ -114,6 +114,12 @@ class RunConfig:
         if isinstance(self.collector, MultiProcess) and not parallel.is_torchrun():
             return 1
         return parallel.automatic(self.n_worlds, torch.device(self.device))
+
+    def settled(self) -> Self:
+        """Return the configuration with as many processes as ``auto`` takes now; it shares all that is built."""
+        made = replace(self, processes=self.n_processes())
+        vars(made).update({name: value for name, value in vars(self).items() if name in ("kinds", "levels")})
+        return made
 
     def check_training(self) -> None:
         """Check what training asks of the machine, and playing what was trained does not.
