@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import pad
 
-from warp_torchrl.system.device import reads_freely
+from warp_torchrl.system.device import needs_no_sync
 from warp_torchrl.system.modes import kept
 
 DIRECTIONS = ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1))
@@ -76,7 +76,7 @@ def flood(seeds: Tensor, open_cells: Tensor) -> Tensor:
     Returns:
         bool [B, H, W].
     """
-    reached, reads = seeds, reads_freely(seeds.device)
+    reached, reads = seeds, needs_no_sync(seeds.device)
     passable = open_cells | seeds
     for step in range(1, 2 * sum(seeds.shape[-2:]) + 1):
         before, reached = reached, grow(reached) & passable
