@@ -8,7 +8,7 @@ from warp_torchrl.models import Mlp
 from warp_torchrl.runs.config.construction import ConfigError, construct
 from warp_torchrl.runs.config.search_options import SearchOptions
 from warp_torchrl.runs.logging import Wandb
-from warp_torchrl.validation import did_you_mean, dotted, nearest
+from warp_torchrl.validation import closest_names, did_you_mean, dotted
 from warp_torchrl.world.air.wind import Uniform
 from warp_torchrl.world.ignition.ignition import Ignition
 from warp_torchrl.world.law.fire import Fire
@@ -76,7 +76,7 @@ KEYS = ["seed", "scenario", "n_worlds", "reward", "reward.gamma", "algorithm", "
     ],
 )
 def test_the_nearest_key_is_found(name, meant):
-    assert nearest(name, KEYS) == meant
+    assert closest_names(name, KEYS) == meant
 
 
 def test_it_ends_a_message():

@@ -140,7 +140,7 @@ def _describe(hint: object) -> str:
     return names.get(hint, getattr(hint, "__name__", str(hint)))
 
 
-def nearest(name: str, known: Iterable[str]) -> list[str]:
+def closest_names(name: str, known: Iterable[str]) -> list[str]:
     """Return the known names closest to a mistyped one, the likeliest first; none if none is close.
 
     The last part of a dotted key, ``algorithm.gama``, is first compared within its group, then with equal last parts
@@ -161,7 +161,7 @@ def nearest(name: str, known: Iterable[str]) -> list[str]:
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:
     """Return the end of a message, ``: did you mean gamma?``; empty if no known name is near."""
-    found = nearest(str(name), known)
+    found = closest_names(str(name), known)
     return f": did you mean {' or '.join(found)}?" if found else ""
 
 

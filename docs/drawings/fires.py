@@ -11,10 +11,10 @@ from warp_torchrl.env.pictures.drawing import (
     CELL,
     INK,
     SOFT,
+    axis_places,
     contours,
     fire_image,
     fire_legend,
-    places,
     relief,
     sheet,
     show_map,
@@ -79,7 +79,7 @@ def _arrows(axes: "Axes", wind: Tensor, count: int = 4) -> float:
     columns = torch.linspace(0, width - 1, 2 * count + 1)[1::2].long()
     u, v = wind[:, rows][:, :, columns].numpy()
     axes.quiver(
-        places(width)[columns], places(height, descending=True)[rows], u, v, color="white", pivot="middle",
+        axis_places(width)[columns], axis_places(height, descending=True)[rows], u, v, color="white", pivot="middle",
         scale=75.0, width=0.009, headwidth=4.0, path_effects=[withStroke(linewidth=1.6, foreground=INK)],
     )  # fmt: skip
     return float(np.hypot(u, v).max())

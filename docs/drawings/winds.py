@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from warp_torchrl.env.pictures.drawing import BLUE, CELL, GRID, VERMILION, places, ramp, sheet
+from warp_torchrl.env.pictures.drawing import BLUE, CELL, GRID, VERMILION, axis_places, ramp, sheet
 from warp_torchrl.world.air.wind import Paper, Wandering
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.fires.burn import burn, start_burning
@@ -49,7 +49,7 @@ def _draw_field(figure: "Figure", axes: "Axes", field: Tensor) -> None:
     side = field.shape[1] * CELL / 1000.0
     u, v = field.numpy()
     speed = np.hypot(u, v)
-    middle = places(field.shape[1])
+    middle = axis_places(field.shape[1])
     lines = axes.streamplot(
         middle, middle, u[::-1], v[::-1], color=speed[::-1], cmap=ramp("viridis_r", 0.12, 1.0),
         linewidth=0.7 + 1.3 * speed[::-1] / speed.max(), density=1.15, arrowsize=0.9,

@@ -106,8 +106,8 @@ def test_training_is_compared_with_stable_baselines(capsys, monkeypatch, install
 
 def test_growth_is_shown_and_drawn(capsys, tmp_path, monkeypatch):
     pytest.importorskip("matplotlib")
-    monkeypatch.setattr(scaling, "AGENTS", (1, 3))
-    monkeypatch.setattr(scaling, "SIDES", (12, 16))
+    monkeypatch.setattr(scaling, "AGENT_COUNTS", (1, 3))
+    monkeypatch.setattr(scaling, "MAP_SIDES", (12, 16))
     path = tmp_path / "growth.png"
     out = output(capsys, "scaling", *TINY, "--plot", str(path))
     varied = [line.split()[0] for line in out.splitlines() if line.startswith(("worlds", "agents", "cells"))]

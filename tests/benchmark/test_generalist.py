@@ -8,14 +8,14 @@ from PIL import Image
 
 from warp_torchrl import load_policy, make_env
 from warp_torchrl.benchmark import __main__ as command
-from warp_torchrl.benchmark.generalist import PLACES, Place, generalist_table, on_ground, table_line
+from warp_torchrl.benchmark.generalist import PLACES, ScenarioVariant, generalist_table, on_ground, table_line
 from warp_torchrl.benchmark.generalist_figure import draw_generalist
 from warp_torchrl.evaluation.play import play, play_heuristics
 from warp_torchrl.evaluation.statistics import compare, summarise
 from warp_torchrl.runs.config.compose import compose_config
 
 SMALL = ["horizon=12", "landscape.size=12"]
-TWO = {"scenarios": (Place("skirmish", "skirmish"), Place("windy", "skirmish", ("wind.speed=9",)))}
+TWO = {"scenarios": (ScenarioVariant("skirmish", "skirmish"), ScenarioVariant("windy", "skirmish", ("wind.speed=9",)))}
 
 
 def test_a_row_is_the_policy_beside_the_best_baseline_on_the_same_fires(capsys, monkeypatch):
@@ -42,7 +42,7 @@ def test_a_row_is_the_policy_beside_the_best_baseline_on_the_same_fires(capsys, 
 
 
 def test_a_specialist_is_played_with_what_it_sees_on_the_same_fires(capsys, monkeypatch):
-    monkeypatch.setattr(command, "PLACES", {"specialists": (Place("skirmish", "skirmish", rival="single"),)})
+    monkeypatch.setattr(command, "PLACES", {"specialists": (ScenarioVariant("skirmish", "skirmish", rival="single"),)})
     command.main(["generalist", "--policy", "skirmish", "--episodes", "4", "--json", "--set", *SMALL])
     (row,) = json.loads(capsys.readouterr().out)["generalist"]
 
@@ -71,7 +71,7 @@ def test_fires_that_do_not_fit_into_one_batch_play_in_parts(capsys, monkeypatch,
         made.append(n_worlds)
         return make_env(*given, n_worlds=n_worlds, **more)
 
-    monkeypatch.setattr(command, "PLACES", {"scenarios": (Place("skirmish", "skirmish", rival=rival),)})
+    monkeypatch.setattr(command, "PLACES", {"scenarios": (ScenarioVariant("skirmish", "skirmish", rival=rival),)})
     monkeypatch.setattr("warp_torchrl.benchmark.generalist.RIVALS", ("noop", "coordinated"))
     monkeypatch.setattr("warp_torchrl.benchmark.generalist.make_env", making)
     at_once = rows(5 * 12 * 12)
@@ -136,7 +136,9 @@ def test_the_figure_has_a_row_for_each_place(tmp_path):
 
 
 def test_places_on_real_ground_need_a_folder(capsys):
-    assert on_ground("a b") == tuple(Place(name, name, ("landscape.path='a b'",)) for name in ("landfire", "wildland"))
+    assert on_ground("a b") == tuple(
+        ScenarioVariant(name, name, ("landscape.path='a b'",)) for name in ("landfire", "wildland")
+    )
     for group, told in (("ground", "got ground, which needs --ground"), ("tems", "got tems: did you mean teams?")):
         with pytest.raises(SystemExit, match="2"):
             command.main(["generalist", "--places", group])

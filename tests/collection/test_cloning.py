@@ -7,7 +7,7 @@ import torch
 
 from tests.demonstrations.played import SMALL, played
 from warp_torchrl.collection.cloning import AGENT
-from warp_torchrl.demonstrations.files import save
+from warp_torchrl.demonstrations.files import save_recording
 from warp_torchrl.models import ACTION, ACTION_MASK, LOGITS, OBSERVATION
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
 from warp_torchrl.runs.config.building import run_config
@@ -40,7 +40,7 @@ def several():
 def people(several, tmp_path_factory):
     folder = tmp_path_factory.mktemp("people")
     for each in several:
-        save(each, folder)
+        save_recording(each, folder)
     return folder
 
 
@@ -196,7 +196,7 @@ def test_another_seed_draws_other_minibatches(people, tmp_path):
 def test_a_run_goes_on_with_no_other_recordings(people, tmp_path):
     trained(tmp_path, people, stop_after=1)
     other = tmp_path / "others"
-    save(played(seed=9), other)
+    save_recording(played(seed=9), other)
     with pytest.raises(CheckpointError, match=r"imitation.demonstrations must hold the recordings that the run began"):
         learning(tmp_path, other, "total_frames=384").load_state_dict(newest(tmp_path)[0].training())
 

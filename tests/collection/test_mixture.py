@@ -2,7 +2,7 @@
 
 import pytest
 
-from warp_torchrl.collection.mixture import Kind, Mixture, apportioned, weights
+from warp_torchrl.collection.mixture import Kind, Mixture, weights, worlds_by_share
 
 
 @pytest.mark.parametrize(
@@ -19,12 +19,12 @@ from warp_torchrl.collection.mixture import Kind, Mixture, apportioned, weights
     ],
 )
 def test_worlds_are_apportioned_by_largest_remainders(shares, count, given):
-    assert apportioned(shares, count) == given
+    assert worlds_by_share(shares, count) == given
 
 
 def test_fewer_worlds_than_kinds_are_refused():
     with pytest.raises(ValueError, match="n_worlds must be at least 3, one for each kind of the mixture, got 2"):
-        apportioned([1.0, 1.0, 1.0], 2)
+        worlds_by_share([1.0, 1.0, 1.0], 2)
 
 
 def test_a_kind_has_a_share_and_a_teacher_a_weight():

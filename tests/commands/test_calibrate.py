@@ -9,7 +9,7 @@ import yaml
 from warp_torchrl.commands import calibrate as command
 from warp_torchrl.commands.calibrate import main
 from warp_torchrl.commands.failure import DONE, IN_USE, MISTAKE
-from warp_torchrl.prediction.calibration.case import read_case
+from warp_torchrl.prediction.calibration.case import read_fire_case
 from warp_torchrl.runs.config.compose import option_of, plain
 from warp_torchrl.runs.config.construction import ConfigError, build
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
@@ -40,7 +40,7 @@ def scar():
 
 
 def test_a_fire_is_read_from_a_folder(tmp_path):
-    case = read_case(write(tmp_path / "small", scar=scar()))
+    case = read_fire_case(write(tmp_path / "small", scar=scar()))
     assert case.name == "small" and case.cell_size == 50.0 and case.last == 120.0 and case.arrival is None
     assert int(case.scar.sum()) == 55 and case.lit.nonzero().tolist() == [[10, 4]]
     assert case.wind.tolist() == pytest.approx([8 / 3.6, 0.0], abs=1e-4)
@@ -48,20 +48,20 @@ def test_a_fire_is_read_from_a_folder(tmp_path):
 
 def test_weather_and_ignition_are_read_as_a_prediction_reads_them(tmp_path):
     folder = write(tmp_path / "small", scar=scar())
-    plain = read_case(folder)
+    plain = read_fire_case(folder)
     rows = "".join(f"2020-07-01 {h}:00;8,0;270;84;40\n" for h in (12, 13))
     (folder / "weather.csv").write_text(f"datetime;WindSpeed;WD;FFMC;BUI\n{rows}")
     (folder / "ignition.csv").write_text("x;y\n225,0;475,0\n")
     with pytest.raises(ValueError, match=r"small: .*WindSpeed must name its unit"):
-        read_case(folder)
-    case = read_case(folder, units={"WindSpeed": "km/h"})
+        read_fire_case(folder)
+    case = read_fire_case(folder, units={"WindSpeed": "km/h"})
     assert torch.equal(case.wind, plain.wind) and torch.equal(case.lit, plain.lit)
 
 
 def test_times_of_arrival_make_an_outcome_by_the_hour(tmp_path):
     times = torch.full((20, 24), -9999.0)
     times[10, 4:8] = torch.tensor([0.0, 30.0, 70.0, 110.0])
-    case = read_case(write(tmp_path / "timed", arrival=times))
+    case = read_fire_case(write(tmp_path / "timed", arrival=times))
     assert case.minutes.tolist() == [60.0, 120.0] and case.burned.sum((1, 2)).tolist() == [2, 4]
 
 
@@ -70,7 +70,7 @@ def test_perimeters_make_an_outcome_by_their_hours(tmp_path):
     feature = {"type": "Feature", "properties": {"hours": 1}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
     folder = write(tmp_path / "seen")
     (folder / "perimeters.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
-    case = read_case(folder)
+    case = read_fire_case(folder)
     assert case.minutes.tolist() == [60.0] and int(case.scar.sum()) == 8 * 4
 
 
@@ -118,7 +118,7 @@ def test_a_fire_that_is_not_whole_is_refused_in_one_line(tmp_path, change, line)
     for name, content in change.items():
         (folder / name).unlink() if content is None else (folder / name).write_text(content)
     with pytest.raises(ValueError, match=line) as error:
-        read_case(folder)
+        read_fire_case(folder)
     assert "\n" not in str(error.value)
 
 
@@ -144,7 +144,7 @@ def test_a_calibration_replaces_an_earlier_one_and_nothing_else(tmp_path, monkey
 
 
 def test_two_calibrations_into_one_folder_are_refused_before_the_work(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(command, "read_case", lambda *_: pytest.fail("it began to work"))
+    monkeypatch.setattr(command, "read_fire_case", lambda *_: pytest.fail("it began to work"))
     lock = RunFolderLock(tmp_path / "out")
     try:
         assert main([f"fires=[{tmp_path}]", f"out={tmp_path / 'out'}"]) == IN_USE

@@ -4,10 +4,10 @@ import re
 
 import pytest
 
-from warp_torchrl.commands.correct import main, read
+from warp_torchrl.commands.correct import main, read_session
 from warp_torchrl.commands.correction import Session
-from warp_torchrl.demonstrations.files import find
-from warp_torchrl.demonstrations.files import read as read_recording
+from warp_torchrl.demonstrations.files import find_recordings
+from warp_torchrl.demonstrations.files import read_recording as read_recording
 from warp_torchrl.demonstrations.recording import Mover
 from warp_torchrl.demonstrations.replay import Replay
 from warp_torchrl.demonstrations.scripted import Person
@@ -18,7 +18,7 @@ from warp_torchrl.system.lock import RunFolderLock
 def test_the_command_writes_recordings_that_replay_and_prints_a_table(weak_run, tmp_path, capsys):
     assert main([f"policy={weak_run}", f"out={tmp_path / 'people'}", "episodes=2", "threshold=1", "delay=0"]) == 0
     row = capsys.readouterr().out.splitlines()[-1]
-    recordings = [read_recording(path) for path in find(tmp_path / "people")]
+    recordings = [read_recording(path) for path in find_recordings(tmp_path / "people")]
     for each in recordings:
         Replay(each).check()
         assert each.frames == newest(weak_run)[0].manifest.frames and each.policy == str(weak_run)
@@ -56,10 +56,10 @@ def test_a_mistake_is_told_in_one_line(arguments, said, capsys, tmp_path, monkey
 
 def test_every_key_is_read():
     given = ["policy=a", "out=b", "episodes=5", "acts=7", "seed=3", "by=local", "delay=2", "error=0.25", "threshold=1"]
-    session, person = read([*given, "team.n_agents=3"])
+    session, person = read_session([*given, "team.n_agents=3"])
     assert session == Session(policy="a", out="b", episodes=5, acts=7, seed=3, overrides=("team.n_agents=3",))
     assert person == Person(by="local", delay=2, error=0.25, threshold=1.0)
-    assert read(["policy=1", "out=2020-01-01", "acts=null"])[0] == Session(policy="1", out="2020-01-01")
+    assert read_session(["policy=1", "out=2020-01-01", "acts=null"])[0] == Session(policy="1", out="2020-01-01")
 
 
 def test_help_names_every_key(capsys):

@@ -9,7 +9,7 @@ import pytest
 
 from warp_torchrl.commands.demonstrations import main
 from warp_torchrl.commands.failure import DISK, DONE, MISTAKE, UNSOUND
-from warp_torchrl.demonstrations.files import MANIFEST, save
+from warp_torchrl.demonstrations.files import MANIFEST, save_recording
 from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.system.checksummed import Unsound
 from warp_torchrl.world.state.state import Action
@@ -23,7 +23,7 @@ def played(people, *overrides):
     for _ in range(3):
         side.crew.press(0, 1, int(Action.SOUTH))
         match.step()
-    return save(side.record(), people)
+    return save_recording(side.record(), people)
 
 
 @pytest.fixture(scope="module")

@@ -2,21 +2,21 @@
 
 import pytest
 
-from warp_torchrl.commands.probe import main, read, table
+from warp_torchrl.commands.probe import main, probe_table, read_probe
 from warp_torchrl.evaluation.probe import Reading
 from warp_torchrl.runs.config.construction import ConfigError
 
 
 def test_a_command_line_is_read():
-    asked = read(["policy=outputs/run", "episodes=8", "scenario=scouts", "team.radio.range=5"])
+    asked = read_probe(["policy=outputs/run", "episodes=8", "scenario=scouts", "team.radio.range=5"])
     assert (asked.policy, asked.episodes) == ("outputs/run", 8)
     assert asked.overrides == ("scenario=scouts", "team.radio.range=5")
     with pytest.raises(ConfigError, match=r"episodes must be in \[2, 4096\], got 1"):
-        read(["policy=run", "episodes=1"])
+        read_probe(["policy=run", "episodes=1"])
 
 
 def test_a_table_has_a_row_for_each_thing():
-    printed = table([Reading("its own row", 0.912, 0.3, 12)], "search").splitlines()
+    printed = probe_table([Reading("its own row", 0.912, 0.3, 12)], "search").splitlines()
     assert printed[0].startswith("| what a message tells on `search`")
     assert printed[2:] == ["| its own row | 0.91 | 0.30 | 12 |"]
 

@@ -8,7 +8,7 @@ import torch
 from tests.demonstrations.played import SMALL, played
 from warp_torchrl.collection.cloning import AGENT
 from warp_torchrl.demonstrations.acts import acts_of, demonstrations
-from warp_torchrl.demonstrations.files import save
+from warp_torchrl.demonstrations.files import save_recording
 from warp_torchrl.demonstrations.recording import MOVER, Mover
 from warp_torchrl.models import ACTION, ACTION_MASK, OBSERVATION, ORIENTATION, ROLE, signature
 from warp_torchrl.models.canonical import Orientation
@@ -54,7 +54,7 @@ def test_what_a_policy_could_not_choose_is_left_out(recording, shape):
 def test_they_are_canonical_as_observations_are(shape, tmp_path):
     several = [played(seed=seed) for seed in range(4)]
     for each in several:
-        save(each, tmp_path)
+        save_recording(each, tmp_path)
     acts, raw = found(tmp_path).acts, torch.cat([acts_of(each, shape) for each in several])
     orientation = Orientation(acts[ORIENTATION])
     assert len(orientation.index.unique()) > 2, "the fire is on several sides"
@@ -66,16 +66,16 @@ def test_they_are_canonical_as_observations_are(shape, tmp_path):
 
 
 def test_teams_of_other_sizes_fit_where_networks_are_shared(recording, tmp_path):
-    save(recording, tmp_path)
-    save(played("team.n_agents=3"), tmp_path)
+    save_recording(recording, tmp_path)
+    save_recording(played("team.n_agents=3"), tmp_path)
     assert len(found(tmp_path, "team.n_agents=4").acts) == len(recording.steps) * 5
     assert len(found(tmp_path, "team.n_agents=4", "model.sharing=role").acts) == len(recording.steps) * 5
 
 
 def test_other_recordings_have_another_digest(recording, tmp_path):
-    save(recording, tmp_path)
+    save_recording(recording, tmp_path)
     first, again = found(tmp_path).digest, found(tmp_path).digest
-    save(played(seed=8), tmp_path)
+    save_recording(played(seed=8), tmp_path)
     assert first == again != found(tmp_path).digest
 
 
@@ -94,7 +94,7 @@ def test_other_recordings_have_another_digest(recording, tmp_path):
     ],
 )
 def test_what_does_not_fit_is_told_in_one_line(recorded, run, said, tmp_path):
-    save(played(*recorded), tmp_path)
+    save_recording(played(*recorded), tmp_path)
     with pytest.raises(ConfigError, match=f"imitation.demonstrations: .*{said}") as error:
         found(tmp_path, *run)
     assert "\n" not in str(error.value)
@@ -102,7 +102,7 @@ def test_what_does_not_fit_is_told_in_one_line(recorded, run, said, tmp_path):
 
 @pytest.mark.parametrize("key", [ROLE, (*OBSERVATION, "view")])
 def test_a_recording_that_lacks_what_its_configuration_has_is_told(recording, key, tmp_path):
-    save(replace(recording, steps=recording.steps.clone().exclude(key)), tmp_path)
+    save_recording(replace(recording, steps=recording.steps.clone().exclude(key)), tmp_path)
     with pytest.raises(ConfigError, match=f"does not hold the .*{key[-1]} that its own configuration has"):
         found(tmp_path)
 
@@ -110,7 +110,7 @@ def test_a_recording_that_lacks_what_its_configuration_has_is_told(recording, ke
 def test_folders_that_teach_nothing_are_told(recording, tmp_path):
     with pytest.raises(ConfigError, match=r"imitation.demonstrations: .*holds no recording"):
         found(tmp_path / "nowhere")
-    folder = save(played(mover=Mover.WAITING), tmp_path)
+    folder = save_recording(played(mover=Mover.WAITING), tmp_path)
     with pytest.raises(ConfigError, match=r"imitation.demonstrations: .*holds no act of a person"):
         found(tmp_path)
     (folder / "steps" / "agents" / "action.memmap").write_bytes(b"other")

@@ -12,13 +12,13 @@ import pytest
 import torch
 from tensordict import TensorDict
 
-from warp_torchrl.demonstrations.files import MANIFEST, find, read, save
+from warp_torchrl.demonstrations.files import MANIFEST, find_recordings, read_recording, save_recording
 from warp_torchrl.system.checksummed import Unsound, checksummed, described
 
 
 @pytest.fixture
 def folder(recording, tmp_path):
-    return save(recording, tmp_path / "people")
+    return save_recording(recording, tmp_path / "people")
 
 
 def reseal(folder, **changes):
@@ -31,7 +31,7 @@ def reseal(folder, **changes):
 
 
 def test_what_is_read_is_what_was_saved(recording, folder):
-    found = read(folder)
+    found = read_recording(folder)
     assert (found.steps == recording.steps).all() and set(found.steps.keys(True)) == set(recording.steps.keys(True))
     for name in ("environment", "seed", "events", "policy", "frames", "agents", "actions", "saved"):
         assert getattr(found, name) == getattr(recording, name), name
@@ -42,15 +42,15 @@ def test_tensordict_reads_its_steps_too(recording, folder):
 
 
 def test_recordings_of_the_same_fire_have_folders_of_their_own(recording, tmp_path):
-    names = [save(recording, tmp_path).name for _ in range(3)]
+    names = [save_recording(recording, tmp_path).name for _ in range(3)]
     assert names == [f"skirmish-{recording.seed}-{number}" for number in (1, 2, 3)]
-    assert [each.name for each in find(tmp_path)] == names
-    assert find(tmp_path / names[1]) == [tmp_path / names[1]]
+    assert [each.name for each in find_recordings(tmp_path)] == names
+    assert find_recordings(tmp_path / names[1]) == [tmp_path / names[1]]
 
 
 def test_a_folder_without_one_is_told(tmp_path):
     with pytest.raises(Unsound, match="holds no recording"):
-        find(tmp_path)
+        find_recordings(tmp_path)
 
 
 def test_a_full_disk_leaves_nothing(recording, tmp_path, monkeypatch):
@@ -59,7 +59,7 @@ def test_a_full_disk_leaves_nothing(recording, tmp_path, monkeypatch):
 
     monkeypatch.setattr(TensorDict, "memmap", full)
     with pytest.raises(OSError, match="No space"):
-        save(recording, tmp_path / "people")
+        save_recording(recording, tmp_path / "people")
     assert list((tmp_path / "people").iterdir()) == []
 
 
@@ -70,7 +70,7 @@ def test_a_disk_without_room_is_told_before_memory_is_mapped_onto_it(recording, 
     monkeypatch.setattr("os.posix_fallocate", full, raising=False)
     monkeypatch.setattr(TensorDict, "memmap", lambda *given, **more: pytest.fail("it would kill the process"))
     with pytest.raises(OSError, match="No space"):
-        save(recording, tmp_path / "people")
+        save_recording(recording, tmp_path / "people")
     assert list((tmp_path / "people").iterdir()) == []
 
 
@@ -80,7 +80,7 @@ def test_a_disk_that_is_full_when_torch_writes_is_told_as_one(recording, tmp_pat
 
     monkeypatch.setattr(TensorDict, "memmap", full)
     with pytest.raises(OSError, match="No space") as raised:
-        save(recording, tmp_path / "people")
+        save_recording(recording, tmp_path / "people")
     assert raised.value.errno == 28 and raised.value.filename and list((tmp_path / "people").iterdir()) == []
 
 
@@ -89,9 +89,9 @@ def test_every_altered_file_is_found(folder):
         kept = path.read_bytes()
         path.write_bytes(kept[:-1] + bytes([kept[-1] ^ 1]))
         with pytest.raises(Unsound):
-            read(folder)
+            read_recording(folder)
         path.write_bytes(kept)
-    read(folder)
+    read_recording(folder)
 
 
 @pytest.mark.parametrize(
@@ -128,13 +128,13 @@ def test_every_altered_file_is_found(folder):
 def test_what_a_recording_says_is_checked_and_told_in_one_line(folder, changes, told):
     reseal(folder, **changes)
     with pytest.raises(Unsound, match=told) as raised:
-        read(folder)
+        read_recording(folder)
     assert "\n" not in str(raised.value)
 
 
 def test_an_event_may_come_after_the_last_step(folder):
     reseal(folder, events=[{"step": 12, "kind": "ignite", "numbers": [1, 1]}])
-    assert read(folder).events[0].step == 12
+    assert read_recording(folder).events[0].step == 12
 
 
 @pytest.mark.parametrize(
@@ -152,12 +152,12 @@ def test_an_event_may_come_after_the_last_step(folder):
 )
 def test_a_number_that_no_environment_shows_is_refused(recording, tmp_path, entry, number, told):
     recording.steps["agents", "observation", "view"] = recording.steps["agents", "observation", "view"].float()
-    folder = save(recording, tmp_path)
+    folder = save_recording(recording, tmp_path)
     found = TensorDict.load_memmap(folder / "steps")
     found[tuple(entry.split("/"))][3].view(-1)[-1] = number
     reseal(folder)
     with pytest.raises(Unsound, match=told):
-        read(folder)
+        read_recording(folder)
 
 
 @pytest.mark.parametrize(
@@ -175,7 +175,7 @@ def test_flags_that_no_environment_shows_are_refused(folder, entry, at, byte, to
     path.write_bytes(content)
     reseal(folder)
     with pytest.raises(Unsound, match=told):
-        read(folder)
+        read_recording(folder)
 
 
 @pytest.mark.parametrize(
@@ -199,25 +199,25 @@ def test_a_manifest_names_files_below_its_folder_alone(folder, name, told):
     content = json.loads((folder / MANIFEST).read_text())
     reseal(folder, files=content["files"] | {name: {"size": 6, "sha256": sha256(b"secret").hexdigest()}})
     with pytest.raises(Unsound, match=told):
-        read(folder)
+        read_recording(folder)
 
 
 def test_a_manifest_that_is_a_link_or_a_pipe_is_refused(folder):
     (folder / MANIFEST).rename(folder / "other.json")
     (folder / MANIFEST).symlink_to(folder / "other.json")
     with pytest.raises(Unsound, match="is a link"):
-        read(folder)
+        read_recording(folder)
     (folder / MANIFEST).unlink()
     os.mkfifo(folder / MANIFEST)
     with pytest.raises(Unsound, match="is no file"):
-        read(folder)
+        read_recording(folder)
 
 
 def test_an_entry_that_is_not_as_large_as_its_file_is_refused(folder):
     entries = json.loads((folder / MANIFEST).read_text())["entries"]
     reseal(folder, entries=entries | {"agents/observation/view": {"dtype": "uint8", "shape": [12, 3, 7]}})
     with pytest.raises(Unsound, match=r"view\.memmap does not fit its file, of 47916 bytes and not 252"):
-        read(folder)
+        read_recording(folder)
 
 
 def test_files_larger_than_a_recording_may_be_are_not_read(folder):
@@ -230,7 +230,7 @@ def test_files_larger_than_a_recording_may_be_are_not_read(folder):
     content.pop("sha256")
     (folder / MANIFEST).write_bytes(checksummed(content))
     with pytest.raises(Unsound, match="at most 4294967296 are read"):
-        read(folder)
+        read_recording(folder)
 
 
 def test_no_link_is_followed_and_odd_names_are_left_with_a_line(folder, recording, caplog):
@@ -238,10 +238,10 @@ def test_no_link_is_followed_and_odd_names_are_left_with_a_line(folder, recordin
     for name in ("odd name", "<b>", ".hidden"):
         shutil.copytree(folder, people / name)
     (people / "more").mkdir()
-    save(recording, people / "more" / ".deep")
+    save_recording(recording, people / "more" / ".deep")
     (people / "loop").symlink_to(people)
     for _ in range(2):
-        assert find(people) == [folder]
+        assert find_recordings(people) == [folder]
     assert sorted(caplog.messages) == [
         f"{people / name} is left: folders of recordings have names of A-Z, a-z, 0-9, '.', '_' and '-' alone"
         for name in ("<b>", "odd name")
@@ -252,20 +252,20 @@ def test_savers_at_once_keep_what_each_has_saved(recording, tmp_path):
     people = tmp_path / "people"
     short = replace(recording, steps=recording.steps[:5], events=(), policy="short")
     with ThreadPoolExecutor(4) as pool:
-        folders = list(pool.map(lambda number: save((recording, short)[number % 2], people), range(12)))
-    assert sorted(folders) == find(people)
+        folders = list(pool.map(lambda number: save_recording((recording, short)[number % 2], people), range(12)))
+    assert sorted(folders) == find_recordings(people)
     for number, path in enumerate(folders):
-        assert len(read(path).steps) == (12, 5)[number % 2]
+        assert len(read_recording(path).steps) == (12, 5)[number % 2]
     assert {each.name for each in people.iterdir()} == {each.name for each in folders}
 
 
 def test_a_save_that_is_not_read_again_leaves_nothing(recording, tmp_path):
     recording.steps["next", "agents", "reward"][3, 1] = math.nan
     with pytest.raises(Unsound, match="finite numbers alone"):
-        save(recording, tmp_path)
+        save_recording(recording, tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_pickle_beside_the_tensors_is_not_read(recording, folder):
     (folder / "steps" / "other.pickle").write_bytes(b"cos\nsystem\n(S'touch hacked'\ntR.")
-    assert torch.equal(read(folder).steps["agents", "action"], recording.steps["agents", "action"])
+    assert torch.equal(read_recording(folder).steps["agents", "action"], recording.steps["agents", "action"])

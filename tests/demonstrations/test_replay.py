@@ -6,14 +6,14 @@ import pytest
 import torch
 
 from warp_torchrl.demonstrations.events import Event
-from warp_torchrl.demonstrations.files import read, save
+from warp_torchrl.demonstrations.files import read_recording, save_recording
 from warp_torchrl.demonstrations.replay import Replay
 from warp_torchrl.system.checksummed import Unsound
 from warp_torchrl.world.state.state import is_tree
 
 
 def test_the_worlds_are_those_that_were_played(match, recording, tmp_path):
-    last = Replay(read(save(recording, tmp_path))).check()
+    last = Replay(read_recording(save_recording(recording, tmp_path))).check()
     for name, value in match.sides[0].state.what_changes().items():
         assert torch.equal(last.what_changes()[name], value), name
 

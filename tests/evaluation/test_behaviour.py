@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from tests.env.reward.drawing import CLEAR, EXTINGUISH, STAY, drawn
-from warp_torchrl.evaluation.behaviour import Behaviour, divided, mutual_information
+from warp_torchrl.evaluation.behaviour import Behaviour, division_of_labour, mutual_information
 from warp_torchrl.world.backends.tick import in_wind
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.state.state import is_burning
@@ -29,11 +29,11 @@ def test_division_is_what_chance_does_not_explain():
     random = np.random.default_rng(0)
     tables = random.multinomial(8, np.full(8, 1 / 8), size=(200, 2)).astype(float)
     assert mutual_information(tables).mean() > 0.3
-    assert abs(divided(tables).mean()) < 0.05
+    assert abs(division_of_labour(tables).mean()) < 0.05
     own = np.zeros((1, 2, 8))
     own[0, 0, 0] = own[0, 1, 4] = 20.0
-    assert divided(own)[0] == pytest.approx(1.0, abs=0.06)
-    assert np.isnan(divided(np.zeros((1, 2, 8)))[0])
+    assert division_of_labour(own)[0] == pytest.approx(1.0, abs=0.06)
+    assert np.isnan(division_of_labour(np.zeros((1, 2, 8)))[0])
 
 
 def test_acts_downwind_attack_the_head_and_shared_targets_are_contested():

@@ -33,10 +33,10 @@ def played(plan, names=("noop", "greedy")):
 
 def test_what_is_kept_is_what_was_played():
     plan = plan_of()
-    assert cache.kept(plan, ["noop"]) == {}
+    assert cache.cached(plan, ["noop"]) == {}
     episodes = played(plan)
-    cache.keep(plan, episodes)
-    found = cache.kept(plan_of("seed=5", "algorithm=ppo", "observation.radius=2"), ["noop", "greedy", "local"])
+    cache.store(plan, episodes)
+    found = cache.cached(plan_of("seed=5", "algorithm=ppo", "observation.radius=2"), ["noop", "greedy", "local"])
     assert found.keys() == episodes.keys()
     for name, metrics in episodes.items():
         assert all(np.array_equal(found[name][metric], values) for metric, values in metrics.items())
@@ -48,14 +48,14 @@ def test_what_is_kept_is_what_was_played():
     ["wind.speed=5", "evaluation.first_seed=2_000_000", "reward=time", "team.tank=3", "horizon=17", "fire.beta=0.01"],
 )
 def test_other_worlds_have_other_files(change):
-    cache.keep(plan_of(), played(plan_of()))
-    assert cache.kept(plan_of(change), ["noop", "greedy"]) == {}
+    cache.store(plan_of(), played(plan_of()))
+    assert cache.cached(plan_of(change), ["noop", "greedy"]) == {}
 
 
 def test_another_code_has_other_files(monkeypatch):
-    cache.keep(plan_of(), played(plan_of()))
+    cache.store(plan_of(), played(plan_of()))
     monkeypatch.setattr(cache, "_code", lambda: "another")
-    assert cache.kept(plan_of(), ["noop", "greedy"]) == {}
+    assert cache.cached(plan_of(), ["noop", "greedy"]) == {}
 
 
 @pytest.mark.parametrize(
@@ -71,27 +71,27 @@ def test_another_code_has_other_files(monkeypatch):
 def test_an_altered_file_is_not_believed_and_is_replaced(alter, caplog):
     plan = plan_of()
     episodes = played(plan)
-    cache.keep(plan, episodes)
+    cache.store(plan, episodes)
     for path in cache.folder().iterdir():
         path.write_text(alter(path.read_text()))
     with caplog.at_level(logging.WARNING, "warp_torchrl"):
-        assert cache.kept(plan, ["noop", "greedy"]) == {}
+        assert cache.cached(plan, ["noop", "greedy"]) == {}
     assert "the baselines are played again" in caplog.text
-    cache.keep(plan, episodes)
-    assert len(cache.kept(plan, ["noop", "greedy"])) == 2
+    cache.store(plan, episodes)
+    assert len(cache.cached(plan, ["noop", "greedy"])) == 2
     assert all(path.suffix == ".json" for path in cache.folder().iterdir()), "no drafts are left"
 
 
 def test_a_folder_that_cannot_be_written_is_no_error(monkeypatch, tmp_path):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    cache.keep(plan_of(), played(plan_of()))
-    assert cache.kept(plan_of(), ["noop"]) == {}
+    cache.store(plan_of(), played(plan_of()))
+    assert cache.cached(plan_of(), ["noop"]) == {}
 
 
 def test_it_can_be_turned_off():
     plan = plan_of("evaluation.cache=false")
-    cache.keep(plan, played(plan))
+    cache.store(plan, played(plan))
     assert not cache.folder().exists()
 
 

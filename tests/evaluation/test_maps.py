@@ -6,7 +6,7 @@ import torch
 
 from tests.world.rasters import LANDFIRE, needs_landfire, rasterio
 from warp_torchrl.evaluation import maps as maps_module
-from warp_torchrl.evaluation.maps import described, play_maps, write_maps
+from warp_torchrl.evaluation.maps import maps_line, play_maps, write_maps
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.heuristics import Coordinated, Dispatch, NoOp
 from warp_torchrl.runs.config.building import run_config
@@ -106,4 +106,4 @@ def test_maps_of_real_ground_lie_where_the_window_does(tmp_path):
 
 def test_the_line_of_the_maps_has_the_paired_interval(maps):
     low, high = maps.numbers()["burned_ha"]["difference"]["ci95"]
-    assert f"({low:+.2f} .. {high:+.2f})" in described(maps.numbers())
+    assert f"({low:+.2f} .. {high:+.2f})" in maps_line(maps.numbers())

@@ -12,7 +12,7 @@ from warp_torchrl.evaluation import play as play_module
 from warp_torchrl.evaluation.behaviour import BEHAVIOUR
 from warp_torchrl.evaluation.goal import goal
 from warp_torchrl.evaluation.play import BASELINES, WithoutAgent, baselines_of, play
-from warp_torchrl.evaluation.report import report, table, write_json
+from warp_torchrl.evaluation.report import evaluation_table, report, write_json
 from warp_torchrl.heuristics import Coordinated, Follower, Greedy, NoOp, Random
 from warp_torchrl.world.mechanics.sensing.sensing import Sight
 from warp_torchrl.world.team.team import Team
@@ -47,7 +47,7 @@ def test_the_report_has_what_the_contract_says(make_small_env, tmp_path):
     for index in range(3):
         averted = read["episodes"][index]["averted"]
         assert averted == pytest.approx(mine["saved"][index] - noop["saved"][index])
-    assert "random - noop" in table(read) and "tiny: 3 fires" in table(read)
+    assert "random - noop" in evaluation_table(read) and "tiny: 3 fires" in evaluation_table(read)
 
 
 def test_a_report_has_no_number_where_there_is_none(make_small_env, tmp_path):
@@ -57,7 +57,7 @@ def test_a_report_has_no_number_where_there_is_none(make_small_env, tmp_path):
     write_json(tmp_path / "evaluation.json", content)
     read = json.loads((tmp_path / "evaluation.json").read_text())
     assert read["metrics"]["lead_time"]["mean"] is None and read["episodes"][0]["head_attack"] is None
-    assert "lead time" not in table(read)
+    assert "lead time" not in evaluation_table(read)
 
 
 def test_behaviour_is_seen_only_where_it_is_asked_for(make_small_env):
@@ -75,7 +75,7 @@ def test_a_team_without_an_agent_does_worse(make_small_env):
     assert whole["saved"].mean() > lamed["saved"].mean() + 0.05
     content = report("tiny", "coordinated", 0, whole, {}, left_out={"bulldozer_1": lamed})
     assert content["left_out"]["bulldozer_1"]["saved_difference"] > 0.05
-    assert "without bulldozer_1" in table(content)
+    assert "without bulldozer_1" in evaluation_table(content)
 
 
 def test_the_agent_left_out_stays_where_it_is(make_small_env):

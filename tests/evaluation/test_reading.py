@@ -6,7 +6,7 @@ import re
 import pytest
 
 from warp_torchrl.evaluation.reading import read_evaluation
-from warp_torchrl.evaluation.summary import draw, gather, main, table
+from warp_torchrl.evaluation.summary import draw_summary, main, read_rows, summary_table
 from warp_torchrl.runs.config.construction import ConfigError
 
 SOUND = {
@@ -85,7 +85,7 @@ def test_a_summary_of_something_else_ends_with_one_line(tmp_path, capsys, conten
 def test_names_of_others_make_no_cell_and_no_formula(tmp_path):
     pytest.importorskip("matplotlib")
     written(tmp_path, method="\x1b[31ma | b $\\frac{", scenario="| x\n| y |", baseline_episodes={})
-    entries = gather(tmp_path)
-    *_, row = table(entries).splitlines()
+    entries = read_rows(tmp_path)
+    *_, row = summary_table(entries).splitlines()
     assert row.startswith("| \\| x \\| y \\| | a \\| b $\\frac{ | 1 | 2 |") and "\x1b" not in row
-    draw(entries, tmp_path / "a.png")
+    draw_summary(entries, tmp_path / "a.png")

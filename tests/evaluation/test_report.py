@@ -3,7 +3,7 @@
 import numpy as np
 
 from warp_torchrl.env.metrics import METRICS, WATCHING
-from warp_torchrl.evaluation.report import report, table
+from warp_torchrl.evaluation.report import evaluation_table, report
 
 
 def episodes(watched, *further):
@@ -20,24 +20,28 @@ def episodes(watched, *further):
 def test_what_is_watched_has_a_table_of_its_own():
     content = report("front", "mine", 7, episodes(0.75, *WATCHING), {"noop": episodes(0.25, *WATCHING)}, goal="watched")
     assert content["watching"]["noop"]["watched_difference"] == 0.5
-    shown = table(content).splitlines()
+    shown = evaluation_table(content).splitlines()
     assert "mine                        75.0    75.0 .. 75.0     50.0        0.250" in shown
     assert "mine - noop: +50.0 points watched, +50.0 .. +50.0; more on 100 % of fires" in shown
     assert not any("points saved" in line for line in shown), "none can act"
-    acts = table(report("search", "mine", 7, episodes(0.75, *WATCHING), {"noop": episodes(0.25, *WATCHING)}))
+    acts = evaluation_table(report("search", "mine", 7, episodes(0.75, *WATCHING), {"noop": episodes(0.25, *WATCHING)}))
     assert "points saved" in acts and "points watched" in acts and "saved %" not in "".join(shown)
     lamed = {"scout_1": episodes(0.5, *WATCHING)}
     alone = report("front", "mine", 7, episodes(0.75, *WATCHING), {}, left_out=lamed, goal="watched")
-    assert "without scout_1          -25.0  -25.0 .. -25.0" in table(alone).splitlines()
+    assert "without scout_1          -25.0  -25.0 .. -25.0" in evaluation_table(alone).splitlines()
     near = {"near_misses": np.full(4, 0.125)}
     flown = report("front", "mine", 7, episodes(0.75, *WATCHING) | near, {"noop": episodes(0.25, *WATCHING) | near})
-    assert "mine                        75.0    75.0 .. 75.0     50.0        0.250           12.5" in table(flown)
+    assert "mine                        75.0    75.0 .. 75.0     50.0        0.250           12.5" in evaluation_table(
+        flown
+    )
 
 
 def test_what_agencies_save_has_a_table_of_its_own():
     shares = {"saved_agency_0": np.full(4, 0.75), "saved_agency_1": np.array([0.2, 0.2, 0.4, 0.4])}
     none = {name: np.zeros(4) for name in shares}
-    shown = table(report("agencies", "mine", 7, episodes(0.0) | shares, {"noop": episodes(0.0) | none})).splitlines()
+    shown = evaluation_table(
+        report("agencies", "mine", 7, episodes(0.0) | shares, {"noop": episodes(0.0) | none})
+    ).splitlines()
     assert "saved %, by agency                    agency_0                agency_1" in shown
     assert any(line.split() == ["noop", *("0.0 (0.0 .. 0.0)".split() * 2)] for line in shown)
     (line,) = (line for line in shown if line.startswith("mine ") and "75.0 (75.0 .. 75.0)" in line)
@@ -59,4 +63,8 @@ def test_a_line_has_the_shares_saved_and_cleared_in_per_cent():
 
 def test_elsewhere_it_has_none():
     content = report("skirmish", "mine", 7, episodes(0.0), {"noop": episodes(0.0)})
-    assert content["watching"] == {} and "watched" not in table(content) and "agency" not in table(content)
+    assert (
+        content["watching"] == {}
+        and "watched" not in evaluation_table(content)
+        and "agency" not in evaluation_table(content)
+    )

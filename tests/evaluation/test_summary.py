@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from warp_torchrl.evaluation.summary import draw, gather, main, table
+from warp_torchrl.evaluation.summary import draw_summary, main, read_rows, summary_table
 
 
 def write(folder, policy, saved, scenario="tiny", configuration="", seeds=None):
@@ -29,7 +29,7 @@ def sweep(tmp_path):
 
 
 def test_runs_that_were_trained_alike_are_gathered(sweep):
-    mappo, local, other = gather(sweep)
+    mappo, local, other = read_rows(sweep)
     assert mappo.policy == "mappo" and mappo.value.shape == (2, 3)
     assert local.value.tolist() == [[0.5, 0.5, 0.6]] and local.success.tolist() == [[0.0, 0.0, 1.0]]
     assert other.scenario == "other"
@@ -40,7 +40,7 @@ def test_baselines_are_those_of_any_evaluation_that_holds_them(sweep):
     held = {"saved": [0.2, 0.3, 0.4], "success": [0.0, 0.0, 1.0]}
     content = json.loads(path.read_text()) | {"baseline_episodes": {"noop": held, "local": held}}
     path.write_text(json.dumps(content))
-    entries = {(entry.scenario, entry.policy): entry for entry in gather(sweep)}
+    entries = {(entry.scenario, entry.policy): entry for entry in read_rows(sweep)}
     assert entries["tiny", "noop"].value.tolist() == [[0.2, 0.3, 0.4]]
     assert entries["tiny", "noop"].success.tolist() == [[0.0, 0.0, 1.0]] and ("other", "noop") not in entries
     assert entries["tiny", "local"].value.tolist() == [[0.5, 0.5, 0.6]], "its own evaluation comes first"
@@ -54,22 +54,22 @@ def test_baselines_that_met_other_worlds_are_left_out(sweep):
             "random": {"saved": [0.1] * 3, "success": [0.0] * 3},
         }
         path.write_text(json.dumps(json.loads(path.read_text()) | {"baseline_episodes": held}))
-    assert [entry.policy for entry in gather(sweep)] == ["random", "mappo", "local", "local"]
+    assert [entry.policy for entry in read_rows(sweep)] == ["random", "mappo", "local", "local"]
 
 
 def test_worlds_that_differ_from_their_scenario_s_are_a_place_of_their_own(sweep):
     path = sweep / "2" / "evaluation.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | {"world_overrides": ["team.n_agents=4", "horizon=9"]}))
-    assert [entry.scenario for entry in gather(sweep)] == ["tiny", "tiny team.n_agents=4 horizon=9", "other"]
+    assert [entry.scenario for entry in read_rows(sweep)] == ["tiny", "tiny team.n_agents=4 horizon=9", "other"]
 
 
 def test_runs_that_were_trained_differently_are_told_apart(sweep):
     write(sweep / "4", "mappo", [0.1, 0.1, 0.1], configuration="bbbbbbbb")
-    assert [entry.policy for entry in gather(sweep)] == ["mappo aaaaaa", "local", "local", "mappo bbbbbb"]
+    assert [entry.policy for entry in read_rows(sweep)] == ["mappo aaaaaa", "local", "local", "mappo bbbbbb"]
 
 
 def test_the_table_puts_the_best_first_and_compares_with_it(sweep):
-    header, _, first, second, third = table(gather(sweep)).splitlines()
+    header, _, first, second, third = summary_table(read_rows(sweep)).splitlines()
     assert "saved %" in header
     assert first.split("|")[1:5] == [" tiny ", " mappo ", " 2 ", " 3 "] and "| 70.0 |" in first
     # Local against the two runs, paired by world: 0.5333 - 0.7; better only where 0.6 beats 0.5, one of six; and
@@ -80,7 +80,7 @@ def test_the_table_puts_the_best_first_and_compares_with_it(sweep):
 
 def test_policies_on_other_fires_are_not_compared(sweep):
     write(sweep / "4", "greedy", [0.1, 0.1, 0.1], seeds=[7, 8, 9])
-    row = next(line for line in table(gather(sweep)).splitlines() if "greedy" in line)
+    row = next(line for line in summary_table(read_rows(sweep)).splitlines() if "greedy" in line)
     assert row.endswith("| - | - | - |")
 
 
@@ -166,8 +166,8 @@ def test_the_figure_shows_means_and_the_share_of_fires_that_reach_each_level(swe
 
     save, kept = Figure.savefig, []
     monkeypatch.setattr(Figure, "savefig", lambda figure, *to, **how: (kept.append(figure), save(figure, *to, **how)))
-    entries = gather(sweep)
-    draw(entries, tmp_path / "summary.png")
+    entries = read_rows(sweep)
+    draw_summary(entries, tmp_path / "summary.png")
     assert np.ptp(imread(tmp_path / "summary.png")[..., :3]) > 0.5
     tiny = [entry for entry in entries if entry.scenario == "tiny"]
     bars, profile, *_ = kept[0].axes

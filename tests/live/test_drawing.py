@@ -50,7 +50,7 @@ def test_a_flame_stands_on_each_cell_that_burns_in_the_colour_of_its_stage():
 def test_without_fire_there_is_neither_flame_nor_smoke_nor_glow():
     state = draw("5T. ~11")
     ground = ground_of(state)
-    assert len(drawing.flames(state, ground).position) == len(drawing.smoke(state, ground).position) == 0
+    assert len(drawing.flames(state, ground).position) == len(drawing.smoke_puffs(state, ground).position) == 0
     assert drawing.glow(state, ground)[1] == 0.0
 
 
@@ -65,7 +65,7 @@ def test_the_glow_stands_over_the_densest_fire_and_grows_with_it():
 def test_smoke_goes_up_and_with_the_wind():
     state = draw("cccc cccc cccc", wind=(10.0, 0.0))
     ground = ground_of(state)
-    shown = drawing.smoke(state, ground)
+    shown = drawing.smoke_puffs(state, ground)
     index = [int(np.abs(ground.position[:, 1] - place[1]).argmin()) for place in shown.position]
     assert len(index) > 0 and (shown.position[:, 2] >= 2.0).all()
     # At a height of h cells the puff is 10 m/s x 0.12 h east of its cell, whose columns begin at -1.5.

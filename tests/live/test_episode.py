@@ -15,7 +15,7 @@ from drawings.episode import _picture
 from warp_torchrl.evaluation.picture import record_episode
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.live.episode import Film, SceneRecorder, legend, progress
+from warp_torchrl.live.episode import Film, SceneRecorder, map_colours, progress
 from warp_torchrl.world.state.state import is_burning
 
 SEED = 1_000_000
@@ -126,7 +126,7 @@ def test_vehicles_face_where_those_of_a_match_face(make_match):
 
 def test_the_legend_names_what_is_on_the_map_and_each_vehicle(make_match):
     side = make_match().sides[0]
-    names = list(legend(side))
+    names = list(map_colours(side))
     covers = {"lake", "wetland", "grassland", "forest", "bare"}
     there = {("lake", "wetland", "grassland", "forest", "bare")[code] for code in side.state.cover.unique().tolist()}
     assert set(names) & covers == there and "bare" not in names

@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from warp_torchrl.demonstrations.files import MANIFEST, read
+from warp_torchrl.demonstrations.files import MANIFEST, read_recording
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.keeping import Keeper
 from warp_torchrl.system.checksummed import Unsound
@@ -41,7 +41,7 @@ def test_an_episode_without_people_is_not_kept_and_one_with_them_is(match, keepe
     side = match.sides[0]
     assert keeper.keep(side) is None and folders(keeper) == []
     drive(match)
-    assert len(read(keeper.keep(side)).steps) == 3
+    assert len(read_recording(keeper.keep(side)).steps) == 3
 
 
 def test_nothing_is_kept_that_nobody_asked_to_keep_and_a_button_saves_all(match, keeper):
@@ -49,7 +49,7 @@ def test_nothing_is_kept_that_nobody_asked_to_keep_and_a_button_saves_all(match,
     assert keeper.keep(drive(match)) is None
     match.restart()
     match.step()
-    assert len(read(keeper.save(match.sides[0])).steps) == 1, "also without people"
+    assert len(read_recording(keeper.save(match.sides[0])).steps) == 1, "also without people"
 
 
 def test_what_is_saved_again_takes_the_place_of_what_was_saved_before(match, keeper):
@@ -58,7 +58,7 @@ def test_what_is_saved_again_takes_the_place_of_what_was_saved_before(match, kee
     assert keeper.keep(side) is None, "all of it is saved"
     drive(match)
     second = keeper.keep(side)
-    assert folders(keeper) == [second.name] and len(read(second).steps) == 4
+    assert folders(keeper) == [second.name] and len(read_recording(second).steps) == 4
     match.restart()
     drive(match)
     keeper.keep(side)
@@ -68,7 +68,7 @@ def test_what_is_saved_again_takes_the_place_of_what_was_saved_before(match, kee
 def test_a_change_of_the_world_is_an_act_too(match, keeper):
     match.step()
     match.blow(3.0, 90.0)
-    assert len(read(keeper.keep(match.sides[0])).events) == 1
+    assert len(read_recording(keeper.keep(match.sides[0])).events) == 1
     match.restart()
     match.blow(3.0, 90.0)
     assert keeper.keep(match.sides[0]) is None, "no step was played"
@@ -87,7 +87,7 @@ def test_a_full_disk_is_one_line_and_what_was_saved_before_stays(match, keeper, 
         keeper.keep(side)
     assert folders(keeper) == [first.name]
     monkeypatch.undo()
-    assert len(read(keeper.keep(side)).steps) == 4, "it is saved as soon as there is room"
+    assert len(read_recording(keeper.keep(side)).steps) == 4, "it is saved as soon as there is room"
 
 
 def test_a_folder_that_cannot_be_made_is_one_line(match, tmp_path):
@@ -145,7 +145,7 @@ def test_an_episode_whose_saving_fails_is_not_called_saved(match, keeper, monkey
     def fail(*given):
         raise error
 
-    monkeypatch.setattr("warp_torchrl.live.keeping.save", fail)
+    monkeypatch.setattr("warp_torchrl.live.keeping.save_recording", fail)
     with pytest.raises(Refused if isinstance(error, Unsound) else type(error)):
         keeper.save(side)
     monkeypatch.undo()

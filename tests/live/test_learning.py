@@ -8,7 +8,7 @@ import pytest
 
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.keeping import Keeper
-from warp_torchrl.live.learning import Learning, _literal, arguments
+from warp_torchrl.live.learning import PageTraining, _literal, arguments
 from warp_torchrl.live.match import Match
 from warp_torchrl.runs.checkpoint import newest
 from warp_torchrl.runs.config.building import run_config
@@ -96,7 +96,7 @@ def test_values_are_written_as_hydra_reads_them(value, literal):
 @pytest.fixture
 def learning(tmp_path, monkeypatch):
     monkeypatch.setattr("warp_torchrl.runs.process.MODULE", "tests.live.fake_training")
-    made = Learning(tmp_path / "people")
+    made = PageTraining(tmp_path / "people")
     yield made
     made.close()
 
@@ -178,7 +178,7 @@ def test_what_a_person_did_is_learned_by_a_real_training(tmp_path, match):
         side.crew.press(0, 1, int(Action.EAST if step % 2 else Action.WEST))
         match.step()
     keeper.save(side)
-    learning = Learning(keeper.folder)
+    learning = PageTraining(keeper.folder)
     folder = learning.start(side, match.setting, 1600)
     end = time.monotonic() + 300.0
     while learning.goes_on and time.monotonic() < end:

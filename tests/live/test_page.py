@@ -17,13 +17,13 @@ from PIL import Image
 pytest.importorskip("viser", reason="needs the extra live")
 
 from tests.live.conftest import SMALL
-from warp_torchrl.demonstrations.files import read
+from warp_torchrl.demonstrations.files import read_recording
 from warp_torchrl.demonstrations.recording import Mover
 from warp_torchrl.live.address import Address
 from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.live.page import Page
-from warp_torchrl.live.panel.tab import chosen
+from warp_torchrl.live.panel.tab import chosen_option
 from warp_torchrl.live.replayed import ReplayedMatch
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.world.state.state import Action, is_tree
@@ -162,9 +162,9 @@ def test_a_new_start_shows_the_ground_of_its_seed(page):
 def test_a_browser_cannot_name_what_it_was_not_offered():
     offered = SimpleNamespace(value="/etc", options=("default", "local"), label="Policy")
     with pytest.raises(ValueError, match="Policy must be one of default, local, got /etc"):
-        chosen(offered)
+        chosen_option(offered)
     offered.value = "local"
-    assert chosen(offered) == "local"
+    assert chosen_option(offered) == "local"
 
 
 def test_what_is_drawn_follows_the_match(page):
@@ -426,7 +426,7 @@ def test_a_person_drives_by_the_keyboard_saves_what_was_played_and_watches_it(pa
     tab.get_by_role("button", name="Save what was played", exact=True).click()
     folder = page.keeper.folder / "skirmish-1000000-1"
     tab.get_by_text(f"saved {folder}").first.wait_for(timeout=30_000)
-    assert read(folder).by(Mover.PERSON)[:, 0].all()
+    assert read_recording(folder).by(Mover.PERSON)[:, 0].all()
     tab.get_by_role("cell", name="skirmish-1000000-1").wait_for(timeout=30_000)
 
     tab.get_by_role("button", name="Watch it", exact=True).click()

@@ -45,4 +45,4 @@ def test_a_tree_is_one_high_and_stands_in_its_cell():
 
 def test_shapes_that_are_joined_keep_their_volumes():
     one, other = shapes.box((1, 1, 1), (0, 0, 0)), shapes.box((1, 2, 1), (5, 0, 0))
-    assert volume(shapes.joined(one, other)) == pytest.approx(3.0)
+    assert volume(shapes.joined_meshes(one, other)) == pytest.approx(3.0)

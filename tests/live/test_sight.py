@@ -33,7 +33,7 @@ def test_a_channel_is_dark_where_it_shows_its_least_and_bright_where_it_shows_it
 
 
 def test_numbers_have_their_names(side):
-    told = sight.numbers(side, 1)
+    told = sight.named_numbers(side, 1)
     seen = sight.entries(side, 1)["status"]
     assert list(told) == list(side.env.channel_names["status"]) and np.allclose(list(told.values()), seen)
     assert told["time_left"] == 1.0
@@ -41,4 +41,4 @@ def test_numbers_have_their_names(side):
 
 def test_the_flat_view_of_the_paper_has_neither_maps_nor_names(make_match):
     side = make_match("local", ("observation=paper",)).sides[0]
-    assert sight.pictures(side, 0) == {} and sight.numbers(side, 0) == {}
+    assert sight.pictures(side, 0) == {} and sight.named_numbers(side, 0) == {}

@@ -27,7 +27,7 @@ def draw(side, ground):
     drawing.headings(shown, {}, ground)
     drawing.wind_arrows(side.state, ground)
     drawing.glow(side.state, ground)
-    return [make(side.state, ground) for make in (drawing.tiles, drawing.trees, drawing.flames, drawing.smoke)]
+    return [make(side.state, ground) for make in (drawing.tiles, drawing.trees, drawing.flames, drawing.smoke_puffs)]
 
 
 def test_a_step_of_a_large_map_is_played_and_drawn_in_a_tenth_of_a_second():

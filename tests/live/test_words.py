@@ -26,7 +26,7 @@ def test_the_headline_tells_the_step_of_the_side_that_is_farthest(match):
 
 
 def test_the_table_has_a_row_for_each_side_with_its_numbers(match):
-    rows = words.numbers(match).splitlines()
+    rows = words.numbers_table(match).splitlines()
     assert [row.split(" | ")[0].strip("| ") for row in rows[2:]] == [
         "default &#40;4.0 M&#41;",
         "local",
@@ -134,7 +134,7 @@ def test_names_of_others_are_text_wherever_they_are_shown(match, monkeypatch):
     row = Summary(MARKUP, MARKUP, 7, MARKUP, 30, 5, 2, 0.613)
     texts = {
         "headline": (words.headline(match), 1),
-        "numbers": (words.numbers(match), 1),
+        "numbers": (words.numbers_table(match), 1),
         "acts": (words.acts(side), 3),
         "questions": (words.questions(side, [Question(0, 1), Question(1, 2, 0.3)]), 4),
         "actions": (words.actions(side, 0), len(side.env.action_names)),

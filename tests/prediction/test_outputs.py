@@ -106,10 +106,10 @@ def test_fires_that_memory_does_not_hold_are_refused_before_they_burn(folder, mo
 
 
 def test_the_report_and_the_log_name_what_was_read(folder, monkeypatch, caplog):
-    from warp_torchrl.system.provenance import Provenance, tell
+    from warp_torchrl.system.provenance import Provenance, report_file
 
     read, one = command.read_case, Provenance(key="weather", file="w.csv", read={"WS": "km/h"}, left=("GUST",))
-    monkeypatch.setattr(command, "read_case", lambda *given: tell(one) or read(*given))
+    monkeypatch.setattr(command, "read_case", lambda *given: report_file(one) or read(*given))
     caplog.set_level(logging.INFO, "warp_torchrl")
     assert main(arguments(folder, fires=1)) == DONE
     assert one.as_values in told(folder / "out")["files"]

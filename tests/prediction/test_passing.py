@@ -3,14 +3,14 @@
 import pytest
 import torch
 
-from warp_torchrl.prediction.passing import Behaviour, passing
+from warp_torchrl.prediction.passing import HeadBehaviour, passing
 
 
 @pytest.mark.parametrize("pace", [1.0, 2.0, 0.5])
 def test_the_bounds_of_a_rate_move_with_the_pace_of_the_fire(pace):
     # 30 m in 5 minutes are 6 m/min; in 0.1 minute more than a head of 10 does, in 500 less than a rear of 0.718.
     # A pace of 2 doubles times: the head does 5 and the rear 0.359.
-    then = Behaviour(*(torch.full((3,), value) for value in (10.0, 0.718, 10_000.0, 2.0)))
+    then = HeadBehaviour(*(torch.full((3,), value) for value in (10.0, 0.718, 10_000.0, 2.0)))
     rate, intensity, flame = passing(torch.tensor([5.0, 0.1, 500.0]), torch.full((3,), pace), then, 30.0)
     head, rear = 10.0 / pace, 0.718 / pace
     assert rate.tolist() == pytest.approx([min(6.0, head), head, rear])

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from tests.prediction.test_predict import UNEVEN, run
-from warp_torchrl.prediction.report import numbers, page
+from warp_torchrl.prediction.report import page, report_numbers
 
 
 @pytest.fixture(scope="module")
@@ -13,7 +13,7 @@ def prediction():
 
 
 def test_the_highest_are_places_in_the_order_of_the_cells_where_a_fire_came(prediction):
-    told = numbers(prediction)["highest"]
+    told = report_numbers(prediction)["highest"]
     for name in ("rate", "intensity", "flame_length"):
         plane = getattr(prediction, name)
         known = plane[~plane.isnan()].double()
@@ -23,7 +23,7 @@ def test_the_highest_are_places_in_the_order_of_the_cells_where_a_fire_came(pred
 
 
 def test_fires_are_told_by_their_median_and_by_all_but_the_twentieth_at_each_end(prediction):
-    told, area = numbers(prediction), prediction.final_area.double().sort().values.tolist()
+    told, area = report_numbers(prediction), prediction.final_area.double().sort().values.tolist()
     # Of 7 in order, places 3, 0.3 and 5.7
     low, high = area[0] + 0.3 * (area[1] - area[0]), area[5] + 0.7 * (area[6] - area[5])
     assert [told["area_ha"][each] for each in ("median", "low", "high")] == pytest.approx([area[3], low, high])
@@ -34,7 +34,7 @@ def test_fires_are_told_by_their_median_and_by_all_but_the_twentieth_at_each_end
 
 
 def test_of_many_hours_the_page_shows_some_and_the_last(prediction):
-    said = numbers(prediction)
+    said = report_numbers(prediction)
     hours = [{**said["by_hour"][0], "hour": float(hour)} for hour in range(60)]
     more = {
         "title": "a",

@@ -5,7 +5,7 @@ import torch
 
 from tests.world.backends.test_growing import land, lit
 from warp_torchrl.prediction.counts import Counter
-from warp_torchrl.prediction.passing import Behaviour, passing, steepness_from
+from warp_torchrl.prediction.passing import HeadBehaviour, passing, steepness_from
 from warp_torchrl.prediction.tally import Tally
 from warp_torchrl.system import memory
 from warp_torchrl.world.fires.alone import Burned, Fires, Spell
@@ -33,7 +33,7 @@ def burned(*fires):
 
 def test_rates_are_held_between_rear_and_head_and_intensity_goes_with_them():
     # 50 m in 10, 1 and 1000 minutes; heads of 10 m/min, rears of 1 m/min, 3000 kW/m, flames of 3 m
-    then = Behaviour(*(torch.full((3,), value) for value in (10.0, 1.0, 3000.0, 3.0)))
+    then = HeadBehaviour(*(torch.full((3,), value) for value in (10.0, 1.0, 3000.0, 3.0)))
     rate, intensity, flame = passing(torch.tensor([10.0, 1.0, 1000.0]), torch.ones(3), then, 50.0)
     assert rate.tolist() == pytest.approx([5.0, 10.0, 1.0])
     assert intensity.tolist() == pytest.approx([1500.0, 3000.0, 300.0])

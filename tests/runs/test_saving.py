@@ -7,7 +7,7 @@ import torch
 
 from tests.training.test_loop import LAST, RUNS, TINIER, flattened, rows, tiny, without_times
 from warp_torchrl.runs.checkpoint import newest
-from warp_torchrl.runs.saving import SHARE, SaveClock, passes
+from warp_torchrl.runs.saving import MOST_TIME_SHARE, SaveClock, passes
 
 
 class Time:
@@ -47,7 +47,7 @@ def test_a_clock_of_no_minutes_never_asks():
 @pytest.mark.parametrize("took", [0.2, 3.0, 40.0])
 def test_saves_take_a_hundredth_of_the_time_however_long_one_takes(took):
     moments, clock = played(1_000_000.0, cost=lambda moment: took, step=10.0)
-    assert clock.share() <= SHARE and len(moments) > 200
+    assert clock.share() <= MOST_TIME_SHARE and len(moments) > 200
     assert all(after - before >= 99.0 * took - 10.0 for before, after in pairwise(moments))
 
 
@@ -56,7 +56,7 @@ def test_a_save_of_a_memory_that_has_grown_is_foreseen():
     moments, clock = played(20_000.0, cost=lambda moment: 8.0 * min(1.0, moment / 400.0))
     assert moments[0] == 1.0 and 780.0 <= moments[1] <= 805.0
     assert all(after - before >= 99.0 * 8.0 for before, after in pairwise(moments[1:]))
-    assert clock.share() <= SHARE and len(moments) > 20
+    assert clock.share() <= MOST_TIME_SHARE and len(moments) > 20
 
 
 @pytest.mark.parametrize(("interval", "frames", "batch", "expected"), [

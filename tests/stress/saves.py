@@ -7,8 +7,8 @@ from pathlib import Path
 
 from tests.demonstrations.played import played
 from tests.runs.test_checkpoint import saved
-from warp_torchrl.demonstrations.files import find, read
-from warp_torchrl.demonstrations.files import save as save_recording
+from warp_torchrl.demonstrations.files import find_recordings, read_recording
+from warp_torchrl.demonstrations.files import save_recording as save_recording
 from warp_torchrl.runs.checkpoint import newest
 from warp_torchrl.runs.output import DRAFT
 
@@ -58,7 +58,7 @@ KINDS = {
     ),
     "recording": Kind(
         save=lambda people, number: save_recording(replace(_recording(), seed=number), people),
-        held=lambda people: {read(each).seed for each in find(people)},
+        held=lambda people: {read_recording(each).seed for each in find_recordings(people)},
         result=lambda people, number: people / f"skirmish-{number}-1",
     ),
 }

@@ -17,7 +17,7 @@ import torch
 
 from tests.stress.processes import ROOT, TINY, finish, rows, start, wait_for
 from tests.stress.saves import KINDS, left
-from warp_torchrl.demonstrations.files import find, read
+from warp_torchrl.demonstrations.files import find_recordings, read_recording
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
 
 pytestmark = pytest.mark.stress
@@ -55,7 +55,7 @@ def test_killed_savers_leave_what_they_said_and_nothing_half(tmp_path):
         process.kill()
         process.wait()
     people = tmp_path / "people"
-    seeds = [read(folder).seed for folder in find(people)]
+    seeds = [read_recording(folder).seed for folder in find_recordings(people)]
     for number, path in enumerate(told, start=1):
         assert 0 <= seeds.count(number) - len(said(path)) <= 1  # it may have been killed before it could say so
     KINDS["recording"].save(people, 4)

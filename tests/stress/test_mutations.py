@@ -13,7 +13,7 @@ from tests.stress.saves import KINDS
 from tests.training.test_loop import tiny
 from warp_torchrl import load_policy
 from warp_torchrl.commands.command import evaluate
-from warp_torchrl.demonstrations.files import MANIFEST, find, read
+from warp_torchrl.demonstrations.files import MANIFEST, find_recordings, read_recording
 from warp_torchrl.demonstrations.replay import Replay
 from warp_torchrl.runs.checkpoint import CheckpointError, newest
 from warp_torchrl.runs.config.construction import ConfigError
@@ -133,10 +133,10 @@ def test_every_mutation_of_a_recording_is_noticed(recorded, tmp_path):
     for _ in range(MUTATIONS):
         folder, what = harmed(recorded, tmp_path / "people", draws)
         if what == f"delete {MANIFEST}":
-            assert folder not in find(tmp_path / "people")
+            assert folder not in find_recordings(tmp_path / "people")
             continue
         with pytest.raises(Unsound) as error:
-            read(folder)
+            read_recording(folder)
         assert "\n" not in str(error.value), what
     print(f"\nmutations of recordings caught / tried: {MUTATIONS} / {MUTATIONS}")
 
@@ -153,7 +153,7 @@ def test_no_forged_recording_is_more_than_an_error_in_one_line(recorded, tmp_pat
         except (OSError, ValueError, KeyError):
             continue  # the manifest itself is gone
         try:
-            Replay(read(folder)).check()
+            Replay(read_recording(folder)).check()
             harmless += 1
         except (Unsound, ConfigError) as error:
             assert "\n" not in str(error), what

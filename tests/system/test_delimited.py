@@ -2,7 +2,7 @@
 
 import pytest
 
-from warp_torchrl.system.delimited import named_separator, read_text, split_rows, to_number, to_points
+from warp_torchrl.system.delimited import named_separator, read_table_text, split_rows, to_number, to_points
 
 TEXT = "Temp (°C);WS\n8,5;3\n"
 
@@ -21,7 +21,7 @@ TEXT = "Temp (°C);WS\n8,5;3\n"
 )
 def test_a_text_is_the_same_in_every_encoding(tmp_path, content):
     (tmp_path / "a.csv").write_bytes(content)
-    assert read_text("weather", tmp_path / "a.csv") == TEXT
+    assert read_table_text("weather", tmp_path / "a.csv") == TEXT
 
 
 @pytest.mark.parametrize(
@@ -32,12 +32,12 @@ def test_what_is_no_text_is_refused(tmp_path, content, why):
     if content is not None:
         (tmp_path / "a.csv").write_bytes(content)
     with pytest.raises(ValueError, match=rf"^weather must be a CSV file that can be read, got .*a\.csv: {why}"):
-        read_text("weather", tmp_path / "a.csv")
+        read_table_text("weather", tmp_path / "a.csv")
 
 
 def test_a_folder_is_refused(tmp_path):
     with pytest.raises(ValueError, match="must be a CSV file that can be read"):
-        read_text("weather", tmp_path)
+        read_table_text("weather", tmp_path)
 
 
 def test_excel_names_its_separator_in_the_first_line():

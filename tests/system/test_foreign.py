@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from warp_torchrl.system.foreign import Foreign, below, read_bytes, read_json, read_text
+from warp_torchrl.system.foreign import Foreign, path_below, read_bytes, read_json, read_text
 
 
 def test_only_regular_files_of_a_bounded_size_are_read(tmp_path):
@@ -62,13 +62,13 @@ def test_json_is_what_its_standard_says(tmp_path, text, why):
 )
 def test_a_manifest_names_plain_files_below_its_folder(tmp_path, name):
     with pytest.raises(Foreign, match="no plain name"):
-        below(tmp_path, name)
+        path_below(tmp_path, name)
 
 
 def test_files_of_a_manifest_are_no_links(tmp_path):
     (tmp_path / "steps").mkdir()
     (tmp_path / "steps" / "a.memmap").touch()
     (tmp_path / "link").symlink_to("steps")
-    assert below(tmp_path, "steps/a.memmap") == tmp_path / "steps" / "a.memmap"
+    assert path_below(tmp_path, "steps/a.memmap") == tmp_path / "steps" / "a.memmap"
     with pytest.raises(Foreign, match="is a link"):
-        below(tmp_path, "link/a.memmap")
+        path_below(tmp_path, "link/a.memmap")

@@ -3,7 +3,7 @@
 import json
 import logging
 
-from warp_torchrl.system.provenance import Provenance, gathered, section, tell
+from warp_torchrl.system.provenance import Provenance, gathered, report_file, section
 
 WEATHER = Provenance(
     key="weather",
@@ -25,11 +25,11 @@ def test_what_is_told_is_logged_once_and_gathered_by_the_innermost_block(caplog)
     caplog.set_level(logging.INFO, "warp_torchrl")
     one = Provenance(key="elevation", file="told once.tif", read={"band 1": "m"})
     with gathered() as outer:
-        tell(one)
+        report_file(one)
         with gathered() as inner:
-            tell(WEATHER)
-        tell(one)
-    tell(WEATHER)
+            report_file(WEATHER)
+        report_file(one)
+    report_file(WEATHER)
     assert outer == [one] and inner == [WEATHER]
     assert [record.getMessage() for record in caplog.records].count(one.line) == 1
 

@@ -17,7 +17,7 @@ import torch
 from tests.demonstrations.played import played
 from tests.stress.processes import ROOT, TINY, alive, finish, rows, start, wait_for
 from tests.training.test_loop import flattened
-from warp_torchrl.demonstrations.files import save
+from warp_torchrl.demonstrations.files import save_recording
 from warp_torchrl.runs.checkpoint import newest
 from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import compose_config, plain
@@ -66,7 +66,7 @@ def test_a_checkpoint_holds_the_worlds_of_both(whole):
 @pytest.mark.slow
 def test_two_processes_learn_from_people_together_and_go_on_exactly(tmp_path):
     for seed in range(2):
-        save(played("horizon=16", seed=seed), tmp_path / "people")
+        save_recording(played("horizon=16", seed=seed), tmp_path / "people")
     people = [f"imitation.demonstrations={tmp_path / 'people'}", "imitation.until=1.0", "imitation.minibatch_size=32"]
     whole = train(tmp_path / "whole", *people)
     losses = [float(row["train/cloning_loss"]) for row in told(whole)]

@@ -12,7 +12,7 @@ from torchrl.modules import ProbabilisticActor
 from torchrl.objectives import A2CLoss, ValueEstimators
 
 from warp_torchrl.algorithms import parallel
-from warp_torchrl.algorithms.on_policy import KEYS, OnPolicy
+from warp_torchrl.algorithms.on_policy import LOSS_ENTRIES, OnPolicy
 
 
 class ExplainedA2c(A2CLoss):
@@ -65,7 +65,7 @@ class A2c(OnPolicy):
             loss_critic_type="l2",
         )
         loss.entropy_coeff.fill_(self.entropy_coeff)
-        loss.set_keys(**KEYS)
+        loss.set_keys(**LOSS_ENTRIES)
         alone = parallel.size() == 1  # else ``standardises`` has it
         loss.make_value_estimator(
             ValueEstimators.MAGAE, gamma=self.gamma, lmbda=self.lmbda, average_gae=self.normalize_advantage and alone

@@ -32,7 +32,7 @@ from warp_torchrl.models import (
 
 AGENT_KEYS = {"reward": REWARD, "done": ("agents", "done"), "terminated": ("agents", "terminated")}
 """Keys of TorchRL's losses for values of each agent; the team's end is each agent's end."""
-STEPS = "steps_to_next_obs"
+STEPS_TO_NEXT = "steps_to_next_obs"
 """Key of the number of steps whose rewards a transition sums, where it is not 1."""
 TEAM_REWARD = "team_reward"
 """Key of the team's mean reward, for a value of the whole team."""
@@ -253,7 +253,7 @@ def transitions(
         batch["next", "agents", name] = batch["next", name].unsqueeze(-2).expand(reward.shape)
     if n_step > 1:
         batch = _several_steps(batch.select(*loss.in_keys, ("next", "done"), strict=False), loss, n_step, gamma)
-    return batch.select(*loss.in_keys, STEPS, strict=False).reshape(-1)
+    return batch.select(*loss.in_keys, STEPS_TO_NEXT, strict=False).reshape(-1)
 
 
 def _several_steps(batch: TensorDictBase, loss: LossModule, n_step: int, gamma: float) -> TensorDictBase:
@@ -262,6 +262,6 @@ def _several_steps(batch: TensorDictBase, loss: LossModule, n_step: int, gamma: 
     several = MultiStep(gamma, n_step)
     several.reward_keys, several.done_keys = (key,), ()  # the ends too are those of n steps later
     batch = several(batch)
-    steps = batch[STEPS].to(torch.float32)  # [B, T]; the estimators read it in the reward's shape
-    batch[STEPS] = expand_right(steps, batch["next"].get(key).shape).contiguous()
+    steps = batch[STEPS_TO_NEXT].to(torch.float32)  # [B, T]; the estimators read it in the reward's shape
+    batch[STEPS_TO_NEXT] = expand_right(steps, batch["next"].get(key).shape).contiguous()
     return batch

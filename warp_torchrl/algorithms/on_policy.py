@@ -26,7 +26,7 @@ from warp_torchrl.models import (
     signature,
 )
 
-KEYS = {
+LOSS_ENTRIES = {
     "action": ACTION,
     "sample_log_prob": LOG_PROB,
     "value": VALUE,

@@ -14,7 +14,7 @@ from torchrl.modules import MaskedCategorical, PopArtValueNorm, ProbabilisticAct
 from torchrl.objectives.multiagent import IPPOLoss, MAPPOLoss
 
 from warp_torchrl.algorithms import parallel
-from warp_torchrl.algorithms.on_policy import KEYS, OnPolicy
+from warp_torchrl.algorithms.on_policy import LOSS_ENTRIES, OnPolicy
 
 
 class SharedValueNorm(PopArtValueNorm):
@@ -92,7 +92,7 @@ class Ppo(OnPolicy):
             value_norm=norm(shape=1) if self.value_norm else None,
             normalize_advantage=alone,  # else ``standardises`` has it
         )
-        loss.set_keys(**KEYS)
+        loss.set_keys(**LOSS_ENTRIES)
         loss.make_value_estimator(gamma=self.gamma, lmbda=self.lmbda)
         return loss
 

@@ -15,7 +15,7 @@ from warp_torchrl.runs.policies.load import load_policy
 from warp_torchrl.runs.policies.trained import TrainedPolicy
 
 
-class Place(NamedTuple):
+class ScenarioVariant(NamedTuple):
     """A scenario with its overrides, on which a policy plays.
 
     Attributes:
@@ -31,20 +31,23 @@ class Place(NamedTuple):
     rival: str | None = None
 
 
-OURS = tuple(Place(name, name) for name in SCENARIOS if not name.startswith("paper"))
-TEAMS = tuple(Place(f"default, {n} vehicles", "default", (f"team.n_agents={n}",)) for n in (1, 2, 3, 6, 12, 16))
-MAPS = tuple(
-    Place(f"default, {side} x {side} cells", "default", (f"landscape.size={side}",)) for side in (16, 24, 48, 96, 192)
+OURS = tuple(ScenarioVariant(name, name) for name in SCENARIOS if not name.startswith("paper"))
+TEAMS = tuple(
+    ScenarioVariant(f"default, {n} vehicles", "default", (f"team.n_agents={n}",)) for n in (1, 2, 3, 6, 12, 16)
 )
-WINDS = tuple(Place(f"default, {speed} m/s", "default", (f"wind.speed={speed}",)) for speed in (0, 2, 8, 12))
-GIANT = (Place("giant", "giant"),)
-SPECIALISTS = tuple(Place(name, name, rival=name) for name in ("skirmish", "single", "default"))
+MAPS = tuple(
+    ScenarioVariant(f"default, {side} x {side} cells", "default", (f"landscape.size={side}",))
+    for side in (16, 24, 48, 96, 192)
+)
+WINDS = tuple(ScenarioVariant(f"default, {speed} m/s", "default", (f"wind.speed={speed}",)) for speed in (0, 2, 8, 12))
+GIANT = (ScenarioVariant("giant", "giant"),)
+SPECIALISTS = tuple(ScenarioVariant(name, name, rival=name) for name in ("skirmish", "single", "default"))
 
 
-def on_ground(folder: str) -> tuple[Place, ...]:
+def on_ground(folder: str) -> tuple[ScenarioVariant, ...]:
     """Return the places on the real ground of a folder: under law ``paper``, and in metres and minutes."""
     path = f"landscape.path='{folder}'"
-    return (Place("landfire", "landfire", (path,)), Place("wildland", "wildland", (path,)))
+    return (ScenarioVariant("landfire", "landfire", (path,)), ScenarioVariant("wildland", "wildland", (path,)))
 
 
 PLACES = {"scenarios": OURS, "teams": TEAMS, "maps": MAPS, "winds": WINDS, "giant": GIANT, "specialists": SPECIALISTS}
@@ -59,7 +62,7 @@ _CELLS = 2**20
 
 
 def generalise(
-    path: str, places: Sequence[Place], device: str, episodes: int, overrides: Sequence[str] = ()
+    path: str, places: Sequence[ScenarioVariant], device: str, episodes: int, overrides: Sequence[str] = ()
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for each place: what the policy, its rival and ``REFERENCE`` save, and paired differences.
 
@@ -82,7 +85,7 @@ def generalise(
         yield _row(place, policy, episodes)
 
 
-def _row(place: Place, policy: TrainedPolicy, episodes: int) -> dict[str, Any]:
+def _row(place: ScenarioVariant, policy: TrainedPolicy, episodes: int) -> dict[str, Any]:
     names = RIVALS if place.rival is None else (REFERENCE,)
     saved = _saved_by_baselines(place, policy, names, episodes)
     if place.rival is None:
@@ -103,7 +106,7 @@ def _row(place: Place, policy: TrainedPolicy, episodes: int) -> dict[str, Any]:
     }
 
 
-def _env(place: Place, policy: TrainedPolicy, first_seed: int, n_worlds: int) -> WildfireEnv:
+def _env(place: ScenarioVariant, policy: TrainedPolicy, first_seed: int, n_worlds: int) -> WildfireEnv:
     """Return the worlds of a place, in which a policy sees what it was trained on."""
     changes = [*policy.overrides, *place.overrides]
     return make_env(place.scenario, n_worlds=n_worlds, seed=first_seed, device=_device(policy), overrides=changes)
@@ -113,7 +116,7 @@ def _device(policy: TrainedPolicy) -> torch.device:
     return next(policy.parameters()).device
 
 
-def _batches(place: Place, policy: TrainedPolicy, episodes: int) -> Iterator[tuple[WildfireEnv, int]]:
+def _batches(place: ScenarioVariant, policy: TrainedPolicy, episodes: int) -> Iterator[tuple[WildfireEnv, int]]:
     """Yield the worlds of each batch, and the seed of their first, for ``episodes`` fires in all."""
     height, width = _env(place, policy, FIRST_SEED, n_worlds=1).world.size
     most = max(1, _CELLS // (height * width))
@@ -122,14 +125,14 @@ def _batches(place: Place, policy: TrainedPolicy, episodes: int) -> Iterator[tup
         yield _env(place, policy, first_seed, min(most, episodes - start)), first_seed
 
 
-def _saved(place: Place, policy: TrainedPolicy, episodes: int) -> np.ndarray:
+def _saved(place: ScenarioVariant, policy: TrainedPolicy, episodes: int) -> np.ndarray:
     """Return the trees that a policy saves in each fire, float64 [episodes]."""
     batches = _batches(place, policy, episodes)
     return np.concatenate([play(env, policy.fitted(env), first, policy.mode)["saved"] for env, first in batches])
 
 
 def _saved_by_baselines(
-    place: Place, policy: TrainedPolicy, names: Sequence[str], episodes: int
+    place: ScenarioVariant, policy: TrainedPolicy, names: Sequence[str], episodes: int
 ) -> dict[str, np.ndarray]:
     """Return the trees that baselines save in each fire, float64 [episodes] by name."""
     parts = [play_heuristics(env, first, names) for env, first in _batches(place, policy, episodes)]

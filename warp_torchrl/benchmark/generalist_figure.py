@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from warp_torchrl.env.pictures.drawing import BLUE, GRID, ORANGE, SOFT, save, sheet, style
+from warp_torchrl.env.pictures.drawing import BLUE, GRID, ORANGE, SOFT, save_figure, sheet, style
 
 _DRAWN = {"policy": ("policy", BLUE, -0.15), "beside": ("rival, named on the right", ORANGE, 0.15)}
 """Label, colour and offset [rows] of what is drawn of a row."""
@@ -46,4 +46,4 @@ def draw_generalist(rows: Sequence[dict[str, Any]], path: Path) -> None:
         panel.set_ylim(len(rows) - 0.4, -0.6)
         panel.set_xlabel("trees saved [%]")
         figure.legend(loc="outside lower center", ncols=2)
-        save(figure, path)
+        save_figure(figure, path)

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warp_torchrl.env.pictures.drawing import BLUE, GRID, INK, SOFT, VERMILION, save, sheet, style
+from warp_torchrl.env.pictures.drawing import BLUE, GRID, INK, SOFT, VERMILION, save_figure, sheet, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +32,7 @@ def draw_growth(rows: list[dict[str, Any]], path: Path, processor: str) -> None:
             row = [axes[f"{measure} {varies}"] for varies in _SWEEPS]
             row[0].set_ylabel(label)
             _share_y(row)
-        save(figure, path)
+        save_figure(figure, path)
 
 
 def _draw_sweep(axes: "Axes", sweep: list[dict[str, Any]], varies: str, measure: str, colour: str) -> None:

@@ -13,9 +13,9 @@ from warp_torchrl.benchmark.timing import clock, spread
 if TYPE_CHECKING:
     from warp_torchrl.env import WildfireEnv
 
-WORLDS = (1, 4, 16, 64, 256, 1024)
-AGENTS = (1, 2, 4, 8, 16)
-SIDES = (16, 32, 64, 128)
+WORLD_COUNTS = (1, 4, 16, 64, 256, 1024)
+AGENT_COUNTS = (1, 2, 4, 8, 16)
+MAP_SIDES = (16, 32, 64, 128)
 _STEPS = 5  # in a repeat
 
 
@@ -38,9 +38,9 @@ def growth(
         state and of what the environment shows of it, and ``peak_gib``, the most that the process has held until then.
     """
     none: list[str] = []
-    sweeps = [("worlds", count, count, none) for count in WORLDS if count <= 4 * n_worlds]
-    sweeps += [("agents", count, n_worlds, [f"team.n_agents={count}"]) for count in AGENTS]
-    sweeps += [("cells", side, n_worlds, [f"landscape.size={side}"]) for side in SIDES]
+    sweeps = [("worlds", count, count, none) for count in WORLD_COUNTS if count <= 4 * n_worlds]
+    sweeps += [("agents", count, n_worlds, [f"team.n_agents={count}"]) for count in AGENT_COUNTS]
+    sweeps += [("cells", side, n_worlds, [f"landscape.size={side}"]) for side in MAP_SIDES]
     return [
         {"varies": varies} | _step_cost(scenario, worlds, device, [*overrides, *more], repeats)
         for varies, _, worlds, more in sweeps

@@ -9,7 +9,7 @@ import torch
 from tensordict import TensorDictBase
 
 from warp_torchrl.benchmark.tables import entry, table
-from warp_torchrl.benchmark.timing import Clock, clock
+from warp_torchrl.benchmark.timing import Timer, clock
 from warp_torchrl.training.loop import Training
 
 _PARTS = ("collector", "environment", "policy", "advantages", "sampling", "loss", "backward", "optimiser", "other")
@@ -23,7 +23,7 @@ class Stopwatch:
         now: Returns the time [s].
     """
 
-    def __init__(self, now: Clock) -> None:
+    def __init__(self, now: Timer) -> None:
         self.seconds: dict[str, float] = defaultdict(float)
         self._now, self._last = now, now()
 
@@ -79,7 +79,7 @@ def share_table(rows: list[dict[str, Any]]) -> str:
 
 
 @contextmanager
-def _watched(training: Training, now: Clock) -> Iterator[Stopwatch]:
+def _watched(training: Training, now: Timer) -> Iterator[Stopwatch]:
     """Let a stopwatch run over a training's parts, until the context ends."""
     watch, learner = Stopwatch(now), training.learner
     samples = learner.samples

@@ -3,11 +3,11 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-Column = tuple[str, Callable[[Mapping[str, Any]], str]]
+TableColumn = tuple[str, Callable[[Mapping[str, Any]], str]]
 """A heading, and a function from a row to its cell."""
 
 
-def table(columns: Sequence[Column], rows: Sequence[Mapping[str, Any]]) -> str:
+def table(columns: Sequence[TableColumn], rows: Sequence[Mapping[str, Any]]) -> str:
     """Return rows under headings, the first column left-aligned and the others right-aligned.
 
     A row with ``skipped`` stands below the others, with its reason.
@@ -24,7 +24,7 @@ def table(columns: Sequence[Column], rows: Sequence[Mapping[str, Any]]) -> str:
     return "\n".join(text + [f"{row['what']} was skipped: {row['skipped']}" for row in rows if "skipped" in row])
 
 
-def entry(heading: str, name: str | None = None, pattern: str = "{}") -> Column:
+def entry(heading: str, name: str | None = None, pattern: str = "{}") -> TableColumn:
     """Return a column of one entry, by default of its heading's name; empty where a row has none."""
     name = name or heading
 
@@ -34,6 +34,6 @@ def entry(heading: str, name: str | None = None, pattern: str = "{}") -> Column:
     return heading, show
 
 
-def spread_of(pattern: str) -> Column:
+def spread_of(pattern: str) -> TableColumn:
     """Return the column of the lowest and the highest value."""
     return "lowest .. highest", lambda row: f"{pattern} .. {pattern}".format(row["lowest"], row["highest"])

@@ -10,7 +10,7 @@ from typing import Any
 
 import torch
 
-Clock = Callable[[], float]
+Timer = Callable[[], float]
 
 
 def is_alone(device: str) -> bool:
@@ -18,7 +18,7 @@ def is_alone(device: str) -> bool:
     return device == "cpu" and torch.get_num_threads() == 1
 
 
-def clock(device: str) -> Clock:
+def clock(device: str) -> Timer:
     """Return a clock [s] that first waits for the device to finish its work."""
     if device == "cpu":
         return time.process_time if is_alone(device) else time.perf_counter

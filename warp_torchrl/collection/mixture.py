@@ -84,7 +84,7 @@ def weights(
     return [share * its / whole for share, its in zip(shares, left, strict=True)]
 
 
-def apportioned(shares: Sequence[float], count: int) -> list[int]:
+def worlds_by_share(shares: Sequence[float], count: int) -> list[int]:
     """Return the number of worlds of each share: one at least, and the rest by largest remainder.
 
     Raises:

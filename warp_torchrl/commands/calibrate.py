@@ -10,18 +10,18 @@ from pathlib import Path
 from typing import Any
 
 from warp_torchrl.commands.program import run_program
-from warp_torchrl.prediction.calibration.case import FireCase, read_case
-from warp_torchrl.prediction.calibration.fitting import check_fuel, check_told, fitted, folds, null_scores, score
+from warp_torchrl.prediction.calibration.case import FireCase, read_fire_case
+from warp_torchrl.prediction.calibration.fitting import check_fuel_codes, check_told, fit_law, folds, null_scores, score
 from warp_torchrl.prediction.calibration.options import CalibrationOptions
 from warp_torchrl.prediction.calibration.parameters import Parameter, parameters_of
-from warp_torchrl.prediction.calibration.report import as_numbers, law_yaml, means, table
+from warp_torchrl.prediction.calibration.report import as_numbers, law_yaml, means, scores_table
 from warp_torchrl.prediction.calibration.scores import Scores
 from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
 from warp_torchrl.runs.config.construction import ConfigError, build, construct
 from warp_torchrl.runs.config.grammar import check_flags
 from warp_torchrl.runs.output import output_folder
 from warp_torchrl.system import disk
-from warp_torchrl.system.provenance import Provenance, gathered, section, tell
+from warp_torchrl.system.provenance import Provenance, gathered, report_file, section
 from warp_torchrl.world.law.rate import RateFire
 
 log = logging.getLogger("warp_torchrl")
@@ -52,10 +52,10 @@ def _run(arguments: Sequence[str]) -> None:
     folder = Path(options.out or datetime.now().strftime(f"outputs/calibrations/%Y-%m-%d/%H-%M-%S-{os.getpid()}"))
     with output_folder(folder, "out", overwrite=options.overwrite, last=REPORT, replaced=OUTPUTS) as draft:
         with gathered() as files:
-            cases = [read_case(each, options.hours, options.units) for each in options.fires]
+            cases = [read_fire_case(each, options.hours, options.units) for each in options.fires]
             for case in cases:
-                check_fuel(case, fire)
-                tell(_of_map(case, fire))
+                check_fuel_codes(case, fire)
+                report_file(_of_map(case, fire))
         _check_names(cases)
         check_told(parameters, cases)
         rows = {case.name: _before(fire, case, options) for case in cases}
@@ -99,9 +99,9 @@ def _fit(
 ) -> RateFire:
     """Fit to all fires but one in turn, and to all; add the scores to the rows; return the law fitted to all."""
     for left_out, others in folds(cases) if options.leave_one_out else ():
-        law = fitted(options.fit, fire, parameters, others, _told(f"without {left_out.name}"))
+        law = fit_law(options.fit, fire, parameters, others, _told(f"without {left_out.name}"))
         rows[left_out.name]["left out"] = score(law, left_out, options.draws, options.seed)
-    law = fitted(options.fit, fire, parameters, cases, _told("all fires"))
+    law = fit_law(options.fit, fire, parameters, cases, _told("all fires"))
     for case in cases:
         rows[case.name]["fitted"] = score(law, case, options.draws, options.seed)
     return law
@@ -134,7 +134,7 @@ def _write(
         "seconds": seconds,
     }
     disk.replace(folder / REPORT, json.dumps(report, indent=1))
-    page = table(rows)
+    page = scores_table(rows)
     if law is not None:
         (folder / LAW).parent.mkdir(exist_ok=True)
         disk.replace(folder / LAW, law_yaml(law, f"Law rate, fitted to {', '.join(rows)}."))

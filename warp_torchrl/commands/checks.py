@@ -17,7 +17,7 @@ from warp_torchrl.commands.failure import fail
 from warp_torchrl.commands.sweep import jobs
 from warp_torchrl.demonstrations.acts import demonstrations
 from warp_torchrl.evaluation.evaluate import check_policy
-from warp_torchrl.evaluation.picture import Kind
+from warp_torchrl.evaluation.picture import PictureKind
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config.building import BuildOnce, run_config
@@ -183,14 +183,14 @@ def map_fires(values: Mapping[str, Any]) -> int | None:
     return fires if maps else None
 
 
-def picture(values: Mapping[str, Any]) -> Kind | None:
+def picture(values: Mapping[str, Any]) -> PictureKind | None:
     """Return as what an evaluation writes its first fire, None where it writes no picture.
 
     Raises:
         ConfigError: If ``picture`` is nothing of the kind, or what writes it is not installed.
     """
     try:
-        kind = cast(Kind | None, fit(values["picture"], Kind | None, "picture"))
+        kind = cast(PictureKind | None, fit(values["picture"], PictureKind | None, "picture"))
     except ValueError as error:
         raise ConfigError(str(error)) from None
     module, extra = _PICTURE_NEEDS.get(str(kind), ("", ""))

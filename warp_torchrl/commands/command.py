@@ -15,7 +15,7 @@ from omegaconf import DictConfig, OmegaConf
 from warp_torchrl.algorithms import parallel
 from warp_torchrl.commands.checks import CheckFirst, map_fires, new_total, of_worlds, picture, without_checkpoint
 from warp_torchrl.commands.failure import fail
-from warp_torchrl.commands.following import FOLLOWING, folder_of_its_own, follow
+from warp_torchrl.commands.following import FOLLOWING, folder_of_its_own, follow_training
 from warp_torchrl.commands.queue import queued
 from warp_torchrl.commands.sweep import SweepSummary, remove_failure, save_failure, summarise_unfinished
 from warp_torchrl.evaluation.evaluate import evaluate_policy
@@ -59,7 +59,7 @@ def evaluate() -> None:
 
 def _train_job(config: DictConfig) -> None:
     if parallel.torchrun_rank():
-        parallel.follow(follow)
+        parallel.follow(follow_training)
         return
     resumed = config.resume is not None
     folder = Path(config.resume if resumed else HydraConfig.get().runtime.output_dir)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from warp_torchrl.commands.correction import Correction, Session
 from warp_torchrl.commands.program import run_program
-from warp_torchrl.demonstrations.files import save
+from warp_torchrl.demonstrations.files import save_recording
 from warp_torchrl.demonstrations.scripted import Person
 from warp_torchrl.demonstrations.summary import Summary, summary
 from warp_torchrl.runs.config.construction import ConfigError, construct
@@ -25,10 +25,10 @@ _TEXTS = ("policy", "out", "by")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Record the corrections that the command line names, and return the exit code."""
     about = f"{USAGE}\n\n{Session.__doc__}\n{Person.__doc__}"
-    return run_program(arguments, about, lambda given: _record(*read(given)))
+    return run_program(arguments, about, lambda given: _record(*read_session(given)))
 
 
-def read(arguments: Sequence[str]) -> tuple[Session, Person]:
+def read_session(arguments: Sequence[str]) -> tuple[Session, Person]:
     """Return the session and the person of a command line.
 
     Raises:
@@ -50,15 +50,15 @@ def _record(session: Session, person: Person) -> None:
     try:
         correction = Correction(session, person)
         for played in correction.episodes():
-            rows.append((summary(save(played.recording, out), played.recording), played.saved_alone))
+            rows.append((summary(save_recording(played.recording, out), played.recording), played.saved_alone))
     finally:
         if is_new and not rows:
             remove_if_empty(out)
         lock.release()
-    print(table(rows, correction.scenario), flush=True)
+    print(correction_table(rows, correction.scenario), flush=True)
 
 
-def table(rows: Sequence[tuple[Summary, float]], scenario: str) -> str:
+def correction_table(rows: Sequence[tuple[Summary, float]], scenario: str) -> str:
     """Return a Markdown table of episodes in all, and the forest that was saved with the person and without."""
     found = [each for each, _ in rows]
     steps, acts, corrections = (sum(each) for each in zip(*((one.steps, one.acts, one.corrections) for one in found)))

@@ -7,7 +7,7 @@ import torch
 from tensordict import TensorDictBase
 from torchrl.envs.utils import set_exploration_type
 
-from warp_torchrl.demonstrations.recording import Mover, OpenRecording, Recording, recorded
+from warp_torchrl.demonstrations.recording import Mover, OpenRecording, Recording, step_record
 from warp_torchrl.demonstrations.scripted import Person, ScriptedPerson
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation.play import play
@@ -152,7 +152,7 @@ class Correction:
                 action[at] = act if act is not None and does else idle[at]
                 mover[at] = Mover.PERSON if does else Mover.WAITING
         after = env.step(shown.set(ACTION, action))["next"]
-        return recorded(shown, proposed, mover, after), after
+        return step_record(shown, proposed, mover, after), after
 
     def _recording(self, seed: int, steps: TensorDictBase, saved: float) -> Recording:
         return Recording(

@@ -32,9 +32,9 @@ def _draw(options: argparse.Namespace) -> None:
         raise ValueError(f"give the folder of at least one run: {_USAGE}")
     check_matplotlib()
     lines = lines_of([_named(given) for given in options.runs])
-    tables = [reached.table(lines, options.reach)] if options.reach else []
-    tables += [saved_at.table(lines, options.at)] if options.at else []  # refuses steps that a run has not made
-    tables += [kinds.table(lines)] if options.kinds else []
+    tables = [reached.reached_table(lines, options.reach)] if options.reach else []
+    tables += [saved_at.saved_table(lines, options.at)] if options.at else []  # refuses steps that a run has not made
+    tables += [kinds.kinds_table(lines)] if options.kinds else []
     for name, draw in curve_figures(lines).items():
         draw_timed(name, draw, options.out)
     print(*tables, sep="\n\n", end="\n" if tables else "")

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from warp_torchrl.commands.failure import DONE
 from warp_torchrl.commands.program import run_program
-from warp_torchrl.demonstrations.export import export
-from warp_torchrl.demonstrations.files import find, read
+from warp_torchrl.demonstrations.export import export_arrays
+from warp_torchrl.demonstrations.files import find_recordings, read_recording
 from warp_torchrl.demonstrations.recording import Recording
 from warp_torchrl.demonstrations.replay import Replay
-from warp_torchrl.demonstrations.summary import summary, table
+from warp_torchrl.demonstrations.summary import recordings_table, summary
 from warp_torchrl.runs.config.construction import ConfigError, construct
 from warp_torchrl.runs.config.grammar import check_flags, own_values
 from warp_torchrl.system.checksummed import Unsound
@@ -78,25 +78,25 @@ def _read(arguments: Sequence[str]) -> DemonstrationOptions:
 
 
 def _run(options: DemonstrationOptions) -> int:
-    folders = find(Path(options.folder))
+    folders = find_recordings(Path(options.folder))
     if options.html is not None and len(folders) != 1:
         raise ConfigError(f"html must be of one recording, and {options.folder} holds {len(folders)}: name one of them")
     sound: dict[Path, Recording] = {}
     broken: list[str] = []
     for folder in folders:
         try:
-            sound[folder] = read(folder)
+            sound[folder] = read_recording(folder)
             if options.check:
                 Replay(sound[folder]).check()
         except (Unsound, ConfigError) as error:
             broken.append(f"{folder.name}: {' '.join(str(error).split())}")
-    print(table(summary(folder, recording) for folder, recording in sound.items()), flush=True)
+    print(recordings_table(summary(folder, recording) for folder, recording in sound.items()), flush=True)
     if broken:
         raise Unsound("; ".join(broken) + ("; nothing was written" if options.export or options.html else ""))
     if options.check:
         print(f"{len(sound)} of {len(sound)} play again as they were recorded", flush=True)
     if options.export is not None:
-        export(list(sound.values()), Path(options.export))
+        export_arrays(list(sound.values()), Path(options.export))
         print(f"wrote {sum(len(each.steps) for each in sound.values())} steps into {options.export}", flush=True)
     if options.html is not None:
         _film(next(iter(sound.values())), Path(options.html))

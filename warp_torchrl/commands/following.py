@@ -24,7 +24,7 @@ FOLLOWING = "warp_torchrl.commands.following"
 """The module that another process runs."""
 
 
-def follow(values: dict[str, Any]) -> None:
+def follow_training(values: dict[str, Any]) -> None:
     """Train as one of the other processes, with the first one's configuration, until it ends.
 
     The first process reports what stops the run.
@@ -55,4 +55,4 @@ def folder_of_its_own() -> Iterator[list[str]]:
 
 
 if __name__ == "__main__":
-    parallel.join(sys.argv[1:], follow)
+    parallel.join(sys.argv[1:], follow_training)

@@ -15,9 +15,9 @@ from tqdm import tqdm
 from warp_torchrl.commands.program import run_program
 from warp_torchrl.prediction.animation import write_animation
 from warp_torchrl.prediction.case import Case, read_case, whole_map
-from warp_torchrl.prediction.files import FIGURE, write_figure, write_layers, write_perimeters
+from warp_torchrl.prediction.files import MAPS_FIGURE, write_figure, write_layers, write_perimeters
 from warp_torchrl.prediction.predict import Prediction, lasting, predict
-from warp_torchrl.prediction.report import numbers, page, warnings
+from warp_torchrl.prediction.report import page, report_numbers, warnings
 from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
 from warp_torchrl.runs.config.construction import ConfigError, build, construct
 from warp_torchrl.runs.config.grammar import check_flags
@@ -34,7 +34,7 @@ _GROUPS = ("landscape", "fire")
 REPORT = "report.json"
 OUTPUTS = (
     *("burn_probability.tif", "arrival_hours.tif", "rate.tif", "intensity.tif", "flame_length.tif"),
-    *("perimeters.geojson", FIGURE, "fire.gif", "report.md"),
+    *("perimeters.geojson", MAPS_FIGURE, "fire.gif", "report.md"),
 )
 """What an earlier prediction may have left, beside its report."""
 USAGE = "warp predict landscape.path=FOLDER weather=FILE.csv ignition=FILE [hours=24] [fires=1000] [KEY=VALUE ...]"
@@ -136,7 +136,7 @@ def _report(
 ) -> dict[str, Any]:
     from warp_torchrl import __version__
 
-    found = numbers(prediction)
+    found = report_numbers(prediction)
     known = [each.name for each in fields(case.weather) if getattr(case.weather, each.name) is not None]
     inputs = {
         "landscape": values["landscape"].get("path"),
@@ -169,9 +169,9 @@ def _write(folder: Path, prediction: Prediction, case: Case, options: Prediction
     write_layers(folder, prediction, case.place)
     write_perimeters(folder / "perimeters.geojson", prediction, case.place, options.perimeter_hours)
     try:
-        write_figure(folder / FIGURE, prediction, title)
+        write_figure(folder / MAPS_FIGURE, prediction, title)
     except ImportError:
-        log.warning('no %s: Matplotlib is missing, pip install "warp_torchrl[figures]"', FIGURE)
+        log.warning('no %s: Matplotlib is missing, pip install "warp_torchrl[figures]"', MAPS_FIGURE)
     if options.animation:
         end = float(prediction.followed[0])
         first, ground = prediction.seen["first_fire"], prediction.ground_seen

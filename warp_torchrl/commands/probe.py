@@ -39,10 +39,10 @@ class Probe:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the linear probes of the policy that the command line names; return the exit code."""
-    return run_program(arguments, f"{USAGE}\n\n{Probe.__doc__}", lambda given: _probe(read(given)))
+    return run_program(arguments, f"{USAGE}\n\n{Probe.__doc__}", lambda given: _probe(read_probe(given)))
 
 
-def read(arguments: Sequence[str]) -> Probe:
+def read_probe(arguments: Sequence[str]) -> Probe:
     """Return the options of a command line.
 
     Raises:
@@ -64,10 +64,10 @@ def _probe(asked: Probe) -> None:
         found = probe(policy, env, FIRST_EVALUATED)
     except ValueError as error:
         raise ConfigError(str(error)) from None
-    print(table(found, made.scenario), flush=True)
+    print(probe_table(found, made.scenario), flush=True)
 
 
-def table(found: Sequence[Reading], scenario: str) -> str:
+def probe_table(found: Sequence[Reading], scenario: str) -> str:
     """Return a Markdown table of probes."""
     return "\n".join(
         [

@@ -270,9 +270,9 @@ def _quoted(path: Path) -> str:
 
 
 def _draw(study: "optuna.Study", space: Sequence[Dimension], folder: Path) -> None:
-    from warp_torchrl.commands.hyperparameters.figure import draw
+    from warp_torchrl.commands.hyperparameters.figure import draw_search
 
     try:
-        draw(study, space, folder)
+        draw_search(study, space, folder)
     except ImportError:
         log.warning('no search.png: Matplotlib is missing, pip install "warp_torchrl[figures]"')

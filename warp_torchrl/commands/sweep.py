@@ -141,7 +141,7 @@ def summarise_unfinished() -> None:
 
 
 def _write_summary(folder: Path) -> list[Failure]:
-    entries = summary.gather(folder)
+    entries = summary.read_rows(folder)
     if entries:
         _summarise(entries, folder)
     failed = failures(folder)
@@ -150,12 +150,12 @@ def _write_summary(folder: Path) -> list[Failure]:
     return failed
 
 
-def _summarise(entries: list[summary.Entry], folder: Path) -> None:
-    text = summary.table(entries)
+def _summarise(entries: list[summary.SummaryRow], folder: Path) -> None:
+    text = summary.summary_table(entries)
     disk.replace(folder / "summary.md", text + "\n")
     print(text, flush=True)
     try:
-        summary.draw(entries, folder / "summary.png")
+        summary.draw_summary(entries, folder / "summary.png")
     except ImportError:
         print('no summary.png: Matplotlib is missing, pip install "warp_torchrl[figures]"', flush=True)
     print(f"wrote the summary into {folder}", flush=True)

@@ -11,7 +11,7 @@ from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
 
 from warp_torchrl.collection.cloning import AGENT, Demonstrations
-from warp_torchrl.demonstrations.files import MANIFEST, find, read
+from warp_torchrl.demonstrations.files import MANIFEST, find_recordings, read_recording
 from warp_torchrl.demonstrations.recording import Mover, Recording
 from warp_torchrl.demonstrations.replay import Replay
 from warp_torchrl.env import WildfireEnv
@@ -39,8 +39,8 @@ def demonstrations(run_config: RunConfig, env: WildfireEnv) -> Demonstrations | 
     known: dict[str, Signature] = {}
     found = []
     try:
-        for path in find(folder):
-            recording = read(path)
+        for path in find_recordings(folder):
+            recording = read_recording(path)
             digest.update((path / MANIFEST).read_bytes())
             if recording.by(Mover.PERSON).any():
                 _check_fits(path, recording, wanted, _signature(recording, known), run_config.model.sharing, agents)

@@ -100,7 +100,7 @@ def leaves(steps: TensorDictBase) -> Iterator[tuple[str, torch.Tensor]]:
         yield key if isinstance(key, str) else "/".join(key), value
 
 
-def size(dtype: torch.dtype, shape: tuple[int, ...]) -> int:
+def entry_size(dtype: torch.dtype, shape: tuple[int, ...]) -> int:
     """Return the size of an entry's file [bytes]."""
     return prod(shape) * dtype.itemsize
 

@@ -16,7 +16,7 @@ from warp_torchrl.world.ignition.intervention import cleared, ignited
 
 @dataclass(frozen=True, kw_only=True)
 class Event:
-    """One of ``KINDS``, before a step.
+    """One of ``EVENT_KINDS``, before a step.
 
     Attributes:
         step: The step that it came before, 0 for the first.
@@ -33,8 +33,10 @@ class Event:
     numbers: tuple[float, float]
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS or type(self.step) is not int or self.step < 0:
-            raise ValueError(f"an event must be one of {', '.join(KINDS)} at a step, got {self.kind} at {self.step}")
+        if self.kind not in EVENT_KINDS or type(self.step) is not int or self.step < 0:
+            raise ValueError(
+                f"an event must be one of {', '.join(EVENT_KINDS)} at a step, got {self.kind} at {self.step}"
+            )
         if len(self.numbers) != 2 or not all(math.isfinite(each) for each in self.numbers):
             raise ValueError(f"{self.kind} must have two finite numbers, got {self.numbers}")
 
@@ -45,7 +47,7 @@ def carry_out(env: WildfireEnv, event: Event) -> TensorDictBase:
     Raises:
         ValueError: If a wind is out of its range, or a cell is not on the map.
     """
-    return KINDS[event.kind](env, *event.numbers)
+    return EVENT_KINDS[event.kind](env, *event.numbers)
 
 
 def at_cell(env: WildfireEnv, row: float, column: float) -> Tensor:
@@ -77,7 +79,7 @@ def _blow(env: WildfireEnv, speed: float, direction: float) -> TensorDictBase:
     return env.set_state(in_wind(env.shared_state, env.world.fire, torch.tensor([u, v]).view(1, 2, 1, 1)))
 
 
-KINDS: Mapping[str, Callable[[WildfireEnv, float, float], TensorDictBase]] = {
+EVENT_KINDS: Mapping[str, Callable[[WildfireEnv, float, float], TensorDictBase]] = {
     "ignite": _ignite,
     "clear": _clear,
     "blow": _blow,

@@ -47,7 +47,7 @@ def arrays(recordings: Sequence[Recording]) -> dict[str, np.ndarray]:
     }
 
 
-def export(recordings: Sequence[Recording], path: Path) -> None:
+def export_arrays(recordings: Sequence[Recording], path: Path) -> None:
     """Write ``arrays`` of recordings as a compressed ``.npz`` file without pickles.
 
     Raises:

@@ -18,7 +18,7 @@ import torch
 import torchrl
 from tensordict import MemoryMappedTensor, TensorDict, TensorDictBase
 
-from warp_torchrl.demonstrations.entries import Layout, leaves, size
+from warp_torchrl.demonstrations.entries import Layout, entry_size, leaves
 from warp_torchrl.demonstrations.events import Event
 from warp_torchrl.demonstrations.recording import Recording
 from warp_torchrl.env.observation import renamed
@@ -35,13 +35,13 @@ from warp_torchrl.system.checksummed import (
     checked_files,
     checksummed,
     described,
-    read_json,
+    read_mapping,
 )
-from warp_torchrl.system.foreign import below
+from warp_torchrl.system.foreign import path_below
 from warp_torchrl.system.foreign_text import plain_text
 
 log = logging.getLogger("warp_torchrl")
-FORMAT = 1
+RECORDING_FORMAT = 1
 MANIFEST, _STEPS = "recording.json", "steps"
 _ERRNO = re.compile(r"file <.*>: .*\((\d+)\)")
 _FOLDER = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]*")
@@ -50,7 +50,7 @@ _LARGEST, _LARGEST_META = 2**32, 100_000  # bytes
 _LONGEST_NAME = 1000
 
 
-def save(recording: Recording, parent: Path) -> Path:
+def save_recording(recording: Recording, parent: Path) -> Path:
     """Write a recording into a new folder, which appears under its name when all of it is on the disk and was read.
 
     Args:
@@ -66,11 +66,11 @@ def save(recording: Recording, parent: Path) -> Path:
         _check_room(draft / ".room", recording.steps)
         _write(recording.steps, draft / _STEPS)
         (draft / MANIFEST).write_bytes(checksummed(_content(recording, draft)))
-        read(draft)
+        read_recording(draft)
         return publish(draft, parent, (f"{recording.scenario}-{recording.seed}-{n}" for n in range(1, _MOST_STEPS)))
 
 
-def read(folder: Path) -> Recording:
+def read_recording(folder: Path) -> Recording:
     """Return the recording in a folder, every file of it verified first; its tensors stay on the disk.
 
     Raises:
@@ -79,9 +79,9 @@ def read(folder: Path) -> Recording:
     path = folder / MANIFEST
     if path.is_symlink():
         raise Unsound(f"{path} is a link, and a recording's files must be there themselves")
-    content = read_json(path)
-    if content.get("format") != FORMAT:
-        raise Unsound(f"{path} has format {content.get('format')!r:.80}, this version reads {FORMAT}")
+    content = read_mapping(path)
+    if content.get("format") != RECORDING_FORMAT:
+        raise Unsound(f"{path} has format {content.get('format')!r:.80}, this version reads {RECORDING_FORMAT}")
     check_checksum(path, content)
     try:
         agents, actions = _names(content, "agents", _MOST_AGENTS), _names(content, "actions", _MOST_ACTIONS)
@@ -106,11 +106,13 @@ def read(folder: Path) -> Recording:
             raise ValueError("it names no scenario")
         layout.check_numbers(recording.steps)
     except (TypeError, KeyError, ValueError, AttributeError, OverflowError, RuntimeError, OSError) as error:
-        raise Unsound(f"{path} is not a recording of format {FORMAT}: {' '.join(str(error).split())}") from None
+        raise Unsound(
+            f"{path} is not a recording of format {RECORDING_FORMAT}: {' '.join(str(error).split())}"
+        ) from None
     return recording
 
 
-def find(folder: Path) -> list[Path]:
+def find_recordings(folder: Path) -> list[Path]:
     """Return the folders of all recordings in a folder, itself one or not, by name.
 
     Raises:
@@ -188,7 +190,7 @@ def _content(recording: Recording, folder: Path) -> dict[str, Any]:
     }
     names = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
     return {
-        "format": FORMAT,
+        "format": RECORDING_FORMAT,
         "steps": recording.steps.batch_size[0],
         "entries": entries,
         "environment": asdict(recording.environment),
@@ -210,7 +212,7 @@ def _check_listed(files: Files, entries: Mapping[str, tuple[torch.dtype, tuple[i
     Raises:
         ValueError: If it lists less, or anything else.
     """
-    needed = {f"{_STEPS}/{name}.memmap": size(*entry) for name, entry in entries.items()}
+    needed = {f"{_STEPS}/{name}.memmap": entry_size(*entry) for name, entry in entries.items()}
     for name, wanted in needed.items():
         if name not in files:
             raise ValueError(f"{name} has no file of its own")
@@ -227,7 +229,7 @@ def _mapped(folder: Path, entries: Mapping[str, tuple[torch.dtype, tuple[int, ..
     """Map the tensors of a folder, by the manifest's entries."""
     steps = TensorDict({}, batch_size=[layout.steps])
     for name, (dtype, shape) in entries.items():
-        path = below(folder, f"{_STEPS}/{name}.memmap")
+        path = path_below(folder, f"{_STEPS}/{name}.memmap")
         steps[tuple(renamed(name).split("/"))] = MemoryMappedTensor.from_filename(path, dtype, torch.Size(shape))
     for key in (OBSERVATION, OBSERVATION[:1], ("next", *OBSERVATION[:1])):
         if isinstance(steps.get(key, None), TensorDictBase):

@@ -75,7 +75,7 @@ class Recording:
         return self.by(Mover.PERSON) & (self.steps[ACTION] != self.steps[PROPOSED])
 
 
-def recorded(shown: TensorDictBase, proposed: Tensor, mover: Tensor, after: TensorDictBase) -> TensorDictBase:
+def step_record(shown: TensorDictBase, proposed: Tensor, mover: Tensor, after: TensorDictBase) -> TensorDictBase:
     """Return the record of a step of any number of worlds, batch size [B].
 
     Args:
@@ -123,7 +123,7 @@ class OpenRecording:
             after: What the step led to.
         """
         whose = torch.tensor(movers, dtype=torch.uint8)
-        row = recorded(shown, proposed[None], whose[None], after)[0].clone()
+        row = step_record(shown, proposed[None], whose[None], after)[0].clone()
         self.rows.append(row)
         others = (row[ACTION] != proposed).tolist()
         self.acts += sum(each == Mover.PERSON for each in movers)

@@ -48,7 +48,7 @@ def summary(folder: Path, recording: Recording) -> Summary:
     )
 
 
-def table(summaries: Iterable[Summary]) -> str:
+def recordings_table(summaries: Iterable[Summary]) -> str:
     """Return a Markdown table, a row for each recording."""
     lines = [
         "| recording | scenario | seed | policy | steps | acts of people | corrections | saved % |",

@@ -96,7 +96,7 @@ class Behaviour:
             "unused_breaks": 1.0 - used / count,
         }
         found = {name: value.double().cpu().numpy() for name, value in numbers.items()}
-        return {"division": divided(self._counts.cpu().numpy())} | found
+        return {"division": division_of_labour(self._counts.cpu().numpy())} | found
 
 
 def _contested(target: Tensor, extinguished: Tensor, redundant: Tensor) -> Tensor:
@@ -113,7 +113,7 @@ def mutual_information(counts: np.ndarray) -> np.ndarray:
     return (share * np.log2(ratio)).sum((-2, -1))
 
 
-def divided(counts: np.ndarray) -> np.ndarray:
+def division_of_labour(counts: np.ndarray) -> np.ndarray:
     """Return the mutual information of agent and sector above chance, float64 [B] [bits].
 
     Mutual information of small tables is above 0 by chance; the mean over shuffled tables with the same margins is

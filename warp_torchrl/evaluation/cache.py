@@ -23,7 +23,7 @@ import warp_torchrl
 from warp_torchrl.evaluation.play import Episodes
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.runs.config.run_config import RunConfig
-from warp_torchrl.runs.destination import LARGEST
+from warp_torchrl.runs.destination import LARGEST_EVALUATION
 from warp_torchrl.system import disk, foreign
 from warp_torchrl.world.state.role import ROLES
 from warp_torchrl.world.team.abilities import ABILITIES
@@ -44,13 +44,13 @@ def folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "warp_torchrl" / "episodes"
 
 
-def kept(run_config: RunConfig, names: Sequence[str]) -> dict[str, Episodes]:
+def cached(run_config: RunConfig, names: Sequence[str]) -> dict[str, Episodes]:
     """Return the cached episodes of heuristics, by name."""
     found = {name: _read(path) for name, path in _paths(run_config, names).items()}
     return {name: episodes for name, episodes in found.items() if episodes is not None}
 
 
-def keep(run_config: RunConfig, played: dict[str, Episodes]) -> None:
+def store(run_config: RunConfig, played: dict[str, Episodes]) -> None:
     """Cache episodes of heuristics; if the folder cannot be written, they are not cached."""
     for name, path in _paths(run_config, list(played)).items():
         episodes = {metric: values.tolist() for metric, values in played[name].items()}
@@ -152,7 +152,7 @@ def _code() -> str:
 def _read(path: Path) -> Episodes | None:
     """Return the episodes in a file; None where there is none, or it is not as it was written."""
     try:
-        content = foreign.read_json(path, LARGEST)
+        content = foreign.read_json(path, LARGEST_EVALUATION)
         episodes = content["episodes"]
         if content["sha256"] != sha256(json.dumps(episodes).encode()).hexdigest():
             raise ValueError("its sha256 does not match")

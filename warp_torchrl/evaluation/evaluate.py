@@ -9,11 +9,11 @@ from tensordict.nn import TensorDictModuleBase
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation import cache
 from warp_torchrl.evaluation.goal import goal
-from warp_torchrl.evaluation.maps import described, play_maps, write_maps
+from warp_torchrl.evaluation.maps import maps_line, play_maps, write_maps
 from warp_torchrl.evaluation.method import method
-from warp_torchrl.evaluation.picture import KINDS, Kind, record_episode
+from warp_torchrl.evaluation.picture import PICTURE_KINDS, PictureKind, record_episode
 from warp_torchrl.evaluation.play import Episodes, WithoutAgent, baselines_of, play, play_heuristics
-from warp_torchrl.evaluation.report import report, table, write_json
+from warp_torchrl.evaluation.report import evaluation_table, report, write_json
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config.construction import ConfigError
@@ -32,7 +32,7 @@ def evaluate_policy(
     found: checkpoints.Checkpoint | str,
     worlds: Sequence[str],
     map_fires: int | None = None,
-    picture: Kind | None = "gif",
+    picture: PictureKind | None = "gif",
 ) -> None:
     """Evaluate a checkpoint or a heuristic beside the baselines: table, ``evaluation.json``, ``episode.gif``.
 
@@ -80,13 +80,13 @@ def evaluate_policy(
         content["maps"] = maps.numbers()
     folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / "evaluation.json", content)
-    print(table(content), flush=True)
+    print(evaluation_table(content), flush=True)
     if maps is not None:
-        print(described(content["maps"]), flush=True)
+        print(maps_line(content["maps"]), flush=True)
         title = f"{run_config.scenario}: {maps.seeds[1]} fires on one ground, {maps.horizon} steps"
         write_maps(folder, maps, getattr(run_config.world.landscape, "grid", None), title, name)
     wrote = ["evaluation.json"]
-    for kind in KINDS:  # a former evaluation's picture would show another policy
+    for kind in PICTURE_KINDS:  # a former evaluation's picture would show another policy
         (folder / f"episode.{kind}").unlink(missing_ok=True)
     if picture is not None:
         wrote += [f"episode.{picture}"]
@@ -137,8 +137,8 @@ def _baselines(run_config: RunConfig, env: WildfireEnv, names: Sequence[str]) ->
     )
     # It keeps the configuration alive: a repr may hold addresses of objects.
     _, played = _PLAYED.setdefault(worlds, (run_config, {}))
-    played |= cache.kept(run_config, [name for name in names if name not in played])
+    played |= cache.cached(run_config, [name for name in names if name not in played])
     new = play_heuristics(env, run_config.evaluation.first_seed, [name for name in names if name not in played])
-    cache.keep(run_config, new)
+    cache.store(run_config, new)
     played |= new
     return {name: played[name] for name in names}

@@ -18,7 +18,7 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.env.pictures.maps import Panel, save_maps
+from warp_torchrl.env.pictures.maps import MapPanel, save_maps
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.evaluation.statistics import summarise
 from warp_torchrl.heuristics import NoOp
@@ -193,21 +193,21 @@ def write_maps(folder: Path, maps: PolicyMaps, grid: Grid | None, title: str, po
         save_maps(folder / "maps.png", maps.ground, panels, maps.cell_size, title, maps.lit)
 
 
-def _panels(maps: PolicyMaps, policy: str) -> list[Panel]:
+def _panels(maps: PolicyMaps, policy: str) -> list[MapPanel]:
     means = [float(area.mean()) for area in (maps.area_without, maps.area_with)]
     names = ["without the team", f"with it: {policy}"]
     chances = [
-        Panel(title=f"{name}, {mean:.3g} ha burned", values=values, label="burn probability")
+        MapPanel(title=f"{name}, {mean:.3g} ha burned", values=values, label="burn probability")
         for name, mean, values in zip(names, means, (maps.without, maps.with_team))
     ]
     label = "difference of burn probability; blue: the team protects"
-    change = Panel(
+    change = MapPanel(
         title=f"with it - without it, {means[1] - means[0]:+.3g} ha", values=maps.difference, label=label, kind="change"
     )
     return [*chances, change]
 
 
-def described(numbers: dict[str, Any]) -> str:
+def maps_line(numbers: dict[str, Any]) -> str:
     """Return the numbers of maps as a line for the terminal."""
     areas = []
     for name, area in numbers["burned_ha"].items():

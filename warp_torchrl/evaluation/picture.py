@@ -13,14 +13,14 @@ from warp_torchrl.env.pictures.render import EpisodeRecorder
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.system import disk
 
-Kind = Literal["gif", "html", "mp4"]
+PictureKind = Literal["gif", "html", "mp4"]
 """As what an episode can be written; ``html`` needs the extra ``live``, ``mp4`` the extra ``video``."""
 _WHOLE = {"movflags": "+faststart"}  # a browser plays it before all of it is there
-KINDS: tuple[Kind, ...] = get_args(Kind)
+PICTURE_KINDS: tuple[PictureKind, ...] = get_args(PictureKind)
 
 
 def record_episode(
-    path: Path, kind: Kind, env: WildfireEnv, policy: TensorDictModuleBase, title: str, seed: int, mode: str
+    path: Path, kind: PictureKind, env: WildfireEnv, policy: TensorDictModuleBase, title: str, seed: int, mode: str
 ) -> None:
     """Play one episode in an environment of one world, and write it; all kinds show the same one.
 

@@ -13,7 +13,7 @@ from torchrl.envs.utils import set_exploration_type
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.specs import episode_metrics
 from warp_torchrl.evaluation.behaviour import Behaviour
-from warp_torchrl.evaluation.match import Match, fits
+from warp_torchrl.evaluation.episode_batch import EpisodeBatch, fits
 from warp_torchrl.heuristics import HEURISTICS, idle_action
 from warp_torchrl.models import ACTION, ACTION_MASK, memory_apart
 from warp_torchrl.runs.policies.trained import MODES, scores
@@ -95,7 +95,7 @@ def _match(
     recorder: Recorder | None,
     behaviour: Behaviour | None,
 ) -> dict[str, Tensor]:
-    match = Match(env, [policy], behaviour)
+    match = EpisodeBatch(env, [policy], behaviour)
     found = match.play(now)
     env.set_state(match.ended)
     return found
@@ -174,7 +174,7 @@ def play_abreast(env: WildfireEnv, first_seed: int, names: Sequence[str]) -> dic
     )
     with torch.random.fork_rng(), torch.no_grad():
         start = wide.reset()
-        ends = Match(wide, [HEURISTICS[name](wide) for name in names]).play(start)
+        ends = EpisodeBatch(wide, [HEURISTICS[name](wide) for name in names]).play(start)
     numbers = {
         metric: ends[metric].double().cpu().numpy().reshape(len(names), count) for metric in episode_metrics(env.world)
     }

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from warp_torchrl.runs.config.construction import ConfigError
-from warp_torchrl.runs.destination import LARGEST
+from warp_torchrl.runs.destination import LARGEST_EVALUATION
 from warp_torchrl.system.foreign import Foreign, read_json
 from warp_torchrl.system.foreign_text import plain_text
 
@@ -24,7 +24,7 @@ def read_evaluation(path: Path) -> dict[str, Any]:
         OSError: If it cannot be opened.
     """
     try:
-        content = read_json(path, LARGEST)
+        content = read_json(path, LARGEST_EVALUATION)
         _check(content)
     except Foreign as error:
         raise ConfigError(str(error)) from None

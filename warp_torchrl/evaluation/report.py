@@ -14,7 +14,7 @@ from warp_torchrl.evaluation.play import Episodes
 from warp_torchrl.evaluation.statistics import compare, summarise
 from warp_torchrl.system import disk
 
-SHOWN = ("averted", *BEHAVIOUR)
+EXTRA_METRICS = ("averted", *BEHAVIOUR)
 
 
 def report(
@@ -90,9 +90,9 @@ def _number(value: float) -> float | None:
     return None if np.isnan(value) else float(value)
 
 
-def table(content: Mapping[str, Any]) -> str:
+def evaluation_table(content: Mapping[str, Any]) -> str:
     """Return the report as a table for the terminal; for a team that cannot act, only the metrics of watching."""
-    lines = [f"{place(content)}: {len(content['seeds'])} fires, seeds from {content['seeds'][0]}"]
+    lines = [f"{worlds_name(content)}: {len(content['seeds'])} fires, seeds from {content['seeds'][0]}"]
     rows = {**content["baselines"], **content["other_modes"], content["policy"]: content["metrics"]}
     if content["goal"] == "saved":
         lines += [*_saved_lines(rows), *_difference_lines(content["policy"], content["versus"], "saved")]
@@ -165,14 +165,14 @@ def _percent(summary: Mapping[str, Any]) -> tuple[float, float, float]:
     return 100.0 * summary["mean"], 100.0 * low, 100.0 * high
 
 
-def place(content: Mapping[str, Any]) -> str:
+def worlds_name(content: Mapping[str, Any]) -> str:
     """Return the name of a report's worlds: the scenario and its overrides."""
     return " ".join((content["scenario"], *content.get("world_overrides", ())))
 
 
 def _behaviour_lines(content: Mapping[str, Any]) -> list[str]:
     lines = []
-    for name in SHOWN:
+    for name in EXTRA_METRICS:
         found = content["metrics"].get(name, {"mean": None})
         if found["mean"] is not None:
             low, high = found["ci95"]

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from warp_torchrl.evaluation.reading import read_evaluation
-from warp_torchrl.evaluation.report import place
+from warp_torchrl.evaluation.report import worlds_name
 from warp_torchrl.evaluation.statistics import compare, performance_profile, summarise
 from warp_torchrl.system import disk
 from warp_torchrl.system.flags import FlagParser
@@ -25,7 +25,7 @@ LEVELS = np.linspace(0.0, 1.0, 101)
 _Key = tuple[str, str, str, tuple[int, ...]]  # scenario, method, configuration, seeds
 
 
-class Entry(NamedTuple):
+class SummaryRow(NamedTuple):
     """Results of a policy on a scenario, over all runs that differ in their seed only."""
 
     scenario: str
@@ -37,7 +37,7 @@ class Entry(NamedTuple):
     goal: str = "saved"  # what policies are compared by there
 
 
-def gather(*folders: Path) -> list[Entry]:
+def read_rows(*folders: Path) -> list[SummaryRow]:
     """Return the results in the ``evaluation.json`` files under folders, baselines included.
 
     Runs that differ in their seed only are one entry.
@@ -49,11 +49,11 @@ def gather(*folders: Path) -> list[Entry]:
     found: dict[_Key, list[Mapping[str, Any]]] = {}
     for path in (path for folder in folders for path in sorted(folder.glob("**/evaluation.json"))):
         content = read_evaluation(path)
-        key = (place(content), content["method"], content["configuration"], tuple(content["seeds"]))
+        key = (worlds_name(content), content["method"], content["configuration"], tuple(content["seeds"]))
         found.setdefault(key, []).append(content)
     several = {(scenario, method) for scenario, method, *_ in found if _differ(found, scenario, method)}
     return _baselines(found) + [
-        Entry(
+        SummaryRow(
             scenario,
             f"{method} {configuration[:6]}" if (scenario, method) in several else method,
             _of_episodes(runs, runs[0]["goal"]),
@@ -66,7 +66,7 @@ def gather(*folders: Path) -> list[Entry]:
     ]
 
 
-def _baselines(found: Mapping[_Key, Sequence[Mapping[str, Any]]]) -> list[Entry]:
+def _baselines(found: Mapping[_Key, Sequence[Mapping[str, Any]]]) -> list[SummaryRow]:
     """Return the baselines in other policies' evaluations that have no evaluation of their own.
 
     A baseline whose episodes differ between evaluations played in different worlds, and is left out.
@@ -78,7 +78,7 @@ def _baselines(found: Mapping[_Key, Sequence[Mapping[str, Any]]]) -> list[Entry]
                 if (scenario, name, "", seeds) not in found:
                     held.setdefault((scenario, name, run["goal"], seeds), []).append(episodes)
     return [
-        Entry(scenario, name, np.array([episodes[0][goal]]), np.array([episodes[0]["success"]]), seeds, goal=goal)
+        SummaryRow(scenario, name, np.array([episodes[0][goal]]), np.array([episodes[0]["success"]]), seeds, goal=goal)
         for (scenario, name, goal, seeds), episodes in held.items()
         if all(each == episodes[0] for each in episodes)
     ]
@@ -93,7 +93,7 @@ def _differ(found: Mapping[_Key, Any], scenario: str, method: str) -> bool:
     return len({key[2] for key in found if key[:2] == (scenario, method)}) > 1
 
 
-def table(entries: Sequence[Entry], against: str | None = None) -> str:
+def summary_table(entries: Sequence[SummaryRow], against: str | None = None) -> str:
     """Return a Markdown table of the entries, best first in each scenario, each compared with one policy.
 
     Scenarios where policies are compared by something else than the trees saved have a table of their own.
@@ -112,7 +112,7 @@ def table(entries: Sequence[Entry], against: str | None = None) -> str:
     return "\n\n".join(_table(goal, [entry for entry in entries if entry.goal == goal], against) for goal in goals)
 
 
-def _table(goal: str, entries: Sequence[Entry], against: str | None) -> str:
+def _table(goal: str, entries: Sequence[SummaryRow], against: str | None) -> str:
     """Return the table of the scenarios of one goal."""
     lines = [
         f"| scenario | policy | runs | fires | {goal} % | 95 % | iqm % | success % | to {against or 'the best'} | 95 % "
@@ -151,7 +151,7 @@ def _cell(text: str) -> str:
     return text.replace("|", "\\|")
 
 
-def metrics_table(entries: Sequence[Entry], names: Sequence[str]) -> str:
+def metrics_table(entries: Sequence[SummaryRow], names: Sequence[str]) -> str:
     """Return a Markdown table of mean metrics, best policy first in each scenario; a dash where no episode has a value.
 
     Raises:
@@ -176,7 +176,7 @@ def _mean_of_known(values: np.ndarray | None) -> str:
     return f"{known.mean():.3f}" if known.size else "-"
 
 
-def draw(entries: Sequence[Entry], path: Path) -> None:
+def draw_summary(entries: Sequence[SummaryRow], path: Path) -> None:
     """Draw the trees saved, or the front watched, with their intervals, and the performance profile of each policy.
 
     Raises:
@@ -215,16 +215,16 @@ _LABEL_WIDTH, _LEGEND_WIDTH = 32, 130  # characters in a line
 _ROOM_BESIDE = 87.0  # longer bars have their number inside
 
 
-def _bar_height(group: Sequence[Entry]) -> float:
+def _bar_height(group: Sequence[SummaryRow]) -> float:
     """Return the height of a bar that leaves room for the longest label [inches]."""
     return max(0.3, 0.05 + 0.14 * max(_label(entry).count("\n") + 1 for entry in group))
 
 
-def _label(entry: Entry) -> str:
+def _label(entry: SummaryRow) -> str:
     return fill(entry.policy, _LABEL_WIDTH, break_long_words=False)
 
 
-def _draw_bars(axes: Any, group: Sequence[Entry], styles: Mapping[str, Mapping[str, Any]]) -> None:
+def _draw_bars(axes: Any, group: Sequence[SummaryRow], styles: Mapping[str, Mapping[str, Any]]) -> None:
     for row, entry in enumerate(reversed(group)):
         found = summarise(entry.value)
         mean, (low, high) = 100 * found["mean"], (100 * bound for bound in found["ci95"])
@@ -244,7 +244,7 @@ def line_style(index: int) -> dict[str, Any]:
     return {"color": colours[index % len(colours)], "linestyle": dashes[index // len(colours) % len(dashes)]}
 
 
-def _by_scenario(entries: Sequence[Entry]) -> list[list[Entry]]:
+def _by_scenario(entries: Sequence[SummaryRow]) -> list[list[SummaryRow]]:
     """Return the entries of each scenario, the best first."""
     scenarios = dict.fromkeys(entry.scenario for entry in entries)
     groups = [[entry for entry in entries if entry.scenario == scenario] for scenario in scenarios]
@@ -269,18 +269,18 @@ def main(arguments: list[str] | None = None) -> None:
         if not folder.is_dir():
             parser.error(f"FOLDER must be a folder that is there, got {folder}")
     try:
-        entries = gather(*options.folders)
+        entries = read_rows(*options.folders)
     except (OSError, ValueError) as error:
         parser.error(plain_text(str(error)))
     if not entries:
         parser.error(f"no evaluation.json under {', '.join(map(str, options.folders))}")
     try:
-        print(metrics_table(entries, options.show) if options.show else table(entries, options.against))
+        print(metrics_table(entries, options.show) if options.show else summary_table(entries, options.against))
     except ValueError as error:
         parser.error(plain_text(str(error)))
     if options.plot is not None:
         try:
-            draw(entries, options.plot)
+            draw_summary(entries, options.plot)
         except (OSError, ValueError) as error:  # a format that Matplotlib does not write
             parser.error(f"--plot: {plain_text(str(error))}")
         except ImportError:

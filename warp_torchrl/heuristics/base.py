@@ -108,7 +108,7 @@ def list_cells(mask: Tensor) -> tuple[Tensor, Tensor]:
     return index, torch.arange(index.shape[1], device=mask.device) < counts[:, None]
 
 
-def chebyshev_distance(state: WorldState, cells: Tensor) -> Tensor:
+def agent_distance(state: WorldState, cells: Tensor) -> Tensor:
     """Return the Chebyshev distance from each agent to cells [B, K], float32 [B, A, K]."""
     row, column = state.vehicles.position.to(torch.float32)[:, :, None].unbind(dim=-1)
     rows, columns = _rows_and_columns(cells, state)
@@ -130,7 +130,7 @@ def nearest_fire(state: WorldState, fire: Tensor) -> tuple[Tensor, Tensor]:
     agents = torch.arange(state.vehicles.position.shape[1], device=cells.device)[:, None]
     draw = (agents * fire[0].numel() + cells[:, None]).to(torch.int32)
     tie_break = uniform_at(state.key, 0, Stream.POLICY, draw.flatten(1)).view(draw.shape)
-    best = (chebyshev_distance(state, cells) + tie_break).masked_fill_(~valid[:, None], float(FAR)).min(dim=-1)
+    best = (agent_distance(state, cells) + tie_break).masked_fill_(~valid[:, None], float(FAR)).min(dim=-1)
     return best.values.floor(), cells.gather(1, best.indices)
 
 
@@ -233,7 +233,7 @@ def claim_cells(state: WorldState, cells: Tensor, value: Tensor, spacing: int, d
         discount: Amount by which it lowers them [cells of distance].
         taken: Further amount for the assigned cell itself [cells of distance].
     """
-    return match_cells(state, cells, value - chebyshev_distance(state, cells), spacing, discount, taken)
+    return match_cells(state, cells, value - agent_distance(state, cells), spacing, discount, taken)
 
 
 def match_cells(state: WorldState, cells: Tensor, gain: Tensor, spacing: int, discount: float, taken: float) -> Tensor:

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.heuristics.base import (
-    chebyshev_distance,
+    agent_distance,
     extinguish_or,
     idle_action,
     list_cells,
@@ -91,7 +91,7 @@ class Dispatch(Coordinated):
         Aircraft, whose moves are longer, have no advantage by it: they would claim what others are at already.
         """
         moves = moves_around(own_cell(state), self._open(state), cells[:, None])
-        return torch.where(moves == FAR, FAR + chebyshev_distance(state, cells), moves)
+        return torch.where(moves == FAR, FAR + agent_distance(state, cells), moves)
 
     def _target_or_water(self, state: WorldState, target: Tensor, front: Tensor) -> Tensor:
         """Return the given targets, or water for agents whose tank is empty, or the base where charge runs out.

@@ -23,7 +23,7 @@ from websockets.protocol import State
 from warp_torchrl.live.access import Access
 from warp_torchrl.system.foreign_text import plain_text
 
-MOST_BYTES = 64 * 1024
+MOST_MESSAGE_BYTES = 64 * 1024
 """Of a message: a page sends less than a thousandth of it."""
 MOST_CONNECTIONS = 256
 """At a time; beyond it the oldest of those that have not shown a token yet is closed."""
@@ -67,7 +67,7 @@ class Door:
                 "sock": self._listener,
                 "process_request": self._process(process_request),
                 "create_connection": self._connection(),
-                "max_size": MOST_BYTES,
+                "max_size": MOST_MESSAGE_BYTES,
                 "logger": _quiet_logger(),
             }
             return usual(_arriving(handler), **(options | own))

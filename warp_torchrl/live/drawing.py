@@ -12,7 +12,7 @@ from torch import Tensor
 from torch.nn.functional import avg_pool2d
 
 from warp_torchrl.env.pictures.render import fire_colours, render
-from warp_torchrl.live.ground import Ground
+from warp_torchrl.live.ground import SceneGround
 from warp_torchrl.world.arrays.geometry import unit_vectors
 from warp_torchrl.world.state.state import FIRST_FIRE, WorldState, is_burning, is_tree
 
@@ -46,7 +46,7 @@ class Instances:
     colour: np.ndarray
 
 
-def tiles(state: WorldState, ground: Ground) -> np.ndarray:
+def tiles(state: WorldState, ground: SceneGround) -> np.ndarray:
     """Return the colours of the tiles of world 0, uint8 [H W, 3].
 
     They are the colours of ``env.render``, darker under trees. They show cover, tree age, fire by stage, ash,
@@ -59,7 +59,7 @@ def tiles(state: WorldState, ground: Ground) -> np.ndarray:
     return torch.where(under, (colours.float() * _SHADE).byte(), colours).numpy()
 
 
-def trees(state: WorldState, ground: Ground) -> Instances:
+def trees(state: WorldState, ground: SceneGround) -> Instances:
     """Return the trees of world 0: one for each cell of ``ground.trees``, with size 0 where the cell has no tree.
 
     A tree's height shows its age. Its colour shows cover, age, fire and wetness, as the colour of the ground does.
@@ -80,7 +80,7 @@ def trees(state: WorldState, ground: Ground) -> Instances:
     )
 
 
-def flames(state: WorldState, ground: Ground) -> Instances:
+def flames(state: WorldState, ground: SceneGround) -> Instances:
     """Return a flame for each burning cell of world 0, its colour by stage; they flicker from step to step."""
     cells = state.cells[0].flatten()
     index = is_burning(cells).nonzero()[:, 0].numpy()
@@ -96,7 +96,7 @@ def flames(state: WorldState, ground: Ground) -> Instances:
     )
 
 
-def smoke(state: WorldState, ground: Ground) -> Instances:
+def smoke_puffs(state: WorldState, ground: SceneGround) -> Instances:
     """Return puffs over the burning cells of world 0, carried by the wind; a third of them at a time."""
     index = is_burning(state.cells[0]).flatten().nonzero()[:, 0].numpy()
     jitter = np.roll(_jitter(ground.size), int(state.step[0]) * 3, axis=0)[index]
@@ -114,7 +114,7 @@ def smoke(state: WorldState, ground: Ground) -> Instances:
     )
 
 
-def sparks(state: WorldState, ground: Ground) -> tuple[np.ndarray, np.ndarray]:
+def sparks(state: WorldState, ground: SceneGround) -> tuple[np.ndarray, np.ndarray]:
     """Return sparks that rise with the wind from the burning cells of world 0.
 
     Returns:
@@ -134,7 +134,7 @@ def sparks(state: WorldState, ground: Ground) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def glow(state: WorldState, ground: Ground) -> tuple[tuple[float, float, float], float]:
+def glow(state: WorldState, ground: SceneGround) -> tuple[tuple[float, float, float], float]:
     """Return where the light of the fires of world 0 comes from, over the densest of them [cells], and its strength."""
     burning = is_burning(state.cells[:1]).float()
     around = avg_pool2d(burning, _GLOW_SIDE, stride=1, padding=_GLOW_SIDE // 2)[0] * burning[0]
@@ -143,7 +143,7 @@ def glow(state: WorldState, ground: Ground) -> tuple[tuple[float, float, float],
     return (x, y, z + 4.0), 90.0 * float(around.flatten()[place].sqrt())
 
 
-def vehicles(state: WorldState, ground: Ground, flies: Tensor, facing: Tensor) -> Instances:
+def vehicles(state: WorldState, ground: SceneGround, flies: Tensor, facing: Tensor) -> Instances:
     """Return the vehicles of world 0.
 
     Args:
@@ -166,7 +166,7 @@ def vehicles(state: WorldState, ground: Ground, flies: Tensor, facing: Tensor) -
     )
 
 
-def headings(shown: Instances, goals: dict[int, tuple[int, int]], ground: Ground) -> np.ndarray:
+def headings(shown: Instances, goals: dict[int, tuple[int, int]], ground: SceneGround) -> np.ndarray:
     """Return where vehicles are heading as lines from each to its end, float32 [A, 2, 3] [cells].
 
     Args:
@@ -183,7 +183,7 @@ def headings(shown: Instances, goals: dict[int, tuple[int, int]], ground: Ground
     return np.stack((start + ahead * 0.9 * size, end), axis=1).astype(np.float32)
 
 
-def wind_arrows(state: WorldState, ground: Ground) -> np.ndarray:
+def wind_arrows(state: WorldState, ground: SceneGround) -> np.ndarray:
     """Return the wind of world 0 as arrows over the map where the air goes, float32 [25, 2, 3] [cells].
 
     An arrow of a wind of 12 m/s is as long as their distance. In a calm all are points.

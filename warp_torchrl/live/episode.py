@@ -14,7 +14,7 @@ from torch import Tensor
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.pictures.render import legend_colours
 from warp_torchrl.live.crew import Crew
-from warp_torchrl.live.scene import aim, furnish, local_server, places, quiet
+from warp_torchrl.live.scene import aim, furnish, local_server, map_offsets, quiet
 from warp_torchrl.live.stage import Shown, Stage
 from warp_torchrl.live.words import chips, labels, vehicle_colours
 from warp_torchrl.system import disk
@@ -48,7 +48,7 @@ class Film:
         aim(self._server, size, len(sides), aside=-0.04, up=0.02)  # heading and legend stand left
         self._stages = [
             Stage(self._server, index, side, east)
-            for index, (side, east) in enumerate(zip(sides, places(size[1], len(sides))))
+            for index, (side, east) in enumerate(zip(sides, map_offsets(size[1], len(sides))))
         ]
         self._film = self._server.get_scene_serializer()
         self._pictures = 0
@@ -71,7 +71,7 @@ class Film:
         page = self._film.as_html(dark_mode=True)
         with quiet():
             self._server.stop()
-        return _framed(page, self._lines, legend(self._sides[0]))
+        return _framed(page, self._lines, map_colours(self._sides[0]))
 
 
 def progress(side: Shown) -> str:
@@ -82,7 +82,7 @@ def progress(side: Shown) -> str:
     return f"step {step} of {horizon}:  {float(counts.saved()[0]):.0%} saved, {burning:.0%} burning"
 
 
-def legend(side: Shown) -> dict[str, Sequence[int]]:
+def map_colours(side: Shown) -> dict[str, Sequence[int]]:
     """Return the colours of what can be seen on a side's map, by name: its covers, fire and what is left, vehicles."""
     absent = {cover.name.lower() for cover in Cover} - {
         Cover(each).name.lower() for each in side.state.cover.unique().tolist()

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import avg_pool2d, pad
 
-from warp_torchrl.live.shapes import Shape
+from warp_torchrl.live.shapes import Mesh
 from warp_torchrl.world.state.state import Cover, WorldState
 
 EXAGGERATION = 2.0
@@ -21,7 +21,7 @@ MOST_TREES = 128 * 128
 
 
 @dataclass(frozen=True)
-class Ground:
+class SceneGround:
     """Arrays that are constant during an episode.
 
     Attributes:
@@ -34,7 +34,7 @@ class Ground:
     """
 
     height: np.ndarray
-    block: Shape
+    block: Mesh
     position: np.ndarray
     turn: np.ndarray
     side: np.ndarray
@@ -46,7 +46,7 @@ class Ground:
         return self.height.shape[0], self.height.shape[1]
 
 
-def ground_of(state: WorldState) -> Ground:
+def ground_of(state: WorldState) -> SceneGround:
     """Return the ground of world 0."""
     elevation, (rows, columns) = state.landscape.elevation, state.cells.shape[1:]
     height = torch.zeros(rows, columns)
@@ -59,7 +59,7 @@ def ground_of(state: WorldState) -> Ground:
     x, y = _east_and_north(rows, columns)
     holds_trees = (state.cover[0] != int(Cover.LAKE)) & (state.cover[0] != int(Cover.BARE))
     trees = holds_trees.flatten().nonzero()[:, 0].numpy() if rows * columns <= MOST_TREES else np.zeros(0, np.int64)
-    return Ground(
+    return SceneGround(
         height=middle.numpy(),
         block=_block(corners.numpy()),
         position=torch.stack((x.expand(rows, -1), y.expand(-1, columns), middle), dim=-1).flatten(0, 1).numpy(),
@@ -70,7 +70,7 @@ def ground_of(state: WorldState) -> Ground:
 
 
 def cell_at(
-    origin: tuple[float, float, float], direction: tuple[float, float, float], ground: Ground
+    origin: tuple[float, float, float], direction: tuple[float, float, float], ground: SceneGround
 ) -> tuple[int, int] | None:
     """Return the (row, column) of the cell that a ray first meets from above; None if it meets none.
 
@@ -94,7 +94,7 @@ def cell_at(
     return (int(row[met[0]]), int(column[met[0]])) if len(met) else None
 
 
-def _within(start: np.ndarray, way: np.ndarray, ground: Ground) -> tuple[float, float]:
+def _within(start: np.ndarray, way: np.ndarray, ground: SceneGround) -> tuple[float, float]:
     """Return from where to where a ray is in the box around the ground [cells]: steps along it are as few as that."""
     if not abs(np.linalg.norm(way) - 1.0) < 0.01:
         return math.inf, 0.0
@@ -120,7 +120,7 @@ def _tilt(east: Tensor, north: Tensor) -> Tensor:
     return torch.stack((w, north * up / (2.0 * w), -east * up / (2.0 * w), torch.zeros_like(w)), dim=1)
 
 
-def _block(corners: np.ndarray) -> Shape:
+def _block(corners: np.ndarray) -> Mesh:
     """Return a closed body under a surface of corner heights [H + 1, W + 1], with its floor three cells below."""
     rows, columns = corners.shape
     floor = corners.min() - 3.0
@@ -136,4 +136,4 @@ def _block(corners: np.ndarray) -> Shape:
     first, last = low[0], len(rim)
     bottom = np.stack((np.full(last - 2, first), low[1:-1], low[2:]), axis=-1)
     faces = np.concatenate((quads[:, [0, 1, 2]], quads[:, [0, 2, 3]], walls[:, [0, 1, 2]], walls[:, [0, 2, 3]], bottom))
-    return Shape(np.concatenate((top, below)).astype(np.float32), faces.astype(np.uint32))
+    return Mesh(np.concatenate((top, below)).astype(np.float32), faces.astype(np.uint32))

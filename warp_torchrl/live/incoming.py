@@ -1,4 +1,4 @@
-"""What a browser may send: four kinds of messages, each of known fields, and values that their control can have.
+"""Messages that a browser may send: four kinds with known fields, and values that fit their control.
 
 viser sets a control to whatever a browser sends for it, and other browsers are shown that. So a message is checked
 before viser reads it; what is refused changes nothing.
@@ -36,7 +36,7 @@ class Misfit(Refused):
 
 
 def _shape(kind: type[Any]) -> type[msgspec.Struct]:
-    """Return what a message of viser has on the wire, and nothing else."""
+    """Return the exact form of a message of viser."""
     hints = get_type_hints_cached(kind)
     fields = [(name, hints[name]) for name in wire_field_names(kind)]
     return msgspec.defstruct(kind.__name__, fields, tag=kind.__name__, forbid_unknown_fields=True)
@@ -129,7 +129,7 @@ def _kind(present: float) -> str:
 
 
 def _values(value: object) -> Iterator[object]:
-    """Return all that tuples hold."""
+    """Return all values in nested tuples."""
     if isinstance(value, tuple | list):
         for each in value:
             yield from _values(each)

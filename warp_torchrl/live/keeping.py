@@ -3,7 +3,7 @@
 import shutil
 from pathlib import Path
 
-from warp_torchrl.demonstrations.files import MANIFEST, read, save, search
+from warp_torchrl.demonstrations.files import MANIFEST, read_recording, save_recording, search
 from warp_torchrl.demonstrations.recording import OpenRecording, Recording
 from warp_torchrl.demonstrations.summary import Summary, summary
 from warp_torchrl.live.crew import Refused
@@ -37,7 +37,7 @@ class Keeper:
         """
         recording = side.record()
         try:
-            folder = save(recording, self.folder)
+            folder = save_recording(recording, self.folder)
         except OSError as error:
             raise Refused(
                 f"{error.filename or self.folder} cannot be written ({error.strerror}): this episode is not saved"
@@ -79,7 +79,7 @@ class Keeper:
             key = (folder, _written(folder))
             if key not in self._known:
                 try:
-                    self._known[key] = summary(folder, read(folder))
+                    self._known[key] = summary(folder, read_recording(folder))
                 except (Unsound, OSError) as error:
                     self._known[key] = str(error)
             found[name] = self._known[key]
@@ -95,7 +95,7 @@ class Keeper:
         folders, _ = self._folders()
         if name not in folders:
             raise Refused(f"{self.folder} holds no recording {name}")
-        return read(folders[name])
+        return read_recording(folders[name])
 
     def _folders(self) -> tuple[dict[str, Path], int]:
         """Return the folders of recordings by their paths in this one, and how many are refused for their names."""

@@ -16,7 +16,7 @@ from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config.compose import compose_config, plain
 from warp_torchrl.runs.config.groups import WORLD_KEYS
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
-from warp_torchrl.runs.process import STOPPED, Training, TrainingProcess
+from warp_torchrl.runs.process import STOPPED, StartedTraining, TrainingProcess
 from warp_torchrl.validation import dotted
 
 ON_POLICY = ("mappo", "ippo", "ppo", "a2c")
@@ -64,7 +64,7 @@ def arguments(
     ]
 
 
-class Learning:
+class PageTraining:
     """The training that a page started; one at a time.
 
     Args:
@@ -77,7 +77,7 @@ class Learning:
         """Run folder of the last training; None before the first."""
         self.overrides: tuple[str, ...] = ()
         """Of the scenario that it was started in."""
-        self._process: Training | None = None
+        self._process: StartedTraining | None = None
         self._total = 0
 
     @property

@@ -26,7 +26,7 @@ from warp_torchrl.world.ignition.intervention import can_be_lit
 from warp_torchrl.world.state.state import is_tree
 from warp_torchrl.world.world import World
 
-SEEDS = (0, 2**62 - 1)
+SEED_RANGE = (0, 2**62 - 1)
 """Of fires, from and to."""
 
 
@@ -51,7 +51,7 @@ class Setting:
     overrides: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        check_fields(self, seed=SEEDS)
+        check_fields(self, seed=SEED_RANGE)
 
 
 class Match:

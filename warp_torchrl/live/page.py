@@ -16,12 +16,12 @@ from warp_torchrl.live.address import Address
 from warp_torchrl.live.door import LOG, Door, arrived
 from warp_torchrl.live.inbox import Act, Inbox
 from warp_torchrl.live.keeping import Keeper
-from warp_torchrl.live.learning import Learning
+from warp_torchrl.live.learning import PageTraining
 from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.live.once import Once
-from warp_torchrl.live.panel.panel import PACES, Panel, tell
+from warp_torchrl.live.panel.panel import PACES, Panel, notify
 from warp_torchrl.live.panel.tab import told_if_refused
-from warp_torchrl.live.scene import aim, furnish, local_server, places, quiet
+from warp_torchrl.live.scene import aim, furnish, local_server, map_offsets, quiet
 from warp_torchrl.live.stage import Stage
 from warp_torchrl.system.foreign_text import plain_text
 
@@ -53,7 +53,7 @@ class Page:
         self.lock = threading.RLock()
         self.inbox, self.once = Inbox(), Once()
         self.playing, self.pace = False, 8.0
-        self.keeper, self.learning = Keeper(recordings), Learning(recordings)
+        self.keeper, self.learning = Keeper(recordings), PageTraining(recordings)
         self._ended: OpenRecording | None = None  # of the last episode that was seen to end
         self._training = ""
         self._panels: dict[int, Panel] = {}
@@ -116,7 +116,7 @@ class Page:
             self._is_left_out.discard(person)
         elif person not in self._is_left_out:
             self._is_left_out.add(person)
-            tell(client, "the page cannot keep up: some of what you asked for is left out", mistake=True)
+            notify(client, "the page cannot keep up: some of what you asked for is left out", mistake=True)
 
     def set_pace(self, pace: float) -> None:
         """Set the pace [steps / s].
@@ -203,7 +203,7 @@ class Page:
         size, count = match.world.size, len(match.sides)
         self._stages = [
             Stage(self.server, index, side, east)
-            for index, (side, east) in enumerate(zip(match.sides, places(size[1], count)))
+            for index, (side, east) in enumerate(zip(match.sides, map_offsets(size[1], count)))
         ]
         for stage in self._stages:
             stage.tiles.on_click(partial(self._click, stage))
@@ -272,14 +272,14 @@ class Page:
         who = "a browser" if client is None else f"browser {client.client_id}"
         LOG.warning("%s: %s%s", who, line, "; more of it is not told" * (count == _MOST_TOLD))
         if client is not None:
-            tell(client, line, mistake=True)
+            notify(client, line, mistake=True)
 
     # The same in the thread that plays
 
     def _welcome(self, client: viser.ClientHandle) -> None:
         if client not in self._clients.values():
             return  # it has left already
-        with told_if_refused(partial(tell, client)):
+        with told_if_refused(partial(notify, client)):
             panel = self._panels[client.client_id] = Panel(self, client)
             panel.show()
 

@@ -50,7 +50,7 @@ def furnish(server: viser.ViserServer) -> None:
     scene.add_light_directional("/sun", color=(255, 226, 196), intensity=3.0, position=(-34.0, -26.0, 50.0))
 
 
-def places(columns: int, count: int) -> list[float]:
+def map_offsets(columns: int, count: int) -> list[float]:
     """Return by how much each of some maps, side by side, is east of the middle [cells]."""
     apart = columns * 1.14
     return [apart * (index - (count - 1) / 2.0) for index in range(count)]
@@ -62,7 +62,7 @@ def aim(server: viser.ViserServer, size: tuple[int, int], count: int, aside: flo
     Args:
         server: Where they are drawn.
         size: (H, W) of each [cells].
-        count: Of the maps, placed as ``places`` has it.
+        count: Of the maps, placed as in ``map_offsets``.
         aside: By how much the maps stand left of the middle, as a share of the distance.
         up: By how much they stand below it.
     """

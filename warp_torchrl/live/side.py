@@ -157,7 +157,7 @@ class Side:
         )
 
     def intervene(self, kind: str, *numbers: float) -> None:
-        """Let an event happen, one of ``KINDS``: what people do to the world.
+        """Let an event happen, one of ``EVENT_KINDS``: what people do to the world.
 
         Raises:
             ValueError: If a number is out of its range.

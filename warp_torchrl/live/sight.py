@@ -1,4 +1,4 @@
-"""What one vehicle's agent sees, as pictures and numbers."""
+"""Observation of one vehicle's agent, as pictures and numbers."""
 
 import numpy as np
 import torch
@@ -39,7 +39,7 @@ def pictures(side: Side, agent: int, tile: int = 84) -> dict[str, np.ndarray]:
     }
 
 
-def numbers(side: Side, agent: int) -> dict[str, float]:
+def named_numbers(side: Side, agent: int) -> dict[str, float]:
     """Return the numbers of an agent's observation by name, such as those of ``status``."""
     found: dict[str, float] = {}
     for name, value in entries(side, agent).items():

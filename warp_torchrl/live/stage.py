@@ -11,8 +11,8 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.live import drawing
 from warp_torchrl.live.crew import Crew
 from warp_torchrl.live.drawing import Instances
-from warp_torchrl.live.ground import Ground, ground_of
-from warp_torchrl.live.shapes import TILE, Shape, bulldozer, drone, flame, puff, tree
+from warp_torchrl.live.ground import SceneGround, ground_of
+from warp_torchrl.live.shapes import TILE, Mesh, bulldozer, drone, flame, puff, tree
 from warp_torchrl.live.words import labels
 from warp_torchrl.world.state.role import ROLES
 from warp_torchrl.world.state.state import WorldState
@@ -30,7 +30,7 @@ class Flock:
         opacity: In 0..1; None is opaque.
     """
 
-    def __init__(self, server: viser.ViserServer, name: str, shape: Shape, opacity: float | None = None) -> None:
+    def __init__(self, server: viser.ViserServer, name: str, shape: Mesh, opacity: float | None = None) -> None:
         self._server, self._name, self._shape, self._opacity = server, name, shape, opacity
         self._handle: Any = None
         self._room = 0
@@ -91,7 +91,7 @@ class Stage:
         self._server, self._side, self._root = server, side, f"/side_{index}"
         self._called = labels(side.env.agent_names)
         self.east = east
-        self.ground: Ground = ground_of(side.state)
+        self.ground: SceneGround = ground_of(side.state)
         scene, ground = server.scene, self.ground
         scene.add_frame(self._root, show_axes=False, position=(east, 0.0, 0.0))
         scene.add_mesh_simple(
@@ -125,7 +125,7 @@ class Stage:
             if len(ground.trees):
                 self._trees.show(drawing.trees(state, ground))
             self._flames.show(drawing.flames(state, ground))
-            self._smoke.show(drawing.smoke(state, ground))
+            self._smoke.show(drawing.smoke_puffs(state, ground))
             self._show_sparks()
             self._show_vehicles()
             place, strength = drawing.glow(state, ground)

@@ -27,7 +27,7 @@ def headline(match: Match) -> str:
     return f"**{escaped(match.scenario)}**, seed {match.setting.seed}: step {step} of {horizon}{end}"
 
 
-def numbers(match: Match) -> str:
+def numbers_table(match: Match) -> str:
     """Return the table of all sides: forest saved and burning, acts."""
     rows = ["| | saved | burning | put out | cleared |", "|---|---:|---:|---:|---:|"]
     for side in match.everywhere:

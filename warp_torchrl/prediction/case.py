@@ -7,7 +7,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from warp_torchrl.prediction.files import Place
+from warp_torchrl.prediction.files import MapPlace
 from warp_torchrl.runs.config.prediction_options import PredictionOptions
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.ignition.file import read_ignition
@@ -28,7 +28,7 @@ class Case:
     """Inputs of ``predict``, read and checked."""
 
     ground: Landscape  # batch size [1]
-    place: Place
+    place: MapPlace
     cell_size: float  # [m]
     fire: RateFire
     weather: WeatherTable
@@ -51,7 +51,7 @@ def read_case(source: LandscapeSource, fire: RateFire, options: PredictionOption
     grid = getattr(source, "grid", None)
     _check_cell_size(options.cell_size, grid)
     corner = (0, 0) if grid is None or ground.corner is None else tuple(ground.corner[0].tolist())
-    place = Place(grid or local_grid((height, width), cell_size), (corner[0], corner[1]))
+    place = MapPlace(grid or local_grid((height, width), cell_size), (corner[0], corner[1]))
     lit = torch.as_tensor(read_ignition(str(options.ignition), place.grid))
     rows, columns = slice(corner[0], corner[0] + height), slice(corner[1], corner[1] + width)
     weather = str(options.weather)
@@ -93,7 +93,7 @@ def whole_map(source: Raster) -> Raster:
     return replace(source, size=source.extent, row=0, column=0)
 
 
-def _convergence(place: Place, size: tuple[int, int]) -> float:
+def _convergence(place: MapPlace, size: tuple[int, int]) -> float:
     """Return the angle from true north to grid north at the middle of a map; 0 where it has no place on Earth."""
     grid: Any = place.grid
     if not grid.is_on_earth:

@@ -8,13 +8,13 @@ import torch
 from torch import Tensor
 from torch.nn.functional import pad
 
-from warp_torchrl.prediction.passing import Behaviour, passing, steepness_from
+from warp_torchrl.prediction.passing import HeadBehaviour, passing, steepness_from
 from warp_torchrl.world.arrays.geometry import DIRECTIONS
 from warp_torchrl.world.fires.alone import Burned, Fires
 from warp_torchrl.world.law.travel import NEVER
 from warp_torchrl.world.state.window import COLUMNS, Window
 
-STEPS = 65534
+TIME_STEPS = 65534
 """Of a time in 16 bits, over the whole time."""
 LATE = 32767
 """Stands for a fire that does not come."""
@@ -101,7 +101,7 @@ class Counter:
         return torch.minimum(whole, arrival.flatten(1).kthvalue(max(1, most), dim=1).values)
 
     def _in_steps(self, arrival: Tensor, came: Tensor) -> Tensor:
-        steps = (arrival * (STEPS / self.minutes)).round() - STEPS // 2
+        steps = (arrival * (TIME_STEPS / self.minutes)).round() - TIME_STEPS // 2
         return torch.where(came, steps, LATE).to(torch.int16)
 
     def _sums(self, arrival: Tensor, burned: Burned) -> Tensor:
@@ -123,7 +123,7 @@ class Counter:
             sums[number] = plane.view(arrival.shape).sum(0)
         return sums
 
-    def _then(self, place: Tensor, times: Tensor, window: Window) -> Behaviour:
+    def _then(self, place: Tensor, times: Tensor, window: Window) -> HeadBehaviour:
         """Return what heads do in cells of a window at some times, float32 [n]."""
         spell = torch.bucketize(times, self._ends).clamp(max=len(self._ends) - 1)
         order = spell.argsort()
@@ -131,7 +131,7 @@ class Counter:
         for part in order.split(torch.bincount(spell).tolist()):
             if len(part):
                 found[:, part] = self.fires.planes(int(spell[part[0]]), window)[3:].flatten(1)[:, place[part]]
-        return Behaviour(*found)
+        return HeadBehaviour(*found)
 
     def _by_hour(self, arrival: Tensor, came: Tensor, window: Window) -> tuple[Tensor, Tensor]:
         """Return the area burned by each hour [ha] and how far it reaches from the start [m], float32 [b, T]."""

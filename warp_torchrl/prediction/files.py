@@ -8,18 +8,18 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from warp_torchrl.env.pictures.maps import Panel, save_maps
+from warp_torchrl.env.pictures.maps import MapPanel, save_maps
 from warp_torchrl.prediction.predict import Prediction
 from warp_torchrl.system import disk
 from warp_torchrl.world.terrain.geotiff import write_geotiff
 from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.perimeter import perimeters, write_geojson
 
-FIGURE = "maps.png"
+MAPS_FIGURE = "maps.png"
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class MapPlace:
     """Where a map lies: a window of a grid."""
 
     grid: Grid
@@ -41,7 +41,7 @@ def layers(prediction: Prediction) -> dict[str, dict[str, Tensor]]:
     }
 
 
-def write_layers(folder: Path, prediction: Prediction, place: Place) -> list[str]:
+def write_layers(folder: Path, prediction: Prediction, place: MapPlace) -> list[str]:
     """Write the GeoTIFFs of ``layers`` and return their names.
 
     Raises:
@@ -54,7 +54,7 @@ def write_layers(folder: Path, prediction: Prediction, place: Place) -> list[str
     return list(bands)
 
 
-def write_perimeters(path: Path, prediction: Prediction, place: Place, every: float) -> None:
+def write_perimeters(path: Path, prediction: Prediction, place: MapPlace, every: float) -> None:
     """Write, as GeoJSON, the outlines of the cells that half of the fires had reached at multiples of ``every`` hours.
 
     Raises:
@@ -82,7 +82,7 @@ def write_figure(path: Path, prediction: Prediction, title: str) -> None:
         save_maps(path, ground, panels(prediction), prediction.cell_size, title, lit)
 
 
-def panels(prediction: Prediction) -> list[Panel]:
+def panels(prediction: Prediction) -> list[MapPanel]:
     """Return the panels of the figure; colours of rates and intensities end at their 99th percentile."""
     maps = prediction.seen
     amounts: Mapping[str, tuple[Tensor, str]] = {
@@ -92,8 +92,10 @@ def panels(prediction: Prediction) -> list[Panel]:
         "flame length": (maps["flame_length"], "m"),
     }
     seen = maps["burn_probability"].masked_fill(maps["burn_probability"] == 0.0, torch.nan)
-    chance = Panel(title=f"burn probability, {len(prediction.followed)} fires", values=seen, label="share of the fires")
-    return [chance, *(Panel(title=name, values=each, label=label, kind="amount", top=_top(each))
+    chance = MapPanel(
+        title=f"burn probability, {len(prediction.followed)} fires", values=seen, label="share of the fires"
+    )
+    return [chance, *(MapPanel(title=name, values=each, label=label, kind="amount", top=_top(each))
                       for name, (each, label) in amounts.items())]  # fmt: skip
 
 

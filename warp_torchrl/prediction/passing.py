@@ -19,7 +19,7 @@ _LEAST = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Behaviour:
+class HeadBehaviour:
     """Behaviour of the heads of fires in some cells, in the weather of their arrival; float32 of one shape."""
 
     head: Tensor  # rate of spread of the head [m/min]
@@ -28,7 +28,7 @@ class Behaviour:
     flame_length: Tensor  # at the head [m]
 
 
-def passing(steep: Tensor, pace: Tensor, then: Behaviour, cell_size: float) -> tuple[Tensor, Tensor, Tensor]:
+def passing(steep: Tensor, pace: Tensor, then: HeadBehaviour, cell_size: float) -> tuple[Tensor, Tensor, Tensor]:
     """Return rate [m/min], intensity [kW/m] and flame length [m] of fires on arrival, float32 of one shape.
 
     The rate is held between those of the rear and of the head in the weather of the arrival: near its start a fire is

@@ -12,7 +12,7 @@ from warp_torchrl.system.provenance import section
 _ROWS = 25  # of the table of hours
 
 
-def numbers(prediction: Prediction) -> dict[str, Any]:
+def report_numbers(prediction: Prediction) -> dict[str, Any]:
     """Return the numbers of a prediction as plain values: areas [ha], metres, minutes, kW/m."""
     area, progress = prediction.area, prediction.progress
     hours = [

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import pad
 
-from warp_torchrl.prediction.counts import LATE, STEPS, Count
+from warp_torchrl.prediction.counts import LATE, TIME_STEPS, Count
 from warp_torchrl.system import memory
 from warp_torchrl.world.law.travel import NEVER
 from warp_torchrl.world.state.window import Window
@@ -15,7 +15,7 @@ _BLOCK = 2**24  # times that are sorted at once
 
 
 @dataclass(frozen=True, eq=False)
-class Arrivals:
+class ArrivalQuantiles:
     """When fires reached each cell, over the fires that did; float32 [h, w] [minutes], NaN where none did."""
 
     median: Tensor
@@ -78,7 +78,7 @@ class Tally:
         """Return the mean rate, intensity and flame length over the fires that came, float32 [h, w], NaN for none."""
         return [torch.where(self._came > 0.0, part / self._came, torch.nan) for part in self._sums]
 
-    def arrivals(self) -> Arrivals:
+    def arrivals(self) -> ArrivalQuantiles:
         """Return quantiles of the arrival times, to a 65,534th of the time that fires are followed."""
         found = torch.full((4, *self._came.shape), torch.nan)
         at_once = max(1, _BLOCK // sum(len(count.times) for count in self._counts))  # cells
@@ -90,7 +90,7 @@ class Tally:
                     times = torch.cat([self._times(count, block) for count in self._counts])
                     quantiles = self._quantiles(times.flatten(1).sort(dim=0).values)
                     found[(slice(None), *block)] = quantiles.view(4, *times.shape[1:])
-        return Arrivals(*found)
+        return ArrivalQuantiles(*found)
 
     def check(self, window: Window) -> None:
         """Refuse fires whose times would not fit in memory if all that are left had this window.
@@ -141,7 +141,7 @@ class Tally:
         count = (times < LATE).sum(0)
         found = [_between(times, (count - 1).clamp(min=0) * share) for share in (0.5, 0.1, 0.9)]
         half = times[(len(times) - 1) // 2]
-        minutes = (torch.stack([*found, half.to(torch.float32)]) + STEPS // 2) * (self._minutes / STEPS)
+        minutes = (torch.stack([*found, half.to(torch.float32)]) + TIME_STEPS // 2) * (self._minutes / TIME_STEPS)
         return torch.where(torch.stack([count > 0] * 3 + [half < LATE]), minutes, torch.nan)
 
 

@@ -30,7 +30,7 @@ from warp_torchrl.runs.manifest import (
 )
 from warp_torchrl.runs.output import draft_in, publish
 from warp_torchrl.system import disk
-from warp_torchrl.system.checksummed import read_json
+from warp_torchrl.system.checksummed import read_mapping
 from warp_torchrl.system.foreign_text import plain_text
 from warp_torchrl.system.tensors import check_finite, load_tensors
 
@@ -63,7 +63,7 @@ class Checkpoint:
         """Return the training's configuration."""
         path = self.path / "config.json"
         with of_a_checkpoint():
-            content = read_json(path)
+            content = read_mapping(path)
         try:
             return read_saved_config(content)
         except ValueError as error:

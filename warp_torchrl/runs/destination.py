@@ -4,7 +4,7 @@ from pathlib import Path
 
 from warp_torchrl.runs.config.construction import ConfigError
 
-LARGEST = 200_000_000
+LARGEST_EVALUATION = 200_000_000
 """Size of an ``evaluation.json`` that is read [bytes]."""
 _OF_HYDRA = (".hydra", "multirun.yaml")  # Hydra writes these, and logs, before the evaluation
 DRAFT = ".warp_torchrl-draft-"

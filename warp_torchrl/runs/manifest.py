@@ -24,7 +24,7 @@ from warp_torchrl.system.checksummed import (
     checked_files,
     checksummed,
     described,
-    read_json,
+    read_mapping,
 )
 from warp_torchrl.system.tensors import largest
 from warp_torchrl.world.state.role import PAPER_ROLES
@@ -104,7 +104,7 @@ def read_manifest(folder: Path) -> Manifest:
 
 def _parse_manifest(folder: Path) -> Manifest:
     path = folder / MANIFEST
-    content = read_json(path)
+    content = read_mapping(path)
     if content.get("format") not in _READ:
         raise CheckpointError(
             f"{folder} has format {content.get('format')!r}, this version reads {', '.join(map(str, _READ))}"

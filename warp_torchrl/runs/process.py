@@ -27,7 +27,7 @@ class SearchEnded(Exception):  # noqa: N818
         self.code = code
 
 
-class Training(Protocol):
+class StartedTraining(Protocol):
     """A started training."""
 
     def poll(self) -> int | None:

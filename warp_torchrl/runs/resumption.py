@@ -16,7 +16,7 @@ from warp_torchrl.runs.config.groups import COMPONENTS
 from warp_torchrl.runs.config.renamed import renamed_values
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
-from warp_torchrl.runs.destination import LARGEST
+from warp_torchrl.runs.destination import LARGEST_EVALUATION
 from warp_torchrl.system.foreign import Foreign, read_json
 from warp_torchrl.system.foreign_yaml import read_yaml
 
@@ -108,7 +108,7 @@ def is_run_of(folder: Path, config: str) -> bool:
 def _evaluated(path: Path) -> int | None:
     """Return the frames of the policy in a run's ``evaluation.json``; None if there is no evaluation."""
     try:
-        frames = read_json(path, LARGEST)["frames"]
+        frames = read_json(path, LARGEST_EVALUATION)["frames"]
     except (OSError, Foreign, KeyError, TypeError):
         return None
     return frames if isinstance(frames, int) else None

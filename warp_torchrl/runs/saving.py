@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-SHARE = 0.01
+MOST_TIME_SHARE = 0.01
 """Largest share of the run's time that saves by the clock may take."""
 
 
@@ -35,7 +35,7 @@ class SaveClock:
         """Return whether the run should save now."""
         if not self._interval or (self.saves and self._now() - self._last < self._interval):
             return False
-        return self._spent + self._pace * self._size() <= SHARE * (self._now() - self._start)
+        return self._spent + self._pace * self._size() <= MOST_TIME_SHARE * (self._now() - self._start)
 
     @contextmanager
     def timed(self) -> Iterator[None]:

@@ -21,7 +21,7 @@ class Unsound(Exception):  # noqa: N818
     """A folder without a part, or with an altered one; the message is one line."""
 
 
-def read_json(path: Path) -> dict[str, Any]:
+def read_mapping(path: Path) -> dict[str, Any]:
     """Return the mapping in a JSON file.
 
     Raises:
@@ -109,7 +109,7 @@ def _opened(folder: Path, name: str) -> BufferedReader:
         Unsound: If it is not there, or is no regular file below the folder.
     """
     try:
-        return foreign.open_file(foreign.below(folder, name))
+        return foreign.open_file(foreign.path_below(folder, name))
     except foreign.Foreign as error:
         raise Unsound(str(error)) from None
     except OSError as error:

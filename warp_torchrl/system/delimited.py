@@ -19,7 +19,7 @@ _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?", re.ASCII)
 _COMMA = re.compile(r"([-+]?\d*),(\d+(?:[eE][-+]?\d{1,3})?)", re.ASCII)
 
 
-def read_text(name: str, path: str | PathLike[str]) -> str:
+def read_table_text(name: str, path: str | PathLike[str]) -> str:
     """Return the text of a file: UTF-8 or UTF-16 with or without a byte order mark, else Windows-1252.
 
     Args:

@@ -73,10 +73,10 @@ def save_tensors(path: Path, content: Any) -> None:
             raise writer.refusal from None
 
 
-def size(content: Any) -> int:
+def tensors_size(content: Any) -> int:
     """Return the size of the tensors in nested mappings [bytes]."""
     if isinstance(content, dict):
-        return sum(size(each) for each in content.values())
+        return sum(tensors_size(each) for each in content.values())
     return content.nbytes if isinstance(content, torch.Tensor) else 0
 
 

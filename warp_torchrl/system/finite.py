@@ -6,7 +6,7 @@ from collections.abc import Iterable
 import torch
 from torch import Tensor
 
-LARGEST = 1.8e19
+LARGEST_SCORE = 1.8e19
 """Of a score of an action; the square of more is no float32, and beside it the others are lost."""
 
 
@@ -34,13 +34,14 @@ def check_scores(scores: Tensor | None) -> None:
     """Check the logits or values by which actions are chosen; it reads from their device.
 
     Raises:
-        NumericalFailure: If one is not finite, or above ``LARGEST``; closed actions may have the least number there is.
+        NumericalFailure: If one is not finite, or above ``LARGEST_SCORE``; closed actions may have the lowest float.
     """
     if scores is None or not scores.numel():
         return
     least, most = map(float, scores.detach().aminmax())
-    if not (math.isfinite(least) and most <= LARGEST):
+    if not (math.isfinite(least) and most <= LARGEST_SCORE):
+        unsound = least if math.isfinite(most) and most <= LARGEST_SCORE else most
         raise NumericalFailure(
-            f"the policy scores an action {least if math.isfinite(most) and most <= LARGEST else most:g}, no number to "
-            "act by: its weights, or what it is shown, are too large"
+            f"the policy scores an action {unsound:g}, no number to act by: its weights, or what it is shown, are too "
+            "large"
         )

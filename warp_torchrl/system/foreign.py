@@ -96,7 +96,7 @@ def read_json(path: Path, most: int) -> Any:
         raise Foreign(f"{path} is no JSON that is read: {' '.join(str(error).split())}") from None
 
 
-def below(folder: Path, name: str) -> Path:
+def path_below(folder: Path, name: str) -> Path:
     """Return the path of a file that a folder's manifest names.
 
     Args:

@@ -14,7 +14,7 @@ import yaml
 
 from warp_torchrl.system.foreign import Foreign, read_text
 
-LARGEST = 1_000_000
+LARGEST_YAML = 1_000_000
 """Size that a file may have [bytes]."""
 _DEEPEST = 30
 _MOST_PARTS = 50_000
@@ -22,7 +22,7 @@ _PLAIN = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # in C ten times as fast
 _WORDS = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 
 
-def read_yaml(path: Path, most: int = LARGEST) -> Any:
+def read_yaml(path: Path, most: int = LARGEST_YAML) -> Any:
     """Return what a YAML file holds as plain values; None if it is empty.
 
     Args:
@@ -36,7 +36,7 @@ def read_yaml(path: Path, most: int = LARGEST) -> Any:
     return _read(path, most, _PLAIN)
 
 
-def read_words(path: Path, most: int = LARGEST) -> Any:
+def read_words(path: Path, most: int = LARGEST_YAML) -> Any:
     """Return what a YAML file holds with every number and word as the text that stands there, as of ``read_yaml``."""
     return _read(path, most, _WORDS)
 

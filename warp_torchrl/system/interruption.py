@@ -19,7 +19,7 @@ _SCRIPTS = ("train.py", "evaluate.py")  # beside the package in a checkout
 _INSTALLED = ("warp",)
 
 
-def tell(number: int) -> None:
+def write_signal_line(number: int) -> None:
     """Write the line of a command that a signal ends: not by print, which the signal may have interrupted."""
     os.write(_STDERR, f"error: stopped by signal {signal.Signals(number).name}\n".encode())
 
@@ -57,7 +57,7 @@ def _end_before_teardown() -> None:
 
 
 def _end(number: int, frame: FrameType | None) -> None:
-    tell(number)
+    write_signal_line(number)
     os._exit(SIGNALED + number)
 
 

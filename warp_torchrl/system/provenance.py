@@ -65,7 +65,7 @@ class Provenance:
 _gathered: ContextVar[list[Provenance] | None] = ContextVar("gathered", default=None)
 
 
-def tell(provenance: Provenance) -> None:
+def report_file(provenance: Provenance) -> None:
     """Report a file that was read: to ``gathered`` blocks, and in one line of the log, once per process."""
     gathering = _gathered.get()
     if gathering is not None and provenance not in gathering:

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from warp_torchrl.system.interruption import SIGNALED, skip_teardown, tell
+from warp_torchrl.system.interruption import SIGNALED, skip_teardown, write_signal_line
 
 _WATCHED = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGUSR1, signal.SIGUSR2)
 _OF_SUBMITIT = "SUBMITIT_PREEMPT_SIGNAL"  # names the signal that submitit warns by, without SIG; USR2 if it is not set
@@ -81,7 +81,7 @@ _left = _Left()
 
 
 def _leave(number: int, frame: FrameType | None) -> None:
-    tell(number)
+    write_signal_line(number)
     _left.number = number
     skip_teardown(SIGNALED + number)
     if _left.clock is None:

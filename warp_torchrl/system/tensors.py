@@ -133,15 +133,15 @@ def check_finite(path: Path, content: Any) -> None:
     Raises:
         Unsound: If one is not; the message names the file and the first such tensor.
     """
-    for name, value in numbers(content):
+    for name, value in float_values(content):
         if (found := not_finite(value)) is not None:
             raise Unsound(f"{path} must hold finite numbers alone, and {name} holds {found:g}")
 
 
-def numbers(content: Any, prefix: str = "") -> Iterator[tuple[str, Tensor | float]]:
+def float_values(content: Any, prefix: str = "") -> Iterator[tuple[str, Tensor | float]]:
     """Yield each tensor and each plain floating-point number of nested mappings and sequences, by its name."""
     if isinstance(content, Tensor | float):
         yield prefix or "it", content
     elif isinstance(content, dict | list | tuple):
         for name, each in content.items() if isinstance(content, dict) else enumerate(content):
-            yield from numbers(each, f"{prefix}.{name}" if prefix else str(name))
+            yield from float_values(each, f"{prefix}.{name}" if prefix else str(name))

@@ -8,7 +8,9 @@ from warp_torchrl.runs.config.seeds import first_world_seed
 from warp_torchrl.world.world import World
 
 
-def reached(run_config: RunConfig, worlds: Sequence[World], name: str, count: int, measure: str) -> list[float]:
+def baseline_results(
+    run_config: RunConfig, worlds: Sequence[World], name: str, count: int, measure: str
+) -> list[float]:
     """Return a heuristic's mean of a measure in each of several worlds, over ``count`` training fires each.
 
     Args:

@@ -11,7 +11,7 @@ from warp_torchrl.collection.curriculum import Curriculum, CurriculumState
 from warp_torchrl.collection.curriculum.state import episodes_by_level
 from warp_torchrl.env import LeveledEnv, WildfireEnv
 from warp_torchrl.runs.config.run_config import RunConfig
-from warp_torchrl.training.baseline import reached
+from warp_torchrl.training.baseline import baseline_results
 
 log = logging.getLogger("warp_torchrl")
 
@@ -77,7 +77,7 @@ def _baseline(run_config: RunConfig) -> tuple[float, ...]:
     if run_config.curriculum.asks_for is None:
         return ()
     name, count = run_config.curriculum.asks_for
-    found = reached(run_config, run_config.levels, name, count, run_config.curriculum.measure)
+    found = baseline_results(run_config, run_config.levels, name, count, run_config.curriculum.measure)
     values = ", ".join(f"{value:.3f}" for value in found)
     log.info("curriculum: %s reaches %s of %s, level by level", name, values, run_config.curriculum.measure)
     return tuple(found)

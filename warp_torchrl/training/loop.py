@@ -229,7 +229,7 @@ class Training(Learning):
 
     def _size(self) -> int:
         """Return the size of a checkpoint's tensors [bytes], as if all processes had as much as this one."""
-        return disk.size(self.state_dict()) + (parallel.size() - 1) * disk.size(self._own())
+        return disk.tensors_size(self.state_dict()) + (parallel.size() - 1) * disk.tensors_size(self._own())
 
     def _is_regular(self, frames: int) -> bool:
         """Return whether a checkpoint is due at this number of frames, by ``checkpoint.interval``."""

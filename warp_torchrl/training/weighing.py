@@ -6,7 +6,7 @@ from typing import Any
 
 from warp_torchrl.collection.mixture import Mixture, weights
 from warp_torchrl.runs.config.run_config import RunConfig
-from warp_torchrl.training.baseline import reached
+from warp_torchrl.training.baseline import baseline_results
 
 log = logging.getLogger("warp_torchrl")
 
@@ -60,7 +60,9 @@ def weighing(run_config: RunConfig, shares: Sequence[float]) -> Weighing | None:
     if not isinstance(run_config.mixture, Mixture) or run_config.mixture.weigh == "share":
         return None
     names, baseline = [kind.name for kind in run_config.kinds], run_config.mixture.baseline
-    found = reached(run_config, [kind.world for kind in run_config.kinds], baseline, run_config.mixture.worlds, "saved")
+    found = baseline_results(
+        run_config, [kind.world for kind in run_config.kinds], baseline, run_config.mixture.worlds, "saved"
+    )
     values = ", ".join(f"{name} {value:.3f}" for name, value in zip(names, found, strict=True))
     log.info("mixture: %s saves of each kind: %s", baseline, values)
     return Weighing(run_config.mixture, names, shares, found)

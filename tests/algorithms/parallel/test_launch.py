@@ -10,7 +10,7 @@ import torch
 from tests.algorithms.parallel.other import addresses
 from warp_torchrl.algorithms import parallel
 from warp_torchrl.algorithms.parallel import launch, torchrun
-from warp_torchrl.algorithms.parallel.messages import MOST_BYTES, header, packed, unpacked
+from warp_torchrl.algorithms.parallel.messages import MOST_BYTES, deserialised, message_header, serialised
 from warp_torchrl.algorithms.parallel.sockets import Sockets, pairs
 
 
@@ -72,17 +72,17 @@ class Payload:
 
 
 def test_what_is_received_is_never_executed():
-    assert unpacked(packed({"a": [1, None, (2.0, "b")]})) == {"a": [1, None, (2.0, "b")]}
+    assert deserialised(serialised({"a": [1, None, (2.0, "b")]})) == {"a": [1, None, (2.0, "b")]}
     with pytest.raises(Exception, match="Weights only load failed"):
-        unpacked(packed({"a": Payload()}))
+        deserialised(serialised({"a": Payload()}))
 
 
 @pytest.mark.parametrize(
     ("sent", "line"),
     [
-        (header(MOST_BYTES + 1), "a message must have at most"),
-        (header(12) + bytes(12), "a message must have 8 bytes here, got 12"),
-        (header(8) + bytes(4), "the connection is closed"),
+        (message_header(MOST_BYTES + 1), "a message must have at most"),
+        (message_header(12) + bytes(12), "a message must have 8 bytes here, got 12"),
+        (message_header(8) + bytes(4), "the connection is closed"),
         (b"", "the connection is closed"),
     ],
     ids=["too large", "of another size", "cut", "none"],

@@ -5,7 +5,7 @@ import torch
 
 from tests.demonstrations.played import played
 from warp_torchrl.algorithms.parallel import group
-from warp_torchrl.demonstrations.files import save
+from warp_torchrl.demonstrations.files import save_recording
 from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import compose_config, plain
 from warp_torchrl.training.learning import Learning
@@ -56,6 +56,6 @@ def test_a_process_has_its_share_of_the_memory_and_waits_for_its_share_of_the_wa
 
 
 def test_a_process_draws_its_share_of_what_people_did(learning, tmp_path):
-    save(played("horizon=16"), tmp_path)
+    save_recording(played("horizon=16"), tmp_path)
     made = learning("algorithm=mappo", f"imitation.demonstrations={tmp_path}", "imitation.minibatch_size=32")
     assert made.learner.keeps["demonstrations"].size == 16

@@ -12,7 +12,7 @@ from pettingzoo.test import render_test
 
 from warp_torchrl.api.adapters import FireExtinguishingVectorEnv, gym_env, parallel_env, pettingzoo
 from warp_torchrl.api.adapters.gymnasium import KEYS
-from warp_torchrl.api.adapters.screen import Terminal, Window, as_text
+from warp_torchrl.api.adapters.screen import PygameWindow, Terminal, as_text
 from warp_torchrl.world.state.state import is_burning
 
 
@@ -29,7 +29,7 @@ def machine(request, monkeypatch):
     pygame = pytest.importorskip("pygame")
     if request.param == "with a display":
         monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    yield Window if request.param == "with a display" else Terminal
+    yield PygameWindow if request.param == "with a display" else Terminal
     pygame.display.quit()
 
 

@@ -8,8 +8,8 @@ optuna = pytest.importorskip("optuna", reason="needs the extra search")
 
 from optuna.trial import TrialState, create_trial
 
-from warp_torchrl.commands.hyperparameters.figure import FIGURE, draw
-from warp_torchrl.commands.hyperparameters.report import BEST, CSV, TABLE, experiment, table, write
+from warp_torchrl.commands.hyperparameters.figure import SEARCH_FIGURE, draw_search
+from warp_torchrl.commands.hyperparameters.report import BEST, CSV, TABLE, experiment, trials_table, write
 from warp_torchrl.runs.config.compose import compose_config, plain
 from warp_torchrl.runs.config.search_options import SearchOptions
 from warp_torchrl.runs.config.space import dimension
@@ -49,7 +49,7 @@ def study():
 
 
 def test_the_table_has_the_best_first_and_those_that_came_furthest_next(study):
-    assert table(study, SPACE).splitlines()[2:] == [
+    assert trials_table(study, SPACE).splitlines()[2:] == [
         "| 2 | trained | 62.5 | - | 0.75 | 3 | relu |",
         "| 0, as it is | trained | 50.0 | - | 0.25 | 3 | tanh |",
         "| 4 | pruned at 60 % | 10.0 | - | 0.2 | 3 | tanh |",
@@ -60,10 +60,10 @@ def test_the_table_has_the_best_first_and_those_that_came_furthest_next(study):
 
 
 def test_what_ten_trials_hang_on_is_told(study):
-    assert "importance" not in table(study, SPACE)
+    assert "importance" not in trials_table(study, SPACE)
     for place in range(12):
         add(study, 0.08 * place, 0.08 * place, values=[0.08 * place])
-    row = table(study, SPACE).splitlines()[-1]
+    row = trials_table(study, SPACE).splitlines()[-1]
     name, *_, gamma, epochs, activation = (cell.strip(" %") for cell in row.strip("|").split("|"))
     assert name == "importance" and float(gamma) > 50.0 > float(epochs), row  # saved is gamma, epochs always 3
     assert float(gamma) + float(epochs) + float(activation) == pytest.approx(100.0, abs=1.0)
@@ -95,8 +95,8 @@ def test_a_search_without_a_trained_trial_has_a_table_and_no_best(tmp_path):
     add(study, 0.5, 0.2, "PRUNED", {25: 0.2})
     assert write(study, SPACE, [], SearchOptions(), tmp_path).endswith("No trial was trained to its end.")
     assert not (tmp_path / BEST).exists()
-    draw(study, SPACE, tmp_path)
-    assert not (tmp_path / FIGURE).exists()
+    draw_search(study, SPACE, tmp_path)
+    assert not (tmp_path / SEARCH_FIGURE).exists()
 
 
 @pytest.mark.parametrize(
@@ -126,10 +126,10 @@ def test_the_figure_has_a_panel_for_each_key(study, tmp_path):
         parts = {name: getattr(trial, name) for name in ("state", "value", "intermediate_values", "user_attrs")}
         both = {"params": {**trial.params, "rate": 0.3}, "distributions": {**DISTRIBUTIONS, "rate": rate}}
         made.add_trial(create_trial(**parts, **both))
-    draw(made, SPACE, tmp_path)
-    small = Image.open(tmp_path / FIGURE).size
-    draw(made, [*SPACE, dimension("rate=tag(log, interval(0.1, 1))")], tmp_path)
-    picture = Image.open(tmp_path / FIGURE).convert("RGB")
+    draw_search(made, SPACE, tmp_path)
+    small = Image.open(tmp_path / SEARCH_FIGURE).size
+    draw_search(made, [*SPACE, dimension("rate=tag(log, interval(0.1, 1))")], tmp_path)
+    picture = Image.open(tmp_path / SEARCH_FIGURE).convert("RGB")
     assert picture.size[0] == small[0] and picture.size[1] > small[1], "four keys have two rows"
     pixels = np.asarray(picture).reshape(-1, 3)
     best, trained = (np.abs(pixels - np.array(colour)).max(1) < 3 for colour in ((213, 94, 0), (0, 114, 178)))

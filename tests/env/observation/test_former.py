@@ -11,7 +11,7 @@ from tests.demonstrations.test_files import reseal
 from tests.forgery import forge
 from tests.training.test_loop import RUNS, TINIER, tiny
 from warp_torchrl import load_policy, make_env
-from warp_torchrl.demonstrations.files import MANIFEST, read, save
+from warp_torchrl.demonstrations.files import MANIFEST, read_recording, save_recording
 from warp_torchrl.env.observation import renamed, with_renamed
 from warp_torchrl.env.specs import check_names
 from warp_torchrl.runs.checkpoint import newest
@@ -83,13 +83,13 @@ def test_an_environment_s_state_of_before_is_restored():
 
 
 def test_a_recording_of_before_is_read(recording, tmp_path):  # noqa: F811
-    folder = save(recording, tmp_path)
+    folder = save_recording(recording, tmp_path)
     seen = folder / "steps" / "agents" / "observation"
     (seen / "status.memmap").rename(seen / "self.memmap")
     told = json.loads((folder / MANIFEST).read_text())
     files = {name.replace("/status.memmap", "/self.memmap"): entry for name, entry in told["files"].items()}
     reseal(folder, entries=formerly(told["entries"]), files=files)
-    assert (read(folder).steps == recording.steps).all()
+    assert (read_recording(folder).steps == recording.steps).all()
 
 
 @pytest.mark.parametrize("name", ["default", "generalist", "single", "skirmish"])

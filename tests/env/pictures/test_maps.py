@@ -10,7 +10,7 @@ from PIL import Image
 pytest.importorskip("matplotlib", reason="maps are drawn with Matplotlib (extra figures)")
 
 from warp_torchrl.env.pictures.drawing import cover_image, hillshade, style
-from warp_torchrl.env.pictures.maps import Panel, draw_maps, save_maps, without_holes
+from warp_torchrl.env.pictures.maps import MapPanel, draw_maps, save_maps, without_holes
 from warp_torchrl.world.state.state import Cover, Landscape
 
 
@@ -32,7 +32,7 @@ def images(panel, **options):
 def test_a_chance_runs_from_0_to_1_and_shows_the_ground_where_it_is_none():
     values = torch.full((20, 30), 0.5)
     values[0, 0], values[0, 1] = 0.0, math.nan
-    drawn = images(Panel(title="chance", values=values, label="probability"))
+    drawn = images(MapPanel(title="chance", values=values, label="probability"))
     assert drawn.get_clim() == (0.0, 1.0)
     assert drawn.get_array().mask.sum() == 2
 
@@ -40,28 +40,28 @@ def test_a_chance_runs_from_0_to_1_and_shows_the_ground_where_it_is_none():
 def test_a_change_is_white_where_there_is_none_and_as_far_to_both_sides():
     values = np.zeros((20, 30))
     values[3, 4] = -0.4
-    drawn = images(Panel(title="change", values=values, label="change", kind="change"))
+    drawn = images(MapPanel(title="change", values=values, label="change", kind="change"))
     assert drawn.get_clim() == (-0.4, 0.4) and (~drawn.get_array().mask).sum() == 1
 
 
 def test_an_amount_of_nothing_is_seen_and_one_beyond_the_top_has_an_arrow():
     values = torch.arange(600.0).view(20, 30)
-    amount = Panel(title="hours", values=values, label="h", kind="amount")
+    amount = MapPanel(title="hours", values=values, label="h", kind="amount")
     assert images(amount).get_clim() == (0.0, 599.0) and not images(amount).get_array().mask.any()
     assert images(amount).colorbar.extend == "neither"
-    cut = images(Panel(title="hours", values=values, label="h", kind="amount", top=24.0))
+    cut = images(MapPanel(title="hours", values=values, label="h", kind="amount", top=24.0))
     assert cut.get_clim() == (0.0, 24.0) and cut.colorbar.extend == "max"
 
 
 @pytest.mark.parametrize("value", [0.0, math.nan])
 def test_a_map_of_nothing_is_drawn(value, tmp_path):
-    panel = Panel(title="change", values=torch.full((20, 30), value), label="change", kind="change")
+    panel = MapPanel(title="change", values=torch.full((20, 30), value), label="change", kind="change")
     save_maps(tmp_path / "maps.png", ground(), [panel], 100.0, "nothing", torch.zeros(20, 30, dtype=torch.bool))
     assert Image.open(tmp_path / "maps.png").size[0] > 300
 
 
 def test_one_small_patch_is_a_star_in_its_middle_and_a_large_one_an_outline():
-    panel = Panel(title="chance", values=torch.ones(20, 30), label="probability")
+    panel = MapPanel(title="chance", values=torch.ones(20, 30), label="probability")
     lit = torch.zeros(20, 30, dtype=torch.bool)
     lit[4:7, 9:12] = True  # 100 m cells: its middle is 1.05 km east, and 1.45 km north of the south
     with style():
@@ -82,7 +82,7 @@ def test_holes_of_an_area_are_filled_and_its_bays_are_not():
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4])  # with the ground: one row, two of two, one of three and two
 def test_every_number_of_maps_finds_its_place(count, tmp_path):
-    panels = [Panel(title=f"map {number}", values=torch.ones(20, 30), label="m") for number in range(count)]
+    panels = [MapPanel(title=f"map {number}", values=torch.ones(20, 30), label="m") for number in range(count)]
     with style():
         figure = draw_maps(ground(relief=True), panels, 100.0, "a title")
     titles = [axes.get_title() for axes in figure.axes]

@@ -14,7 +14,7 @@ from warp_torchrl.evaluation.runs.curves import (
     SINGLE,
     band,
     curve_figures,
-    gather,
+    grouped_lines,
     learning_curves,
     lines_of,
 )
@@ -59,7 +59,7 @@ def write_run(folder, seed=0, n_agents=2, scenario="skirmish", steps=32, frames=
 
 
 def lines(*folders):
-    return gather([read_run(folder) for folder in run_folders(folders)])
+    return grouped_lines([read_run(folder) for folder in run_folders(folders)])
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import pytest
 from tests.evaluation.runs.test_curves import write_run
 from warp_torchrl.commands.curves import main
 from warp_torchrl.evaluation.runs.folders import read_run
-from warp_torchrl.evaluation.runs.reached import reached
+from warp_torchrl.evaluation.runs.reached import first_reached
 
 FRAMES = range(100, 4100, 100)  # a window of a twentieth: 100 to each side, three batches
 SAVED = [0.9, *[0.1] * 19, *[0.4] * 10, *[0.7] * 10]
@@ -27,14 +27,14 @@ def run(tmp_path):
     ],
 )
 def test_a_level_is_reached_by_the_mean_of_the_batches_about_one(run, level, frames):
-    found = reached(read_run(run), level - 1e-9)
+    found = first_reached(read_run(run), level - 1e-9)
     assert found == (None if frames is None else (frames, frames / 10))
 
 
 def test_short_episodes_of_the_first_batches_do_not_count(tmp_path):
     for first, frames in (([0.9, 0.1], None), ([0.1, 0.9], 200)):
         run = write_run(tmp_path / f"{frames}", frames=FRAMES, columns={"world__saved": first + [None] * 38})
-        assert reached(read_run(run), 0.8) == (frames and (frames, frames / 10))
+        assert first_reached(read_run(run), 0.8) == (frames and (frames, frames / 10))
 
 
 def test_it_is_printed_for_each_line(run, tmp_path, capsys):

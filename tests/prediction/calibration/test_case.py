@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from warp_torchrl.prediction.calibration.case import read_case
-from warp_torchrl.prediction.calibration.fitting import check_fuel
+from warp_torchrl.prediction.calibration.case import read_fire_case
+from warp_torchrl.prediction.calibration.fitting import check_fuel_codes
 from warp_torchrl.world.law.rate import RateFire
 
 rasterio = pytest.importorskip("rasterio", reason="rasters need the extra gis")
@@ -56,7 +56,7 @@ def perimeters(folder, *properties, crs="EPSG:4326", ring=RING, name="perimeters
 def test_perimeters_are_in_the_crs_that_their_file_states(fire, crs):
     empty = {"type": "Feature", "properties": {"hours": 1}, "geometry": None}
     perimeters(fire, {"hours": 1}, crs=crs, more=[empty])
-    scar = read_case(fire).scar
+    scar = read_fire_case(fire).scar
     assert int(scar.sum()) == 48 and scar[3:9, 3:11].all()
 
 
@@ -73,14 +73,14 @@ def test_perimeters_are_in_the_crs_that_their_file_states(fire, crs):
 )
 def test_the_time_of_a_perimeter_is_a_number_a_text_or_that_of_the_scar(fire, told, hours, minutes):
     perimeters(fire, told)
-    assert read_case(fire, hours).minutes.tolist() == [minutes]
+    assert read_fire_case(fire, hours).minutes.tolist() == [minutes]
 
 
 def test_perimeters_without_a_time_beside_others_need_one(fire):
     perimeters(fire, {"hours": 0.5}, {"name": "final"})
     with pytest.raises(ValueError, match=r"^small: perimeters.geojson must have features with minutes or hours"):
-        read_case(fire)
-    assert read_case(fire, 1.5).minutes.tolist() == [30.0, 90.0]
+        read_fire_case(fire)
+    assert read_fire_case(fire, 1.5).minutes.tolist() == [30.0, 90.0]
 
 
 def test_perimeters_of_other_times_do_not_pass_for_one(fire):
@@ -88,27 +88,27 @@ def test_perimeters_of_other_times_do_not_pass_for_one(fire):
     with pytest.raises(
         ValueError, match=r"hours= must say .*, its features have poly_DateCurrent 1719838800000, 17198424"
     ):
-        read_case(fire)
-    assert read_case(fire, 1.5).minutes.tolist() == [90.0]
+        read_fire_case(fire)
+    assert read_fire_case(fire, 1.5).minutes.tolist() == [90.0]
     perimeters(fire, {"DATE_": "2024-07-01"}, {"DATE_": "2024-07-01"})
-    assert len(read_case(fire).minutes) == 1
+    assert len(read_fire_case(fire).minutes) == 1
 
 
 @pytest.mark.parametrize("value", ["noon", -1, 0, True, [1], 1e400, "nan"])
 def test_times_that_are_none_are_refused(fire, value):
     perimeters(fire, {"hours": value})
     with pytest.raises(ValueError, match=r"^small: perimeters.geojson must have features with minutes or hours over 0"):
-        read_case(fire)
+        read_fire_case(fire)
 
 
 def test_a_narrow_perimeter_beside_another_has_its_cells(fire):
     x, y = 500005.0, 4499520.0  # a strip of eight metres along a diagonal
     strip = [(x, y), (x + 400, y - 80), (x + 400, y - 88), (x, y - 8), (x, y)]
     perimeters(fire, {"hours": 1}, crs=UTM)
-    alone = int(read_case(fire).scar.sum())
+    alone = int(read_fire_case(fire).scar.sum())
     shape = {"type": "Polygon", "coordinates": [strip]}
     perimeters(fire, {"hours": 1}, crs=UTM, more=[{"type": "Feature", "properties": {"hours": 1}, "geometry": shape}])
-    assert int(read_case(fire).scar.sum()) > alone + 12
+    assert int(read_fire_case(fire).scar.sum()) > alone + 12
 
 
 def test_a_shapefile_is_a_scar(fire):
@@ -118,7 +118,7 @@ def test_a_shapefile_is_a_scar(fire):
         writer.poly([RING])
         writer.record("Camp")
     (fire / "scar.prj").write_text(rasterio.crs.CRS.from_string(UTM).to_wkt())
-    case = read_case(fire)
+    case = read_fire_case(fire)
     assert int(case.scar.sum()) == 48 and case.last == 120.0
     assert case.files == [
         "fuel: fuel.tif",
@@ -131,7 +131,7 @@ def test_a_shapefile_is_a_scar(fire):
 def test_what_nobody_reads_is_named(fire):
     perimeters(fire, {"hours": 1})
     tif(fire / "canopy.tif", np.full((SIDE, SIDE), 50))
-    assert read_case(fire).files[-1] == "files of small that are not read: canopy.tif"
+    assert read_fire_case(fire).files[-1] == "files of small that are not read: canopy.tif"
 
 
 @pytest.mark.parametrize("kind", ["asc", "tif"])
@@ -142,7 +142,7 @@ def test_times_of_arrival_without_declared_nodata_are_those_of_cells_that_burned
         asc(fire / "arrival.asc", times, nodata=False)
     else:
         tif(fire / "arrival.tif", times, "float32")
-    case = read_case(fire)
+    case = read_fire_case(fire)
     assert case.burned.sum((1, 2)).tolist() == [2, 3] and int((~case.arrival.isnan()).sum()) == 3
 
 
@@ -150,7 +150,7 @@ def test_times_of_arrival_are_in_the_unit_that_the_band_states(fire):
     path = tif(fire / "arrival.tif", np.where(np.eye(SIDE) > 0, 1.5, -1.0), "float32")
     with rasterio.open(path, "r+") as file:
         file.units = ("hours",)
-    assert read_case(fire).arrival[3, 3] == 90.0
+    assert read_fire_case(fire).arrival[3, 3] == 90.0
 
 
 @pytest.mark.parametrize("name", ["ignition.tif", "ignition.geojson"])
@@ -163,7 +163,7 @@ def test_an_ignition_may_be_what_predict_reads(fire, name):
         tif(fire / name, values)
     else:
         perimeters(fire, {}, name=name)
-    assert torch.equal(read_case(fire).lit, read_case(fire).scar)
+    assert torch.equal(read_fire_case(fire).lit, read_fire_case(fire).scar)
 
 
 @pytest.mark.parametrize(
@@ -186,15 +186,15 @@ def test_what_does_not_fit_is_refused_in_one_line(fire, write, words):
     if len(list(fire.glob("arrival.*")) + list(fire.glob("scar.*"))) > 0:
         (fire / "perimeters.geojson").unlink()
     with pytest.raises(ValueError, match=f"^small: .*{words}") as error:
-        read_case(fire)
+        read_fire_case(fire)
     assert "\n" not in str(error.value)
 
 
 def test_hours_beyond_the_weather_are_refused(fire):
     perimeters(fire, {})
-    assert read_case(fire, 2.0).last == 120.0
+    assert read_fire_case(fire, 2.0).last == 120.0
     with pytest.raises(ValueError, match="known in hours of the weather, 2, got 40"):
-        read_case(fire, 40.0)
+        read_fire_case(fire, 40.0)
 
 
 def test_fuel_that_the_law_lacks_is_named(fire):
@@ -202,7 +202,7 @@ def test_fuel_that_the_law_lacks_is_named(fire):
     codes[0, :3], codes[1, 0] = 312, -9999
     tif(fire / "fuel.tif", codes)
     perimeters(fire, {"hours": 1})
-    case = read_case(fire)
+    case = read_fire_case(fire)
     with pytest.raises(ValueError, match=r"^small: fuel must hold codes of fbfm40, 99 where .*, got 312 \(3 cells\)$"):
-        check_fuel(case, RateFire())
+        check_fuel_codes(case, RateFire())
     assert RateFire().told_fuel(case.landscape) == "102 (396); no fuel: 99 (1), 312 (3)"

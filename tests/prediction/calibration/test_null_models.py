@@ -5,7 +5,7 @@ import math
 import pytest
 import torch
 
-from warp_torchrl.prediction.calibration.null_models import circle, ellipse, length_to_breadth, mean_wind
+from warp_torchrl.prediction.calibration.null_models import circle_cells, ellipse_cells, length_to_breadth, mean_wind
 
 FUEL = torch.ones(61, 61, dtype=torch.bool)
 
@@ -19,12 +19,12 @@ def lit():
 def test_both_have_the_cells_that_were_asked_for_and_burn_fuel_alone():
     fuel = FUEL.clone()
     fuel[:, 33:36] = False
-    for burned in (circle(lit(), fuel, 300), ellipse(lit(), fuel, 300, torch.tensor([3.0, 0.0]))):
+    for burned in (circle_cells(lit(), fuel, 300), ellipse_cells(lit(), fuel, 300, torch.tensor([3.0, 0.0]))):
         assert int(burned.sum()) == 300 and not (burned & ~fuel).any() and burned[30, 30]
 
 
 def test_a_circle_is_as_wide_as_high():
-    burned = circle(lit(), FUEL, 441)
+    burned = circle_cells(lit(), FUEL, 441)
     row, column = burned.nonzero().float().T
     assert row.mean() == pytest.approx(30, abs=0.2) and column.mean() == pytest.approx(30, abs=0.2)
     radius = math.sqrt(441 / math.pi)
@@ -33,7 +33,7 @@ def test_a_circle_is_as_wide_as_high():
 
 @pytest.mark.parametrize(("u", "v"), [(3.0, 0.0), (0.0, 3.0), (-3.0, 0.0), (0.0, -3.0)])
 def test_an_ellipse_points_downwind_from_its_focus(u, v):
-    burned = ellipse(lit(), FUEL, 300, torch.tensor([u, v]))
+    burned = ellipse_cells(lit(), FUEL, 300, torch.tensor([u, v]))
     row, column = burned.nonzero().float().T
     east, north = column - 30, 30 - row
     along, across = (east * u + north * v) / 3.0, (east * v - north * u) / 3.0
@@ -44,7 +44,7 @@ def test_an_ellipse_points_downwind_from_its_focus(u, v):
 
 
 def test_without_wind_the_ellipse_is_the_circle():
-    assert torch.equal(ellipse(lit(), FUEL, 300, torch.zeros(2)), circle(lit(), FUEL, 300))
+    assert torch.equal(ellipse_cells(lit(), FUEL, 300, torch.zeros(2)), circle_cells(lit(), FUEL, 300))
 
 
 def test_the_length_to_breadth_is_that_of_the_canadian_curve():

@@ -7,7 +7,7 @@ import torch
 from tests.world.rasters import FIRES, LANDFIRE, needs_fires, needs_landfire, read
 from warp_torchrl.world.behaviour.fbp_fuels import fbp_fuels
 from warp_torchrl.world.state.state import Cover
-from warp_torchrl.world.terrain.fuel import FBFM13, FBFM40, FBP, NO_FUEL, TABLES, WORLDCOVER, code_table, to_cover
+from warp_torchrl.world.terrain.fuel import FBFM13, FBFM40, FBP, NO_FUEL_CODE, TABLES, WORLDCOVER, code_table, to_cover
 from warp_torchrl.world.terrain.landscape import holds_trees
 
 LETTERS = {Cover.LAKE: "L", Cover.WETLAND: "W", Cover.GRASSLAND: "G", Cover.FOREST: "F", Cover.BARE: "B"}
@@ -49,7 +49,7 @@ def test_what_burns_in_the_fbp_table_is_what_has_a_rate_of_spread():
     codes = torch.tensor(sorted(FBP))
     burns = fbp_fuels(codes).a > 0.0
     assert torch.equal(burns, holds_trees(torch.tensor([int(FBP[code]) for code in codes.tolist()], dtype=torch.uint8)))
-    assert FBP[NO_FUEL] == Cover.BARE and FBFM13[NO_FUEL] == FBFM40[NO_FUEL] == Cover.BARE
+    assert FBP[NO_FUEL_CODE] == Cover.BARE and FBFM13[NO_FUEL_CODE] == FBFM40[NO_FUEL_CODE] == Cover.BARE
 
 
 @needs_fires

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.world.rasters import rasterio
-from warp_torchrl.world.terrain.features import Part
+from warp_torchrl.world.terrain.features import GeometryPart
 from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.vector import Shape, burn_in, mark
 
@@ -19,7 +19,7 @@ def polygon(*rings, feature=0, kind="Polygon"):
     arrays = [
         np.array([(x, 12.0 - y) for x, y in (*ring, *([ring[0]] if kind == "Polygon" else []))]) for ring in rings
     ]
-    return Shape(Part(kind, arrays), {}, feature)
+    return Shape(GeometryPart(kind, arrays), {}, feature)
 
 
 def strip(start, end, width):

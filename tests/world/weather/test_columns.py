@@ -2,7 +2,7 @@
 
 import pytest
 
-from warp_torchrl.world.weather.columns import find_columns, read_header
+from warp_torchrl.world.weather.columns import find_columns, read_column_header
 from warp_torchrl.world.weather.quantities import QUANTITIES
 
 
@@ -39,13 +39,13 @@ from warp_torchrl.world.weather.quantities import QUANTITIES
     ],
 )
 def test_a_header_is_a_quantity_a_unit_and_a_height(header, quantity, unit, height):
-    found = read_header(header)
+    found = read_column_header(header)
     assert (found.quantity, found.unit if quantity else None, found.height) == (quantity, unit, height)
 
 
 def test_wind_of_other_heights_and_air_above_two_metres_are_not_read():
     for name in ("wind_speed_100m (km/h)", "wind_speed_2m (km/h)", "temperature_80m (°C)"):
-        assert read_header(name).quantity is None
+        assert read_column_header(name).quantity is None
     with pytest.raises(ValueError, match=r"wind_speed_80m \(m/s\) is not the wind at 10 m or 20 ft"):
         find_columns(["wind_speed_80m (m/s)", "WD"])
 
@@ -55,7 +55,7 @@ def test_every_name_is_one_quantity_and_reads_as_its_own():
     assert len(names) == len(set(names))
     for quantity, kind in QUANTITIES.items():
         for tier in kind.names:
-            assert {read_header(name).quantity for name in tier - {"wind"}} == {quantity}
+            assert {read_column_header(name).quantity for name in tier - {"wind"}} == {quantity}
 
 
 RAWS = ["Year", "Mth", "Day", "Time", "Temp", "RH", "Precip", "WindSpd", "WindDir"]
@@ -87,7 +87,7 @@ def test_what_nobody_states_is_asked_for(headers, temperature):
     row = [temperature] * len(headers)
     with pytest.raises(ValueError) as refusal:
         find_columns(headers, [row])
-    wind = next(header for header in headers if read_header(header).quantity == "wind_speed")
+    wind = next(header for header in headers if read_column_header(header).quantity == "wind_speed")
     assert str(refusal.value) == (
         f"{wind} must name its unit (m/s, km/h, mph, kt), as in wind_speed [m/s], got none: write it there, or say "
         "which by the key units.wind_speed"

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from warp_torchrl.world.weather.fwi import buildup_index, hourly_ffmc
-from warp_torchrl.world.weather.table import Weather, read_weather
+from warp_torchrl.world.weather.table import WeatherValues, read_weather
 
 FIRES = Path(__file__).parents[4] / "shared" / "fires"
 needs_fires = pytest.mark.skipif(not FIRES.is_dir(), reason="the shared fires are not here")
@@ -137,11 +137,11 @@ def test_a_row_holds_until_the_next_and_the_last_holds_on(table):
     weather = table("hours,WS,WD,FFMC\n0,3.6,0,80\n1,7.2,90,85\n3,10.8,180,90")
     minutes = torch.tensor([[-5.0, 0.0, 59.9], [60.0, 179.0, 1e6]])
     at = weather.at(minutes)
-    assert type(at) is Weather and at.temperature is None and at.wind_height == "10m"
+    assert type(at) is WeatherValues and at.temperature is None and at.wind_height == "10m"
     assert torch.allclose(at.wind_speed, torch.tensor([[1.0, 1, 1], [2, 2, 3]]))
     assert at.ffmc.tolist() == [[80, 80, 80], [85, 85, 90]]
     assert weather.at(100).wind_bearing.item() == 90
-    values = [getattr(at, each.name) for each in fields(Weather)]
+    values = [getattr(at, each.name) for each in fields(WeatherValues)]
     assert {(each.dtype, each.shape) for each in values if isinstance(each, torch.Tensor)} == {(torch.float32, (2, 3))}
 
 

@@ -10,10 +10,10 @@ from typing import Any, ParamSpec, Protocol, TypeVar
 import torch
 from torch import Tensor
 
-from warp_torchrl.algorithms.parallel.messages import packed, unpacked
+from warp_torchrl.algorithms.parallel.messages import deserialised, serialised
 
 Given = ParamSpec("Given")
-Told = TypeVar("Told")
+Result = TypeVar("Result")
 
 
 class WorkerDied(Exception):  # noqa: N818
@@ -75,11 +75,11 @@ def rank() -> int:
     return 0 if _group is None else _group.rank
 
 
-def _collective(operation: Callable[Given, Told]) -> Callable[Given, Told]:
+def _collective(operation: Callable[Given, Result]) -> Callable[Given, Result]:
     """Convert errors of an operation to ``WorkerDied``; torch has no type for the end of another process."""
 
     @wraps(operation)
-    def told(*args: Given.args, **kwargs: Given.kwargs) -> Told:
+    def told(*args: Given.args, **kwargs: Given.kwargs) -> Result:
         try:
             return operation(*args, **kwargs)
         except (RuntimeError, OSError) as error:
@@ -115,8 +115,8 @@ def share(value: Any) -> Any:
     if _group is None:
         return value
     if _group.rank:
-        return unpacked(_group.broadcast(None))
-    _group.broadcast(packed(value))
+        return deserialised(_group.broadcast(None))
+    _group.broadcast(serialised(value))
     return value
 
 
@@ -125,8 +125,8 @@ def gather(value: Any) -> list[Any]:
     """Return the values of all processes in process 0, and nothing in the others."""
     if _group is None:
         return [value]
-    found = _group.gather(packed(value))
-    return [value, *map(unpacked, found[1:])] if found else []
+    found = _group.gather(serialised(value))
+    return [value, *map(deserialised, found[1:])] if found else []
 
 
 def standardised(parts: Sequence[Tensor], dim: int) -> list[Tensor]:

@@ -43,7 +43,7 @@ def processes(count: int, values: Mapping[str, Any], module: str) -> Iterator[No
     Args:
         count: Processes in all.
         values: The configuration, which is sent to the others.
-        module: Module that they run: it calls ``follow``.
+        module: Module that they run: it calls ``follow`` of this module.
 
     Raises:
         WorkerDied: If one of the others ends before the block does.

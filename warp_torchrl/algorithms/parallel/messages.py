@@ -14,15 +14,15 @@ HEADER = 8
 """Bytes that hold the size of what follows."""
 
 
-def packed(value: Any) -> memoryview:
+def serialised(value: Any) -> memoryview:
     """Return a value as bytes."""
     held = io.BytesIO()
     torch.save(value, held)
     return held.getbuffer()
 
 
-def unpacked(message: bytes | bytearray | memoryview) -> Any:
-    """Return the value that ``packed`` has made bytes of, with its tensors on the CPU.
+def deserialised(message: bytes | bytearray | memoryview) -> Any:
+    """Return the value that ``serialised`` has made bytes of, with its tensors on the CPU.
 
     Raises:
         UnpicklingError: If it holds anything but plain values.
@@ -30,7 +30,7 @@ def unpacked(message: bytes | bytearray | memoryview) -> Any:
     return torch.load(io.BytesIO(message), weights_only=True, map_location="cpu")
 
 
-def header(size: int) -> bytes:
+def message_header(size: int) -> bytes:
     """Return the bytes that announce a message."""
     return size.to_bytes(HEADER, "little")
 

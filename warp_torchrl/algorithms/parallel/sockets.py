@@ -15,7 +15,7 @@ from torch import Tensor
 from torch import distributed as dist
 from torch.distributed import FileStore  # type: ignore[attr-defined]  # torch does not say that it exports it
 
-from warp_torchrl.algorithms.parallel.messages import HEADER, announced, header
+from warp_torchrl.algorithms.parallel.messages import HEADER, announced, message_header
 
 _LOOPBACK = "lo"  # the interface by which NCCL talks on one machine
 _WAIT = timedelta(days=1)  # a process that has ended is noticed at once; others may wait for an evaluation
@@ -110,7 +110,7 @@ def _bytes_of(tensor: Tensor) -> memoryview:
 
 
 def _send(end: socket.socket, message: memoryview) -> None:
-    end.sendall(header(message.nbytes))
+    end.sendall(message_header(message.nbytes))
     end.sendall(message)
 
 

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 from torch import distributed as dist
 
-from warp_torchrl.algorithms.parallel.messages import HEADER, announced, header
+from warp_torchrl.algorithms.parallel.messages import HEADER, announced, message_header
 
 _WAIT = timedelta(days=1)  # a process that has ended is noticed at once; others may wait for an evaluation
 
@@ -39,7 +39,7 @@ class Torchrun:
 
     def broadcast(self, message: memoryview | None) -> memoryview:
         """Return the first process's message in every process."""
-        head = _tensor(header(0 if message is None else message.nbytes))
+        head = _tensor(message_header(0 if message is None else message.nbytes))
         dist.broadcast(head, 0)
         held = _empty(head) if message is None else _tensor(message)
         dist.broadcast(held, 0)
@@ -48,7 +48,7 @@ class Torchrun:
     def gather(self, message: memoryview) -> list[memoryview]:
         """Return the messages of all processes in the first one, and nothing in the others."""
         if self.rank:
-            dist.send(_tensor(header(message.nbytes)), 0)
+            dist.send(_tensor(message_header(message.nbytes)), 0)
             dist.send(_tensor(message), 0)
             return []
         return [message, *(_received(rank) for rank in range(1, self.size))]

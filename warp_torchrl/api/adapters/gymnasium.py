@@ -9,7 +9,7 @@ import torch
 from gymnasium import spaces
 
 from warp_torchrl.api.adapters.screen import FRAMES_PER_SECOND, Screen
-from warp_torchrl.api.adapters.worlds import NumpyStep, Worlds, action_number
+from warp_torchrl.api.adapters.worlds import NumpyStep, NumpyWorlds, action_number
 
 RENDER_MODES = ("rgb_array",)
 KEYS = {"w": 0, "e": 1, "d": 2, "c": 3, "x": 4, "z": 5, "a": 6, "q": 7, " ": 8, "f": 9, "s": 10}
@@ -55,7 +55,7 @@ class FireExtinguishingEnv(gymnasium.Env[Observation, int]):
         overrides: Sequence[str] = (),
         **more: object,
     ) -> None:
-        self._worlds = Worlds(
+        self._worlds = NumpyWorlds(
             scenario, n_worlds=1, seed=seed, layout=layout, device=device, overrides=overrides, more=more
         )
         check_alone(self._worlds, scenario)
@@ -126,7 +126,7 @@ gym_env = FireExtinguishingEnv
 """The same, beside ``parallel_env``."""
 
 
-def check_alone(worlds: Worlds, scenario: str) -> None:
+def check_alone(worlds: NumpyWorlds, scenario: str) -> None:
     """Check that the team has one agent, as Gymnasium needs.
 
     Raises:

@@ -11,7 +11,7 @@ from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
 from warp_torchrl.api.adapters.screen import FRAMES_PER_SECOND, Screen
-from warp_torchrl.api.adapters.worlds import NumpyStep, Worlds, action_number
+from warp_torchrl.api.adapters.worlds import NumpyStep, NumpyWorlds, action_number
 
 RENDER_MODES = ("human", "rgb_array")
 Observation = np.ndarray | dict[str, np.ndarray]
@@ -69,7 +69,7 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
         **more: object,
     ) -> None:
         more = more if max_cycles is None else {**more, "horizon": max_cycles}
-        self._worlds = Worlds(
+        self._worlds = NumpyWorlds(
             scenario, n_worlds=1, seed=seed, layout=layout, device=device, overrides=overrides, more=more
         )
         self.render_mode = render_mode

@@ -72,10 +72,10 @@ def viewer(title: str) -> Viewer:
     except pygame.error:
         return Terminal()
     # Without a display pygame may draw off-screen.
-    return Terminal() if pygame.display.get_driver() == "offscreen" else Window(pygame, title)
+    return Terminal() if pygame.display.get_driver() == "offscreen" else PygameWindow(pygame, title)
 
 
-class Window:
+class PygameWindow:
     """A pygame window.
 
     Args:

@@ -11,7 +11,7 @@ from gymnasium.vector.utils import batch_space
 
 from warp_torchrl.api.adapters.gymnasium import Observation, check_alone
 from warp_torchrl.api.adapters.screen import FRAMES_PER_SECOND
-from warp_torchrl.api.adapters.worlds import NumpyStep, Worlds, whole_number
+from warp_torchrl.api.adapters.worlds import NumpyStep, NumpyWorlds, whole_number
 
 
 class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
@@ -65,7 +65,7 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
         if mode not in ("NextStep", "SameStep"):
             raise ValueError(f"autoreset_mode must be NextStep or SameStep, got {mode!r}")
         num_envs = whole_number("num_envs", num_envs)
-        self._worlds = Worlds(
+        self._worlds = NumpyWorlds(
             scenario, n_worlds=num_envs, seed=seed, layout=layout, device=device, overrides=overrides, more=more
         )
         check_alone(self._worlds, scenario)

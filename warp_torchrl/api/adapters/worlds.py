@@ -56,7 +56,7 @@ class UnknownKeywordError(ConfigError, TypeError):
     """A keyword that is neither an argument nor a configuration key; a ``TypeError``, as of any function."""
 
 
-class Worlds:
+class NumpyWorlds:
     """An environment from ``make_env`` with numpy inputs and outputs.
 
     Args:

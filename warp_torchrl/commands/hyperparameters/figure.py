@@ -9,19 +9,19 @@ import optuna
 from optuna.trial import FrozenTrial, TrialState
 
 from warp_torchrl.commands.hyperparameters.search import best_of
-from warp_torchrl.env.pictures.drawing import BLUE, INK, SOFT, VERMILION, save, sheet, style
+from warp_torchrl.env.pictures.drawing import BLUE, INK, SOFT, VERMILION, save_figure, sheet, style
 from warp_torchrl.runs.config.space import Dimension
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FIGURE = "search.png"
+SEARCH_FIGURE = "search.png"
 _COLUMNS = 3
 _MARGIN = 1.15
 _LONGEST = 14  # characters of a choice on an axis
 
 
-def draw(study: optuna.Study, space: Sequence[Dimension], folder: Path) -> None:
+def draw_search(study: optuna.Study, space: Sequence[Dimension], folder: Path) -> None:
     """Draw a search into its folder; nothing where no trial has a value yet.
 
     Raises:
@@ -48,7 +48,7 @@ def draw(study: optuna.Study, space: Sequence[Dimension], folder: Path) -> None:
             axes[row[0]].set_ylabel("forest saved [%]")
         for each in axes.values():
             each.spines[["top", "right"]].set_visible(False)
-        save(figure, folder / FIGURE)
+        save_figure(figure, folder / SEARCH_FIGURE)
 
 
 def _history(axes: "Axes", trained: Sequence[FrozenTrial], pruned: Sequence[FrozenTrial], best: FrozenTrial) -> None:

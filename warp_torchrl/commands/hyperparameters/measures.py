@@ -4,12 +4,12 @@ import csv
 import math
 from pathlib import Path
 
-from warp_torchrl.runs.destination import LARGEST
+from warp_torchrl.runs.destination import LARGEST_EVALUATION
 from warp_torchrl.system.foreign import Foreign, read_bytes, read_json
 
-STEP = 5
+COMPARED_EVERY = 5
 """Between two of the shares at which trials are compared [% of a training]."""
-LAST = 80
+VALUED_FROM = 80
 """The mean over what comes after is the value of a training [%]."""
 _LARGEST_NUMBER = 1e15
 _LARGEST = 100_000_000  # bytes of a metrics.csv
@@ -28,26 +28,26 @@ def saved_by_share(path: Path, total: int) -> dict[int, float]:
     rows = _rows(path)
     reached = min(100, int(100 * max((frames for frames, _ in rows), default=0) / total))
     found: dict[int, float] = {}
-    for share in range(STEP, reached + 1, STEP):
-        low, high = (share - STEP) * total / 100, math.inf if share == 100 else share * total / 100
+    for share in range(COMPARED_EVERY, reached + 1, COMPARED_EVERY):
+        low, high = (share - COMPARED_EVERY) * total / 100, math.inf if share == 100 else share * total / 100
         within = [saved for frames, saved in rows if low < frames <= high and math.isfinite(saved)]
         if within:
             found[share] = sum(within) / len(within)
         elif found:
-            found[share] = found[share - STEP]
+            found[share] = found[share - COMPARED_EVERY]
     return found
 
 
 def saved_at_the_end(path: Path, total: int) -> float | None:
     """Return the mean of ``world/saved`` over the last fifth of a training; None where no episode ended in it."""
-    last = [saved for frames, saved in _rows(path) if frames > LAST * total / 100 and math.isfinite(saved)]
+    last = [saved for frames, saved in _rows(path) if frames > VALUED_FROM * total / 100 and math.isfinite(saved)]
     return sum(last) / len(last) if last else None
 
 
 def saved_in_evaluation(path: Path) -> float | None:
     """Return the mean share of the forest that an ``evaluation.json`` says; None where there is none."""
     try:
-        found = read_json(path, LARGEST)["metrics"]["saved"]["mean"]
+        found = read_json(path, LARGEST_EVALUATION)["metrics"]["saved"]["mean"]
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return float(found) if type(found) in (int, float) and abs(found) <= _LARGEST_NUMBER else None

@@ -36,7 +36,7 @@ def write(
     study: optuna.Study, space: Sequence[Dimension], fixed: Sequence[str], options: SearchOptions, folder: Path
 ) -> str:
     """Write table, CSV and best values into a search's folder, and return the table with what is said below it."""
-    page = "\n\n".join([table(study, space), *_notes(study, space, fixed, options, folder)])
+    page = "\n\n".join([trials_table(study, space), *_notes(study, space, fixed, options, folder)])
     disk.replace(folder / TABLE, page + "\n")
     disk.replace(folder / CSV, _csv(study, space))
     best = best_of(study)
@@ -62,7 +62,7 @@ def _value(trial: FrozenTrial) -> float:
     return trial.value if trial.value is not None else -math.inf
 
 
-def table(study: optuna.Study, space: Sequence[Dimension]) -> str:
+def trials_table(study: optuna.Study, space: Sequence[Dimension]) -> str:
     """Return a Markdown table of the trials.
 
     ``saved`` is the value of a trial that was trained to its end, and ``world/saved`` of a pruned one where it ended.

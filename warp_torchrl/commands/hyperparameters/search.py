@@ -11,11 +11,11 @@ import optuna
 from optuna.trial import FrozenTrial, TrialState
 
 from warp_torchrl.commands.hyperparameters.measures import saved_at_the_end, saved_by_share, saved_in_evaluation
-from warp_torchrl.commands.hyperparameters.storage import ask, draw, goes_on
+from warp_torchrl.commands.hyperparameters.storage import ask, draw_values, goes_on
 from warp_torchrl.runs.checkpoint import holds_any, leave_policy
 from warp_torchrl.runs.config.search_options import SearchOptions
 from warp_torchrl.runs.config.space import Dimension, Value
-from warp_torchrl.runs.process import STOPPED, SearchEnded, Training
+from warp_torchrl.runs.process import STOPPED, SearchEnded, StartedTraining
 from warp_torchrl.system.exit_codes import DISK, DONE, NUMERICAL
 from warp_torchrl.system.lock import RunFolderInUse, RunFolderLock
 
@@ -33,7 +33,7 @@ class _Running:
 
     trial: optuna.Trial
     folders: list[Path]
-    trainings: list[Training]
+    trainings: list[StartedTraining]
     total: int
     reported: set[int] = field(default_factory=set)
     is_pruned: bool = False
@@ -64,7 +64,7 @@ class Search:
     space: Sequence[Dimension]
     options: SearchOptions
     folder: Path
-    start: Callable[[Mapping[str, Value], int, Path], Training]
+    start: Callable[[Mapping[str, Value], int, Path], StartedTraining]
     total: Callable[[Mapping[str, Value]], int]
     after: Callable[[], object] = lambda: None
     received: Callable[[], int] = lambda: 0
@@ -105,7 +105,7 @@ class Search:
         return self.study.get_trials(deepcopy=False, states=states)
 
     def _start(self, trial: optuna.Trial) -> None:
-        values = draw(trial, self.space)
+        values = draw_values(trial, self.space)
         place = self.folder / TRIALS / str(trial.number)
         seeds = range(self.options.seeds)
         folders = [place] if self.options.seeds == 1 else [place / f"seed_{seed}" for seed in seeds]

@@ -13,7 +13,7 @@ import optuna
 from optuna.storages import JournalStorage
 from optuna.storages.journal import JournalFileBackend
 
-from warp_torchrl.commands.hyperparameters.measures import STEP
+from warp_torchrl.commands.hyperparameters.measures import COMPARED_EVERY
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.search_options import SearchOptions
 from warp_torchrl.runs.config.space import Dimension, Value
@@ -65,7 +65,7 @@ def _drop_cut_line(path: Path) -> None:
 
 
 def _pruner(options: SearchOptions) -> optuna.pruners.BasePruner:
-    first = max(STEP, round(100 * options.prune_from))
+    first = max(COMPARED_EVERY, round(100 * options.prune_from))
     if options.pruner == "median":
         return optuna.pruners.MedianPruner(n_startup_trials=options.startup, n_warmup_steps=first)
     if options.pruner == "hyperband":
@@ -80,7 +80,7 @@ def ask(study: optuna.Study, space: Sequence[Dimension], options: SearchOptions)
     """
     study.sampler = _sampler(options, len(study.get_trials(deepcopy=False)))
     trial = study.ask()
-    draw(trial, space)
+    draw_values(trial, space)
     return trial
 
 
@@ -88,11 +88,11 @@ def goes_on(study: optuna.Study, number: int, space: Sequence[Dimension], option
     """Return a trial that was begun, with its values; values that a kill left undrawn are drawn."""
     study.sampler = _sampler(options, number)
     trial = optuna.Trial(study, study.get_trials(deepcopy=False)[number]._trial_id)
-    draw(trial, space)
+    draw_values(trial, space)
     return trial
 
 
-def draw(trial: optuna.Trial, space: Sequence[Dimension]) -> dict[str, Value]:
+def draw_values(trial: optuna.Trial, space: Sequence[Dimension]) -> dict[str, Value]:
     """Return the values of a trial, drawn where it has none yet."""
     return {each.key: _suggest(trial, each) for each in space}
 

@@ -98,7 +98,7 @@ def ramp(name: str, low: float, high: float) -> Any:
     return ListedColormap(matplotlib.colormaps[name](np.linspace(low, high, 256)))
 
 
-def save(figure: "Figure", path: Path, largest: int | None = _LARGEST) -> None:
+def save_figure(figure: "Figure", path: Path, largest: int | None = _LARGEST) -> None:
     """Write a PNG, the same bytes for the same figure and Matplotlib.
 
     Args:
@@ -130,7 +130,7 @@ def show_map(axes: "Axes", image: Tensor | np.ndarray, cell_size: float = CELL, 
     return shown
 
 
-def places(size: int, cell_size: float = CELL, descending: bool = False) -> np.ndarray:
+def axis_places(size: int, cell_size: float = CELL, descending: bool = False) -> np.ndarray:
     """Return where the middles of a map's columns lie on its axes, or of its rows (descending) [km]."""
     middle = (np.arange(size) + 0.5) * cell_size / 1000.0
     return middle[::-1] if descending else middle
@@ -139,7 +139,9 @@ def places(size: int, cell_size: float = CELL, descending: bool = False) -> np.n
 def contours(axes: "Axes", plane: Tensor, cell_size: float = CELL, **options: Any) -> Any:
     """Draw contour lines of a plane [H, W] over a map."""
     height, width = plane.shape
-    return axes.contour(places(width, cell_size), places(height, cell_size, True), np.asarray(plane), **options)
+    return axes.contour(
+        axis_places(width, cell_size), axis_places(height, cell_size, True), np.asarray(plane), **options
+    )
 
 
 def scale_bar(axes: "Axes", width: float) -> None:

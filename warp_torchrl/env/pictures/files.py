@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from warp_torchrl.env.pictures.drawing import save, style
+from warp_torchrl.env.pictures.drawing import save_figure, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,7 +26,7 @@ def draw_figure(draw: Callable[[], "Figure"], path: Path) -> Path:
     """Draw a figure and write it as PNG; a missing folder is made."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with style():
-        save(draw(), path)
+        save_figure(draw(), path)
     return path
 
 

@@ -11,14 +11,14 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.env.pictures.drawing import (
+    axis_places,
     contours,
     cover_image,
     cover_legend,
     hillshade,
-    places,
     ramp,
     round_length,
-    save,
+    save_figure,
     sheet,
     show_map,
     style,
@@ -38,7 +38,7 @@ _SMALL = 0.06  # share of the map's side below which an ignition is marked by a 
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Panel:
+class MapPanel:
     """One map of a figure.
 
     Attributes:
@@ -59,7 +59,7 @@ class Panel:
 
 def draw_maps(
     ground: Landscape,
-    panels: Sequence[Panel],
+    panels: Sequence[MapPanel],
     cell_size: float,
     title: str,
     ignition: Tensor | np.ndarray | None = None,
@@ -102,7 +102,7 @@ def save_maps(path: Path, *arguments: Any, **options: Any) -> None:
         ImportError: If Matplotlib is not installed.
     """
     with style():
-        save(draw_maps(*arguments, **options), path, largest=None)
+        save_figure(draw_maps(*arguments, **options), path, largest=None)
 
 
 def _light(ground: Landscape, cell_size: float) -> Tensor | None:
@@ -125,7 +125,7 @@ def _draw_ground(axes: "Axes", ground: Landscape, cell_size: float) -> dict[str,
     return {f"contours every {step:g} m": _RELIEF} if len(levels) else {}
 
 
-def _draw_panel(figure: "Figure", axes: "Axes", ground: Landscape, panel: Panel, cell_size: float) -> None:
+def _draw_panel(figure: "Figure", axes: "Axes", ground: Landscape, panel: MapPanel, cell_size: float) -> None:
     """Draw a map over the paled ground, with its colour bar."""
     backdrop = 0.35 * cover_image(ground.cover[0].cpu(), _light(ground, cell_size)) + 0.65
     show_map(axes, backdrop.clamp(max=1.0), cell_size)
@@ -153,7 +153,7 @@ def _mark_ignition(axes: "Axes", lit: np.ndarray, cell_size: float) -> dict[str,
     height, width = lit.shape
     if max(np.ptp(rows) + 1, np.ptp(columns) + 1) <= max(3.0, _SMALL * max(height, width)):
         middle = int(rows.mean().round()), int(columns.mean().round())
-        axes.plot(places(width, cell_size)[middle[1]], places(height, cell_size, True)[middle[0]], **_STAR)
+        axes.plot(axis_places(width, cell_size)[middle[1]], axis_places(height, cell_size, True)[middle[0]], **_STAR)
         return _STAR
     look = {"colors": _OUTLINE["color"], "linewidths": 1.2, "linestyles": "dashed"}
     contours(axes, torch.from_numpy(without_holes(lit).astype(np.float32)), cell_size, levels=[0.5], **look)

@@ -74,7 +74,7 @@ def lines_of(paths: Sequence[Path | tuple[str, Path]]) -> list[Line]:
     for name, path in named:
         for folder in run_folders([path]):
             found.setdefault(folder.resolve(), (name, folder))
-    return gather([replace(read_run(folder), called=name) for name, folder in found.values()])
+    return grouped_lines([replace(read_run(folder), called=name) for name, folder in found.values()])
 
 
 def curve_figures(lines: Sequence[Line]) -> dict[str, Callable[[], "Figure"]]:
@@ -116,7 +116,7 @@ def band(runs: Sequence[Run], x: str, y: str) -> tuple[np.ndarray, np.ndarray, n
     return (places, values.mean(axis=0), values.min(axis=0), values.max(axis=0)) if places.size else None
 
 
-def gather(runs: Sequence[Run]) -> list[Line]:
+def grouped_lines(runs: Sequence[Run]) -> list[Line]:
     """Return the lines to draw: runs that differ in their seed alone together, named by what differs among all.
 
     Runs that are called something have that name.

@@ -31,7 +31,7 @@ def last_evaluation(run: Run) -> dict[str, float]:
     return {name.removeprefix(EVALUATED).removeprefix("_") or "all": share for name, share in shares.items()}
 
 
-def table(lines: Sequence[Line]) -> str:
+def kinds_table(lines: Sequence[Line]) -> str:
     """Return a Markdown table, a row for each line: what its runs save [%] of all kinds of worlds and of each, in the
     mean, and how much more each saves of all than the first line's run of its seed.
 

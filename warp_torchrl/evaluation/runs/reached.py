@@ -8,11 +8,11 @@ from warp_torchrl.evaluation.runs.curves import Line
 from warp_torchrl.evaluation.runs.folders import FRAMES, SAVED, SECONDS, Run
 from warp_torchrl.evaluation.runs.markdown import markdown
 
-WINDOW = 0.05
+REACHED_WINDOW = 0.05
 """Share of a run's world steps over which batches are averaged, half before and half after each."""
 
 
-def reached(run: Run, level: float) -> tuple[float, float] | None:
+def first_reached(run: Run, level: float) -> tuple[float, float] | None:
     """Return the world steps and the seconds after which a run saves a share; None where it never does.
 
     Args:
@@ -24,7 +24,7 @@ def reached(run: Run, level: float) -> tuple[float, float] | None:
     saved = run.columns.get(SAVED, np.full_like(frames, np.nan))
     if seconds is None:
         return None
-    width = 0.5 * WINDOW * frames[-1]
+    width = 0.5 * REACHED_WINDOW * frames[-1]
     counts = np.isfinite(saved) & (frames > width)  # the episodes that end before are the short ones
     for now, clock in zip(frames[counts], seconds[counts], strict=True):
         if saved[counts & (np.abs(frames - now) <= width)].mean() >= level:
@@ -32,14 +32,14 @@ def reached(run: Run, level: float) -> tuple[float, float] | None:
     return None
 
 
-def table(lines: Sequence[Line], levels: Sequence[float]) -> str:
+def reached_table(lines: Sequence[Line], levels: Sequence[float]) -> str:
     """Return a Markdown table, a row for each line and a column for each level [%]: thousands of world steps, seconds.
 
     Several runs have the lowest and the highest of each.
     """
     rows = []
     for line in lines:
-        found = [[reached(run, level / 100.0) for run in line.runs] for level in levels]
+        found = [[first_reached(run, level / 100.0) for run in line.runs] for level in levels]
         rows.append([line.label, *map(_cell, found)])
     return markdown(["runs", *(f"to {level:g} %" for level in levels)], rows)
 

@@ -8,7 +8,7 @@ from warp_torchrl.evaluation.runs.curves import Line
 from warp_torchrl.evaluation.runs.folders import FPS, FRAMES, SAVED, SECONDS, Run
 from warp_torchrl.evaluation.runs.markdown import markdown
 
-WINDOW = 0.05
+SAVED_WINDOW = 0.05
 """Share of a run's world steps over which batches are averaged, all of it before the step that is asked for."""
 
 
@@ -30,7 +30,7 @@ def saved_at(run: Run, step: float) -> float:
         raise ValueError(f"{run.folder / 'metrics.csv'} has no column {SAVED}")
     if step > end:
         raise ValueError(f"at must be within the run, {end:.0f} world steps of {run.folder}, got {step:.0f}")
-    counts = (frames > step - WINDOW * end) & (frames <= step) & np.isfinite(run.rows[SAVED])
+    counts = (frames > step - SAVED_WINDOW * end) & (frames <= step) & np.isfinite(run.rows[SAVED])
     return float(run.rows[SAVED][counts].mean()) if counts.any() else np.nan
 
 
@@ -47,7 +47,7 @@ def minutes(run: Run) -> float:
     return float(found[-1]) / 60.0 if found.size else np.nan
 
 
-def table(lines: Sequence[Line], steps: Sequence[float]) -> str:
+def saved_table(lines: Sequence[Line], steps: Sequence[float]) -> str:
     """Return a Markdown table, a row for each line: its forest saved [%] by world steps, its world steps a second, and
     the minutes that it took.
 

@@ -40,6 +40,6 @@ def _shown(side: Side, agent: int) -> tuple[str, str, str, dict[str, bytes]]:
     return (
         f"What **{escaped_markdown(side.env.agent_names[agent])}** sees, and how likely it acts:",
         words.actions(side, agent),
-        words.told(sight.numbers(side, agent)),
+        words.told(sight.named_numbers(side, agent)),
         {name: png(picture) for name, picture in sight.pictures(side, agent).items()},
     )

@@ -7,7 +7,7 @@ from warp_torchrl.live.order import Order
 from warp_torchrl.live.panel.tab import Tab
 from warp_torchrl.live.stage import change
 
-KEYS = {
+DRIVE_KEYS = {
     "Q": "north_west", "W": "north", "E": "north_east", "A": "west", "S": "stay", "D": "east", "Z": "south_west",
     "X": "south", "C": "south_east", "F": "extinguish", "R": "clear",
 }  # fmt: skip

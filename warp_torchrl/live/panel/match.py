@@ -1,8 +1,8 @@
 """The tab Match: scenario, policies, seed."""
 
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.live.match import SEEDS, Match, Setting
-from warp_torchrl.live.panel.tab import Tab, chosen
+from warp_torchrl.live.match import SEED_RANGE, Match, Setting
+from warp_torchrl.live.panel.tab import Tab, chosen_option
 from warp_torchrl.runs.config.compose import conf_folder
 from warp_torchrl.system.shipped import policy_names
 
@@ -22,12 +22,12 @@ class MatchTab(Tab):
         self._scenario = gui.add_dropdown("Scenario", self._scenarios(), initial_value=self._scenario_of(setting))
         self._policy = gui.add_dropdown("Policy", policies, initial_value=setting.policy)
         self._beside = gui.add_dropdown("Beside it", (_ALONE, *policies), initial_value=setting.beside or _ALONE)
-        self._seed = gui.add_number("Seed", initial_value=setting.seed, min=0, max=SEEDS[1], step=1)
+        self._seed = gui.add_number("Seed", initial_value=setting.seed, min=0, max=SEED_RANGE[1], step=1)
         load = gui.add_button("Load", hint="shows this match from its start")
         load.on_click(self.guarded(lambda _: self._load()))
 
     def _load(self) -> None:
-        scenario, policy, beside = (chosen(each) for each in (self._scenario, self._policy, self._beside))
+        scenario, policy, beside = (chosen_option(each) for each in (self._scenario, self._policy, self._beside))
         is_given = scenario == self._scenario_of(self.page.given)
         setting = Setting(
             policy=policy,

@@ -10,7 +10,7 @@ from warp_torchrl.live import words
 from warp_torchrl.live.ground import cell_at
 from warp_torchrl.live.panel.agent import AgentTab
 from warp_torchrl.live.panel.controls import Callback, Controls
-from warp_torchrl.live.panel.drive import KEYS, DriveTab
+from warp_torchrl.live.panel.drive import DRIVE_KEYS, DriveTab
 from warp_torchrl.live.panel.match import MatchTab
 from warp_torchrl.live.panel.question import QuestionBox
 from warp_torchrl.live.panel.record import RecordTab
@@ -24,7 +24,7 @@ PACES = (1, 30)
 """Steps a second that can be chosen."""
 
 
-def tell(client: viser.ClientHandle, line: str, mistake: bool = False) -> None:
+def notify(client: viser.ClientHandle, line: str, mistake: bool = False) -> None:
     """Show a message at one browser."""
     title = "This cannot be done" if mistake else "Told"
     client.add_notification(title, plain_text(line), auto_close_seconds=7.0, color="red" if mistake else None)
@@ -83,7 +83,7 @@ class Panel:
         return folder
 
     def _add_keys(self) -> None:
-        for key, action in KEYS.items():
+        for key, action in DRIVE_KEYS.items():
             command = self.gui.add_command(f"Drive: {action}", hotkey=key)
             command.on_trigger(self.guarded(partial(self._press, action)))
         agree = self.gui.add_command("Do it", hotkey="G")
@@ -102,7 +102,7 @@ class Panel:
         match, once = self.page.match, self.page.once
         with self._client.atomic():
             change(self._headline, content=once("headline", lambda: words.headline(match)))
-            change(self._numbers, content=once("numbers", lambda: words.numbers(match)))
+            change(self._numbers, content=once("numbers", lambda: words.numbers_table(match)))
             self.question.show()
             if paints:
                 for tab in self._tabs:
@@ -110,7 +110,7 @@ class Panel:
 
     def tell(self, line: str, mistake: bool = False) -> None:
         """Show a message to the person."""
-        tell(self._client, line, mistake)
+        notify(self._client, line, mistake)
 
     # What is done, in turn with other people's; told in one line where it cannot be
 

@@ -3,7 +3,7 @@
 from warp_torchrl.live import words
 from warp_torchrl.live.learning import MOST_FRAMES
 from warp_torchrl.live.match import Match
-from warp_torchrl.live.panel.tab import Tab, chosen
+from warp_torchrl.live.panel.tab import Tab, chosen_option
 from warp_torchrl.live.replayed import ReplayedMatch
 from warp_torchrl.live.stage import change
 
@@ -57,7 +57,7 @@ class RecordTab(Tab):
         self.page.show()
 
     def _watch(self) -> None:
-        name = chosen(self._which)
+        name = chosen_option(self._which)
         self.page.open(ReplayedMatch(self.page.keeper.read(name), self.match.setting))
 
     def _train(self, button: str) -> None:

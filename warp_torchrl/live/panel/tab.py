@@ -92,7 +92,7 @@ def _tell(tell: Callable[[str, bool], object], line: str) -> None:
         LOG.error("%s, and nobody could be told: %s", line, plain_text(str(error)))
 
 
-def chosen(dropdown: Any) -> str:
+def chosen_option(dropdown: Any) -> str:
     """Return a dropdown's value. It must be one of the options: an invented one could name a file of this machine.
 
     Raises:

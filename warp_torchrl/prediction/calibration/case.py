@@ -17,7 +17,7 @@ from warp_torchrl.world.terrain.features import SUFFIXES
 from warp_torchrl.world.terrain.fuel import is_code
 from warp_torchrl.world.terrain.grid import Grid, check_grid
 from warp_torchrl.world.terrain.layer import RASTERS, Header, read_header, read_layer
-from warp_torchrl.world.terrain.layers import elevation_unit, unread
+from warp_torchrl.world.terrain.layers import elevation_unit, unread_files
 from warp_torchrl.world.terrain.planes import check_slopes, to_fuel, to_metres
 from warp_torchrl.world.terrain.resampling import fill
 from warp_torchrl.world.weather.table import WeatherTable, read_weather
@@ -91,7 +91,7 @@ class FireCase:
         return mean_wind(winds, torch.tensor([spell.minutes for spell in self.spells]))
 
 
-def read_case(folder: str | Path, hours: float | None = None, units: Mapping[str, str] | None = None) -> FireCase:
+def read_fire_case(folder: str | Path, hours: float | None = None, units: Mapping[str, str] | None = None) -> FireCase:
     """Read a fire from a folder.
 
     It holds ``fuel`` and, unless the ground is level, ``elevation``, each a GeoTIFF (.tif) or an ESRI ASCII grid
@@ -132,7 +132,7 @@ def _read(folder: Path, hours: float | None, units: Mapping[str, str] | None) ->
     landscape, elevation = _landscape(folder, header)
     lit = _only("ignition", folder)
     files = [f"fuel: {header.told}", *elevation, f"ignition: {lit.name}", f"outcome: {observed.name}"]
-    if left := unread(folder, [each for name in (*_KINDS, "weather") if (each := _found(name, folder))]):
+    if left := unread_files(folder, [each for name in (*_KINDS, "weather") if (each := _found(name, folder))]):
         files.append(f"files of {folder.name} that are not read: {', '.join(left)}")
     return FireCase(
         name=folder.name,

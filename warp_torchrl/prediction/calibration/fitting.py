@@ -8,7 +8,7 @@ from torch import Tensor
 
 from warp_torchrl.prediction.calibration.candidates import burnable
 from warp_torchrl.prediction.calibration.case import FireCase
-from warp_torchrl.prediction.calibration.null_models import circle, ellipse
+from warp_torchrl.prediction.calibration.null_models import circle_cells, ellipse_cells
 from warp_torchrl.prediction.calibration.parameters import Parameter, fire_at
 from warp_torchrl.prediction.calibration.scores import Scores, scores_at_area, scores_of
 from warp_torchrl.world.arrays.random import world_key
@@ -17,7 +17,7 @@ from warp_torchrl.world.fires.alone import arrival_minutes
 from warp_torchrl.world.law.rate import RateFire
 
 
-class Method(Protocol):
+class FittingMethod(Protocol):
     """A fitting method: ``Gradients`` or ``Evolution``."""
 
     def __call__(
@@ -42,8 +42,8 @@ def null_scores(fire: RateFire, case: FireCase) -> dict[str, Scores]:
     """Return the scores of the circle and of the ellipse over the cells that can burn under a law."""
     fuel, cells = burnable(fire, case), int(case.scar.sum())
     grown = {
-        "circle": circle(case.lit, fuel, cells),
-        "ellipse": ellipse(case.lit, fuel, cells, case.wind),
+        "circle": circle_cells(case.lit, fuel, cells),
+        "ellipse": ellipse_cells(case.lit, fuel, cells, case.wind),
     }
     return {name: scores_at_area(burned, case.scar) for name, burned in grown.items()}
 
@@ -62,7 +62,7 @@ def check_told(parameters: Sequence[Parameter], cases: Sequence[FireCase]) -> No
                 raise ValueError(f"parameters must not be told by the weather, {each.name} is by that of {case.name}")
 
 
-def check_fuel(case: FireCase, fire: RateFire) -> None:
+def check_fuel_codes(case: FireCase, fire: RateFire) -> None:
     """Refuse a fire whose map has fuel codes that the law lacks.
 
     Raises:
@@ -80,8 +80,8 @@ def folds(cases: Sequence[FireCase]) -> Iterator[tuple[FireCase, list[FireCase]]
         yield left_out, [case for place, case in enumerate(cases) if place != index]
 
 
-def fitted(
-    method: Method,
+def fit_law(
+    method: FittingMethod,
     fire: RateFire,
     parameters: Sequence[Parameter],
     cases: Sequence[FireCase],

@@ -14,7 +14,7 @@ from warp_torchrl.world.law.travel import NEVER
 _KMH = 3.6  # kilometres an hour in a metre a second
 
 
-def circle(lit: Tensor, fuel: Tensor, cells: int) -> Tensor:
+def circle_cells(lit: Tensor, fuel: Tensor, cells: int) -> Tensor:
     """Return the cells of fuel that lie nearest to the ignition, bool [H, W].
 
     Args:
@@ -25,14 +25,14 @@ def circle(lit: Tensor, fuel: Tensor, cells: int) -> Tensor:
     return _grown(lit, fuel, cells, torch.zeros(2), 0.0)
 
 
-def ellipse(lit: Tensor, fuel: Tensor, cells: int, wind: Tensor) -> Tensor:
+def ellipse_cells(lit: Tensor, fuel: Tensor, cells: int, wind: Tensor) -> Tensor:
     """Return the cells of fuel that an ellipse reaches first, bool [H, W].
 
     Its focus is the ignition, its head points downwind: the distance is |v| - e n . v, e = sqrt(1 - 1 / LB^2).
 
     Args:
-        lit: As in ``circle``.
-        fuel: As in ``circle``.
+        lit: As in ``circle_cells``.
+        fuel: As in ``circle_cells``.
         cells: How many.
         wind: (u east, v north) of the air's motion at 10 m, float32 [2] [m/s].
     """

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from warp_torchrl.prediction.calibration.evolution import Evolution
-from warp_torchrl.prediction.calibration.fitting import Method
+from warp_torchrl.prediction.calibration.fitting import FittingMethod
 from warp_torchrl.prediction.calibration.gradients import Gradients
 from warp_torchrl.prediction.calibration.losses import Loss
 from warp_torchrl.validation import check_fields
@@ -16,7 +16,7 @@ class CalibrationOptions:
     """Options of ``warp calibrate``, besides ``fire``.
 
     Attributes:
-        fires: Folders of real fires, see ``warp_torchrl.prediction.calibration.case.read_case``.
+        fires: Folders of real fires, see ``warp_torchrl.prediction.calibration.case.read_fire_case``.
         hours: When their scars are known [h]; None is the end of each one's weather.
         units: Unit of a quantity or column of their weather where files state none, ``units.wind_speed=km/h``; for
             ``datetime`` the order of its dates, ``units.datetime=d/m/y``.
@@ -70,7 +70,7 @@ class CalibrationOptions:
         _ = self.fit  # refuse what it refuses
 
     @property
-    def fit(self) -> Method:
+    def fit(self) -> FittingMethod:
         """Return the method with its options."""
         if self.method == "gradients":
             return Gradients(

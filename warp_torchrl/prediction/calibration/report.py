@@ -9,7 +9,7 @@ import yaml
 from warp_torchrl.prediction.calibration.scores import Scores
 from warp_torchrl.world.law.rate import RateFire
 
-Rows = Mapping[str, Mapping[str, Scores]]
+ScoreRows = Mapping[str, Mapping[str, Scores]]
 """Scores by fire and by what was scored."""
 _COLUMNS = {
     "jaccard_at_area": "Jaccard at area",
@@ -22,7 +22,7 @@ _COLUMNS = {
 }
 
 
-def table(rows: Rows) -> str:
+def scores_table(rows: ScoreRows) -> str:
     """Return scores as a table in Markdown, a line for each fire and what was scored, their means at the end."""
     all_scores = [scores for by_model in rows.values() for scores in by_model.values()]
     shown = [name for name in _COLUMNS if any(getattr(scores, name) is not None for scores in all_scores)]
@@ -35,7 +35,7 @@ def table(rows: Rows) -> str:
     return "\n".join(lines)
 
 
-def means(rows: Rows) -> dict[str, dict[str, float | None]]:
+def means(rows: ScoreRows) -> dict[str, dict[str, float | None]]:
     """Return the mean of each score over the fires; of errors of the area, of how large they are."""
     models = list(dict.fromkeys(model for by_model in rows.values() for model in by_model))
     return {
@@ -46,7 +46,7 @@ def means(rows: Rows) -> dict[str, dict[str, float | None]]:
     }
 
 
-def as_numbers(rows: Rows) -> dict[str, Any]:
+def as_numbers(rows: ScoreRows) -> dict[str, Any]:
     """Return scores as plain values."""
     return {fire: {model: asdict(scores) for model, scores in each.items()} for fire, each in rows.items()}
 

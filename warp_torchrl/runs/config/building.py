@@ -62,10 +62,10 @@ class BuildOnce:
 
 
 def check_keys(config: Mapping[str, Any]) -> None:
-    """Check that a composed configuration has no key but those that there are: ``+key`` adds whatever one likes.
+    """Check that a composed configuration has known keys only: Hydra's ``+key`` adds any key.
 
     Raises:
-        ConfigError: With the first that is none, and those that there are.
+        ConfigError: With the first unknown key, and the known ones.
     """
     known = {each.name for each in fields(RunConfig)} | {*COMPONENTS, *WORLD_KEYS, *COMMAND_KEYS}
     for key in config:
@@ -78,7 +78,7 @@ def check_keys(config: Mapping[str, Any]) -> None:
 
 @contextmanager
 def _in_section(section: str) -> Iterator[None]:
-    """Let a mistake name the section of the configuration that it is in."""
+    """Add the section of the configuration to errors in this context."""
     try:
         yield
     except ValueError as error:

@@ -7,7 +7,7 @@ from warp_torchrl.validation import check_fields
 
 @dataclass(frozen=True, kw_only=True)
 class CheckpointConfig:
-    """When training saves.
+    """Times of checkpoints.
 
     Attributes:
         interval: Frames between checkpoints.

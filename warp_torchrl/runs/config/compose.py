@@ -71,7 +71,7 @@ def choices(overrides: Sequence[str]) -> dict[str, str]:
 def check_choices(overrides: Sequence[str]) -> None:
     """Check that each group has one option, by its name.
 
-    Hydra merges lists of options and follows paths; a run folder could not tell them, nor resume.
+    Hydra merges lists of options and follows paths; a run folder cannot record those, nor resume from them.
 
     Raises:
         ConfigError: If not, in one line.
@@ -95,7 +95,7 @@ def _compose(name: str, overrides: Sequence[str]) -> DictConfig:
 
 
 def _without_values_of_others(config: DictConfig, overrides: Sequence[str]) -> DictConfig:
-    """Return a configuration without what its scenario says of options that the overrides replace.
+    """Return a configuration without the scenario's values for options that the overrides replace.
 
     ``ignition=file`` in a scenario with ``ignition: {count: 3}`` has no count. What is no field of any option stays, to
     be refused as a mistake.
@@ -112,7 +112,7 @@ def _without_values_of_others(config: DictConfig, overrides: Sequence[str]) -> D
 
 
 def _known_keys(name: str, overrides: Sequence[str]) -> list[str]:
-    """Return every key of a configuration with the options that the overrides choose, where they can be had."""
+    """Return every key of a configuration with the options of the overrides, as far as they can be composed."""
     chosen = tuple(each for each in overrides if each.partition("=")[0] in (*COMPONENTS, *GROUPS))
     for choices in (chosen, ()):
         try:
@@ -143,7 +143,7 @@ def _composed(folder: Path, last_change: int, name: str, overrides: tuple[str, .
 
 
 def _may_name_a_value(folder: Path, override: str) -> bool:
-    """Return whether an override gives a key a value, and chooses no option and neither adds nor removes."""
+    """Return whether an override gives a key a value, and neither chooses an option nor adds or removes a key."""
     key, equals, _ = override.partition("=")
     return bool(equals and _KEY.fullmatch(key)) and not key.startswith("hydra.") and not (folder / key).is_dir()
 
@@ -171,7 +171,7 @@ def explain(error: Exception, name: str, overrides: Sequence[str]) -> ConfigErro
 
 
 def one_line(error: Exception, known: Sequence[str] = ()) -> str:
-    """Return Hydra's message in one line, with the options where it lists them, and the known key that is nearest."""
+    """Return Hydra's message in one line, with the options if it lists them, and the nearest known key."""
     text = str(error)
     unknown = re.match(r"Could not override '([^']*)'", text)
     if unknown:

@@ -1,4 +1,4 @@
-"""The worlds of a mixture's kinds: scenarios of ``conf/scenario``, with what differs."""
+"""The worlds of a mixture's kinds: scenarios of ``conf/scenario`` with overrides."""
 
 import json
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Builds components from plain configuration nodes: types, unknown keys and the components' own rules.
+"""Construction of components from plain configuration nodes: types, unknown keys and the components' rules.
 
 A node names its class, one of this package's dataclasses, in ``_target_``; nothing else is ever imported by name.
 """
@@ -14,7 +14,7 @@ from warp_torchrl.validation import did_you_mean, fit
 
 
 class ConfigError(ValueError):
-    """A mistake in the configuration, told in one line with key, value and rule."""
+    """A mistake in the configuration; the message is one line with key, value and rule."""
 
 
 class UnknownKeyError(ConfigError):

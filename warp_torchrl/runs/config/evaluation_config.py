@@ -9,7 +9,7 @@ from warp_torchrl.validation import check_fields
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluationConfig:
-    """How policies are evaluated.
+    """Options of evaluations.
 
     Attributes:
         interval: Frames between evaluations during training; 0 evaluates only at the end.

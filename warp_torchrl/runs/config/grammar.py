@@ -1,4 +1,4 @@
-"""The command line's grammar: what does not fit is told with what would.
+"""The command line's grammar, with messages that show the right form.
 
 Keys are Hydra's, ``key=value``; its parser reads a value with ``=``, commas or parentheses only in quotes.
 """
@@ -29,7 +29,7 @@ _WITH_VALUE = (
 
 
 def check_flags(arguments: Sequence[str]) -> None:
-    """Check that what begins with a dash is a flag of Hydra's, and no key.
+    """Check that words with a leading dash are flags of Hydra, and no keys.
 
     Raises:
         ConfigError: With how keys are given.
@@ -127,7 +127,7 @@ def own_values(
 
 
 def several_values(override: str) -> str:
-    """Return what is said of values with commas between them where no sweep was asked for."""
+    """Return the message for values with commas between them, outside of a sweep."""
     key, _, value = override.partition("=")
     return (
         f"{override} has several values: -m sweeps over them, {key}=[{value}] is a list, {_quoted(key, value)} one text"
@@ -146,7 +146,7 @@ def _without_equals(overrides: Sequence[str], place: int) -> str:
 
 
 def _refusal(override: str) -> str | None:
-    """Return why Hydra's parser refuses an override; None where it does not."""
+    """Return the reason of Hydra's parser to refuse an override; None if it accepts it."""
     try:
         OverridesParser.create().parse_override(override)
     except HydraException as error:
@@ -155,7 +155,7 @@ def _refusal(override: str) -> str | None:
 
 
 def _quoted(key: str, value: str) -> str:
-    """Return an override whose value is one text, as a shell takes it; empty where the value is not what is wrong."""
+    """Return an override whose value is one quoted text for a shell; empty if the value is not the fault."""
     escaped = value.replace("'", "\\'")
     override = f"{key}='{escaped}'"
     return "" if _refusal(override) else '"' + re.sub(r'([\\"$`])', r"\\\1", override) + '"'

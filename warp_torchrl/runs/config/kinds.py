@@ -1,4 +1,4 @@
-"""The kinds of worlds that a training plays, built."""
+"""The kinds of worlds of a training, built."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,11 +18,11 @@ class KindOfWorld:
     """A kind of worlds, built.
 
     Attributes:
-        name: Of the kind.
+        name: Name of the kind.
         world: Its rules.
-        share: Of the worlds, in proportion to the shares of the others.
-        teacher: Who labels its worlds; None for none.
-        teacher_weight: By what the weight of the cloning loss is multiplied.
+        share: Share of the worlds, in proportion to the shares of the others.
+        teacher: Teacher of its worlds; None for none.
+        teacher_weight: Factor on the weight of the cloning loss.
     """
 
     name: str

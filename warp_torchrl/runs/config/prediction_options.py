@@ -1,4 +1,4 @@
-"""What a prediction asks for beside its ground and its law."""
+"""Options of a prediction, besides its ground and its law."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,24 +9,24 @@ from warp_torchrl.validation import check_fields
 
 @dataclass(frozen=True, kw_only=True)
 class PredictionOptions:
-    """What ``warp predict`` is told beside ``landscape`` and ``fire``.
+    """Options of ``warp predict``, besides ``landscape`` and ``fire``.
 
     Attributes:
-        weather: CSV file of weather by the hour, see ``warp_torchrl.world.weather.table``.
-        ignition: File of where the fire starts: points, a raster or a perimeter.
-        hours: How long fires are followed; None: to the end of the weather.
-        area: Area at which a fire stops, even before [ha]; None lets it go on.
-        fires: How many.
+        weather: CSV file of hourly weather, see ``warp_torchrl.world.weather.table``.
+        ignition: File of the ignition: points, a raster or a perimeter.
+        hours: Time for which fires are followed [h]; None: to the end of the weather.
+        area: Area at which a fire stops, even before [ha]; None for no limit.
+        fires: Number of fires.
         seed: Fire i has seed ``seed + i``.
-        start: When the fires start: minutes since the weather's first row, or a date and time.
+        start: Start of the fires: minutes since the weather's first row, or a date and time.
         perimeter_hours: Hours between the perimeters that are written.
-        wind_height: At what height the wind was measured; None goes by the file.
+        wind_height: Height at which the wind was measured; None takes the file's.
         units: Unit of a quantity or column of the weather where the file states none, ``units.wind_speed=km/h``; of
             ``datetime`` the order of its dates, ``units.datetime=d/m/y``.
         true_north: Whether the weather's bearings are from true north, and are turned to the map's; else they are from
             the map's grid north already.
-        start_ffmc: Fine fuel moisture code an hour before the first row, where the file has none and it is computed.
-        bui: Buildup index, where the file has none and neither DMC nor DC; None leaves that of the law.
+        start_ffmc: Fine fuel moisture code an hour before the first row, for a file without FFMC.
+        bui: Buildup index, for a file without BUI, DMC and DC; None takes the law's.
         cell_size: Side of a cell [m]; None is that of the landscape.
         animation: Whether the first fire is written as a GIF.
         out: Folder to write to; None makes one in ``outputs/predictions``.

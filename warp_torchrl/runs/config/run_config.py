@@ -11,7 +11,7 @@ from warp_torchrl.algorithms.on_policy import OnPolicy
 from warp_torchrl.collection.collectors import MultiProcess
 from warp_torchrl.collection.curriculum import Curriculum
 from warp_torchrl.collection.imitation import Imitation
-from warp_torchrl.collection.mixture import Mixture, apportioned
+from warp_torchrl.collection.mixture import Mixture, worlds_by_share
 from warp_torchrl.env import LeveledEnv, WildfireEnv
 from warp_torchrl.runs.config.checkpoint_config import CheckpointConfig
 from warp_torchrl.runs.config.construction import ConfigError
@@ -204,7 +204,7 @@ class RunConfig:
             ConfigError: If there are fewer than kinds.
         """
         try:
-            return apportioned([kind.share for kind in self.kinds], count)
+            return worlds_by_share([kind.share for kind in self.kinds], count)
         except ValueError as error:
             raise ConfigError(str(error)) from None
 

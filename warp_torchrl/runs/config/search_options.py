@@ -1,4 +1,4 @@
-"""What a search asks for beside the training."""
+"""Options of a search, besides the training."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,25 +9,25 @@ from warp_torchrl.validation import check_fields
 
 @dataclass(frozen=True, kw_only=True)
 class SearchOptions:
-    """What ``warp search`` is told under ``search``.
+    """Options of ``warp search`` under ``search``.
 
     Attributes:
         space: Values by key of a ready search, in the grammar of Hydra's sweeps; the command line adds to them.
         fixed: Overrides of a ready search, the same in all trials.
-        trials: How many are to be trained to their end or pruned.
+        trials: Number of trials that are trained to their end or pruned.
         seeds: Training seeds of each trial, from ``seed`` upwards; its value is their mean.
-        jobs: Trials side by side.
-        objective: What is made large: ``evaluation``, the forest that the trained policy saves on fires that no
-            training and no other evaluation has, or ``training``, the mean of ``world/saved`` over the last fifth of a
-            training.
+        jobs: Number of parallel trials.
+        objective: Objective that is maximised: ``evaluation``, the forest that the trained policy saves on fires that
+            no training and no other evaluation has, or ``training``, the mean of ``world/saved`` over the last fifth of
+            a training.
         pruner: ``median`` ends a trial that at equal frames is below the median of those before it; ``hyperband`` gives
             few of the trials many frames; ``none``.
         prune_from: Share of a training before which no trial is pruned.
         startup: Trials that are drawn at random, and by ``median`` not pruned, before the search learns from them.
-        keep_training: Keep what training goes on from in the folders of ended trials, not their policies alone: for a
-            learner with a replay memory up to a gigabyte each.
-        seed: Of the search's own draws.
-        out: Folder to write to, or to go on in; None makes one in ``outputs/searches``.
+        keep_training: Keep the training state in the folders of ended trials, not only their policies: for a learner
+            with a replay memory up to a gigabyte each.
+        seed: Seed of the search's draws.
+        out: Folder to write to, or of a search to resume; None makes one in ``outputs/searches``.
 
     Raises:
         ValueError: If a value is out of its range.

@@ -1,4 +1,4 @@
-"""Which worlds training has for itself: no evaluation meets them, and no two training seeds share one."""
+"""Seeds of training worlds: no evaluation plays those worlds, and no two training seeds share one."""
 
 WORLDS = 4096
 """Worlds that one training seed owns."""

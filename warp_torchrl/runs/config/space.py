@@ -1,4 +1,4 @@
-"""What a search tries: keys of a configuration with several values, in the grammar of Hydra's sweeps.
+"""Search space: keys of a configuration with several values, in the grammar of Hydra's sweeps.
 
 ``interval(0.9, 0.99)`` is a float, ``int(interval(16, 128))`` a whole number, ``range(1, 9)`` one of its numbers, and
 ``choice(tanh, relu)`` or ``tanh,relu`` one of any values. ``tag(log, ...)`` searches an interval by its logarithm.
@@ -25,9 +25,9 @@ class Dimension:
     """A key that is searched.
 
     Attributes:
-        key: As in an override.
-        text: The values that it may have, in Hydra's grammar.
-        choices: Their texts, where they are no interval or range.
+        key: Key of the configuration.
+        text: Its values, in Hydra's grammar.
+        choices: Texts of the values, without an interval or range.
         low: The lowest.
         high: The highest.
         step: Between values; None for any between the two.
@@ -35,7 +35,7 @@ class Dimension:
         is_whole: Whether its values are whole numbers.
 
     Raises:
-        ConfigError: If there are fewer than two values, or a logarithm is asked for that is not there.
+        ConfigError: If there are fewer than two values, or ``log`` is set without an interval above 0.
     """
 
     key: str
@@ -67,7 +67,7 @@ class Dimension:
         return f"{self.key}={value}"
 
     def holding(self, value: Any) -> Value | None:
-        """Return a configuration's value as one of this dimension's; None where it is none of them."""
+        """Return a configuration's value as one of this dimension's; None if it is another."""
         if self.choices:
             return next((each for each in self.choices if _same(value_of(self.override(each)), value)), None)
         if isinstance(value, bool) or not isinstance(value, int | float) or not self.low <= value <= self.high:
@@ -85,7 +85,7 @@ def _same(one: Any, other: Any) -> bool:
 def divided(
     overrides: Sequence[str], searched: Mapping[str, str], fixed: Sequence[str]
 ) -> tuple[list[Dimension], list[str]]:
-    """Divide what is told of a training into what is searched and what is the same for all of a search's trainings.
+    """Divide the overrides of a search into its dimensions and the overrides that are the same in all trainings.
 
     Args:
         overrides: Of the command line; an override with several values is searched.
@@ -104,7 +104,7 @@ def divided(
 
 
 def dimension(override: str) -> Dimension | None:
-    """Return what an override in Hydra's grammar searches; None where it has one value.
+    """Return the dimension of an override in Hydra's grammar; None if it has one value.
 
     Raises:
         ConfigError: If it has several that no search can draw from.

@@ -15,7 +15,7 @@ from warp_torchrl.validation import check_fields
 from warp_torchrl.world.air.wind import Wind
 from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.terrain.array import read_npz
-from warp_torchrl.world.terrain.bands import DEGREES, SPEEDS, factor_of
+from warp_torchrl.world.terrain.bands import DEGREES, SPEED_UNITS, factor_of
 from warp_torchrl.world.terrain.grid import Grid, check_grid
 from warp_torchrl.world.terrain.landscape import LandscapeSource, map_size
 from warp_torchrl.world.terrain.layer import Header, find_layer, read_header, read_layer
@@ -146,7 +146,7 @@ class Gridded(Wind):
 def _read_unit(name: str, header: Header, is_bearing: bool) -> np.ndarray:
     """Return a layer in metres per second or degrees, NaN where it is not known, by its file's unit."""
     values, known = read_layer(name, header.path, header.number)
-    factor = factor_of(name, header.path, header.unit, DEGREES if is_bearing else SPEEDS)
+    factor = factor_of(name, header.path, header.unit, DEGREES if is_bearing else SPEED_UNITS)
     return np.where(known, values * factor if factor != 1.0 else values, np.nan)
 
 

@@ -153,7 +153,7 @@ def _from_metric(given: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-NO_FUEL = FuelModel(depth=0.0, extinction_moisture=0.0)
+UNBURNABLE = FuelModel(depth=0.0, extinction_moisture=0.0)
 """Ground that does not burn."""
 
 
@@ -166,7 +166,7 @@ def fuel_table(models: Mapping[int, FuelModel], names: Mapping[str, int] | None 
     if not models:
         raise ValueError("model must have at least one fuel model, got none")
     codes = sorted(models)
-    rows = [*(models[code] for code in codes), NO_FUEL]
+    rows = [*(models[code] for code in codes), UNBURNABLE]
     sav = torch.tensor([(*row.ratios[:4], *row.ratios[3:]) for row in rows])
     size = torch.bucketize(sav, torch.tensor(_SIZES[::-1]), right=True)
     alive = torch.tensor([False] * 4 + [True] * 2)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from warp_torchrl.system.modes import kept
-from warp_torchrl.world.behaviour.fuel_models import NO_FUEL, TON_PER_ACRE, FuelModel, FuelTable, fuel_table
+from warp_torchrl.world.behaviour.fuel_models import TON_PER_ACRE, UNBURNABLE, FuelModel, FuelTable, fuel_table
 
 NOT_BURNABLE = {"NB1": 91, "NB2": 92, "NB3": 93, "NB8": 98, "NB9": 99}
 """Urban, snow and ice, agriculture, water, bare ground; in both sets."""
@@ -89,7 +89,7 @@ _DIGITS = 4
 @kept(1)
 def anderson_13() -> FuelTable:
     """Return the 13 fuel models (Anderson 1982), codes 1..13, names FM1..FM13, and what does not burn."""
-    models = {code: NO_FUEL for code in NOT_BURNABLE.values()}
+    models = {code: UNBURNABLE for code in NOT_BURNABLE.values()}
     for code, (*loads, sav, live, depth, extinction) in _ANDERSON.items():
         models[code] = _model(loads, (sav, live, live), depth, extinction)
     return fuel_table(models, {**NOT_BURNABLE, **{f"FM{code}": code for code in _ANDERSON}})
@@ -98,7 +98,7 @@ def anderson_13() -> FuelTable:
 @kept(1)
 def scott_burgan_40() -> FuelTable:
     """Return the 40 fuel models (Scott and Burgan 2005), codes 101..204, names GR1..SB4, and what does not burn."""
-    models = {code: NO_FUEL for code in NOT_BURNABLE.values()}
+    models = {code: UNBURNABLE for code in NOT_BURNABLE.values()}
     for name, (code, *loads, sav, herbs, woody, depth, extinction) in _SCOTT_BURGAN.items():
         pounds = [round(load * TON_PER_ACRE, _DIGITS) for load in loads]
         model = _model(pounds, (sav, herbs, woody), depth, extinction)

@@ -281,7 +281,7 @@ def _rise(landscape: Landscape, window: Window, cell_size: float) -> Tensor:
 
 
 def _heads(spread: Spread) -> Tensor:
-    """Return the fields of ``Behaviour`` for a spread [1, h, w], float32 [4, h, w].
+    """Return the fields of ``HeadBehaviour`` for a spread [1, h, w], float32 [4, h, w].
 
     The rear spreads at R_head (1 - e) / (1 + e), e the eccentricity of the ellipse.
     """

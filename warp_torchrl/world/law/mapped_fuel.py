@@ -9,11 +9,11 @@ from warp_torchrl.world.behaviour.fbp_fuels import fbp_fuels
 from warp_torchrl.world.behaviour.fuel_codes import FBP_CODES
 from warp_torchrl.world.behaviour.fuel_models import FuelTable
 from warp_torchrl.world.state.state import Cover
-from warp_torchrl.world.terrain.fuel import NO_FUEL, TABLES
+from warp_torchrl.world.terrain.fuel import NO_FUEL_CODE, TABLES
 
 Cells = Mapping[tuple[int, int], int]
 """How many cells of a map have each pair of a fuel code and a cover."""
-_NON_BURNABLE = (91, 92, 93, 98, NO_FUEL)  # of LANDFIRE's fuel models
+_NON_BURNABLE = (91, 92, 93, 98, NO_FUEL_CODE)  # of LANDFIRE's fuel models
 _SHOWN = 5  # codes that a message names
 
 
@@ -63,7 +63,7 @@ def check_fuel(fuel: Tensor, table: FuelTable | None, model: str) -> None:
     lacking = [f"{code} ({count} cells)" for code, count in zip(codes.tolist(), counts.tolist(), strict=True)
                if not _is_known(code, table)]  # fmt: skip
     if lacking:
-        rule = f"fuel must hold codes of {model}, {NO_FUEL} where nothing burns"
+        rule = f"fuel must hold codes of {model}, {NO_FUEL_CODE} where nothing burns"
         raise ValueError(f"{rule}, got {', '.join(lacking[:_SHOWN])}{', ...' * (len(lacking) > _SHOWN)}")
 
 

@@ -20,7 +20,7 @@ from warp_torchrl.world.terrain.landscape import TALLEST, map_size
 from warp_torchrl.world.terrain.layer import LARGEST_MAP
 from warp_torchrl.world.terrain.planes import HIGHEST, LOWEST
 
-LAYERS = {
+LAYER_TYPES = {
     "cover": np.uint8,
     "elevation": np.float32,
     "age": np.uint8,
@@ -95,10 +95,10 @@ class Array(Cropped):
         check_fields(self, min_fuel=(0.0, 1.0), cell_size=(0.01, 100_000.0))
         if self.size is not None:
             map_size(self.size)
-        layers = {name: getattr(self, name) for name in LAYERS if getattr(self, name) is not None}
+        layers = {name: getattr(self, name) for name in LAYER_TYPES if getattr(self, name) is not None}
         if self.path is not None and layers:
             raise ValueError(f"path must be null where arrays are passed, got {self.path} and {', '.join(layers)}")
-        layers = layers if self.path is None else read_npz(self.path, tuple(LAYERS))
+        layers = layers if self.path is None else read_npz(self.path, tuple(LAYER_TYPES))
         if "cover" not in layers:
             raise ValueError(f"path must name an .npz file with cover where cover is not passed, got {self.path}")
         layers = {name: _check_layer(name, layer) for name, layer in layers.items()}
@@ -165,7 +165,7 @@ def _check_layer(name: str, layer: Any) -> np.ndarray:
         rule = f"be {words} everywhere"
     if broken.any():
         raise ValueError(f"{name} must {rule}, got {values[broken][0]}")
-    return values.astype(LAYERS[name])
+    return values.astype(LAYER_TYPES[name])
 
 
 def _digest(layers: dict[str, np.ndarray]) -> str:

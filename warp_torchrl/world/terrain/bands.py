@@ -18,7 +18,7 @@ MINUTES: Mapping[str, float] = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0 / 60.0),
 }
 """Minutes in each unit of time that a band may state."""
-SPEEDS: Mapping[str, float] = {
+SPEED_UNITS: Mapping[str, float] = {
     **dict.fromkeys(("m/s", "m s-1", "m s**-1", "mps", "metre/second"), 1.0),
     **dict.fromkeys(("km/h", "km h-1", "kph", "kmh"), 1.0 / 3.6),
     **dict.fromkeys(("mph", "mi/h"), 0.44704),
@@ -73,7 +73,7 @@ def band_names(layer: Any) -> list[str]:
     return [_told(layer, number) or str(number) for number in range(1, layer.count + 1)]
 
 
-def unit_of(layer: Any, number: int) -> str:
+def band_unit(layer: Any, number: int) -> str:
     """Return the unit of a band of an open raster, in lower case, or of its vertical CRS; else nothing."""
     stated = str(layer.units[number - 1] or "").strip().lower()
     vertical = _VERTICAL.search(layer.crs.to_wkt()) if layer.crs and not stated else None

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from warp_torchrl.system.delimited import SEPARATORS, named_separator, read_text, split_rows, to_number, to_points
-from warp_torchrl.system.provenance import Provenance, tell
+from warp_torchrl.system.delimited import SEPARATORS, named_separator, read_table_text, split_rows, to_number, to_points
+from warp_torchrl.system.provenance import Provenance, report_file
 from warp_torchrl.world.terrain.grid import Grid, check_grid
 from warp_torchrl.world.terrain.layer import RASTERS, read_header, read_layer
 from warp_torchrl.world.terrain.vector import SUFFIXES, in_grid, mark, read_shapes
@@ -131,7 +131,7 @@ def _read_points(name: str, path: Path, grid: Grid) -> np.ndarray:
 
 def _read_pairs(name: str, path: Path) -> tuple[np.ndarray, np.ndarray, str]:
     """Return the two columns of coordinates of a CSV, and their unit."""
-    named, text = named_separator(read_text(name, path))
+    named, text = named_separator(read_table_text(name, path))
     headers: list[str] = []
     for separator in [named] if named else SEPARATORS:
         try:
@@ -194,4 +194,4 @@ def _tell(name: str, path: Path, headers: list[str], places: tuple[int, int], un
     units = {"cells": "cells of the map, from 0", "map": "the map's coordinates"}
     read = {headers[place]: units.get(unit, f"degrees of {unit}") for place in places}
     left = tuple(header for place, header in enumerate(headers) if place not in places and header)
-    tell(Provenance(key=name, file=str(path), read=read, left=left))
+    report_file(Provenance(key=name, file=str(path), read=read, left=left))

@@ -22,7 +22,7 @@ _DEEPEST = 8  # collections in collections
 _log = logging.getLogger("warp_torchrl")
 
 
-class Part(NamedTuple):
+class GeometryPart(NamedTuple):
     """One point, line or polygon."""
 
     kind: str  # Point, LineString or Polygon
@@ -32,7 +32,7 @@ class Part(NamedTuple):
 class Feature(NamedTuple):
     """Content of a file about one place."""
 
-    parts: list[Part]
+    parts: list[GeometryPart]
     properties: Mapping[str, Any]
 
 
@@ -136,7 +136,7 @@ def _read_shapefile(name: str, path: Path) -> tuple[list[tuple[Any, Mapping[str,
         return features, stated_crs(name, file.read(_LARGEST_FILE).decode("utf-8-sig", "replace"))
 
 
-def _parts(geometry: Any, depth: int = 0) -> Iterator[Part]:
+def _parts(geometry: Any, depth: int = 0) -> Iterator[GeometryPart]:
     """Return the points, lines and polygons of a geometry."""
     kind = geometry["type"]
     if kind == "GeometryCollection" and depth < _DEEPEST:
@@ -151,14 +151,14 @@ def _parts(geometry: Any, depth: int = 0) -> Iterator[Part]:
         raise ValueError(kind)
 
 
-def _part(kind: str, coordinates: Any) -> Part:
+def _part(kind: str, coordinates: Any) -> GeometryPart:
     """Return a part of at least a point, a line of two, or a polygon of rings of four."""
     lines = coordinates if kind == "Polygon" else [coordinates] if kind == "LineString" else [[coordinates]]
     rings = [_places(line) for line in lines]
     least = {"Point": 1, "LineString": 2, "Polygon": 4}[kind]
     if not rings or any(len(ring) < least for ring in rings):
         raise ValueError(kind)
-    return Part(kind, rings)
+    return GeometryPart(kind, rings)
 
 
 def _places(line: Any) -> np.ndarray:

@@ -102,7 +102,7 @@ TABLES = {
 """The presets by name."""
 LAND_COVER = ("worldcover", "nlcd", "corine")
 """Those whose codes are classes of land cover, and no fuel models: laws of rates of spread go by the cover there."""
-NO_FUEL = 99
+NO_FUEL_CODE = 99
 """Fuel code of cells that are not known: no fuel in FBFM13, FBFM40 and FBP alike."""
 _UNDECLARED = (255, 32767, 65535)
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-MISSING = 'path must be read with rasterio, which is missing: pip install "warp_torchrl[gis]"'
+NO_RASTERIO = 'path must be read with rasterio, which is missing: pip install "warp_torchrl[gis]"'
 _ALONE = {
     "GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR",  # a mask beside a file may be of any driver, VRT too
     "GDAL_PAM_ENABLED": "NO",
@@ -30,7 +30,7 @@ def reading(rule: str, **options: str) -> Iterator[Any]:
     try:
         import rasterio
     except ImportError:
-        raise ValueError(MISSING) from None
+        raise ValueError(NO_RASTERIO) from None
     from rasterio._err import CPLE_BaseError
     from rasterio.errors import CRSError, RasterioError
 

@@ -10,7 +10,9 @@ from torch import Tensor
 from warp_torchrl.system import disk
 from warp_torchrl.world.terrain.grid import Grid
 
-MISSING = 'GeoTIFF and GeoJSON must be written with rasterio, which is missing: pip install "warp_torchrl[gis]"'
+NO_RASTERIO_TO_WRITE = (
+    'GeoTIFF and GeoJSON must be written with rasterio, which is missing: pip install "warp_torchrl[gis]"'
+)
 
 
 def write_geotiff(
@@ -129,5 +131,5 @@ def _rasterio() -> Any:
     try:
         import rasterio
     except ImportError:
-        raise ValueError(MISSING) from None
+        raise ValueError(NO_RASTERIO_TO_WRITE) from None
     return rasterio

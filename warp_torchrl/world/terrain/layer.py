@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from warp_torchrl.world.terrain.bands import band_names, choose_band, unit_of
+from warp_torchrl.world.terrain.bands import band_names, band_unit, choose_band
 from warp_torchrl.world.terrain.crs import check_crs
 from warp_torchrl.world.terrain.gdal import reading
 from warp_torchrl.world.terrain.grid import Grid
@@ -104,7 +104,7 @@ def read_header(
         if not dtype.startswith(("int", "uint", "float")):
             raise ValueError(f"{name} must have one band of real numbers, {path} has {dtype}")
         grid = Grid((rows, columns), crs, layer.transform)
-        header = Header(path, grid, number, band_names(layer), unit_of(layer, number), dtype)
+        header = Header(path, grid, number, band_names(layer), band_unit(layer, number), dtype)
     _check_place(name, path, grid)
     if metric:
         hint = f"; give {remedy} to put it on such cells" if grid.is_on_earth else ""

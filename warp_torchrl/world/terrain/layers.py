@@ -138,7 +138,7 @@ def height_unit(header: Header, given: float | None) -> float:
     return factor_of("height", header.path, header.unit, LENGTHS, given)
 
 
-def unread(folder: Path, read: Iterable[Path]) -> list[str]:
+def unread_files(folder: Path, read: Iterable[Path]) -> list[str]:
     """Return the names of a folder's rasters and vector files that are not read."""
     there = {each.resolve() for each in read}
     kinds = (*RASTERS, *SUFFIXES)

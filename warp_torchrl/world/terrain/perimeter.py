@@ -9,12 +9,12 @@ import numpy as np
 from torch import Tensor
 
 from warp_torchrl.system import disk
-from warp_torchrl.world.terrain.geotiff import MISSING, as_array, check_window, window_transform
+from warp_torchrl.world.terrain.geotiff import NO_RASTERIO_TO_WRITE, as_array, check_window, window_transform
 from warp_torchrl.world.terrain.grid import Grid
 
 _DECIMALS = 7  # of a degree: a centimetre
 _NO_PLACE = "coordinates are those of the grid, which has no CRS; they are not longitude and latitude"
-Ring = Sequence[Sequence[float]]
+LinearRing = Sequence[Sequence[float]]
 """Places (x, y) round an area, the last being the first."""
 
 
@@ -72,13 +72,13 @@ def _feature(burned: np.ndarray, grid: Grid, corner: tuple[int, int], minute: fl
     return {"type": "Feature", "properties": {**time, "area_ha": area}, "geometry": geometry}
 
 
-def _polygons(burned: np.ndarray, grid: Grid, corner: tuple[int, int]) -> list[list[Ring]]:
+def _polygons(burned: np.ndarray, grid: Grid, corner: tuple[int, int]) -> list[list[LinearRing]]:
     """Return the rings of each patch of burned cells, the outer one first, in longitude and latitude if possible."""
     try:
         from rasterio.features import shapes
         from rasterio.warp import transform_geom
     except ImportError:
-        raise ValueError(MISSING) from None
+        raise ValueError(NO_RASTERIO_TO_WRITE) from None
     found = shapes(burned.astype(np.uint8), mask=burned, connectivity=4, transform=window_transform(grid, corner))
     patches = [geometry for geometry, _ in found]
     if not grid.crs:
@@ -91,7 +91,7 @@ def _polygons(burned: np.ndarray, grid: Grid, corner: tuple[int, int]) -> list[l
     ]
 
 
-def _turned(ring: Ring, is_outer: bool) -> Ring:
+def _turned(ring: LinearRing, is_outer: bool) -> LinearRing:
     """Return a ring that runs counter-clockwise where it is an outer one, clockwise where it is a hole."""
     x, y = np.asarray(ring, np.float64)[:, :2].T
     x, y = x - x[0], y - y[0]  # of large coordinates a difference would lose its last digits

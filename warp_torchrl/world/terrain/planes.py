@@ -9,7 +9,7 @@ import numpy as np
 
 from warp_torchrl.world.state.state import OLDEST, Cover
 from warp_torchrl.world.terrain.crop import DRAWN
-from warp_torchrl.world.terrain.fuel import NO_FUEL
+from warp_torchrl.world.terrain.fuel import NO_FUEL_CODE
 from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.landscape import TALLEST
 from warp_torchrl.world.terrain.vector import burn_in, read_shapes
@@ -127,7 +127,7 @@ def to_canopy_height(values: np.ndarray, known: np.ndarray, unit: float) -> np.n
 
 
 def to_fuel(codes: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Return class codes, int16 [H, W]; ``NO_FUEL`` where they are not known.
+    """Return class codes, int16 [H, W]; ``NO_FUEL_CODE`` where they are not known.
 
     Raises:
         ValueError: If a code is not whole, or not in -32768..32767.
@@ -136,7 +136,7 @@ def to_fuel(codes: np.ndarray, known: np.ndarray) -> np.ndarray:
     if broken.any():
         raise ValueError(f"fuel must hold whole class codes, got {codes[broken][0]}")
     _check("fuel", codes, known, -32768, 32767)
-    return np.where(known, codes, NO_FUEL).astype(np.int16)
+    return np.where(known, codes, NO_FUEL_CODE).astype(np.int16)
 
 
 def _check(name: str, values: np.ndarray, known: np.ndarray, low: float, high: float, unit: str = "") -> None:

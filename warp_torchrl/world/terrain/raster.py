@@ -14,7 +14,14 @@ from warp_torchrl.world.terrain.crop import Crop, Cropped
 from warp_torchrl.world.terrain.fuel import LAND_COVER, code_table, is_code, to_cover
 from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.landscape import map_size
-from warp_torchrl.world.terrain.layers import Layers, elevation_unit, find_layers, height_unit, read_layers, unread
+from warp_torchrl.world.terrain.layers import (
+    Layers,
+    elevation_unit,
+    find_layers,
+    height_unit,
+    read_layers,
+    unread_files,
+)
 from warp_torchrl.world.terrain.planes import (
     check_slopes,
     to_age,
@@ -52,7 +59,7 @@ class Raster(Cropped):
         table: Cover of each class code: a preset of ``fuel.TABLES``, or a mapping to ``Cover`` codes or names, or a
             yaml file of one.
         nodata: Cells whose fuel or elevation is not known: ``refuse`` leaves no world there; ``unburnable`` gives cells
-            without fuel ``fuel.NO_FUEL`` and bare cover, and cells without elevation that of the cells around.
+            without fuel ``fuel.NO_FUEL_CODE`` and bare cover, and cells without elevation that of the cells around.
         ages: Ages without a layer of ages: ``drawn`` draws the trees' ages for each episode, as the paper does;
             ``oldest`` gives all the oldest, 10, so that every cell of fuel can burn.
         age: The same for a layer of tree ages, in any unit; None leaves them to ``ages``. A tree's code is
@@ -154,7 +161,7 @@ class Raster(Cropped):
         Args:
             others: Files that are read for something else, such as the ignition.
         """
-        return unread(self._paths[0].parent, [*self._paths, *map(Path, others)])
+        return unread_files(self._paths[0].parent, [*self._paths, *map(Path, others)])
 
     def _check_together(self) -> None:
         if self.age is not None and self.canopy is not None:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from warp_torchrl.world.terrain.crs import project
-from warp_torchrl.world.terrain.features import SUFFIXES, Part, read_features
+from warp_torchrl.world.terrain.features import SUFFIXES, GeometryPart, read_features
 from warp_torchrl.world.terrain.gdal import reading
 from warp_torchrl.world.terrain.grid import Grid
 
@@ -21,7 +21,7 @@ _log = logging.getLogger("warp_torchrl")
 class Shape(NamedTuple):
     """One point, line or polygon in a grid's coordinates, with its properties."""
 
-    part: Part
+    part: GeometryPart
     properties: Mapping[str, Any]
     feature: int  # its place in the file: parts of one feature have the same
 
@@ -105,14 +105,14 @@ def in_grid(name: str, x: np.ndarray, y: np.ndarray, crs: Any, grid: Grid) -> tu
     return project(name, x, y, crs, grid.crs)
 
 
-def _moved(name: str, part: Part, crs: Any, grid: Grid) -> Part:
+def _moved(name: str, part: GeometryPart, crs: Any, grid: Grid) -> GeometryPart:
     """Return a part in the grid's coordinates."""
     corners = np.concatenate(part.rings)
     x, y = in_grid(name, corners[:, 0], corners[:, 1], crs, grid)
     if not (np.isfinite(x).all() and np.isfinite(y).all()):
         raise ValueError(f"{name} must have coordinates that {grid.crs} can hold, got {corners[0].tolist()}")
     ends = np.cumsum([len(ring) for ring in part.rings])[:-1]
-    return Part(part.kind, np.split(np.stack((x, y), axis=1), ends))
+    return GeometryPart(part.kind, np.split(np.stack((x, y), axis=1), ends))
 
 
 def _touches(shape: Shape, grid: Grid) -> bool:

@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from warp_torchrl.validation import did_you_mean
-from warp_torchrl.world.weather.quantities import OWNER, QUANTITIES, SHOWN, STATED
+from warp_torchrl.world.weather.quantities import OWNER, QUANTITIES, SHOWN_NAMES, STATED
 from warp_torchrl.world.weather.sources import Source, find_source
 from warp_torchrl.world.weather.units import SPEED, Units, ascii_text, unit_of, without_unit
 
@@ -32,7 +32,7 @@ _NOTE = re.compile(
 
 
 @dataclass(frozen=True)
-class Header:
+class ColumnHeader:
     """Meaning of a column's first cell."""
 
     text: str
@@ -54,12 +54,12 @@ class Column:
     height: str | None = None
 
 
-def plain(text: str) -> str:
+def plain_name(text: str) -> str:
     """Return the letters and digits of a name, in lower case and without accents."""
     return re.sub(r"[^a-z0-9]", "", ascii_text(text))
 
 
-def read_header(text: str) -> Header:
+def read_column_header(text: str) -> ColumnHeader:
     """Return the meaning of the text above a column."""
     name, *inside = (part.strip() for part in re.split(r"[\[\]()]", ascii_text(text)))
     unit, odd = None, [part for part in inside if not _NOTE.fullmatch(part)]
@@ -67,9 +67,9 @@ def read_header(text: str) -> Header:
         unit = unit_of(part) or unit
     if unit is None and (tail := re.fullmatch(r"(.+)(?:,| - | in )\s*([^,]+)", name)) and unit_of(tail[2]):
         name, unit = tail[1], unit_of(tail[2])
-    found, glued, height = _known(plain(name))
+    found, glued, height = _known(plain_name(name))
     if found is None:
-        return Header(text, None, plain(name))
+        return ColumnHeader(text, None, plain_name(name))
     height = height or next(
         (part.replace(" ", "") for part in inside if _HEIGHT.fullmatch(part.replace(" ", ""))), None
     )
@@ -77,7 +77,7 @@ def read_header(text: str) -> Header:
     quantity = OWNER[found] if _is_at(height, OWNER[found]) else None
     if found == "wind" and unit not in SPEED:  # a word that stands for much else
         quantity = None
-    return Header(text, quantity, found, unit, height)
+    return ColumnHeader(text, quantity, found, unit, height)
 
 
 def _known(name: str) -> tuple[str | None, str | None, str | None]:
@@ -136,8 +136,8 @@ def find_columns(
     Raises:
         ValueError: If a quantity has two columns, no unit or one that is not known, or the wind has no column.
     """
-    heads = [read_header(text) for text in headers]
-    source = find_source([plain(head.text.split("(")[0].split("[")[0]) for head in heads], rows)
+    heads = [read_column_header(text) for text in headers]
+    source = find_source([plain_name(head.text.split("(")[0].split("[")[0]) for head in heads], rows)
     if source:
         heads = [replace(head, quantity=source.names.get(head.name, head.quantity)) for head in heads]
     places = {name: _places(name, heads) for name in QUANTITIES}
@@ -155,7 +155,7 @@ def find_columns(
     return found, source
 
 
-def _places(name: str, heads: Sequence[Header]) -> list[int]:
+def _places(name: str, heads: Sequence[ColumnHeader]) -> list[int]:
     """Return where a quantity's columns stand: of all that there are those of the first names."""
     at = [place for place, head in enumerate(heads) if head.quantity == name]
     tiers = ([place for place in at if heads[place].name in tier] for tier in QUANTITIES[name].names)
@@ -169,7 +169,7 @@ def _unread(places: Mapping[str, list[int]]) -> list[str]:
     return unread + ([] if places["temperature"] and not places["humidity"] else ["dew_point"])
 
 
-def _check_wind(places: Mapping[str, list[int]], heads: Sequence[Header]) -> None:
+def _check_wind(places: Mapping[str, list[int]], heads: Sequence[ColumnHeader]) -> None:
     if places["wind_u"] and places["wind_v"]:
         return
     for name in ("wind_speed", "wind_bearing"):
@@ -177,21 +177,21 @@ def _check_wind(places: Mapping[str, list[int]], heads: Sequence[Header]) -> Non
             high = [head.text for head in heads if head.height and head.name in OWNER and OWNER[head.name] == name]
             why = f"; {', '.join(high)} is not the wind at 10 m or 20 ft" if high else ""
             got = ", ".join(head.text for head in heads)
-            raise ValueError(f"weather must have a column of {name} ({SHOWN[name]}), got {got}{why}")
+            raise ValueError(f"weather must have a column of {name} ({SHOWN_NAMES[name]}), got {got}{why}")
 
 
-def _said(told: Mapping[str, str], heads: Sequence[Header]) -> dict[str, str]:
+def _said(told: Mapping[str, str], heads: Sequence[ColumnHeader]) -> dict[str, str]:
     """Return the user's units, by quantity.
 
     Raises:
         ValueError: If one names no column or no unit.
     """
     said = {}
-    by_name = {plain(head.text): head.quantity for head in heads} | {head.name: head.quantity for head in heads}
-    by_name |= {plain(name): name for name in QUANTITIES}
+    by_name = {plain_name(head.text): head.quantity for head in heads} | {head.name: head.quantity for head in heads}
+    by_name |= {plain_name(name): name for name in QUANTITIES}
     for key, word in told.items():
-        quantity = by_name.get(plain(key))
-        if plain(key) == "datetime":
+        quantity = by_name.get(plain_name(key))
+        if plain_name(key) == "datetime":
             continue
         if quantity is None:
             hint = did_you_mean(key, QUANTITIES)
@@ -204,7 +204,7 @@ def _said(told: Mapping[str, str], heads: Sequence[Header]) -> dict[str, str]:
 
 
 def _column(
-    name: str, head: Header, place: int, below: Sequence[str], said: Mapping[str, str], source: Source | None
+    name: str, head: ColumnHeader, place: int, below: Sequence[str], said: Mapping[str, str], source: Source | None
 ) -> Column:
     quantity = QUANTITIES[name]
     stated = [each for each in (head.unit, _below(below, place)) if each is not None]

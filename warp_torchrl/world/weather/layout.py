@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from warp_torchrl.system.delimited import SEPARATORS, named_separator, read_text, split_rows, to_number
-from warp_torchrl.world.weather.columns import read_header
+from warp_torchrl.system.delimited import SEPARATORS, named_separator, read_table_text, split_rows, to_number
+from warp_torchrl.world.weather.columns import read_column_header
 from warp_torchrl.world.weather.stations import read_station
 from warp_torchrl.world.weather.units import unit_of
 
@@ -49,7 +49,7 @@ def read_sheet(path: Path) -> Sheet:
     Raises:
         ValueError: If it cannot be read, has no header or row, or a row has other cells than the header.
     """
-    text = read_text("weather", path)
+    text = read_table_text("weather", path)
     try:
         if station := read_station(text):
             return Sheet(**station)
@@ -88,7 +88,7 @@ def _find_header(text: str, named: str | None) -> tuple[str, int]:
             continue
         for line, row in enumerate(rows):
             cells = _uncommented(row)
-            found = len({head.quantity for cell in cells if cell and (head := read_header(cell)).quantity})
+            found = len({head.quantity for cell in cells if cell and (head := read_column_header(cell)).quantity})
             length = next((k for k, below in enumerate(rows[line:]) if not below), len(rows) - line)
             if found and (score := (found, length, len(cells), -rank)) > best:
                 best, place = score, (separator, line)
@@ -126,7 +126,7 @@ def _is_header(row: Sequence[str], follows: Sequence[str]) -> bool:
         return False
     if not follows and not re.search(r"\d", row[0]):
         return True
-    return sum(read_header(cell).quantity is not None for cell in row if cell) > 1
+    return sum(read_column_header(cell).quantity is not None for cell in row if cell) > 1
 
 
 def _units_below(headers: Sequence[str], rows: list[list[str]]) -> tuple[list[str], list[list[str]]]:

@@ -120,7 +120,7 @@ OWNER = {each: name for name, quantity in QUANTITIES.items() for tier in quantit
 """The quantity that a name is one of."""
 STATED = {"sknt": "kt", "p01i": "in", "airtc": "c", "intensidadeventokm": "km/h"}
 """Names that say a unit by what they abbreviate."""
-SHOWN = {
+SHOWN_NAMES = {
     "wind_speed": "ws, windspeed, windspd, wind_speed",
     "wind_bearing": "wd, winddirection, winddir, wind_direction, wind_dir, wind_bearing",
 }

@@ -9,10 +9,10 @@ from typing import Literal, cast
 import torch
 from torch import Tensor
 
-from warp_torchrl.system.provenance import Provenance, tell
+from warp_torchrl.system.provenance import Provenance, report_file
 from warp_torchrl.world.weather.cells import bearings, column_values
 from warp_torchrl.world.weather.clock import Clock, hours_until
-from warp_torchrl.world.weather.columns import Column, find_columns, plain, stated_height
+from warp_torchrl.world.weather.columns import Column, find_columns, plain_name, stated_height
 from warp_torchrl.world.weather.dead_moisture import dead_moisture
 from warp_torchrl.world.weather.fwi import buildup_index, hourly_ffmc
 from warp_torchrl.world.weather.layout import Sheet, read_sheet, zone_of
@@ -29,7 +29,7 @@ _log = logging.getLogger("warp_torchrl")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Weather:
+class WeatherValues:
     """The weather of some moments; every tensor float32 of one shape, None where it is not known."""
 
     wind_speed: Tensor  # at wind_height in the open [m/s]
@@ -50,18 +50,18 @@ class Weather:
 
 
 @dataclass(frozen=True, kw_only=True)
-class WeatherTable(Weather):
+class WeatherTable(WeatherValues):
     """Weather row by row; every tensor float32 [T]. A row holds until the next begins, the last one from then on."""
 
     hours: Tensor  # since the first row began, growing
 
-    def at(self, minutes: Tensor | float) -> Weather:
+    def at(self, minutes: Tensor | float) -> WeatherValues:
         """Return the weather at some minutes since the first row began, in their shape; before, the first row holds."""
         moments = torch.as_tensor(minutes, dtype=torch.float32, device=self.hours.device) / 60
         row = (torch.searchsorted(self.hours, moments.contiguous(), right=True) - 1).clamp(min=0)
-        known = {each.name: getattr(self, each.name) for each in fields(Weather)}
+        known = {each.name: getattr(self, each.name) for each in fields(WeatherValues)}
         values = {name: value[row] for name, value in known.items() if isinstance(value, Tensor)}
-        return Weather(wind_height=self.wind_height, **values)
+        return WeatherValues(wind_height=self.wind_height, **values)
 
 
 def read_weather(
@@ -138,7 +138,7 @@ def minutes_until(moment: str, path: str | Path, units: Mapping[str, str] | None
 
 def _in_time(sheet: Sheet, units: Mapping[str, str]) -> tuple[Sheet, Clock]:
     """Return the table and its times with the first row first; stations often write the newest row on top."""
-    clock = read_clock(sheet, next((str(unit) for key, unit in units.items() if plain(key) == "datetime"), None))
+    clock = read_clock(sheet, next((str(unit) for key, unit in units.items() if plain_name(key) == "datetime"), None))
     if clock.hours[-1] >= 0.0:
         return sheet, clock
     return replace(sheet, rows=sheet.rows[::-1]), clock.reversed()
@@ -178,7 +178,7 @@ def _tell(
     notes = [f"wind is that at {height}"]
     if source:
         notes.append(f"its columns have the names of {source.title}, whose units are taken where the file states none")
-    tell(
+    report_file(
         Provenance(
             key="weather",
             file=str(path),

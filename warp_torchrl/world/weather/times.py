@@ -17,7 +17,7 @@ from statistics import median_low
 
 from warp_torchrl.system.delimited import to_number, to_points
 from warp_torchrl.world.weather.clock import APART, Clock, dated_clock, since_first
-from warp_torchrl.world.weather.columns import plain
+from warp_torchrl.world.weather.columns import plain_name
 from warp_torchrl.world.weather.dates import epoch_hours, read_stamp
 from warp_torchrl.world.weather.layout import Sheet
 
@@ -49,7 +49,7 @@ def read_clock(sheet: Sheet, order: str | None = None) -> Clock:
     """
     if order is not None and order not in _ORDERS:
         raise ValueError(f"units.datetime must be {', '.join(_ORDERS)}, got {order}")
-    names = [plain(header.split("(")[0].split("[")[0].split(",")[0]) for header in sheet.headers]
+    names = [plain_name(header.split("(")[0].split("[")[0].split(",")[0]) for header in sheet.headers]
     if "hours" in names:
         clock: Clock | None = _elapsed(sheet, names.index("hours"))
     else:

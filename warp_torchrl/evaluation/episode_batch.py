@@ -23,7 +23,7 @@ _PART = 16
 """Worlds go on without those that have ended when these are one in so many."""
 
 
-class Match:
+class EpisodeBatch:
     """One episode of each world of an environment, equal to a loop over its steps, number for number.
 
     Args:

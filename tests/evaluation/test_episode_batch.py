@@ -9,7 +9,7 @@ from warp_torchrl.algorithms.ppo import Ppo
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.observation import Paper, Surroundings
 from warp_torchrl.evaluation import play as play_module
-from warp_torchrl.evaluation.match import Match, fits
+from warp_torchrl.evaluation.episode_batch import EpisodeBatch, fits
 from warp_torchrl.evaluation.play import WithoutAgent, play
 from warp_torchrl.heuristics import HEURISTICS, Greedy
 from warp_torchrl.models import Mlp, signature
@@ -76,8 +76,8 @@ def test_heuristics_play_side_by_side_as_they_do_alone(make_small_env, monkeypat
 
 def test_a_match_goes_on_with_the_worlds_that_have_not_ended(make_small_env, monkeypatch):
     env, sizes = make_small_env(32), []
-    step = Match._step
-    monkeypatch.setattr(Match, "_step", lambda self, action: (sizes.append(len(self.rows)), step(self, action)))
+    step = EpisodeBatch._step
+    monkeypatch.setattr(EpisodeBatch, "_step", lambda self, action: (sizes.append(len(self.rows)), step(self, action)))
     play(env, Greedy(env), 0)
     assert sizes[0] == 32 and sorted(sizes, reverse=True) == sizes and 1 <= sizes[-1] < 32
     assert env.world_state.done.all()
