@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -79,7 +80,36 @@ def test_every_tool_of_the_script_comes_with_development(step):
 def test_the_hooks_before_a_commit_run_what_the_script_lints_with():
     hooks = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text())["repos"][0]["hooks"]
     linted = [line.split()[0] for name in ("lint", "types") for line in STEPS[name].splitlines()]
-    assert {hook["entry"].split()[0] for hook in hooks} == set(linted) == {"ruff", "codespell", "mypy"}
+    assert {hook["entry"].split()[0] for hook in hooks} == set(linted) == {"ruff", "codespell", "mypy", ".ci/words"}
+
+
+def words(*arguments):
+    """Run the check of docstrings, and return its exit code and what it printed."""
+    ran = subprocess.run(
+        [sys.executable, ROOT / ".ci" / "words", *arguments], capture_output=True, text=True, check=False
+    )
+    return ran.returncode, ran.stdout
+
+
+def test_few_docstrings_have_words_that_are_hard_to_read():
+    code, printed = words()
+    assert code == 0, printed
+
+
+@pytest.mark.parametrize(
+    ("docstring", "line"),
+    [
+        ("Return who asks for it.", "module.py:1: who"),
+        ("Return the rest,\nto those that go on.", "module.py:1: those that"),
+        ("What the module has.", "module.py:1: title is a clause: What the module has."),
+    ],
+)
+def test_words_that_are_hard_to_read_are_found(tmp_path, docstring, line):
+    (tmp_path / "module.py").write_text(f'"""{docstring}"""\n')
+    code, printed = words(tmp_path)
+    assert code == 1 and line in printed.replace(f"{tmp_path}/", "")
+    (tmp_path / "module.py").write_text('"""Sum of both shares."""\n\n\ndef told():\n    """Return whose it is."""\n')
+    assert words(tmp_path)[0] == 0
 
 
 def test_codespell_finds_a_mistake_and_none_of_ours(tmp_path):
