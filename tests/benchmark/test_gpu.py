@@ -46,7 +46,7 @@ def test_worlds_that_differ_are_told(tmp_path, monkeypatch):
         return make(scenario, seed=next(seeds), **options)
 
     monkeypatch.setattr(gpu, "make_env", other)
-    measure_gpu("cpu", tmp_path / "gpu.json", replace(ONE, worlds=(), ways=()), tell=lambda line: None)
+    measure_gpu("cpu", tmp_path / "gpu.json", replace(ONE, worlds=(), ways=()), progress=lambda line: None)
     assert "cells" in json.loads((tmp_path / "gpu.json").read_text())["equality"]["differing"]
 
 
@@ -69,14 +69,14 @@ def test_a_way_that_fails_does_not_take_the_others_along(tmp_path, monkeypatch):
         raise RuntimeError("no such kernel")
 
     monkeypatch.setattr(gpu, "_steps_by", broken)
-    assert not measure_gpu("cpu", tmp_path / "gpu.json", ONE, tell=lambda line: None)
+    assert not measure_gpu("cpu", tmp_path / "gpu.json", ONE, progress=lambda line: None)
     found = json.loads((tmp_path / "gpu.json").read_text())["steps 2"]
     assert found["error"] == found["eager"]["error"] == "RuntimeError: no such kernel"
     assert found["tick"]["cells_per_second"] > 0.0
 
 
 def test_no_part_begins_late(tmp_path):
-    assert measure_gpu("cpu", tmp_path / "gpu.json", replace(ONE, seconds=-1.0), tell=lambda line: None)
+    assert measure_gpu("cpu", tmp_path / "gpu.json", replace(ONE, seconds=-1.0), progress=lambda line: None)
     assert json.loads((tmp_path / "gpu.json").read_text())["waits"] == {"skipped": "-1 s had passed"}
 
 

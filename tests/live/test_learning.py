@@ -114,20 +114,20 @@ def until(holds):
 
 
 def test_a_training_is_started_followed_and_stopped(learning, match):
-    assert learning.told() == "" and learning.newest() is None
+    assert learning.status() == "" and learning.newest() is None
     with pytest.raises(Refused, match="no policy is trained yet"):
         learning.setting(7)
     folder = learning.start(match.sides[0], match.setting, 5000)
     assert folder.parent == learning.recordings / "runs"
     until(lambda: learning.newest() == 2000)
-    assert learning.told() == f"{folder} trains: 2,000 of 5,000 steps, 75% saved in training"
+    assert learning.status() == f"{folder} trains: 2,000 of 5,000 steps, 75% saved in training"
     with pytest.raises(Refused, match="trains: stop it first"):
         learning.start(match.sides[0], match.setting, 5000)
     setting = learning.setting(7)
     assert (setting.policy, setting.seed, setting.overrides) == (str(folder), 7, match.setting.overrides)
     learning.stop()
     until(lambda: not learning.goes_on)
-    assert learning.told() == (
+    assert learning.status() == (
         f"{folder} was stopped: 2,000 of 5,000 steps, 75% saved in training; train.py resume={folder} goes on"
     )
     with pytest.raises(Refused, match="no training goes on"):
@@ -140,13 +140,13 @@ def test_a_training_is_started_followed_and_stopped(learning, match):
 def test_a_training_ends_by_itself(learning, match):
     folder = learning.start(match.sides[0], match.setting, 1)
     until(lambda: not learning.goes_on)
-    assert learning.told() == f"{folder} is trained: 2,000 of 1 steps, 75% saved in training"
+    assert learning.status() == f"{folder} is trained: 2,000 of 1 steps, 75% saved in training"
 
 
 def test_why_a_training_fails_is_told(learning, match):
     folder = learning.start(match.sides[0], match.setting, 2)
     until(lambda: not learning.goes_on)
-    assert learning.told() == f"{folder} failed: the disk is full" and learning.newest() is None
+    assert learning.status() == f"{folder} failed: the disk is full" and learning.newest() is None
 
 
 def test_the_page_s_end_is_the_training_s_when_it_has_saved(learning, match):
@@ -183,7 +183,7 @@ def test_what_a_person_did_is_learned_by_a_real_training(tmp_path, match):
     end = time.monotonic() + 300.0
     while learning.goes_on and time.monotonic() < end:
         time.sleep(0.2)
-    assert learning.told().startswith(f"{folder} is trained: "), learning.told()
+    assert learning.status().startswith(f"{folder} is trained: "), learning.status()
     with (folder / "metrics.csv").open() as file:
         losses = [float(row["train/cloning_loss"]) for row in csv.DictReader(file)]
     assert 0.0 < losses[4] < losses[0] and losses[-1] == 0.0, "the weight falls to 0 at three tenths"

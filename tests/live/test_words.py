@@ -64,8 +64,8 @@ def test_a_policy_without_probabilities_says_so(match):
 
 
 def test_what_an_agent_is_told_leaves_out_noughts():
-    assert words.told({"time_left": 0.5, "tank": 0.0}).count("<b>") == 1
-    assert "nothing else" in words.told({"tank": 0.0})
+    assert words.numbers_html({"time_left": 0.5, "tank": 0.0}).count("<b>") == 1
+    assert "nothing else" in words.numbers_html({"tank": 0.0})
 
 
 def test_the_legend_names_every_kind_of_cell_and_every_vehicle(match):
@@ -138,7 +138,7 @@ def test_names_of_others_are_text_wherever_they_are_shown(match, monkeypatch):
         "acts": (words.acts(side), 3),
         "questions": (words.questions(side, [Question(0, 1), Question(1, 2, 0.3)]), 4),
         "actions": (words.actions(side, 0), len(side.env.action_names)),
-        "told": (words.told({MARKUP: 1.0}), 1),
+        "told": (words.numbers_html({MARKUP: 1.0}), 1),
         "legend": (words.legend(side), 3),
         "recordings": (words.recordings(Path(MARKUP), {MARKUP: row, f"{MARKUP}2": "broken"}), 3),
         "no recordings": (words.recordings(Path(MARKUP), {}), 1),

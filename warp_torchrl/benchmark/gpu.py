@@ -71,14 +71,14 @@ SMALL = Size(
 """What a CPU measures in its place, without compiling, to show that all of it runs."""
 
 
-def measure_gpu(device: str, path: Path, size: Size, tell: Callable[[str], object] = print) -> bool:
+def measure_gpu(device: str, path: Path, size: Size, progress: Callable[[str], object] = print) -> bool:
     """Measure everything, write it to a file as JSON, and return whether every part was measured.
 
     Args:
         device: ``cuda``, or ``cpu``, which runs the GPU's code.
         path: The file.
         size: Size of the benchmark.
-        tell: Called with a line about each part.
+        progress: Called with a line about each part.
     """
     begin = time.perf_counter()
     found: dict[str, Any] = {"machine": _machine(device), "scenario": _SCENARIO}
@@ -94,15 +94,15 @@ def measure_gpu(device: str, path: Path, size: Size, tell: Callable[[str], objec
         if time.perf_counter() - begin > size.seconds:
             found[name] = {"skipped": f"{size.seconds:g} s had passed"}
         else:
-            found[name] = _told(part, device)
+            found[name] = _result(part, device)
         sound = sound and "error" not in found[name]
         found["seconds"] = round(time.perf_counter() - begin, 1)
         disk.replace(path, json.dumps(found, indent=1) + "\n")
-        tell(f"{found['seconds']:6.1f} s  {name}: {_line(found[name])}")
+        progress(f"{found['seconds']:6.1f} s  {name}: {_line(found[name])}")
     return sound
 
 
-def _told(part: Callable[[], Any], device: str) -> dict[str, Any]:
+def _result(part: Callable[[], Any], device: str) -> dict[str, Any]:
     """Return the result of a part, or its error: on a borrowed card the other parts are still worth their figures."""
     try:
         with unread() if device == "cpu" else nullcontext():
@@ -178,7 +178,7 @@ def _steps(device: str, n_worlds: int, size: Size) -> dict[str, Any]:
     _forget_peak(device)
     parts: dict[str, Callable[[], Any]] = {way: partial(_steps_by, way, device, n_worlds, size) for way in size.ways}
     parts["tick"] = partial(_ticks, device, n_worlds, size)
-    found = {name: _told(part, device) for name, part in parts.items()}
+    found = {name: _result(part, device) for name, part in parts.items()}
     failed = [each["error"] for each in found.values() if "error" in each]
     return found | ({"error": failed[0]} if failed else {}) | {"peak_gib": _peak(device)}
 

@@ -11,7 +11,14 @@ from typing import Any
 
 from warp_torchrl.commands.program import run_program
 from warp_torchrl.prediction.calibration.case import FireCase, read_fire_case
-from warp_torchrl.prediction.calibration.fitting import check_fuel_codes, check_told, fit_law, folds, null_scores, score
+from warp_torchrl.prediction.calibration.fitting import (
+    check_fuel_codes,
+    check_not_in_weather,
+    fit_law,
+    folds,
+    null_scores,
+    score,
+)
 from warp_torchrl.prediction.calibration.options import CalibrationOptions
 from warp_torchrl.prediction.calibration.parameters import Parameter, parameters_of
 from warp_torchrl.prediction.calibration.report import as_numbers, law_yaml, means, scores_table
@@ -57,7 +64,7 @@ def _run(arguments: Sequence[str]) -> None:
                 check_fuel_codes(case, fire)
                 report_file(_of_map(case, fire))
         _check_names(cases)
-        check_told(parameters, cases)
+        check_not_in_weather(parameters, cases)
         rows = {case.name: _before(fire, case, options) for case in cases}
         law = _fit(fire, parameters, cases, rows, options) if parameters else None
         page = _write(draft, rows, values, files, law, parameters, time.perf_counter() - began)
@@ -99,15 +106,15 @@ def _fit(
 ) -> RateFire:
     """Fit to all fires but one in turn, and to all; add the scores to the rows; return the law fitted to all."""
     for left_out, others in folds(cases) if options.leave_one_out else ():
-        law = fit_law(options.fit, fire, parameters, others, _told(f"without {left_out.name}"))
+        law = fit_law(options.fit, fire, parameters, others, _progress(f"without {left_out.name}"))
         rows[left_out.name]["left out"] = score(law, left_out, options.draws, options.seed)
-    law = fit_law(options.fit, fire, parameters, cases, _told("all fires"))
+    law = fit_law(options.fit, fire, parameters, cases, _progress("all fires"))
     for case in cases:
         rows[case.name]["fitted"] = score(law, case, options.draws, options.seed)
     return law
 
 
-def _told(fires: str) -> Callable[[int, float], None]:
+def _progress(fires: str) -> Callable[[int, float], None]:
     return lambda step, loss: log.info("%s: step %d, loss %.4f", fires, step, loss)
 
 

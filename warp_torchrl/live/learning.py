@@ -147,8 +147,8 @@ class PageTraining:
             raise Refused("no policy is trained yet")
         return Setting(policy=str(self.folder), seed=seed, overrides=self.overrides)
 
-    def told(self) -> str:
-        """Return how far the training is, in one line; nothing before the first."""
+    def status(self) -> str:
+        """Return the progress of the training, in one line; empty before the first."""
         if self._process is None or self.folder is None:
             return ""
         frames, saved = _reached(self.folder / "metrics.csv")

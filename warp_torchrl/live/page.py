@@ -20,7 +20,7 @@ from warp_torchrl.live.learning import PageTraining
 from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.live.once import Once
 from warp_torchrl.live.panel.panel import PACES, Panel, notify
-from warp_torchrl.live.panel.tab import told_if_refused
+from warp_torchrl.live.panel.tab import errors_shown
 from warp_torchrl.live.scene import aim, furnish, local_server, map_offsets, quiet
 from warp_torchrl.live.stage import Stage
 from warp_torchrl.system.foreign_text import plain_text
@@ -96,7 +96,7 @@ class Page:
             with self.lock:
                 self._go_on()
             for act in self.inbox.until(max(time.monotonic() + 0.002, began + 1.0 / self.pace)):
-                with self.lock, told_if_refused(self.tell):
+                with self.lock, errors_shown(self.tell):
                     act()
 
     def stop(self) -> None:
@@ -153,7 +153,7 @@ class Page:
         side = self.match.sides[0]
         if side.ended and side.open_recording is not self._ended:
             self._ended = side.open_recording
-            with told_if_refused(self.tell):
+            with errors_shown(self.tell):
                 self._keep()
 
     def restart(self, seed: int | None = None) -> None:
@@ -210,7 +210,7 @@ class Page:
         aim(self.server, size, count, aside=0.15)  # the panel stands on the right
 
     def _go_on(self) -> None:
-        with told_if_refused(self._stand_still):  # the page stays, to show what the match had come to
+        with errors_shown(self._stand_still):  # the page stays, to show what the match had come to
             self._follow()
             if self.playing:
                 self.step()
@@ -227,7 +227,7 @@ class Page:
 
     def _keep_the_last(self) -> None:
         """Save the episode that is being played when the page ends, and say so where it was started."""
-        with told_if_refused(lambda line, mistake: print(f"error: {line}", file=sys.stderr, flush=True)):
+        with errors_shown(lambda line, mistake: print(f"error: {line}", file=sys.stderr, flush=True)):
             folder = self.keeper.keep(self.match.sides[0])
             if folder is not None:
                 print(f"saved {plain_text(str(folder))}", flush=True)
@@ -279,7 +279,7 @@ class Page:
     def _welcome(self, client: viser.ClientHandle) -> None:
         if client not in self._clients.values():
             return  # it has left already
-        with told_if_refused(partial(notify, client)):
+        with errors_shown(partial(notify, client)):
             panel = self._panels[client.client_id] = Panel(self, client)
             panel.show()
 
@@ -288,7 +288,7 @@ class Page:
         self._is_left_out.discard(client.client_id)
         for name in self.match.sides[0].crew.leave(client.client_id):
             self.tell(f"{name} is the policy's again: who drove it has left")
-        with told_if_refused(self.tell):
+        with errors_shown(self.tell):
             self.show()
 
     def _follow(self) -> None:
@@ -297,7 +297,7 @@ class Page:
         self._followed = time.monotonic()
         for line in self.match.follow():
             self.tell(line)
-        if (training := self.learning.told()) != self._training:
+        if (training := self.learning.status()) != self._training:
             self._training = training
             if not self.learning.goes_on:
                 self.tell(training)

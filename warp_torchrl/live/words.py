@@ -148,7 +148,7 @@ def actions(side: Side, agent: int) -> str:
     return f"<div style='{_STYLE};padding:0 12px'>{note}<table style='width:100%'>{''.join(rows)}</table></div>"
 
 
-def told(numbers: Mapping[str, float]) -> str:
+def numbers_html(numbers: Mapping[str, float]) -> str:
     """Return the numbers of an agent's observation that are not 0, as HTML."""
     rows = [f"{escaped(name)} <b>{value:.2f}</b>" for name, value in numbers.items() if abs(value) >= 0.005]
     return f"<div style='{_STYLE};padding:0 12px'>{', '.join(rows) or 'nothing else'}</div>"

@@ -135,7 +135,7 @@ class _TorchRlTracker:
         name: Its name in TorchRL.
         run: The run folder.
         title: Name of the run; None takes the folder's name.
-        told: Frames of the last row that the tracker has already.
+        sent_frames: Frames of the last row that the tracker has already.
         begin: Called with the new logger.
         options: Options of TorchRL's logger.
     """
@@ -145,11 +145,11 @@ class _TorchRlTracker:
         name: str,
         run: Path,
         title: str | None = None,
-        told: int = 0,
+        sent_frames: int = 0,
         begin: Callable[[Any], None] = lambda logger: None,
         **options: object,
     ) -> None:
-        self._name, self._told = name, told
+        self._name, self._sent_frames = name, sent_frames
         try:
             self._logger = get_logger(name, str(run), title or run.name, **options)
             begin(self._logger)
@@ -158,7 +158,7 @@ class _TorchRlTracker:
 
     def log(self, row: Mapping[str, float | None], frames: int) -> None:
         """Send a row, with the column names of ``metrics.csv``."""
-        if self._logger is None or frames <= self._told:
+        if self._logger is None or frames <= self._sent_frames:
             return
         try:
             for name, value in row.items():
@@ -187,7 +187,7 @@ class _TorchRlTracker:
 class CsvOnly:
     """No tracker; a run always writes ``metrics.csv``."""
 
-    def open(self, run: Path, frames: int = 0, told: int = 0) -> Tracker:
+    def open(self, run: Path, frames: int = 0, sent_frames: int = 0) -> Tracker:
         """Return a tracker for a run folder, see ``Tensorboard.open``."""
         return _Silent()
 
@@ -209,27 +209,27 @@ class Wandb:
     def __post_init__(self) -> None:
         check_fields(self)
 
-    def open(self, run: Path, frames: int = 0, told: int = 0) -> Tracker:
+    def open(self, run: Path, frames: int = 0, sent_frames: int = 0) -> Tracker:
         """Return a tracker for a run folder, see ``Tensorboard.open``: rows that it has are not sent again."""
         os.environ.setdefault("WANDB_SILENT", "true")
         sweep = run.resolve().parent
         group = self.group or (sweep.name if (sweep / "multirun.yaml").exists() else None)
         number = _own_id(run / _ID, is_new=not frames)
         options = {"offline": self.mode == "offline", "project": self.project, "group": group, "id": number}
-        return _TorchRlTracker("wandb", run, told=told, wandb_kwargs=options)
+        return _TorchRlTracker("wandb", run, sent_frames=sent_frames, wandb_kwargs=options)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Tensorboard:
     """TensorBoard; needs the extra ``tensorboard``."""
 
-    def open(self, run: Path, frames: int = 0, told: int = 0) -> Tracker:
+    def open(self, run: Path, frames: int = 0, sent_frames: int = 0) -> Tracker:
         """Return a tracker for a run folder.
 
         Args:
             run: The folder.
             frames: Frames of the checkpoint from which the run resumes; 0 for a new one.
-            told: Frames of the last row that the run wrote before that; 0 if none is after the checkpoint.
+            sent_frames: Frames of the last row that the run wrote before that; 0 if none is after the checkpoint.
         """
         before = sorted(path.parent.name for path in run.glob("*/*tfevents*"))
 

@@ -1,1 +1,1 @@
-"""The world: fire, terrain, wind and vehicles as pure batched tensor functions (torch and tensordict only)."""
+"""The world: fire, terrain, wind and vehicles as pure batched tensor functions (torch only)."""

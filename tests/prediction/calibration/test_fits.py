@@ -7,7 +7,7 @@ from tests.prediction.calibration.ground import case_of, cases_of, fire
 from warp_torchrl.prediction.calibration.candidates import arrivals, burnable, grouped, median_pace
 from warp_torchrl.prediction.calibration.evolution import Evolution
 from warp_torchrl.prediction.calibration.expected import burning_probability, differentiated, margin
-from warp_torchrl.prediction.calibration.fitting import check_told, folds
+from warp_torchrl.prediction.calibration.fitting import check_not_in_weather, folds
 from warp_torchrl.prediction.calibration.gradients import Gradients
 from warp_torchrl.prediction.calibration.parameters import fire_at, parameters_of
 from warp_torchrl.world.law.travel import NEVER
@@ -127,4 +127,4 @@ def test_refusals_are_one_line():
         Evolution(seed=2**31)
     cases[0].spells[0].moisture[5] = 90.0
     with pytest.raises(ValueError, match=r"moisture\.ffmc is by that of east"):
-        check_told(parameters_of(["moisture.ffmc"], start), cases)
+        check_not_in_weather(parameters_of(["moisture.ffmc"], start), cases)

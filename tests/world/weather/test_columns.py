@@ -97,9 +97,9 @@ def test_what_nobody_states_is_asked_for(headers, temperature):
 def test_the_user_says_a_unit_by_quantity_or_by_column():
     headers = ["WindSpeed", "WD"]
     for key in ("wind_speed", "WindSpeed", "windspeed"):
-        assert unit(headers, told={key: "km/h"}) == "km/h"
-    assert unit(["WS", "WD"], told={"WS": "m/s"}) == "m/s"  # before what is only the custom
-    assert unit(["WS (furlong)", "WD"], told={"WS": "mph"}) == "mph"  # and before what is no unit
+        assert unit(headers, given_units={key: "km/h"}) == "km/h"
+    assert unit(["WS", "WD"], given_units={"WS": "m/s"}) == "m/s"  # before what is only the custom
+    assert unit(["WS (furlong)", "WD"], given_units={"WS": "mph"}) == "mph"  # and before what is no unit
 
 
 @pytest.mark.parametrize(
@@ -112,7 +112,7 @@ def test_the_user_says_a_unit_by_quantity_or_by_column():
 )
 def test_what_the_user_says_is_checked(told, words):
     with pytest.raises(ValueError) as refusal:
-        find_columns(["WindSpeed (km/h)", "WD"], told=told)
+        find_columns(["WindSpeed (km/h)", "WD"], given_units=told)
     assert str(refusal.value).startswith(words)
 
 

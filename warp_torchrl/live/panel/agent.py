@@ -22,15 +22,15 @@ class AgentTab(Tab):
             for name, value in sight.entries(self.side, 0).items()
             if value.ndim == 3
         }
-        self._told = self.gui.add_html("")
+        self._numbers = self.gui.add_html("")
 
     def paint(self) -> None:
         """Show what the chosen vehicle's agent sees now."""
         agent = self.panel.agent
-        who, chances, told, pictures = self.once(("agent", agent), lambda: _shown(self.side, agent))
+        who, chances, numbers, pictures = self.once(("agent", agent), lambda: _shown(self.side, agent))
         change(self._who, content=who)
         change(self._chances, content=chances)
-        change(self._told, content=told)
+        change(self._numbers, content=numbers)
         for name, handle in self._sights.items():
             show_picture(handle, pictures[name])
 
@@ -40,6 +40,6 @@ def _shown(side: Side, agent: int) -> tuple[str, str, str, dict[str, bytes]]:
     return (
         f"What **{escaped_markdown(side.env.agent_names[agent])}** sees, and how likely it acts:",
         words.actions(side, agent),
-        words.told(sight.named_numbers(side, agent)),
+        words.numbers_html(sight.named_numbers(side, agent)),
         {name: png(picture) for name, picture in sight.pictures(side, agent).items()},
     )

@@ -14,7 +14,7 @@ from warp_torchrl.live.panel.drive import DRIVE_KEYS, DriveTab
 from warp_torchrl.live.panel.match import MatchTab
 from warp_torchrl.live.panel.question import QuestionBox
 from warp_torchrl.live.panel.record import RecordTab
-from warp_torchrl.live.panel.tab import Tab, told_if_refused
+from warp_torchrl.live.panel.tab import Tab, errors_shown
 from warp_torchrl.live.panel.watch import WatchTab
 from warp_torchrl.live.panel.world import WorldTab
 from warp_torchrl.live.stage import Stage, change
@@ -122,7 +122,7 @@ class Panel:
         """
 
         def act(value: object) -> None:
-            with told_if_refused(self.tell):
+            with errors_shown(self.tell):
                 do(value)
 
         async def call(event: Any) -> None:  # in the server's thread, as messages come
@@ -133,7 +133,7 @@ class Panel:
 
     def click(self, stage: Stage, origin: tuple[float, float, float], direction: tuple[float, float, float]) -> None:
         """Do what a click on a cell is to do."""
-        with told_if_refused(self.tell):
+        with errors_shown(self.tell):
             x, y, z = origin
             cell = cell_at((x - stage.east, y, z), direction, stage.ground)
             if cell is not None:

@@ -43,7 +43,7 @@ class RecordTab(Tab):
         change(self._so_far, content=words.so_far(self.side))
         change(self._every, value=keeper.every)
         change(
-            self._training, content=self.once("training", lambda: words.training(learning.told(), learning.newest()))
+            self._training, content=self.once("training", lambda: words.training(learning.status(), learning.newest()))
         )
         if self._listed != keeper.changes:
             self._listed = keeper.changes

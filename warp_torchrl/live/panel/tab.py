@@ -70,7 +70,7 @@ class Tab(ABC):
 
 
 @contextmanager
-def told_if_refused(tell: Callable[[str, bool], object]) -> Iterator[None]:
+def errors_shown(tell: Callable[[str, bool], object]) -> Iterator[None]:
     """Catch every error in this context and show it in one line, so that the match continues.
 
     An unexpected error is also logged in one line.

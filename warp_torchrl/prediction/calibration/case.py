@@ -131,7 +131,7 @@ def _read(folder: Path, hours: float | None, units: Mapping[str, str] | None) ->
         raise ValueError(f"the outcome must be known in hours of the weather, {end / 60.0:g}, got {got}")
     landscape, elevation = _landscape(folder, header)
     lit = _only("ignition", folder)
-    files = [f"fuel: {header.told}", *elevation, f"ignition: {lit.name}", f"outcome: {observed.name}"]
+    files = [f"fuel: {header.description}", *elevation, f"ignition: {lit.name}", f"outcome: {observed.name}"]
     if left := unread_files(folder, [each for name in (*_KINDS, "weather") if (each := _found(name, folder))]):
         files.append(f"files of {folder.name} that are not read: {', '.join(left)}")
     return FireCase(
@@ -193,7 +193,7 @@ def _elevation(path: Path | None, grid: Grid) -> tuple[Tensor | None, list[str]]
     metres = to_metres(values, known, unit)
     if not header.unit:
         check_slopes(metres, known, grid.cell_size)
-    told = f"elevation: {header.told} [{header.unit or 'm'}]"
+    told = f"elevation: {header.description} [{header.unit or 'm'}]"
     return torch.from_numpy(fill(metres, known))[None], [told]
 
 

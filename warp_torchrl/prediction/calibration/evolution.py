@@ -55,7 +55,7 @@ class Evolution:
         fire: RateFire,
         parameters: Sequence[Parameter],
         cases: Sequence[FireCase],
-        tell: Callable[[int, float], None] = lambda step, loss: None,
+        progress: Callable[[int, float], None] = lambda step, loss: None,
     ) -> Tensor:
         """Return the best z, float32 [P].
 
@@ -63,7 +63,7 @@ class Evolution:
             fire: The law at z = 0.
             parameters: Parameters to fit.
             cases: The fires.
-            tell: Called with the number and the least loss of each generation.
+            progress: Called with the number and the least loss of each generation.
 
         Raises:
             ValueError: If the package cma is not installed, or the loss does not depend on a parameter.
@@ -78,7 +78,7 @@ class Evolution:
             strategy.tell(asked, losses.tolist())
             if float(losses.min()) < least:
                 best, least = candidates[losses.argmin()], float(losses.min())
-            tell(generation + 1, least)
+            progress(generation + 1, least)
         return best
 
     def losses(

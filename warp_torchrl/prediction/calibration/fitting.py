@@ -25,7 +25,7 @@ class FittingMethod(Protocol):
         fire: RateFire,
         parameters: Sequence[Parameter],
         cases: Sequence[FireCase],
-        tell: Callable[[int, float], None] = ...,
+        progress: Callable[[int, float], None] = ...,
     ) -> Tensor:
         """Return z, float32 [P]."""
         ...
@@ -48,7 +48,7 @@ def null_scores(fire: RateFire, case: FireCase) -> dict[str, Scores]:
     return {name: scores_at_area(burned, case.scar) for name, burned in grown.items()}
 
 
-def check_told(parameters: Sequence[Parameter], cases: Sequence[FireCase]) -> None:
+def check_not_in_weather(parameters: Sequence[Parameter], cases: Sequence[FireCase]) -> None:
     """Refuse to fit a moisture that a fire's weather file states: the law's value is not used there.
 
     Raises:
@@ -85,7 +85,7 @@ def fit_law(
     fire: RateFire,
     parameters: Sequence[Parameter],
     cases: Sequence[FireCase],
-    tell: Callable[[int, float], None] = lambda step, loss: None,
+    progress: Callable[[int, float], None] = lambda step, loss: None,
 ) -> RateFire:
     """Return the law with its parameters fitted to some fires."""
-    return fire_at(fire, parameters, method(fire, parameters, cases, tell))
+    return fire_at(fire, parameters, method(fire, parameters, cases, progress))

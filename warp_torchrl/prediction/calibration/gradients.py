@@ -46,7 +46,7 @@ class Gradients:
         fire: RateFire,
         parameters: Sequence[Parameter],
         cases: Sequence[FireCase],
-        tell: Callable[[int, float], None] = lambda step, loss: None,
+        progress: Callable[[int, float], None] = lambda step, loss: None,
     ) -> Tensor:
         """Return the best z, float32 [P].
 
@@ -54,7 +54,7 @@ class Gradients:
             fire: The law at z = 0.
             parameters: Parameters to fit.
             cases: The fires.
-            tell: Called with the number and the least loss of each step.
+            progress: Called with the number and the least loss of each step.
 
         Raises:
             ValueError: If a deviation is among the parameters: arrival times at median rates do not depend on it.
@@ -76,7 +76,7 @@ class Gradients:
                 best, (least, gradient, curvature), share = z, found, min(1.0, 2.0 * share)
             else:
                 share *= 0.4
-            tell(number + 1, least)
+            progress(number + 1, least)
         return best
 
     def slope(

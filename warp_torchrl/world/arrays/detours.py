@@ -58,9 +58,10 @@ def moves_from(marked: Tensor, is_open: Tensor, cells: Tensor) -> Tensor:
 
 
 def _counted(start: Tensor, passable: Tensor, cells: Tensor, bit: Tensor) -> Tensor:
-    """Return what ``moves_around`` does, of starts and open cells uint8 [B, H, W] of which each agent has a bit [A, 1].
+    """Bit-packed breadth-first search: moves from each agent's start to each cell, int32 [B, A, K].
 
-    Nothing is read back from a device where that is not free: there the search takes as many rounds as it may.
+    ``start`` and ``passable`` are uint8 [B, H, W], with a bit for each agent, ``bit`` [A, 1]. On a device that would
+    have to synchronise, the search runs the largest number of rounds, without reading results.
     """
     worlds, height, width = start.shape
     reads, most, wide = needs_no_sync(start.device), 2 * (height + width), width + 1

@@ -58,10 +58,10 @@ def choose_band(name: str, path: object, layer: Any, wanted: int | str | None, k
     bands = [number for number in range(1, layer.count + 1) if layer.colorinterp[number - 1].name != "alpha"]
     if wanted is not None:
         asked = str(wanted).strip().lower()
-        bands = [number for number in bands if asked in (str(number), _told(layer, number).lower())]
+        bands = [number for number in bands if asked in (str(number), _description(layer, number).lower())]
     elif len(bands) > 1:
         words = _LAYERS.get(name.removesuffix(".path"), "$.")
-        bands = [number for number in bands if re.search(words, _told(layer, number), re.IGNORECASE)]
+        bands = [number for number in bands if re.search(words, _description(layer, number), re.IGNORECASE)]
     if len(bands) != 1:
         asked = "" if wanted is None else f"; {wanted!r} names {len(bands)} of them"
         raise ValueError(f"{name} must have one band of real numbers, {path} has {_all(layer)}{asked}; {key}")
@@ -70,7 +70,7 @@ def choose_band(name: str, path: object, layer: Any, wanted: int | str | None, k
 
 def band_names(layer: Any) -> list[str]:
     """Return the description of each band of an open raster, its number where it has none."""
-    return [_told(layer, number) or str(number) for number in range(1, layer.count + 1)]
+    return [_description(layer, number) or str(number) for number in range(1, layer.count + 1)]
 
 
 def band_unit(layer: Any, number: int) -> str:
@@ -98,10 +98,12 @@ def factor_of(name: str, path: object, unit: str, units: Mapping[str, float], gi
     return units[unit]
 
 
-def _told(layer: Any, number: int) -> str:
+def _description(layer: Any, number: int) -> str:
     return str(layer.descriptions[number - 1] or "").strip()
 
 
 def _all(layer: Any) -> str:
-    shown = [f"{number} ({_told(layer, number) or layer.dtypes[number - 1]})" for number in range(1, layer.count + 1)]
+    shown = [
+        f"{number} ({_description(layer, number) or layer.dtypes[number - 1]})" for number in range(1, layer.count + 1)
+    ]
     return ", ".join(shown[:12]) + ", ..." * (len(shown) > 12)

@@ -47,7 +47,7 @@ class Header(NamedTuple):
     dtype: str
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         """Return the file and the band in words."""
         band = f", band {self.bands[self.number - 1]}" if len(self.bands) > 1 else ""
         return f"{self.path.name}{band}"

@@ -136,7 +136,7 @@ class Raster(Cropped):
         layers.known["fuel"] &= is_code(layers.values["fuel"], table)
         planes, units = self._make_planes(layers, table)
         crop = Crop(**planes, size=self.size, row=self.row, column=self.column, min_fuel=self.min_fuel)
-        object.__setattr__(self, "_files", self._told(layers, units))
+        object.__setattr__(self, "_files", self._file_lines(layers, units))
         object.__setattr__(self, "_paths", tuple(paths.values()))
         object.__setattr__(self, "_crop", crop)
 
@@ -201,15 +201,15 @@ class Raster(Cropped):
         whole = known["fuel"] & known.get("elevation", known["fuel"])
         return {**planes, "known": whole if self.nodata == "refuse" else None}, units
 
-    def _told(self, layers: Layers, units: Mapping[str, str]) -> tuple[str, ...]:
+    def _file_lines(self, layers: Layers, units: Mapping[str, str]) -> tuple[str, ...]:
         """Return a line for each file, with the bands that are not read."""
         named = self.table if isinstance(self.table, str) else "a table of your own"
         units = {"fuel": f"codes of {named}", **units}
         lines = []
         for name, path in layers.paths.items():
             header = layers.headers.get(name)
-            told = path.name if header is None else header.told
-            lines.append(f"{name}: {told}" + (f" [{units[name]}]" if name in units else ""))
+            described = path.name if header is None else header.description
+            lines.append(f"{name}: {described}" + (f" [{units[name]}]" if name in units else ""))
         read = {(each.path, each.number) for each in layers.headers.values()}
         for path, bands in {each.path: each.bands for each in layers.headers.values()}.items():
             left = [band for number, band in enumerate(bands, start=1) if (path, number) not in read]

@@ -123,7 +123,7 @@ def find_columns(
     headers: Sequence[str],
     rows: Sequence[Sequence[str]] = (),
     below: Sequence[str] = (),
-    told: Mapping[str, str] | None = None,
+    given_units: Mapping[str, str] | None = None,
 ) -> tuple[dict[str, Column], Source | None]:
     """Return the column of each quantity in a table, and the source whose names it has.
 
@@ -131,7 +131,7 @@ def find_columns(
         headers: The table's first row.
         rows: The rows below it, by which names of RAWS are recognised.
         below: Units in a row below the names, empty without one.
-        told: Units by quantity or header, given by the user.
+        given_units: Units by quantity or header, given by the user.
 
     Raises:
         ValueError: If a quantity has two columns, no unit or one that is not known, or the wind has no column.
@@ -144,7 +144,7 @@ def find_columns(
     _check_wind(places, heads)
     for name in _unread(places):
         places[name] = []
-    said = _said(told or {}, heads)
+    said = _said(given_units or {}, heads)
     found = {}
     for name, at in places.items():
         columns = [_column(name, heads[k], k, below, said, source) for k in at]
@@ -180,7 +180,7 @@ def _check_wind(places: Mapping[str, list[int]], heads: Sequence[ColumnHeader]) 
             raise ValueError(f"weather must have a column of {name} ({SHOWN_NAMES[name]}), got {got}{why}")
 
 
-def _said(told: Mapping[str, str], heads: Sequence[ColumnHeader]) -> dict[str, str]:
+def _said(given_units: Mapping[str, str], heads: Sequence[ColumnHeader]) -> dict[str, str]:
     """Return the user's units, by quantity.
 
     Raises:
@@ -189,7 +189,7 @@ def _said(told: Mapping[str, str], heads: Sequence[ColumnHeader]) -> dict[str, s
     said = {}
     by_name = {plain_name(head.text): head.quantity for head in heads} | {head.name: head.quantity for head in heads}
     by_name |= {plain_name(name): name for name in QUANTITIES}
-    for key, word in told.items():
+    for key, word in given_units.items():
         quantity = by_name.get(plain_name(key))
         if plain_name(key) == "datetime":
             continue
