@@ -263,7 +263,7 @@ def test_texts_and_pictures_are_made_once_for_all_browsers(page, browser, monkey
     browsers = [browser() for _ in range(3)]
     until(lambda: len(page._panels) == 3)
     made = []
-    for module, name in (("words", "acts"), ("words", "numbers"), ("sight", "pictures")):
+    for module, name in (("words", "acts"), ("words", "numbers_table"), ("sight", "pictures")):
         real = getattr(__import__(f"warp_torchrl.live.{module}", fromlist=[name]), name)
         monkeypatch.setattr(
             f"warp_torchrl.live.{module}.{name}",
@@ -271,7 +271,7 @@ def test_texts_and_pictures_are_made_once_for_all_browsers(page, browser, monkey
         )
     with page.lock:
         page.show()
-    assert sorted(made) == ["acts", "numbers", "pictures"]
+    assert sorted(made) == ["acts", "numbers_table", "pictures"]
     shown = browsers[0].texts("step")
     until(lambda: all(each.texts("step") == shown for each in browsers))
 

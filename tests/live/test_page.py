@@ -261,7 +261,7 @@ def test_the_page_tells_how_far_a_training_is_and_ends_it(page, monkeypatch):
     told = []
     monkeypatch.setattr(page, "tell", lambda line, mistake=False: told.append(line))
     states = iter(["one trains", "one trains", "one is trained"])
-    monkeypatch.setattr(page.learning, "told", lambda: next(states))
+    monkeypatch.setattr(page.learning, "status", lambda: next(states))
     for _ in range(3):
         page._followed = -1e9
         page._go_on()
