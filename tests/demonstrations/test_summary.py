@@ -19,5 +19,5 @@ def test_what_others_wrote_makes_no_row_and_rings_no_bell(recording):
     row = summary(Path("one"), recording)._replace(policy="\x1b]0;owned\x07\x1b[31mred\n| fake | row |" + "a" * 999)
     lines = recordings_table([row]).splitlines()
     assert len(lines) == 3 and "| red \\| fake \\| row \\|" in lines[-1] and "\x1b" not in lines[-1]
-    cell = table([row._replace(policy="a" * 999)]).splitlines()[-1].split(" | ")[3]
+    cell = recordings_table([row._replace(policy="a" * 999)]).splitlines()[-1].split(" | ")[3]
     assert len(cell) == 80 and cell.startswith("aaa")

@@ -55,7 +55,7 @@ def test_a_line_has_the_shares_saved_and_cleared_in_per_cent():
         "control_time": np.full(4, 0.75),
         "cleared": np.full(4, 0.0125),
     }
-    lines = table(report("skirmish", "mine", 7, episodes(0.0) | values, {})).splitlines()
+    lines = evaluation_table(report("skirmish", "mine", 7, episodes(0.0) | values, {})).splitlines()
     (line,) = (line for line in lines if line.startswith("mine "))
     mean, _, _, _, iqm, success, control, cleared = line.split()[1:]
     assert (mean, iqm, success, control, cleared) == ("40.0", "50.0", "25.0", "0.75", "1.25")
