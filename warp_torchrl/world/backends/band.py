@@ -12,7 +12,7 @@ from torch.nn.functional import pad
 
 from warp_torchrl.system.modes import kept
 from warp_torchrl.world.arrays.bytes import byte
-from warp_torchrl.world.arrays.geometry import DIRECTIONS, grow
+from warp_torchrl.world.arrays.geometry import DIRECTIONS
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.backends.edge import places
 from warp_torchrl.world.law.rate import RateFire
@@ -48,8 +48,7 @@ class AtBand:
         return self._arrivals(state, self._band(state))
 
     def _band(self, state: WorldState) -> "_Band":
-        beside = grow(self.fire.spreads(state)) & self.fire.can_ignite(state)
-        return _band_of(places(byte(beside).flatten()), state)
+        return _band_of(places(byte(self.fire.beside(state)).flatten()), state)
 
     def _arrivals(self, state: WorldState, band: "_Band") -> Arrivals:
         kept, times = self.fire.sources(state)
@@ -62,11 +61,10 @@ class AtBand:
 
         at = Places(band.row, band.column, state.cells.shape[2], time_of)
         minutes, origin = arrival(times, origins, _metric(state, band.cell), at)
-        known = minutes < NEVER / 2
         never, nowhere = torch.full_like(kept.minutes, NEVER), torch.full_like(kept.origin, NOWHERE)
         return Arrivals(
-            _put(never, band.cell, torch.where(known, minutes, NEVER)),
-            _put(nowhere, band.cell, torch.where(known, origin, NOWHERE)),
+            _put(never, band.cell, minutes),
+            _put(nowhere, band.cell, origin),
         )
 
     def _expected_ignitions(self, state: WorldState, band: "_Band") -> Tensor:

@@ -12,7 +12,7 @@ from torch import Tensor
 from torch.nn.functional import pad
 
 from warp_torchrl.world.arrays.geometry import DIRECTIONS
-from warp_torchrl.world.law.travel import NEVER, NOWHERE, Metric, Places, arrival, rate_from
+from warp_torchrl.world.law.travel import NEVER, NOWHERE, Metric, Places, arrival, at_other_rates, rate_from
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,9 +124,7 @@ class Spreading:
             return self.minutes_now.index_select(0, first + origin)
 
         at = Places(place // self._width, place % self._width, self._width, time_of)
-        minutes, origin = arrival(times, origins, self._metric(travel, cells), at)
-        known = minutes < NEVER / 2
-        return torch.where(known, minutes, NEVER), torch.where(known, origin, NOWHERE)
+        return arrival(times, origins, self._metric(travel, cells), at)
 
     @property
     def minutes_now(self) -> Tensor:
@@ -154,9 +152,7 @@ class Spreading:
         self._changed = torch.cat((edge, self._waiting))
 
     def _scale(self, cells: Tensor, before: Tensor, after: Tensor) -> None:
-        times = self._times[cells]
-        ratio = torch.where((before > 0.0) & (after > 0.0), before / after, 1.0)
-        self._times[cells] = torch.where(times < NEVER / 2, self._now + (times - self._now) * ratio, times)
+        self._times[cells] = at_other_rates(self._times[cells], self._now, before, after)
 
     def _rates_into(self, travel: Tensor, cells: Tensor) -> Tensor:
         metric, total = self._metric(travel, cells), torch.zeros(len(cells), device=cells.device)

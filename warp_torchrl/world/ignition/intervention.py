@@ -12,7 +12,7 @@ from warp_torchrl.world.state.state import FIRST_FIRE, WorldState, is_tree
 
 def can_be_lit(state: WorldState, fire: Automaton) -> Tensor:
     """Return which cells hold a tree that can ignite now: old enough, dry and flammable; bool [B, H, W]."""
-    return fire.is_fuel(state) & (state.alpha > 0.0)
+    return fire.can_ignite(state)
 
 
 def ignited(state: WorldState, fire: Automaton, where: Tensor) -> WorldState:

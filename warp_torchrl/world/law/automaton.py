@@ -156,6 +156,10 @@ class Automaton(ABC):
         """Return which trees can ignite now: age >= A_min, dry; bool [B, H, W]."""
         return (state.cells >= self.youngest_fuel) & (state.cells <= OLDEST) & (state.wet == 0)
 
+    def can_ignite(self, state: WorldState) -> Tensor:
+        """Return which trees can ignite now and stand on ground that burns, bool [B, H, W]."""
+        return self.is_fuel(state) & (state.alpha > 0.0)
+
     def tick(self, state: WorldState, u: Tensor, ticks_now: Tensor) -> WorldState:
         """Advance the fire by one tick in the worlds that tick now.
 
@@ -184,8 +188,7 @@ class Automaton(ABC):
 
     def spontaneous(self, state: WorldState) -> Tensor:
         """Return each tree's probability to ignite by itself in the next tick, float32 [B, H, W]."""
-        can = self.is_fuel(state) & (state.alpha > 0.0)
-        return of_codes(self.lightning(state.cells[0].numel()), state.cells) * can
+        return of_codes(self.lightning(state.cells[0].numel()), state.cells) * self.can_ignite(state)
 
     def growing(self) -> tuple[float, ...]:
         """Return p_grow in one tick of each cell code, 0..15."""

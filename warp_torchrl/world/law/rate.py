@@ -17,7 +17,7 @@ from warp_torchrl.world.behaviour.moistures import moisture_row
 from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.law.fuel_bed import COVER_FUEL, FuelBed
 from warp_torchrl.world.law.mapped_fuel import check_fuel, has_own_table, told_fuel
-from warp_torchrl.world.law.travel import NEVER, NOWHERE, Metric, Places, arrival, rate_from, travel
+from warp_torchrl.world.law.travel import NEVER, NOWHERE, Metric, Places, arrival, at_other_rates, rate_from, travel
 from warp_torchrl.world.state.state import (
     FIRST_FIRE,
     Air,
@@ -226,16 +226,13 @@ class RateFire(Automaton):
         burning cell is an origin from now on.
         """
         before, after = self._mean_rate(state, state.air), self._mean_rate(state, air)
-        arrivals, now = _of(state), self._now(state)
-        ratio = torch.where((before > 0.0) & (after > 0.0), before / after, 1.0)
-        waits = arrivals.minutes < NEVER / 2
-        minutes = torch.where(waits, now + (arrivals.minutes - now) * ratio, arrivals.minutes)
+        minutes = at_other_rates(_of(state).minutes, self._now(state), before, after)
         origin = torch.where(is_burning(state.cells), _own_cell(state.cells), NOWHERE)
         return state.replace(air=air, arrivals=Arrivals(minutes, origin))
 
-    def can_ignite(self, state: WorldState) -> Tensor:
-        """Return which trees can ignite now and burn where they stand, bool [B, H, W]."""
-        return self.is_fuel(state) & (state.alpha > 0.0)
+    def beside(self, state: WorldState) -> Tensor:
+        """Return which cells can ignite and are beside a burning one, bool [B, H, W]."""
+        return grow(self.spreads(state)) & self.can_ignite(state)
 
     def sources(self, state: WorldState) -> tuple[Arrivals, Tensor]:
         """Return what is kept of arrivals, and the times that neighbours go by, float32 [B, H, W].
@@ -261,7 +258,7 @@ class RateFire(Automaton):
         places = Places(row, column, state.cells.shape[2], time_of)
         around = neighbours(times, NEVER), neighbours(kept.origin, NOWHERE)
         minutes, origin = arrival(*around, self._metric(state, state.air), places)
-        beside = grow(self.spreads(state)) & self.can_ignite(state) & (minutes < NEVER / 2)
+        beside = self.beside(state)
         return Arrivals(torch.where(beside, minutes, NEVER), torch.where(beside, origin, NOWHERE))
 
     def tick(self, state: WorldState, u: Tensor, ticks_now: Tensor) -> WorldState:

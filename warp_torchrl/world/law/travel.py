@@ -98,14 +98,30 @@ def arrival(times: Tensor, origins: Tensor, metric: Metric, at: Places) -> tuple
         at: The cells.
 
     Returns:
-        float32 [...] [minutes], ``NEVER`` or more where it does not come, and int32 [...] like ``origins``.
+        float32 [...] [minutes], ``NEVER`` where it does not come, and int32 [...] like ``origins``.
     """
     time, direction, from_one = from_edges(times, metric)
     handed = origins.gather(0, direction[None])[0]
     straight = along_ray(times, origins, handed, metric, at)
     on_ray = straight <= time + ROUNDING * metric[0]
     neighbour = _neighbour(direction, at)
-    return torch.where(on_ray, straight, time), torch.where(on_ray, handed, torch.where(from_one, neighbour, NOWHERE))
+    time = torch.where(on_ray, straight, time)
+    origin = torch.where(on_ray, handed, torch.where(from_one, neighbour, NOWHERE))
+    comes = time < NEVER / 2
+    return torch.where(comes, time, NEVER), torch.where(comes, origin, NOWHERE)
+
+
+def at_other_rates(times: Tensor, now: Tensor | float, before: Tensor, after: Tensor) -> Tensor:
+    """Return times at which rates of spread change: what is left of them, or past, changes by the ratio of the rates.
+
+    Args:
+        times: float32 [...] [minutes]; ``NEVER`` stays.
+        now: When they change [minutes].
+        before: Mean rates to or from the neighbours so far, float32 [...]; where either is 0, times stay.
+        after: The same from now on.
+    """
+    ratio = torch.where((before > 0.0) & (after > 0.0), before / after, 1.0)
+    return torch.where(times < NEVER / 2, now + (times - now) * ratio, times)
 
 
 def from_edges(times: Tensor, metric: Metric) -> tuple[Tensor, Tensor, Tensor]:
