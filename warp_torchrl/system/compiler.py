@@ -1,4 +1,4 @@
-"""Functions that ``torch.compile`` fuses, for those who ask for it: ``compile=true``.
+"""Functions that ``torch.compile`` fuses, where ``compile=true``.
 
 Eager, each of their operations passes over every cell; fused, one loop does them all. The law and the draws are the
 same, and on the CPU every bit of a world, but for the last places of exponentials: law ``hazard``, changing winds.
@@ -30,20 +30,20 @@ _NOISE = (
 
 @cache
 def compiled(function: Callable[P, T], in_parts: bool = False) -> Callable[P, T]:
-    """Return a function of tensors that changes nothing as one loop, compiled for each shape anew when it is called.
+    """Return a pure function of tensors as one loop, compiled when it is first called with a shape.
 
-    What is computed of a cell is computed again for each who asks, and kept for none: on the CPU a mask in memory costs
-    more than the comparisons that made it. A function that is fused ``in_parts`` keeps what is asked for often.
+    Each reader of a value computes it again, and none is stored: on the CPU a mask in memory costs more than the
+    comparisons that made it. A function that is fused ``in_parts`` stores what several parts read.
     """
     torch._dynamo.config.recompile_limit = max(torch._dynamo.config.recompile_limit, _SHAPES)
     return compile_function(function, fullgraph=True, **(_IN_PARTS if in_parts else _IN_REGISTERS))
 
 
 def compile_function(function: Callable[P, T], fullgraph: bool = False, **options: Any) -> Callable[P, T]:
-    """Return a function that is compiled for each shape anew when it is called.
+    """Return a function that is compiled when it is first called with a shape.
 
-    Names of modules are taken to stay what they are: to look at them at every call takes longer than a loss's sums, and
-    tensordict's list of classes grows, which would have all compiled again.
+    Globals of modules are taken to be constant: to check them at every call takes longer than a loss's sums, and
+    tensordict's list of classes grows, so that all would be compiled again.
 
     Args:
         function: Of tensors.

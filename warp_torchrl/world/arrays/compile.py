@@ -1,6 +1,6 @@
-"""The compiler's part in functions of tensors: whether one is being fused, and operators that stay as they are.
+"""What functions of tensors know of the compiler: whether it fuses them, and operators that it leaves alone.
 
-It is the one module that speaks of the compiler; ``system.compiler`` calls it.
+No other module of the world speaks of it. ``system.compiler`` fuses functions.
 """
 
 from collections.abc import Callable
@@ -13,7 +13,7 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 is_fused = torch.compiler.is_dynamo_compiling
-"""Return whether the present function is being fused. A step of one world looks more than a hundred times, and
+"""Return whether the calling function is being fused. A step of one world calls it some eighty times, and
 ``torch.compiler.is_compiling`` takes twice as long."""
 
 _OPERATORS = torch.library.Library("warp_torchrl", "FRAGMENT")
