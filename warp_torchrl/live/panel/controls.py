@@ -7,7 +7,7 @@ import viser
 
 from warp_torchrl.live.inbox import Act
 from warp_torchrl.live.keeping import Keeper
-from warp_torchrl.live.learning import Learning
+from warp_torchrl.live.learning import PageTraining
 from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.live.once import Once
 
@@ -24,7 +24,7 @@ class Controls(Protocol):
     pace: float
     once: Once
     keeper: Keeper
-    learning: Learning
+    learning: PageTraining
 
     def ask(self, person: int, act: Act) -> None:
         """Queue an act of a person."""
