@@ -551,7 +551,7 @@ def test_a_policy_acts_in_the_mode_that_reaches_more_of_what_its_team_is_for(mon
 
 def test_the_size_of_a_checkpoint_counts_what_every_process_has_of_its_own(finished, monkeypatch):
     training = finished[1]
-    whole, own = disk.size(training.state_dict()), disk.size(training._own())
+    whole, own = disk.tensors_size(training.state_dict()), disk.tensors_size(training._own())
     assert training._size() == whole > own > 0
     monkeypatch.setattr(parallel, "size", lambda: 3)
     assert training._size() == whole + 2 * own
