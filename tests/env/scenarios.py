@@ -1,6 +1,8 @@
 """Every scenario, small: what of TorchRL and torch must hold for all of them is asked of each."""
 
 from functools import cache
+from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,9 +25,10 @@ FURTHER = {
     "rates": ("scenario=skirmish", "fire=rate"),
     "talks late": ("scenario=search", "team.radio.carries=both", "team.radio.delay=2", "team.radio.loss=0.2"),
     "lends": ("scenario=agencies", "agencies.own=1", "agencies.lending=need", "agencies.term=3"),
-    "flies apart": ("scenario=hetero", "team.flight.battery=9", "team.flight.separation=2", "reward.shaping=1.0"),
 }  # fmt: skip
 """Further worlds: what no scenario shows, does or pays."""
+for _path in sorted((Path(__file__).parents[1] / "world" / "mechanics").glob("*/worlds.py")):
+    FURTHER |= import_module(f"tests.world.mechanics.{_path.parent.name}.worlds").WORLDS
 WORLDS = (*SCENARIOS, *FURTHER)
 
 

@@ -4,17 +4,16 @@ import pytest
 import torch
 
 from tests.conftest import small_world
-from warp_torchrl.env.metrics import FLYING, METRICS, WATCHING, metrics
+from warp_torchrl.env.metrics import METRICS, WATCHING, metrics
 from warp_torchrl.world.mechanics.sensing.sensing import Sight
 from warp_torchrl.world.state.state import Action, count_trees
-from warp_torchrl.world.team.flight import Flight
 from warp_torchrl.world.team.team import Team
 
 
 def test_metrics_are_fractions_that_add_up(make_small_env):
     env = make_small_env(8)
     env.rollout(30, break_when_any_done=False)
-    found = metrics(env.world_state, env.tree_counts, env.world.horizon)
+    found = metrics(env.world_state, env.tree_counts, env.world)
     assert tuple(found) == METRICS
     for name, value in found.items():
         assert value.shape == (8,) and ((value >= 0) & (value <= 1)).all(), name
@@ -29,19 +28,18 @@ def test_acts_are_counted_for_what_they_are(make_small_env):
     tree = ((state.cells[0] > 0) & (state.cells[0] <= 10)).nonzero()[0]
     state = state.replace(vehicles=state.vehicles.replace(position=tree.expand(1, 2, 2).clone()))
     after = env.world.step(state, torch.full((1, 2), int(Action.CLEAR))).after
-    found = metrics(after, count_trees(after), env.world.horizon)
+    found = metrics(after, count_trees(after), env.world)
     assert found["actions"].item() == 1.0  # two agents, one step, two acts
     assert found["redundant"].item() == 0.5  # both at one tree
     assert found["cleared"].item() == pytest.approx(1.0 / count_trees(state).initial.item())
     assert found["control_time"].item() == pytest.approx(1.0 / env.world.horizon)
 
 
-def test_limited_sight_and_aircraft_have_metrics_of_their_own(make_small_env):
-    team = Team(n_agents=2, roles=("scout",), flight=Flight(separation=2.0))
-    env = make_small_env(4, small_world(sensing=Sight(radius=2), team=team))
+def test_limited_sight_has_metrics_of_its_own(make_small_env):
+    env = make_small_env(4, small_world(sensing=Sight(radius=2), team=Team(n_agents=2, roles=("scout",))))
     now = env.rollout(20, break_when_any_done=False)
-    found = metrics(env.world_state, env.tree_counts, env.world.horizon)
-    assert tuple(found) == (*METRICS, *WATCHING, *FLYING)
+    found = metrics(env.world_state, env.tree_counts, env.world)
+    assert tuple(found) == (*METRICS, *WATCHING)
     assert set(now["next", "info"].keys()) == {*found, "episode_reward", "episode_length"} == {*env_names(env)}
     for name, value in found.items():
         assert ((value >= 0) & (value <= 1)).all(), name
@@ -49,12 +47,10 @@ def test_limited_sight_and_aircraft_have_metrics_of_their_own(make_small_env):
     state = env.world_state
     watching, fronts = state.watching, torch.full((4,), 4, dtype=torch.int32)
     watching = watching.replace(fronts=fronts, watched=torch.ones(4), found=torch.full((4,), 2.0))
-    misses = torch.tensor([[5, 3]] * 4, dtype=torch.int32)
-    vehicles = state.vehicles.replace(near_misses=misses)
     step = torch.full((4,), 8, dtype=torch.int32)
-    state = state.replace(step=step, vehicles=vehicles, watching=watching.replace(uncertainty=torch.full((4,), 6.0)))
-    found = metrics(state, env.tree_counts, env.world.horizon)
-    assert [found[name][0].item() for name in (*WATCHING, *FLYING)] == [0.25, 0.5, 0.75, 0.5]
+    state = state.replace(step=step, watching=watching.replace(uncertainty=torch.full((4,), 6.0)))
+    found = metrics(state, env.tree_counts, env.world)
+    assert [found[name][0].item() for name in WATCHING] == [0.25, 0.5, 0.75]
 
 
 def env_names(env):

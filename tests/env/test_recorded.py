@@ -23,7 +23,7 @@ AT_LENGTH = [
     ["scenario=default", "observation=paper", "landscape.relief=200", "fire=paper"],
     ["scenario=hetero", "reward=collaborative"],
     ["scenario=smoke", "team.radio.carries=both", "team.radio.range=6", "team.radio.loss=0.1"],
-    ["scenario=front", "team.flight.battery=9", "team.flight.drift=0.05"],
+    ["scenario=front"],
 ]
 SCENARIOS = [*BRIEFLY, *(pytest.param(each, marks=pytest.mark.slow) for each in AT_LENGTH)]
 

@@ -278,16 +278,3 @@ def test_followers_watch_more_than_searchers_and_idlers_of_front():
         name: play(env, HEURISTICS[name](env), 1_000_000)["watched"].mean() for name in ("noop", "oldest", "follower")
     }
     assert watched["noop"] < 0.1 < watched["oldest"] - 0.1 and watched["oldest"] + 0.15 < watched["follower"]
-
-
-@pytest.mark.parametrize("name", ["oldest", "lawnmower", "follower"])
-def test_aircraft_turn_back_before_their_batteries_are_empty(name):
-    env = make_env("front", n_worlds=4, overrides=["team.flight.battery=24"])
-    policy, now, lowest, charged = HEURISTICS[name](env), env.reset(), 24, False
-    for _ in range(80):
-        before = env.world_state.vehicles.battery
-        now = env.step(policy(now))["next"]
-        battery = env.world_state.vehicles.battery
-        lowest = min(lowest, int(battery.min()))
-        charged |= bool(((battery == 24) & (before < 10)).any())
-    assert 0 < lowest < 24 and charged

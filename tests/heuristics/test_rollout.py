@@ -141,7 +141,7 @@ def test_imagined_draws_differ_between_steps() -> None:
     [
         ("water", ("team.allow_stay=false",)),
         ("ring", ()),
-        ("hetero", ("team.flight.battery=24",)),
+        ("hetero", ()),
         ("hazard", ()),
         ("smoke", ("team.radio.delay=1",)),
         ("lightning", ()),

@@ -12,7 +12,6 @@ from warp_torchrl.world.ignition.ignition import Ignition
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.law.hazard import HazardFire
 from warp_torchrl.world.mechanics.agencies.agencies import SeveralAgencies
-from warp_torchrl.world.team.flight import Flight
 from warp_torchrl.world.team.radio import Radio
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.array import Array
@@ -67,9 +66,6 @@ OUT_OF_RANGE = [
     (Radio, "range", [-0.1, 1.1e6, NAN]),
     (Radio, "loss", [-0.1, 1.1, NAN]),
     (Radio, "delay", [-1, 65]),
-    (Flight, "separation", [-0.1, 1.1e6, NAN]),
-    (Flight, "battery", [0, 1_000_001]),
-    (Flight, "drift", [-0.1, 1.1, NAN]),
     (Uniform, "speed", [-0.1, 60.1, NAN]),
     (Uniform, "direction", [NAN, INF]),
     (Paper, "scale", [-0.1, 10.1, NAN]),
@@ -163,12 +159,14 @@ def test_every_field_with_a_range_is_in_the_list() -> None:
         (Array, "column"),
         (Team, "allow_stay"),
         (Team, "radio"),
-        (Team, "flight"),
         (Radio, "line_of_sight"),
         (Paper, "rotate"),
         *(
             (World, part)
-            for part in ("landscape", "wind", "fire", "team", "ignition", "sensing", "agencies", "action_masking")
+            for part in (
+                *("landscape", "wind", "fire", "team", "ignition", "sensing", "agencies", "mechanics"),
+                "action_masking",
+            )
         ),
     }
     for component in (
@@ -178,7 +176,6 @@ def test_every_field_with_a_range_is_in_the_list() -> None:
         Array,
         Team,
         Radio,
-        Flight,
         Uniform,
         Paper,
         Wandering,

@@ -5,6 +5,7 @@ from torch import Tensor
 
 from warp_torchrl.world.mechanics.agencies.agencies import standing
 from warp_torchrl.world.state.state import TreeCounts, WorldState
+from warp_torchrl.world.world import World
 
 METRICS = (
     "saved",
@@ -21,14 +22,12 @@ METRICS = (
 """Names of the metrics, in the order of tables."""
 WATCHING = ("watched", "found", "uncertainty")
 """Further ones where sight is limited, see ``world.sensing.Sight``."""
-FLYING = ("near_misses",)
-"""Further ones of teams whose aircraft keep apart, see ``Flight.separation``."""
 SAVED_BY = "saved_"
 """Of agencies, before the name of each: ``saved_agency_0``."""
 SUCCESS_LEVEL = 0.6
 
 
-def metrics(state: WorldState, counts: TreeCounts, horizon: int) -> dict[str, Tensor]:
+def metrics(state: WorldState, counts: TreeCounts, world: World) -> dict[str, Tensor]:
     """Return the metrics of each world's episode so far, float32 [B] each.
 
     ``saved``, ``burned``, ``extinguished``, ``cleared``, ``burning``: shares of the initial trees, saved being those
@@ -40,16 +39,15 @@ def metrics(state: WorldState, counts: TreeCounts, horizon: int) -> dict[str, Te
     Where sight is limited: ``watched``, the share of the front that the team saw burn within the last steps, as many as
     ``sensing.recent``; ``found``, the share of the front that it knows to burn; both as means over the steps with a
     front, see ``spreading_front``. ``uncertainty``: 1 - freshness of the team's newest records, mean over cells and
-    steps. Of teams whose aircraft keep apart: ``near_misses``, those at the ends of steps, a share of the agents'
-    steps. Where there are several agencies, ``saved_agency_0`` and so on: what stands of the trees on the land of each,
-    by their worth.
+    steps. Those of the world's mechanics, see ``Mechanic.metrics``. Where there are several agencies,
+    ``saved_agency_0`` and so on: what stands of the trees on the land of each, by their worth.
 
     Args:
         state: The worlds.
         counts: Of their trees.
-        horizon: Agent steps to an episode.
+        world: Their rules.
     """
-    vehicles = state.vehicles
+    vehicles, horizon = state.vehicles, world.horizon
     acts = vehicles.acts.sum(1)
     agent_steps = (state.step * vehicles.acts.shape[1]).clamp(min=1)
     saved = counts.saved()
@@ -70,8 +68,8 @@ def metrics(state: WorldState, counts: TreeCounts, horizon: int) -> dict[str, Te
         found["watched"] = watching.watched / fronts
         found["found"] = watching.found / fronts
         found["uncertainty"] = watching.uncertainty / state.step.clamp(min=1)
-    if vehicles.near_misses is not None:
-        found["near_misses"] = vehicles.near_misses.sum(1) / agent_steps
+    for each in world.mechanics:
+        found |= each.metrics(state)
     if state.lands is not None:
         left = standing(state).unbind(dim=1)
         found |= {f"{SAVED_BY}agency_{index}": share for index, share in enumerate(left)}

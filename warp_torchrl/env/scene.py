@@ -151,7 +151,7 @@ def _observe(
     return Observations(
         observation(state, world, forecast),
         world.action_mask(state),
-        metrics(state, counts, world.horizon),
+        metrics(state, counts, world),
         critic_state(observation, world)(state, forecast),
         world.team.radio.observed(state, world.team.table(state.cells.device).flies)
         if world.team.radio.sends_vectors

@@ -55,7 +55,7 @@ class EpisodeBatch:
             if not isinstance(self.policies[0], Heuristic):
                 self._show(shown)
         self.ended[self.rows] = self.state
-        found = metrics(self.ended, count_trees(self.ended), self.world.horizon)
+        found = metrics(self.ended, count_trees(self.ended), self.world)
         return found | {"episode_reward": self.paid, "episode_length": self.ended.step.to(torch.float32)}
 
     def _actions(self, shown: TensorDict) -> Tensor:

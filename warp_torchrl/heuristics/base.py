@@ -189,7 +189,7 @@ def move_towards(state: WorldState, world: World, target: Tensor) -> Tensor:
     direction = torch.arange(8, device=target.device)
     last = vehicles.last_action[..., None]
     way = way + ((direction == (last + 4) % 8) & (last >= 0) & (last < 8))
-    return way.masked_fill(~team.open_moves(state), float(FAR)).argmin(dim=-1)
+    return way.masked_fill(~world.open_moves(state), float(FAR)).argmin(dim=-1)
 
 
 def target_or_base(state: WorldState, world: World, target: Tensor) -> Tensor:
@@ -197,12 +197,12 @@ def target_or_base(state: WorldState, world: World, target: Tensor) -> Tensor:
 
     int64 [B, A, 2].
     """
-    vehicles = state.vehicles
-    if vehicles.battery is None:
+    vehicles, battery = state.vehicles, state.plane("flight", "battery")
+    if battery is None:
         return target
     table, base = world.team.table(target.device), vehicles.base[:, None]
     away = (vehicles.position - base).abs().amax(dim=-1)
-    turns_back = table.flies & (vehicles.battery <= away / table.stride + 2.0)
+    turns_back = table.flies & (battery <= away / table.stride + 2.0)
     return torch.where(turns_back[..., None], base, target)
 
 

@@ -117,7 +117,7 @@ class Dispatch(Coordinated):
         reached, _ = places(state, step)
         goal = target[..., 0] * state.cells.shape[2] + target[..., 1]
         gap = (state.vehicles.position[:, :, None] + step - target[:, :, None]).abs().to(torch.float32)
-        can = team.open_moves(state)
+        can = self.world.open_moves(state)
         moves = moves_around(goal, self._open(state), torch.where(can, reached, goal[..., None]))  # open moves alone
         way = torch.where(moves == FAR, FAR + gap.amax(dim=-1), moves) + 0.01 * gap.sum(dim=-1)
         move = way.masked_fill_(~can, math.inf).argmin(dim=-1)

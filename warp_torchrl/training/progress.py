@@ -7,7 +7,6 @@ from tensordict import TensorDictBase
 from torch import Tensor
 
 from warp_torchrl.algorithms import parallel
-from warp_torchrl.env.metrics import FLYING, SAVED_BY, WATCHING
 from warp_torchrl.env.specs import EPISODE_METRICS
 from warp_torchrl.models import CANONICAL, OBSERVATION, RADIO, REWARD, SENT, STATE, VALUE
 from warp_torchrl.models.signature import Key
@@ -43,8 +42,7 @@ def episode_columns(
         there are several; and which ``NUMBERS`` are not finite.
     """
     info = batches[0]["next", "info"]
-    names = [*EPISODE_METRICS, *(name for name in (*WATCHING, *FLYING) if name in info.keys())]
-    names += sorted(name for name in info.keys() if name.startswith(SAVED_BY))
+    names = [*EPISODE_METRICS, *sorted(name for name in info.keys() if name not in EPISODE_METRICS)]
     of_kinds = parallel.sum_(torch.stack([_sums(batch, names) for batch in batches])).tolist()
     *unsound, count = map(sum, zip(*(sums[: len(NUMBERS) + 1] for sums in of_kinds), strict=True))
     totals = map(sum, zip(*(sums[len(NUMBERS) + 1 :] for sums in of_kinds), strict=True))

@@ -18,6 +18,7 @@ from warp_torchrl.world.ignition.ignition import Ignition, IgnitionSource
 from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.mechanics.agencies.agencies import Agencies, OneAgency
+from warp_torchrl.world.mechanics.mechanic import Mechanic
 from warp_torchrl.world.mechanics.sensing.sensing import Full, Sensing
 from warp_torchrl.world.state.state import (
     EMBER,
@@ -48,6 +49,7 @@ class World:
         ignition: Where the fire starts.
         sensing: What agents know of the fire.
         agencies: Whom the vehicles serve.
+        mechanics: What else holds in these worlds; they begin and step in the order of their names.
         steps_per_tick: Agent steps to a fire tick.
         horizon: Agent steps to an episode.
         cell_size: Side of a cell [m]; None takes the landscape's own, 30 m where it has none.
@@ -65,6 +67,7 @@ class World:
     ignition: IgnitionSource = field(default_factory=Ignition)
     sensing: Sensing = field(default_factory=Full)
     agencies: Agencies = field(default_factory=OneAgency)
+    mechanics: tuple[Mechanic, ...] = ()
     steps_per_tick: int = 5
     horizon: int = 256
     cell_size: float | None = None
@@ -86,6 +89,12 @@ class World:
                 f"got {self.team.radio.carries}"
             )
         self.agencies.check(self.team)
+        names = [each.name for each in self.mechanics]
+        if len(set(names)) < len(names):
+            raise ValueError(f"mechanics must be one of each name, got {', '.join(names)}")
+        object.__setattr__(self, "mechanics", tuple(sorted(self.mechanics, key=lambda each: each.name)))
+        for each in self.mechanics:
+            each.check(self)
         _ = self.lighting  # refuses an ignition that does not fit the landscape
 
     @property
@@ -181,6 +190,8 @@ class World:
             spreads = (state.cells >= FIRST_FIRE) & (state.cells < EMBER)
             state = self._tick(state, spreads.flatten(1).any(dim=1))
         state = self.team.radio.begun(self.agencies.begun(state, self.team), self.team.table(state.cells.device).flies)
+        for each in self.mechanics:
+            state = each.begin(state, self)
         state = self.sensing.begun(state, self.team)
         index = state.vehicles.position[..., 0] * self.size[1] + state.vehicles.position[..., 1]
         is_crowded = (ground.cover.flatten(1).gather(1, index) == int(Cover.LAKE)).any()
@@ -190,7 +201,7 @@ class World:
         """Advance every world that has not ended by one agent step.
 
         Agents move; agents act; on every ``steps_per_tick``-th step the fire ticks; the clock advances;
-        vehicles are lent; packets set out; agents look, and are told.
+        mechanics step, in the order of their names; vehicles are lent; packets set out; agents look, and are told.
 
         Args:
             state: The worlds, batch size [B].
@@ -201,11 +212,16 @@ class World:
             The transition; ``before`` is ``state`` itself.
         """
         running = ~state.done
-        after, result = self.team.act(state, action, running, self.fire.last_spreading, self.fire.wet_for)
+        after, result = self.team.act(
+            state, action, running, self.fire.last_spreading, self.fire.wet_for, self.mechanics
+        )
         ticks_now = running & ((state.step + 1) % self.steps_per_tick == 0)
         after = self._tick(after, ticks_now)
         counts_after = count_trees(after)
-        after = self.agencies.updated(self._advance_clock(after, counts_after, running), running)
+        after = self._advance_clock(after, counts_after, running)
+        for each in self.mechanics:
+            after = each.step(state, after, running, self)
+        after = self.agencies.updated(after, running)
         after = self.team.radio.sent(after, self.team.table(after.cells.device).flies, running)
         return Transition(
             before=state,
@@ -226,7 +242,11 @@ class World:
 
     def possible_actions(self, state: WorldState) -> Tensor:
         """Return which actions would do something, bool [B, A, actions]."""
-        return self.team.action_mask(state, self.fire.last_spreading)
+        return self.team.action_mask(state, self.fire.last_spreading, self.mechanics)
+
+    def open_moves(self, state: WorldState) -> Tensor:
+        """Return which of the eight moves each agent can make, bool [B, A, 8]."""
+        return self.team.open_moves(state, self.mechanics)
 
     def action_mask(self, state: WorldState) -> Tensor:
         """Return which actions agents are shown as open, bool [B, A, actions]: those possible, or all."""

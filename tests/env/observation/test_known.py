@@ -7,7 +7,6 @@ import torch
 
 from tests.conftest import small_world
 from tests.world.drawing import draw
-from warp_torchrl import load_policy, make_env
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.observation import CriticState, Local, Paper, Surroundings
 from warp_torchrl.env.observation.channels import DEFAULT
@@ -159,29 +158,3 @@ def test_threat_is_not_told_of_what_may_not_be_known():
     assert not Local(channels=("threat",))(state, world, risky)["view"].any()
     full = state.replace(knowledge=None)
     assert Local(channels=("threat",))(full, small_world(), risky)["view"].any()
-
-
-def test_a_battery_is_shown_where_it_runs_down():
-    plain = make_env("scouts", n_worlds=2)
-    env = make_env("scouts", n_worlds=2, overrides=["team.flight.battery=10"])
-    names = env.channel_names["status"]
-    assert names == (*plain.channel_names["status"], "battery")
-    now = env.reset()
-    policy = HEURISTICS["oldest"](env)
-    for _ in range(3):
-        now = env.step(policy(now))["next"]
-    shown = now["agents", "observation", "status"][..., -1]
-    assert torch.equal(shown, env.world_state.vehicles.battery / 10.0)
-    assert shown[0].tolist() == pytest.approx([0.7, 1.0, 0.7, 1.0])  # scouts fly, bulldozers do not
-
-
-def test_an_older_policy_plays_on_beside_a_battery():
-    policy = load_policy(GOLDEN, mode="deterministic")
-    played = [
-        env.rollout(12, policy.fitted(env), break_when_any_done=False)["agents", "action"]
-        for env in (
-            make_env("skirmish", n_worlds=4, overrides=[*policy.overrides, *further])
-            for further in ([], ["team.flight.battery=9"])  # bulldozers do not fly
-        )
-    ]
-    assert torch.equal(*played)

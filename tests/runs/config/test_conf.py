@@ -23,7 +23,6 @@ from warp_torchrl.runs.config.saved_config import SavedConfig, read_saved_config
 from warp_torchrl.world.air.gridded import Gridded
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.ignition.file import IgnitionFile
-from warp_torchrl.world.team.flight import Flight
 from warp_torchrl.world.team.radio import Radio
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.array import Array
@@ -268,8 +267,11 @@ MISTAKES = [
     ("team.radio.carries=maps", r"^team\.radio\.carries must be none or map or graph or both, got 'maps'"),
     ("team.radio=5", r"^team\.radio must be a mapping, got 5"),
     ("team.radio=null", r"^team\.radio must be a mapping, got None"),
-    ("team.flight.battery=0", r"^team\.flight\.battery must be in"),
-    ("team.flight.battery=1.5", r"^team\.flight\.battery must be a whole number or null, got 1\.5"),
+    ("mechanics.flight.battery=0", r"^mechanics\.flight\.battery must be in"),
+    ("mechanics.flight.battery=1.5", r"^mechanics\.flight\.battery must be a whole number or null, got 1\.5"),
+    ("mechanics=5", r"^mechanics must be a mapping, got 5"),
+    ("mechanics.fligth.drift=0.1", r"^mechanics must be some of .*flight.*, got fligth: did you mean flight"),
+    ("mechanics.flight.dirft=0.1", r"^mechanics\.flight\.dirft is not a key .*did you mean mechanics\.flight\.drift"),
     ("ignition.count=0", r"ignition\.count must be"),
     ("observation.radius=2.5", r"observation\.radius must be a whole number"),
     ("reward.team_share=2", r"reward\.team_share must be"),
@@ -299,7 +301,7 @@ def test_mistakes_are_told_in_one_line(override, message):
 def test_a_yaml_file_that_sets_a_part_of_a_component_leaves_the_rest_as_it_is(name, tmp_path, monkeypatch):
     shutil.copytree(conf_folder(), tmp_path / "conf")
     monkeypatch.setattr("warp_torchrl.runs.config.compose.conf_folder", lambda: tmp_path / "conf")
-    part = {"radio": {"range": 5.0}, "flight": {"battery": 9}}
+    part = {"radio": {"range": 5.0}}
     own = {"_target_": "warp_torchrl.world.team.team.Team", **part}
     OmegaConf.save({"team": part} if name.startswith("scenario") else own, tmp_path / "conf" / name)
     if name.startswith("scenario"):
@@ -307,7 +309,7 @@ def test_a_yaml_file_that_sets_a_part_of_a_component_leaves_the_rest_as_it_is(na
         path.write_text(f"# @package _global_\nscenario: mine\n{path.read_text()}")
     group = name.partition("/")[0]
     team = run_config(plain(compose_config("train", [f"{group}=mine", "team.radio.loss=0.5"]))).world.team
-    assert team.radio == Radio(range=5.0, loss=0.5) and team.flight == Flight(battery=9)
+    assert team.radio == Radio(range=5.0, loss=0.5)
     merged = run_config(plain(compose_config("train", [f"{group}=mine", "team.radio={loss:0.5}"]))).world.team
     assert merged == team
 

@@ -25,7 +25,6 @@ from warp_torchrl.validation import dotted
         ("model.facing=north,fire", "model.symmetry=none,canonical"),
         ("model.facing=up", "model.symmetry=up"),
         ("team.radio_range=3,5", "team.radio.range=3,5"),
-        ("team.drift=0.1", "team.flight.drift=0.1"),
     ],
 )
 def test_an_old_key_is_read_and_told_once(old, new, caplog):
@@ -54,7 +53,6 @@ def test_values_that_stand_one_level_deeper_now_are_put_there():
         "n_agents": 3,
         "messages": "map",
         "radio_range": 4.0,
-        "separation": None,
         "radio_loss": 0.1,
         "start": "corner",
     }
@@ -62,10 +60,9 @@ def test_values_that_stand_one_level_deeper_now_are_put_there():
     assert found == {
         "n_agents": 3,
         "radio": {"carries": "map", "range": 4.0, "loss": 0.1},
-        "flight": {"separation": None},
         "start": "corner",
     }
-    assert list(found) == ["n_agents", "radio", "flight", "start"] and "messages" in team
+    assert list(found) == ["n_agents", "radio", "start"] and "messages" in team
     assert renamed_values({"team": found})["team"] == found
     assert renamed_values({"team": {"radio_range": [1]}}) == {"team": {"radio": {"range": [1]}}}
 
@@ -80,11 +77,10 @@ def test_an_old_name_beside_its_new_one_is_refused(both):
 
 
 def test_a_former_team_is_restored_and_an_override_by_an_old_name_counts():
-    values = renamed_values({"team": {"messages": "map", "radio_range": 4.0, "battery": 9, "drift": 0.2}})
+    values = renamed_values({"team": {"messages": "map", "radio_range": 4.0}})
     record = SavedConfig(choices={"scenario": "scouts"}, values=values)
-    team = plain(restore(record, ["team.radio_range=7", "team.drift=0.0"]))["team"]
+    team = plain(restore(record, ["team.radio_range=7"]))["team"]
     assert team["radio"] == {"carries": "map", "range": 7, "loss": 0.0, "line_of_sight": False, "delay": 0}
-    assert team["flight"] == {"separation": None, "battery": 9, "drift": 0.0}
 
 
 def test_shipped_and_former_runs_are_read_by_the_names_of_now(tmp_path):

@@ -50,7 +50,7 @@ def test_tensors_of_any_names_are_a_batch():
     )
     assert [*packets.leaves()] == ["links", "places", "shown.", "shown.status"]
     both = concatenated([packets, packets])[torch.tensor([1, 2])]
-    assert both.shown.tensors["status"].tolist() == [1, 0] and both.links.shape == (2, 1, 3, 3)
+    assert both.shown.held["status"].tolist() == [1, 0] and both.links.shape == (2, 1, 3, 3)
 
 
 def test_a_packet_reaches_those_that_heard_its_sender_when_it_was_sent():

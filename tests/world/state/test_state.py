@@ -18,7 +18,7 @@ def told(batch):
 def of_other_types(batch):
     """The tensors of a batch that are of another type than is told, or of which none is."""
     types, found = told(batch), {}
-    for name, value in vars(batch).items():
+    for name, value in batch.parts():
         if isinstance(value, Batch):
             found |= {f"{name}.{inner}": each for inner, each in of_other_types(value).items()}
         elif isinstance(value, Tensor) and str(value.dtype).removeprefix("torch.") != types.get(name):
@@ -32,7 +32,7 @@ def of_other_types(batch):
         ("water", []),
         ("agencies", ["landscape.relief=50"]),
         ("haksar", []),
-        ("front", ["team.flight.battery=60"]),
+        ("front", []),
         ("smoke", ["team.radio.carries=map", "team.radio.delay=2"]),
         ("default", ["fire=rate", "wind=wandering"]),
     ],

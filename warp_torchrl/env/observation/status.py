@@ -32,7 +32,7 @@ from warp_torchrl.system.modes import kept
 from warp_torchrl.world.mechanics.agencies.agencies import lands_of
 from warp_torchrl.world.state.role import PAPER_ROLES
 from warp_torchrl.world.state.state import Action, Forecast, WorldState
-from warp_torchrl.world.team.flight import wind_at
+from warp_torchrl.world.team.places import wind_at
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.world import World
 
@@ -167,11 +167,13 @@ def further_last_action(now: Context) -> Tensor:
     return _one_hot_action(now.state.vehicles.last_action, now.world.team)[..., len(Action) :]
 
 
-@number(is_there=lambda world, choice: world.team.flight.battery is not None)
-def battery(now: Context) -> Tensor:
-    """Return the share of the battery that is left."""
-    full, left = now.world.team.flight.battery, now.state.vehicles.battery
-    return torch.zeros_like(now.state.vehicles.tank) if full is None or left is None else left / full
+@number(
+    lambda world: [Part("scalar", tuple(name for each in world.mechanics for name in each.entries(world)))],
+    lambda world, choice: any(each.entries(world) for each in world.mechanics),
+)
+def mechanics(now: Context) -> Tensor:
+    """Return the numbers of mechanics, such as the share of the battery that is left."""
+    return torch.cat([each.status(now.state) for each in now.world.mechanics if each.entries(now.world)], dim=-1)
 
 
 @number(lambda world: [Part("scalar", world.agencies.names)], lambda world, choice: bool(world.agencies.names))

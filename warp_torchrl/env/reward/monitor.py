@@ -19,8 +19,8 @@ class Monitor(Reward):
     W_i: share of the front, the burning cells that can spread, that the team saw burn at most ``sensing.recent`` steps
     ago, as far as agent i saw it last. F_i: burning cells that nobody of the team knew to burn and that agent i records
     first, a share of all that burn. Agents that saw a cell in the same step share W and F of it. M_i: 1 where aircraft
-    i ends the step with a near miss (``team.flight.separation``), else 0. U: mean over the map of 1 - freshness of the
-    team's newest records. An agent's own part counts A times, as in other rewards. The team's mean is
+    i ends the step with a near miss (``mechanics.flight.separation``), else 0. U: mean over the map of 1 - freshness of
+    the team's newest records. An agent's own part counts A times, as in other rewards. The team's mean is
 
         R = sum_i (w_w W_i + w_f F_i - w_m M_i) + w_u (U(t-1) - U(t))
 
@@ -34,7 +34,7 @@ class Monitor(Reward):
         watched: w_w.
         found: w_f.
         uncertainty: w_u.
-        near_miss: w_m; nothing where ``team.flight.separation`` is not set.
+        near_miss: w_m; nothing where ``mechanics.flight.separation`` is not set.
 
     Raises:
         ValueError: If a value is out of its range.
@@ -67,7 +67,8 @@ class Monitor(Reward):
         if before.watching is None or after.watching is None:
             raise ValueError("reward monitor needs worlds whose agents' sight is limited: choose sensing=sight")
         own = self.watched * after.watching.watches + self.found * after.watching.finds
-        if before.vehicles.near_misses is not None and after.vehicles.near_misses is not None:
-            own = own - self.near_miss * (after.vehicles.near_misses - before.vehicles.near_misses)
+        was, misses = (state.plane("flight", "near_misses") for state in (before, after))
+        if was is not None and misses is not None:
+            own = own - self.near_miss * (misses - was)
         drop = before.watching.uncertain - after.watching.uncertain
         return own.shape[1] * own + self.uncertainty * drop[:, None]

@@ -6,6 +6,9 @@ from typing import Any
 
 from warp_torchrl.runs.config.construction import ConfigError, build, construct
 from warp_torchrl.runs.config.groups import COMPONENTS
+from warp_torchrl.validation import did_you_mean
+from warp_torchrl.world.mechanics.mechanic import Mechanic
+from warp_torchrl.world.mechanics.table import mechanics
 from warp_torchrl.world.world import World
 
 
@@ -21,6 +24,7 @@ def build_components(config: Mapping[str, Any], names: Sequence[str] = COMPONENT
     """
     first = ("model",) if "model" in names else ()  # whose messages are the team's: mistakes are told of the model
     built = {name: build(config[name], name) for name in dict.fromkeys((*first, *names))}
+    built["mechanics"] = build_mechanics(config.get("mechanics", {}))
     world = construct(World, chosen(World, {**config, **built}), "")
     if "reward" in built:
         try:
@@ -28,6 +32,22 @@ def build_components(config: Mapping[str, Any], names: Sequence[str] = COMPONENT
         except ValueError as error:
             raise ConfigError(str(error)) from None
     return {**built, "world": world}
+
+
+def build_mechanics(values: object) -> tuple[Mechanic, ...]:
+    """Build the mechanics of a world from their values by name; a mechanic without values has its defaults.
+
+    Raises:
+        ConfigError: With key, value and rule.
+    """
+    if not isinstance(values, Mapping):
+        raise ConfigError(f"mechanics must be a mapping, got {values!r}")
+    known = mechanics()
+    for name in values:
+        if name not in known:
+            hint = did_you_mean(name, known)
+            raise ConfigError(f"mechanics must be some of {', '.join(known)}, got {name}{hint}")
+    return tuple(construct(known[name], own or {}, f"mechanics.{name}") for name, own in values.items())
 
 
 def chosen(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:

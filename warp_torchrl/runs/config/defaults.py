@@ -114,7 +114,7 @@ def _left_out(config_path: str, node: DictConfig) -> dict[str, Any]:
     if name == "search":
         return {"search": defaults(SearchOptions)}
     if name == "train":
-        run = {**defaults(World), **defaults(RunConfig)}
+        run = {**defaults(World), "mechanics": {}, **defaults(RunConfig)}
         return {key: value for key, value in run.items() if key not in COMPONENTS}
     kind = component(node["_target_"]) if "_target_" in node else None
     if kind is None:

@@ -11,6 +11,7 @@ from torch import Tensor
 from warp_torchrl.collection.curriculum import Curriculum
 from warp_torchrl.env.observation import Observation
 from warp_torchrl.env.specs import make_specs
+from warp_torchrl.runs.config.components import build_mechanics
 from warp_torchrl.runs.config.construction import ConfigError, build, construct
 from warp_torchrl.validation import did_you_mean, dotted
 from warp_torchrl.world.arrays.batch import Batch
@@ -33,12 +34,18 @@ def level_worlds(config: Mapping[str, Any], built: Mapping[str, Any], keys: tupl
     for number, values in enumerate(_configs(config, built["curriculum"], keys)):
         groups = [name for name in keys if isinstance(values[name], Mapping) and values[name] != config[name]]
         try:
-            parts = {**values, **built, **{name: build(values[name], name) for name in groups}}
+            own = {name: _built(name, values[name]) for name in groups}
+            parts = {**values, **built, **own}
             fitting = {each.name: parts[each.name] for each in fields(World)}
             levels.append(construct(World, fitting, ""))
         except ConfigError as error:
             raise ConfigError(f"curriculum.over, level {number}: {error}") from None
     return levels
+
+
+def _built(name: str, node: Any) -> Any:
+    """Return what a key of a scenario describes."""
+    return build_mechanics(node) if name == "mechanics" else build(node, name)
 
 
 def _configs(config: Mapping[str, Any], curriculum: Curriculum, keys: tuple[str, ...]) -> list[dict[str, Any]]:
@@ -104,7 +111,7 @@ def _name(key: Any) -> str:
 def _leaves(batch: Batch, prefix: str = "state.") -> dict[str, str]:
     """Return the shapes and types of a batch's tensors, and its numbers, by name; what is None has no name."""
     found: dict[str, str] = {}
-    for name, value in vars(batch).items():
+    for name, value in batch.parts():
         if isinstance(value, Batch):
             found |= _leaves(value, f"{prefix}{name}.")
         elif value is not None:

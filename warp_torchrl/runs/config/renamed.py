@@ -12,9 +12,6 @@ RENAMED: dict[str, tuple[str, dict[str, str]]] = {
     "team.radio_range": ("team.radio.range", {}),
     "team.radio_loss": ("team.radio.loss", {}),
     "team.radio_line_of_sight": ("team.radio.line_of_sight", {}),
-    "team.separation": ("team.flight.separation", {}),
-    "team.battery": ("team.flight.battery", {}),
-    "team.drift": ("team.flight.drift", {}),
 }
 """The new name of each, and of values that have one."""
 

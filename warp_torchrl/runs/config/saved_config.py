@@ -148,7 +148,7 @@ def _recorded(saved_config: SavedConfig, config: DictConfig, touched: Sequence[s
 
     So it has the keys that it had, and no others that our files have.
     """
-    whole: dict[str, Any] = {}
+    whole = {key: saved_config.values[key] for key in ("mechanics",) if key in saved_config.values}
     for group in (each for each in COMPONENTS if isinstance(saved_config.values.get(each), Mapping)):
         kind, values = component(config[group]["_target_"]), saved_config.values[group]
         for name in sorted(free_mappings(kind) & values.keys()) if kind is not None else ():

@@ -4,8 +4,8 @@ They are plain objects. A step makes a dozen of them and reads some hundreds of 
 tensordicts took a quarter of the time of a step of one world.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, ItemsView
+from dataclasses import dataclass, field
 from typing import Any, Self, TypeVar
 
 import torch
@@ -50,10 +50,14 @@ class Batch:
         for name, leaf in self.leaves().items():
             leaf.index_copy_(0, index, given[name])
 
+    def parts(self) -> ItemsView[str, Any]:
+        """Return the names and values of what it holds: tensors, batches, numbers, None."""
+        return vars(self).items()
+
     def leaves(self) -> dict[str, Tensor]:
         """Return all tensors by name; those of a batch in it have names like ``vehicles.position``."""
         found: dict[str, Tensor] = {}
-        for name, value in vars(self).items():
+        for name, value in self.parts():
             if isinstance(value, Batch):
                 found.update({f"{name}.{inner}": leaf for inner, leaf in value.leaves().items()})
             elif isinstance(value, Tensor):
@@ -63,7 +67,7 @@ class Batch:
     def with_leaves(self, leaves: dict[str, Tensor], prefix: str = "") -> Self:
         """Return a batch like this one of other tensors, which have the names of ``leaves`` after the prefix."""
         changes: dict[str, Any] = {}
-        for name, value in vars(self).items():
+        for name, value in self.parts():
             if isinstance(value, Batch):
                 changes[name] = value.with_leaves(leaves, f"{prefix}{name}.")
             elif isinstance(value, Tensor):
@@ -72,6 +76,21 @@ class Batch:
 
     def _each(self, change: Callable[[Tensor], Tensor]) -> Self:
         return self.with_leaves({name: change(leaf) for name, leaf in self.leaves().items()})
+
+
+@dataclass(eq=False, repr=False)
+class Named(Batch):
+    """Tensors and batches whose names their reader gives."""
+
+    held: dict[str, Any] = field(default_factory=dict)  # tensors [B, ...] and batches
+
+    def parts(self) -> ItemsView[str, Any]:
+        """Return the names and values of what it holds."""
+        return self.held.items()
+
+    def replace(self, **changes: Any) -> Self:
+        """Return the same batch but for some of what it holds."""
+        return type(self)({**self.held, **changes})
 
 
 Batched = TypeVar("Batched", bound=Batch)

@@ -6,22 +6,7 @@ from typing import Self
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.arrays.batch import Batch
-
-
-@dataclass(eq=False, repr=False)
-class Named(Batch):
-    """Tensors whose names the world does not know."""
-
-    tensors: dict[str, Tensor]  # [B, ...] each
-
-    def leaves(self) -> dict[str, Tensor]:
-        """Return all tensors by name."""
-        return dict(self.tensors)
-
-    def with_leaves(self, leaves: dict[str, Tensor], prefix: str = "") -> Self:
-        """Return a batch like this one of other tensors, which have the names of ``leaves`` after the prefix."""
-        return self.replace(tensors={name: leaves[prefix + name] for name in self.tensors})
+from warp_torchrl.world.arrays.batch import Batch, Named
 
 
 @dataclass(eq=False, repr=False)

@@ -3,12 +3,13 @@
 Letters, everywhere: B worlds, A agents, H rows, W columns.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import TypeVar, cast
 
 from torch import Tensor
 
-from warp_torchrl.world.arrays.batch import Batch
+from warp_torchrl.world.arrays.batch import Batch, Named
 from warp_torchrl.world.arrays.bytes import at_least, between, byte, counts
 from warp_torchrl.world.state.packets import Packets
 
@@ -50,6 +51,9 @@ FIRST_FIRE = 11
 """Cell code of the first burning stage; 11..15 burn."""
 EMBER = 15
 """Cell code of the last stage."""
+
+
+Planes = TypeVar("Planes", bound=Batch)
 
 
 @dataclass(eq=False, repr=False)
@@ -95,8 +99,6 @@ class Vehicles(Batch):
     redundant: Tensor  # int32 [B,A], those on a target that a team-mate had
     last_useful: Tensor  # int32 [B,A], step of the last credited act; -1 before the first
     arrived: Tensor | None = None  # bool [B,A], was over the fire since it set out; None but in ``retardant`` teams
-    near_misses: Tensor | None = None  # int32 [B,A], steps that ended too near another aircraft; None: not counted
-    battery: Tensor | None = None  # int32 [B,A], steps of flight left; None where they are not counted
     serves: Tensor | None = None  # int64 [B,A], the agency that each serves now; None where there is but one
 
 
@@ -203,6 +205,30 @@ class WorldState(Batch):
     lands: Lands | None = None  # None where there is but one agency
     packets: Packets | None = None  # None where packets arrive in the step in which they are sent
     origin: Tensor | None = None  # int64 [B], key of what began with the episode, in imagined worlds; None: ``key``
+    extras: Named = field(default_factory=Named)  # planes of each mechanic by its name, see ``world.mechanics``
+
+    def planes(self, name: str, kind: type[Planes]) -> Planes:
+        """Return what a mechanic keeps in the worlds.
+
+        Args:
+            name: Of the mechanic.
+            kind: Of its planes.
+
+        Raises:
+            ValueError: If the worlds have none: the mechanic did not begin them.
+        """
+        if name not in self.extras.held:
+            raise ValueError(f"worlds must have planes of {name}, got those of {', '.join(self.extras.held) or 'none'}")
+        return cast("Planes", self.extras.held[name])
+
+    def plane(self, name: str, part: str) -> Tensor | None:
+        """Return one tensor that a mechanic keeps, for readers that do without it; None where there is none."""
+        found = self.extras.held.get(name)
+        return None if found is None else getattr(found, part, None)
+
+    def with_planes(self, name: str, planes: Batch) -> "WorldState":
+        """Return the worlds with other planes of a mechanic."""
+        return self.replace(extras=self.extras.replace(**{name: planes}))
 
     def what_changes(self) -> dict[str, Tensor]:
         """Return all tensors by name but those that follow from others, of which they can be made again."""

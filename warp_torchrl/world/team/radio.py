@@ -8,8 +8,9 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
+from warp_torchrl.world.arrays.batch import Named
 from warp_torchrl.world.arrays.random import Stream, uniform
-from warp_torchrl.world.state.packets import Named, Packets, moved_up
+from warp_torchrl.world.state.packets import Packets, moved_up
 from warp_torchrl.world.state.state import WorldState
 
 MAST = 3.0
@@ -128,7 +129,7 @@ class Radio:
             return state
         packets, steps = self._under_way(state), self.delay + 1
         before = {name: each.new_zeros(len(each), steps, *each.shape[1:]) for name, each in shown.items()}
-        before = before if packets.shown is None else packets.shown.tensors
+        before = before if packets.shown is None else packets.shown.held
         after = Named({name: moved_up(before[name], each, running) for name, each in shown.items()})
         return state.replace(packets=packets.replace(shown=after))
 
@@ -166,7 +167,7 @@ class Radio:
         shown = self._under_way(state).shown
         if shown is None:
             raise ValueError("worlds must tell what their agents sent, as those of an environment do")
-        return {name: steps[:, 0].clone() for name, steps in shown.tensors.items()}
+        return {name: steps[:, 0].clone() for name, steps in shown.held.items()}
 
     def _under_way(self, state: WorldState) -> Packets:
         """Return the packets, checked."""

@@ -1,10 +1,10 @@
 """The vehicles: where they start, and how a step makes one of what each of them does."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, reduce
 from operator import add, or_
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, Protocol
 
 import torch
 from torch import Tensor
@@ -14,7 +14,6 @@ from warp_torchrl.world.arrays.bytes import scatter_add
 from warp_torchrl.world.state.role import ROLES, RoleTable, role_names, role_table
 from warp_torchrl.world.state.state import Action, ActionResult, Cover, Vehicles, WorldState
 from warp_torchrl.world.team.abilities import ABILITIES, PAPER_ABILITIES, Ability, Deed, Situation, neighbourhood
-from warp_torchrl.world.team.flight import Flight, grounded
 from warp_torchrl.world.team.radio import Radio
 from warp_torchrl.world.team.start import starting_cells
 
@@ -46,6 +45,18 @@ class Skill(NamedTuple):
         return deed.possible if self.of_all else deed.possible & now.roles.can[self.name], deed
 
 
+class MoveRule(Protocol):
+    """What binds vehicles that move, beside their abilities; see ``world.mechanics.Mechanic``."""
+
+    def grounded(self, state: WorldState, roles: RoleTable) -> Tensor | None:
+        """Return which agents cannot move, bool [B, A]; None where it keeps none."""
+        ...
+
+    def moved(self, state: WorldState, roles: RoleTable, running: Tensor) -> WorldState:
+        """Return worlds after the agents' moves, in those that go on, bool [B]."""
+        ...
+
+
 @dataclass(frozen=True, kw_only=True)
 class Team:
     """A team of vehicles and its rules (WARP-CA, agents and actions).
@@ -58,7 +69,6 @@ class Team:
         tank: Extinguish acts that a vehicle carries water for; None is unlimited, 0 none at all. It fills up beside a
             lake and at the corner where the team started.
         radio: What agents tell each other, and who hears whom.
-        flight: What binds its aircraft.
         start: ``corner`` starts the team in a corner drawn for each episode, ``anywhere`` on cells drawn over the map.
 
     Raises:
@@ -71,7 +81,6 @@ class Team:
     extinguish_p: float = 1.0
     tank: int | None = None
     radio: Radio = field(default_factory=Radio)
-    flight: Flight = field(default_factory=Flight)
     start: Literal["corner", "anywhere"] = "corner"
 
     def __post_init__(self) -> None:
@@ -144,7 +153,6 @@ class Team:
         """Return the team at the start of an episode; see ``starting_cells``."""
         base, position = starting_cells(key, cover, burning, self.n_agents, self.start)
         counter = torch.zeros(position.shape[:2], dtype=torch.int32, device=cover.device)
-        battery = self.flight.battery
         return Vehicles(
             position=position,
             tank=torch.full_like(counter, -1 if self.tank is None else self.tank),
@@ -153,22 +161,25 @@ class Team:
             acts=counter,
             redundant=counter.clone(),
             last_useful=torch.full_like(counter, -1),
-            near_misses=None if self.flight.separation is None else counter.clone(),
-            battery=None if battery is None else torch.full_like(counter, battery),
         )
 
-    def open_moves(self, state: WorldState) -> Tensor:
-        """Return which of the eight moves each agent can make, bool [B, A, 8]."""
-        return self._mask(self.skills[0], self._situation(state, 0))
+    def open_moves(self, state: WorldState, rules: Sequence[MoveRule] = ()) -> Tensor:
+        """Return which of the eight moves each agent can make under some rules, bool [B, A, 8]."""
+        return self._mask(self.skills[0], self._situation(state, 0), rules)
 
-    def action_mask(self, state: WorldState, last_spreading: int) -> Tensor:
+    def action_mask(self, state: WorldState, last_spreading: int, rules: Sequence[MoveRule] = ()) -> Tensor:
         """Return which actions would do something, bool [B, A, actions].
 
         Stay is always open. Without it, an agent that can do nothing at all is shown ``EXTINGUISH``, which then does
         nothing: a policy needs one action to choose.
+
+        Args:
+            state: The worlds.
+            last_spreading: Cell code of the last stage that can be put out.
+            rules: What binds moves.
         """
         now = self._situation(state, last_spreading)
-        can = [self._mask(skill, now) for skill in self.skills]
+        can = [self._mask(skill, now, rules) for skill in self.skills]
         if self.allow_stay:
             can.insert(len(PAPER_ABILITIES), torch.ones_like(can[-1][..., :1]))
         open_actions = torch.cat(can, dim=-1)
@@ -177,7 +188,13 @@ class Team:
         return open_actions
 
     def act(
-        self, state: WorldState, action: Tensor, running: Tensor, last_spreading: int, wet_ticks: int
+        self,
+        state: WorldState,
+        action: Tensor,
+        running: Tensor,
+        last_spreading: int,
+        wet_ticks: int,
+        rules: Sequence[MoveRule] = (),
     ) -> tuple[WorldState, ActionResult]:
         """Let the agents move, then let them put out fire, clear trees, and do what else their roles can.
 
@@ -189,12 +206,13 @@ class Team:
             running: Which worlds go on, bool [B]; elsewhere nothing happens.
             last_spreading: Cell code of the last stage that can be put out.
             wet_ticks: Ticks for which a tree that was put out stays wet.
+            rules: What binds moves.
 
         Returns:
             The worlds after it, and what each action came to.
         """
+        state, moved = self._move(state, action, running, rules)
         running = running[:, None]
-        state, moved = self._move(state, action, running)
         now = self._situation(state, last_spreading, wet_ticks)
         target = now.own_cell
         vehicles, tank = state.vehicles, state.vehicles.tank
@@ -215,7 +233,6 @@ class Team:
         redundant = is_second(target, acting)
         credited = acting & ~redundant
         after = changed(state, target, [(done & credited, becomes) for done, becomes in deeds])
-        flies = self.table(target.device).flies
         after = after.replace(
             vehicles=vehicles.replace(
                 tank=self._refill(state, tank),
@@ -223,8 +240,6 @@ class Team:
                 acts=vehicles.acts + reduce(or_, chosen),
                 redundant=vehicles.redundant + redundant,
                 last_useful=torch.where(credited, state.step[:, None], vehicles.last_useful),
-                near_misses=self.flight.near_misses(vehicles, flies, running),
-                battery=self.flight.batteries(vehicles, flies, running),
             )
         )
         return after, ActionResult(action=action, moved=moved, credited=credited, redundant=redundant, target=target)
@@ -232,25 +247,30 @@ class Team:
     def _situation(self, state: WorldState, last_spreading: int, wet_ticks: int = 0) -> Situation:
         return Situation(state, self.table(state.cells.device), self.extinguish_p, last_spreading, wet_ticks)
 
-    def _mask(self, skill: Skill, now: Situation) -> Tensor:
+    def _mask(self, skill: Skill, now: Situation, rules: Sequence[MoveRule]) -> Tensor:
         mask = skill.ability.mask(now)
-        if skill.ability.moves and self.flight.battery is not None:
-            mask = mask & ~grounded(now.state.vehicles, now.roles.flies)[..., None]
+        if skill.ability.moves:
+            for grounded in _grounded(now, rules):
+                mask = mask & ~grounded[..., None]
         return mask if skill.of_all else mask & now.roles.can[skill.name][:, None]
 
-    def _move(self, state: WorldState, action: Tensor, running: Tensor) -> tuple[WorldState, Tensor]:
+    def _move(
+        self, state: WorldState, action: Tensor, running: Tensor, rules: Sequence[MoveRule]
+    ) -> tuple[WorldState, Tensor]:
         """Return the worlds after the moves, and which agents moved, bool [B, A]."""
         now, position, moved = self._situation(state, 0), state.vehicles.position, []
         for skill in self.skills:
             if skill.ability.moves:
                 possible, deed = skill.act(now, action)
-                if self.flight.battery is not None:
-                    possible = possible & ~grounded(state.vehicles, now.roles.flies)
-                moved.append(skill.is_chosen(action) & running & possible)
+                for grounded in _grounded(now, rules):
+                    possible = possible & ~grounded
+                moved.append(skill.is_chosen(action) & running[:, None] & possible)
                 if deed.step is not None:
                     position = position + deed.step * moved[-1][..., None]
         state = state.replace(vehicles=state.vehicles.replace(position=position))
-        return self.flight.drifted(state, now.roles.flies, running), reduce(or_, moved)
+        for rule in rules:
+            state = rule.moved(state, now.roles, running)
+        return state, reduce(or_, moved)
 
     def _refill(self, state: WorldState, tank: Tensor) -> Tensor:
         """Fill the tanks of vehicles beside a lake or at the base."""
@@ -261,6 +281,12 @@ class Team:
         by_lake = ((cover == int(Cover.LAKE)) & inside).any(dim=-1)
         at_base = (state.vehicles.position == state.vehicles.base[:, None]).all(dim=-1)
         return torch.where(by_lake | at_base, self.tank, tank)
+
+
+def _grounded(now: Situation, rules: Sequence[MoveRule]) -> list[Tensor]:
+    """Return which agents cannot move by each rule that keeps some where they are, bool [B, A] each."""
+    found = (rule.grounded(now.state, now.roles) for rule in rules)
+    return [each for each in found if each is not None]
 
 
 def changed(state: WorldState, target: Tensor, deeds: list[tuple[Tensor, Mapping[str, Tensor | int]]]) -> WorldState:

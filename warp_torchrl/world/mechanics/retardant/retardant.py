@@ -4,6 +4,7 @@ Retardant is no action: an aircraft that is over a burning tree treats it, whate
 and is less likely to after the next tick (``warp_torchrl.world.law.lattice``).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -16,7 +17,7 @@ from warp_torchrl.world.arrays.geometry import DIRECTIONS
 from warp_torchrl.world.state.role import Role, add_role
 from warp_torchrl.world.state.state import Action, ActionResult, Vehicles, WorldState, is_burning
 from warp_torchrl.world.team.abilities import own_cell
-from warp_torchrl.world.team.team import Team, changed, is_second
+from warp_torchrl.world.team.team import MoveRule, Team, changed, is_second
 
 TANKER = "tanker"
 """The role of these aircraft."""
@@ -66,9 +67,9 @@ class RetardantTeam(Team):
         here = torch.arange(2, device=cover.device)
         return vehicles.replace(base=torch.where(here == 0, row, column).expand_as(vehicles.base).contiguous())
 
-    def action_mask(self, state: WorldState, last_spreading: int) -> Tensor:
+    def action_mask(self, state: WorldState, last_spreading: int, rules: Sequence[MoveRule] = ()) -> Tensor:
         """Return which actions would do something, or are shown alone, bool [B, A, actions]."""
-        mask = super().action_mask(state, last_spreading)
+        mask = super().action_mask(state, last_spreading, rules)
         if not self.approach:
             return mask
         actions = torch.arange(mask.shape[-1], device=mask.device)
@@ -77,7 +78,13 @@ class RetardantTeam(Team):
         return torch.where(sets_out[..., None], alone, mask)
 
     def act(
-        self, state: WorldState, action: Tensor, running: Tensor, last_spreading: int, wet_ticks: int
+        self,
+        state: WorldState,
+        action: Tensor,
+        running: Tensor,
+        last_spreading: int,
+        wet_ticks: int,
+        rules: Sequence[MoveRule] = (),
     ) -> tuple[WorldState, ActionResult]:
         """Let the vehicles do as in any team, and the aircraft drop their retardant; see ``Team.act``.
 
@@ -89,7 +96,7 @@ class RetardantTeam(Team):
         treated = first = torch.zeros_like(drops)
         if self.treats == "path":
             state, treated, first = _treat(state, drops)
-        state, result = super().act(state, action, running, last_spreading, wet_ticks)
+        state, result = super().act(state, action, running, last_spreading, wet_ticks, rules)
         state, ends, new = _treat(state, drops & result.moved if self.treats == "path" else drops)
         treated, first = treated | ends, first | new
         target = torch.where(drops, torch.where(ends, own_cell(state), target), result.target)

@@ -1,0 +1,83 @@
+"""Rules of flight in play: what agents are shown, what heuristics mind, what rewards and tables tell."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+
+from tests.env.reward.drawing import FIELD, STAY, drawn, earned
+from warp_torchrl import load_policy, make_env
+from warp_torchrl.env.metrics import metrics
+from warp_torchrl.env.reward import Monitor
+from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.world.mechanics.flight.flight import Aircraft, Flight
+from warp_torchrl.world.mechanics.sensing.sensing import Sight
+from warp_torchrl.world.state.state import Action, count_trees
+from warp_torchrl.world.team.team import Team
+
+GOLDEN = Path(__file__).parents[3] / "golden" / "0.1.0"
+
+
+def test_a_battery_is_shown_where_it_runs_down():
+    plain = make_env("scouts", n_worlds=2)
+    env = make_env("scouts", n_worlds=2, overrides=["mechanics.flight.battery=10"])
+    names = env.channel_names["status"]
+    assert names == (*plain.channel_names["status"], "battery")
+    now = env.reset()
+    policy = HEURISTICS["oldest"](env)
+    for _ in range(3):
+        now = env.step(policy(now))["next"]
+    shown = now["agents", "observation", "status"][..., -1]
+    assert torch.equal(shown, env.world_state.plane("flight", "battery") / 10.0)
+    assert shown[0].tolist() == pytest.approx([0.7, 1.0, 0.7, 1.0])  # scouts fly, bulldozers do not
+
+
+def test_an_older_policy_plays_on_beside_a_battery():
+    policy = load_policy(GOLDEN, mode="deterministic")
+    played = [
+        env.rollout(12, policy.fitted(env), break_when_any_done=False)["agents", "action"]
+        for env in (
+            make_env("skirmish", n_worlds=4, overrides=[*policy.overrides, *further])
+            for further in ([], ["mechanics.flight.battery=9"])  # bulldozers do not fly
+        )
+    ]
+    assert torch.equal(*played)
+
+
+@pytest.mark.parametrize("name", ["oldest", "lawnmower", "follower"])
+def test_aircraft_turn_back_before_their_batteries_are_empty(name):
+    env = make_env("front", n_worlds=4, overrides=["mechanics.flight.battery=24"])
+    policy, now, lowest, charged = HEURISTICS[name](env), env.reset(), 24, False
+    for _ in range(80):
+        before = env.world_state.plane("flight", "battery")
+        now = env.step(policy(now))["next"]
+        battery = env.world_state.plane("flight", "battery")
+        lowest = min(lowest, int(battery.min()))
+        charged |= bool(((battery == 24) & (before < 10)).any())
+    assert 0 < lowest < 24 and charged
+
+
+def apart(positions):
+    """Worlds drawn by hand whose two scouts must keep two cells apart, and see one."""
+    state, world = drawn(FIELD, positions)
+    team = Team(n_agents=2, roles=("scout",), start="anywhere")
+    world = replace(world, sensing=Sight(radius=1), team=team, mechanics=(Flight(separation=2.0),))
+    return world.sensing.begun(world.mechanics[0].begin(state, world), world.team), world
+
+
+def test_near_misses_cost_those_who_have_them():
+    state, world = apart([[3, 2], [3, 3]])
+    assert earned(Monitor(scale=1.0, near_miss=0.5), state, world, STAY, STAY) == pytest.approx([-1.0, -1.0])
+    # The first flies two cells north, sqrt(5) away from the second, which sees no fire.
+    free = Monitor(scale=1.0, near_miss=0.5, uncertainty=0.0)
+    assert earned(free, state, world, int(Action.NORTH), STAY)[1] == pytest.approx(0.0)
+
+
+def test_near_misses_are_a_share_of_the_agents_steps():
+    state, world = apart([[3, 2], [3, 3]])
+    misses = state.planes("flight", Aircraft).replace(near_misses=torch.tensor([[5, 3]], dtype=torch.int32))
+    state = state.replace(step=torch.tensor([8], dtype=torch.int32)).with_planes("flight", misses)
+    assert metrics(state, count_trees(state), world)["near_misses"].tolist() == [8 / 16]
+    env = make_env("front", n_worlds=2)
+    assert env.rollout(2)["next", "info", "near_misses"].shape == (2, 2, 1)

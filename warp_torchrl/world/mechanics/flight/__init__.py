@@ -1,0 +1,1 @@
+"""Flight: separation, batteries and drift of aircraft."""

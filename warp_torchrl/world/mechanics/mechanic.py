@@ -1,0 +1,104 @@
+"""Mechanics: what a scenario adds to fire and team. Each is a folder here, a dataclass, and its planes of the state."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+from torch import Tensor
+
+from warp_torchrl.world.law.automaton import Automaton
+from warp_torchrl.world.state.role import RoleTable
+from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.world.team.team import Team
+
+
+class Rules(Protocol):
+    """What a mechanic may read of its world."""
+
+    @property
+    def team(self) -> Team:
+        """Return the vehicles."""
+        ...
+
+    @property
+    def fire(self) -> Automaton:
+        """Return the automaton."""
+        ...
+
+    @property
+    def steps_per_tick(self) -> int:
+        """Return the agent steps to a fire tick."""
+        ...
+
+    @property
+    def horizon(self) -> int:
+        """Return the agent steps to an episode."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mechanic:
+    """A mechanic of the world. Its fields are its configuration; each method is a socket, which by default is empty.
+
+    Its tensors that change with the worlds are a ``Batch`` under its name in ``WorldState.extras``.
+
+    Attributes:
+        name: Of its planes in the state, and of its values in ``mechanics`` of the configuration.
+        maps: What agents may be shown of it: channels of their view by name, each a function of the worlds that returns
+            whole numbers 0..255, uint8 [B, H, W].
+    """
+
+    name: ClassVar[str] = ""
+    maps: ClassVar[Mapping[str, Callable[[WorldState], Tensor]]] = {}
+
+    def check(self, world: Rules) -> None:
+        """Check that it fits a world.
+
+        Raises:
+            ValueError: If not.
+        """
+
+    def begin(self, state: WorldState, world: Rules) -> WorldState:
+        """Return worlds at the start of an episode, after the head start of the fire, with its planes."""
+        return state
+
+    def grounded(self, state: WorldState, roles: RoleTable) -> Tensor | None:
+        """Return which agents cannot move, bool [B, A]; None where it keeps none."""
+        return None
+
+    def moved(self, state: WorldState, roles: RoleTable, running: Tensor) -> WorldState:
+        """Return worlds after the agents' moves and before their other acts.
+
+        Args:
+            state: The worlds after the moves.
+            roles: Of the agents.
+            running: Worlds that have not ended, bool [B].
+        """
+        return state
+
+    def step(self, before: WorldState, after: WorldState, running: Tensor, world: Rules) -> WorldState:
+        """Return worlds after a step: agents have acted, the fire has ticked, and the clock has advanced.
+
+        Args:
+            before: The worlds before the step.
+            after: The worlds after it.
+            running: Worlds that had not ended before it, bool [B]; the others stay the same.
+            world: Their rules.
+        """
+        return after
+
+    def metric_names(self, world: Rules) -> tuple[str, ...]:
+        """Return the names of its metrics."""
+        return ()
+
+    def metrics(self, state: WorldState) -> dict[str, Tensor]:
+        """Return the metrics of each world's episode so far, shares in 0..1, float32 [B] each by name."""
+        return {}
+
+    def entries(self, world: Rules) -> tuple[str, ...]:
+        """Return the names of the numbers that ``status`` tells each agent; none of them turns with the map."""
+        return ()
+
+    def status(self, state: WorldState) -> Tensor:
+        """Return these numbers, float32 [B, A, F], in -3..3."""
+        raise TypeError(f"{type(self).__name__} does not say what it tells: define status()")
