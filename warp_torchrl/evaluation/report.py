@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from warp_torchrl.env.metrics import SAVED_BY
+from warp_torchrl.env.metrics import SAVED_BY, WATCHING
+from warp_torchrl.env.specs import EPISODE_METRICS
 from warp_torchrl.evaluation.behaviour import BEHAVIOUR
 from warp_torchrl.evaluation.goal import Goal
 from warp_torchrl.evaluation.play import Episodes
@@ -98,7 +99,9 @@ def evaluation_table(content: Mapping[str, Any]) -> str:
         lines += [*_saved_lines(rows), *_difference_lines(content["policy"], content["versus"], "saved")]
     if content["watching"]:
         lines += [*_watching_lines(rows), *_difference_lines(content["policy"], content["watching"], "watched")]
-    lines += _agency_lines(rows, [name for name in content["metrics"] if name.startswith(SAVED_BY)])
+    lines += _share_lines("saved %, by agency", rows, SAVED_BY)
+    for name in _further(content):
+        lines += _share_lines(f"{name.replace('_', ' ')} %", rows, name)
     lines += _behaviour_lines(content) if content["goal"] == "saved" else []
     lines += _left_out_lines(content)
     return "\n".join(lines)
@@ -149,11 +152,18 @@ def _difference_lines(policy: str, differences: Mapping[str, Any], metric: str) 
     return lines
 
 
-def _agency_lines(rows: Mapping[str, Any], names: Sequence[str]) -> list[str]:
-    """Return a line for each policy: the share of its land that each agency saved; none for a single agency."""
+def _further(content: Mapping[str, Any]) -> list[str]:
+    """Return the metrics of mechanics, which no other line of the table shows."""
+    shown = {*EPISODE_METRICS, *SHOWN, *WATCHING, *(("near_misses",) if content["watching"] else ())}
+    return [name for name in content["metrics"] if name not in shown and not name.startswith(SAVED_BY)]
+
+
+def _share_lines(title: str, rows: Mapping[str, Any], start: str) -> list[str]:
+    """Return the shares whose names begin with a text, a line for each policy; none where there is no such share."""
+    names = [name for name in next(iter(rows.values())) if name.startswith(start)]
     if not names:
         return []
-    lines = [f"{'saved %, by agency':<22}" + "".join(f"{name.removeprefix(SAVED_BY):>24}" for name in names)]
+    lines = [f"{title:<22}" + "".join(f"{name.removeprefix(start):>24}" for name in names)]
     for policy, summary in rows.items():
         cells = ["{:.1f} ({:.1f} .. {:.1f})".format(*_percent(summary[name])) for name in names]
         lines.append(f"{policy:<22}" + "".join(f"{cell:>24}" for cell in cells))

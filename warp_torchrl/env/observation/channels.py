@@ -17,8 +17,9 @@ from warp_torchrl.entries import Content, Empty, Follows, Part
 from warp_torchrl.env.observation.features import Features, Function, Holds, anything
 from warp_torchrl.env.observation.look import Look
 from warp_torchrl.world.arrays.bytes import byte, to_codes
+from warp_torchrl.world.mechanics.table import mechanics
 from warp_torchrl.world.state.role import PAPER_ROLES
-from warp_torchrl.world.state.state import FIRST_FIRE, is_burning, is_tree
+from warp_torchrl.world.state.state import FIRST_FIRE, WorldState, is_burning, is_tree
 from warp_torchrl.world.world import World
 
 ELEVATION_SCALE = 100.0
@@ -156,6 +157,26 @@ def own_land(look: Look) -> Tensor:
     if lands is None or serves is None:
         return torch.zeros_like(look.on_map)
     return look.on_map * byte(look.window.of(lands.owner) == serves[..., None, None]) * 255
+
+
+def _map_of(name: str, show: Callable[[WorldState], Tensor]) -> Channel:
+    """Return the channel that shows a map of a mechanic; it is empty in worlds without."""
+
+    def shown(look: Look) -> Tensor:
+        if name not in look.state.extras.held:
+            return torch.zeros_like(look.on_map)
+        return look.window.of(show(look.state))
+
+    def content(world: World, names: Sequence[str]) -> Content:
+        return None if name in (each.name for each in world.mechanics) else Empty()
+
+    return Channel(shown, 255, content)
+
+
+for _kind in mechanics().values():
+    for _name, _show in _kind.maps.items():
+        check_new_name("channel", _name, _show, CHANNELS[_name].show if _name in CHANNELS else None)
+        CHANNELS[_name] = _map_of(_kind.name, _show)
 
 
 def check_channels(names: Sequence[str]) -> None:

@@ -179,13 +179,15 @@ def world_overrides(values: Mapping[str, Any]) -> list[str]:
             )
             choices.append(next(of_its_class))
             usual = _composed_worlds(choices)
+    plain_ones = [name for name, own in values.get("mechanics", {}).items() if not own]  # with their defaults
+    added = [f"mechanics.{name}={{}}" for name in plain_ones if name not in usual["mechanics"]]
     usual = dotted(usual)
     changed = [
         f"{path}={value}".replace(" ", "")
         for path, value in map(_of_worlds, dotted({key: values[key] for key in WORLD_KEYS if key in values}).items())
         if (path not in usual or usual[path] != value) and not path.endswith(".path")
     ]
-    return choices[1:] + changed
+    return choices[1:] + added + changed
 
 
 def _of_worlds(leaf: tuple[str, Any]) -> tuple[str, Any]:

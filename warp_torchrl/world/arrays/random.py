@@ -7,6 +7,7 @@ one seed meet the same fire, nothing has to be saved, and a CUDA graph can repla
 
 import math
 from enum import IntEnum
+from zlib import crc32
 
 import torch
 from torch import Tensor
@@ -42,6 +43,7 @@ class Stream(IntEnum):
     DRIFT = 20
     LANDS = 21
     IMAGINED = 22
+    NAMED = 23
 
 
 def world_key(seed: Tensor, episode: Tensor | int = 0) -> Tensor:
@@ -70,6 +72,19 @@ def imagined_keys(key: Tensor, step: Tensor, count: int) -> Tensor:
     """
     word = splitmix64(_counted(key, step, Stream.IMAGINED))
     return splitmix64(word[:, None] + torch.arange(count, device=key.device) * _GOLDEN)
+
+
+def named_key(key: Tensor, name: str) -> Tensor:
+    """Return keys whose draws are those of a name alone, for mechanics that users add.
+
+    Args:
+        key: World keys, int64 [B].
+        name: Whose draws they are.
+
+    Returns:
+        int64 [B].
+    """
+    return splitmix64(_counted(key, crc32(name.encode()), Stream.NAMED))
 
 
 def uniform(key: Tensor, tick: Tensor | int, stream: Stream, shape: tuple[int, ...]) -> Tensor:

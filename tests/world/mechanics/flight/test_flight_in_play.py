@@ -11,6 +11,10 @@ from warp_torchrl import load_policy, make_env
 from warp_torchrl.env.metrics import metrics
 from warp_torchrl.env.reward import Monitor
 from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.saved_config import environment_record, restore, world_overrides
 from warp_torchrl.world.mechanics.flight.flight import Aircraft, Flight
 from warp_torchrl.world.mechanics.sensing.sensing import Sight
 from warp_torchrl.world.state.state import Action, count_trees
@@ -56,6 +60,36 @@ def test_aircraft_turn_back_before_their_batteries_are_empty(name):
         lowest = min(lowest, int(battery.min()))
         charged |= bool(((battery == 24) & (before < 10)).any())
     assert 0 < lowest < 24 and charged
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("mechanics.flight.battery=0", r"^mechanics\.flight\.battery must be in"),
+        ("mechanics.flight.battery=1.5", r"^mechanics\.flight\.battery must be a whole number or null, got 1\.5"),
+        ("mechanics.fligth.drift=0.1", r"^mechanics must be some of .*flight.*, got fligth: did you mean flight"),
+        (
+            "mechanics.flight.dirft=0.1",
+            r"^mechanics\.flight\.dirft is not a key .*: did you mean .*drift",
+        ),
+    ],
+)
+def test_mistakes_are_told_in_one_line(override, message):
+    with pytest.raises(ConfigError, match=message):
+        run_config(plain(compose_config("train", [override])))
+
+
+def test_rules_of_flight_are_recorded_whole_and_restored():
+    values = plain(compose_config("train", ["scenario=front", "mechanics.flight.battery=9"]))
+    record = environment_record(values)
+    assert record.values["mechanics"] == {"flight": {"separation": 2.0, "battery": 9}}
+    assert plain(restore(record))["mechanics"] == record.values["mechanics"]
+    assert plain(restore(record, ["mechanics.flight.battery=5"]))["mechanics"]["flight"]["battery"] == 5
+    assert world_overrides(values) == ["mechanics.flight.battery=9"]
+    bare = plain(compose_config("train", ["mechanics={flight:{}}"]))
+    assert world_overrides(bare) == ["mechanics.flight={}"] and run_config(bare).world.mechanics == (Flight(),)
+    assert run_config(plain(restore(environment_record(bare)))).world.mechanics == (Flight(),)
+    assert plain(compose_config("train", world_overrides(bare)))["mechanics"] == {"flight": {}}
 
 
 def apart(positions):

@@ -1,0 +1,56 @@
+"""A mechanic stands apart: without its folder, its values in yaml files and its tests, the rest works as before."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.test_docs import ROOT, run
+
+APART = ("flight",)
+"""Mechanics whose folder can be deleted."""
+TRY = """
+import pkgutil, importlib, warp_torchrl
+from warp_torchrl import make_env
+from warp_torchrl.world.mechanics.table import mechanics
+for each in pkgutil.walk_packages(warp_torchrl.__path__, "warp_torchrl."):
+    if each.name.split(".")[1] in ("env", "evaluation", "heuristics", "models", "runs", "training", "world"):
+        importlib.import_module(each.name)
+assert "{name}" not in mechanics(), "it is deleted"
+for scenario in ("default", "hetero", "front", "agencies", "search", "haksar"):
+    make_env(scenario, n_worlds=2, overrides=["landscape.size=16"]).rollout(3)
+"""
+
+
+@pytest.fixture(scope="module", params=APART)
+def without(request, tmp_path_factory):
+    """A copy of the project without a mechanic, and its name."""
+    name, copy = request.param, tmp_path_factory.mktemp("without") / "project"
+    shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns("__pycache__", ".git", "outputs", ".*_cache"))
+    for tree in ("warp_torchrl", "tests"):
+        shutil.rmtree(copy / tree / "world" / "mechanics" / name)
+    for path in (copy / "conf").rglob("*.yaml"):
+        path.write_text(re.sub(rf"^mechanics: {{{name}: .*}}\n", "", path.read_text(), flags=re.MULTILINE))
+    return name, copy
+
+
+def check(copy: Path, *command: str) -> None:
+    done = run(*command, folder=copy, PYTHONPATH=str(copy))
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def passes(copy: Path, processes: str, *tests: str) -> None:
+    check(copy, "-m", "pytest", "-n", processes, "-p", "no:cacheprovider", *tests)
+
+
+def test_no_word_of_it_is_imported_and_worlds_are_played(without):
+    name, copy = without
+    check(copy, "-c", TRY.replace("{name}", name))
+    passes(copy, "0", "tests/test_architecture.py", "tests/world/mechanics/test_mechanic.py")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("room", ["world", "env", "heuristics", "evaluation", "models", "runs", "training"])
+def test_the_rest_of_the_suite_passes(without, room):
+    passes(without[1], "2", f"tests/{room}")
