@@ -6,6 +6,7 @@ import torch
 from warp_torchrl import make_env
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.world.mechanics.retardant.retardant import Missions
 
 NORTH, NORTH_EAST, EAST, SOUTH_EAST, SOUTH, STAY = 0, 1, 2, 3, 4, 10
 NOTHING = {}
@@ -22,7 +23,8 @@ def chosen(at, cells=NOTHING, arrived=True, overrides=()):
     for (row, column), code in cells.items():
         codes[0, row, column], burned[0, row, column] = code, code == BURNT
     place = torch.tensor(at)[None]
-    vehicles = state.vehicles.replace(position=place, arrived=torch.full((1, len(at)), arrived))
+    vehicles = state.vehicles.replace(position=place)
+    state = state.with_planes("retardant", Missions(torch.full((1, len(at)), arrived)))
     now = env.set_state(state.replace(cells=codes, burned=burned, vehicles=vehicles))
     now = HEURISTICS["clockwise"](env)(now)["agents"]
     assert now["action_mask"].gather(-1, now["action"][..., None]).all()

@@ -68,7 +68,7 @@ def metrics(state: WorldState, counts: TreeCounts, world: World) -> dict[str, Te
         found["watched"] = watching.watched / fronts
         found["found"] = watching.found / fronts
         found["uncertainty"] = watching.uncertainty / state.step.clamp(min=1)
-    for each in world.mechanics:
+    for each in world.loop:
         found |= each.metrics(state)
     if state.lands is not None:
         left = standing(state).unbind(dim=1)

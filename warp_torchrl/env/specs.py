@@ -32,7 +32,7 @@ class Specs(NamedTuple):
 def episode_metrics(world: World) -> tuple[str, ...]:
     """Return the entries of ``info`` of a world: ``EPISODE_METRICS``, then those that only worlds like it have."""
     watching = WATCHING if world.sensing.is_limited else ()
-    mechanics = (name for each in world.mechanics for name in each.metric_names(world))
+    mechanics = (name for each in world.loop for name in each.metric_names(world))
     return (*EPISODE_METRICS, *watching, *mechanics, *(SAVED_BY + name for name in world.agencies.names))
 
 

@@ -49,7 +49,7 @@ class World:
         ignition: Where the fire starts.
         sensing: What agents know of the fire.
         agencies: Whom the vehicles serve.
-        mechanics: What else holds in these worlds; they begin and step in the order of their names.
+        mechanics: What else holds in these worlds, see ``loop``.
         steps_per_tick: Agent steps to a fire tick.
         horizon: Agent steps to an episode.
         cell_size: Side of a cell [m]; None takes the landscape's own, 30 m where it has none.
@@ -89,11 +89,10 @@ class World:
                 f"got {self.team.radio.carries}"
             )
         self.agencies.check(self.team)
-        names = [each.name for each in self.mechanics]
+        names = [each.name for each in self.loop]
         if len(set(names)) < len(names):
             raise ValueError(f"mechanics must be one of each name, got {', '.join(names)}")
-        object.__setattr__(self, "mechanics", tuple(sorted(self.mechanics, key=lambda each: each.name)))
-        for each in self.mechanics:
+        for each in self.loop:
             each.check(self)
         _ = self.lighting  # refuses an ignition that does not fit the landscape
 
@@ -121,6 +120,16 @@ class World:
     def lighting(self) -> IgnitionSource:
         """Return the ignition on this landscape's map."""
         return self.ignition.over(self.landscape)
+
+    @cached_property
+    def loop(self) -> tuple[Mechanic, ...]:
+        """Return all mechanics in the order in which they begin and step, that of their names.
+
+        They are ``mechanics``, and those of the other parts that are mechanics too.
+        """
+        parts = (self.team,)
+        found = (*self.mechanics, *(each for each in parts if isinstance(each, Mechanic)))
+        return tuple(sorted(found, key=lambda each: each.name))
 
     def reset(self, seed: Tensor, episode: Tensor) -> WorldState:
         """Start an episode in each world: the ground, the fire after its head start, the team.
@@ -190,7 +199,7 @@ class World:
             spreads = (state.cells >= FIRST_FIRE) & (state.cells < EMBER)
             state = self._tick(state, spreads.flatten(1).any(dim=1))
         state = self.team.radio.begun(self.agencies.begun(state, self.team), self.team.table(state.cells.device).flies)
-        for each in self.mechanics:
+        for each in self.loop:
             state = each.begin(state, self)
         state = self.sensing.begun(state, self.team)
         index = state.vehicles.position[..., 0] * self.size[1] + state.vehicles.position[..., 1]
@@ -212,14 +221,12 @@ class World:
             The transition; ``before`` is ``state`` itself.
         """
         running = ~state.done
-        after, result = self.team.act(
-            state, action, running, self.fire.last_spreading, self.fire.wet_for, self.mechanics
-        )
+        after, result = self.team.act(state, action, running, self.fire.last_spreading, self.fire.wet_for, self.loop)
         ticks_now = running & ((state.step + 1) % self.steps_per_tick == 0)
         after = self._tick(after, ticks_now)
         counts_after = count_trees(after)
         after = self._advance_clock(after, counts_after, running)
-        for each in self.mechanics:
+        for each in self.loop:
             after = each.step(state, after, running, self)
         after = self.agencies.updated(after, running)
         after = self.team.radio.sent(after, self.team.table(after.cells.device).flies, running)
@@ -242,11 +249,11 @@ class World:
 
     def possible_actions(self, state: WorldState) -> Tensor:
         """Return which actions would do something, bool [B, A, actions]."""
-        return self.team.action_mask(state, self.fire.last_spreading, self.mechanics)
+        return self.team.action_mask(state, self.fire.last_spreading, self.loop)
 
     def open_moves(self, state: WorldState) -> Tensor:
         """Return which of the eight moves each agent can make, bool [B, A, 8]."""
-        return self.team.open_moves(state, self.mechanics)
+        return self.team.open_moves(state, self.loop)
 
     def action_mask(self, state: WorldState) -> Tensor:
         """Return which actions agents are shown as open, bool [B, A, actions]: those possible, or all."""

@@ -168,7 +168,7 @@ def _map_of(name: str, show: Callable[[WorldState], Tensor]) -> Channel:
         return look.window.of(show(look.state))
 
     def content(world: World, names: Sequence[str]) -> Content:
-        return None if name in (each.name for each in world.mechanics) else Empty()
+        return None if name in (each.name for each in world.loop) else Empty()
 
     return Channel(shown, 255, content)
 

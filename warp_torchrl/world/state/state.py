@@ -98,7 +98,6 @@ class Vehicles(Batch):
     acts: Tensor  # int32 [B,A], extinguish and clear actions chosen so far
     redundant: Tensor  # int32 [B,A], those on a target that a team-mate had
     last_useful: Tensor  # int32 [B,A], step of the last credited act; -1 before the first
-    arrived: Tensor | None = None  # bool [B,A], was over the fire since it set out; None but in ``retardant`` teams
     serves: Tensor | None = None  # int64 [B,A], the agency that each serves now; None where there is but one
 
 

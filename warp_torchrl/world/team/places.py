@@ -1,8 +1,15 @@
-"""Where vehicles are: in which wind."""
+"""Where vehicles are: in which wind, from the middle of the map, and from each other."""
 
+import torch
 from torch import Tensor
 
-from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.system.modes import kept
+from warp_torchrl.world.arrays.geometry import DIRECTIONS
+from warp_torchrl.world.state.state import Action, WorldState, is_burning
+from warp_torchrl.world.team.abilities import own_cell
+
+_APPROACH = (0, 2, 4, 6, 7, 1, 3, 5)
+"""Directions in the order in which an aircraft on its way to the fire prefers them: N, E, S, W, NW, NE, SE, SW."""
 
 
 def wind_at(state: WorldState) -> Tensor:
@@ -12,3 +19,54 @@ def wind_at(state: WorldState) -> Tensor:
         return wind[:, None, :, 0, 0].expand(-1, position.shape[1], -1)
     index = position[..., 0] * wind.shape[3] + position[..., 1]
     return wind.flatten(2).gather(2, index[:, None].expand(-1, 2, -1)).transpose(1, 2)
+
+
+def has_reached(state: WorldState) -> Tensor:
+    """Return which agents have been over a tree that burned, or had, since they set out, bool [B, A].
+
+    In teams that do not keep it, those that are now, or have acted in this episode.
+    """
+    cell, vehicles = own_cell(state), state.vehicles
+    here = state.cells.flatten(1).gather(1, cell)
+    burnt = (state.burned.flatten(1).gather(1, cell) != 0) & (here == 0)
+    was = state.plane("retardant", "arrived")
+    return is_burning(here) | burnt | (vehicles.acts > 0 if was is None else was)
+
+
+def from_middle(state: WorldState) -> Tensor:
+    """Return where each agent is from the middle of the map, (east, north), float32 [B, A, 2] [cells]."""
+    height, width = state.cells.shape[1:]
+    row, column = state.vehicles.position.to(torch.float32).unbind(-1)
+    return torch.stack((column - 0.5 * (width - 1), 0.5 * (height - 1) - row), dim=-1)
+
+
+def approach_move(state: WorldState) -> Tensor:
+    """Return the move of each agent that has not reached the fire, int64 [B, A]; stay in the very middle of a map.
+
+    It is the move to the cell with the least way to the middle, along rows and columns; of such that take as much, the
+    first of N, E, S, W, NW, NE, SE, SW, and each place in that order is worth a tenth of a cell.
+    """
+    way = from_middle(state)
+    order, preferred = _in_order(way.device)
+    then = (way[..., None, :] + order).abs().sum(-1) - preferred
+    move = then.argmin(dim=-1)
+    return torch.where(way.abs().amax(dim=-1) < 0.5, int(Action.STAY), move)
+
+
+def nearest_mate(state: WorldState) -> Tensor:
+    """Return the index of the team-mate nearest to each agent, the first of those as near, int64 [B, A].
+
+    Of an agent alone it is its own.
+    """
+    position = state.vehicles.position
+    square = (position[:, :, None] - position[:, None]).square().sum(-1)
+    alone = torch.eye(position.shape[1], dtype=torch.bool, device=position.device)
+    return square.masked_fill(alone, 1 << 40).argmin(dim=-1)
+
+
+@kept(8)
+def _in_order(device: torch.device) -> tuple[Tensor, Tensor]:
+    """Return the (east, north) offset of each direction, float32 [8, 2], and what its place is worth, float32 [8]."""
+    offsets = torch.tensor([(column, -row) for row, column in DIRECTIONS], dtype=torch.float32, device=device)
+    worth = torch.tensor([0.1 * (8 - _APPROACH.index(each)) for each in range(8)], device=device)
+    return offsets, worth

@@ -6,13 +6,9 @@ import torch
 from tests.world.drawing import differing, draw
 from warp_torchrl import make_env
 from warp_torchrl.world.law.lattice import LatticeFire
-from warp_torchrl.world.mechanics.retardant.retardant import (
-    RetardantTeam,
-    approach_move,
-    from_middle,
-    has_reached,
-    nearest_mate,
-)
+from warp_torchrl.world.mechanics.retardant.retardant import Missions, RetardantTeam
+from warp_torchrl.world.team.places import approach_move, from_middle, has_reached, nearest_mate
+from warp_torchrl.world.world import World
 
 NORTH_EAST, EAST, WEST, STAY = 1, 2, 6, 10
 LAW = LatticeFire()
@@ -24,7 +20,15 @@ def act(team, state, *actions):
 
 def over(drawing, *at, **options):
     team = RetardantTeam(n_agents=len(at), **options)
-    return team, draw(drawing, fire=LAW, team=team, at=list(at))
+    return team, begun(drawing, team, *at)
+
+
+def begun(drawing, team, *at):
+    return team.begin(draw(drawing, fire=LAW, team=team, at=list(at)), World(team=team))
+
+
+def arrived(state):
+    return state.planes("retardant", Missions).arrived.tolist()
 
 
 @pytest.mark.parametrize(("treats", "wet", "left"), [("path", [1, 1, 0], 3), ("end", [0, 1, 0], 4)])
@@ -58,10 +62,10 @@ def test_with_its_last_drop_an_aircraft_is_back_at_its_base_with_a_full_tank():
     team, state = over(drawing, (0, 0), tank=3)
     assert state.vehicles.base.tolist() == [[2, 4]], "the fifth row from the south, the fifth column"
     after, _ = act(team, state, EAST)
-    assert after.vehicles.tank.tolist() == [[1]] and after.vehicles.arrived.tolist() == [[True]]
+    assert after.vehicles.tank.tolist() == [[1]] and arrived(after) == [[True]]
     after, _ = act(team, after, WEST)
     assert after.vehicles.position.tolist() == [[[2, 4]]] and after.vehicles.tank.tolist() == [[3]]
-    assert after.vehicles.arrived.tolist() == [[False]] and after.wet[0, 0, :2].tolist() == [1, 1]
+    assert arrived(after) == [[False]] and after.wet[0, 0, :2].tolist() == [1, 1]
 
 
 def test_without_tanks_retardant_does_not_run_out_and_with_empty_ones_there_is_none():
@@ -77,7 +81,7 @@ def test_without_tanks_retardant_does_not_run_out_and_with_empty_ones_there_is_n
 def test_bulldozers_of_a_mixed_team_drop_nothing():
     team = RetardantTeam(n_agents=2, roles=("ugv", "tanker"))
     assert team.agent_names == ["bulldozer_0", "tanker_0"]
-    after, _ = act(team, draw("aTa", fire=LAW, team=team, at=[(0, 0), (0, 2)]), STAY, STAY)
+    after, _ = act(team, begun("aTa", team, (0, 0), (0, 2)), STAY, STAY)
     assert after.wet[0].tolist() == [[0, 0, 1]]
 
 
@@ -96,8 +100,8 @@ def test_an_aircraft_has_reached_the_fire_until_it_sets_out_again():
         state, _ = act(team, state, EAST)
         assert state.vehicles.position.tolist() == [[[0, 2]]] and has_reached(state).tolist() == [[True]]
     burnt = state.replace(burned=torch.ones_like(state.burned), cells=torch.zeros_like(state.cells))
-    forgot = burnt.vehicles.replace(arrived=torch.tensor([[False]]))
-    assert has_reached(burnt.replace(vehicles=forgot)).tolist() == [[True]], "burnt trees count"
+    forgot = burnt.with_planes("retardant", Missions(torch.tensor([[False]])))
+    assert has_reached(forgot).tolist() == [[True]], "burnt trees count"
 
 
 def test_the_way_to_the_middle_is_diagonal_and_then_along_the_axis_with_north_before_east():

@@ -6,31 +6,37 @@ and is less likely to after the next tick (``warp_torchrl.world.law.lattice``).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import torch
 from torch import Tensor
 
-from warp_torchrl.system.modes import kept
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.arrays.geometry import DIRECTIONS
+from warp_torchrl.world.arrays.batch import Batch
+from warp_torchrl.world.mechanics.mechanic import Mechanic, Rules
 from warp_torchrl.world.state.role import Role, add_role
-from warp_torchrl.world.state.state import Action, ActionResult, Vehicles, WorldState, is_burning
+from warp_torchrl.world.state.state import ActionResult, Vehicles, WorldState, is_burning
 from warp_torchrl.world.team.abilities import own_cell
+from warp_torchrl.world.team.places import approach_move, has_reached
 from warp_torchrl.world.team.team import MoveRule, Team, changed, is_second
 
 TANKER = "tanker"
 """The role of these aircraft."""
 add_role(TANKER, Role(TANKER, abilities=("move",), flies=True))
 
-_APPROACH = (0, 2, 4, 6, 7, 1, 3, 5)
-"""Directions in the order in which an aircraft on its way to the fire prefers them: N, E, S, W, NW, NE, SE, SW."""
 _BASE = 5
 """The base is in this row from the south and this column from the west, from 1."""
 
 
+@dataclass(eq=False, repr=False)
+class Missions(Batch):
+    """How far aircraft have come since they set out."""
+
+    arrived: Tensor  # bool [B,A], was over the fire
+
+
 @dataclass(frozen=True, kw_only=True)
-class RetardantTeam(Team):
+class RetardantTeam(Team, Mechanic):
     """A team whose aircraft, role ``tanker``, treat the burning trees that they fly over.
 
     In each step an aircraft moves to one of the eight cells about it, or stays. It treats the burning tree that it
@@ -47,6 +53,8 @@ class RetardantTeam(Team):
         ValueError: If a value is out of its range or a role is unknown.
     """
 
+    name: ClassVar[str] = "retardant"
+
     n_agents: int = 10
     roles: tuple[str, ...] = (TANKER,)
     start: Literal["corner", "anywhere"] = "anywhere"
@@ -60,12 +68,15 @@ class RetardantTeam(Team):
     def place(self, key: Tensor, cover: Tensor, burning: Tensor) -> Vehicles:
         """Return the team at the start of an episode; its base is near the south-west corner."""
         vehicles = super().place(key, cover, burning)
-        vehicles = vehicles.replace(arrived=torch.zeros_like(vehicles.tank, dtype=torch.bool))
         if self.start == "corner":
             return vehicles
         row, column = max(cover.shape[1] - _BASE, 0), min(_BASE, cover.shape[2]) - 1
         here = torch.arange(2, device=cover.device)
         return vehicles.replace(base=torch.where(here == 0, row, column).expand_as(vehicles.base).contiguous())
+
+    def begin(self, state: WorldState, world: Rules) -> WorldState:
+        """Return worlds whose aircraft have not reached the fire."""
+        return state.with_planes(self.name, Missions(torch.zeros_like(state.vehicles.tank, dtype=torch.bool)))
 
     def action_mask(self, state: WorldState, last_spreading: int, rules: Sequence[MoveRule] = ()) -> Tensor:
         """Return which actions would do something, or are shown alone, bool [B, A, actions]."""
@@ -105,22 +116,29 @@ class RetardantTeam(Team):
             acts=vehicles.acts + treated,
             redundant=vehicles.redundant + redundant,
             last_useful=torch.where(first, step[:, None], vehicles.last_useful),
-            arrived=reached if vehicles.arrived is None else reached | vehicles.arrived,
         )
-        return state.replace(vehicles=self._sent_back(vehicles, drops)), result.replace(
+        arrived = reached | state.planes(self.name, Missions).arrived
+        return self._sent_back(state.replace(vehicles=vehicles), drops, arrived), result.replace(
             credited=result.credited | first, redundant=result.redundant | redundant, target=target
         )
 
-    def _sent_back(self, vehicles: Vehicles, drops: Tensor) -> Vehicles:
-        """Return the vehicles, of which those that dropped their last, bool [B, A], are at the base with full tanks."""
+    def _sent_back(self, state: WorldState, drops: Tensor, arrived: Tensor) -> WorldState:
+        """Return worlds in which those that dropped their last are at the base, with full tanks, and set out again.
+
+        Args:
+            state: The worlds after all acts.
+            drops: Which vehicles drop retardant, bool [B, A].
+            arrived: Which have been over the fire since they set out, bool [B, A].
+        """
         if not self.tank:
-            return vehicles
+            return state.with_planes(self.name, Missions(arrived))
+        vehicles = state.vehicles
         empty = drops & (vehicles.tank == 0)
-        return vehicles.replace(
+        vehicles = vehicles.replace(
             position=torch.where(empty[..., None], vehicles.base[:, None], vehicles.position),
             tank=torch.where(empty, self.tank, vehicles.tank),
-            arrived=None if vehicles.arrived is None else vehicles.arrived & ~empty,
         )
+        return state.replace(vehicles=vehicles).with_planes(self.name, Missions(arrived & ~empty))
 
     def _drops(self, device: torch.device) -> Tensor:
         """Return which vehicles drop retardant, bool [A]."""
@@ -145,54 +163,3 @@ def _treat(state: WorldState, drops: Tensor) -> tuple[WorldState, Tensor, Tensor
     after = changed(state, cell, [(first, {"wet": 1})])
     left = tank - (treated & (tank > 0)).to(torch.int32)
     return after.replace(vehicles=after.vehicles.replace(tank=left)), treated, first
-
-
-def has_reached(state: WorldState) -> Tensor:
-    """Return which agents have been over a tree that burned, or had, since they set out, bool [B, A].
-
-    In teams that do not keep it, those that are now, or have acted in this episode.
-    """
-    cell, vehicles = own_cell(state), state.vehicles
-    here = state.cells.flatten(1).gather(1, cell)
-    burnt = (state.burned.flatten(1).gather(1, cell) != 0) & (here == 0)
-    was = vehicles.acts > 0 if vehicles.arrived is None else vehicles.arrived
-    return is_burning(here) | burnt | was
-
-
-def from_middle(state: WorldState) -> Tensor:
-    """Return where each agent is from the middle of the map, (east, north), float32 [B, A, 2] [cells]."""
-    height, width = state.cells.shape[1:]
-    row, column = state.vehicles.position.to(torch.float32).unbind(-1)
-    return torch.stack((column - 0.5 * (width - 1), 0.5 * (height - 1) - row), dim=-1)
-
-
-def approach_move(state: WorldState) -> Tensor:
-    """Return the move of each agent that has not reached the fire, int64 [B, A]; stay in the very middle of a map.
-
-    It is the move to the cell with the least way to the middle, along rows and columns; of such that take as much, the
-    first of N, E, S, W, NW, NE, SE, SW, and each place in that order is worth a tenth of a cell.
-    """
-    way = from_middle(state)
-    order, preferred = _in_order(way.device)
-    then = (way[..., None, :] + order).abs().sum(-1) - preferred
-    move = then.argmin(dim=-1)
-    return torch.where(way.abs().amax(dim=-1) < 0.5, int(Action.STAY), move)
-
-
-def nearest_mate(state: WorldState) -> Tensor:
-    """Return the index of the team-mate nearest to each agent, the first of those as near, int64 [B, A].
-
-    Of an agent alone it is its own.
-    """
-    position = state.vehicles.position
-    square = (position[:, :, None] - position[:, None]).square().sum(-1)
-    alone = torch.eye(position.shape[1], dtype=torch.bool, device=position.device)
-    return square.masked_fill(alone, 1 << 40).argmin(dim=-1)
-
-
-@kept(8)
-def _in_order(device: torch.device) -> tuple[Tensor, Tensor]:
-    """Return the (east, north) offset of each direction, float32 [8, 2], and what its place is worth, float32 [8]."""
-    offsets = torch.tensor([(column, -row) for row, column in DIRECTIONS], dtype=torch.float32, device=device)
-    worth = torch.tensor([0.1 * (8 - _APPROACH.index(each)) for each in range(8)], device=device)
-    return offsets, worth
