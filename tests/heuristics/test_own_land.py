@@ -20,7 +20,7 @@ def played(**options):
 def test_who_serves_a_land_without_fire_waits_and_the_others_go():
     env, now = played(agencies=SeveralAgencies())
     state = env.world_state
-    of_first = state.lands.owner == 0
+    of_first = state.plane("agencies", "owner") == 0
     # A fire in each world, on the first land alone, away from all vehicles.
     burning = torch.zeros_like(of_first)
     cells = torch.where(of_first, 100.0, 0.0)

@@ -63,7 +63,8 @@ def packed(world: World, state: WorldState, observed: Observations, episode_rewa
     roles = world.team.table(device).index.repeat(*batch, 1)
     agents = {"observation": of_team(observed.entries), "action_mask": observed.action_mask, "role": roles}
     agents |= {} if observed.radio is None else {"radio": observed.radio}
-    agents |= {} if state.vehicles.serves is None else {"agency": state.vehicles.serves.clone()}
+    serves = state.plane("agencies", "serves")
+    agents |= {} if serves is None else {"agency": serves.clone()}
     agents |= {"sent": of_team(sent)} if (sent := world.team.radio.shown(state)) else {}
     paid = episode_reward.clone()  # the environment adds to its own
     info = observed.metrics | {"episode_reward": paid, "episode_length": state.step.to(torch.float32)}

@@ -3,7 +3,6 @@
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.mechanics.agencies.agencies import standing
 from warp_torchrl.world.state.state import TreeCounts, WorldState
 from warp_torchrl.world.world import World
 
@@ -70,7 +69,4 @@ def metrics(state: WorldState, counts: TreeCounts, world: World) -> dict[str, Te
         found["uncertainty"] = watching.uncertainty / state.step.clamp(min=1)
     for each in world.loop:
         found |= each.metrics(state)
-    if state.lands is not None:
-        left = standing(state).unbind(dim=1)
-        found |= {f"{SAVED_BY}agency_{index}": share for index, share in enumerate(left)}
     return found

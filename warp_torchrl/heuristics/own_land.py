@@ -25,7 +25,7 @@ class OwnLand(Coordinated):
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
-        if state.lands is None:
+        if not state.keeps("agencies"):
             return super().choose(state, mask)
         value, front = self.value(state)
         cells, valid = list_cells(front)

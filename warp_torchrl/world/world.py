@@ -88,7 +88,6 @@ class World:
                 "team.radio.carries must be none or graph where agents see all (sensing=full), "
                 f"got {self.team.radio.carries}"
             )
-        self.agencies.check(self.team)
         names = [each.name for each in self.loop]
         if len(set(names)) < len(names):
             raise ValueError(f"mechanics must be one of each name, got {', '.join(names)}")
@@ -127,7 +126,7 @@ class World:
 
         They are ``mechanics``, and those of the other parts that are mechanics too.
         """
-        parts = (self.team,)
+        parts = (self.team, self.agencies)
         found = (*self.mechanics, *(each for each in parts if isinstance(each, Mechanic)))
         return tuple(sorted(found, key=lambda each: each.name))
 
@@ -198,7 +197,7 @@ class World:
         for _ in range(self.ignition.head_start):
             spreads = (state.cells >= FIRST_FIRE) & (state.cells < EMBER)
             state = self._tick(state, spreads.flatten(1).any(dim=1))
-        state = self.team.radio.begun(self.agencies.begun(state, self.team), self.team.table(state.cells.device).flies)
+        state = self.team.radio.begun(state, self.team.table(state.cells.device).flies)
         for each in self.loop:
             state = each.begin(state, self)
         state = self.sensing.begun(state, self.team)
@@ -210,7 +209,7 @@ class World:
         """Advance every world that has not ended by one agent step.
 
         Agents move; agents act; on every ``steps_per_tick``-th step the fire ticks; the clock advances;
-        mechanics step, in the order of their names; vehicles are lent; packets set out; agents look, and are told.
+        mechanics step, in the order of their names; packets set out; agents look, and are told.
 
         Args:
             state: The worlds, batch size [B].
@@ -228,7 +227,6 @@ class World:
         after = self._advance_clock(after, counts_after, running)
         for each in self.loop:
             after = each.step(state, after, running, self)
-        after = self.agencies.updated(after, running)
         after = self.team.radio.sent(after, self.team.table(after.cells.device).flies, running)
         return Transition(
             before=state,

@@ -28,11 +28,11 @@ def test_the_view_shows_the_land_of_whom_it_serves_and_nothing_beyond_the_map():
     world, state = worlds()
     state.vehicles.position[:, :2] = torch.tensor([[0, 0], [7, 9]])
     view = shown(Local(radius=2, channels=CHANNELS), state, world)["view"][:, :, -1]
-    owner = state.lands.owner
+    owner = lands_of(state).owner
     assert torch.equal(view[:, 1], (owner[:, 5:10, 7:12] == 0) * torch.tensor(255, dtype=torch.uint8))
     assert (view[:, 0, :2] == 0).all() and (view[:, 0, :, :2] == 0).all()
     assert torch.equal(view[:, 0, 2:, 2:] == 255, owner[:, :3, :3] == 0)
-    lent = state.replace(vehicles=state.vehicles.replace(serves=1 - state.vehicles.serves))
+    lent = state.with_planes("agencies", lands_of(state).replace(serves=1 - lands_of(state).serves))
     assert torch.equal(shown(Local(radius=2, channels=CHANNELS), lent, world)["view"][:, 1, -1] == 255, view[:, 1] == 0)
 
 
@@ -40,7 +40,7 @@ def test_the_picture_tells_the_share_of_each_block():
     world, state = worlds()
     whole = shown(Surroundings(centred=False), state, world)["picture"]
     assert whole.shape == (4, 4, 4, 8, 8)
-    mine = (state.lands.owner == 1).float().unflatten(1, (8, 2)).unflatten(3, (8, 2)).mean((2, 4))
+    mine = (lands_of(state).owner == 1).float().unflatten(1, (8, 2)).unflatten(3, (8, 2)).mean((2, 4))
     assert torch.allclose(whole[:, 2, 3], mine)
     state.vehicles.position[:, 2] = torch.tensor([5, 12])  # block 2, 6
     about = shown(Surroundings(), state, world)["picture"][:, 2, 3]
@@ -59,7 +59,7 @@ def test_the_critic_sees_lands_and_who_serves_them():
     world, state = worlds()
     shown = CriticState(world)
     planes = dict(zip(shown.names, shown(state, world.forecast(state)).unbind(1), strict=True))
-    assert torch.equal(planes["land_of_agency_0"], (state.lands.owner == 0).float())
+    assert torch.equal(planes["land_of_agency_0"], (lands_of(state).owner == 0).float())
     assert torch.equal(planes["land_of_agency_0"] + planes["land_of_agency_1"], torch.ones(4, 16, 16))
     row, column = state.vehicles.position[0, 2].tolist()
     assert planes["vehicles_of_agency_1"][0, row, column] == 1.0

@@ -13,8 +13,7 @@ from warp_torchrl.env.reward import Agency
 from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import compose_config, plain
 from warp_torchrl.runs.config.construction import ConfigError
-from warp_torchrl.world.mechanics.agencies.agencies import SeveralAgencies, by_land
-from warp_torchrl.world.state.state import Lands
+from warp_torchrl.world.mechanics.agencies.agencies import Lands, SeveralAgencies, by_land, lands_of
 
 PLAIN = Agency(scale=1.0, shaping=0.0, act=0.0)
 
@@ -23,8 +22,8 @@ def parted(positions, serves):
     """The field with its left half, where the fire is, of agency 0, and its right half of agency 1; 8 trees each."""
     state, world = drawn(FIELD, positions)
     owner = torch.tensor([0, 0, 1, 1], dtype=torch.uint8).expand(1, 4, 4).contiguous()
-    lands = Lands(owner=owner, worth=by_land(state.initial.float(), owner, 2))
-    state = state.replace(lands=lands, vehicles=state.vehicles.replace(serves=torch.tensor([serves])))
+    worth = by_land(state.initial.float(), owner, 2)
+    state = state.with_planes("agencies", Lands(owner=owner, worth=worth, serves=torch.tensor([serves])))
     return state, replace(world, agencies=SeveralAgencies())
 
 
@@ -41,9 +40,9 @@ def test_trees_count_by_their_worth():
     assets = torch.ones(1, 4, 4)
     assets[0, 1, 1], assets[0, 3, 3] = 9.0, 0.0  # the burning tree, and one of the other agency's
     ground = state.ground.replace(landscape=state.landscape.replace(assets=assets))
-    lands = state.lands.replace(worth=by_land(assets * state.initial, state.lands.owner, 2))
+    lands = lands_of(state).replace(worth=by_land(assets * state.initial, lands_of(state).owner, 2))
     assert lands.worth.tolist() == [[16.0, 7.0]]
-    state = state.replace(ground=ground, lands=lands)
+    state = state.replace(ground=ground).with_planes("agencies", lands)
     assert earned(PLAIN, state, world, EXTINGUISH, STAY) == pytest.approx([0.9 * 9 / 16, 0.0])
     assert earned(PLAIN, state, world, STAY, CLEAR) == pytest.approx([0.0, 0.0])
 
@@ -64,7 +63,7 @@ def test_a_step_is_paid_by_whom_a_vehicle_served_in_it():
     state, world = parted([[3, 2], [3, 3]], [1, 1])
     world = replace(world, agencies=SeveralAgencies(own=0, lending="need", term=1))
     transition = world.step(state, torch.tensor([[STAY, CLEAR]]))
-    assert transition.after.vehicles.serves.tolist() == [[0, 0]], "fire burns on the land of agency 0 alone"
+    assert lands_of(transition.after).serves.tolist() == [[0, 0]], "fire burns on the land of agency 0 alone"
     assert PLAIN(transition)[0, :, 0].tolist() == pytest.approx([-1.5 / 8, -1.5 / 8])
 
 
@@ -78,7 +77,7 @@ def test_an_act_costs_a_share_of_a_tree_or_of_the_agency_s_land():
     state, world = parted([[0, 1], [3, 3]], [0, 1])
     own = earned(replace(PLAIN, act=0.2), state, world, EXTINGUISH, CLEAR)
     assert own == pytest.approx([0.7 / 8, -1.7 / 8])
-    bare = state.replace(lands=state.lands.replace(worth=torch.tensor([[8.0, 0.0]])))
+    bare = state.with_planes("agencies", lands_of(state).replace(worth=torch.tensor([[8.0, 0.0]])))
     assert earned(replace(PLAIN, act=0.2), bare, world, EXTINGUISH, CLEAR) == pytest.approx([0.7 / 8, 0.0])
 
 

@@ -153,10 +153,10 @@ def other_scout(look: Look) -> Tensor:
 @channel(content=lambda world, names: None if world.agencies.names else Empty())
 def own_land(look: Look) -> Tensor:
     """Return 255 on the land of the agency that the vehicle serves."""
-    lands, serves = look.state.lands, look.state.vehicles.serves
-    if lands is None or serves is None:
+    owner, serves = (look.state.plane("agencies", part) for part in ("owner", "serves"))
+    if owner is None or serves is None:
         return torch.zeros_like(look.on_map)
-    return look.on_map * byte(look.window.of(lands.owner) == serves[..., None, None]) * 255
+    return look.on_map * byte(look.window.of(owner) == serves[..., None, None]) * 255
 
 
 def _map_of(name: str, show: Callable[[WorldState], Tensor]) -> Channel:

@@ -29,7 +29,7 @@ from warp_torchrl.env.observation.features import (
 from warp_torchrl.env.observation.rules import RULES, rules_of
 from warp_torchrl.env.observation.water import WATER, way_to_water
 from warp_torchrl.system.modes import kept
-from warp_torchrl.world.loop.agencies.agencies import lands_of
+from warp_torchrl.world.mechanics.agencies.agencies import lands_of
 from warp_torchrl.world.state.role import PAPER_ROLES
 from warp_torchrl.world.state.state import Action, Forecast, WorldState
 from warp_torchrl.world.team.places import wind_at

@@ -53,8 +53,9 @@ def render(state: WorldState, flies: Tensor | None, scale: int = 12) -> Tensor:
     if scale < 1:
         raise ValueError(f"scale must be at least 1 pixel, got {scale}")
     image = _ground_colours(state).repeat_interleave(scale, dim=1).repeat_interleave(scale, dim=2)
-    if state.lands is not None:
-        image = _with_borders(image, state.lands.owner.repeat_interleave(scale, dim=1).repeat_interleave(scale, dim=2))
+    owner = state.plane("agencies", "owner")
+    if owner is not None:
+        image = _with_borders(image, owner.repeat_interleave(scale, dim=1).repeat_interleave(scale, dim=2))
     if flies is None:
         return image
     return _stamp(image, state.vehicles.position * scale + scale // 2, flies.to(torch.int64), scale)

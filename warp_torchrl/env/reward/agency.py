@@ -54,7 +54,7 @@ class Agency(Conservation):
     def own(self, transition: Transition) -> Tensor:
         """Return each vehicle's reward before shaping, float32 [B, A]."""
         before, after = transition.before, transition.after
-        lands, serves = lands_of(before)
+        lands, serves = lands_of(before), lands_of(before).serves
         agencies = lands.worth.shape[1]
         gained = self.worth_by_agency(after) - self.worth_by_agency(before)
         others = (gained.sum(dim=1, keepdim=True) - gained) / (agencies - 1)
@@ -66,7 +66,7 @@ class Agency(Conservation):
 
     def worth_by_agency(self, state: WorldState) -> Tensor:
         """Return Q_k, float32 [B, K]; 0 where an agency has no tree."""
-        lands, _ = lands_of(state)
+        lands = lands_of(state)
         standing = state.initial & ~state.burned & is_tree(state.cells)
         gain = torch.where(state.extinguished, self.extinguished, self.preserved) * standing
         loss = torch.where(state.burned, self.burned, torch.where(state.firebreak, self.cleared, 0.0)) * state.initial

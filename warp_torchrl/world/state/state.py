@@ -98,7 +98,6 @@ class Vehicles(Batch):
     acts: Tensor  # int32 [B,A], extinguish and clear actions chosen so far
     redundant: Tensor  # int32 [B,A], those on a target that a team-mate had
     last_useful: Tensor  # int32 [B,A], step of the last credited act; -1 before the first
-    serves: Tensor | None = None  # int64 [B,A], the agency that each serves now; None where there is but one
 
 
 @dataclass(eq=False, repr=False)
@@ -167,14 +166,6 @@ class Watching(Batch):
 
 
 @dataclass(eq=False, repr=False)
-class Lands(Batch):
-    """Whose land is whose, where there are several agencies; see ``world.agencies``."""
-
-    owner: Tensor  # uint8 [B,H,W], index of an agency
-    worth: Tensor  # float32 [B,K], of the initial trees of each agency's land, in the unit of ``Landscape.assets`` or 1
-
-
-@dataclass(eq=False, repr=False)
 class WorldState(Batch):
     """What changes in the worlds, and the ground and air that it changes in; batch size [B].
 
@@ -201,7 +192,6 @@ class WorldState(Batch):
     arrivals: Arrivals | None = None  # None but under law ``rate``
     knowledge: Tensor | None = None  # int32 [B,A,H,W], records of ``world.records``; None where all is seen
     watching: Watching | None = None  # None where all is seen
-    lands: Lands | None = None  # None where there is but one agency
     packets: Packets | None = None  # None where packets arrive in the step in which they are sent
     origin: Tensor | None = None  # int64 [B], key of what began with the episode, in imagined worlds; None: ``key``
     extras: Named = field(default_factory=Named)  # planes of each mechanic by its name, see ``world.mechanics``
@@ -216,9 +206,13 @@ class WorldState(Batch):
         Raises:
             ValueError: If the worlds have none: the mechanic did not begin them.
         """
-        if name not in self.extras.held:
+        if not self.keeps(name):
             raise ValueError(f"worlds must have planes of {name}, got those of {', '.join(self.extras.held) or 'none'}")
         return cast("Planes", self.extras.held[name])
+
+    def keeps(self, name: str) -> bool:
+        """Return whether a mechanic keeps planes in the worlds."""
+        return name in self.extras.held
 
     def plane(self, name: str, part: str) -> Tensor | None:
         """Return one tensor that a mechanic keeps, for readers that do without it; None where there is none."""

@@ -12,17 +12,21 @@ from warp_torchrl import make_env
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.mechanics.agencies.agencies import (
+    Lands,
     OneAgency,
     SeveralAgencies,
     apportioned,
     by_land,
+    lands_of,
     own_land,
     standing,
     worth_of,
 )
-from warp_torchrl.world.state.state import Action, Cover, Lands, is_burning
+from warp_torchrl.world.state.state import Action, Cover, is_burning
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
+
+WORLD = small_world()
 
 
 def begun(n_agents=4, seeds=8, **options):
@@ -38,14 +42,13 @@ def parted(drawing, owner, serves, at=None):
     owner = torch.tensor([[int(cell) for cell in row] for row in owner.split()], dtype=torch.uint8)[None]
     agencies = int(owner.max()) + 1
     worth = by_land(worth_of(state) * state.initial, owner, agencies)
-    vehicles = state.vehicles.replace(serves=torch.tensor([serves]))
-    return state.replace(lands=Lands(owner=owner, worth=worth), vehicles=vehicles)
+    return state.with_planes("agencies", Lands(owner=owner, worth=worth, serves=torch.tensor([serves])))
 
 
 @pytest.mark.parametrize("count", [2, 3, 5])
 def test_land_is_parted_into_equal_sectors_in_a_direction_of_the_episode(count):
     _, state = begun(n_agents=5, seeds=64, count=count)
-    owner = state.lands.owner
+    owner = lands_of(state).owner
     shares = torch.stack([(owner == agency).float().mean((1, 2)) for agency in range(count)], dim=1)
     assert torch.allclose(shares.sum(1), torch.ones(64)) and (shares - 1.0 / count).abs().max() < 0.1
     assert len({tuple(each.flatten().tolist()) for each in owner}) > 40, "each episode draws its own"
@@ -57,13 +60,13 @@ def test_land_is_parted_into_equal_sectors_in_a_direction_of_the_episode(count):
 def test_a_world_is_parted_alike_in_any_batch():
     world, state = begun(seeds=8)
     alone = world.reset(torch.tensor([5]), torch.tensor([0]))
-    assert torch.equal(alone.lands.owner[0], state.lands.owner[5])
+    assert torch.equal(lands_of(alone).owner[0], lands_of(state).owner[5])
     assert torch.equal(alone.vehicles.position[0], state.vehicles.position[5])
 
 
 def test_vehicles_start_on_dry_land_of_those_they_serve_and_no_two_on_one_cell():
     world, state = begun(n_agents=6, seeds=32, own=2)
-    assert state.vehicles.serves[0].tolist() == [0, 0, 1, 1, 0, 1]
+    assert lands_of(state).serves[0].tolist() == [0, 0, 1, 1, 0, 1]
     index = state.vehicles.position[..., 0] * 12 + state.vehicles.position[..., 1]
     on_own = own_land(state).flatten(2).gather(2, index[..., None])[..., 0]
     assert on_own.all() and all(len(set(each.tolist())) == 6 for each in index)
@@ -72,7 +75,7 @@ def test_vehicles_start_on_dry_land_of_those_they_serve_and_no_two_on_one_cell()
     anywhere = replace(world, team=replace(world.team, start="anywhere"))
     other = anywhere.reset(torch.arange(32), torch.zeros(32, dtype=torch.int64))
     assert not torch.equal(other.vehicles.position, state.vehicles.position)
-    assert torch.equal(other.lands.owner, state.lands.owner)
+    assert torch.equal(lands_of(other).owner, lands_of(state).owner)
 
 
 def test_a_vehicle_stands_at_home_in_the_middle_of_its_agency_s_land():
@@ -86,13 +89,13 @@ def test_a_vehicle_stands_at_home_in_the_middle_of_its_agency_s_land():
 
 def test_worth_is_that_of_the_trees_of_each_land_before_the_fire():
     state = parted("T.a T5T", "001 011", [0, 1])
-    assert state.lands.worth.tolist() == [[2.0, 3.0]]
+    assert lands_of(state).worth.tolist() == [[2.0, 3.0]]
     assert standing(state).tolist() == [[1.0, pytest.approx(2 / 3)]]
     landscape = state.landscape.replace(assets=torch.tensor([[[4.0, 9.0, 1.0], [1.0, 1.0, 2.0]]]))
     state = state.replace(ground=state.ground.replace(landscape=landscape))
-    worth = by_land(worth_of(state) * state.initial, state.lands.owner, 2)
+    worth = by_land(worth_of(state) * state.initial, lands_of(state).owner, 2)
     assert worth.tolist() == [[5.0, 4.0]]
-    state = state.replace(lands=state.lands.replace(worth=worth))
+    state = state.with_planes("agencies", lands_of(state).replace(worth=worth))
     assert standing(state).tolist() == [[1.0, 0.75]]
 
 
@@ -137,16 +140,18 @@ def test_the_pool_is_lent_by_need_when_a_term_is_over():
 
     def lent(step, **changes):
         now = state.replace(step=torch.tensor([step], dtype=torch.int32), **changes)
-        return agencies.updated(now, running).vehicles.serves[0].tolist()
+        return lands_of(agencies.step(now, now, running, WORLD)).serves[0].tolist()
 
     assert lent(4) == [0, 1, 0, 1]  # one burns against two: 2, 1 | 1
-    assert lent(4, cells=torch.where(state.lands.owner == 0, 0, state.cells)) == [0, 1, 1, 1]
-    assert lent(5, cells=torch.where(state.lands.owner == 0, 0, state.cells)) == [0, 1, 0, 1], "within a term"
+    assert lent(4, cells=torch.where(lands_of(state).owner == 0, 0, state.cells)) == [0, 1, 1, 1]
+    assert lent(5, cells=torch.where(lands_of(state).owner == 0, 0, state.cells)) == [0, 1, 0, 1], "within a term"
     assert lent(4, cells=torch.zeros_like(state.cells)) == [0, 1, 0, 1], "nothing burns"
     fixed = replace(agencies, lending="fixed")
-    now = state.replace(step=torch.tensor([4]), cells=torch.where(state.lands.owner == 0, 0, state.cells))
-    assert fixed.updated(now, running).vehicles.serves[0].tolist() == [0, 1, 0, 1]
-    assert agencies.updated(now, torch.tensor([False])).vehicles.serves[0].tolist() == [0, 1, 0, 1], "it has ended"
+    now = state.replace(step=torch.tensor([4]), cells=torch.where(lands_of(state).owner == 0, 0, state.cells))
+    assert lands_of(fixed.step(now, now, running, WORLD)).serves[0].tolist() == [0, 1, 0, 1]
+    assert lands_of(agencies.step(now, now, torch.tensor([False]), WORLD)).serves[0].tolist() == [0, 1, 0, 1], (
+        "it has ended"
+    )
 
 
 def test_a_world_lends_as_it_steps():
@@ -154,10 +159,10 @@ def test_a_world_lends_as_it_steps():
     state = world.reset(torch.arange(16), torch.zeros(16, dtype=torch.int64))
     for _ in range(2):
         state = world.step(state, torch.full((16, 3), int(Action.STAY))).after
-    burning = by_land(is_burning(state.cells).float(), state.lands.owner, 2)
+    burning = by_land(is_burning(state.cells).float(), lands_of(state).owner, 2)
     one_sided = (burning == 0).any(dim=1) & (burning > 0).any(dim=1)
     assert one_sided.any()
-    assert (state.vehicles.serves[one_sided] == burning[one_sided].argmax(1, keepdim=True)).all()
+    assert (lands_of(state).serves[one_sided] == burning[one_sided].argmax(1, keepdim=True)).all()
 
 
 def test_groups_are_the_agencies_and_the_pool():

@@ -7,15 +7,17 @@ whoever needs them.
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import torch
 from torch import Tensor
 from torch.nn.functional import one_hot
 
 from warp_torchrl.validation import check_fields
+from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.arrays.random import Stream, uniform
-from warp_torchrl.world.state.state import Cover, Lands, WorldState, is_burning, is_tree
+from warp_torchrl.world.mechanics.mechanic import Mechanic, Rules
+from warp_torchrl.world.state.state import Cover, WorldState, is_burning, is_tree
 from warp_torchrl.world.team.start import distances_to, first_free
 from warp_torchrl.world.team.team import Team
 
@@ -23,8 +25,20 @@ _HOME = 0.35
 """How far an agency's home is from the middle of the map, as a share of its shorter side."""
 
 
-class Agencies(ABC):
+@dataclass(eq=False, repr=False)
+class Lands(Batch):
+    """Whose land is whose, and whom vehicles serve."""
+
+    owner: Tensor  # uint8 [B,H,W], index of an agency
+    worth: Tensor  # float32 [B,K], of the initial trees of each agency's land, in the unit of ``Landscape.assets`` or 1
+    serves: Tensor  # int64 [B,A], the agency that each vehicle serves now
+
+
+@dataclass(frozen=True, kw_only=True)
+class Agencies(Mechanic, ABC):
     """What the world needs of a component that tells whom a team serves."""
+
+    name: ClassVar[str] = "agencies"
 
     @property
     @abstractmethod
@@ -32,24 +46,8 @@ class Agencies(ABC):
         """Return the agencies' names; none where the whole team serves all land."""
 
     @abstractmethod
-    def check(self, team: Team) -> None:
-        """Check that a team has vehicles enough.
-
-        Raises:
-            ValueError: If not.
-        """
-
-    @abstractmethod
     def groups(self, team: Team) -> dict[str, list[int]]:
         """Return the vehicles of each group by their index: those of each agency, then those of the pool."""
-
-    @abstractmethod
-    def begun(self, state: WorldState, team: Team) -> WorldState:
-        """Return worlds at the start of an episode with their lands, and the vehicles where they start."""
-
-    @abstractmethod
-    def updated(self, state: WorldState, running: Tensor) -> WorldState:
-        """Return worlds after a step, with whom each vehicle serves now in those that go on, bool [B]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,20 +59,9 @@ class OneAgency(Agencies):
         """Return no name."""
         return ()
 
-    def check(self, team: Team) -> None:
-        """Check nothing."""
-
     def groups(self, team: Team) -> dict[str, list[int]]:
         """Return the team, ``agents``."""
         return {"agents": list(range(team.n_agents))}
-
-    def begun(self, state: WorldState, team: Team) -> WorldState:
-        """Return the worlds."""
-        return state
-
-    def updated(self, state: WorldState, running: Tensor) -> WorldState:
-        """Return the worlds."""
-        return state
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,17 +98,17 @@ class SeveralAgencies(Agencies):
         """Return ``agency_0`` and so on."""
         return tuple(f"agency_{index}" for index in range(self.count))
 
-    def check(self, team: Team) -> None:
-        """Check that a team has vehicles enough.
+    def check(self, world: Rules) -> None:
+        """Check that the team has vehicles enough.
 
         Raises:
             ValueError: If not.
         """
         least = self.count * (1 if self.own is None else self.own)
-        if team.n_agents < least:
+        if world.team.n_agents < least:
             raise ValueError(
                 f"team.n_agents must be at least {least}, the vehicles that {self.count} agencies own, "
-                f"got {team.n_agents}"
+                f"got {world.team.n_agents}"
             )
 
     def groups(self, team: Team) -> dict[str, list[int]]:
@@ -130,29 +117,47 @@ class SeveralAgencies(Agencies):
         parts = {name: places[index * own : (index + 1) * own] for index, name in enumerate(self.names)}
         return {name: part for name, part in {**parts, "pool": places[self.count * own :]}.items() if part}
 
-    def begun(self, state: WorldState, team: Team) -> WorldState:
+    def begin(self, state: WorldState, world: Rules) -> WorldState:
         """Return worlds at the start of an episode with their lands, and the vehicles where they start."""
+        team = world.team
         owner, homes = self._parted(state)
         worth = by_land(worth_of(state) * state.initial, owner, self.count)
         own, places = self._owned(team.n_agents), torch.arange(team.n_agents, device=owner.device)
         serves = torch.where(places < self.count * own, places // max(own, 1), (places - self.count * own) % self.count)
-        vehicles = state.vehicles.replace(serves=serves.expand(len(owner), -1).clone())
         if team.start == "corner":
-            vehicles = vehicles.replace(position=self._starts(state, owner, homes, serves))
-        return state.replace(lands=Lands(owner=owner, worth=worth), vehicles=vehicles)
+            starts = self._starts(state, owner, homes, serves)
+            state = state.replace(vehicles=state.vehicles.replace(position=starts))
+        serves = serves.expand(len(owner), -1).clone()
+        return state.with_planes(self.name, Lands(owner=owner, worth=worth, serves=serves))
 
-    def updated(self, state: WorldState, running: Tensor) -> WorldState:
+    def step(self, before: WorldState, after: WorldState, running: Tensor, world: Rules) -> WorldState:
         """Return worlds after a step, with whom each vehicle serves now in those that go on, bool [B]."""
-        lands, serves = lands_of(state)
+        lands, serves = lands_of(after), lands_of(after).serves
         pool = serves.shape[1] - self.count * self._owned(serves.shape[1])
         if self.lending == "fixed" or pool == 0:
-            return state
-        need = by_land(worth_of(state) * is_burning(state.cells), lands.owner, self.count)
+            return after
+        need = by_land(worth_of(after) * is_burning(after.cells), lands.owner, self.count)
         lent = apportioned(need, pool)
-        now = running & (state.step % self.term == 0) & (need > 0.0).any(dim=1)
+        now = running & (after.step % self.term == 0) & (need > 0.0).any(dim=1)
         lent = torch.where(now[:, None], lent, serves[:, -pool:])
         serves = torch.cat((serves[:, :-pool], lent), dim=1)
-        return state.replace(vehicles=state.vehicles.replace(serves=serves))
+        return after.with_planes(self.name, lands.replace(serves=serves))
+
+    def metric_names(self, world: Rules) -> tuple[str, ...]:
+        """Return ``saved_agency_0`` and so on."""
+        return tuple(f"saved_{name}" for name in self.names)
+
+    def metrics(self, state: WorldState) -> dict[str, Tensor]:
+        """Return what stands of the trees on the land of each agency, by their worth; see ``standing``."""
+        return {f"saved_{name}": left for name, left in zip(self.names, standing(state).unbind(1), strict=True)}
+
+    def entries(self, world: Rules) -> tuple[str, ...]:
+        """Return the agencies' names."""
+        return self.names
+
+    def status(self, state: WorldState) -> Tensor:
+        """Return the agency that each vehicle serves, one-hot, float32 [B, A, K]."""
+        return one_hot(lands_of(state).serves, self.count).to(torch.float32)
 
     def _owned(self, n_agents: int) -> int:
         """Return how many of a team's vehicles each agency owns."""
@@ -223,7 +228,7 @@ def standing(state: WorldState) -> Tensor:
 
     It is 1 where there was none.
     """
-    lands, _ = lands_of(state)
+    lands = lands_of(state)
     alive = state.initial & ~state.burned & is_tree(state.cells)
     left = by_land(worth_of(state) * alive, lands.owner, lands.worth.shape[1])
     return torch.where(lands.worth > 0.0, left / lands.worth, 1.0)
@@ -236,16 +241,16 @@ def land_of_each(lands: Lands) -> Tensor:
 
 def own_land(state: WorldState) -> Tensor:
     """Return the cells on the land of the agency that each vehicle serves, bool [B, A, H, W]."""
-    lands, serves = lands_of(state)
-    return lands.owner[:, None] == serves[..., None, None]
+    lands = lands_of(state)
+    return lands.owner[:, None] == lands.serves[..., None, None]
 
 
-def lands_of(state: WorldState) -> tuple[Lands, Tensor]:
-    """Return the lands of worlds, and whom each vehicle serves, int64 [B, A].
+def lands_of(state: WorldState) -> Lands:
+    """Return the lands of worlds, and whom each vehicle serves.
 
     Raises:
         ValueError: If there is but one agency.
     """
-    if state.lands is None or state.vehicles.serves is None:
+    if not state.keeps(Agencies.name):
         raise ValueError("worlds must have lands: choose agencies=several")
-    return state.lands, state.vehicles.serves
+    return state.planes(Agencies.name, Lands)
