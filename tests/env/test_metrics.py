@@ -6,6 +6,7 @@ import torch
 from tests.conftest import small_world
 from warp_torchrl.env.metrics import METRICS, WATCHING, metrics
 from warp_torchrl.world.mechanics.sensing.sensing import Sight
+from warp_torchrl.world.mechanics.sensing.watching import Memory, watching_of
 from warp_torchrl.world.state.state import Action, count_trees
 from warp_torchrl.world.team.team import Team
 
@@ -45,10 +46,11 @@ def test_limited_sight_has_metrics_of_its_own(make_small_env):
         assert ((value >= 0) & (value <= 1)).all(), name
         assert torch.equal(now["next", "info", name][:, -1, 0], value)
     state = env.world_state
-    watching, fronts = state.watching, torch.full((4,), 4, dtype=torch.int32)
+    watching, fronts = watching_of(state), torch.full((4,), 4, dtype=torch.int32)
     watching = watching.replace(fronts=fronts, watched=torch.ones(4), found=torch.full((4,), 2.0))
     step = torch.full((4,), 8, dtype=torch.int32)
-    state = state.replace(step=step, watching=watching.replace(uncertainty=torch.full((4,), 6.0)))
+    memory = state.planes("sensing", Memory).replace(watching=watching.replace(uncertainty=torch.full((4,), 6.0)))
+    state = state.replace(step=step).with_planes("sensing", memory)
     found = metrics(state, env.tree_counts, env.world)
     assert [found[name][0].item() for name in WATCHING] == [0.25, 0.5, 0.75]
 

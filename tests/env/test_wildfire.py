@@ -18,7 +18,9 @@ from warp_torchrl.world.air.wind import Paper as PaperWind
 from warp_torchrl.world.backends import road
 from warp_torchrl.world.backends.tick import in_wind
 from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.mechanics.sensing.records import kept
 from warp_torchrl.world.mechanics.sensing.sensing import Sight
+from warp_torchrl.world.state.packets import Packets
 from warp_torchrl.world.state.state import Action, count_trees
 from warp_torchrl.world.team.radio import Radio
 from warp_torchrl.world.team.team import Team
@@ -372,7 +374,7 @@ def test_what_agents_know_is_kept_and_restored(make_small_env):
     env, other = make_small_env(3, world, seed=4), make_small_env(3, world, seed=9)
     env.rollout(6, break_when_any_done=False)
     other.load_state_dict(env.state_dict())
-    assert torch.equal(other.world_state.knowledge, env.world_state.knowledge)
+    assert torch.equal(kept(other.world_state), kept(env.world_state))
 
 
 def late_env(make_small_env, n_worlds=3, seed=4, sensing=None, **options):
@@ -408,7 +410,7 @@ def test_without_delay_nothing_is_shown_of_before(make_small_env):
     assert "sent" not in env.reset()["agents"].keys() and "sent" not in env.observation_spec["agents"].keys()
     silent = make_small_env(2, small_world(sensing=Sight(), team=Team(n_agents=2, radio=Radio(carries="map", delay=2))))
     assert "sent" not in silent.reset()["agents"].keys(), "no network reads it"
-    assert silent.world_state.packets.shown is None
+    assert silent.world_state.planes("radio", Packets).shown is None
 
 
 def test_what_is_under_way_is_kept_and_restored(make_small_env):
@@ -421,7 +423,7 @@ def test_what_is_under_way_is_kept_and_restored(make_small_env):
             for each in (env, other)
         )
         assert (ours == theirs).all()
-    without = {"worlds": {k: v for k, v in env.state_dict()["worlds"].items() if "packets" not in k}}
+    without = {"worlds": {k: v for k, v in env.state_dict()["worlds"].items() if "extras.radio" not in k}}
     with pytest.raises(ValueError, match="worlds must have the entries"):
         other.load_state_dict({**env.state_dict(), **without})
 

@@ -6,6 +6,7 @@ import torch
 
 from tests.conftest import small_world
 from tests.heuristics.drawing import chosen, scene
+from tests.world.drawing import knowing
 from warp_torchrl import make_env
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation.play import play, play_heuristics
@@ -15,7 +16,9 @@ from warp_torchrl.world.air.wind import Calm
 from warp_torchrl.world.arrays.distances import FAR, chebyshev_distance
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.ignition.ignition import Ignition
+from warp_torchrl.world.mechanics.sensing.records import kept
 from warp_torchrl.world.mechanics.sensing.sensing import Sight
+from warp_torchrl.world.state.packets import Packets
 from warp_torchrl.world.state.state import Action
 from warp_torchrl.world.team.radio import Radio
 from warp_torchrl.world.team.team import Team
@@ -229,15 +232,18 @@ def told(env, at, *, fires, step=40, heard_at=None):
     """
     env.reset()
     state = env.world_state
-    knowledge = state.landscape.age.to(torch.int32)[:, None].expand_as(state.knowledge) + 64 * (step + 1)
+    knowledge = state.landscape.age.to(torch.int32)[:, None].expand_as(kept(state)) + 64 * (step + 1)
     for (row, column), seen in fires.items():
         knowledge[..., row, column] = (1 + seen) * 64 + 11
     vehicles = state.vehicles.replace(position=torch.tensor([at]))
     if heard_at is not None:
-        places = torch.tensor([heard_at]).expand_as(state.packets.places)
+        packets = state.planes("radio", Packets)
+        places = torch.tensor([heard_at]).expand_as(packets.places)
         others = ~torch.eye(len(at), dtype=torch.bool)
-        state = state.replace(packets=state.packets.replace(links=others.expand_as(state.packets.links), places=places))
-    now = env.set_state(state.replace(knowledge=knowledge, vehicles=vehicles, step=torch.full_like(state.step, step)))
+        packets = packets.replace(links=others.expand_as(packets.links), places=places)
+        state = state.with_planes("radio", packets)
+    state = knowing(state, knowledge).replace(vehicles=vehicles, step=torch.full_like(state.step, step))
+    now = env.set_state(state)
     return HEURISTICS["follower"](env)(now)["agents", "action"][0].tolist()
 
 
@@ -264,7 +270,7 @@ def test_followers_leave_to_each_other_what_is_nearer_to_them():
 def test_a_follower_that_knows_of_no_fire_searches_and_one_that_could_put_it_out_does_not():
     env = watched_forest(Team(n_agents=2, roles=("uav",)))
     now = env.reset()
-    assert not (env.world_state.knowledge % 16 > 10).any()
+    assert not (kept(env.world_state) % 16 > 10).any()
     choices = [HEURISTICS[name](env)(now)["agents", "action"].tolist() for name in ("follower", "oldest")]
     assert choices[0] == choices[1]
     assert told(env, [[9, 9], [9, 9]], fires={(9, 9): 40, (3, 9): 20}) == [Action.NORTH, Action.NORTH]

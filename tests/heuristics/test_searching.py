@@ -4,11 +4,11 @@ import pytest
 import torch
 
 from tests.conftest import small_world
-from tests.world.drawing import draw
+from tests.world.drawing import draw, knowing
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS, Lawnmower, Oldest
 from warp_torchrl.world.arrays.geometry import DIRECTIONS
-from warp_torchrl.world.mechanics.sensing.records import freshness, known_codes
+from warp_torchrl.world.mechanics.sensing.records import freshness, kept, known_codes
 from warp_torchrl.world.mechanics.sensing.sensing import Sight, in_reach
 from warp_torchrl.world.state.state import Action
 from warp_torchrl.world.team.radio import Radio
@@ -51,11 +51,11 @@ def test_a_fire_that_nobody_knows_of_moves_nobody(name):
 def with_fire_known(env, place, agent=0):
     """The first state with a tree that burns, which one agent has seen."""
     state = env.world_state.clone()
-    cells, knowledge = torch.where(state.cells > 10, 9, state.cells), state.knowledge.clone()
+    cells, knowledge = torch.where(state.cells > 10, 9, state.cells), kept(state).clone()
     cells[:, place[0], place[1]] = 11
     knowledge = torch.where(knowledge % 64 > 10, knowledge - knowledge % 64 + 9, knowledge)
     knowledge[:, agent, place[0], place[1]] = 64 + 11
-    return state.replace(cells=cells, knowledge=knowledge, age=torch.where(cells > 10, 9, 0).to(torch.uint8))
+    return knowing(state, knowledge).replace(cells=cells, age=torch.where(cells > 10, 9, 0).to(torch.uint8))
 
 
 @pytest.mark.parametrize("name", ["oldest", "lawnmower"])
@@ -65,8 +65,8 @@ def test_agents_go_to_the_fire_that_they_remember(name):
     state = with_fire_known(env, (11, 11))
     state.vehicles.position[:] = torch.tensor([[3, 3], [3, 3]])
     assert (chosen(env, HEURISTICS[name](env), state)[:, 0] == Action.SOUTH_EAST).all()
-    gone = state.replace(knowledge=torch.where(state.knowledge % 64 == 11, 64 + 9, state.knowledge))
-    state.knowledge[:, 0, 0, 3] = 64 + 11  # nearer
+    gone = knowing(state, torch.where(kept(state) % 64 == 11, 64 + 9, kept(state)))
+    kept(state)[:, 0, 0, 3] = 64 + 11  # nearer
     assert (chosen(env, HEURISTICS[name](env), state)[:, 0] == Action.NORTH).all()
     assert (known_codes(gone) <= 10).all()
 
@@ -76,7 +76,7 @@ def test_local_remembers_no_fire():
     env.reset()
     state = with_fire_known(env, (11, 11))
     state.vehicles.position[:] = torch.tensor([[3, 3], [3, 3]])
-    nothing = state.replace(knowledge=torch.where(state.knowledge % 64 == 11, 64 + 9, state.knowledge))
+    nothing = knowing(state, torch.where(kept(state) % 64 == 11, 64 + 9, kept(state)))
     policy = HEURISTICS["local"](env)
     assert torch.equal(chosen(env, policy, state), chosen(env, policy, nothing))
 
@@ -86,7 +86,7 @@ def test_those_that_cannot_extinguish_go_on_searching():
     env.reset()
     state = with_fire_known(env, (0, 0))
     state.vehicles.position[:] = torch.tensor([[6, 6], [6, 6]])
-    nothing = state.replace(knowledge=torch.where(state.knowledge % 64 == 11, 64 + 9, state.knowledge))
+    nothing = knowing(state, torch.where(kept(state) % 64 == 11, 64 + 9, kept(state)))
     for name in ("oldest", "lawnmower"):
         policy = HEURISTICS[name](env)
         assert torch.equal(chosen(env, policy, state), chosen(env, policy, nothing))
@@ -102,7 +102,7 @@ def test_the_oldest_goes_where_it_has_not_looked_for_longest():
         knowledge = fresh.clone()
         at = 4 + 3 * row, 4 + 3 * column
         knowledge[:, 0, at[0] - 1 : at[0] + 2, at[1] - 1 : at[1] + 2] = 10  # never seen
-        target = Oldest(env).search(state.replace(knowledge=knowledge))[0, 0]
+        target = Oldest(env).search(knowing(state, knowledge))[0, 0]
         assert (target - torch.tensor(at)).abs().max() <= 1, direction
 
 
@@ -123,5 +123,5 @@ def test_a_lawnmower_sees_the_whole_map_there_and_back(n_agents, radius):
             env.set_state(state.replace(terminated=torch.zeros_like(state.terminated)))
         now = env.step(policy(now))["next"]
     state = env.world_state
-    seen = (freshness(state.knowledge, state.step) > 0).any(dim=1)
+    seen = (freshness(kept(state), state.step) > 0).any(dim=1)
     assert seen.all()

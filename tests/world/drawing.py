@@ -14,6 +14,7 @@ from torch import Tensor
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.backends.tick import initial_state
 from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.mechanics.sensing.watching import Memory, unwatched, watching_of
 from warp_torchrl.world.state.state import Cover, Landscape, WorldState
 from warp_torchrl.world.team.team import Team
 
@@ -92,6 +93,12 @@ def draw(
         age=in_each(trees * burning),
         firebreak=in_each(marks(drawing, FIREBREAK)),
     )
+
+
+def knowing(state: WorldState, records: Tensor) -> WorldState:
+    """Return the worlds whose agents have these records of the fire, int32 [B, A, H, W]."""
+    watching = watching_of(state) if state.keeps("sensing") else unwatched(state)
+    return state.with_planes("sensing", Memory(records=records, watching=watching))
 
 
 def drawn(state: WorldState, world: int = 0) -> str:

@@ -62,11 +62,6 @@ def metrics(state: WorldState, counts: TreeCounts, world: World) -> dict[str, Te
         "redundant": vehicles.redundant.sum(1) / acts.clamp(min=1),
         "success": ((counts.alight == 0) & (saved >= SUCCESS_LEVEL)).to(torch.float32),
     }
-    if state.watching is not None:
-        watching, fronts = state.watching, state.watching.fronts.clamp(min=1)
-        found["watched"] = watching.watched / fronts
-        found["found"] = watching.found / fronts
-        found["uncertainty"] = watching.uncertainty / state.step.clamp(min=1)
     for each in world.loop:
         found |= each.metrics(state)
     return found

@@ -9,7 +9,7 @@ import torch
 from tensordict import TensorDict
 from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 
-from warp_torchrl.env.metrics import METRICS, WATCHING
+from warp_torchrl.env.metrics import METRICS
 from warp_torchrl.env.observation import Observation, Space, critic_state
 from warp_torchrl.world.world import World
 
@@ -31,9 +31,8 @@ class Specs(NamedTuple):
 
 def episode_metrics(world: World) -> tuple[str, ...]:
     """Return the entries of ``info`` of a world: ``EPISODE_METRICS``, then those that only worlds like it have."""
-    watching = WATCHING if world.sensing.is_limited else ()
     mechanics = (name for each in world.loop for name in each.metric_names(world))
-    return (*EPISODE_METRICS, *watching, *mechanics)
+    return (*EPISODE_METRICS, *mechanics)
 
 
 def check_names(names: Iterable[str]) -> None:

@@ -136,7 +136,7 @@ def nearest_fire(state: WorldState, fire: Tensor) -> tuple[Tensor, Tensor]:
 
 def known_fire(state: WorldState, world: World) -> Tensor:
     """Return the burning cells that each agent knows of and could extinguish, bool [B, A, H, W]."""
-    if state.knowledge is None:
+    if not state.keeps("sensing"):
         return can_be_put_out(state, world)[:, None].expand(-1, state.vehicles.position.shape[1], -1, -1)
     codes = known_codes(state)
     return (codes >= FIRST_FIRE) & (codes <= world.fire.last_spreading)

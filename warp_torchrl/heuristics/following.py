@@ -13,7 +13,7 @@ from warp_torchrl.heuristics.base import (
 )
 from warp_torchrl.heuristics.searching import Oldest
 from warp_torchrl.world.arrays.random import Stream, uniform
-from warp_torchrl.world.mechanics.sensing.records import known_codes, steps_since
+from warp_torchrl.world.mechanics.sensing.records import known_codes, records_of, steps_since
 from warp_torchrl.world.state.front import spreading_front
 from warp_torchrl.world.state.state import WorldState
 
@@ -41,9 +41,10 @@ class Follower(Oldest):
         """Return whether each agent has a target cell of the front, bool [B, A], and the cell, int64 [B, A, 2]."""
         agents, (height, width) = state.vehicles.position.shape[1], state.cells.shape[1:]
         device, team = state.cells.device, self.world.team
-        codes = state.cells[:, None].expand(-1, agents, -1, -1) if state.knowledge is None else known_codes(state)
+        records = records_of(state)
+        codes = state.cells[:, None].expand(-1, agents, -1, -1) if records is None else known_codes(state)
         front = spreading_front(codes, state.alpha[:, None])
-        since = 0 if state.knowledge is None else steps_since(state.knowledge, state.step)
+        since = 0 if records is None else steps_since(records, state.step)
         away = distance_to_cells(state)
         draw = uniform(state.key, 0, Stream.POLICY, (agents, height, width))
         score = since - away / team.table(device).stride[:, None, None] + draw

@@ -19,7 +19,7 @@ from warp_torchrl.heuristics.base import (
     target_or_supply,
 )
 from warp_torchrl.world.arrays.random import Stream, uniform
-from warp_torchrl.world.mechanics.sensing.records import freshness
+from warp_torchrl.world.mechanics.sensing.records import freshness, records_of
 from warp_torchrl.world.state.state import WorldState
 
 
@@ -62,7 +62,8 @@ class Oldest(Searching):
         away_column = (column - state.vehicles.base[:, 1, None, None]).abs()
         sector = torch.atan2(away_row.float(), away_column.float()) / (torch.pi / 2.0)
         mine = (torch.arange(agents, device=row.device) + 0.5)[:, None, None] / agents
-        stale = torch.zeros_like(distance) if state.knowledge is None else 1.0 - freshness(state.knowledge, state.step)
+        records = records_of(state)
+        stale = torch.zeros_like(distance) if records is None else 1.0 - freshness(records, state.step)
         draw = uniform(state.key, 0, Stream.POLICY, (agents, height, width))
         score = stale - 2.0 * distance / max(height, width) - (sector[:, None] - mine).abs() + 0.1 * draw
         return place(score.flatten(2).argmax(dim=-1), state)

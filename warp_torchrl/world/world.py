@@ -19,6 +19,7 @@ from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.mechanics.agencies.agencies import Agencies, OneAgency
 from warp_torchrl.world.mechanics.mechanic import Mechanic
+from warp_torchrl.world.mechanics.radio.radio import RadioTurn
 from warp_torchrl.world.mechanics.sensing.sensing import Full, Sensing
 from warp_torchrl.world.state.state import (
     EMBER,
@@ -83,11 +84,6 @@ class World:
             raise ValueError(
                 f"team.n_agents must be at most a quarter of the map's {height * width} cells, got {self.team.n_agents}"
             )
-        if self.team.radio.sends_maps and not self.sensing.is_limited:
-            raise ValueError(
-                "team.radio.carries must be none or graph where agents see all (sensing=full), "
-                f"got {self.team.radio.carries}"
-            )
         names = [each.name for each in self.loop]
         if len(set(names)) < len(names):
             raise ValueError(f"mechanics must be one of each name, got {', '.join(names)}")
@@ -126,7 +122,7 @@ class World:
 
         They are ``mechanics``, and those of the other parts that are mechanics too.
         """
-        parts = (self.team, self.agencies)
+        parts = (self.team, self.agencies, RadioTurn(), self.sensing)
         found = (*self.mechanics, *(each for each in parts if isinstance(each, Mechanic)))
         return tuple(sorted(found, key=lambda each: each.name))
 
@@ -197,10 +193,8 @@ class World:
         for _ in range(self.ignition.head_start):
             spreads = (state.cells >= FIRST_FIRE) & (state.cells < EMBER)
             state = self._tick(state, spreads.flatten(1).any(dim=1))
-        state = self.team.radio.begun(state, self.team.table(state.cells.device).flies)
         for each in self.loop:
             state = each.begin(state, self)
-        state = self.sensing.begun(state, self.team)
         index = state.vehicles.position[..., 0] * self.size[1] + state.vehicles.position[..., 1]
         is_crowded = (ground.cover.flatten(1).gather(1, index) == int(Cover.LAKE)).any()
         return state, torch.stack((is_dark, is_crowded))
@@ -209,7 +203,7 @@ class World:
         """Advance every world that has not ended by one agent step.
 
         Agents move; agents act; on every ``steps_per_tick``-th step the fire ticks; the clock advances;
-        mechanics step, in the order of their names; packets set out; agents look, and are told.
+        mechanics step, in the order of their names: vehicles are lent, packets set out, agents look and are told.
 
         Args:
             state: The worlds, batch size [B].
@@ -227,11 +221,10 @@ class World:
         after = self._advance_clock(after, counts_after, running)
         for each in self.loop:
             after = each.step(state, after, running, self)
-        after = self.team.radio.sent(after, self.team.table(after.cells.device).flies, running)
         return Transition(
             before=state,
             result=result,
-            after=self.sensing.updated(after, self.team, running),
+            after=after,
             counts_before=count_trees(state) if counts is None else counts,
             counts_after=counts_after,
         )

@@ -156,5 +156,5 @@ def test_threat_is_not_told_of_what_may_not_be_known():
     one = torch.ones_like(state.cells, dtype=torch.float32)
     risky = Forecast(expected_ignitions=one, ignition_probability=one * 0.0, fuel=one)
     assert not Local(channels=("threat",))(state, world, risky)["view"].any()
-    full = state.replace(knowledge=None)
+    full = state.without_planes("sensing")
     assert Local(channels=("threat",))(full, small_world(), risky)["view"].any()

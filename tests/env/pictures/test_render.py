@@ -5,6 +5,7 @@ import pytest
 import torch
 from PIL import Image
 
+from tests.world.drawing import knowing
 from warp_torchrl.env.pictures.render import EpisodeRecorder, render
 from warp_torchrl.world.backends.tick import in_wind, initial_state
 from warp_torchrl.world.ignition.ignition import Ignition
@@ -86,7 +87,7 @@ def test_what_nobody_saw_lately_is_in_fog():
     state = drawn([[6, 12, 6, 12, 6]])
     plain = colours(state)[0]
     record = torch.tensor([[[[18, 1, 18, 1, 0]], [[1, 1, 1, 18, 0]]]], dtype=torch.int32) * 64
-    state = state.replace(knowledge=record, step=torch.full_like(state.step, 17))  # seen now, or 17 steps ago
+    state = knowing(state, record).replace(step=torch.full_like(state.step, 17))  # seen now, or 17 steps ago
     fog = colours(state)[0]
     assert [torch.equal(ours, theirs) for ours, theirs in zip(fog, plain)] == [True, False, True, True, False]
     assert (fog[1].int() < plain[1].int()).all() and (fog[4].int() < plain[4].int()).all()

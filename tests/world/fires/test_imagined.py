@@ -43,6 +43,6 @@ def test_nothing_hides_fire_from_who_imagines() -> None:
     world, state = rules_in_sight(env.world), imagined(env.world_state, env.world_state.key + 1)
     assert env.world.sensing.is_limited and not world.sensing.is_limited
     after = world.step(state, torch.zeros(2, env.n_agents, dtype=torch.int64)).after
-    assert after.knowledge is None and after.watching is None and after.packets is None
+    assert not after.keeps("sensing") and not after.keeps("radio")
     seen = make_env("skirmish").world
     assert rules_in_sight(seen) is seen

@@ -85,7 +85,7 @@ def test_planes_that_no_mechanic_began_are_missed_by_name():
 def test_a_world_refuses_what_does_not_fit_it():
     with pytest.raises(ValueError, match="n_agents must be at most 8, got 9"):
         small_world(mechanics=(First(),), team=Team(n_agents=9), landscape=small_world().landscape)
-    with pytest.raises(ValueError, match="mechanics must be one of each name, got .*first, first"):
+    with pytest.raises(ValueError, match=r"mechanics must be one of each name, got .*first, first"):
         small_world(mechanics=(First(), First()))
 
 

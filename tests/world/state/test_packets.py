@@ -7,8 +7,9 @@ from tests.conftest import small_world
 from tests.world.drawing import draw, tiled
 from tests.world.mechanics.sensing.test_sensing import known
 from warp_torchrl.world.arrays.batch import concatenated
-from warp_torchrl.world.mechanics.sensing.records import freshness
+from warp_torchrl.world.mechanics.sensing.records import freshness, kept
 from warp_torchrl.world.mechanics.sensing.sensing import Sight
+from warp_torchrl.world.mechanics.sensing.watching import watching_of
 from warp_torchrl.world.state.packets import Named, Packets, moved_up
 from warp_torchrl.world.state.state import Action
 from warp_torchrl.world.team.radio import Radio
@@ -93,10 +94,10 @@ def test_maps_arrive_so_many_steps_later_as_they_were():
     assert known(state, 0)[0] == "TT?????", "step 1"
     state = later(state, team, *at, sight=sight)
     assert known(state, 0)[0] == "TT??TTa", "step 2: what it knew in step 0"
-    assert freshness(state.knowledge, state.step)[0, 0, 0, 6].item() == pytest.approx(16 / 18)
+    assert freshness(kept(state), state.step)[0, 0, 0, 6].item() == pytest.approx(16 / 18)
     state = later(state, team, *at, sight=sight)
     assert known(state, 0)[0] == "TTTTTTa", "step 3: what it knew in step 1"
-    assert not state.watching.itself[0, 0, 0, 2:].any(), "it was told of it"
+    assert not watching_of(state).itself[0, 0, 0, 2:].any(), "it was told of it"
 
 
 def test_news_goes_from_hand_to_hand_and_waits_at_each():
@@ -120,9 +121,9 @@ def test_what_agents_know_is_what_lists_of_all_steps_say(delay):
     )
     seeds, episodes = torch.arange(4), torch.zeros(4, dtype=torch.int64)
     state, alone, sent, links = late.reset(seeds, episodes), silent.reset(seeds, episodes), [], []
-    knew = torch.zeros_like(state.knowledge)
+    knew = torch.zeros_like(kept(state))
     for step in range(12):
-        sent.append(torch.maximum(knew, alone.knowledge))
+        sent.append(torch.maximum(knew, kept(alone)))
         links.append(late.team.radio.heard(state, flies(late.team)))
         knew = sent[-1]
         for i in range(3):
@@ -131,10 +132,10 @@ def test_what_agents_know_is_what_lists_of_all_steps_say(delay):
                     came = links[step - delay][:, i, j, None, None] * sent[step - delay][:, j]
                     knew = knew.clone()
                     knew[:, i] = torch.maximum(knew[:, i], came.to(torch.int32))
-        assert torch.equal(state.knowledge, knew)
+        assert torch.equal(kept(state), knew)
         action = torch.full((4, 3), int(Action.SOUTH_EAST if step % 3 else Action.EAST))
         state, alone = late.step(state, action).after, silent.step(alone, action).after
-    assert not torch.equal(state.knowledge, alone.knowledge)
+    assert not torch.equal(kept(state), kept(alone))
 
 
 def test_where_others_are_is_told_late_and_seen_at_once():
@@ -162,7 +163,7 @@ def test_without_delay_nothing_is_under_way():
     team = Team(n_agents=2, radio=Radio(carries="both", range=4.0))
     world = small_world(team=team, sensing=Sight())
     state = world.reset(torch.arange(2), torch.zeros(2, dtype=torch.int64))
-    assert state.packets is None and not any("packets" in name for name in state.what_changes())
+    assert not state.keeps("radio") and not any("radio" in name for name in state.what_changes())
     assert team.radio.sent(state, flies(team), ~state.done) is state
     assert torch.equal(team.radio.places(state), state.vehicles.position)
 
@@ -171,7 +172,7 @@ def test_worlds_of_another_delay_are_refused():
     team = Team(n_agents=2, radio=Radio(delay=2))
     state = begun(team, (0, 0), (0, 3))
     for other, got in (
-        (state.replace(packets=None), 0),
+        (state.without_planes("radio"), 0),
         (begun(Team(n_agents=2, radio=Radio(delay=1)), (0, 0), (0, 3)), 2),
     ):
         with pytest.raises(

@@ -7,7 +7,7 @@ from torch import Tensor
 
 from warp_torchrl.world.arrays.bytes import at_least, byte, equal, scatter_add, to_int32
 from warp_torchrl.world.arrays.squares import Window, window
-from warp_torchrl.world.mechanics.sensing.records import freshness, read
+from warp_torchrl.world.mechanics.sensing.records import freshness, read, records_of
 from warp_torchrl.world.state.state import Forecast, WorldState
 from warp_torchrl.world.world import World
 
@@ -43,8 +43,9 @@ def look_at(state: WorldState, world: World, forecast: Forecast, radius: int) ->
 
     Codes, ash, firebreaks and the map are read at once, as the bits of a byte.
     """
-    if state.knowledge is not None:
-        return _look_by_knowledge(state, state.knowledge, world, forecast, radius)
+    records = records_of(state)
+    if records is not None:
+        return _look_by_knowledge(state, records, world, forecast, radius)
     burned, cleared = to_int32(state.burned.view(torch.uint8)), to_int32(state.firebreak.view(torch.uint8))
     code = torch.add(to_int32(state.cells), burned, alpha=_BURNED).add_(cleared, alpha=_FIREBREAK).add_(_ON_MAP)
     risk = forecast.expected_ignitions, forecast.ignition_probability

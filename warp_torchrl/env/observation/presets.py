@@ -32,7 +32,7 @@ from warp_torchrl.env.observation.status import STATUS, status_vector
 from warp_torchrl.env.observation.view import egocentric_view
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.squares import window
-from warp_torchrl.world.mechanics.sensing.records import read
+from warp_torchrl.world.mechanics.sensing.records import read, records_of
 from warp_torchrl.world.state.state import Forecast, WorldState
 from warp_torchrl.world.world import World
 
@@ -221,7 +221,8 @@ class Paper:
     def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
         """Return one entry, float32 [B, A, 3 (2 r + 1)^2]."""
         seen = window(state.vehicles.position, state.cells.shape[1:], self.radius)
-        cells = seen.of(state.cells) if state.knowledge is None else read(seen.of_own(state.knowledge))[0]
+        records = records_of(state)
+        cells = seen.of(state.cells) if records is None else read(seen.of_own(records))[0]
         cover = (seen.of(state.landscape.cover) + seen.inside) * 51
         view = torch.stack((cover, ages(cells), stages(cells)), dim=2)
         return {"": view.flatten(2).to(torch.float32).mul_(1.0 / 255.0)}

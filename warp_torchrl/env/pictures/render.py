@@ -13,7 +13,7 @@ from torch import Tensor
 from torch.nn.functional import interpolate
 
 from warp_torchrl.system.modes import kept
-from warp_torchrl.world.mechanics.sensing.records import freshness
+from warp_torchrl.world.mechanics.sensing.records import freshness, records_of
 from warp_torchrl.world.state.role import ROLES
 from warp_torchrl.world.state.state import EMPTY, FIRST_FIRE, OLDEST, Cover, WorldState, count_trees, is_burning
 
@@ -141,8 +141,9 @@ def _ground_colours(state: WorldState) -> Tensor:
     row = row.masked_fill(state.burned & (cells == EMPTY), _ASH_ROW)
     row = row.masked_fill(state.firebreak & (cells == EMPTY), _FIREBREAK_ROW)
     row = row + (state.wet > 0) * _WET_ROW
-    if state.knowledge is not None:
-        lately = freshness(state.knowledge.amax(dim=1, keepdim=True), state.step)[:, 0] >= _LATELY
+    records = records_of(state)
+    if records is not None:
+        lately = freshness(records.amax(dim=1, keepdim=True), state.step)[:, 0] >= _LATELY
         row = torch.where(lately, row, row % _WET_ROW + _FOG_ROW)
     return _colour_table(cells.device)[row]
 

@@ -6,6 +6,7 @@ from torch import Tensor
 
 from warp_torchrl.env.reward.base import Reward
 from warp_torchrl.validation import check_fields
+from warp_torchrl.world.mechanics.sensing.watching import watching_of
 from warp_torchrl.world.state.state import Transition
 from warp_torchrl.world.world import World
 
@@ -64,11 +65,12 @@ class Monitor(Reward):
     def own(self, transition: Transition) -> Tensor:
         """Return each agent's reward before sharing and shaping, float32 [B, A]."""
         before, after = transition.before, transition.after
-        if before.watching is None or after.watching is None:
+        if not after.keeps("sensing"):
             raise ValueError("reward monitor needs worlds whose agents' sight is limited: choose sensing=sight")
-        own = self.watched * after.watching.watches + self.found * after.watching.finds
-        was, misses = (state.plane("flight", "near_misses") for state in (before, after))
-        if was is not None and misses is not None:
-            own = own - self.near_miss * (misses - was)
-        drop = before.watching.uncertain - after.watching.uncertain
+        watching, was = watching_of(after), watching_of(before)
+        own = self.watched * watching.watches + self.found * watching.finds
+        misses_before, misses = (state.plane("flight", "near_misses") for state in (before, after))
+        if misses_before is not None and misses is not None:
+            own = own - self.near_miss * (misses - misses_before)
+        drop = was.uncertain - watching.uncertain
         return own.shape[1] * own + self.uncertainty * drop[:, None]

@@ -22,4 +22,4 @@ def imagined(state: WorldState, key: Tensor) -> WorldState:
 
     What was drawn at the start of the episode stays: the ground, the prevailing wind, the hour of the weather.
     """
-    return state.replace(key=key, origin=state.episode_key, knowledge=None, watching=None, packets=None)
+    return state.without_planes("sensing", "radio").replace(key=key, origin=state.episode_key)

@@ -14,7 +14,7 @@ _SINCE = tuple(f"ground.landscape.{name}" for name in ("fuel", "canopy_cover", "
 """What landscapes once had not: worlds that were saved without it are read back without it."""
 
 
-_BEGINS_NOW = "watching."
+_BEGINS_NOW = "extras.sensing.watching."
 """Of entries that worlds of limited sight once had not: such worlds begin to count when they are read back."""
 
 

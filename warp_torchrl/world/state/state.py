@@ -11,7 +11,6 @@ from torch import Tensor
 
 from warp_torchrl.world.arrays.batch import Batch, Named
 from warp_torchrl.world.arrays.bytes import at_least, between, byte, counts
-from warp_torchrl.world.state.packets import Packets
 
 
 class Cover(IntEnum):
@@ -152,20 +151,6 @@ class Forecast(Batch):
 
 
 @dataclass(eq=False, repr=False)
-class Watching(Batch):
-    """What a team of limited sight has watched of the fire so far; ``world.watching`` counts it."""
-
-    itself: Tensor  # bool [B,A,H,W], whether the agent saw itself what its record tells
-    watches: Tensor  # float32 [B,A], share of the front that the team watches by this agent's records, now
-    finds: Tensor  # float32 [B,A], burning cells that this agent was the first to record in the last step / all of them
-    uncertain: Tensor  # float32 [B], mean over the map of 1 - freshness of the team's newest records, now
-    watched: Tensor  # float32 [B], sum over steps of the share of the front that the team watches
-    found: Tensor  # float32 [B], sum over steps of the share of the front that the team knows to burn
-    uncertainty: Tensor  # float32 [B], sum over steps of ``uncertain``
-    fronts: Tensor  # int32 [B], steps at whose end there was a front
-
-
-@dataclass(eq=False, repr=False)
 class WorldState(Batch):
     """What changes in the worlds, and the ground and air that it changes in; batch size [B].
 
@@ -190,9 +175,6 @@ class WorldState(Batch):
     terminated: Tensor  # bool [B], no cell burns any more
     truncated: Tensor  # bool [B], the horizon was reached
     arrivals: Arrivals | None = None  # None but under law ``rate``
-    knowledge: Tensor | None = None  # int32 [B,A,H,W], records of ``world.records``; None where all is seen
-    watching: Watching | None = None  # None where all is seen
-    packets: Packets | None = None  # None where packets arrive in the step in which they are sent
     origin: Tensor | None = None  # int64 [B], key of what began with the episode, in imagined worlds; None: ``key``
     extras: Named = field(default_factory=Named)  # planes of each mechanic by its name, see ``world.mechanics``
 
@@ -218,6 +200,10 @@ class WorldState(Batch):
         """Return one tensor that a mechanic keeps, for readers that do without it; None where there is none."""
         found = self.extras.held.get(name)
         return None if found is None else getattr(found, part, None)
+
+    def without_planes(self, *names: str) -> "WorldState":
+        """Return the worlds without what some mechanics keep."""
+        return self.replace(extras=Named({name: each for name, each in self.extras.held.items() if name not in names}))
 
     def with_planes(self, name: str, planes: Batch) -> "WorldState":
         """Return the worlds with other planes of a mechanic."""

@@ -17,6 +17,8 @@ MAST = 3.0
 """Height of a ground vehicle's antenna over the ground [m]."""
 ALTITUDE = 100.0
 """Height at which aircraft fly over the ground [m]."""
+UNDER_WAY = "radio"
+"""Name of the packets among the planes of the state."""
 _SAMPLES = 16
 """Points of a line of sight at which it is compared with the ground."""
 
@@ -91,7 +93,7 @@ class Radio:
             places=position.new_zeros(*steps, 2),
             maps=state.step.new_zeros(*steps, *size) if self.sends_maps else None,
         )
-        return self.sent(state.replace(packets=packets), flies, torch.ones_like(state.done))
+        return self.sent(state.with_planes(UNDER_WAY, packets), flies, torch.ones_like(state.done))
 
     def sent(self, state: WorldState, flies: Tensor, running: Tensor) -> WorldState:
         """Return worlds after a step with the packets that set out then, in those that go on, bool [B].
@@ -101,7 +103,7 @@ class Radio:
         if not self.delay:
             return state
         links, places = self.heard(state, flies), state.vehicles.position
-        return state.replace(packets=self._under_way(state).sent(running, links=links, places=places))
+        return state.with_planes(UNDER_WAY, self._under_way(state).sent(running, links=links, places=places))
 
     def told(self, state: WorldState, maps: Tensor, flies: Tensor, running: Tensor) -> tuple[WorldState, Tensor]:
         """Return worlds whose agents have sent their maps, and the newest records that reach each agent now.
@@ -117,7 +119,7 @@ class Radio:
         """
         if self.delay:
             packets = self._under_way(state).sent(running, maps=maps)
-            state, maps = state.replace(packets=packets), packets.arriving("maps")
+            state, maps = state.with_planes(UNDER_WAY, packets), packets.arriving("maps")
         return state, torch.where(self.arriving(state, flies)[..., None, None], maps[:, None], 0).amax(dim=2)
 
     def with_shown(self, state: WorldState, shown: Mapping[str, Tensor], running: Tensor) -> WorldState:
@@ -131,7 +133,7 @@ class Radio:
         before = {name: each.new_zeros(len(each), steps, *each.shape[1:]) for name, each in shown.items()}
         before = before if packets.shown is None else packets.shown.held
         after = Named({name: moved_up(before[name], each, running) for name, each in shown.items()})
-        return state.replace(packets=packets.replace(shown=after))
+        return state.with_planes(UNDER_WAY, packets.replace(shown=after))
 
     def arriving(self, state: WorldState, flies: Tensor) -> Tensor:
         """Return whose packets reach whom now, bool [B, A, A]: [b, i, j] where agent i gets what agent j sent."""
@@ -171,11 +173,12 @@ class Radio:
 
     def _under_way(self, state: WorldState) -> Packets:
         """Return the packets, checked."""
-        steps = 0 if state.packets is None else state.packets.links.shape[1]
-        if state.packets is None or steps != self.delay + 1:
+        links = state.plane(UNDER_WAY, "links")
+        steps = 0 if links is None else links.shape[1]
+        if steps != self.delay + 1:
             rule = f"worlds must have the packets of {self.delay + 1} steps where team.radio.delay is {self.delay}"
             raise ValueError(f"{rule}, got {steps}")
-        return state.packets
+        return state.planes(UNDER_WAY, Packets)
 
 
 def _in_line_of_sight(state: WorldState, elevation: Tensor, flies: Tensor) -> Tensor:

@@ -7,7 +7,7 @@ import torch
 
 from tests.conftest import small_world
 from tests.world.drawing import CELLS, draw
-from warp_torchrl.world.mechanics.sensing.records import freshness, known_codes
+from warp_torchrl.world.mechanics.sensing.records import freshness, kept, known_codes
 from warp_torchrl.world.mechanics.sensing.sensing import Full, Sight, others_in_sight
 from warp_torchrl.world.state.state import EMBER, FIRST_FIRE, Action
 from warp_torchrl.world.team.radio import Radio
@@ -23,7 +23,7 @@ def started(sensing, team=TWO, at=((0, 0), (6, 6)), drawing=FIELD, worlds=1, **o
 
 def known(state, agent, world=0):
     """The map of an agent as a drawing, a question mark where it has never been."""
-    fresh = freshness(state.knowledge, state.step)[world, agent]
+    fresh = freshness(kept(state), state.step)[world, agent]
     codes = known_codes(state)[world, agent]
     return ["".join(CELLS[c] if f > 0 else "?" for c, f in zip(*row)) for row in zip(codes.tolist(), fresh.tolist())]
 
@@ -60,7 +60,7 @@ def test_what_was_seen_is_kept_and_grows_old():
     seen = sight.updated(seen, TWO, running(seen))
     assert known(seen, 1)[-1] == "?????aa", "the fire is out, and it has not seen that"
     assert known(seen, 1)[0] == "??TTT??"
-    assert freshness(seen.knowledge, seen.step)[0, 1, 6, 6].item() == pytest.approx(16 / 17)
+    assert freshness(kept(seen), seen.step)[0, 1, 6, 6].item() == pytest.approx(16 / 17)
     back = moved(seen, 1, (6, 6))
     assert known(sight.updated(back, TWO, running(back)), 1)[-1] == "?????TT"
 
@@ -75,7 +75,7 @@ def test_maps_are_told_to_those_that_hear_and_the_newer_record_counts():
     later = first.replace(step=first.step + 1)
     later = sight.updated(later, team, running(later))
     assert known(later, 0) == ["TT?TTTa", "TT?TTTT"], "from hand to hand, one a step"
-    assert freshness(later.knowledge, later.step)[0, 0, 0, 6].item() == pytest.approx(16 / 17)
+    assert freshness(kept(later), later.step)[0, 0, 0, 6].item() == pytest.approx(16 / 17)
     alone = sight.begun(state, Team(n_agents=3, radio=Radio(carries="graph")))
     assert known(alone, 1) == ["???TTT?", "???TTT?"]
 
@@ -115,21 +115,23 @@ def test_errors_come_with_their_chance_and_are_each_agents_own():
     assert abs(missed - 0.25) < 0.02  # 8400 draws: 4.2 standard deviations
     assert abs(alarms - 0.1) < 0.012  # 11 200 draws: 4.2 standard deviations
     assert (codes[:, 0] != codes[:, 1]).any()
-    assert torch.equal(started(sight, drawing=burning, worlds=2, at=((3, 3), (3, 3))).knowledge, state.knowledge[:2])
+    assert torch.equal(
+        started(sight, drawing=burning, worlds=2, at=((3, 3), (3, 3))).plane("sensing", "records"), kept(state)[:2]
+    )
 
 
 def test_smoke_hides_cells_by_the_law_of_beer_and_lambert():
     sight = Sight(radius=1, smoke=0.5, smoke_length=2)
     state = started(sight, Team(n_agents=1), [(0, 1)], "aTT TTT TTT", worlds=3000, wind=(5.0, 0.0))
-    seen = (freshness(state.knowledge, state.step)[:, 0, 0] == 1.0).float().mean(dim=0).tolist()
+    seen = (freshness(kept(state), state.step)[:, 0, 0] == 1.0).float().mean(dim=0).tolist()
     for share, amount in zip(seen, (1.0, 1 / 2, 1 / 3)):
         assert abs(share - math.exp(-0.5 * amount)) < 0.04  # 3000 draws: over 4 standard deviations
-    assert (freshness(state.knowledge, state.step)[:, 0, 1] == 1.0).all(), "where no smoke is"
+    assert (freshness(kept(state), state.step)[:, 0, 1] == 1.0).all(), "where no smoke is"
 
 
 def test_full_sensing_keeps_no_maps():
     world = small_world()
-    assert isinstance(world.sensing, Full) and world.reset(torch.arange(2), torch.zeros(2).long()).knowledge is None
+    assert isinstance(world.sensing, Full) and not world.reset(torch.arange(2), torch.zeros(2).long()).keeps("sensing")
 
 
 def test_a_world_keeps_what_its_agents_know():
@@ -140,9 +142,9 @@ def test_a_world_keeps_what_its_agents_know():
     for step in range(12):
         action = torch.full((4, 2), int(Action.SOUTH_EAST if step % 3 else Action.EXTINGUISH))
         state, alone = world.step(state, action).after, world.step(alone, action[2:3]).after
-    assert torch.equal(alone.knowledge, state.knowledge[2:3])
+    assert torch.equal(kept(alone), kept(state)[2:3])
     assert (known_codes(state) <= EMBER).all()
-    assert "knowledge" in state.what_changes()
+    assert "extras.sensing.records" in state.what_changes()
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,9 @@ import torch
 
 from tests.conftest import small_world
 from tests.world.drawing import CELLS, codes, draw
+from warp_torchrl.world.mechanics.sensing.records import kept
 from warp_torchrl.world.mechanics.sensing.sensing import Sight
+from warp_torchrl.world.mechanics.sensing.watching import watching_of
 from warp_torchrl.world.state.saved import filled
 from warp_torchrl.world.state.state import Action
 from warp_torchrl.world.team.radio import Radio
@@ -40,19 +42,19 @@ def later(state, team, *at, sight, drawing=None, running=True):
 @pytest.mark.parametrize("carries", ["none", "map"])  # who was told of it has no part
 def test_the_front_is_watched_by_those_who_saw_it_last(at, watches, carries):
     state, _ = started(*at, sight=Sight(radius=1), carries=carries)
-    assert state.watching.watches[0].tolist() == watches
-    assert state.watching.finds[0].tolist() == watches
+    assert watching_of(state).watches[0].tolist() == watches
+    assert watching_of(state).finds[0].tolist() == watches
 
 
 def test_what_was_seen_lately_is_watched_and_what_was_seen_once_is_known():
     sight = Sight(radius=1, recent=1)
     state, team = started(WEST, sight=sight)
-    assert state.watching.fronts.item() == 0 and state.watching.watched.item() == 0.0, "a start is no step"
+    assert watching_of(state).fronts.item() == 0 and watching_of(state).watched.item() == 0.0, "a start is no step"
     state = later(state, team, MIDDLE, sight=sight)
-    assert state.watching.watches.item() == 0.5, "seen one step ago"
+    assert watching_of(state).watches.item() == 0.5, "seen one step ago"
     state = later(state, team, MIDDLE, sight=sight)
-    assert state.watching.watches.item() == 0.0
-    watching = state.watching
+    assert watching_of(state).watches.item() == 0.0
+    watching = watching_of(state)
     assert (watching.watched.item(), watching.found.item(), watching.fronts.item()) == (0.5, 1.0, 2)
 
 
@@ -60,54 +62,54 @@ def test_the_credit_passes_to_who_sees_it_again():
     sight = Sight(radius=1)
     state, team = started(WEST, MIDDLE, sight=sight, carries="map")
     state = later(state, team, MIDDLE, WEST, sight=sight)
-    assert state.watching.watches[0].tolist() == [0.0, 0.5] and state.watching.finds[0].tolist() == [0.0, 0.0]
+    assert watching_of(state).watches[0].tolist() == [0.0, 0.5] and watching_of(state).finds[0].tolist() == [0.0, 0.0]
 
 
 def test_a_cell_that_was_seen_before_it_burned_is_not_watched():
     sight = Sight(radius=1)
     state, team = started(MIDDLE, sight=sight)
     state = later(state, team, WEST, sight=sight, drawing="TTTTTTTTT TaTTaTTaT TTTTTTTTT")
-    assert state.watching.watches.item() == pytest.approx(1 / 3)
-    assert state.watching.found.item() == pytest.approx(1 / 3)
+    assert watching_of(state).watches.item() == pytest.approx(1 / 3)
+    assert watching_of(state).found.item() == pytest.approx(1 / 3)
 
 
 def test_a_fire_is_found_once_by_whom_nobody_went_before():
     sight = Sight(radius=1)
     state, team = started(WEST, MIDDLE, sight=sight)
     state = later(state, team, WEST, WEST, sight=sight, drawing="TTTTTTTTT aaTTTTTaT TTTTTTTTT")
-    assert state.watching.finds[0].tolist() == pytest.approx([1 / 6, 1 / 6])  # one of three, by two
+    assert watching_of(state).finds[0].tolist() == pytest.approx([1 / 6, 1 / 6])  # one of three, by two
     again = later(state, team, WEST, WEST, sight=sight)
-    assert again.watching.finds[0].tolist() == [0.0, 0.0]
+    assert watching_of(again).finds[0].tolist() == [0.0, 0.0]
 
 
 def test_a_false_alarm_is_no_find():
     state, _ = started(MIDDLE, sight=Sight(radius=1, false_alarm=1.0))
-    assert state.watching.finds.item() == 0.0 == state.watching.watches.item()
+    assert watching_of(state).finds.item() == 0.0 == watching_of(state).watches.item()
 
 
 def test_uncertainty_is_what_the_team_has_not_seen_lately():
     sight = Sight(radius=1)
     state, team = started(WEST, sight=sight)
-    assert state.watching.uncertain.item() == pytest.approx(1 - 9 / 27)
+    assert watching_of(state).uncertain.item() == pytest.approx(1 - 9 / 27)
     state = later(state, team, MIDDLE, sight=sight)
     now = 1 - (9 + 9 * 16 / 17) / 27
-    assert state.watching.uncertain.item() == pytest.approx(now) == state.watching.uncertainty.item()
+    assert watching_of(state).uncertain.item() == pytest.approx(now) == watching_of(state).uncertainty.item()
 
 
 def test_steps_without_a_front_do_not_count():
     sight = Sight(radius=1)
     state, team = started(WEST, sight=sight)
     state = later(state, team, WEST, sight=sight, drawing="TTTTTTTTT TeTTTTTTT TTTTTTTTT")
-    assert state.watching.fronts.item() == 0 and state.watching.watches.item() == 0.0
+    assert watching_of(state).fronts.item() == 0 and watching_of(state).watches.item() == 0.0
 
 
 def test_worlds_that_have_ended_are_watched_no_more():
     sight = Sight(radius=1)
     state, team = started(WEST, sight=sight, worlds=2)
     after = later(state, team, EAST, sight=sight, running=[True, False])
-    assert after.watching.fronts.tolist() == [1, 0] and after.watching.finds[:, 0].tolist() == [0.5, 0.5]
-    assert after.watching.uncertain[1] == state.watching.uncertain[1] != after.watching.uncertain[0]
-    assert torch.equal(after.watching.itself[1], state.watching.itself[1])
+    assert watching_of(after).fronts.tolist() == [1, 0] and watching_of(after).finds[:, 0].tolist() == [0.5, 0.5]
+    assert watching_of(after).uncertain[1] == watching_of(state).uncertain[1] != watching_of(after).uncertain[0]
+    assert torch.equal(watching_of(after).itself[1], watching_of(state).itself[1])
 
 
 def test_a_world_is_watched_alike_in_any_batch_and_worlds_saved_before_begin_to_count():
@@ -117,9 +119,11 @@ def test_a_world_is_watched_alike_in_any_batch_and_worlds_saved_before_begin_to_
     for step in range(9):
         action = torch.full((4, 2), int(Action.SOUTH_EAST if step % 3 else Action.STAY))
         state, alone = world.step(state, action).after, world.step(alone, action[2:3]).after
-    for name, leaf in state.watching.leaves().items():
-        assert torch.equal(leaf[2:3], alone.watching.leaves()[name]), name
-    saved = {name: leaf for name, leaf in state.what_changes().items() if not name.startswith("watching.")}
+    for name, leaf in watching_of(state).leaves().items():
+        assert torch.equal(leaf[2:3], watching_of(alone).leaves()[name]), name
+    saved = {
+        name: leaf for name, leaf in state.what_changes().items() if not name.startswith("extras.sensing.watching.")
+    }
     assert len(saved) < len(state.what_changes())
     read = world.restored(filled(world.reset(seeds, episodes), saved))
-    assert torch.equal(read.knowledge, state.knowledge) and (read.watching.fronts == 0).all()
+    assert torch.equal(kept(read), kept(state)) and (watching_of(read).fronts == 0).all()

@@ -41,15 +41,21 @@ def known_codes(state: WorldState) -> Tensor:
     return codes(kept(state))
 
 
+def records_of(state: WorldState) -> Tensor | None:
+    """Return the agents' records, int32 [B, A, H, W]; None where they keep none."""
+    return state.plane("sensing", "records")
+
+
 def kept(state: WorldState) -> Tensor:
     """Return the agents' records, int32 [B, A, H, W].
 
     Raises:
         ValueError: If they keep none.
     """
-    if state.knowledge is None:
+    records = records_of(state)
+    if records is None:
         raise ValueError("agents of these worlds know nothing of their own: sensing is full")
-    return state.knowledge
+    return records
 
 
 def codes(record: Tensor) -> Tensor:

@@ -3,25 +3,38 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.random import Stream, uniform
-from warp_torchrl.world.mechanics.sensing.records import kept, kinds, recorded
+from warp_torchrl.world.mechanics.mechanic import Mechanic, Rules
+from warp_torchrl.world.mechanics.sensing.records import kinds, recorded
 from warp_torchrl.world.mechanics.sensing.smoke import smoke
-from warp_torchrl.world.mechanics.sensing.watching import at_start, counted, newest_records, unwatched
+from warp_torchrl.world.mechanics.sensing.watching import (
+    Memory,
+    Watching,
+    at_start,
+    counted,
+    newest_records,
+    unwatched,
+    watching_of,
+)
 from warp_torchrl.world.state.role import ROLES
-from warp_torchrl.world.state.state import FIRST_FIRE, Watching, WorldState, is_burning, is_tree
+from warp_torchrl.world.state.state import FIRST_FIRE, WorldState, is_burning, is_tree
 from warp_torchrl.world.team.team import Team
 
 _EVERYWHERE = 1 << 20
 """A sight that no map limits [cells]."""
 
 
-class Sensing(ABC):
+@dataclass(frozen=True, kw_only=True)
+class Sensing(Mechanic, ABC):
     """What the world needs of a sensing component."""
+
+    name: ClassVar[str] = "sensing"
 
     @property
     @abstractmethod
@@ -38,6 +51,14 @@ class Sensing(ABC):
 
         The places are int64 [B, A or 1, A, 2], (row, column) [cells]: [b, i, j] is where agent i takes agent j to be.
         """
+
+    def begin(self, state: WorldState, world: Rules) -> WorldState:
+        """Return worlds at the start of an episode with what the agents know then."""
+        return self.begun(state, world.team)
+
+    def step(self, before: WorldState, after: WorldState, running: Tensor, world: Rules) -> WorldState:
+        """Return worlds after a step, with what the agents know then of those that go on, bool [B]."""
+        return self.updated(after, world.team, running)
 
     @abstractmethod
     def begun(self, state: WorldState, team: Team) -> WorldState:
@@ -56,6 +77,18 @@ class Full(Sensing):
     def is_limited(self) -> bool:
         """Return that it is not."""
         return False
+
+    def check(self, world: Rules) -> None:
+        """Check that the radio sends no maps, of which agents know all.
+
+        Raises:
+            ValueError: If it does.
+        """
+        if world.team.radio.sends_maps:
+            raise ValueError(
+                "team.radio.carries must be none or graph where agents see all (sensing=full), "
+                f"got {world.team.radio.carries}"
+            )
 
     def reach(self, team: Team) -> list[int]:
         """Return more than any map is long [cells]."""
@@ -141,14 +174,15 @@ class Sight(Sensing):
         """Return the worlds with what the agents see where they start."""
         agents = state.vehicles.position.shape[1]
         before = state.landscape.age.to(torch.int32)[:, None].expand(-1, agents, -1, -1)
-        blank = state.replace(knowledge=before, watching=unwatched(state))
+        blank = state.with_planes(self.name, Memory(records=before, watching=unwatched(state)))
         begun = self.updated(blank, team, torch.ones_like(state.done))
-        return begun.replace(watching=at_start(_watching(begun)))
+        memory = begun.planes(self.name, Memory)
+        return begun.with_planes(self.name, memory.replace(watching=at_start(memory.watching)))
 
     def updated(self, state: WorldState, team: Team, running: Tensor) -> WorldState:
         """Return the worlds with what the agents see now, and are told."""
-        known, record = kept(state), recorded(self._taken_for(state), state.step)
-        sees, watching = self._sees(state, team), _watching(state)
+        memory, record = state.planes(self.name, Memory), recorded(self._taken_for(state), state.step)
+        sees, known, watching = self._sees(state, team), memory.records, memory.watching
         knows, itself = torch.where(sees, record, known), watching.itself | sees
         if team.radio.sends_maps:
             state, told = team.radio.told(state, knows, _flies(state, team), running)
@@ -157,7 +191,26 @@ class Sight(Sensing):
         goes_on = running[:, None, None, None]
         knows, itself = torch.where(goes_on, knows, known), torch.where(goes_on, itself, watching.itself)
         after = counted(state, watching, itself, newest_records(known, knows, itself, state.step), self.recent)
-        return state.replace(knowledge=knows, watching=_where(running, after, watching))
+        return state.with_planes(self.name, Memory(records=knows, watching=_where(running, after, watching)))
+
+    def metric_names(self, world: Rules) -> tuple[str, ...]:
+        """Return ``watched``, ``found`` and ``uncertainty``."""
+        return ("watched", "found", "uncertainty")
+
+    def metrics(self, state: WorldState) -> dict[str, Tensor]:
+        """Return how well the team keeps the fire in sight.
+
+        ``watched`` is the share of the front that it saw burn within the last ``recent`` steps, ``found`` that which it
+        knows to burn, both means over the steps with a front. ``uncertainty`` is 1 - freshness of its newest records,
+        mean over cells and steps.
+        """
+        watching = watching_of(state)
+        fronts = watching.fronts.clamp(min=1)
+        return {
+            "watched": watching.watched / fronts,
+            "found": watching.found / fronts,
+            "uncertainty": watching.uncertainty / state.step.clamp(min=1),
+        }
 
     def _sees(self, state: WorldState, team: Team) -> Tensor:
         """Return which cells each agent sees, bool [B, A, H, W]."""
@@ -222,9 +275,3 @@ def _where(running: Tensor, after: Watching, before: Watching) -> Watching:
             for name, leaf in after.leaves().items()
         }
     )
-
-
-def _watching(state: WorldState) -> Watching:
-    if state.watching is None:
-        raise ValueError("what the team of these worlds watched is not counted: let its sensing begin them")
-    return state.watching

@@ -5,9 +5,32 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.mechanics.sensing.records import codes, freshness, steps_since
 from warp_torchrl.world.state.front import spreading_front
-from warp_torchrl.world.state.state import FIRST_FIRE, Watching, WorldState, is_burning
+from warp_torchrl.world.state.state import FIRST_FIRE, WorldState, is_burning
+
+
+@dataclass(eq=False, repr=False)
+class Watching(Batch):
+    """What a team of limited sight has watched of the fire so far; ``counted`` counts it."""
+
+    itself: Tensor  # bool [B,A,H,W], whether the agent saw itself what its record tells
+    watches: Tensor  # float32 [B,A], share of the front that the team watches by this agent's records, now
+    finds: Tensor  # float32 [B,A], burning cells that this agent was the first to record in the last step / all of them
+    uncertain: Tensor  # float32 [B], mean over the map of 1 - freshness of the team's newest records, now
+    watched: Tensor  # float32 [B], sum over steps of the share of the front that the team watches
+    found: Tensor  # float32 [B], sum over steps of the share of the front that the team knows to burn
+    uncertainty: Tensor  # float32 [B], sum over steps of ``uncertain``
+    fronts: Tensor  # int32 [B], steps at whose end there was a front
+
+
+@dataclass(eq=False, repr=False)
+class Memory(Batch):
+    """What a team of limited sight keeps of the fire."""
+
+    records: Tensor  # int32 [B,A,H,W], see ``records``
+    watching: Watching
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,6 +42,15 @@ class NewestRecords:
     since: Tensor  # int32 [B,H,W], how old it is [steps]; of a cell that nobody saw the step + 1
     fresh: Tensor  # float32 [B,H,W], how fresh it is, 0..1
     holders: Tensor  # bool [B,A,H,W], the agents that hold it and saw it themselves
+
+
+def watching_of(state: WorldState) -> Watching:
+    """Return what teams have watched so far.
+
+    Raises:
+        ValueError: If their sight is not limited.
+    """
+    return state.planes("sensing", Memory).watching
 
 
 def unwatched(state: WorldState) -> Watching:

@@ -1,0 +1,1 @@
+"""Radio: packets that set out in the loop of a step."""
