@@ -154,7 +154,7 @@ def _difference_lines(policy: str, differences: Mapping[str, Any], metric: str) 
 
 def _further(content: Mapping[str, Any]) -> list[str]:
     """Return the metrics of mechanics, which no other line of the table shows."""
-    shown = {*EPISODE_METRICS, *SHOWN, *WATCHING, *(("near_misses",) if content["watching"] else ())}
+    shown = {*EPISODE_METRICS, *EXTRA_METRICS, *WATCHING, *(("near_misses",) if content["watching"] else ())}
     return [name for name in content["metrics"] if name not in shown and not name.startswith(SAVED_BY)]
 
 

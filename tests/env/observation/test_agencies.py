@@ -6,7 +6,7 @@ import torch
 from tests.conftest import small_world
 from warp_torchrl.env.observation import CriticState, Local, Surroundings
 from warp_torchrl.env.observation.channels import DEFAULT
-from warp_torchrl.world.mechanics.agencies.agencies import SeveralAgencies
+from warp_torchrl.world.mechanics.agencies.agencies import SeveralAgencies, lands_of
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
 

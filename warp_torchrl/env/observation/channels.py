@@ -14,8 +14,9 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.entries import Content, Empty, Follows, Part
-from warp_torchrl.env.observation.features import Features, Function, Holds, anything
+from warp_torchrl.env.observation.features import Feature, Features, Function, Holds, anything
 from warp_torchrl.env.observation.look import Look
+from warp_torchrl.validation import check_new_name
 from warp_torchrl.world.arrays.bytes import byte, to_codes
 from warp_torchrl.world.mechanics.table import mechanics
 from warp_torchrl.world.state.role import PAPER_ROLES
@@ -159,7 +160,7 @@ def own_land(look: Look) -> Tensor:
     return look.on_map * byte(look.window.of(owner) == serves[..., None, None]) * 255
 
 
-def _map_of(name: str, show: Callable[[WorldState], Tensor]) -> Channel:
+def _map_of(name: str, channel_name: str, show: Callable[[WorldState], Tensor]) -> Feature:
     """Return the channel that shows a map of a mechanic; it is empty in worlds without."""
 
     def shown(look: Look) -> Tensor:
@@ -170,13 +171,13 @@ def _map_of(name: str, show: Callable[[WorldState], Tensor]) -> Channel:
     def content(world: World, names: Sequence[str]) -> Content:
         return None if name in (each.name for each in world.loop) else Empty()
 
-    return Channel(shown, 255, content)
+    return Feature(shown, lambda world: [Part("plane", (channel_name,))], content, 255, None)
 
 
 for _kind in mechanics().values():
     for _name, _show in _kind.maps.items():
         check_new_name("channel", _name, _show, CHANNELS[_name].show if _name in CHANNELS else None)
-        CHANNELS[_name] = _map_of(_kind.name, _show)
+        CHANNELS[_name] = _map_of(_kind.name, _name, _show)
 
 
 def check_channels(names: Sequence[str]) -> None:

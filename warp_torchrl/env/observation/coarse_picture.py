@@ -28,7 +28,7 @@ from warp_torchrl.env.observation.features import (
 from warp_torchrl.world.arrays.blocks import block_means
 from warp_torchrl.world.arrays.squares import Window, window
 from warp_torchrl.world.mechanics.agencies.agencies import land_of_each, lands_of
-from warp_torchrl.world.mechanics.sensing.records import freshness, kept, known_codes
+from warp_torchrl.world.mechanics.sensing.records import freshness, kept, known_codes, records_of
 from warp_torchrl.world.state.state import FIRST_FIRE, OLDEST, Forecast, WorldState, is_burning
 from warp_torchrl.world.world import World
 
@@ -147,13 +147,13 @@ def last_seen(now: Blocks) -> Tensor:
 @picture_channel(is_there=lambda world, choice: bool(world.agencies.names))
 def own_land(now: Blocks) -> Tensor:
     """Return the share that is land of the agency that the vehicle serves."""
-    lands, serves = lands_of(now.state)
+    lands = lands_of(now.state)
     shares = block_means(land_of_each(lands), now.side)
-    return now.show(shares.gather(1, serves[..., None, None].expand(-1, -1, now.side, now.side)))
+    return now.show(shares.gather(1, lands.serves[..., None, None].expand(-1, -1, now.side, now.side)))
 
 
 def _known(state: WorldState) -> Tensor | None:
-    return None if state.knowledge is None else known_codes(state)
+    return None if records_of(state) is None else known_codes(state)
 
 
 def _shown(now: Blocks, choice: Choice) -> Tensor:

@@ -190,7 +190,7 @@ def last_seen(now: Context) -> Tensor:
 )
 def lands(now: Context) -> Tensor:
     """Return the land of each agency."""
-    return block_means(land_of_each(lands_of(now.state)[0]), STATE_SIDE)
+    return block_means(land_of_each(lands_of(now.state)), STATE_SIDE)
 
 
 @state_plane(
@@ -201,7 +201,7 @@ def serving(now: Context) -> Tensor:
     """Return how many vehicles serve each agency."""
     place = one_hot(block_of(now.state, STATE_SIDE), STATE_SIDE**2).to(torch.float32)
     agencies = torch.arange(len(now.world.agencies.names), device=place.device)[:, None]
-    count = (lands_of(now.state)[1][:, None] == agencies).to(torch.float32) @ place
+    count = (lands_of(now.state).serves[:, None] == agencies).to(torch.float32) @ place
     return count.unflatten(-1, (STATE_SIDE, STATE_SIDE))
 
 

@@ -29,7 +29,6 @@ from warp_torchrl.env.observation.features import (
 from warp_torchrl.env.observation.rules import RULES, rules_of
 from warp_torchrl.env.observation.water import WATER, way_to_water
 from warp_torchrl.system.modes import kept
-from warp_torchrl.world.mechanics.agencies.agencies import lands_of
 from warp_torchrl.world.state.role import PAPER_ROLES
 from warp_torchrl.world.state.state import Action, Forecast, WorldState
 from warp_torchrl.world.team.places import wind_at
@@ -172,15 +171,8 @@ def further_last_action(now: Context) -> Tensor:
     lambda world, choice: any(each.entries(world) for each in world.loop),
 )
 def mechanics(now: Context) -> Tensor:
-    """Return the numbers of mechanics, such as the share of the battery that is left."""
+    """Return the numbers of mechanics, such as the battery that is left and the agency that a vehicle serves."""
     return torch.cat([each.status(now.state) for each in now.world.loop if each.entries(now.world)], dim=-1)
-
-
-@number(lambda world: [Part("scalar", world.agencies.names)], lambda world, choice: bool(world.agencies.names))
-def agency(now: Context) -> Tensor:
-    """Return the agency that the vehicle serves, one-hot."""
-    _, serves = lands_of(now.state)
-    return one_hot(serves, len(now.world.agencies.names))
 
 
 @number([RULES], lambda world, choice: choice.rules)
