@@ -6,7 +6,7 @@ import pytest
 
 from tests.conftest import small_world
 from warp_torchrl.entries import Part, Planes, Target, TeamPlanes, Vector, from_plain, to_plain
-from warp_torchrl.env.observation import STATE_SIDE, CriticState, Local, Paper, Surroundings, former_symmetry
+from warp_torchrl.env.observation import STATE_SIDE, CriticState, Local, Paper, Surroundings
 
 STATE = CriticState(small_world())
 PRESETS = [Surroundings(), Surroundings(centred=False, identity=False), Local(channels=("age", "threat")), Paper()]
@@ -22,13 +22,6 @@ def test_what_is_declared_is_read_back_from_json(symmetry):
 def test_what_is_no_symmetry_is_refused(plain):
     with pytest.raises((ValueError, KeyError)):
         from_plain(plain)
-
-
-@pytest.mark.parametrize(("name", "space"), SPACES)
-def test_entries_of_presets_in_manifests_that_do_not_tell_turn_as_they_do_now(name, space):
-    assert former_symmetry(name, space.shape, space.names) == space.symmetry
-    assert former_symmetry("mine", space.shape, space.names) is None
-    assert former_symmetry(name, (*space.shape, 2), space.names) is None
 
 
 @pytest.mark.parametrize(

@@ -39,17 +39,13 @@ def test_a_golden_policy_acts_as_it_did(release):
 
 
 @pytest.mark.parametrize("release", RELEASES)
-def test_a_golden_run_goes_on_or_is_refused_by_the_name_of_what_is_missing(release, tmp_path):
+def test_a_golden_run_goes_on(release, tmp_path):
     run = shutil.copytree(GOLDEN / release, tmp_path / "run")
     found, skipped = newest(run)
     training = Training(
         run_config(plain(restore(found.saved_config(), ["total_frames=96"]))), found.saved_config(), run
     )
-    try:
-        training.load_state_dict(found.training())
-    except CheckpointError as error:  # a later world has other entries; the policy must still act
-        assert "must have the entries" in str(error) and "\n" not in str(error)
-        return
+    training.load_state_dict(found.training())
     assert not skipped and training.frames == 64
     training.train()
     assert newest(run)[0].manifest.frames == 96
@@ -60,7 +56,7 @@ def test_a_golden_run_goes_on_or_is_refused_by_the_name_of_what_is_missing(relea
 def test_an_unknown_format_is_refused_by_name(release, tmp_path):
     run = shutil.copytree(GOLDEN / release, tmp_path / "run")
     forge(run / "checkpoints" / "64", format=3)
-    with pytest.raises(CheckpointError, match="has format 3, this version reads 1, 2"):
+    with pytest.raises(CheckpointError, match="has format 3, this version reads 2"):
         load_policy(run)
 
 
@@ -71,7 +67,7 @@ def test_a_golden_run_is_small(release):
 
 def test_golden_policies_play_in_make_env():
     policy = load_policy(GOLDEN / RELEASES[-1])
-    assert "observation.identity=false" in policy.overrides, "which no record of then names"
+    assert "observation.identity=false" in policy.overrides
     env = make_env("skirmish", n_worlds=2, overrides=["landscape.size=8", *policy.overrides])
     rollout = env.rollout(3, policy, break_when_any_done=False)
     assert rollout[ACTION].shape == (2, 3, 2) and rollout[ACTION].dtype == torch.int64

@@ -25,7 +25,6 @@ from warp_torchrl.runs.config.compose import HYDRA_ERRORS, conf_folder, explain,
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.grammar import check_flags, check_overrides, flags_first
 from warp_torchrl.runs.config.groups import COMPONENTS
-from warp_torchrl.runs.config.renamed import renamed_overrides
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore, world_overrides
 from warp_torchrl.runs.destination import check_free
 from warp_torchrl.runs.policies.find import find_policy
@@ -193,7 +192,7 @@ def _values(config: DictConfig) -> dict[str, Any]:
 
 
 def _run(name: str, job: Callable[[DictConfig], None]) -> None:
-    arguments = renamed_overrides(sys.argv[1:])
+    arguments = sys.argv[1:]
     debug = "debug=true" in [each.lower() for each in arguments]
     logging.raiseExceptions = debug  # a full disk must not print a second error
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra then raises its errors instead of printing them

@@ -22,7 +22,6 @@ from warp_torchrl.runs.config.compose import GROUPS, compose_config, conf_folder
 from warp_torchrl.runs.config.construction import ConfigError, UnknownKeyError, construct
 from warp_torchrl.runs.config.grammar import check_flags, check_overrides
 from warp_torchrl.runs.config.groups import COMPONENTS
-from warp_torchrl.runs.config.renamed import renamed_overrides
 from warp_torchrl.runs.config.search_options import SearchOptions
 from warp_torchrl.runs.config.space import Dimension, Value, divided
 from warp_torchrl.runs.destination import check_free
@@ -59,7 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run_to_its_end(arguments: Sequence[str]) -> int:
     try:
-        return _run(renamed_overrides(arguments))
+        return _run(arguments)
     except SearchEnded as error:
         print(f"error: {error}", file=sys.stderr, flush=True)
         return error.code

@@ -21,7 +21,6 @@ from tensordict import MemoryMappedTensor, TensorDict, TensorDictBase
 from warp_torchrl.demonstrations.entries import Layout, entry_size, leaves
 from warp_torchrl.demonstrations.events import Event
 from warp_torchrl.demonstrations.recording import Recording
-from warp_torchrl.env.observation import renamed
 from warp_torchrl.models import OBSERVATION
 from warp_torchrl.runs.config.compose import OPTION
 from warp_torchrl.runs.config.saved_config import read_saved_config
@@ -230,7 +229,7 @@ def _mapped(folder: Path, entries: Mapping[str, tuple[torch.dtype, tuple[int, ..
     steps = TensorDict({}, batch_size=[layout.steps])
     for name, (dtype, shape) in entries.items():
         path = path_below(folder, f"{_STEPS}/{name}.memmap")
-        steps[tuple(renamed(name).split("/"))] = MemoryMappedTensor.from_filename(path, dtype, torch.Size(shape))
+        steps[tuple(name.split("/"))] = MemoryMappedTensor.from_filename(path, dtype, torch.Size(shape))
     for key in (OBSERVATION, OBSERVATION[:1], ("next", *OBSERVATION[:1])):
         if isinstance(steps.get(key, None), TensorDictBase):
             steps[key].batch_size = torch.Size([layout.steps, layout.agents])

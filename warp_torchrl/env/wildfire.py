@@ -11,7 +11,7 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from warp_torchrl.env.layout import checked_action, packed
-from warp_torchrl.env.observation import Observation, Surroundings, critic_state, searched_for, with_renamed
+from warp_torchrl.env.observation import Observation, Surroundings, critic_state, searched_for
 from warp_torchrl.env.pictures.render import render
 from warp_torchrl.env.recorded import RecordedStep
 from warp_torchrl.env.reset_cache import ResetCache, Start
@@ -283,7 +283,6 @@ class WildfireEnv(EnvBase):
         Raises:
             ValueError: If an entry is missing or of another shape or type.
         """
-        state_dict = with_renamed(state_dict)
         missing = [name for name in ("seeds", "episodes", "episode_reward", "worlds") if name not in state_dict]
         if missing and strict and state_dict:
             raise ValueError(f"state_dict must have {', '.join(missing)}, got {', '.join(state_dict)}")

@@ -14,7 +14,6 @@ from typing import Any
 
 import torch
 
-from warp_torchrl.env.observation import with_renamed
 from warp_torchrl.models import Signature
 from warp_torchrl.runs.config.saved_config import SavedConfig, read_saved_config
 from warp_torchrl.runs.manifest import (
@@ -99,7 +98,7 @@ class Checkpoint:
     def _load(self, name: str) -> dict[str, Any]:
         path = self.path / name
         with of_a_checkpoint():
-            content = with_renamed(load_tensors(path))
+            content = load_tensors(path)
             check_finite(path, content)
         if not isinstance(content, dict):
             raise CheckpointError(f"{path} must hold a mapping")

@@ -1,9 +1,8 @@
 """``manifest.json`` of a checkpoint, with the size and sha256 of every file and a sha256 of its own content."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +10,7 @@ import tensordict
 import torch
 import torchrl
 
-from warp_torchrl.entries import Symmetry, Vector, from_plain, to_plain
-from warp_torchrl.env.observation import DEFAULT, former_symmetry, renamed
-from warp_torchrl.env.observation.former import FORMER_STATE, FORMER_STATUS, FORMER_STATUS_AND_IDENTITY
+from warp_torchrl.entries import from_plain, to_plain
 from warp_torchrl.models import Entry, Signature
 from warp_torchrl.runs.config.compose import OPTION
 from warp_torchrl.system.checksummed import (
@@ -27,25 +24,14 @@ from warp_torchrl.system.checksummed import (
     read_mapping,
 )
 from warp_torchrl.system.tensors import largest
-from warp_torchrl.world.state.role import PAPER_ROLES
-from warp_torchrl.world.state.state import Action
 
 FORMAT = 2
 """Version of the format that checkpoints are written in."""
-_READ = (1, FORMAT)  # 1 has no sha256 of its own
 MANIFEST = "manifest.json"
 TRAINING = "training.pt"
 POLICY = ("policy.pt", "config.json")
 """Files of an exported policy."""
 _FILES = ("policy.pt", TRAINING, "config.json")
-_FORMER_NAMES = {
-    "view": (DEFAULT,),
-    "picture": (("fire", "fuel", "team_mates"),),
-    "status": tuple(Vector(parts).names for parts in (FORMER_STATUS, FORMER_STATUS_AND_IDENTITY)),
-    "state": (FORMER_STATE.names,),
-}
-_FORMER_ACTIONS = tuple(action.name.lower() for action in Action)
-"""Channels and actions of manifests without names; one entry had two lengths."""
 
 
 class CheckpointError(Unsound):
@@ -105,12 +91,9 @@ def read_manifest(folder: Path) -> Manifest:
 def _parse_manifest(folder: Path) -> Manifest:
     path = folder / MANIFEST
     content = read_mapping(path)
-    if content.get("format") not in _READ:
-        raise CheckpointError(
-            f"{folder} has format {content.get('format')!r}, this version reads {', '.join(map(str, _READ))}"
-        )
-    if content["format"] == FORMAT:
-        check_checksum(path, content)
+    if content.get("format") != FORMAT:
+        raise CheckpointError(f"{folder} has format {content.get('format')!r}, this version reads {FORMAT}")
+    check_checksum(path, content)
     try:
         signature = _signature_from_json(content.pop("signature"))
         manifest = Manifest(signature=signature, **content)
@@ -153,33 +136,21 @@ def _signature_to_json(signature: Signature) -> dict[str, Any]:
     return signature._asdict() | {
         "observation": {name: entry(each) for name, each in signature.observation.items()},
         "state": entry(signature.state),
-        "n_actions": signature.n_actions,
-        "n_roles": signature.n_roles,
     }
 
 
 def _signature_from_json(content: dict[str, Any]) -> Signature:
-    former_names = _FORMER_NAMES if "roles" not in content else {}
-
-    def entry(name: str, node: dict[str, Any], former: Callable[..., Symmetry | None]) -> Entry:
+    def entry(node: dict[str, Any]) -> Entry:
         shape = tuple(int(side) for side in node["shape"])
-        names = next((names for names in former_names.get(name, ()) if len(names) == shape[0]), ())
-        told = tuple(str(each) for each in node.get("names") or names)
-        if told and len(told) != shape[0]:
-            raise ValueError(f"{len(told)} names of {shape[0]} channels")
-        plain = node.get("symmetry")
-        symmetry = former(shape, told) if "symmetry" not in node else plain and from_plain(plain)
+        names = tuple(str(each) for each in node["names"])
+        if names and len(names) != shape[0]:
+            raise ValueError(f"{len(names)} names of {shape[0]} channels")
+        symmetry = node["symmetry"] and from_plain(node["symmetry"])
         if symmetry is not None and not symmetry.fits(shape):
             raise ValueError(f"{symmetry} is not of shape {shape}")
-        return Entry(shape, str(node["dtype"]), told, symmetry)
+        return Entry(shape, str(node["dtype"]), names, symmetry)
 
-    observed = {renamed(str(name)): node for name, node in content["observation"].items()}
-    observation = {name: entry(name, node, partial(former_symmetry, name)) for name, node in observed.items()}
-    state = entry(
-        "state", content["state"], lambda shape, _: FORMER_STATE.symmetry if FORMER_STATE.symmetry.fits(shape) else None
-    )
-    actions = tuple(str(name) for name in content.get("actions", _FORMER_ACTIONS[: int(content["n_actions"])]))
-    roles = tuple(str(name) for name in content.get("roles", PAPER_ROLES))
-    agencies = tuple(str(name) for name in content.get("agencies", ()))
-    is_late = content.get("is_late", False) is True
-    return Signature(observation, state, int(content["n_agents"]), actions, roles, agencies, is_late)
+    observation = {str(name): entry(node) for name, node in content["observation"].items()}
+    actions, roles, agencies = (tuple(map(str, content[key])) for key in ("actions", "roles", "agencies"))
+    state, n_agents, is_late = entry(content["state"]), int(content["n_agents"]), content["is_late"] is True
+    return Signature(observation, state, n_agents, actions, roles, agencies, is_late)

@@ -13,7 +13,6 @@ from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import plain
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.groups import COMPONENTS
-from warp_torchrl.runs.config.renamed import renamed_values
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
 from warp_torchrl.runs.destination import LARGEST_EVALUATION
@@ -99,7 +98,7 @@ def is_run_of(folder: Path, config: str) -> bool:
     Raises:
         ConfigError: If its ``config.yaml`` cannot be read.
     """
-    held, asked = read_config(folder / "config.yaml"), renamed_values(yaml.safe_load(config))
+    held, asked = read_config(folder / "config.yaml"), yaml.safe_load(config)
     aside = ("resume", "debug", *(["processes"] if asked["processes"] == "auto" else []))
     held, asked = ({key: value for key, value in each.items() if key not in aside} for each in (held, asked))
     return held == asked
@@ -132,7 +131,7 @@ def read_config(path: Path) -> dict[str, Any]:
     if not isinstance(content, dict):
         told = "must be as the run wrote it; without it resume takes what the checkpoint holds"
         raise ConfigError(f"{path} {told}{reason}")
-    return renamed_values({str(key): value for key, value in content.items()})
+    return {str(key): value for key, value in content.items()}
 
 
 def _check_unedited(

@@ -5,7 +5,6 @@ from torchrl.objectives import LossModule
 
 from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.algorithms.on_policy import OnPolicy
-from warp_torchrl.runs import former
 from warp_torchrl.runs.checkpoint import Checkpoint, CheckpointError
 from warp_torchrl.runs.config.run_config import RunConfig
 
@@ -37,7 +36,7 @@ def actor_parameters(found: Checkpoint, learner: Learner) -> dict[str, Tensor]:
         CheckpointError: If their names or shapes differ.
     """
     now = learner.policy.state_dict()
-    given = former.parameters(found.policy(), now)
+    given = found.policy()
     if {name: each.shape for name, each in now.items()} != {name: each.shape for name, each in given.items()}:
         raise CheckpointError(f"{found.path} was trained by another algorithm or other networks")
     return given
@@ -49,10 +48,9 @@ def learned_parameters(found: Checkpoint, loss: LossModule) -> dict[str, Tensor]
     Raises:
         CheckpointError: If their names or shapes differ from this loss's.
     """
-    now = loss.state_dict()
     own, given = (
         {name: each for name, each in state.items() if _is_learned(name)}
-        for state in (now, former.parameters(found.training()["loss"], now))
+        for state in (loss.state_dict(), found.training()["loss"])
     )
     if {name: each.shape for name, each in own.items()} != {name: each.shape for name, each in given.items()}:
         raise CheckpointError(f"{found.path} was trained by another algorithm or other networks")

@@ -19,7 +19,6 @@ from warp_torchrl.collection.guidance import guided
 from warp_torchrl.collection.running import Collection
 from warp_torchrl.demonstrations.acts import demonstrations
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.runs import former
 from warp_torchrl.runs.checkpoint import Checkpoint
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.runs.transfer import actor_parameters, learned_parameters
@@ -230,9 +229,8 @@ class Learning:
         self._restore_own(state)
 
     def _restore_shared(self, state: Mapping[str, Any]) -> None:
-        now = self.learner.loss.state_dict()
-        loss = former.parameters(state["loss"], now)
-        differing = now.keys() ^ loss.keys()
+        loss = state["loss"]
+        differing = self.learner.loss.state_dict().keys() ^ loss.keys()
         if differing:  # tensordict does not report missing or unexpected names
             raise ValueError(f"{min(differing)} is in one of the two alone")
         self.learner.loss.load_state_dict(loss)

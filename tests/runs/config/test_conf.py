@@ -371,23 +371,6 @@ def test_a_mapping_takes_keys_of_its_own(override):
         compose_config("train", ["reward=adaptive", "reward.trms.front=0.2"])
 
 
-def test_a_record_of_before_the_logit_penalty_goes_on_without_it():
-    values = without_targets(plain(compose_config("train", ["algorithm=maddpg"])))
-    record = SavedConfig(choices={"algorithm": "maddpg"}, values=values)
-    assert restore(record).algorithm.logit_penalty == 1e-3
-    values["algorithm"].pop("logit_penalty")
-    assert restore(record).algorithm.logit_penalty == 0.0
-    assert restore(record, ["algorithm=ddpg"]).algorithm.logit_penalty == 1e-3
-    assert "logit_penalty" not in restore(SavedConfig(values={"algorithm": {}})).algorithm, "others have none"
-
-
-def test_a_record_of_before_acts_were_priced_by_the_tree_keeps_its_price():
-    record = SavedConfig(values={"reward": {"act": 5e-4}})
-    assert restore(record).reward.act_per == "forest" and restore(record).reward.act == 5e-4
-    assert restore(record, ["reward.act_per=tree"]).reward.act_per == "tree"
-    assert "act_per" not in restore(SavedConfig(choices={"reward": "paper"}, values={"reward": {}})).reward
-
-
 def test_overrides_come_before_what_is_recorded():
     record = recorded("scenario=single", "observation=local", "wind.speed=9")
     config = restore(record, ["team.n_agents=2", "fire=paper"])

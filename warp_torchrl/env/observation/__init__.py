@@ -4,7 +4,6 @@ from warp_torchrl.env.observation.channels import CHANNELS, DEFAULT, ELEVATION_S
 from warp_torchrl.env.observation.coarse_picture import PICTURE, PICTURE_SIDE, Blocks, picture, picture_channel
 from warp_torchrl.env.observation.critic import STATE, STATE_SIDE, CriticState, state_plane
 from warp_torchrl.env.observation.features import Choice, Context
-from warp_torchrl.env.observation.former import renamed, with_renamed
 from warp_torchrl.env.observation.look import Look
 from warp_torchrl.env.observation.presets import (
     OF_CRITIC,
@@ -14,7 +13,6 @@ from warp_torchrl.env.observation.presets import (
     Space,
     Surroundings,
     critic_state,
-    former_symmetry,
     searched_for,
 )
 from warp_torchrl.env.observation.status import STATUS, WIND_SCALE, number, status_vector
@@ -44,13 +42,10 @@ __all__ = [
     "channel",
     "critic_state",
     "egocentric_view",
-    "former_symmetry",
     "number",
     "picture",
     "picture_channel",
-    "renamed",
     "searched_for",
     "state_plane",
     "status_vector",
-    "with_renamed",
 ]

@@ -27,7 +27,6 @@ from warp_torchrl.env.observation.features import (
     names_of,
     parts_of,
 )
-from warp_torchrl.env.observation.former import FORMER_STATUS, FORMER_STATUS_AND_IDENTITY
 from warp_torchrl.env.observation.status import STATUS, status_vector
 from warp_torchrl.env.observation.view import egocentric_view
 from warp_torchrl.validation import check_fields
@@ -236,19 +235,6 @@ def target_of(features: Sequence[Feature], world: World, **options: Any) -> Targ
     """Return what agents turn towards among features, None where none shows it; see ``Target`` for the options."""
     found = first_of("target", features, world)
     return None if found is None else Target(found[0], **options)
-
-
-def former_symmetry(name: str, shape: tuple[int, ...], names: tuple[str, ...]) -> Planes | Vector | None:
-    """Return how an entry of a preset turns, for manifests that do not tell it; None for an entry of no preset."""
-    former = Vector(FORMER_STATUS)
-    of_presets: dict[str, Planes | Vector] = {
-        "": PAPER_SYMMETRY,
-        "view": Planes(len(names), Target(names.index("fire_stage")) if "fire_stage" in names else None),
-        "status": former if former.fits(shape) else Vector(FORMER_STATUS_AND_IDENTITY),
-        "picture": Planes(3, Target(0, order=1, near=0.5, is_share=True, in_middle=shape[-1] != PICTURE_SIDE)),
-    }
-    found = of_presets.get(name)
-    return found if found is not None and found.fits(shape) else None
 
 
 Observation = Surroundings | Local | Paper

@@ -24,7 +24,6 @@ from warp_torchrl.runs.config.construction import ConfigError, UnknownKeyError, 
 from warp_torchrl.runs.config.defaults import defaults
 from warp_torchrl.runs.config.grammar import check_overrides, several_values
 from warp_torchrl.runs.config.groups import COMPONENTS
-from warp_torchrl.runs.config.renamed import renamed_overrides
 from warp_torchrl.validation import did_you_mean
 
 OmegaConf.register_new_resolver("pid", os.getpid, replace=True, use_cache=True)  # a sweep's jobs get its own process's
@@ -50,7 +49,6 @@ def compose_config(name: str, overrides: Sequence[str] = ()) -> DictConfig:
     Raises:
         ConfigError: If an override does not fit, in one line.
     """
-    overrides = renamed_overrides(overrides)
     check_choices(overrides)
     config = _compose(name, overrides)
     try:
@@ -64,7 +62,7 @@ def choices(overrides: Sequence[str]) -> dict[str, str]:
     """Return the option of each group of ``conf/train.yaml`` with overrides that ``compose_config`` takes."""
     GlobalHydra.instance().clear()
     with initialize_config_dir(str(conf_folder()), version_base="1.3"):
-        composed = compose("train", overrides=renamed_overrides(overrides), return_hydra_config=True)
+        composed = compose("train", overrides=list(overrides), return_hydra_config=True)
     return dict(composed.hydra.runtime.choices)
 
 

@@ -13,19 +13,8 @@ from omegaconf.errors import OmegaConfBaseException
 from warp_torchrl.runs.config.compose import OPTION, compose_config, conf_folder, option_of, plain, without_targets
 from warp_torchrl.runs.config.construction import ConfigError, component, free_mappings
 from warp_torchrl.runs.config.groups import COMPONENTS, ENVIRONMENT, WORLD_KEYS
-from warp_torchrl.runs.config.renamed import renamed_overrides, renamed_values
 from warp_torchrl.validation import dotted
 
-_BEFORE = {
-    "model.symmetry": "none",
-    "processes": 1,
-    "collector.grows_at": 0.0,
-    "observation.identity": False,
-    "observation.centred": False,
-    "algorithm.logit_penalty": 0.0,
-    "reward.act_per": "forest",
-}
-"""Values of keys that configurations of former runs lack."""
 _DEEPEST = 20
 """How deep what is recorded may be nested; a configuration is 5 deep."""
 _LONGEST = 4096
@@ -48,7 +37,7 @@ class SavedConfig:
 
 
 def read_saved_config(content: object) -> SavedConfig:
-    """Return the configuration that a JSON file holds, with the names of now.
+    """Return the configuration that a JSON file holds.
 
     Args:
         content: From a run folder or a recording: not trusted.
@@ -62,7 +51,7 @@ def read_saved_config(content: object) -> SavedConfig:
     if not all(isinstance(option, str) for option in choices.values()):
         raise ValueError("choices must be names of options")
     _check_bounds([values, list(choices.values())])
-    return SavedConfig(choices=choices, values=renamed_values(values))
+    return SavedConfig(choices=choices, values=values)
 
 
 def _check_bounds(values: Any) -> None:
@@ -105,7 +94,6 @@ def restore(saved_config: SavedConfig, overrides: Sequence[str] = ()) -> DictCon
     Raises:
         ConfigError: If a choice or a value does not fit.
     """
-    overrides = renamed_overrides(overrides)
     for group, option in saved_config.choices.items():
         if group not in (*COMPONENTS, "scenario") or not OPTION.fullmatch(str(option)):
             raise ConfigError(f"{group}={option!r} in the run folder is not one of our options")
@@ -114,14 +102,7 @@ def restore(saved_config: SavedConfig, overrides: Sequence[str] = ()) -> DictCon
         touched += WORLD_KEYS
     choices = [f"{group}={option}" for group, option in saved_config.choices.items() if group not in touched]
     config = compose_config("train", [*choices, *overrides])
-    recorded = _recorded(saved_config, config, touched)
-    groups = {*saved_config.values, "processes"}
-    before = {
-        key: value
-        for key, value in _BEFORE.items()
-        if key.split(".")[0] in groups and OmegaConf.select(config, key) is not None
-    }
-    for path, value in {**before, **recorded}.items():
+    for path, value in _recorded(saved_config, config, touched).items():
         if "${" in str(value):  # what is recorded was resolved: this one was put there to read what is ours
             raise ConfigError(f"{path} in the run folder must be a plain value, got {value!r}")
         is_touched = any(path == key or _is_in(path, key) for key in touched)

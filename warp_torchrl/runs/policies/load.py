@@ -9,7 +9,6 @@ import torch
 from warp_torchrl.env.observation import OF_CRITIC
 from warp_torchrl.models import RADIO
 from warp_torchrl.runs import checkpoint as checkpoints
-from warp_torchrl.runs import former
 from warp_torchrl.runs.config.compose import plain
 from warp_torchrl.runs.config.construction import build
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
@@ -55,10 +54,10 @@ def policy_of(
     try:
         with torch.device("meta"):  # without memory: a configuration may name networks larger than the machine
             shapes = _shapes(algorithm.policy(found.manifest.signature, model).state_dict())
-        if shapes != _shapes(former.parameters(weights, shapes)):
+        if shapes != _shapes(weights):
             raise ValueError("the parameters have other names or shapes than the networks that it is said to have")
         policy = algorithm.policy(found.manifest.signature, model)
-        policy.load_state_dict(former.parameters(weights, policy.state_dict()))
+        policy.load_state_dict(weights)
     except Exception as error:  # torch and TorchRL raise many types for weights that do not fit
         reason = " ".join(str(error).split())
         raise checkpoints.CheckpointError(f"{found.path} is of another architecture: {reason}") from None
