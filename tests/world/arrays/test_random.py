@@ -11,7 +11,7 @@ import torch
 from scipy.stats import chi2, poisson
 from torch import Tensor
 
-from warp_torchrl.world.arrays.random import Stream, uniform, uniform_at, world_key
+from warp_torchrl.world.arrays.random import Stream, named_key, uniform, uniform_at, world_key
 
 N = 20_000_000
 
@@ -36,7 +36,7 @@ def draws() -> Tensor:
 
 def test_streams_keep_their_numbers() -> None:
     # Every world that was published hangs on them.
-    assert [stream.value for stream in Stream] == list(range(1, 23))
+    assert [stream.value for stream in Stream] == list(range(1, 24))
 
 
 def test_the_mean_is_a_half_and_the_variance_a_twelfth(draws: Tensor) -> None:
@@ -168,3 +168,11 @@ def test_draws_at_some_places_are_those_of_the_whole() -> None:
     index = torch.tensor([[5, 0, 41], [7, 7, 119]], dtype=torch.int32)
     whole = uniform(keys([3, 4]), 6, Stream.POLICY, (10, 12)).flatten(1)
     assert torch.equal(uniform_at(keys([3, 4]), 6, Stream.POLICY, index), whole.gather(1, index.long()))
+
+
+def test_a_name_has_draws_that_no_stream_and_no_other_name_has():
+    key = world_key(torch.arange(4))
+    drawn = [uniform(named_key(key, name), 0, Stream.FIRE, (8,)) for name in ("rain", "road")]
+    drawn += [uniform(key, 0, stream, (8,)) for stream in Stream]
+    assert len(torch.cat(drawn).unique()) == 4 * 8 * len(drawn)
+    assert torch.equal(named_key(key, "rain")[2:], named_key(key[2:], "rain")), "in any batch"
