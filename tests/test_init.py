@@ -11,8 +11,8 @@ import warp_torchrl
 def test_its_public_names_are_there_and_no_others():
     assert dir(warp_torchrl) == sorted(warp_torchrl.__all__)
     assert all(getattr(warp_torchrl, name) is not None for name in warp_torchrl.__all__)
-    with pytest.raises(AttributeError, match=r"module 'warp_torchrl' has no attribute 'trian'"):
-        _ = warp_torchrl.trian
+    with pytest.raises(AttributeError, match=r"module 'warp_torchrl' has no attribute 'tarin'"):
+        _ = warp_torchrl.make
 
 
 def test_importing_it_imports_no_torch():

@@ -147,3 +147,7 @@ def test_what_a_user_adds_is_not_kept(monkeypatch):
     assert cache._paths(plan_of(), ["noop"]) == {}
     with pytest.raises(cache.Unknown, match="a function"):
         cache.digest([lambda: None])
+
+
+def test_the_rooms_whose_code_plays_episodes_are_there():
+    assert all((cache._PACKAGE / room).is_dir() for room in cache._SOURCES)

@@ -30,7 +30,7 @@ from warp_torchrl.world.team.abilities import ABILITIES
 
 log = logging.getLogger("warp_torchrl")
 _PACKAGE = Path(warp_torchrl.__file__).parent
-_SOURCES = ("world", "heuristics", "reward", "rates", "weather", "env", "evaluation")
+_SOURCES = ("world", "heuristics", "env", "evaluation", "system")
 _OURS = "warp_torchrl."
 _MOST_EPISODES = 65_536
 

@@ -1,4 +1,4 @@
-"""Where vehicles are: in which wind, from the middle of the map, and from each other."""
+"""Places of vehicles: the wind there, and distances from the map's middle and from each other."""
 
 import torch
 from torch import Tensor

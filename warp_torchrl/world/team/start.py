@@ -1,4 +1,4 @@
-"""Where a team starts."""
+"""Start of a team."""
 
 import torch
 from torch import Tensor
