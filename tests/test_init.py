@@ -11,7 +11,7 @@ import warp_torchrl
 def test_its_public_names_are_there_and_no_others():
     assert dir(warp_torchrl) == sorted(warp_torchrl.__all__)
     assert all(getattr(warp_torchrl, name) is not None for name in warp_torchrl.__all__)
-    with pytest.raises(AttributeError, match=r"module 'warp_torchrl' has no attribute 'tarin'"):
+    with pytest.raises(AttributeError, match=r"module 'warp_torchrl' has no attribute 'make'"):
         _ = warp_torchrl.make
 
 
