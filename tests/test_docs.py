@@ -187,7 +187,7 @@ def extended(tmp_path_factory):
 
 def test_an_extension_is_one_module_one_yaml_and_one_test(extended):
     _, files = extended
-    assert [Path(path).parts[0] for path in files] == ["warp_torchrl", "conf", "tests"] * 8
+    assert [Path(path).parts[0] for path in files] == ["warp_torchrl", "conf", "tests"] * 9
 
 
 @pytest.mark.slow

@@ -1,12 +1,10 @@
 """What runs are called in the tables of a sweep."""
 
-import copy
-
 import pytest
 
 from warp_torchrl.evaluation.method import method
-from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
-from warp_torchrl.runs.config.saved_config import SavedConfig, completed
+from warp_torchrl.runs.config.compose import compose_config, plain
+from warp_torchrl.runs.config.saved_config import SavedConfig
 
 
 @pytest.mark.parametrize(
@@ -47,15 +45,6 @@ def test_a_policy_is_called_by_what_is_unusual(overrides, named):
 def test_a_record_from_before_a_key_tells_nothing_of_it():
     choices = {"algorithm": "mappo", "reward": "time", "observation": "local"}
     assert method(SavedConfig(choices=choices, values={"model": {"sharing": "team"}}))[0] == "mappo time local"
-
-
-def test_a_run_of_before_a_key_is_alike_one_with_the_value_that_it_was_run_by():
-    choices = {"algorithm": "mappo", "reward": "efficiency", "observation": "surroundings"}
-    values = without_targets(plain(compose_config("train", ["observation.identity=false"])))
-    former = copy.deepcopy(values)
-    del former["observation"]["identity"], former["observation"]["near"], former["mixture"]
-    now, then = SavedConfig(choices=choices, values=values), SavedConfig(choices=choices, values=former)
-    assert method(now) != method(then) and method(now) == method(completed(now)) == method(completed(then))
 
 
 def test_runs_that_are_saved_at_other_times_are_alike():

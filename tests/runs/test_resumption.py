@@ -98,7 +98,7 @@ def test_a_new_total_must_be_more_than_what_was_trained_and_the_former_one_is_no
     record, path = SavedConfig(choices={}, values=values), tmp_path / "config.yaml"
     path.write_text(text := yaml.safe_dump(config))
     options = {"scenario": "skirmish", "signature": SIGNATURE, "policy": {}, "training": {}, "keep": 3}
-    checkpoints.save(tmp_path, frames=64, mode="sampled", record=record, **options)
+    checkpoints.save(tmp_path, frames=64, mode="sampled", saved_config=record, **options)
     assert resumption(tmp_path).total_before == 64, "its own total is reached, and it goes on to its evaluation"
     told = "total_frames must be more than the 64 that .* has had, got 64"
     with pytest.raises(ConfigError, match=told):

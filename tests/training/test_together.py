@@ -22,7 +22,6 @@ from warp_torchrl.runs.checkpoint import newest
 from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import compose_config, plain
 from warp_torchrl.runs.config.construction import ConfigError
-from warp_torchrl.runs.config.saved_config import SavedConfig, restore
 
 LENGTH = ("processes=2", "total_frames=256", "checkpoint.interval=64", "checkpoint.keep=9")
 
@@ -178,8 +177,3 @@ configured = partial(compose_config, "train")
 def test_what_cannot_be_shared_is_refused_in_a_line(overrides, line):
     with pytest.raises(ConfigError, match=line):
         run_config(plain(configured(overrides)))
-
-
-def test_a_run_of_before_learns_in_one_process(tmp_path):
-    assert restore(SavedConfig(values={"seed": 3})).processes == 1
-    assert restore(SavedConfig(values={"processes": 2})).processes == 2

@@ -14,7 +14,7 @@ from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import compose_config, plain
 from warp_torchrl.runs.config.construction import ConfigError
-from warp_torchrl.runs.config.saved_config import environment_record, restore, world_overrides
+from warp_torchrl.runs.config.saved_config import environment_config, restore, world_overrides
 from warp_torchrl.world.mechanics.flight.flight import Aircraft, Flight
 from warp_torchrl.world.mechanics.sensing.sensing import Sight
 from warp_torchrl.world.state.state import Action, count_trees
@@ -81,14 +81,14 @@ def test_mistakes_are_told_in_one_line(override, message):
 
 def test_rules_of_flight_are_recorded_whole_and_restored():
     values = plain(compose_config("train", ["scenario=front", "mechanics.flight.battery=9"]))
-    record = environment_record(values)
+    record = environment_config(values)
     assert record.values["mechanics"] == {"flight": {"separation": 2.0, "battery": 9}}
     assert plain(restore(record))["mechanics"] == record.values["mechanics"]
     assert plain(restore(record, ["mechanics.flight.battery=5"]))["mechanics"]["flight"]["battery"] == 5
     assert world_overrides(values) == ["mechanics.flight.battery=9"]
     bare = plain(compose_config("train", ["mechanics={flight:{}}"]))
     assert world_overrides(bare) == ["mechanics.flight={}"] and run_config(bare).world.mechanics == (Flight(),)
-    assert run_config(plain(restore(environment_record(bare)))).world.mechanics == (Flight(),)
+    assert run_config(plain(restore(environment_config(bare)))).world.mechanics == (Flight(),)
     assert plain(compose_config("train", world_overrides(bare)))["mechanics"] == {"flight": {}}
 
 
