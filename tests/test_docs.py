@@ -233,3 +233,12 @@ def test_the_map_of_the_code_has_every_room():
 def test_the_glossary_is_in_order():
     terms = re.findall(r"(?m)^\| ([\w' ]+) \| ", (DOCS / "glossary.md").read_text())[1:]
     assert len(terms) >= 30 and terms == sorted(terms)
+
+
+def test_columns_of_metrics_are_named_as_they_are_written(weak_run):
+    columns = (weak_run / "metrics.csv").read_text().splitlines()[0].split(",")
+    rooms = {name.split("/")[0] for name in columns} & {"world", "rollout", "time"}
+    pages = [ROOT / "README.md", *DOCS.glob("*.md")]
+    named = {name for page in pages for name in re.findall(rf"`((?:{'|'.join(rooms)})/[a-z_/]+)`", page.read_text())}
+    folders = {f"world/{path.name}" for path in (ROOT / "warp_torchrl/world").iterdir()}
+    assert named - folders <= {*columns, "world/rained"}, "the last is of an extension"
