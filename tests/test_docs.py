@@ -174,7 +174,7 @@ def test_the_views_of_pettingzoo_and_gymnasium_are_as_shown(capsys):
 def extended(tmp_path_factory):
     """A copy of the project with the files that docs/extending.md shows."""
     copy = tmp_path_factory.mktemp("extended")
-    for folder in ("warp_torchrl", "conf", "tests"):
+    for folder in ("warp_torchrl", "conf", "tests", "docs/policies"):
         shutil.copytree(ROOT / folder, copy / folder, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "pyproject.toml", copy)
     files = re.findall(r'```\w+ title="(\S+)"\n(.*?)```', (DOCS / "extending.md").read_text(), flags=re.DOTALL)

@@ -47,42 +47,42 @@ class Prediction:
 
     @property
     def arrival_minutes(self) -> Tensor:
-        """Return the median arrival time over the fires that arrived, float32 [H, W] [min]; NaN where none did."""
+        """Return the median arrival time over the fires that arrived [min], float32 [H, W]; NaN where none did."""
         return self._map("arrival_minutes")
 
     @property
     def arrival_early(self) -> Tensor:
-        """Return the time before which a tenth of the fires that came did, float32 [H, W] [min]; NaN where none did."""
+        """Return the time before which a tenth of the fires that came did [min], float32 [H, W]; NaN where none did."""
         return self._map("arrival_early")
 
     @property
     def arrival_late(self) -> Tensor:
-        """Return the time after which a tenth of the fires that came did, float32 [H, W] [min]; NaN where none did."""
+        """Return the time after which a tenth of the fires that came did [min], float32 [H, W]; NaN where none did."""
         return self._map("arrival_late")
 
     @property
     def half_minutes(self) -> Tensor:
-        """Return when half of all fires had come, float32 [H, W] [min]; NaN where fewer ever did."""
+        """Return when half of all fires had come [min], float32 [H, W]; NaN where fewer ever did."""
         return self._map("half_minutes")
 
     @property
     def rate(self) -> Tensor:
-        """Return the mean rate of spread on arrival over the fires that did, float32 [H, W] [m/min]; NaN for none."""
+        """Return the mean rate of spread on arrival over the fires that did [m/min], float32 [H, W]; NaN for none."""
         return self._map("rate")
 
     @property
     def intensity(self) -> Tensor:
-        """Return the fireline intensity as fires came, the same, float32 [H, W] [kW/m]."""
+        """Return the mean fireline intensity on arrival [kW/m], float32 [H, W]."""
         return self._map("intensity")
 
     @property
     def flame_length(self) -> Tensor:
-        """Return the flame length as fires came, the same, float32 [H, W] [m]."""
+        """Return the mean flame length on arrival [m], float32 [H, W]."""
         return self._map("flame_length")
 
     @property
     def first_fire(self) -> Tensor:
-        """Return when the first fire came, float32 [H, W] [min]; NaN where it did not."""
+        """Return when the first fire came [min], float32 [H, W]; NaN where it did not."""
         return self._map("first_fire")
 
     @property

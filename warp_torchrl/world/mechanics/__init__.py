@@ -1,0 +1,1 @@
+"""Mechanics of the world, a folder each."""
