@@ -156,7 +156,7 @@ class OffPolicy(Algorithm):
             samples=samples,
             after_step=after_step,
             schedule=schedule,
-            keeps={"replay": ReplayMemory(memory, canonical), "targets": targets},
+            keeps={"replay": ReplayMemory(memory), "targets": targets},
         )
 
     def memory(self, device: torch.device) -> ReplayBuffer:

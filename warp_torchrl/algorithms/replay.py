@@ -13,7 +13,6 @@ from torchrl.data import (
 from torchrl.data.replay_buffers import PrioritizedSampler
 
 from warp_torchrl.algorithms.storage import RowStorage
-from warp_torchrl.models import OBSERVATION, CanonicalBatch
 
 _TREES = {"_sum_tree", "_min_tree"}  # where TorchRL's prioritised sampler keeps the priorities
 _ALPHA, _BETA = 0.6, 0.4  # Schaul et al., 2016, proportional prioritisation
@@ -55,11 +54,9 @@ class ReplayMemory:
 
     Attributes:
         buffer: TorchRL's.
-        canonical: Makes the transitions that it holds; those of runs before 0.2 were kept as they were observed.
     """
 
     buffer: ReplayBuffer
-    canonical: CanonicalBatch
 
     def state_dict(self) -> dict[str, Any]:
         """Return the transitions, the batch sizes of nested tensordicts, and the write position."""
@@ -83,7 +80,7 @@ class ReplayMemory:
             data = TensorDict(state_dict["_storage"], batch_size=[length]).unflatten_keys(".")
             for key, size in state_dict["sizes"].items():
                 data[tuple(key.split("."))].batch_size = size
-            self.buffer.extend(self._as_kept(data))
+            self.buffer.extend(data)
         now = self.buffer.state_dict()
         sampler = dict(state_dict["_sampler"])
         for name in _TREES & sampler.keys():
@@ -92,13 +89,6 @@ class ReplayMemory:
                 tree[torch.arange(len(sampler[name]))] = sampler[name]
             sampler[name] = tree
         self.buffer.load_state_dict(state_dict | {"_storage": now["_storage"], "_sampler": sampler})
-
-    def _as_kept(self, data: TensorDictBase) -> TensorDictBase:
-        """Return transitions with the entries that are kept now."""
-        if OBSERVATION not in data.keys(include_nested=True):
-            return data
-        following = self.canonical(data["next"])
-        return self.canonical(data).set("next", following)
 
 
 def check_prioritised() -> None:

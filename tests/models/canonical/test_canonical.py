@@ -7,7 +7,6 @@ from functools import cache
 import pytest
 import torch
 from tensordict import TensorDict
-from torchrl.data import LazyTensorStorage, TensorDictReplayBuffer
 from torchrl.envs import CatFrames, TransformedEnv
 
 from tests.conftest import small_world
@@ -15,7 +14,6 @@ from tests.env.observation.test_observation import drawn
 from warp_torchrl.algorithms.ddpg import Ddpg
 from warp_torchrl.algorithms.dqn import Dqn
 from warp_torchrl.algorithms.ppo import Ppo
-from warp_torchrl.algorithms.replay import ReplayMemory
 from warp_torchrl.algorithms.sac import Sac
 from warp_torchrl.entries import Part, Planes, Target, Vector
 from warp_torchrl.env import WildfireEnv
@@ -38,7 +36,6 @@ from warp_torchrl.models import (
     signature,
 )
 from warp_torchrl.models.canonical import (
-    CanonicalBatch,
     Canonicalise,
     Orientation,
     canonical_state,
@@ -309,31 +306,6 @@ def test_a_replay_memory_keeps_canonical_entries_in_place_of_the_others(learner)
         keys = part.keys(True, True)
         assert ORIENTATION in keys and ("agents", "canonical_view") in keys
         assert "state" not in keys and not any(key[:2] == OBSERVATION for key in keys)
-
-
-def test_transitions_of_former_runs_are_kept_as_those_of_now():
-    """They were kept as they were observed."""
-    env = fighting(PRESETS["whole map"])
-    learner, fresh = (
-        Dqn(mixer="qmix", warm_up=0, minibatch_size=8, capacity=64).build(env, Mlp(), 24) for _ in range(2)
-    )
-    with torch.no_grad():
-        batch = env.rollout(4, learner.explore, break_when_any_done=False)
-    learner.store(batch.clone())
-    kept, former = learner.keeps["replay"].buffer[:], learner.keeps["replay"].buffer[:].clone()
-    for part, seen in ((former, batch.reshape(-1)), (former["next"], batch["next"].reshape(-1))):
-        for name in ("view", "status", "picture"):
-            part.set((*OBSERVATION, name), seen[(*OBSERVATION, name)])
-            del part["agents", f"canonical_{name}"]
-        part.set("state", seen["state"])
-        del part["canonical_state"], part[ORIENTATION]
-    buffer = TensorDictReplayBuffer(storage=LazyTensorStorage(64), batch_size=8)
-    buffer.extend(former)
-    fresh.keeps["replay"].load_state_dict(ReplayMemory(buffer, CanonicalBatch(None)).state_dict())
-    found = fresh.keeps["replay"].buffer[:]
-    for key in kept.keys(True, True):
-        if key != "index":
-            assert torch.equal(found[key], kept[key]), key
 
 
 def test_a_policy_that_is_handed_out_writes_no_canonical_entries():

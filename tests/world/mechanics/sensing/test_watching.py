@@ -5,10 +5,8 @@ import torch
 
 from tests.conftest import small_world
 from tests.world.drawing import CELLS, codes, draw
-from warp_torchrl.world.mechanics.sensing.records import kept
 from warp_torchrl.world.mechanics.sensing.sensing import Sight
 from warp_torchrl.world.mechanics.sensing.watching import watching_of
-from warp_torchrl.world.state.saved import filled
 from warp_torchrl.world.state.state import Action
 from warp_torchrl.world.team.radio import Radio
 from warp_torchrl.world.team.team import Team
@@ -112,7 +110,7 @@ def test_worlds_that_have_ended_are_watched_no_more():
     assert torch.equal(watching_of(after).itself[1], watching_of(state).itself[1])
 
 
-def test_a_world_is_watched_alike_in_any_batch_and_worlds_saved_before_begin_to_count():
+def test_a_world_is_watched_alike_in_any_batch():
     world = small_world(sensing=Sight(radius=2), team=Team(n_agents=2, radio=Radio(carries="map")))
     seeds, episodes = torch.arange(4), torch.zeros(4, dtype=torch.int64)
     state, alone = world.reset(seeds, episodes), world.reset(seeds[2:3], episodes[2:3])
@@ -121,9 +119,3 @@ def test_a_world_is_watched_alike_in_any_batch_and_worlds_saved_before_begin_to_
         state, alone = world.step(state, action).after, world.step(alone, action[2:3]).after
     for name, leaf in watching_of(state).leaves().items():
         assert torch.equal(leaf[2:3], watching_of(alone).leaves()[name]), name
-    saved = {
-        name: leaf for name, leaf in state.what_changes().items() if not name.startswith("extras.sensing.watching.")
-    }
-    assert len(saved) < len(state.what_changes())
-    read = world.restored(filled(world.reset(seeds, episodes), saved))
-    assert torch.equal(kept(read), kept(state)) and (watching_of(read).fronts == 0).all()
