@@ -25,7 +25,8 @@ from warp_torchrl.env.pictures.files import draw_figure
 from warp_torchrl.world.air.wind import Calm
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.law.fire import Fire
-from warp_torchrl.world.state.state import OLDEST, is_tree
+from warp_torchrl.world.state.cells import is_tree
+from warp_torchrl.world.state.state import OLDEST
 from warp_torchrl.world.terrain.landscape import Perlin
 
 SMALL = {

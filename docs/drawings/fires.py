@@ -22,7 +22,8 @@ from warp_torchrl.env.pictures.drawing import (
 from warp_torchrl.world.air.wind import Calm, Paper
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.law.fire import Fire
-from warp_torchrl.world.state.state import Cover, is_burning
+from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.state import Cover
 from warp_torchrl.world.terrain.landscape import Perlin
 
 if TYPE_CHECKING:

@@ -12,7 +12,8 @@ from warp_torchrl.world.arrays.random import Stream, uniform, world_key
 from warp_torchrl.world.fires.burn import FireHistory, burn, start_burning
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.law.hazard import HazardFire
-from warp_torchrl.world.state.state import FIRST_FIRE, OLDEST, Cover, Landscape, WorldState, is_burning, is_tree
+from warp_torchrl.world.state.cells import is_burning, is_tree
+from warp_torchrl.world.state.state import FIRST_FIRE, OLDEST, Cover, Landscape, WorldState
 
 Kernel = Literal["alexandridis", "ellipse"]
 CALM_HAZARD = 0.05
@@ -32,10 +33,7 @@ def snapshots(
         seed: Seed of the world's draws.
         cell_size: Side of a cell [m].
     """
-    state = start_burning(
-        ground.age, ground.cover, ground.elevation, wind=wind, fire=fire, first_tick=0, stage_age=None, seed=seed,
-        cell_size=cell_size,
-    )  # fmt: skip
+    state = start_burning(ground, wind=wind, fire=fire, first_tick=0, stage_age=None, seed=seed, cell_size=cell_size)
     states, now = [], 0
     for tick in at:
         state, now = burn(state, fire, wind, tick - now), tick
@@ -177,8 +175,8 @@ def strike_and_burn(
     key = world_key(seed + torch.arange(worlds))
     cells = (uniform(key, 0, Stream.AGE, (size, size)) < 0.25).to(torch.uint8)
     state = start_burning(
-        cells, torch.full_like(cells, Cover.FOREST), None, wind=Calm(), fire=fire, first_tick=0, stage_age=None,
-        seed=seed, cell_size=30.0,
+        Landscape(torch.full_like(cells, Cover.FOREST), cells, None),
+        wind=Calm(), fire=fire, first_tick=0, stage_age=None, seed=seed, cell_size=30.0,
     )  # fmt: skip
     certain = torch.full(cells.shape, 0.5)  # every chance is 0 or 1: any number will do
     all_worlds, trees = torch.ones(worlds, dtype=torch.bool), is_tree(cells).sum((1, 2))

@@ -12,6 +12,7 @@ from warp_torchrl.world.air.wind import Paper, Wandering
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.fires.burn import burn, start_burning
 from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.state.state import Landscape
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +36,7 @@ def wandering_wind(ticks: int, seed: int) -> Tensor:
     air = Wandering(speed=_SPEED, direction=_TOWARDS)
     empty = torch.zeros(1, 4, 4, dtype=torch.uint8)
     state = start_burning(
-        empty, empty, None, wind=air, fire=Fire(), first_tick=0, stage_age=None, seed=seed, cell_size=CELL
+        Landscape(empty, empty, None), wind=air, fire=Fire(), first_tick=0, stage_age=None, seed=seed, cell_size=CELL
     )
     trace = [state.wind]
     for _ in range(ticks):

@@ -278,8 +278,8 @@ def test_the_header_tells_the_kind_of_processor(capsys, monkeypatch, vectors, ha
 
 
 def test_what_is_not_compiled_is_told(capsys, monkeypatch):
-    monkeypatch.setattr("warp_torchrl.world.backends.road.vectors", lambda: "AVX2")
-    monkeypatch.setattr("warp_torchrl.world.backends.road.FEW_CELLS", 1)
+    monkeypatch.setattr("warp_torchrl.world.eager.vectors", lambda: "AVX2")
+    monkeypatch.setattr("warp_torchrl.world.eager.FEW_CELLS", 1)
     out = output(capsys, "env", *TINY)
     assert "\ncompiled was skipped: a step of 512 cells is faster eager with AVX2" in out
 

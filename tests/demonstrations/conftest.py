@@ -7,7 +7,7 @@ import pytest
 
 from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.live.order import Order
-from warp_torchrl.world.state.state import is_tree
+from warp_torchrl.world.state.cells import is_tree
 
 SMALL = ("landscape.size=16", "team.n_agents=3", "horizon=30")
 

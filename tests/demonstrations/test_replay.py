@@ -9,7 +9,7 @@ from warp_torchrl.demonstrations.events import Event
 from warp_torchrl.demonstrations.files import read_recording, save_recording
 from warp_torchrl.demonstrations.replay import Replay
 from warp_torchrl.system.checksummed import Unsound
-from warp_torchrl.world.state.state import is_tree
+from warp_torchrl.world.state.cells import is_tree
 
 
 def test_the_worlds_are_those_that_were_played(match, recording, tmp_path):

@@ -7,7 +7,8 @@ from tests.conftest import small_world
 from warp_torchrl.env.metrics import METRICS, WATCHING, metrics
 from warp_torchrl.world.mechanics.sensing.sensing import Sight
 from warp_torchrl.world.mechanics.sensing.watching import Memory, watching_of
-from warp_torchrl.world.state.state import Action, count_trees
+from warp_torchrl.world.state.cells import count_trees
+from warp_torchrl.world.state.state import Action
 from warp_torchrl.world.team.team import Team
 
 

@@ -5,7 +5,7 @@ from tensordict import TensorDict
 
 from tests.conftest import small_world
 from warp_torchrl.env.reset_cache import ResetCache
-from warp_torchrl.world.state.state import count_trees
+from warp_torchrl.world.state.cells import count_trees
 
 SEEDS = torch.tensor([10, 11, 12, 13])
 

@@ -14,14 +14,15 @@ from warp_torchrl import WildfireEnv, make_env
 from warp_torchrl.env import scene
 from warp_torchrl.env.observation import Local, Paper, Surroundings
 from warp_torchrl.env.reward import Efficiency
+from warp_torchrl.world import eager
 from warp_torchrl.world.air.wind import Paper as PaperWind
-from warp_torchrl.world.backends import road
 from warp_torchrl.world.backends.tick import in_wind
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.mechanics.sensing.records import kept
 from warp_torchrl.world.mechanics.sensing.sensing import Sight
+from warp_torchrl.world.state.cells import count_trees
 from warp_torchrl.world.state.packets import Packets
-from warp_torchrl.world.state.state import Action, count_trees
+from warp_torchrl.world.state.state import Action
 from warp_torchrl.world.team.radio import Radio
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
@@ -255,7 +256,7 @@ def test_a_state_whose_wind_was_changed_burns_in_that_wind(make_small_env):
     rows, columns = env.world.size
     field = gale.expand(2, 2, rows, columns).clone()  # the same, cell by cell
     env.set_state(in_wind(env.world_state, env.world.fire, field))
-    assert env.world_state.air.gain is None
+    assert not env.world_state.air.terms.leaves()
     torch.testing.assert_close(env.world.fire.spread_probability(env.world_state), spread)
 
 
@@ -333,7 +334,7 @@ def test_another_reward_may_be_given_to_an_environment(make_small_env):
 
 
 def test_steps_that_are_not_compiled_are_told_in_one_line(caplog, monkeypatch):
-    monkeypatch.setattr(road, "vectors", lambda: "AVX2")
+    monkeypatch.setattr(eager, "vectors", lambda: "AVX2")
     monkeypatch.setattr(scene, "check_compiler", lambda device: None)
     with caplog.at_level(logging.INFO, logger="warp_torchrl"):
         few, many = (WildfireEnv(n_worlds=n, fuse=True) for n in (32, 33))

@@ -10,7 +10,7 @@ from tests.env.reward.drawing import CLEAR, EXTINGUISH, STAY, drawn
 from warp_torchrl.evaluation.behaviour import Behaviour, division_of_labour, mutual_information
 from warp_torchrl.world.backends.tick import in_wind
 from warp_torchrl.world.law.fire import Fire
-from warp_torchrl.world.state.state import is_burning
+from warp_torchrl.world.state.cells import is_burning
 
 
 def test_mutual_information_by_hand():

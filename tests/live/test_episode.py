@@ -16,7 +16,7 @@ from warp_torchrl.evaluation.picture import record_episode
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.live.episode import Film, SceneRecorder, map_colours, progress
-from warp_torchrl.world.state.state import is_burning
+from warp_torchrl.world.state.cells import is_burning
 
 SEED = 1_000_000
 HOSTILE = "<script>alert('&')</script>"

@@ -8,7 +8,8 @@ from warp_torchrl.live.crew import Refused
 from warp_torchrl.live.match import Match, Setting
 from warp_torchrl.live.order import Order
 from warp_torchrl.runs.config.construction import ConfigError
-from warp_torchrl.world.state.state import Action, is_tree
+from warp_torchrl.world.state.cells import is_tree
+from warp_torchrl.world.state.state import Action
 
 
 def run(match, steps):

@@ -26,7 +26,8 @@ from warp_torchrl.live.page import Page
 from warp_torchrl.live.panel.tab import chosen_option
 from warp_torchrl.live.replayed import ReplayedMatch
 from warp_torchrl.runs.config.construction import ConfigError
-from warp_torchrl.world.state.state import Action, is_tree
+from warp_torchrl.world.state.cells import is_tree
+from warp_torchrl.world.state.state import Action
 
 BROWSER = next((path for name in ("chromium", "google-chrome") if (path := shutil.which(name))), None)
 FLAGS = ["--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]

@@ -27,8 +27,7 @@ def ground(side=SIDE, code=31):
         cover=torch.full(shape, 3, dtype=torch.uint8),
         age=torch.full(shape, 10, dtype=torch.uint8),
         elevation=None,
-        fuel=torch.full(shape, code, dtype=torch.int16),
-    )
+    ).with_layers(fuel=torch.full(shape, code, dtype=torch.int16))
 
 
 def weather(*bearings, speed=3.0, ffmc=90.0):
@@ -159,7 +158,7 @@ def test_history_comes_in_minutes_as_the_prediction_does():
     cells = ground().age.clone()
     cells[0, SIDE // 2, SIDE // 2] = 11
     history = fire_history(
-        cells, ground().cover, fire=EVEN, fuel=ground().fuel, weather=weather(270.0), ticks=24, cell_size=50.0
+        cells, ground().cover, fire=EVEN, fuel=ground().layer("fuel"), weather=weather(270.0), ticks=24, cell_size=50.0
     )
     minutes = history.arrival_minutes[0]
     came = ~minutes.isnan()
@@ -207,10 +206,10 @@ def test_an_ignition_without_fuel_is_refused():
 
 
 HISTORIES = {
-    "fuel must be left out under laws": {"fuel": ground(8).fuel},
+    "fuel must be left out under laws": {"fuel": ground(8).layer("fuel")},
     "wind must be left out where weather": {"wind": (1.0, 0.0), "weather": weather(1), "fire": EVEN},
     "first_tick must be 0 under law rate": {"fire": EVEN, "first_tick": 2},
-    r"fuel must hold whole codes \[1, 8, 8\]": {"fire": EVEN, "fuel": ground(9).fuel},
+    r"fuel must hold whole codes \[1, 8, 8\]": {"fire": EVEN, "fuel": ground(9).layer("fuel")},
     "minutes_per_tick must be given": {"weather": weather(1, 2)},
 }
 

@@ -16,7 +16,8 @@ from warp_torchrl.world.fires.burn import burn, start_burning, trace
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.law.hazard import HazardFire
 from warp_torchrl.world.law.wind_and_slope import length_to_breadth
-from warp_torchrl.world.state.state import WorldState, is_burning
+from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.state import Landscape, WorldState
 
 CALM = Uniform(speed=0.0)
 SLOW = pytest.mark.slow
@@ -38,9 +39,7 @@ def grassland(
     cells[:, lit[0] - radius : lit[0] + radius + 1, lit[1] - radius : lit[1] + radius + 1] = 11
     climb = 30.0 * math.tan(math.radians(degrees)) * torch.arange(float(size[1]))
     return start_burning(
-        cells,
-        torch.full_like(cells, 2),
-        climb.expand(worlds, *size) if degrees else None,
+        Landscape(torch.full_like(cells, 2), cells, climb.expand(worlds, *size) if degrees else None),
         wind=wind,
         fire=fire,
         first_tick=0,
@@ -307,9 +306,7 @@ def test_chances_of_nought_and_one_are_exact_for_every_law(fire: Fire) -> None:
         return torch.randint(high, (20, 9, 11), generator=generator, dtype=torch.uint8)
 
     state = start_burning(
-        random(16),
-        random(5),
-        torch.rand(20, 9, 11, generator=generator) * 60.0,
+        Landscape(age=random(16), cover=random(5), elevation=torch.rand(20, 9, 11, generator=generator) * 60.0),
         wind=Uniform(speed=8.0),
         fire=fire,
         first_tick=0,

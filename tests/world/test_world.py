@@ -8,13 +8,15 @@ from torch import Tensor
 from tests.world.drawing import differing, draw, drawn
 from warp_torchrl.world.air.gridded import Gridded
 from warp_torchrl.world.air.wind import Calm, Paper, Uniform, Wandering
+from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.arrays.random import Stream, uniform
-from warp_torchrl.world.backends import road
+from warp_torchrl.world.backends import backend
 from warp_torchrl.world.backends.tick import advance, in_wind
 from warp_torchrl.world.ignition.ignition import Ignition
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.law.hazard import HazardFire
-from warp_torchrl.world.state.state import Cover, WorldState, count_trees, is_burning, is_tree
+from warp_torchrl.world.state.cells import count_trees, is_burning, is_tree
+from warp_torchrl.world.state.state import Cover, WorldState
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.landscape import Perlin
@@ -93,7 +95,7 @@ def test_ticking_the_worlds_that_are_due_alone_changes_nothing(world: World) -> 
     state = run(world, start(world, range(8)), 5)
     for due in ([True] * 8, [False] * 8, [index % 3 == 1 for index in range(8)]):
         mask = torch.tensor(due)
-        some = road.advance_rows(state, mask, lambda rows, ticks: advance(rows, world.fire, world.air, ticks))
+        some = backend.advance_rows(state, mask, lambda rows, ticks: advance(rows, world.fire, world.air, ticks))
         assert not differing(some, advance(state, world.fire, world.air, mask))
 
 
@@ -458,12 +460,14 @@ def test_ground_and_air_are_replaced_whole() -> None:
         with pytest.raises(TypeError, match=derived):
             state.replace(**{derived: getattr(state, derived)})
     gale = in_wind(state, WORLDS["control"].fire, torch.full((2, 2, 1, 1), 30.0))
-    assert not torch.equal(gale.air.gain, state.air.gain) and not torch.equal(gale.air.table, state.air.table)
+    made, other = state.air.terms.leaves(), gale.air.terms.leaves()
+    assert set(made) == {"gain", "table"} and not any(torch.equal(made[name], other[name]) for name in made)
 
 
 def test_what_follows_from_ground_and_air_is_made_again_from_what_changes(world: World) -> None:
     state = start(world, range(3))
     emptied = state.replace(
-        ground=state.ground.replace(alpha=torch.zeros_like(state.alpha)), air=state.air.replace(table=None)
+        ground=state.ground.replace(alpha=torch.zeros_like(state.alpha), terms=Batch()),
+        air=state.air.replace(terms=Batch()),
     )
     assert differing(world.restored(emptied), state) == []

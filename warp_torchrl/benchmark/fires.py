@@ -95,7 +95,7 @@ def _fuel(ground: Landscape) -> Tensor:
 def _ellipse(reach: int, ratio: float, bearing: int, deviation: float) -> dict[str, Any]:
     size, (row, column) = (reach + 30, (reach + 15, 15)) if ratio > 1.0 else (2 * reach + 11, (reach + 5, reach + 5))
     whole = torch.ones(1, size, size, dtype=torch.uint8)
-    ground = Landscape(cover=whole * 3, age=whole * 10, elevation=None, fuel=whole.to(torch.int16) * _C2)
+    ground = Landscape(whole * 3, whole * 10, elevation=None).with_layers(fuel=whole.to(torch.int16) * _C2)
     fire, angle = RateFire(model="fbp", cell_deviation=deviation), math.radians(bearing)
     wind = torch.tensor([RATIOS[ratio] * math.sin(angle), RATIOS[ratio] * math.cos(angle)])
     told = spread_in(fire, ground, _CELL, Spell(wind, 1.0)).head[0, 0, 0].item()

@@ -11,10 +11,10 @@ from warp_torchrl.benchmark.numpy_world import NumpyWorld, plays
 from warp_torchrl.benchmark.tables import entry, spread_of, table
 from warp_torchrl.benchmark.timing import spread, take_turns
 from warp_torchrl.system.compiler import check_compiler, compiled
-from warp_torchrl.world.backends.road import in_bytes
 from warp_torchrl.world.backends.tick import advance
 from warp_torchrl.world.fires.burn import burn
 from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.state.flags import in_bytes
 from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.world import World
 

@@ -15,8 +15,10 @@ from warp_torchrl.env.metrics import metrics
 from warp_torchrl.env.observation import Observation, critic_state, searched_for
 from warp_torchrl.env.reward import Collaborative, Efficiency, Reward, Time
 from warp_torchrl.system.compiler import check_compiler, compiled
-from warp_torchrl.world.backends.road import in_bytes, in_flags, why_eager
-from warp_torchrl.world.state.state import ActionResult, Forecast, Transition, TreeCounts, WorldState, count_trees
+from warp_torchrl.world.eager import why_eager
+from warp_torchrl.world.state.cells import count_trees
+from warp_torchrl.world.state.flags import in_bytes, in_flags
+from warp_torchrl.world.state.state import ActionResult, Forecast, Transition, TreeCounts, WorldState
 from warp_torchrl.world.world import World
 
 _log = logging.getLogger("warp_torchrl")

@@ -22,9 +22,10 @@ from warp_torchrl.env.specs import make_specs
 from warp_torchrl.system import memory
 from warp_torchrl.system.device import needs_no_sync
 from warp_torchrl.system.modes import apart
+from warp_torchrl.world.state.cells import count_trees
 from warp_torchrl.world.state.role import ROLES
 from warp_torchrl.world.state.saved import filled
-from warp_torchrl.world.state.state import Transition, TreeCounts, WorldState, count_trees
+from warp_torchrl.world.state.state import Transition, TreeCounts, WorldState
 from warp_torchrl.world.world import World
 
 _LEAST_BYTES = 16  # of a cell of a world with its start that lies ready; a step of `default` takes 40

@@ -5,8 +5,9 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.arrays.geometry import grow
+from warp_torchrl.world.state.cells import is_burning, is_tree
 from warp_torchrl.world.state.front import alignment, centre, containment, sector
-from warp_torchrl.world.state.state import Transition, WorldState, is_burning, is_tree
+from warp_torchrl.world.state.state import Transition, WorldState
 
 SECTORS = 8
 SHUFFLES = 64

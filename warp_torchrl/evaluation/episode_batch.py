@@ -13,7 +13,8 @@ from warp_torchrl.heuristics import Heuristic
 from warp_torchrl.models import ACTION, ACTION_MASK, AGENCY, OBSERVATION, ROLE
 from warp_torchrl.runs.policies.trained import scores
 from warp_torchrl.system.finite import check_scores
-from warp_torchrl.world.state.state import Transition, count_trees
+from warp_torchrl.world.state.cells import count_trees
+from warp_torchrl.world.state.state import Transition
 
 Watcher = Callable[[Transition, Tensor], None]
 """Called with the transition of each step, and the rows of its worlds, int64 [n]."""

@@ -25,7 +25,8 @@ from warp_torchrl.heuristics import NoOp
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.system import disk
 from warp_torchrl.world.arrays.random import world_key
-from warp_torchrl.world.state.state import Landscape, WorldState, is_burning
+from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.state import Landscape, WorldState
 from warp_torchrl.world.terrain.fixed import Fixed
 from warp_torchrl.world.terrain.geotiff import local_grid, write_geotiff
 from warp_torchrl.world.terrain.grid import Grid

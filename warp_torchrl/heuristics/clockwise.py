@@ -6,7 +6,8 @@ from torch import Tensor
 from warp_torchrl.heuristics.base import Heuristic, extinguish_or, idle_action
 from warp_torchrl.world.arrays.geometry import offsets, unit_vectors
 from warp_torchrl.world.arrays.squares import window
-from warp_torchrl.world.state.state import WorldState, is_burning
+from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.team.places import approach_move, from_middle, has_reached, nearest_mate
 
 _MANY = 6

@@ -16,7 +16,8 @@ from warp_torchrl.heuristics.base import (
 from warp_torchrl.heuristics.coordinated import Coordinated
 from warp_torchrl.world.arrays.distances import distance_to_nearest
 from warp_torchrl.world.arrays.geometry import grow
-from warp_torchrl.world.state.state import Action, WorldState, is_burning, is_tree
+from warp_torchrl.world.state.cells import is_burning, is_tree
+from warp_torchrl.world.state.state import Action, WorldState
 
 
 class Ring(Coordinated):

@@ -14,7 +14,8 @@ from torch.nn.functional import avg_pool2d
 from warp_torchrl.env.pictures.render import fire_colours, render
 from warp_torchrl.live.ground import SceneGround
 from warp_torchrl.world.arrays.geometry import unit_vectors
-from warp_torchrl.world.state.state import FIRST_FIRE, WorldState, is_burning, is_tree
+from warp_torchrl.world.state.cells import is_burning, is_tree
+from warp_torchrl.world.state.state import FIRST_FIRE, WorldState
 
 VEHICLE_COLOURS = np.array(  # Okabe and Ito 2008, on the dark sides of a vehicle; then again from the first
     [(255, 255, 255), (230, 159, 0), (86, 180, 233), (240, 228, 66), (204, 121, 167), (0, 158, 115), (213, 94, 0),

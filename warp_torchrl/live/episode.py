@@ -20,7 +20,8 @@ from warp_torchrl.live.words import chips, labels, vehicle_colours
 from warp_torchrl.system import disk
 from warp_torchrl.system.foreign_text import escaped_markdown
 from warp_torchrl.world.arrays.geometry import DIRECTIONS
-from warp_torchrl.world.state.state import Cover, WorldState, count_trees
+from warp_torchrl.world.state.cells import count_trees
+from warp_torchrl.world.state.state import Cover, WorldState
 
 STEP_SECONDS, END_SECONDS = 0.12, 2.0
 """How long a picture stands, and the last one."""

@@ -23,7 +23,7 @@ from warp_torchrl.runs.config.seeds import FIRST_EVALUATED
 from warp_torchrl.runs.policies.named_policy import NamedPolicy
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.ignition.intervention import can_be_lit
-from warp_torchrl.world.state.state import is_tree
+from warp_torchrl.world.state.cells import is_tree
 from warp_torchrl.world.world import World
 
 SEED_RANGE = (0, 2**62 - 1)

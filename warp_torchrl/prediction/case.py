@@ -15,8 +15,8 @@ from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.terrain.geotiff import local_grid
 from warp_torchrl.world.terrain.grid import Grid
-from warp_torchrl.world.terrain.landscape import LandscapeSource
 from warp_torchrl.world.terrain.raster import Raster
+from warp_torchrl.world.terrain.source import LandscapeSource
 from warp_torchrl.world.weather.convergence import grid_convergence
 from warp_torchrl.world.weather.table import WeatherTable, minutes_until, read_weather
 

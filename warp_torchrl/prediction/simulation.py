@@ -148,21 +148,19 @@ def _start(
         raise ValueError(f"stage_age must be under {automaton.ticks_per_stage} ticks, got {int(stage_age.max())}")
     elevation = None if elevation is None else elevation.to(torch.float32)
     _check_rate(automaton, first_tick, fuel, cells)
-    codes = None if fuel is None else fuel.to(torch.int16)
+    ground = Landscape(cover, cells, elevation)
+    ground = ground if fuel is None else ground.with_layers(fuel=fuel.to(torch.int16))
     air = _air(wind, weather)
-    automaton = automaton.over(_Given(Landscape(cover, cells, elevation, fuel=codes)), air, cell_size)
+    automaton = automaton.over(_Given(ground), air, cell_size)
     air = air.paced(automaton.minutes)
     state = start_burning(
-        cells,
-        cover,
-        elevation,
+        ground,
         wind=air,
         fire=automaton,
         first_tick=first_tick,
         stage_age=stage_age,
         seed=seed,
         cell_size=cell_size,
-        fuel=codes,
     )
     return state, automaton, air
 

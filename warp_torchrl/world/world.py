@@ -12,7 +12,7 @@ from warp_torchrl.validation import check_fields
 from warp_torchrl.world.air.wind import Uniform, Wind
 from warp_torchrl.world.arrays.batch import concatenated
 from warp_torchrl.world.arrays.random import world_key
-from warp_torchrl.world.backends import road
+from warp_torchrl.world.backends import backend
 from warp_torchrl.world.backends.tick import advance, initial_state
 from warp_torchrl.world.ignition.ignition import Ignition, IgnitionSource
 from warp_torchrl.world.law.automaton import Automaton
@@ -21,18 +21,11 @@ from warp_torchrl.world.mechanics.agencies.agencies import Agencies, OneAgency
 from warp_torchrl.world.mechanics.mechanic import Mechanic
 from warp_torchrl.world.mechanics.radio.radio import RadioTurn
 from warp_torchrl.world.mechanics.sensing.sensing import Full, Sensing
-from warp_torchrl.world.state.state import (
-    EMBER,
-    FIRST_FIRE,
-    Cover,
-    Forecast,
-    Transition,
-    TreeCounts,
-    WorldState,
-    count_trees,
-)
+from warp_torchrl.world.state.cells import count_trees
+from warp_torchrl.world.state.state import EMBER, FIRST_FIRE, Cover, Forecast, Transition, TreeCounts, WorldState
 from warp_torchrl.world.team.team import Team
-from warp_torchrl.world.terrain.landscape import LandscapeSource, Perlin, map_size
+from warp_torchrl.world.terrain.landscape import Perlin
+from warp_torchrl.world.terrain.source import LandscapeSource, map_size
 
 _CELLS_AT_ONCE = {"cpu": 2**17, "cuda": 2**20}
 """Whose ground is made together: it takes some hundred bytes a cell while it is made, on a CPU best of its cache."""
@@ -84,7 +77,7 @@ class World:
             raise ValueError(
                 f"team.n_agents must be at most a quarter of the map's {height * width} cells, got {self.team.n_agents}"
             )
-        names = [each.name for each in self.loop]
+        names = [*self.fire.keeps, *(each.name for each in self.loop)]
         if len(set(names)) < len(names):
             raise ValueError(f"mechanics must be one of each name, got {', '.join(names)}")
         for each in self.loop:
@@ -232,11 +225,11 @@ class World:
     def restored(self, state: WorldState) -> WorldState:
         """Return worlds with what follows from their landscape and wind made anew."""
         ground = self.fire.ground(state.landscape, self.side_of_cell, state.key)
-        return state.replace(ground=ground, air=road.air(self.fire, state.wind, state.air.moisture, ground))
+        return state.replace(ground=ground, air=backend.air(self.fire, state.wind, state.air.moisture, ground))
 
     def forecast(self, state: WorldState) -> Forecast:
         """Return what the fire is about to do."""
-        return road.forecast(self.fire, state)
+        return backend.forecast(self.fire, state)
 
     def possible_actions(self, state: WorldState) -> Tensor:
         """Return which actions would do something, bool [B, A, actions]."""
@@ -254,7 +247,7 @@ class World:
     def _tick(self, state: WorldState, ticks_now: Tensor) -> WorldState:
         if self.steps_per_tick == 1:
             return advance(state, self.fire, self.air, ticks_now)
-        return road.advance_rows(state, ticks_now, lambda rows, ticks: advance(rows, self.fire, self.air, ticks))
+        return backend.advance_rows(state, ticks_now, lambda rows, ticks: advance(rows, self.fire, self.air, ticks))
 
     def _advance_clock(self, state: WorldState, counts: TreeCounts, running: Tensor) -> WorldState:
         step = state.step + running

@@ -13,7 +13,7 @@ from pettingzoo.test import render_test
 from warp_torchrl.api.adapters import FireExtinguishingVectorEnv, gym_env, parallel_env, pettingzoo
 from warp_torchrl.api.adapters.gymnasium import KEYS
 from warp_torchrl.api.adapters.screen import PygameWindow, Terminal, as_text
-from warp_torchrl.world.state.state import is_burning
+from warp_torchrl.world.state.cells import is_burning
 
 
 @pytest.fixture(params=["without pygame", "without a display", "with a display"])

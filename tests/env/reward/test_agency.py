@@ -39,7 +39,7 @@ def test_trees_count_by_their_worth():
     state, world = parted([[0, 1], [3, 3]], [0, 1])
     assets = torch.ones(1, 4, 4)
     assets[0, 1, 1], assets[0, 3, 3] = 9.0, 0.0  # the burning tree, and one of the other agency's
-    ground = state.ground.replace(landscape=state.landscape.replace(assets=assets))
+    ground = state.ground.replace(landscape=state.landscape.with_layers(assets=assets))
     lands = lands_of(state).replace(worth=by_land(assets * state.initial, lands_of(state).owner, 2))
     assert lands.worth.tolist() == [[16.0, 7.0]]
     state = state.replace(ground=ground).with_planes("agencies", lands)

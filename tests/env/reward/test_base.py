@@ -10,7 +10,8 @@ from tests.env.reward.drawing import EAST, EXTINGUISH, FIELD, STAY, drawn, earne
 from warp_torchrl.env.reward import Adaptive, Collaborative, Coverage, Efficiency, Monitor, Paper, Reward, Time
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.mechanics.sensing.sensing import Full, Sight
-from warp_torchrl.world.state.state import Action, count_trees
+from warp_torchrl.world.state.cells import count_trees
+from warp_torchrl.world.state.state import Action
 
 
 def test_shaping_pays_the_way_to_the_fire():

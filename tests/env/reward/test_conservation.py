@@ -12,7 +12,7 @@ from warp_torchrl.env import reward as rewards
 from warp_torchrl.world.arrays.batch import concatenated
 from warp_torchrl.world.backends.tick import in_wind
 from warp_torchrl.world.law.fire import Fire
-from warp_torchrl.world.state.state import count_trees
+from warp_torchrl.world.state.cells import count_trees
 from warp_torchrl.world.terrain.landscape import Perlin
 
 SURE = Fire(alpha=(0, 0, 0, 1.0, 0), diagonal="unit", wind_gain=0.0, wind_focus=0.0)
@@ -100,7 +100,7 @@ def test_coverage_weighs_blocks_by_their_assets():
     state, world = drawn(BLOCKS, [[7, 15]], steps_per_tick=1, fire=SURE)
     # The left block is worth three times the right one: 1.5 and 0.5 of the mean.
     assets = torch.tensor(np.repeat([3.0, 1.0], 8), dtype=torch.float32).expand(1, 8, 16)
-    state = state.replace(ground=state.ground.replace(landscape=state.landscape.replace(assets=assets)))
+    state = state.replace(ground=state.ground.replace(landscape=state.landscape.with_layers(assets=assets)))
     assert earned(Coverage(), state, world, STAY) == pytest.approx([-8 / 128 - 0.03])
 
 
@@ -111,7 +111,7 @@ def test_assets_are_weighed_by_the_mean_of_the_whole_map_of_each_world():
     state, _ = drawn(rows, [[15, 15]])
     assets = torch.tensor([[1.0, 2.0], [3.0, 6.0]]).repeat_interleave(8, 0).repeat_interleave(8, 1)
     both = concatenated([state, state])
-    weighed = both.landscape.replace(assets=torch.stack((assets, 10.0 * assets)))
+    weighed = both.landscape.with_layers(assets=torch.stack((assets, 10.0 * assets)))
     both = both.replace(ground=both.ground.replace(landscape=weighed))
     assert Coverage().value(both, count_trees(both)).tolist() == pytest.approx([248 / 256 + 0.02 * 11 / 3] * 2)
 

@@ -6,7 +6,7 @@ import pytest
 
 from tests.env.reward.drawing import CLEAR, EAST, EXTINGUISH, FIELD, STAY, drawn, earned
 from warp_torchrl.env import reward
-from warp_torchrl.world.state.state import count_trees
+from warp_torchrl.world.state.cells import count_trees
 
 Paper = partial(reward.Paper, shaping=0.0)
 

@@ -33,8 +33,7 @@ def case_of(truth, wind=(4.0, 1.0), side=41, name="drawn", turned=60.0):
         cover=cover,
         age=torch.full_like(cover, 10),
         elevation=(12.0 * rows[:, None] + 4.0 * rows)[None],
-        fuel=fuel,
-    )
+    ).with_layers(fuel=fuel)
     unknown = torch.full((7,), math.nan)
     spells = [Spell(torch.tensor(wind), 180.0 - turned, unknown)]
     spells += [Spell(torch.tensor((wind[1], -wind[0])), turned, unknown)] if turned else []

@@ -23,6 +23,7 @@ from warp_torchrl.runs.config.saved_config import SavedConfig, read_saved_config
 from warp_torchrl.world.air.gridded import Gridded
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.ignition.file import IgnitionFile
+from warp_torchrl.world.law.fire import Slopes
 from warp_torchrl.world.team.radio import Radio
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.array import Array
@@ -201,7 +202,7 @@ def test_the_landfire_scenario_runs_on_its_raster():
     plan = run_config(plain(compose_config("train", ["scenario=landfire", f"landscape.path={LANDFIRE}"])))
     env = plan.make_env(2, 0)
     env.rollout(6, break_when_any_done=False)
-    assert env.world_state.ground.slope is not None and env.world.side_of_cell == 30.0
+    assert isinstance(env.world_state.ground.terms, Slopes) and env.world.side_of_cell == 30.0
 
 
 def test_the_landfire_scenario_has_no_path_of_its_own():

@@ -8,9 +8,9 @@ from torch._inductor.exc import InvalidCxxCompiler
 from warp_torchrl import make_env
 from warp_torchrl.system.compiler import compiled
 from warp_torchrl.world.arrays.compile import opaque_op
-from warp_torchrl.world.backends.road import in_bytes, in_flags
 from warp_torchrl.world.backends.tick import advance
-from warp_torchrl.world.state.state import count_trees
+from warp_torchrl.world.state.cells import count_trees
+from warp_torchrl.world.state.flags import in_bytes, in_flags
 
 try:
     get_cpp_compiler()

@@ -1,12 +1,11 @@
-"""The band road comes to the page's bits."""
+"""The band computes the reference's bits."""
 
 import pytest
 import torch
 
 from warp_torchrl.world.air.wind import Uniform, Wandering
+from warp_torchrl.world.backends.backend import Reference, fastest
 from warp_torchrl.world.backends.band import AtBand
-from warp_torchrl.world.backends.road import Page, fastest, why_eager
-from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.world import World
@@ -20,32 +19,27 @@ AUTOMATA = {
 @pytest.mark.parametrize("wind", [Uniform(speed=6.0), Wandering(speed=6.0)], ids=["steady", "wandering"])
 @pytest.mark.parametrize("relief", [0.0, 200.0])
 @pytest.mark.parametrize("name", AUTOMATA)
-def test_the_band_comes_to_the_bits_of_the_page(name: str, relief: float, wind: Uniform | Wandering) -> None:
+def test_the_band_comes_to_the_bits_of_the_reference(name: str, relief: float, wind: Uniform | Wandering) -> None:
     world = World(fire=AUTOMATA[name], wind=wind, landscape=Perlin(size=24, relief=relief), steps_per_tick=1)
     state = world.reset(torch.arange(5), torch.zeros(5, dtype=torch.int64))
-    page, band = Page(world.fire), AtBand(world.fire)
+    reference, band = Reference(world.fire), AtBand(world.fire)
     generator = torch.Generator().manual_seed(0)
     for tick in range(25):
         now = torch.rand(5, generator=generator) < 0.8
-        one, other = page.tick(state, now).leaves(), band.tick(state, now).leaves()
+        one, other = reference.tick(state, now).leaves(), band.tick(state, now).leaves()
         differ = [leaf for leaf, value in one.items() if not torch.equal(value, other[leaf])]
         assert not differ, f"tick {tick}"
-        for forecast, same in zip(page.forecast(state), band.forecast(state), strict=True):
+        for forecast, same in zip(reference.forecast(state), band.forecast(state), strict=True):
             assert torch.equal(forecast, same)
         state = world.step(state, torch.randint(0, 10, (5, world.team.n_agents), generator=generator)).after
     assert (state.cells > 10).any()
 
 
-def test_a_cpu_takes_the_band_and_a_subclass_the_page() -> None:
+def test_a_cpu_takes_the_band_and_a_subclass_the_reference() -> None:
     class Own(RateFire):
         pass
 
     cpu = torch.device("cpu")
     assert isinstance(fastest(RateFire(), cpu), AtBand)
-    assert isinstance(fastest(Own(), cpu), Page)
-    assert isinstance(fastest(RateFire(), torch.device("cuda")), Page)
-
-
-def test_compiled_steps_are_left_out_under_law_rate() -> None:
-    assert "not compiled" in str(why_eager(RateFire(), torch.device("cpu"), 1))
-    assert why_eager(Fire(), torch.device("cpu"), 1) is None
+    assert isinstance(fastest(Own(), cpu), Reference)
+    assert isinstance(fastest(RateFire(), torch.device("cuda")), Reference)

@@ -33,7 +33,7 @@ def land(seed, size, relief=True):
     fuel = patches.repeat_interleave(5, 0).repeat_interleave(5, 1)[:height, :width].to(torch.int16)
     rise = torch.cumsum(torch.randn(1, height, width, generator=draws), 1) * 4.0
     cover = torch.full((1, height, width), 3, dtype=torch.uint8)
-    return Landscape(cover=cover, age=cover * 3 + 1, elevation=rise if relief else None, fuel=fuel[None].clone())
+    return Landscape(cover, cover * 3 + 1, rise if relief else None).with_layers(fuel=fuel[None].clone())
 
 
 def lit(size, *places):
@@ -69,7 +69,7 @@ def test_times_are_those_of_the_whole_map_to_the_bit(case):
     seed, size, places = CASES[case]
     fire = RateFire(model="fbp", cell_deviation=0.3, fire_deviation=0.2)
     ground, key, cells = land(seed, size, relief=seed != 4), world_key(torch.arange(2) + seed), lit(size, *places)
-    ground.fuel[0][cells] = 2
+    ground.layer("fuel")[0][cells] = 2
     fires = Fires(fire=fire, landscape=ground, spells=turning(3), cell_size=30.0)
     whole, found = on_whole_map(fire, ground, cells, key, fires.spells), fires.burn(cells, key)
     assert torch.equal(alone._on_map(found), whole)
@@ -78,7 +78,7 @@ def test_times_are_those_of_the_whole_map_to_the_bit(case):
 
 def test_the_window_grows_to_the_sides_that_the_fire_nears():
     fire, size = RateFire(model="fbp", cell_deviation=0.0), (100, 300)
-    ground = land(1, size, relief=False).replace(fuel=torch.full((1, *size), 2, dtype=torch.int16))
+    ground = land(1, size, relief=False).with_layers(fuel=torch.full((1, *size), 2, dtype=torch.int16))
     cells = lit(size, (50, 40))
     fires = Fires(fire=fire, landscape=ground, spells=[Spell(torch.tensor([6.0, 0.0]), 60.0)], cell_size=30.0)
     first, grown = Window.about(cells), fires.burn(cells, world_key(torch.arange(1))).window
@@ -87,8 +87,8 @@ def test_the_window_grows_to_the_sides_that_the_fire_nears():
 
 def test_a_fire_that_is_out_asks_for_no_more_weather():
     fire, size = RateFire(model="fbp", cell_deviation=0.0), (40, 300)
-    ground = land(1, size, relief=False).replace(fuel=torch.full((1, *size), 102, dtype=torch.int16))
-    ground.fuel[:, 10:13, 100:103] = 2
+    ground = land(1, size, relief=False).with_layers(fuel=torch.full((1, *size), 102, dtype=torch.int16))
+    ground.layer("fuel")[:, 10:13, 100:103] = 2
     asked = []
     fire.__dict__["bed"] = _Listening(fire.bed, asked)
     fires = Fires(fire=fire, landscape=ground, spells=turning(9, minutes=60.0), cell_size=30.0)
@@ -114,7 +114,7 @@ class _Listening:
 def started(seed=7, size=(80, 130), weather=4):
     ground = land(seed, size)
     cells = lit(size, *((40 + row, 50 + column) for row in range(3) for column in range(3)))
-    ground.fuel[0][cells] = 2
+    ground.layer("fuel")[0][cells] = 2
     fire = RateFire(model="fbp", cell_deviation=0.3)
     return Fires(fire=fire, landscape=ground, spells=turning(weather), cell_size=30.0), cells
 
@@ -160,7 +160,7 @@ def test_a_window_that_memory_does_not_hold_is_refused_in_one_line(monkeypatch):
 
 @pytest.mark.parametrize("size", [(71, 149), (70, 159), (130, 95)])
 def test_rates_of_a_window_are_those_of_the_whole_map_to_the_bit(size):
-    ground = land(1, size).replace(fuel=torch.full((1, *size), 2, dtype=torch.int16))
+    ground = land(1, size).with_layers(fuel=torch.full((1, *size), 2, dtype=torch.int16))
     fires = Fires(fire=RateFire(model="fbp"), landscape=ground, spells=turning(8), cell_size=30.0)
     windows = [Window(0, 0, 20, 64, size), Window(30, 64, size[0] - 30, 128, size), Window(9, 0, 33, 192, size)]
     for number in range(8):

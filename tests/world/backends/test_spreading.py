@@ -1,11 +1,12 @@
-"""Fires alone come to the times of the page."""
+"""Fires alone compute the times of the law."""
 
 import torch
 
 from warp_torchrl.world.arrays.random import world_key
-from warp_torchrl.world.backends.road import Page
+from warp_torchrl.world.backends.backend import Reference
 from warp_torchrl.world.backends.spreading import Hour, Spreading
 from warp_torchrl.world.backends.tick import in_wind, initial_state
+from warp_torchrl.world.law.arrivals import arrivals_in
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER
 from warp_torchrl.world.state.state import WorldState
@@ -27,18 +28,18 @@ def started() -> WorldState:
     return FIRE.started(state.replace(cells=torch.where(lit, 11, state.cells).to(torch.uint8)))
 
 
-def test_times_are_those_of_the_page_in_weather_that_changes() -> None:
+def test_times_are_those_of_the_law_in_weather_that_changes() -> None:
     state, ticks = started(), 12
     fuel = (state.alpha[0] > 0.0) & (state.landscape.age[0] > 0)
     hours = []
-    fires = Spreading(state.cells == 11, fuel, state.ground.pace)
+    fires = Spreading(state.cells == 11, fuel, state.ground.terms.pace)
     for wind in WINDS:
         if hours:
             state = in_wind(state, FIRE, wind[None, :, None, None].expand(2, -1, -1, -1))
-        hours.append(Hour(state.air.travel[0], FIRE.minutes, ticks))
+        hours.append(Hour(state.air.terms.travel[0], FIRE.minutes, ticks))
         for _ in range(ticks):
             before = state
-            state = Page(FIRE).tick(state, torch.ones(2, dtype=torch.bool))
+            state = Reference(FIRE).tick(state, torch.ones(2, dtype=torch.bool))
             assert (state.tick == before.tick + 1).all()
     fires.burn(hours)
     burned = state.cells > 10
@@ -46,15 +47,15 @@ def test_times_are_those_of_the_page_in_weather_that_changes() -> None:
     assert burned.sum() > 150
     # The last hour's are those in force; earlier ones were scaled as the weather changed.
     late = burned & (fires.arrival() > 2 * ticks * FIRE.minutes)
-    assert torch.allclose(fires.arrival()[late], state.arrivals.minutes[late], rtol=1e-5)
+    assert torch.allclose(fires.arrival()[late], arrivals_in(state).minutes[late], rtol=1e-5)
 
 
 def test_hours_in_two_goes_are_hours_in_one() -> None:
     state = started()
     fuel = (state.alpha[0] > 0.0) & (state.landscape.age[0] > 0)
-    hours = [Hour(state.air.travel[0], 2.0, 10), Hour(state.air.travel[0], 1.0, 20)]
-    whole = Spreading(state.cells == 11, fuel, state.ground.pace)
+    hours = [Hour(state.air.terms.travel[0], 2.0, 10), Hour(state.air.terms.travel[0], 1.0, 20)]
+    whole = Spreading(state.cells == 11, fuel, state.ground.terms.pace)
     whole.burn(hours)
-    one = Spreading((state.cells == 11)[:1], fuel, state.ground.pace[:1])
+    one = Spreading((state.cells == 11)[:1], fuel, state.ground.terms.pace[:1])
     one.burn(hours)
     assert torch.equal(whole.arrival()[:1], one.arrival())

@@ -5,7 +5,7 @@ import torch
 from tests.world.drawing import draw
 from warp_torchrl.world.backends.table import BESIDE, bit_of, burning_neighbours, pattern_table
 from warp_torchrl.world.law.fire import Fire
-from warp_torchrl.world.state.state import is_burning
+from warp_torchrl.world.state.cells import is_burning
 
 N, NE, E, SE, S, SW, W, NW = (1 << bit_of(direction) for direction in range(8))
 

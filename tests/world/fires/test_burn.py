@@ -24,11 +24,8 @@ WINDS = {"steady": Uniform(speed=5.0), "field": Paper(scale=0.5), "wandering": W
 
 
 def fire_alone(state: WorldState, fire: Fire, wind: Wind, *, first_tick: int = 0, seed: int = 0) -> WorldState:
-    ground = state.landscape
     return start_burning(
-        state.cells,
-        ground.cover,
-        ground.elevation,
+        state.landscape.replace(age=state.cells),
         wind=wind,
         fire=fire,
         first_tick=first_tick,

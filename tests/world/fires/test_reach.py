@@ -5,7 +5,7 @@ import torch
 from tests.heuristics.drawing import scene
 from warp_torchrl.world.arrays.geometry import grow
 from warp_torchrl.world.fires.reach import distance_from_fire
-from warp_torchrl.world.state.state import is_tree
+from warp_torchrl.world.state.cells import is_tree
 
 
 def ways(drawing: str) -> list[list[int]]:

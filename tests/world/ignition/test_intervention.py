@@ -7,10 +7,12 @@ from tests.world.drawing import draw
 from warp_torchrl.world.air.wind import Calm
 from warp_torchrl.world.backends.tick import advance
 from warp_torchrl.world.ignition.intervention import can_be_lit, cleared, ignited
+from warp_torchrl.world.law.arrivals import arrivals_in
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.law.hazard import HazardFire
 from warp_torchrl.world.law.rate import RateFire
-from warp_torchrl.world.state.state import Landscape, count_trees
+from warp_torchrl.world.state.cells import count_trees
+from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.world import World
 
@@ -70,9 +72,9 @@ def test_under_a_law_with_a_clock_the_fire_goes_on_from_a_lit_cell():
     far[0, 0, 0] = True
     before, state = state, ignited(state, world.fire, far & can_be_lit(state, world.fire))
     # The fire reached the corner at the end of six ticks, one of them its head start; elsewhere nothing has changed.
-    assert float(state.arrivals.minutes[0, 0, 0]) == pytest.approx(6 * world.fire.minutes)
-    assert int(state.arrivals.origin[0, 0, 0]) == 0 and int(state.cells[0, 0, 0]) == 11
-    assert state.arrivals.minutes[0, 1:].equal(before.arrivals.minutes[0, 1:])
+    assert float(arrivals_in(state).minutes[0, 0, 0]) == pytest.approx(6 * world.fire.minutes)
+    assert int(arrivals_in(state).origin[0, 0, 0]) == 0 and int(state.cells[0, 0, 0]) == 11
+    assert arrivals_in(state).minutes[0, 1:].equal(arrivals_in(before).minutes[0, 1:])
     for _ in range(60):
         state = advance(state, world.fire, world.air, torch.ones(1, dtype=torch.bool))
     assert (state.cells[0, :2, :2] != 10).sum() > 1, "its neighbours caught fire"

@@ -12,13 +12,14 @@ from tests.world.literal_fire import LiteralFire
 from warp_torchrl.world.air.wind import Paper, Wind
 from warp_torchrl.world.arrays.batch import concatenated
 from warp_torchrl.world.arrays.random import Stream, uniform, world_key
-from warp_torchrl.world.backends import road
+from warp_torchrl.world.backends import backend
 from warp_torchrl.world.backends.tick import in_wind
 from warp_torchrl.world.law import law
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.law.hazard import HazardFire
 from warp_torchrl.world.law.wind_and_slope import slope_factor
-from warp_torchrl.world.state.state import WorldState, is_burning
+from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.state import WorldState
 
 ALMOST_ONE = 1.0 - 2.0**-24
 CALM_WETLAND = {"ground": "www www www"}
@@ -145,7 +146,7 @@ def test_the_risk_is_the_literal_loop_s(compared: tuple[Fire, WorldState, Litera
             burning = literal.cells[row][column] >= 11
             expected = min(1.0, literal.expected_to_ignite(row, column) / 4.0)
             wanted[row, column] = expected if burning else literal.chance_to_ignite(row, column)
-    torch.testing.assert_close(road.forecast(fire, state).fire_risk()[0], wanted, atol=2e-6, rtol=0)
+    torch.testing.assert_close(backend.forecast(fire, state).fire_risk()[0], wanted, atol=2e-6, rtol=0)
 
 
 def counts_of_one_tick(fire: Fire, state: WorldState, trials: int) -> Tensor:
@@ -450,7 +451,7 @@ def test_tables_of_growth_and_lightning_are_made_once(monkeypatch: pytest.Monkey
     for name in ("growth_probability", "lightning_probability"):
         rule = getattr(law, name)
         monkeypatch.setattr(law, name, lambda *given, rule=rule: made.append(rule) or rule(*given))
-    road.fastest(fire, state.cells.device).tick(state, torch.ones(1, dtype=torch.bool))
+    backend.fastest(fire, state.cells.device).tick(state, torch.ones(1, dtype=torch.bool))
     assert len(made) == 2 * 16, "one of each cell code"
     after_ticks(fire, state, 3)
     assert len(made) == 2 * 16
@@ -570,7 +571,7 @@ def test_a_chance_does_not_depend_on_the_batch(wind: Wind) -> None:
     state = draw(CELLS, ground=GROUND, fire=fire, elevation=METRES, worlds=65)
     calm = fire.ignition_probability(state)
     state = in_wind(state, fire, wind(state.key, (5, 6)))
-    for probability in (fire.ignition_probability, lambda each: road.forecast(fire, each).ignition_probability):
+    for probability in (fire.ignition_probability, lambda each: backend.forecast(fire, each).ignition_probability):
         q = probability(state)
         assert (q != calm).flatten(1).any(dim=1).all()
         for world in (0, 7, 64):

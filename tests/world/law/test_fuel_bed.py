@@ -7,7 +7,7 @@ import torch
 from tests.world.rasters import keys, write
 from warp_torchrl.world.behaviour.moistures import moisture_row
 from warp_torchrl.world.law.rate import RateFire
-from warp_torchrl.world.state.state import is_burning
+from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.terrain.raster import Raster
 from warp_torchrl.world.world import World
 
@@ -35,7 +35,7 @@ def test_land_cover_burns_as_the_fuels_of_its_cover_do(tmp_path, model):
     ground = raster(tmp_path, np.where(np.arange(12) < 6, 30, 50), "worldcover")  # grassland, built-up
     one = ground(keys(1))
     law = RateFire(model=model)
-    assert one.fuel is None
+    assert one.layer("fuel") is None
     flammability = law.flammability(one)[0]
     assert (flammability[:, :6] > 0.0).all() and (flammability[:, 6:] == 0.0).all()
     state = World(landscape=ground, fire=law).reset(torch.arange(2), torch.zeros(2, dtype=torch.int64))

@@ -10,6 +10,7 @@ from warp_torchrl.world.air.wind import Calm, Uniform
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.backends.tick import advance, in_wind
 from warp_torchrl.world.fires.alone import Spell, arrival_minutes, spread_in
+from warp_torchrl.world.law.arrivals import arrivals_in
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER
 from warp_torchrl.world.state.state import Landscape, WorldState
@@ -22,7 +23,7 @@ EVERY = torch.ones(1, dtype=torch.bool)
 
 def forest(size: int, fuel: int = C2) -> Landscape:
     whole = torch.ones(1, size, size, dtype=torch.uint8)
-    return Landscape(cover=whole * 3, age=whole * 10, elevation=None, fuel=whole.to(torch.int16) * fuel)
+    return Landscape(whole * 3, whole * 10, None).with_layers(fuel=whole.to(torch.int16) * fuel)
 
 
 def law(**options: object) -> RateFire:
@@ -105,8 +106,7 @@ def test_cells_ignite_at_the_minute_that_the_fire_needs() -> None:
         state = steps(state, fire, 1)
         expected = 1 + min(4, int(tick * 2.0 / cell))
         assert (state.cells > 10).sum().item() == expected
-    assert state.arrivals is not None
-    assert state.arrivals.minutes[0, 0, 1:3].tolist() == pytest.approx([cell, 2 * cell], rel=1e-5)
+    assert arrivals_in(state).minutes[0, 0, 1:3].tolist() == pytest.approx([cell, 2 * cell], rel=1e-5)
 
 
 def test_the_edge_burns_until_it_has_nowhere_to_go() -> None:
@@ -136,9 +136,8 @@ def test_fire_goes_round_a_firebreak_and_not_over_it() -> None:
     gap = start("aT#TT TT#TT TTTTT", fire)
     after = steps(gap, fire, 300)
     assert (after.cells[0, :, 3:] > 10).all()
-    assert after.arrivals is not None
-    straight, round_it = (steps(start(each, fire), fire, 300).arrivals for each in ("aTTTT " * 3, "aT#TT TT#TT TTTTT"))
-    assert straight is not None and round_it is not None
+    maps = "aTTTT " * 3, "aT#TT TT#TT TTTTT"
+    straight, round_it = (arrivals_in(steps(start(each, fire), fire, 300)) for each in maps)
     assert round_it.minutes[0, 0, 4] > straight.minutes[0, 0, 4] * 1.1
 
 
@@ -159,7 +158,7 @@ def test_in_another_wind_the_fire_goes_on_from_where_it_is() -> None:
         state = start(row, fire, wind=first[0])
         state = steps(state, fire, change)
         state = steps(in_wind(state, fire, second), fire, 200 - change)
-        return state.arrivals.minutes[0, 0]  # type: ignore[union-attr]
+        return arrivals_in(state).minutes[0, 0]
 
     one, other = (minutes_of(each, each, 1)[1].item() for each in (slow, fast))
     changed = minutes_of(slow, fast, 4)
@@ -172,7 +171,7 @@ def test_the_same_wind_again_changes_no_time() -> None:
     fire = law(cell_deviation=0.3)
     state = steps(start("TTTTT TTaTT TTTTT", fire, wind=(3.0, 1.0)), fire, 4)
     again = fire.in_air(state, state.air)
-    assert torch.allclose(again.arrivals.minutes, state.arrivals.minutes)  # type: ignore[union-attr]
+    assert torch.allclose(arrivals_in(again).minutes, arrivals_in(state).minutes)
 
 
 def test_rates_differ_as_much_as_they_are_told_to() -> None:
@@ -225,8 +224,7 @@ def test_forecasts_tell_how_near_the_fire_is() -> None:
     fire = law(minutes_per_tick=1.0)
     state = steps(start("aTT", fire), fire, 1)
     probability = fire.ignition_probability(state)[0, 0]
-    assert state.arrivals is not None
-    left = state.arrivals.minutes[0, 0, 1].item() - 1.0
+    left = arrivals_in(state).minutes[0, 0, 1].item() - 1.0
     assert probability.tolist() == pytest.approx([0.0, 1.0 / left, 0.0], rel=1e-4)
     assert fire.expected_ignitions(state)[0, 0].tolist() == pytest.approx([1.0 / (left + 1.0), 0.0, 0.0], rel=1e-4)
-    assert (state.arrivals.minutes < NEVER).sum() == 2
+    assert (arrivals_in(state).minutes < NEVER).sum() == 2

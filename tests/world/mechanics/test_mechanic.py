@@ -8,6 +8,7 @@ from torch import Tensor
 
 from tests.conftest import small_world
 from warp_torchrl.world.arrays.batch import Batch, Named, concatenated
+from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.mechanics.mechanic import Mechanic
 from warp_torchrl.world.mechanics.table import mechanic, mechanics
 from warp_torchrl.world.state.saved import filled
@@ -80,6 +81,15 @@ def test_planes_that_no_mechanic_began_are_missed_by_name():
         state.planes("third", Steps)
     assert state.plane("third", "each") is None and torch.equal(state.plane("first", "each"), torch.zeros(3))
     assert Named().leaves() == {}
+
+
+def test_no_mechanic_has_the_name_of_planes_that_the_law_keeps():
+    class Rate(Counting):
+        name = "rate"
+
+    small_world(mechanics=(Rate(),))
+    with pytest.raises(ValueError, match="mechanics must be one of each name, got rate, .*rate"):
+        small_world(mechanics=(Rate(),), fire=RateFire())
 
 
 def test_a_world_refuses_what_does_not_fit_it():

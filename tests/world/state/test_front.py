@@ -4,6 +4,7 @@ import pytest
 import torch
 
 from tests.world.drawing import draw, marks
+from warp_torchrl.world.state.cells import count_trees
 from warp_torchrl.world.state.front import (
     alignment,
     block_shares,
@@ -13,7 +14,6 @@ from warp_torchrl.world.state.front import (
     sector,
     spreading_front,
 )
-from warp_torchrl.world.state.state import count_trees
 
 FIELD = " ".join(["T" * 15] * 7 + ["T" * 7 + "a" + "T" * 7] + ["T" * 15] * 7)  # fire in the middle of 15 x 15
 

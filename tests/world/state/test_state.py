@@ -12,7 +12,8 @@ from warp_torchrl.world.arrays.batch import Batch
 
 def told(batch):
     """The types that the comments of a batch's class tell, by name."""
-    return dict(re.findall(r"^    (\w+): Tensor.*?# (\w+) \[", inspect.getsource(type(batch)), flags=re.MULTILINE))
+    sources = "".join(inspect.getsource(each) for each in type(batch).__mro__[:-1])
+    return dict(re.findall(r"^    (\w+): Tensor.*?# (\w+) \[", sources, flags=re.MULTILINE))
 
 
 def of_other_types(batch):

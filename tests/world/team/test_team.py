@@ -8,7 +8,8 @@ from tests.world.drawing import draw, drawn
 from warp_torchrl.world.air.wind import Calm
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.law.fire import Fire
-from warp_torchrl.world.state.state import Action, ActionResult, Cover, WorldState, count_trees, is_burning
+from warp_torchrl.world.state.cells import count_trees, is_burning
+from warp_torchrl.world.state.state import Action, ActionResult, Cover, WorldState
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.world import World

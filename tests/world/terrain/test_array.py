@@ -182,7 +182,7 @@ def test_an_enormous_file_is_refused_from_its_header(tmp_path: Path) -> None:
 def test_a_window_has_the_assets_of_its_cells() -> None:
     worth = np.arange(80.0).reshape(8, 10)
     ground = Array(cover=np.full((8, 10), 3), assets=worth, size=4, row=2, column=5)(world_key(torch.arange(2)))
-    assert torch.equal(ground.assets[1], torch.from_numpy(worth[2:6, 5:9]).float())
+    assert torch.equal(ground.layer("assets")[1], torch.from_numpy(worth[2:6, 5:9]).float())
 
 
 def test_a_window_has_the_fuel_and_canopy_of_its_cells() -> None:
@@ -191,9 +191,9 @@ def test_a_window_has_the_fuel_and_canopy_of_its_cells() -> None:
     ground = Array(cover=np.full((8, 10), 3), **planes, size=4, row=2, column=5)(keys(2))
     types = {"fuel": torch.int16, "canopy_cover": torch.float32, "canopy_height": torch.float32}
     for name, values in planes.items():
-        plane = getattr(ground, name)
+        plane = ground.layer(name)
         assert plane.dtype == types[name] and plane[1].tolist() == values[2:6, 5:9].tolist()
-    assert Array(cover=np.full((8, 10), 3))(keys(1)).fuel is None
+    assert Array(cover=np.full((8, 10), 3))(keys(1)).layer("fuel") is None
 
 
 def test_fuel_tells_arrays_apart_and_comes_from_files_too(tmp_path: Path) -> None:
@@ -201,7 +201,7 @@ def test_fuel_tells_arrays_apart_and_comes_from_files_too(tmp_path: Path) -> Non
     np.savez(tmp_path / "land.npz", cover=cover, fuel=cover + 100)
     from_file = Array(path=tmp_path / "land.npz")
     assert from_file == Array(cover=cover, fuel=cover + 100) != Array(cover=cover)
-    assert (from_file(keys(1)).fuel == 103).all()
+    assert (from_file(keys(1)).layer("fuel") == 103).all()
 
 
 def test_the_oldest_trees_stand_on_every_cell_of_fuel() -> None:

@@ -10,8 +10,9 @@ from tests.conftest import small_world
 from tests.world.rasters import LANDFIRE, keys, needs_landfire, refuse
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.terrain.fixed import Fixed
-from warp_torchrl.world.terrain.landscape import LandscapeSource, Perlin
+from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.terrain.raster import Raster
+from warp_torchrl.world.terrain.source import LandscapeSource
 
 SOURCE = Perlin(size=12, relief=40.0)
 

@@ -83,7 +83,8 @@ def test_bands_of_a_landscape_file_are_found_by_their_descriptions(tmp_path, nam
     same = {"elevation": path.name, "canopy": path.name, "canopy_height": path.name, "height_unit": 0.1}
     source = ground(path, table="fbfm40", **same)
     land = source(keys(1))
-    assert (land.fuel == 102).all() and (land.canopy_cover == 60).all() and (land.canopy_height == 15).all()
+    layers = {name: layer.unique().tolist() for name, layer in land.layers.held.items()}
+    assert layers == {"fuel": [102], "canopy_cover": [60], "canopy_height": [15]}
     assert land.elevation[0, :, 0].tolist() == rising()[:, 0].tolist()
     assert source.files[0] == f"fuel: landscape.tif, band {names[3]} [codes of fbfm40]"
     assert source.files[-1] == f"bands of landscape.tif that are not read: {names[1]}, {names[2]}, {names[6]}"
@@ -92,12 +93,12 @@ def test_bands_of_a_landscape_file_are_found_by_their_descriptions(tmp_path, nam
 def test_a_band_is_chosen_where_no_description_tells_which(tmp_path):
     tif(tmp_path / "fuel.tif", flat(1), flat(102))
     refuse(r"^fuel must have one band .* 1 \(int16\), 2 \(int16\); give bands=\{fuel: NUMBER\}$", ground, tmp_path)
-    assert (ground(tmp_path, table="fbfm40", bands={"fuel": 2})(keys(1)).fuel == 102).all()
+    assert (ground(tmp_path, table="fbfm40", bands={"fuel": 2})(keys(1)).layer("fuel") == 102).all()
     refuse("; 3 names 0 of them; give bands", ground, tmp_path, bands={"fuel": 3})
     refuse("^bands must choose bands of fuel, got age", ground, tmp_path, bands={"age": 1})
     tif(tmp_path / "fuel.tif", flat(1), flat(102), names=("LC22_F13_230", "LC22_F40_230"))
     refuse("1 .LC22_F13_230., 2 .LC22_F40_230.; give", ground, tmp_path)
-    assert (ground(tmp_path, bands={"fuel": "lc22_f13_230"})(keys(1)).fuel == 1).all()
+    assert (ground(tmp_path, bands={"fuel": "lc22_f13_230"})(keys(1)).layer("fuel") == 1).all()
     lit = tif(tmp_path / "lit.tif", flat(1), flat(0))
     refuse("^ignition.path must have one band .*; write the one that is meant into", read_ignition, lit, GRID)
 
@@ -106,7 +107,7 @@ def test_an_alpha_band_is_no_layer(tmp_path):
     path = tif(tmp_path / "fuel.tif", flat(102, "uint8"), holed(255, 0, "uint8"))
     with rasterio.open(path, "r+") as file:
         file.colorinterp = [rasterio.enums.ColorInterp.gray, rasterio.enums.ColorInterp.alpha]
-    assert ground(tmp_path, table="fbfm40", nodata="unburnable")(keys(1)).fuel[0, 0, :2].tolist() == [99, 102]
+    assert ground(tmp_path, table="fbfm40", nodata="unburnable")(keys(1)).layer("fuel")[0, 0, :2].tolist() == [99, 102]
 
 
 def test_heights_of_minus_9999_are_nodata_in_an_ascii_grid_that_does_not_say(tmp_path):
@@ -170,7 +171,7 @@ def test_the_canopy_is_in_the_unit_that_the_file_states_and_shares_are_refused(t
     tif(tmp_path / "fuel.tif", flat(1))
     tif(tmp_path / "ch.tif", flat(15), units=("m",))
     tif(tmp_path / "cc.tif", flat(0.5, "float32"))
-    assert (ground(tmp_path, canopy_height="ch.tif")(keys(1)).canopy_height == 15).all()
+    assert (ground(tmp_path, canopy_height="ch.tif")(keys(1)).layer("canopy_height") == 15).all()
     refuse("^height_unit must be that of .* states 'm'", ground, tmp_path, canopy_height="ch.tif", height_unit=0.1)
     refuse("^canopy must be in per cent, 0 to 100", ground, tmp_path, canopy="cc.tif")
 
@@ -186,7 +187,7 @@ def test_the_canopy_is_in_the_unit_that_the_file_states_and_shares_are_refused(t
 )  # fmt: skip
 def test_ascii_grids_of_fire_models_are_read(tmp_path, name, write_it, expected):
     write_it(tmp_path / "fuel.asc")
-    fuel = ground(tmp_path, table="fbfm40", nodata="unburnable")(keys(1)).fuel[0]
+    fuel = ground(tmp_path, table="fbfm40", nodata="unburnable")(keys(1)).layer("fuel")[0]
     assert fuel[5, 5] == expected and fuel[0, 0] == (99 if "hole" in name else expected)
 
 
@@ -220,7 +221,7 @@ def holed(value, hole, dtype="int16"):
 @pytest.mark.parametrize("hole, dtype", [(-9999, "int16"), (-32768, "int16"), (-3.4028235e38, "float32")])
 def test_numbers_below_zero_are_no_fuel_whatever_the_file_declares(tmp_path, hole, dtype):
     tif(tmp_path / "fuel.tif", holed(1, hole, dtype))
-    assert ground(tmp_path, nodata="unburnable")(keys(1)).fuel[0, 0, :2].tolist() == [99, 1]
+    assert ground(tmp_path, nodata="unburnable")(keys(1)).layer("fuel")[0, 0, :2].tolist() == [99, 1]
 
 
 def test_a_largest_number_that_no_table_has_is_refused_with_the_way_out(tmp_path):
@@ -242,7 +243,7 @@ def test_classes_of_land_cover_burn_as_their_cover(tmp_path, table, codes, cover
     tif(tmp_path / "fuel.tif", values)
     source = ground(tmp_path, table=table)
     land = source(keys(1))
-    assert land.fuel is None and land.cover[0, 0, :3].tolist() == [covers[1], covers[2], covers[0]]
+    assert land.layer("fuel") is None and land.cover[0, 0, :3].tolist() == [covers[1], covers[2], covers[0]]
     assert RateFire().on(source).bed.fuel(land)[0, 0, :3].tolist() == [102, 98, 165]
 
 
@@ -310,7 +311,7 @@ def test_files_beside_a_raster_are_not_opened(tmp_path):
     vrt += '</Metadata><VRTRasterBand dataType="Byte" band="1"><SimpleSource><SourceFilename relativeToVRT="1">'
     vrt += f"{secret.name}</SourceFilename><SourceBand>1</SourceBand></SimpleSource></VRTRasterBand></VRTDataset>"
     (tmp_path / "fuel.tif.msk").write_text(vrt)
-    assert (ground(path)(keys(1)).fuel == 1).all()  # by the mask no cell would be known
+    assert (ground(path)(keys(1)).layer("fuel") == 1).all()  # by the mask no cell would be known
     (tmp_path / "odd.tif").write_text(vrt)
     refuse("^fuel must be a whole GTiff raster", ground, tmp_path / "odd.tif")
 

@@ -6,9 +6,9 @@ import torch
 
 from tests.world.rasters import FIRES, LANDFIRE, needs_fires, needs_landfire, read
 from warp_torchrl.world.behaviour.fbp_fuels import fbp_fuels
+from warp_torchrl.world.state.cells import holds_trees
 from warp_torchrl.world.state.state import Cover
 from warp_torchrl.world.terrain.fuel import FBFM13, FBFM40, FBP, NO_FUEL_CODE, TABLES, WORLDCOVER, code_table, to_cover
-from warp_torchrl.world.terrain.landscape import holds_trees
 
 LETTERS = {Cover.LAKE: "L", Cover.WETLAND: "W", Cover.GRASSLAND: "G", Cover.FOREST: "F", Cover.BARE: "B"}
 

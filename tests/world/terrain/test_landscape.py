@@ -7,9 +7,11 @@ from torch import Tensor
 
 from warp_torchrl.world.arrays.random import Stream, world_key
 from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.state.cells import holds_trees
 from warp_torchrl.world.state.state import Cover
-from warp_torchrl.world.terrain.landscape import Perlin, draw_age, holds_trees, map_size
+from warp_torchrl.world.terrain.landscape import Perlin, draw_age
 from warp_torchrl.world.terrain.perlin import fractal_noise
+from warp_torchrl.world.terrain.source import map_size
 from warp_torchrl.world.world import World
 
 

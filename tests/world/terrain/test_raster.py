@@ -27,8 +27,9 @@ from tests.world.rasters import (
 from warp_torchrl.commands.command import train
 from warp_torchrl.runs.config.compose import compose_config, plain
 from warp_torchrl.runs.config.construction import build
+from warp_torchrl.world.state.cells import holds_trees
 from warp_torchrl.world.state.state import Cover
-from warp_torchrl.world.terrain.landscape import draw_age, holds_trees
+from warp_torchrl.world.terrain.landscape import draw_age
 from warp_torchrl.world.terrain.raster import Raster
 
 
@@ -230,11 +231,11 @@ def test_the_oldest_trees_stand_on_all_fuel_whatever_the_canopy(trees):
 def test_canopies_are_told_in_percent_and_metres(trees):
     write(trees["path"] / "cc.tif", [[0, 15, 25, 95, 100, NODATA]] * 4, "int16")
     write(trees["path"] / "ch.tif", [[0, 25, 75, 175, 375, NODATA]] * 4, "int16")
-    assert Raster(**trees)(keys(1)).canopy_cover is None
+    assert Raster(**trees)(keys(1)).layer("canopy_cover") is None
     land = Raster(**trees, canopy="cc.tif", canopy_height="ch.tif", height_unit=0.1)(keys(2))
-    assert land.canopy_cover.tolist() == [[[0, 15, 25, 95, 100, 0]] * 4] * 2
+    assert land.layer("canopy_cover").tolist() == [[[0, 15, 25, 95, 100, 0]] * 4] * 2
     wanted = torch.tensor([0, 2.5, 7.5, 17.5, 37.5, 0]).expand(2, 4, 6)  # LANDFIRE's CH is metres x 10
-    torch.testing.assert_close(land.canopy_height, wanted)
+    torch.testing.assert_close(land.layer("canopy_height"), wanted)
     refuse(
         r"^canopy_height must be in \[0, 150\] \(150 m in units of 1 m\) wherever it is known, got 175",
         **trees,
@@ -248,13 +249,13 @@ def test_canopies_are_told_in_percent_and_metres(trees):
 
 def test_the_fuel_of_a_window_is_its_codes(folder):
     land = Raster(path=folder, size=4, row=5, column=2)(keys(2))
-    assert land.fuel.dtype == torch.int16 and (land.fuel == 8).all()
+    assert land.layer("fuel").dtype == torch.int16 and (land.layer("fuel") == 8).all()
 
 
 @needs_landfire
 def test_the_fuel_of_a_real_map_is_its_pixels():
     land = Raster(path=LANDFIRE, fuel="*F40*", table="fbfm40", row=300, column=250)(keys(1))
-    np.testing.assert_array_equal(land.fuel[0].numpy(), read(LANDFIRE / "LC22_F40_230.tif")[300:364, 250:314])
+    np.testing.assert_array_equal(land.layer("fuel")[0].numpy(), read(LANDFIRE / "LC22_F40_230.tif")[300:364, 250:314])
 
 
 def test_nodata_is_no_fuel_where_the_user_says_so(folder):
@@ -262,7 +263,7 @@ def test_nodata_is_no_fuel_where_the_user_says_so(folder):
     assert source.corner == (0, 0)
     land, unknown = source(keys(2)), torch.zeros(12, 16, dtype=torch.bool)
     unknown[:3, :3] = True
-    assert torch.equal(land.cover[1] == Cover.BARE, unknown) and torch.equal(land.fuel[1] == 99, unknown)
+    assert torch.equal(land.cover[1] == Cover.BARE, unknown) and torch.equal(land.layer("fuel")[1] == 99, unknown)
     assert torch.equal(land.age[1] == 0, unknown)
     heights = torch.from_numpy(read(folder / "map_Elev.tif"))
     known = heights != NODATA
@@ -276,16 +277,16 @@ def test_nodata_that_a_fuel_layer_does_not_declare_is_nodata(folder):
     codes[0, 0] = -9999
     write(folder / "map_F13.tif", codes, "int16", nodata=None)
     refuse(r"columns 0\.\.0 \(1 cells, ", path=folder, size=4, row=0, column=0)
-    assert Raster(path=folder, size=4, row=0, column=0, nodata="unburnable")(keys(1)).fuel[0, 0, 0] == 99
+    assert Raster(path=folder, size=4, row=0, column=0, nodata="unburnable")(keys(1)).layer("fuel")[0, 0, 0] == 99
     table = {8: "forest", -9999: "grassland"}
-    assert Raster(path=folder, size=4, row=0, column=0, table=table)(keys(1)).fuel[0, 0, 0] == -9999
+    assert Raster(path=folder, size=4, row=0, column=0, table=table)(keys(1)).layer("fuel")[0, 0, 0] == -9999
 
 
 @needs_landfire
 def test_a_whole_real_map_can_burn_where_it_is_known():
     source = Raster(path=LANDFIRE, fuel="*F40*", table="fbfm40", size=(613, 549), nodata="unburnable", ages="oldest")
     land = source(keys(1))
-    assert (land.fuel == 99).float().mean() > 0.3 and torch.isfinite(land.elevation).all()
+    assert (land.layer("fuel") == 99).float().mean() > 0.3 and torch.isfinite(land.elevation).all()
     assert land.elevation.min() >= 201.0 and land.elevation.max() <= 1101.0
     assert torch.equal(land.age > 0, holds_trees(land.cover))
 
@@ -297,7 +298,7 @@ def test_ground_of_real_fires_is_read_whole(fire, table, cell):
     layers = {"fuel": "fuel.asc", "elevation": "elevation.asc", "table": table}
     source = Raster(path=FIRES / fire, **layers, size=codes.shape, ages="oldest")
     assert source.cell_size == cell and source.corner == (0, 0)
-    np.testing.assert_array_equal(source(keys(1)).fuel[0].numpy(), codes)
+    np.testing.assert_array_equal(source(keys(1)).layer("fuel")[0].numpy(), codes)
 
 
 # --- Assets of a vector file
@@ -314,7 +315,7 @@ def houses(path, *places, **properties):
 @pytest.mark.parametrize("properties, worth", [({}, 1.0), ({"worth": 2.5}, 2.5), ({"VALUE": "4", "name": "farm"}, 4.0)])
 def test_a_cell_is_worth_the_sum_of_the_shapes_in_it(folder, properties, worth):
     houses(folder / "houses.geojson", (5, 2), (5, 2), (8, 7), **properties)
-    assets = Raster(path=folder, size=(4, 6), row=5, column=2, assets="houses*")(keys(2)).assets[1]
+    assets = Raster(path=folder, size=(4, 6), row=5, column=2, assets="houses*")(keys(2)).layer("assets")[1]
     wanted = torch.zeros(4, 6)
     wanted[0, 0], wanted[3, 5] = 2 * worth, worth
     assert torch.equal(assets, wanted)

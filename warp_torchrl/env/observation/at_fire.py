@@ -8,7 +8,8 @@ from torch import Tensor
 from warp_torchrl.env.observation.presets import Space
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.squares import window
-from warp_torchrl.world.state.state import Forecast, WorldState, is_burning
+from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.state import Forecast, WorldState
 from warp_torchrl.world.team.places import from_middle, nearest_mate
 from warp_torchrl.world.world import World
 

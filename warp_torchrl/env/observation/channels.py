@@ -19,8 +19,9 @@ from warp_torchrl.env.observation.look import Look
 from warp_torchrl.validation import check_new_name
 from warp_torchrl.world.arrays.bytes import byte, to_codes
 from warp_torchrl.world.mechanics.table import mechanics
+from warp_torchrl.world.state.cells import is_burning, is_tree
 from warp_torchrl.world.state.role import PAPER_ROLES
-from warp_torchrl.world.state.state import FIRST_FIRE, WorldState, is_burning, is_tree
+from warp_torchrl.world.state.state import FIRST_FIRE, WorldState
 from warp_torchrl.world.world import World
 
 ELEVATION_SCALE = 100.0

@@ -29,7 +29,8 @@ from warp_torchrl.world.arrays.blocks import block_means
 from warp_torchrl.world.arrays.squares import Window, window
 from warp_torchrl.world.mechanics.agencies.agencies import land_of_each, lands_of
 from warp_torchrl.world.mechanics.sensing.records import freshness, kept, known_codes, records_of
-from warp_torchrl.world.state.state import FIRST_FIRE, OLDEST, Forecast, WorldState, is_burning
+from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.state import FIRST_FIRE, OLDEST, Forecast, WorldState
 from warp_torchrl.world.world import World
 
 PICTURE_SIDE = 8

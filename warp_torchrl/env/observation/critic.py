@@ -37,7 +37,8 @@ from warp_torchrl.world.arrays.blocks import block_means
 from warp_torchrl.world.fires.reach import distance_from_fire
 from warp_torchrl.world.mechanics.agencies.agencies import land_of_each, lands_of
 from warp_torchrl.world.mechanics.sensing.records import freshness, kept, known_codes
-from warp_torchrl.world.state.state import FIRST_FIRE, Forecast, WorldState, is_burning
+from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.state import FIRST_FIRE, Forecast, WorldState
 from warp_torchrl.world.world import World
 
 STATE_SIDE = 16

@@ -4,7 +4,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.entries import Part
-from warp_torchrl.world.arrays.constants import counting
+from warp_torchrl.world.arrays.counting import counting
 from warp_torchrl.world.arrays.distances import chebyshev_distance
 from warp_torchrl.world.mechanics.water.supply import where_tanks_fill
 from warp_torchrl.world.state.state import WorldState

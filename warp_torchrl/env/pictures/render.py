@@ -14,8 +14,9 @@ from torch.nn.functional import interpolate
 
 from warp_torchrl.system.modes import kept
 from warp_torchrl.world.mechanics.sensing.records import freshness, records_of
+from warp_torchrl.world.state.cells import count_trees, is_burning
 from warp_torchrl.world.state.role import ROLES
-from warp_torchrl.world.state.state import EMPTY, FIRST_FIRE, OLDEST, Cover, WorldState, count_trees, is_burning
+from warp_torchrl.world.state.state import EMPTY, FIRST_FIRE, OLDEST, Cover, WorldState
 
 # The fire front, 11..13, is lighter than any ground; 14 stays 16 units of CIE Lab off without the red or green cone.
 _GROUND = {  # without a tree, youngest tree, oldest tree

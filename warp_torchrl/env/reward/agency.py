@@ -8,7 +8,8 @@ from torch.nn.functional import one_hot
 
 from warp_torchrl.env.reward.conservation import Conservation
 from warp_torchrl.world.mechanics.agencies.agencies import by_land, lands_of, worth_of
-from warp_torchrl.world.state.state import Transition, WorldState, is_tree
+from warp_torchrl.world.state.cells import is_tree
+from warp_torchrl.world.state.state import Transition, WorldState
 from warp_torchrl.world.world import World
 
 

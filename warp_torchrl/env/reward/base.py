@@ -7,8 +7,9 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.distances import distance_to_nearest
+from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.front import exposure
-from warp_torchrl.world.state.state import Transition, TreeCounts, WorldState, is_burning
+from warp_torchrl.world.state.state import Transition, TreeCounts, WorldState
 from warp_torchrl.world.world import World
 
 

@@ -19,8 +19,9 @@ from torch.nn.functional import avg_pool2d
 from warp_torchrl.env.reward.base import Reward
 from warp_torchrl.env.reward.terms import TERMS
 from warp_torchrl.validation import check_fields, did_you_mean
+from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.front import alignment, block_shares, centre, containment, exposure
-from warp_torchrl.world.state.state import Transition, TreeCounts, WorldState, is_burning
+from warp_torchrl.world.state.state import Transition, TreeCounts, WorldState
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,7 +145,7 @@ class Coverage(Conservation):
         """Return R without the cost of acts, float32 [B]."""
         lost = state.burned | is_burning(state.cells)
         spared = block_shares(lost, state.initial, self.side) < self.least
-        assets = state.landscape.assets
+        assets = state.landscape.layer("assets")
         if assets is None:
             return self.worth(counts) + self.omega * spared.sum((1, 2))
         worth = avg_pool2d(assets[:, None], self.side, ceil_mode=True, count_include_pad=False)[:, 0]

@@ -9,7 +9,8 @@ from torch import Tensor
 from warp_torchrl.env.reward.base import Reward
 from warp_torchrl.world.arrays.distances import distance_to_nearest
 from warp_torchrl.world.arrays.geometry import flood
-from warp_torchrl.world.state.state import Action, Transition, is_burning, is_tree
+from warp_torchrl.world.state.cells import is_burning, is_tree
+from warp_torchrl.world.state.state import Action, Transition
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,8 @@ from torch import Tensor
 from warp_torchrl.env.reward.base import Reward
 from warp_torchrl.world.arrays.geometry import offsets
 from warp_torchrl.world.arrays.squares import window
-from warp_torchrl.world.state.state import Transition, WorldState, is_burning, is_tree
+from warp_torchrl.world.state.cells import is_burning, is_tree
+from warp_torchrl.world.state.state import Transition, WorldState
 from warp_torchrl.world.team.places import from_middle, nearest_mate
 
 

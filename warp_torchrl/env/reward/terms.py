@@ -12,8 +12,9 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_new_name
 from warp_torchrl.world.arrays.geometry import grow
+from warp_torchrl.world.state.cells import is_burning, is_tree
 from warp_torchrl.world.state.front import alignment, centre, sector
-from warp_torchrl.world.state.state import Transition, TreeCounts, WorldState, is_burning, is_tree
+from warp_torchrl.world.state.state import Transition, TreeCounts, WorldState
 
 Term = Callable[[Transition], Tensor]
 """What a step earns, float32 [B]: the difference of a state's value, or an event that can happen to a tree once."""

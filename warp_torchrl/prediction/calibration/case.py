@@ -175,12 +175,8 @@ def _landscape(folder: Path, header: Header) -> tuple[Landscape, list[str]]:
     elevation, told = (
         (None, ["elevation: none, the ground is level"]) if path is None else _elevation(path, header.grid)
     )
-    return Landscape(
-        cover=cover,
-        age=torch.full_like(cover, OLDEST),
-        elevation=elevation,
-        fuel=torch.from_numpy(fuel)[None],
-    ), told
+    ground = Landscape(cover=cover, age=torch.full_like(cover, OLDEST), elevation=elevation)
+    return ground.with_layers(fuel=torch.from_numpy(fuel)[None]), told
 
 
 def _elevation(path: Path | None, grid: Grid) -> tuple[Tensor | None, list[str]]:

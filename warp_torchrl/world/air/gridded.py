@@ -17,9 +17,9 @@ from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.terrain.array import read_npz
 from warp_torchrl.world.terrain.bands import DEGREES, SPEED_UNITS, factor_of
 from warp_torchrl.world.terrain.grid import Grid, check_grid
-from warp_torchrl.world.terrain.landscape import LandscapeSource, map_size
 from warp_torchrl.world.terrain.layer import Header, find_layer, read_header, read_layer
 from warp_torchrl.world.terrain.resampling import resample
+from warp_torchrl.world.terrain.source import LandscapeSource, map_size
 
 STRONGEST = 120.0
 """Largest component of a wind that is believed [m/s]."""

@@ -14,7 +14,7 @@ from warp_torchrl.world.air.wind import Wind
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.behaviour.moistures import MOISTURES
 from warp_torchrl.world.state.state import WorldState
-from warp_torchrl.world.terrain.landscape import LandscapeSource
+from warp_torchrl.world.terrain.source import LandscapeSource
 from warp_torchrl.world.weather.convergence import grid_convergence
 from warp_torchrl.world.weather.table import OPEN_10M_OVER_20FT, WeatherTable, read_weather
 

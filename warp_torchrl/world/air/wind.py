@@ -15,7 +15,7 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.state.state import WorldState
-from warp_torchrl.world.terrain.landscape import LandscapeSource
+from warp_torchrl.world.terrain.source import LandscapeSource
 
 _FASTEST = 60.0  # m/s
 

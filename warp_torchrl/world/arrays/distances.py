@@ -5,7 +5,7 @@ from torch import Tensor
 
 from warp_torchrl.world.arrays.bytes import byte
 from warp_torchrl.world.arrays.compile import is_fused
-from warp_torchrl.world.arrays.constants import counting
+from warp_torchrl.world.arrays.counting import counting
 
 FAR = 30_000
 """Distance reported where there is nothing to be near to [cells]; fits in int16."""

@@ -12,7 +12,7 @@ from zlib import crc32
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.arrays.constants import counting
+from warp_torchrl.world.arrays.counting import counting
 from warp_torchrl.world.arrays.hashing import mixed, splitmix64
 
 _GOLDEN = -7046029254386353131  # 2^64 / golden ratio, odd, as a signed word

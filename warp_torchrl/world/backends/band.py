@@ -1,4 +1,4 @@
-"""Law ``rate`` at the trees beside the fire alone: the road of a CPU.
+"""Law ``rate`` at the trees beside the fire alone: the backend of a CPU.
 
 Only they have a time of arrival. They are a few cells in a hundred, and times there alone come to the same bits as
 those of whole maps. How many they are is read back, which a CPU does for nothing and a CUDA device does not.
@@ -15,9 +15,10 @@ from warp_torchrl.world.arrays.bytes import byte
 from warp_torchrl.world.arrays.geometry import DIRECTIONS
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.backends.edge import places
+from warp_torchrl.world.law.arrivals import Arrivals, arrivals_in, reached, terms_of
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER, NOWHERE, Metric, Places, arrival, rate_from
-from warp_torchrl.world.state.state import Arrivals, WorldState
+from warp_torchrl.world.state.state import WorldState
 
 
 class AtBand:
@@ -51,13 +52,13 @@ class AtBand:
         return _band_of(places(byte(self.fire.beside(state)).flatten()), state)
 
     def _arrivals(self, state: WorldState, band: "_Band") -> Arrivals:
-        kept, times = self.fire.sources(state)
-        around = [padded(times, NEVER), padded(kept.origin, NOWHERE)]
+        kept = arrivals_in(state)
+        around = [padded(self.fire.sources(state), NEVER), padded(kept.origin, NOWHERE)]
         times, origins = (plane.index_select(0, band.around.flatten()).view(8, -1) for plane in around)
-        reached = self.fire.reached(state).flatten()
+        known = reached(state).flatten()
 
         def time_of(origin: Tensor) -> Tensor:
-            return reached.index_select(0, band.first + origin)
+            return known.index_select(0, band.first + origin)
 
         at = Places(band.row, band.column, state.cells.shape[2], time_of)
         minutes, origin = arrival(times, origins, _metric(state, band.cell), at)
@@ -112,9 +113,7 @@ def padded(plane: Tensor, beyond: float) -> Tensor:
 
 
 def _metric(state: WorldState, cell: Tensor) -> Metric:
-    made, pace = state.air.travel, state.ground.pace
-    if made is None or pace is None:
-        raise ValueError("the worlds must be those of a fire with rates of spread")
+    made, pace = terms_of(state.ground, state.air)
     factor = pace.flatten().index_select(0, cell)
     slowness, east, north = (made[:, part].flatten().index_select(0, cell) * factor for part in range(3))
     return slowness, east, north

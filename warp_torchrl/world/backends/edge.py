@@ -1,4 +1,4 @@
-"""The fire's edge, the trees that a burning neighbour may ignite in the next tick: the road of a CPU.
+"""The fire's edge, the trees that a burning neighbour may ignite in the next tick: the backend of a CPU.
 
 Where trees neither grow nor ignite by themselves, nothing else is drawn for. They are a few cells in a hundred, so that
 probabilities and draws at them alone cost a fraction of those of whole maps, and come to the same bits. How many they
@@ -18,8 +18,8 @@ from warp_torchrl.world.arrays.geometry import DIRECTIONS
 from warp_torchrl.world.arrays.random import Stream, uniform_among
 from warp_torchrl.world.backends.join import Joining, in_place
 from warp_torchrl.world.backends.planes import age_fires, is_fuel, spreads
-from warp_torchrl.world.backends.table import BESIDE, bits, burning_neighbours
-from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.backends.table import BESIDE, bits, burning_neighbours, table_in
+from warp_torchrl.world.law.fire import Fire, slope_in
 from warp_torchrl.world.state.state import FIRST_FIRE, WorldState
 
 _WORD = 8  # bytes
@@ -59,11 +59,12 @@ class AtEdge:
         return edge_of(spreads(self.fire, state), is_fuel(self.fire, state), self.fire.directions)
 
     def _probabilities(self, state: WorldState, trees: "Edge") -> "EdgeProbabilities":
-        if state.air.table is not None:
-            return ByPattern(trees, state.air.table, trees.of(state.cover).long() + 1)
+        table = table_in(state)
+        if table is not None:
+            return ByPattern(trees, table, trees.of(state.cover).long() + 1)
         law = in_place(self.fire.law)
         susceptible = law.susceptibility(trees.of(state.alpha))
-        return ByStrength(law, trees, susceptible, self.fire.gain_in(state), state.ground.slope)
+        return ByStrength(law, trees, susceptible, self.fire.gain_in(state), slope_in(state))
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from warp_torchrl.world.law.law import LARGEST_ALPHA, Clipped, Hazard
 
 
 class Joining(Protocol):
-    """What a road asks of a law; all tensors are float32, those of one call have one shape."""
+    """What a backend needs of a law; all tensors are float32, those of one call have one shape."""
 
     def susceptibility(self, alpha: Tensor) -> Tensor:
         """Return the ground's part of a strength."""

@@ -1,4 +1,4 @@
-"""Whole maps in bytes, and neighbours as slices of one row: the road for any automaton of the two laws."""
+"""Whole maps in bytes, and neighbours as slices of one row: the backend for any automaton of the two laws."""
 
 import torch
 from torch import Tensor
@@ -23,11 +23,11 @@ from warp_torchrl.world.arrays.compile import is_fused
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.backends.join import in_place
 from warp_torchrl.world.backends.rows import expected_from_rows, probability_from_rows
-from warp_torchrl.world.backends.table import probability_by_pattern
-from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.backends.table import probability_by_pattern, table_in
+from warp_torchrl.world.law.fire import Fire, slope_in
 from warp_torchrl.world.law.law import in_finer_time
-from warp_torchrl.world.state.state import EMBER, FIRST_FIRE, OLDEST, WorldState, is_burning
-from warp_torchrl.world.terrain.landscape import holds_trees
+from warp_torchrl.world.state.cells import holds_trees, is_burning
+from warp_torchrl.world.state.state import EMBER, FIRST_FIRE, OLDEST, WorldState
 
 
 class Planes:
@@ -69,7 +69,7 @@ class Planes:
         """Return what ``Fire.expected_ignitions`` and ``Fire.ignition_probability`` do, float32 [B, H, W] each."""
         fire = self.fire
         expected = expected_from_rows(
-            in_place(fire.law), self._susceptible(state), fire.gain_in(state), state.ground.slope, fire.directions
+            in_place(fire.law), self._susceptible(state), fire.gain_in(state), slope_in(state), fire.directions
         )
         return expected * number(spreads(fire, state)), self.ignition_probability(state)
 
@@ -84,15 +84,16 @@ class Planes:
 
     def _spread_probability(self, state: WorldState) -> Tensor:
         fire = self.fire
-        if state.air.table is not None and not is_fused():  # a look-up costs more than what it spares there
+        table = table_in(state)
+        if table is not None and not is_fused():  # a look-up costs more than what it spares there
             kind = (state.cover + 1) * byte(is_fuel(fire, state))
-            return probability_by_pattern(state.air.table, spreads(fire, state), kind)
+            return probability_by_pattern(table, spreads(fire, state), kind)
         return probability_from_rows(
             in_place(fire.law),
             spreads(fire, state),
             self._susceptible(state),
             fire.gain_in(state),
-            state.ground.slope,
+            slope_in(state),
             fire.directions,
         )
 

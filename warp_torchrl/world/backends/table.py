@@ -4,6 +4,8 @@ There are 256 patterns of burning neighbours, so a small table holds every chanc
 pattern is a byte with a bit for each neighbour, see ``bit_of``.
 """
 
+from dataclasses import dataclass
+
 import torch
 from torch import Tensor
 from torch.nn.functional import pad
@@ -12,7 +14,21 @@ from warp_torchrl.system.modes import kept
 from warp_torchrl.world.arrays.bytes import byte
 from warp_torchrl.world.arrays.constants import numbers
 from warp_torchrl.world.backends.join import in_place
-from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.law.fire import Fire, Gains
+from warp_torchrl.world.state.state import WorldState
+
+
+@dataclass(eq=False, repr=False)
+class Tabled(Gains):
+    """What the law makes of one wind for each world, and its probabilities on level ground."""
+
+    table: Tensor  # float32 [B,G,256], of ``pattern_table``
+
+
+def table_in(state: WorldState) -> Tensor | None:
+    """Return the table that worlds hold, float32 [B, G, 256]; None where they have slopes or several winds."""
+    terms = state.air.terms
+    return terms.table if isinstance(terms, Tabled) else None
 
 
 def pattern_table(fire: Fire, gain: Tensor) -> Tensor:

@@ -4,7 +4,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.air.wind import Wind
-from warp_torchrl.world.backends import road
+from warp_torchrl.world.backends import backend
 from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.state.state import Landscape, Vehicles, WorldState
 
@@ -36,7 +36,7 @@ def initial_state(
     made = fire.ground(ground, cell_size, key)
     return WorldState(
         ground=made,
-        air=road.air(fire, wind, moisture, made),
+        air=backend.air(fire, wind, moisture, made),
         cells=cells.clone(),
         age=none,
         stage_age=none.clone() if fire.ticks_per_stage > 1 else None,
@@ -57,7 +57,7 @@ def initial_state(
 
 def advance(state: WorldState, fire: Automaton, wind: Wind, ticks_now: Tensor) -> WorldState:
     """Advance fire and wind by one tick in the worlds that tick now, bool [B]."""
-    after = road.fastest(fire, state.cells.device).tick(state, ticks_now)
+    after = backend.fastest(fire, state.cells.device).tick(state, ticks_now)
     if not wind.changes:
         return after
     now = torch.where(ticks_now[:, None, None, None], wind.after_tick(after), state.wind)
@@ -66,4 +66,4 @@ def advance(state: WorldState, fire: Automaton, wind: Wind, ticks_now: Tensor) -
 
 def in_wind(state: WorldState, fire: Automaton, wind: Tensor, moisture: Tensor | None = None) -> WorldState:
     """Return worlds in another wind, float32 [B, 2, 1, 1] or [B, 2, H, W] [m/s], and moisture; None keeps theirs."""
-    return road.in_wind(fire, state, wind, state.air.moisture if moisture is None else moisture)
+    return backend.in_wind(fire, state, wind, state.air.moisture if moisture is None else moisture)

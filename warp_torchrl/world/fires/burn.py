@@ -9,8 +9,10 @@ from warp_torchrl.world.air.wind import Wind
 from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.backends.tick import advance, in_wind, initial_state
+from warp_torchrl.world.law.arrivals import RATE, Arrivals
 from warp_torchrl.world.law.automaton import Automaton
-from warp_torchrl.world.state.state import Landscape, WorldState, is_burning
+from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.state import Landscape, WorldState
 from warp_torchrl.world.team.team import Team
 
 
@@ -43,9 +45,7 @@ class FireHistory(Batch):
 
 
 def start_burning(
-    cells: Tensor,
-    cover: Tensor,
-    elevation: Tensor | None,
+    ground: Landscape,
     *,
     wind: Wind,
     fire: Automaton,
@@ -53,16 +53,15 @@ def start_burning(
     stage_age: Tensor | None,
     seed: int,
     cell_size: float,
-    fuel: Tensor | None = None,
 ) -> WorldState:
     """Return worlds without vehicles that are ready for their tick number ``first_tick`` + 1.
 
-    The arguments are those of ``warp_torchrl.simulate``.
+    The ages of the ground are the codes of the cells; the other arguments are those of ``warp_torchrl.simulate``.
     """
+    cells = ground.age
     seeds = seed + torch.arange(cells.shape[0], device=cells.device)
     key = world_key(seeds, torch.zeros_like(seeds))
-    ground = Landscape(cover=cover, age=cells, elevation=elevation, fuel=fuel)
-    nobody = Team(n_agents=1).place(key, cover, is_burning(cells))
+    nobody = Team(n_agents=1).place(key, ground.cover, is_burning(cells))
     air = wind(key, (cells.shape[1], cells.shape[2]))
     state = initial_state(ground, fire, air, key, nobody, cell_size, wind.moisture(key, torch.zeros_like(key)))
     state = fire.started(state)
@@ -86,15 +85,15 @@ def trace(state: WorldState, fire: Automaton, wind: Wind, ticks: int, cell_size:
     """Burn for ``ticks`` ticks and record when each cell caught fire."""
     burning = is_burning(state.cells)
     arrival = torch.where(burning, 0, -1).to(torch.int32)
-    minutes = None if state.arrivals is None else torch.where(burning, 0.0, torch.nan)
+    minutes = torch.where(burning, 0.0, torch.nan) if state.keeps(RATE) else None
     alight = [burning.sum((1, 2), dtype=torch.int32)]
     for tick in range(1, ticks + 1):
         state = burn(state, fire, wind, 1)
         burning = is_burning(state.cells)
         lit = burning & (arrival < 0)
         arrival.masked_fill_(lit, tick)
-        if minutes is not None and state.arrivals is not None:
-            minutes = torch.where(lit, state.arrivals.minutes, minutes)
+        if minutes is not None:
+            minutes = torch.where(lit, state.planes(RATE, Arrivals).minutes, minutes)
         alight.append(burning.sum((1, 2), dtype=torch.int32))
     return FireHistory(
         cells=state.cells,

@@ -4,7 +4,8 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.arrays.detours import moves_from
-from warp_torchrl.world.state.state import WorldState, is_tree
+from warp_torchrl.world.state.cells import is_tree
+from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.world import World
 
 

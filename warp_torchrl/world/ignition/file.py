@@ -14,9 +14,10 @@ from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.geometry import grow
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.ignition.ignition import IgnitionSource
+from warp_torchrl.world.state.cells import holds_trees
 from warp_torchrl.world.terrain.cells import read_cells
 from warp_torchrl.world.terrain.grid import Grid
-from warp_torchrl.world.terrain.landscape import LandscapeSource, holds_trees, map_size
+from warp_torchrl.world.terrain.source import LandscapeSource, map_size
 
 _NAME = "ignition.path"
 _SAMPLES = 4  # worlds whose ground is compared

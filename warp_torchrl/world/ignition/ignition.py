@@ -10,7 +10,7 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.geometry import grow
 from warp_torchrl.world.arrays.random import Stream, uniform
-from warp_torchrl.world.terrain.landscape import LandscapeSource, map_size
+from warp_torchrl.world.terrain.source import LandscapeSource, map_size
 
 _FEW = 4  # fires, whose places are found faster one by one than by topk
 

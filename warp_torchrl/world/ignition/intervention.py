@@ -7,7 +7,8 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.law.automaton import Automaton
-from warp_torchrl.world.state.state import FIRST_FIRE, WorldState, is_tree
+from warp_torchrl.world.state.cells import is_tree
+from warp_torchrl.world.state.state import FIRST_FIRE, WorldState
 
 
 def can_be_lit(state: WorldState, fire: Automaton) -> Tensor:

@@ -7,7 +7,7 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.ignition.ignition import IgnitionSource
-from warp_torchrl.world.terrain.landscape import LandscapeSource, map_size
+from warp_torchrl.world.terrain.source import LandscapeSource, map_size
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,8 +14,9 @@ from warp_torchrl.world.air.wind import Wind
 from warp_torchrl.world.arrays.constants import numbers
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.law import law
+from warp_torchrl.world.law.cells import holds_trees
 from warp_torchrl.world.state.state import EMBER, FIRST_FIRE, OLDEST, Air, Ground, Landscape, WorldState
-from warp_torchrl.world.terrain.landscape import LandscapeSource, holds_trees
+from warp_torchrl.world.terrain.source import LandscapeSource
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,8 +83,13 @@ class Automaton(ABC):
         """Return whether a world without fire stays so: an episode may end early."""
         return self.beta == 0.0
 
+    @property
+    def keeps(self) -> tuple[str, ...]:
+        """Return the names of the planes that the automaton keeps in ``WorldState.extras``."""
+        return ()
+
     def started(self, state: WorldState) -> WorldState:
-        """Return worlds at their start, whose cells are lit, with what the automaton keeps of its own."""
+        """Return worlds at their start, whose cells are lit, with the planes of the automaton."""
         return state
 
     def lit(self, state: WorldState, where: Tensor) -> WorldState:

@@ -8,11 +8,26 @@ from torch import Tensor
 
 from warp_torchrl.system.modes import kept
 from warp_torchrl.validation import check_fields
+from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.arrays.geometry import DISTANCES
 from warp_torchrl.world.law import law
 from warp_torchrl.world.law.automaton import Automaton, of_codes
 from warp_torchrl.world.law.wind_and_slope import alexandridis, ellipse, slope_factor
 from warp_torchrl.world.state.state import Air, Ground, Landscape, WorldState
+
+
+@dataclass(eq=False, repr=False)
+class Slopes(Batch):
+    """What the law makes of ground that is not flat."""
+
+    slope: Tensor  # float32 [B,8,H+2,W+1], s_d into a cell, a margin about the map
+
+
+@dataclass(eq=False, repr=False)
+class Gains(Batch):
+    """What the law makes of one wind for each world."""
+
+    gain: Tensor  # float32 [B,8,1,1], w_d / distance_d
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,18 +112,18 @@ class Fire(Automaton):
     def ground(self, landscape: Landscape, cell_size: float, key: Tensor) -> Ground:
         """See ``Automaton``."""
         height = landscape.elevation
-        slope = None if height is None else slope_factor(height, cell_size, self.slope_gain)
-        return Ground(landscape=landscape, alpha=self.flammability(landscape), slope=slope, cell_size=cell_size)
+        terms = Batch() if height is None else Slopes(slope_factor(height, cell_size, self.slope_gain))
+        return Ground(landscape, self.flammability(landscape), terms, cell_size)
 
     def air(self, wind: Tensor, moisture: Tensor | None, ground: Ground) -> Air:
         """See ``Automaton``. What differs from cell to cell is not kept: ``gain`` makes it anew."""
-        return Air(wind=wind, moisture=moisture, gain=self.gain(wind) if wind.shape[2:] == (1, 1) else None)
+        return Air(wind, moisture, Gains(self.gain(wind)) if wind.shape[2:] == (1, 1) else Batch())
 
     def spread_probability(self, state: WorldState) -> Tensor:
         """Return each tree's probability to be ignited by its neighbours in one tick, float32 [B, H, W]."""
         gain, burns = self.gain_in(state), self.spreads(state).to(torch.float32)
         return law.spread_probability(
-            self.law, burns, self._susceptible(state), gain, state.ground.slope_into_cell, self.directions
+            self.law, burns, self._susceptible(state), gain, _slope_into_cell(state), self.directions
         )
 
     def ignition_probability(self, state: WorldState) -> Tensor:
@@ -125,16 +140,29 @@ class Fire(Automaton):
     def expected_ignitions(self, state: WorldState) -> Tensor:
         """Return how many neighbours each burning cell is expected to ignite in one tick, float32 [B, H, W]; else 0."""
         expected = law.expected_ignitions(
-            self.law, self._susceptible(state), self.gain_in(state), state.ground.slope_into_cell, self.directions
+            self.law, self._susceptible(state), self.gain_in(state), _slope_into_cell(state), self.directions
         )
         return expected * self.spreads(state)
 
     def gain_in(self, state: WorldState) -> Tensor:
         """Return w_d / distance_d at the source in some worlds, float32 [B, 8, h, w]."""
-        return self.gain(state.wind) if state.air.gain is None else state.air.gain
+        terms = state.air.terms
+        return terms.gain if isinstance(terms, Gains) else self.gain(state.wind)
 
     def _susceptible(self, state: WorldState) -> Tensor:
         return self.law.susceptibility(state.alpha) * self.is_fuel(state)
+
+
+def slope_in(state: WorldState) -> Tensor | None:
+    """Return s_d into each cell with a margin about the map, float32 [B, 8, H + 2, W + 1]; None where all is flat."""
+    terms = state.ground.terms
+    return terms.slope if isinstance(terms, Slopes) else None
+
+
+def _slope_into_cell(state: WorldState) -> Tensor | None:
+    """Return s_d into each cell by direction of travel, float32 [B, 8, H, W]; None where all is flat."""
+    slope = slope_in(state)
+    return None if slope is None else slope[:, :, 1:-1, :-1]
 
 
 @kept(8)

@@ -20,7 +20,7 @@ from warp_torchrl.world.behaviour.surface import surface_spread
 from warp_torchrl.world.behaviour.wind_adjustment import TEN_METRES, wind_adjustment_factor
 from warp_torchrl.world.law.mapped_fuel import check_codes
 from warp_torchrl.world.state.state import Landscape
-from warp_torchrl.world.terrain.landscape import LandscapeSource, map_size
+from warp_torchrl.world.terrain.source import LandscapeSource, map_size
 
 COVER_FUEL: Mapping[str, tuple[int, int, int, int, int]] = {
     "fbfm13": (98, 8, 1, 10, 99),
@@ -74,8 +74,9 @@ class FuelBed:
 
     def fuel(self, landscape: Landscape) -> Tensor:
         """Return the fuel codes of landscapes, int16 [B, H, W]."""
-        if landscape.fuel is not None and not self.by_cover:
-            return landscape.fuel
+        codes = landscape.layer("fuel")
+        if codes is not None and not self.by_cover:
+            return codes
         table = torch.tensor(self.fuel_of_cover, dtype=torch.int16, device=landscape.cover.device)
         return table.index_select(0, landscape.cover.flatten().to(torch.int32)).view(landscape.cover.shape)
 
@@ -145,8 +146,8 @@ class FuelBed:
         table = _on(self.table, fuel.device)
         depth = table.fuels.depth[table.index(fuel)]
         none = torch.zeros_like(depth)
-        cover = none if landscape.canopy_cover is None else landscape.canopy_cover
-        height = none + _UNTOLD_HEIGHT if landscape.canopy_height is None else landscape.canopy_height
+        cover, height = landscape.layer("canopy_cover"), landscape.layer("canopy_height")
+        cover, height = none if cover is None else cover, none + _UNTOLD_HEIGHT if height is None else height
         return wind_adjustment_factor(depth, cover, height, none + 1.0) / TEN_METRES
 
     def _factor(self, fuel: Tensor) -> Tensor:

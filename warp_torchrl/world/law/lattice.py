@@ -9,8 +9,8 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.geometry import neighbour_in
 from warp_torchrl.world.law.automaton import Automaton
-from warp_torchrl.world.state.state import FIRST_FIRE, Air, Ground, Landscape, WorldState, is_burning
-from warp_torchrl.world.terrain.landscape import holds_trees
+from warp_torchrl.world.law.cells import holds_trees, is_burning
+from warp_torchrl.world.state.state import FIRST_FIRE, Air, Ground, Landscape, WorldState
 
 _FOUR = range(0, 8, 2)
 """Directions of the neighbours along the axes."""
@@ -69,11 +69,11 @@ class LatticeFire(Automaton):
 
     def ground(self, landscape: Landscape, cell_size: float, key: Tensor) -> Ground:
         """See ``Automaton``."""
-        return Ground(landscape=landscape, alpha=self.flammability(landscape), slope=None, cell_size=cell_size)
+        return Ground(landscape, self.flammability(landscape), cell_size=cell_size)
 
     def air(self, wind: Tensor, moisture: Tensor | None, ground: Ground) -> Air:
         """See ``Automaton``."""
-        return Air(wind=wind, moisture=moisture, gain=None)
+        return Air(wind, moisture)
 
     def ignition_probability(self, state: WorldState) -> Tensor:
         """Return 1 - (1 - alpha)^k, joined with p_spont, float32 [B, H, W]; 0 where nothing can ignite."""

@@ -12,7 +12,8 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.arrays.geometry import neighbour_in
-from warp_torchrl.world.state.state import EMBER, FIRST_FIRE, OLDEST, WorldState, is_burning
+from warp_torchrl.world.law.cells import is_burning
+from warp_torchrl.world.state.state import EMBER, FIRST_FIRE, OLDEST, WorldState
 
 LARGEST_ALPHA = 0.95
 """Flammability from which law ``hazard`` grows no more: at 1 its hazard would have no bound."""

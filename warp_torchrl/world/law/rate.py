@@ -11,25 +11,19 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.air.wind import Wind
-from warp_torchrl.world.arrays.geometry import grow, neighbour_in, neighbours
+from warp_torchrl.world.arrays.geometry import grow, neighbour_in
 from warp_torchrl.world.arrays.random import Stream, uniform, uniform_at
 from warp_torchrl.world.behaviour.moistures import moisture_row
+from warp_torchrl.world.law import arrivals
+from warp_torchrl.world.law.arrivals import RATE, Arrivals, Paces, Travel, arrivals_in, metric, own_cell
 from warp_torchrl.world.law.automaton import Automaton
+from warp_torchrl.world.law.cells import is_burning, is_tree
 from warp_torchrl.world.law.fuel_bed import COVER_FUEL, FuelBed
 from warp_torchrl.world.law.mapped_fuel import check_fuel, has_own_table, told_fuel
-from warp_torchrl.world.law.travel import NEVER, NOWHERE, Metric, Places, arrival, at_other_rates, rate_from, travel
-from warp_torchrl.world.state.state import (
-    FIRST_FIRE,
-    Air,
-    Arrivals,
-    Ground,
-    Landscape,
-    WorldState,
-    is_burning,
-    is_tree,
-)
+from warp_torchrl.world.law.travel import NEVER, rate_from, travel
+from warp_torchrl.world.state.state import FIRST_FIRE, Air, Ground, Landscape, WorldState
 from warp_torchrl.world.state.window import Window
-from warp_torchrl.world.terrain.landscape import LandscapeSource
+from warp_torchrl.world.terrain.source import LandscapeSource
 
 TICKS_PER_CELL = 2
 """Ticks in which the fastest fire crosses a cell: with one the narrowest heads fall back by a tenth more."""
@@ -107,6 +101,11 @@ class RateFire(Automaton):
         return 1.0 if self.minutes_per_tick is None else self.minutes_per_tick
 
     @property
+    def keeps(self) -> tuple[str, ...]:
+        """See ``Automaton``: the times of arrival."""
+        return (RATE,)
+
+    @property
     def ticks_per_stage(self) -> int:
         """Return the ticks that a burning stage lasts: a fifth of the residence."""
         return min(_LONGEST_WAIT, max(1, round(self.residence / _STAGES / self.minutes)))
@@ -178,13 +177,8 @@ class RateFire(Automaton):
 
     def ground(self, landscape: Landscape, cell_size: float, key: Tensor) -> Ground:
         """See ``Automaton``."""
-        return Ground(
-            landscape=landscape,
-            alpha=self.flammability(landscape),
-            slope=None,
-            pace=self.pace(key, (landscape.cover.shape[1], landscape.cover.shape[2])),
-            cell_size=cell_size,
-        )
+        pace = self.pace(key, (landscape.cover.shape[1], landscape.cover.shape[2]))
+        return Ground(landscape, self.flammability(landscape), Paces(pace), cell_size)
 
     def pace(self, key: Tensor, size: tuple[int, int]) -> Tensor:
         """Return the factor on the fire's times in each cell, float32 [B, H, W]: 1 over that on its rates."""
@@ -205,61 +199,36 @@ class RateFire(Automaton):
         here = row.expand(len(wind), -1) if moisture is None else torch.where(moisture.isnan(), row, moisture)
         spread = self.bed.spread(ground.landscape, wind, here, ground.cell_size)
         made = travel(spread.head, spread.direction, spread.length_to_breadth, ground.cell_size)
-        return Air(wind=wind, gain=None, moisture=moisture, travel=made)
+        return Air(wind, moisture, Travel(made))
 
     def started(self, state: WorldState) -> WorldState:
         """Return worlds whose fires have reached the cells that burn at minute 0."""
-        burning = is_burning(state.cells)
-        minutes = torch.where(burning, 0.0, NEVER)
-        return state.replace(arrivals=Arrivals(minutes, torch.where(burning, _own_cell(state.cells), NOWHERE)))
+        return arrivals.started(state)
 
     def lit(self, state: WorldState, where: Tensor) -> WorldState:
         """Return worlds whose fires have reached these cells, bool [B, H, W], now, each from itself."""
-        kept = _of(state)
-        minutes = torch.where(where, self._now(state), kept.minutes)
-        return state.replace(arrivals=Arrivals(minutes, torch.where(where, _own_cell(state.cells), kept.origin)))
+        return arrivals.lit(state, where, self._now(state))
 
     def in_air(self, state: WorldState, air: Air) -> WorldState:
-        """Return worlds in another air: the fire has gone as far as it has, and goes on at the new rates.
-
-        What a cell has waited, or has to wait, changes by the ratio of the mean rates to or from its neighbours. Every
-        burning cell is an origin from now on.
-        """
-        before, after = self._mean_rate(state, state.air), self._mean_rate(state, air)
-        minutes = at_other_rates(_of(state).minutes, self._now(state), before, after)
-        origin = torch.where(is_burning(state.cells), _own_cell(state.cells), NOWHERE)
-        return state.replace(air=air, arrivals=Arrivals(minutes, origin))
+        """See ``Automaton``. The fire has gone as far as it has, and spreads at the new rates."""
+        return arrivals.in_air(state, air, self._now(state), self.spreads(state), self.can_ignite(state))
 
     def beside(self, state: WorldState) -> Tensor:
         """Return which cells can ignite and are beside a burning one, bool [B, H, W]."""
         return grow(self.spreads(state)) & self.can_ignite(state)
 
-    def sources(self, state: WorldState) -> tuple[Arrivals, Tensor]:
-        """Return what is kept of arrivals, and the times that neighbours go by, float32 [B, H, W].
+    def sources(self, state: WorldState) -> Tensor:
+        """Return the times that neighbours go by, float32 [B, H, W].
 
         They are those of cells that burn, and of trees that the fire has not reached yet.
         """
-        kept = _of(state)
-        ahead = self.can_ignite(state) & (kept.minutes > self._now(state))
-        return kept, torch.where(self.spreads(state) | ahead, kept.minutes, NEVER)
-
-    def reached(self, state: WorldState) -> Tensor:
-        """Return when the fire reached the cells that burn or have burned, else ``NEVER``, float32 [B, H, W]."""
-        return torch.where(is_tree(state.cells), NEVER, _of(state).minutes)
+        minutes = arrivals_in(state).minutes
+        ahead = self.can_ignite(state) & (minutes > self._now(state))
+        return torch.where(self.spreads(state) | ahead, minutes, NEVER)
 
     def next_arrivals(self, state: WorldState) -> Arrivals:
         """Return when the fire reaches each cell that can ignite and is beside it, else ``NEVER``."""
-        kept, times = self.sources(state)
-        reached, (row, column) = self.reached(state).flatten(1), _rows_and_columns(state.cells)
-
-        def time_of(origin: Tensor) -> Tensor:
-            return reached.gather(1, origin.flatten(1).to(torch.int64)).view(origin.shape)
-
-        places = Places(row, column, state.cells.shape[2], time_of)
-        around = neighbours(times, NEVER), neighbours(kept.origin, NOWHERE)
-        minutes, origin = arrival(*around, self._metric(state, state.air), places)
-        beside = self.beside(state)
-        return Arrivals(torch.where(beside, minutes, NEVER), torch.where(beside, origin, NOWHERE))
+        return arrivals.next_arrivals(state, self.sources(state), self.beside(state))
 
     def tick(self, state: WorldState, u: Tensor, ticks_now: Tensor) -> WorldState:
         """See ``Automaton``. What the fire reaches within the tick ignites, at the minute when it does."""
@@ -273,12 +242,12 @@ class RateFire(Automaton):
         after = self.tick_with(state, u, ticks_now, torch.maximum(reached.to(torch.float32), self.spontaneous(state)))
         after = self._held(state, after)
         lit = (after.cells == FIRST_FIRE) & ~is_burning(state.cells)
-        kept, waits = _of(state), is_tree(after.cells)
+        kept, waits = arrivals_in(state), is_tree(after.cells)
         minutes = torch.where(lit, torch.where(reached, coming.minutes, end), kept.minutes)
-        origin = torch.where(lit, torch.where(reached, coming.origin, _own_cell(state.cells)), kept.origin)
+        origin = torch.where(lit, torch.where(reached, coming.origin, own_cell(state.cells)), kept.origin)
         minutes = torch.where(waits, torch.where(here, coming.minutes, kept.minutes), minutes)
         origin = torch.where(waits, torch.where(here, coming.origin, kept.origin), origin)
-        return after.replace(arrivals=Arrivals(minutes, origin))
+        return after.with_planes(RATE, Arrivals(minutes, origin))
 
     def ignition_probability(self, state: WorldState) -> Tensor:
         """Return 1 where the fire arrives in the next tick, else a tick's share of the minutes until it does.
@@ -299,9 +268,9 @@ class RateFire(Automaton):
         A neighbour that takes several ticks counts for its share of them.
         """
         total = torch.zeros_like(state.alpha)
-        fuel, metric = self.can_ignite(state), self._metric(state, state.air)
+        fuel, rates = self.can_ignite(state), metric(state.ground, state.air)
         for direction in range(8):
-            rate = rate_from(direction, metric)
+            rate = rate_from(direction, rates)
             share = (rate * self.minutes).clamp(max=1.0) * fuel
             total = total + neighbour_in((direction + 4) % 8, share)
         return total * self.spreads(state)
@@ -320,42 +289,8 @@ class RateFire(Automaton):
         }
         return after.replace(**kept)
 
-    def _metric(self, state: WorldState, air: Air) -> Metric:
-        made, pace = air.travel, state.ground.pace
-        if made is None or pace is None:
-            raise ValueError("the worlds must be those of a fire with rates of spread")
-        return made[:, 0] * pace, made[:, 1] * pace, made[:, 2] * pace
-
-    def _mean_rate(self, state: WorldState, air: Air) -> Tensor:
-        """Return the sum of the rates from each burning cell to fuel, or from burning cells into fuel [B, H, W]."""
-        burning = self.spreads(state)
-        fuel, metric = self.can_ignite(state).to(torch.float32), self._metric(state, air)
-        into, out = torch.zeros_like(fuel), torch.zeros_like(fuel)
-        for direction in range(8):
-            rate = rate_from(direction, metric)
-            into = into + rate * neighbour_in(direction, burning.to(torch.float32))
-            out = out + neighbour_in((direction + 4) % 8, rate * fuel)
-        return torch.where(burning, out, into * fuel)
-
-
-def _of(state: WorldState) -> Arrivals:
-    if state.arrivals is None:
-        raise ValueError("the worlds must be those of a fire with rates of spread")
-    return state.arrivals
-
 
 def _log_normal(u: Tensor, variation: float) -> Tensor:
     """Return log-normal factors of median 1 and a coefficient of variation, from uniform draws in [0, 1)."""
     deviation = math.sqrt(math.log1p(variation * variation))
     return torch.exp(deviation * math.sqrt(2.0) * torch.erfinv((2.0 * u - 1.0).clamp(-1.0 + 1e-6, 1.0 - 1e-6)))
-
-
-def _rows_and_columns(cells: Tensor) -> tuple[Tensor, Tensor]:
-    row = torch.arange(cells.shape[1], dtype=torch.int32, device=cells.device)[:, None]
-    column = torch.arange(cells.shape[2], dtype=torch.int32, device=cells.device)
-    return row.expand(cells.shape), column.expand(cells.shape)
-
-
-def _own_cell(cells: Tensor) -> Tensor:
-    row, column = _rows_and_columns(cells)
-    return row * cells.shape[2] + column

@@ -8,7 +8,8 @@ from torch.nn.functional import avg_pool2d
 
 from warp_torchrl.system.modes import kept
 from warp_torchrl.world.arrays.geometry import grow
-from warp_torchrl.world.state.state import EMBER, FIRST_FIRE, OLDEST, TreeCounts, WorldState, is_burning, is_tree
+from warp_torchrl.world.state.cells import is_burning, is_tree
+from warp_torchrl.world.state.state import EMBER, FIRST_FIRE, OLDEST, TreeCounts, WorldState
 
 RAYS = 32
 """Rays from a fire's centre on which barriers are looked for."""

@@ -10,7 +10,6 @@ from typing import TypeVar, cast
 from torch import Tensor
 
 from warp_torchrl.world.arrays.batch import Batch, Named
-from warp_torchrl.world.arrays.bytes import at_least, between, byte, counts
 
 
 class Cover(IntEnum):
@@ -62,11 +61,20 @@ class Landscape(Batch):
     cover: Tensor  # uint8 [B,H,W], a Cover code
     age: Tensor  # uint8 [B,H,W], tree age before the fire, 0..10
     elevation: Tensor | None  # float32 [B,H,W] [m]; None where every world is flat
-    assets: Tensor | None = None  # float32 [B,H,W], what each cell is worth, any unit; None: all alike
-    fuel: Tensor | None = None  # int16 [B,H,W], class codes of the fuel layer; None where there is none
-    canopy_cover: Tensor | None = None  # float32 [B,H,W] [%], 0 without trees; None where no source tells it
-    canopy_height: Tensor | None = None  # float32 [B,H,W] [m], 0 without trees; None where no source tells it
     corner: Tensor | None = None  # int64 [B,2], (row, column) of the map's first cell in its source; None: at (0, 0)
+    layers: Named = field(default_factory=Named)  # what else the source knows of each cell, see ``layer``
+
+    def layer(self, name: str) -> Tensor | None:
+        """Return a layer of the source; None where it has none of this name.
+
+        ``fuel`` holds class codes, int16 [B, H, W]; ``assets`` what each cell is worth, in any unit; ``canopy_cover``
+        [%] and ``canopy_height`` [m] are 0 without trees: float32 [B, H, W].
+        """
+        return self.layers.held.get(name)
+
+    def with_layers(self, **layers: Tensor) -> "Landscape":
+        """Return the landscapes with more layers, by name."""
+        return self.replace(layers=self.layers.replace(**layers))
 
 
 @dataclass(eq=False, repr=False)
@@ -105,33 +113,17 @@ class Ground(Batch):
 
     landscape: Landscape
     alpha: Tensor  # float32 [B,H,W], flammability
-    slope: Tensor | None  # float32 [B,8,H+2,W+1], s_d into a cell, a margin about the map; None where flat
-    pace: Tensor | None = None  # float32 [B,H,W], factor on the times of law ``rate``; None elsewhere
+    terms: Batch = field(default_factory=Batch)  # what else its law makes of it, in a class of the law; or nothing
     cell_size: float = 30.0  # side of a cell [m]
-
-    @property
-    def slope_into_cell(self) -> Tensor | None:
-        """Return s_d into each cell by direction of travel, float32 [B, 8, H, W]; None where flat."""
-        return None if self.slope is None else self.slope[:, :, 1:-1, :-1]
 
 
 @dataclass(eq=False, repr=False)
 class Air(Batch):
-    """A wind and all that follows from it for the fire; ``world.backends.road.air`` makes it."""
+    """A wind and all that follows from it for the fire; ``world.backends.backend.air`` makes it."""
 
     wind: Tensor  # float32 [B,2,1,1] or [B,2,H,W], (u east, v north) of the air's motion [m/s]
-    gain: Tensor | None  # float32 [B,8,1,1], w_d / distance_d; None where the wind differs by cell
-    table: Tensor | None = None  # float32 [B,G,256], see ``world.backends.table``; None where no road asks for one
     moisture: Tensor | None = None  # float32 [B,7] [%], see ``Wind.moisture``; None where the fire's own holds
-    travel: Tensor | None = None  # float32 [B,3,H,W], see ``travel.travel``; None but under law ``rate``
-
-
-@dataclass(eq=False, repr=False)
-class Arrivals(Batch):
-    """When the fire reaches each cell at the present rates of spread, and where it comes from; of law ``rate``."""
-
-    minutes: Tensor  # float32 [B,H,W], since ignition; of cells that burn and their neighbours, else ``travel.NEVER``
-    origin: Tensor  # int32 [B,H,W], flat index of the cell that it came from on a straight way, or -1
+    terms: Batch = field(default_factory=Batch)  # what else its law makes of it, in a class of the law; or nothing
 
 
 @dataclass(eq=False, repr=False)
@@ -174,30 +166,29 @@ class WorldState(Batch):
     burning_area: Tensor  # float32 [B], sum over steps of burning initial trees / N0, the area under the fire's curve
     terminated: Tensor  # bool [B], no cell burns any more
     truncated: Tensor  # bool [B], the horizon was reached
-    arrivals: Arrivals | None = None  # None but under law ``rate``
     origin: Tensor | None = None  # int64 [B], key of what began with the episode, in imagined worlds; None: ``key``
-    extras: Named = field(default_factory=Named)  # planes of each mechanic by its name, see ``world.mechanics``
+    extras: Named = field(default_factory=Named)  # planes of each mechanic, and of the law, by its name
 
     def planes(self, name: str, kind: type[Planes]) -> Planes:
-        """Return what a mechanic keeps in the worlds.
+        """Return what a mechanic or a law keeps in the worlds.
 
         Args:
-            name: Of the mechanic.
+            name: Of the mechanic or the law.
             kind: Of its planes.
 
         Raises:
-            ValueError: If the worlds have none: the mechanic did not begin them.
+            ValueError: If the worlds have none: the mechanic or the law did not begin them.
         """
         if not self.keeps(name):
             raise ValueError(f"worlds must have planes of {name}, got those of {', '.join(self.extras.held) or 'none'}")
         return cast("Planes", self.extras.held[name])
 
     def keeps(self, name: str) -> bool:
-        """Return whether a mechanic keeps planes in the worlds."""
+        """Return whether a mechanic or a law keeps planes in the worlds."""
         return name in self.extras.held
 
     def plane(self, name: str, part: str) -> Tensor | None:
-        """Return one tensor that a mechanic keeps, for readers that do without it; None where there is none."""
+        """Return one tensor of a mechanic or a law, for readers that do without it; None where there is none."""
         found = self.extras.held.get(name)
         return None if found is None else getattr(found, part, None)
 
@@ -206,12 +197,12 @@ class WorldState(Batch):
         return self.replace(extras=Named({name: each for name, each in self.extras.held.items() if name not in names}))
 
     def with_planes(self, name: str, planes: Batch) -> "WorldState":
-        """Return the worlds with other planes of a mechanic."""
+        """Return the worlds with other planes of a mechanic or a law."""
         return self.replace(extras=self.extras.replace(**{name: planes}))
 
     def what_changes(self) -> dict[str, Tensor]:
         """Return all tensors by name but those that follow from others, of which they can be made again."""
-        return {name: leaf for name, leaf in self.leaves().items() if name not in _FOLLOWS}
+        return {name: leaf for name, leaf in self.leaves().items() if not name.startswith(_FOLLOWS)}
 
     @property
     def episode_key(self) -> Tensor:
@@ -244,7 +235,7 @@ class WorldState(Batch):
         return self.terminated | self.truncated
 
 
-_FOLLOWS = ("ground.alpha", "ground.slope", "ground.pace", "air.gain", "air.table", "air.travel")
+_FOLLOWS = ("ground.alpha", "ground.terms.", "air.terms.")
 
 
 @dataclass(eq=False, repr=False)
@@ -277,43 +268,3 @@ class Transition(Batch):
     after: WorldState
     counts_before: TreeCounts  # of ``before``
     counts_after: TreeCounts  # of ``after``
-
-
-def is_burning(cells: Tensor) -> Tensor:
-    """Return which cells, uint8 codes, burn (11..15), bool, shape of the input."""
-    return at_least(cells, FIRST_FIRE)
-
-
-def is_tree(cells: Tensor) -> Tensor:
-    """Return which cells, uint8 codes, hold a tree that does not burn (1..10), bool, shape of the input."""
-    return between(cells, 1, OLDEST)
-
-
-def count_trees(state: WorldState) -> TreeCounts:
-    """Count the initial trees by fate.
-
-        T_p + T_e + T_c + T_b + burning = N0      (WARP-CA, conservation metric)
-
-    A tree that has once burned to ash stays counted as burned when the ground regrows.
-    """
-    initial, burned, burning = byte(state.initial), byte(state.burned), byte(is_burning(state.cells))
-    unburned = initial & (burned ^ 1)
-    alive = unburned & byte(is_tree(state.cells))
-    trees, standing, extinguished, cleared, ash, aflame, alight = counts(
-        initial,
-        alive,
-        alive & byte(state.extinguished),
-        unburned & byte(state.firebreak),
-        initial & burned,
-        unburned & burning,
-        burning,
-    )
-    return TreeCounts(
-        initial=trees,
-        preserved=standing - extinguished,
-        extinguished=extinguished,
-        cleared=cleared,
-        burned=ash,
-        burning=aflame,
-        alight=alight,
-    )

@@ -19,8 +19,9 @@ from warp_torchrl.system.modes import kept
 from warp_torchrl.validation import check_new_name
 from warp_torchrl.world.arrays.geometry import offsets
 from warp_torchrl.world.arrays.random import Stream, uniform
+from warp_torchrl.world.state.cells import is_burning, is_tree
 from warp_torchrl.world.state.role import RoleTable
-from warp_torchrl.world.state.state import FIRST_FIRE, Cover, WorldState, is_burning, is_tree
+from warp_torchrl.world.state.state import FIRST_FIRE, Cover, WorldState
 
 _NEIGHBOURHOOD = ((0, 0), (-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1))
 

@@ -5,7 +5,8 @@ from torch import Tensor
 
 from warp_torchrl.system.modes import kept
 from warp_torchrl.world.arrays.geometry import DIRECTIONS
-from warp_torchrl.world.state.state import Action, WorldState, is_burning
+from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.state import Action, WorldState
 from warp_torchrl.world.team.abilities import own_cell
 
 _APPROACH = (0, 2, 4, 6, 7, 1, 3, 5)

@@ -16,9 +16,10 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.state.state import OLDEST, Cover
 from warp_torchrl.world.terrain.crop import Crop, Cropped
-from warp_torchrl.world.terrain.landscape import TALLEST, map_size
+from warp_torchrl.world.terrain.landscape import TALLEST
 from warp_torchrl.world.terrain.layer import LARGEST_MAP
 from warp_torchrl.world.terrain.planes import HIGHEST, LOWEST
+from warp_torchrl.world.terrain.source import map_size
 
 LAYER_TYPES = {
     "cover": np.uint8,

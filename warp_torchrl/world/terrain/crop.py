@@ -2,15 +2,16 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from warp_torchrl.world.arrays.random import Stream, uniform
+from warp_torchrl.world.state.cells import holds_trees
 from warp_torchrl.world.state.state import Cover, Landscape
-from warp_torchrl.world.terrain.landscape import draw_age, holds_trees, map_size
+from warp_torchrl.world.terrain.landscape import draw_age
+from warp_torchrl.world.terrain.source import map_size
 
 DRAWN = 255
 """Age code of a cell whose age is drawn for each episode."""
@@ -80,9 +81,10 @@ class Crop:
         draw = uniform(key, 0, Stream.CROP, (1, 1))[:, 0, 0].double()  # float32 cannot count past 2^24 windows
         window, across = corners[(draw * len(corners)).long()], self.cover.shape[1]
         corner = torch.stack((window // across, window % across), dim=1)
-        planes: dict[str, Any] = {name: self._cut(layer, corner) for name, layer in maps.items()}
-        age = self._fill_age(key, planes["cover"], planes.get("age"))
-        return Landscape(**{"elevation": None, **planes, "age": age}, corner=corner)
+        planes = {name: self._cut(layer, corner) for name, layer in maps.items()}
+        cover, elevation = planes.pop("cover"), planes.pop("elevation", None)
+        age = self._fill_age(key, cover, planes.pop("age", None))
+        return Landscape(cover, age, elevation, corner).with_layers(**planes)
 
     @property
     def corner(self) -> tuple[int, int] | None:

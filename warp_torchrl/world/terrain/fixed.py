@@ -9,7 +9,7 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.state.state import Landscape
-from warp_torchrl.world.terrain.landscape import LandscapeSource
+from warp_torchrl.world.terrain.source import LandscapeSource
 
 
 @dataclass(frozen=True, kw_only=True)

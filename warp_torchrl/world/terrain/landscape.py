@@ -1,12 +1,9 @@
-"""Landscape sources, and the one from Perlin noise.
-
-A source has a ``size`` (H, W) and, called with world keys, returns the ``Landscape`` of each world's episode.
-"""
+"""The landscape from Perlin noise."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol, TypeVar, runtime_checkable
+from typing import Literal, TypeVar
 
 import numpy as np
 import torch
@@ -14,43 +11,15 @@ from torch import Tensor
 
 from warp_torchrl.system.device import needs_no_sync
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.arrays.bytes import byte, equal
+from warp_torchrl.world.arrays.bytes import byte
 from warp_torchrl.world.arrays.random import Stream, uniform
+from warp_torchrl.world.state.cells import holds_trees
 from warp_torchrl.world.state.state import OLDEST, Cover, Landscape
 from warp_torchrl.world.terrain.perlin import fractal_noise
+from warp_torchrl.world.terrain.source import map_size
 
-LARGEST_SIDE = 4096
-"""Longest side of a simulated map [cells]."""
 TALLEST = 150.0
 """Height of a canopy that is believed [m]; the tallest tree known has 116."""
-
-
-@runtime_checkable
-class LandscapeSource(Protocol):
-    """Interface of a landscape component."""
-
-    @property
-    def size(self) -> tuple[int, int] | int:
-        """Return the map's (H, W), or its side where it is square [cells]."""
-        ...
-
-    def __call__(self, key: Tensor) -> Landscape:
-        """Return the landscape of each world, from int64 keys [B]."""
-        ...
-
-
-def map_size(size: tuple[int, int] | int) -> tuple[int, int]:
-    """Return (H, W) of a size given as a side or as a pair.
-
-    Raises:
-        ValueError: If a side is not in 4..4096.
-    """
-    sides = (size, size) if isinstance(size, int) else size
-    fits = isinstance(sides, Sequence) and not isinstance(sides, str) and len(sides) == 2
-    if not fits or not all(type(side) is int and 4 <= side <= LARGEST_SIDE for side in sides):
-        raise ValueError(f"size must be one side or [rows, columns], each in 4..{LARGEST_SIDE} cells, got {size}")
-    height, width = sides
-    return height, width
 
 
 def draw_age(key: Tensor, cover: Tensor) -> Tensor:
@@ -65,11 +34,6 @@ def draw_age(key: Tensor, cover: Tensor) -> Tensor:
     """
     age = uniform(key, 0, Stream.AGE, tuple(cover.shape[1:])).mul_(OLDEST).round_().to(torch.int32).to(torch.uint8)
     return age.mul_(byte(holds_trees(cover)))
-
-
-def holds_trees(cover: Tensor) -> Tensor:
-    """Return where a tree can stand (wetland, grassland, forest), bool, shape of the input."""
-    return ~(equal(cover, int(Cover.LAKE)) | equal(cover, int(Cover.BARE)))
 
 
 _PRINTED = (0.01, 0.2, 0.01)

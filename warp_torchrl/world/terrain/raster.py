@@ -13,7 +13,6 @@ from warp_torchrl.world.state.state import OLDEST
 from warp_torchrl.world.terrain.crop import Crop, Cropped
 from warp_torchrl.world.terrain.fuel import LAND_COVER, code_table, is_code, to_cover
 from warp_torchrl.world.terrain.grid import Grid
-from warp_torchrl.world.terrain.landscape import map_size
 from warp_torchrl.world.terrain.layers import (
     Layers,
     elevation_unit,
@@ -33,6 +32,7 @@ from warp_torchrl.world.terrain.planes import (
     to_worth,
 )
 from warp_torchrl.world.terrain.resampling import fill
+from warp_torchrl.world.terrain.source import map_size
 
 LAYERS = ("fuel", "elevation", "age", "canopy", "canopy_height", "assets")
 """The layers of a map, which have a file name or a pattern each."""

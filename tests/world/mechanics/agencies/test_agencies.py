@@ -22,7 +22,8 @@ from warp_torchrl.world.mechanics.agencies.agencies import (
     standing,
     worth_of,
 )
-from warp_torchrl.world.state.state import Action, Cover, is_burning
+from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.state import Action, Cover
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
 
@@ -91,7 +92,7 @@ def test_worth_is_that_of_the_trees_of_each_land_before_the_fire():
     state = parted("T.a T5T", "001 011", [0, 1])
     assert lands_of(state).worth.tolist() == [[2.0, 3.0]]
     assert standing(state).tolist() == [[1.0, pytest.approx(2 / 3)]]
-    landscape = state.landscape.replace(assets=torch.tensor([[[4.0, 9.0, 1.0], [1.0, 1.0, 2.0]]]))
+    landscape = state.landscape.with_layers(assets=torch.tensor([[[4.0, 9.0, 1.0], [1.0, 1.0, 2.0]]]))
     state = state.replace(ground=state.ground.replace(landscape=landscape))
     worth = by_land(worth_of(state) * state.initial, lands_of(state).owner, 2)
     assert worth.tolist() == [[5.0, 4.0]]

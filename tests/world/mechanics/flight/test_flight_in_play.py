@@ -17,7 +17,8 @@ from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.saved_config import environment_config, restore, world_overrides
 from warp_torchrl.world.mechanics.flight.flight import Aircraft, Flight
 from warp_torchrl.world.mechanics.sensing.sensing import Sight
-from warp_torchrl.world.state.state import Action, count_trees
+from warp_torchrl.world.state.cells import count_trees
+from warp_torchrl.world.state.state import Action
 from warp_torchrl.world.team.team import Team
 
 GOLDEN = Path(__file__).parents[3] / "golden" / "0.1.0"

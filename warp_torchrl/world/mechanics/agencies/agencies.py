@@ -17,7 +17,8 @@ from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.mechanics.mechanic import Mechanic, Rules
-from warp_torchrl.world.state.state import Cover, WorldState, is_burning, is_tree
+from warp_torchrl.world.state.cells import is_burning, is_tree
+from warp_torchrl.world.state.state import Cover, WorldState
 from warp_torchrl.world.team.start import distances_to, first_free
 from warp_torchrl.world.team.team import Team
 
@@ -207,7 +208,7 @@ def apportioned(need: Tensor, seats: int) -> Tensor:
 
 def worth_of(state: WorldState) -> Tensor:
     """Return what each cell is worth, float32 [B, H, W]: the landscape's assets, or 1."""
-    assets = state.landscape.assets
+    assets = state.landscape.layer("assets")
     return torch.ones_like(state.alpha) if assets is None else assets
 
 

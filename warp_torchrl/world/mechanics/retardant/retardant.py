@@ -14,8 +14,9 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.mechanics.mechanic import Mechanic, Rules
+from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.role import Role, add_role
-from warp_torchrl.world.state.state import ActionResult, Vehicles, WorldState, is_burning
+from warp_torchrl.world.state.state import ActionResult, Vehicles, WorldState
 from warp_torchrl.world.team.abilities import own_cell
 from warp_torchrl.world.team.places import approach_move, has_reached
 from warp_torchrl.world.team.team import MoveRule, Team, changed, is_second

@@ -22,8 +22,9 @@ from warp_torchrl.world.mechanics.sensing.watching import (
     unwatched,
     watching_of,
 )
+from warp_torchrl.world.state.cells import is_burning, is_tree
 from warp_torchrl.world.state.role import ROLES
-from warp_torchrl.world.state.state import FIRST_FIRE, WorldState, is_burning, is_tree
+from warp_torchrl.world.state.state import FIRST_FIRE, WorldState
 from warp_torchrl.world.team.team import Team
 
 _EVERYWHERE = 1 << 20

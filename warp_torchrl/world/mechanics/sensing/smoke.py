@@ -3,7 +3,8 @@
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.state.state import WorldState, is_burning
+from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.state import WorldState
 
 
 def smoke(state: WorldState, length: int) -> Tensor:

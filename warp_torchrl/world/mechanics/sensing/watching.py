@@ -7,8 +7,9 @@ from torch import Tensor
 
 from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.mechanics.sensing.records import codes, freshness, steps_since
+from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.front import spreading_front
-from warp_torchrl.world.state.state import FIRST_FIRE, WorldState, is_burning
+from warp_torchrl.world.state.state import FIRST_FIRE, WorldState
 
 
 @dataclass(eq=False, repr=False)

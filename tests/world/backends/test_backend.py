@@ -1,4 +1,4 @@
-"""Every fast road comes to what the law's page does, to the bit."""
+"""Every fast backend computes what the law does, to the bit."""
 
 from dataclasses import dataclass
 
@@ -9,13 +9,14 @@ from torch import Tensor
 from tests.world.drawing import differing
 from warp_torchrl.world.air.wind import Calm, Paper, Uniform, Wandering, Wind
 from warp_torchrl.world.arrays.random import Stream, uniform, uniform_among
+from warp_torchrl.world.backends.backend import Reference, fastest
 from warp_torchrl.world.backends.edge import AtEdge
 from warp_torchrl.world.backends.join import in_place
 from warp_torchrl.world.backends.planes import Planes
-from warp_torchrl.world.backends.road import FEW_CELLS, Page, fastest, why_eager
 from warp_torchrl.world.backends.rows import probability_from_rows
+from warp_torchrl.world.backends.table import table_in
 from warp_torchrl.world.backends.tick import advance
-from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.law.fire import Fire, Gains
 from warp_torchrl.world.law.hazard import HazardFire
 from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.terrain.landscape import Perlin
@@ -54,15 +55,15 @@ def whole_map(state: WorldState) -> Tensor:
 @pytest.mark.parametrize("fire", [*ALONE.values(), *WHOLE.values()], ids=[*ALONE, *WHOLE])
 @pytest.mark.parametrize("relief", [0.0, 300.0], ids=["level", "slopes"])
 @pytest.mark.parametrize("wind", WINDS.values(), ids=WINDS)
-def test_planes_come_to_what_the_page_does(fire: Fire, relief: float, wind: Wind) -> None:
+def test_planes_come_to_what_the_law_does(fire: Fire, relief: float, wind: Wind) -> None:
     lit, ticks_now = 0, torch.arange(6) != 4
     for state in burning(fire, relief, wind):
         q = fire.ignition_probability(state)
         expected, probability = Planes(fire).forecast(state)
         assert torch.equal(probability, q) and torch.equal(expected, fire.expected_ignitions(state))
         after = fire.tick(state, whole_map(state), ticks_now)
-        for road in (Page(fire), Planes(fire), fastest(fire, state.cells.device)):
-            assert differing(road.tick(state, ticks_now), after) == []
+        for each in (Reference(fire), Planes(fire), fastest(fire, state.cells.device)):
+            assert differing(each.tick(state, ticks_now), after) == []
         lit += int((q > 0.0).sum())
     assert lit > 100
 
@@ -70,15 +71,15 @@ def test_planes_come_to_what_the_page_does(fire: Fire, relief: float, wind: Wind
 @pytest.mark.parametrize("fire", ALONE.values(), ids=ALONE)
 @pytest.mark.parametrize("relief", [0.0, 300.0], ids=["level", "slopes"])
 @pytest.mark.parametrize("wind", WINDS.values(), ids=WINDS)
-def test_the_edge_comes_to_what_the_page_does(fire: Fire, relief: float, wind: Wind) -> None:
+def test_the_edge_comes_to_what_the_law_does(fire: Fire, relief: float, wind: Wind) -> None:
     listed, ticks_now = 0, torch.arange(6) != 4
     for state in burning(fire, relief, wind):
-        road, draws = AtEdge(fire), whole_map(state)
-        edge = road.edge(state)
+        at_edge, draws = AtEdge(fire), whole_map(state)
+        edge = at_edge.edge(state)
         at_trees = uniform_among(state.key, state.tick, Stream.FIRE, edge.world, edge.place)
         assert torch.equal(at_trees, edge.of(draws))
-        assert differing(road.tick(state, ticks_now), fire.tick(state, draws, ticks_now)) == []
-        expected, probability = road.forecast(state)
+        assert differing(at_edge.tick(state, ticks_now), fire.tick(state, draws, ticks_now)) == []
+        expected, probability = at_edge.forecast(state)
         assert torch.equal(expected, fire.expected_ignitions(state))
         assert torch.equal(probability, fire.ignition_probability(state))
         listed += len(edge.cell)
@@ -88,8 +89,8 @@ def test_the_edge_comes_to_what_the_page_does(fire: Fire, relief: float, wind: W
 @pytest.mark.parametrize("fire", ALONE.values(), ids=ALONE)
 def test_rows_come_to_what_the_table_does(fire: Fire) -> None:
     for state in burning(fire, 0.0, Uniform(speed=7.0), ticks=5):
-        assert state.air.table is not None
-        without = state.replace(air=state.air.replace(table=None))
+        assert table_in(state) is not None
+        without = state.replace(air=state.air.replace(terms=Gains(state.air.terms.gain)))
         q = Planes(fire).ignition_probability(without)
         assert torch.equal(Planes(fire).ignition_probability(state), q)
         made = probability_from_rows(
@@ -112,31 +113,12 @@ class Certain(Fire):
         return (super().spread_probability(state) > 0.0).to(torch.float32)
 
 
-def test_an_automaton_with_rules_of_its_own_takes_the_page() -> None:
+def test_an_automaton_with_rules_of_its_own_takes_the_reference() -> None:
     fire = Certain()
     world = World(landscape=Perlin(size=12), fire=fire, wind=Calm(), steps_per_tick=1)
     state = world.reset(torch.arange(4), torch.zeros(4, dtype=torch.int64))
-    assert state.air.table is None
+    assert table_in(state) is None
     beside = Fire().ignition_probability(state) > 0.0
     assert torch.equal(world.forecast(state).ignition_probability, beside.to(torch.float32)) and beside.any()
     after = world.step(state, torch.full((4, world.team.n_agents), 10)).after
     assert torch.equal((after.cells == 11), beside | (state.cells == 11) & (after.cells == 11))
-
-
-@pytest.mark.parametrize(
-    ("vectors", "device", "cells", "compiles"),
-    [
-        ("AVX512", "cpu", 1024 * 32 * 32, True),
-        ("AVX2", "cpu", 1024 * 32 * 32, False),
-        ("AVX2", "cpu", FEW_CELLS, True),
-        ("AVX2", "cpu", FEW_CELLS + 1, False),
-        ("AVX2", "cuda", 1024 * 32 * 32, True),
-    ],
-)
-def test_steps_are_compiled_where_that_gains(
-    monkeypatch, vectors: str, device: str, cells: int, compiles: bool
-) -> None:
-    monkeypatch.setattr("warp_torchrl.world.backends.road.vectors", lambda: vectors)
-    why = why_eager(Fire(), torch.device(device), cells)
-    assert (why is None) == compiles
-    assert compiles or f"{cells} cells is faster eager with {vectors}" in str(why)

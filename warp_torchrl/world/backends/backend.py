@@ -1,7 +1,7 @@
-"""The one entry to the fast roads, and the place where one is chosen.
+"""The one entry to the fast backends, and the place where one is chosen.
 
-A road computes what the law's page does (``world.law.law``), to the bit. An automaton that none covers takes
-the page itself, on any device.
+A backend computes what the law itself does (``world.law.law``), to the bit. An automaton that none covers takes
+the reference, the law in plain tensor operations, on any device.
 """
 
 from collections.abc import Callable
@@ -10,7 +10,6 @@ from typing import Protocol
 import torch
 from torch import Tensor
 
-from warp_torchrl.system.compiler import vectors
 from warp_torchrl.system.device import needs_no_sync
 from warp_torchrl.world.arrays.bytes import number
 from warp_torchrl.world.arrays.compile import is_fused
@@ -18,21 +17,21 @@ from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.backends.band import AtBand
 from warp_torchrl.world.backends.edge import AtEdge
 from warp_torchrl.world.backends.planes import Planes
-from warp_torchrl.world.backends.table import pattern_table
+from warp_torchrl.world.backends.table import Tabled, pattern_table
+from warp_torchrl.world.law.arrivals import RATE
 from warp_torchrl.world.law.automaton import Automaton
-from warp_torchrl.world.law.fire import Fire
+from warp_torchrl.world.law.fire import Fire, Gains, Slopes
 from warp_torchrl.world.law.hazard import HazardFire
 from warp_torchrl.world.law.rate import RateFire
-from warp_torchrl.world.state.state import Air, Forecast, Ground, WorldState, is_tree
+from warp_torchrl.world.state.cells import is_tree
+from warp_torchrl.world.state.state import Air, Forecast, Ground, WorldState
 
 COVERED = (Fire, HazardFire)
-"""The automata that the fast roads compute; a subclass may have other rules, and takes the page."""
-FEW_CELLS = 2**15
-"""Of all worlds; a compiled step of so many gains on any CPU."""
+"""The automata that the fast backends compute; a subclass may have other rules, and takes the reference."""
 
 
-class Road(Protocol):
-    """One way to compute the law's page."""
+class Backend(Protocol):
+    """One way to compute a law."""
 
     def tick(self, state: WorldState, ticks_now: Tensor) -> WorldState:
         """Return the worlds after one tick of the fire with their own draws, in the worlds that tick now, bool [B]."""
@@ -43,8 +42,8 @@ class Road(Protocol):
         ...
 
 
-class Page:
-    """The law's page itself, for any automaton and on any device.
+class Reference:
+    """The law itself, for any automaton and on any device.
 
     Args:
         fire: The automaton.
@@ -54,18 +53,18 @@ class Page:
         self.fire = fire
 
     def tick(self, state: WorldState, ticks_now: Tensor) -> WorldState:
-        """See ``Road``."""
+        """See ``Backend``."""
         return self.fire.tick(
             state, uniform(state.key, state.tick, Stream.FIRE, tuple(state.cells.shape[1:])), ticks_now
         )
 
     def forecast(self, state: WorldState) -> tuple[Tensor, Tensor]:
-        """See ``Road``."""
+        """See ``Backend``."""
         return self.fire.expected_ignitions(state), self.fire.ignition_probability(state)
 
 
-def fastest(fire: Automaton, device: torch.device) -> Road:
-    """Return the fastest road of an automaton on a device.
+def fastest(fire: Automaton, device: torch.device) -> Backend:
+    """Return the fastest backend of an automaton on a device.
 
     A CPU computes a tick at the fire's edge alone where trees neither grow nor ignite by themselves, unless whole maps
     are compiled.
@@ -74,32 +73,13 @@ def fastest(fire: Automaton, device: torch.device) -> Road:
     if type(fire) is RateFire and on_cpu:
         return AtBand(fire)
     if not isinstance(fire, Fire) or type(fire) not in COVERED:
-        return Page(fire)
+        return Reference(fire)
     spreads_alone = not fire.growth and fire.beta == 0.0 and fire.p_regrow == 0.0
     return AtEdge(fire) if spreads_alone and on_cpu else Planes(fire)
 
 
 def _may_read(device: torch.device) -> bool:
     return needs_no_sync(device) and not is_fused()
-
-
-def why_eager(fire: Automaton, device: torch.device, cells: int) -> str | None:
-    """Return why a step of worlds is not compiled, though it was asked for; None where it is.
-
-    Under law ``rate`` the page took minutes to compile, and a CPU's band is faster without. On CPUs whose vectors are
-    shorter than those of AVX-512 Inductor reads and writes bytes and whole numbers one by one, so that compiled code
-    gains only where a step has so few cells that most of its time is the calls of its operations.
-
-    Args:
-        fire: The automaton.
-        device: Where the worlds live.
-        cells: B * H * W.
-    """
-    if isinstance(fire, RateFire):
-        return "a step under a law with a clock is not compiled"
-    if device.type != "cpu" or vectors() == "AVX512" or cells <= FEW_CELLS:
-        return None
-    return f"a step of {cells} cells is faster eager with {vectors()}, and is not compiled"
 
 
 def forecast(fire: Automaton, state: WorldState) -> Forecast:
@@ -115,9 +95,11 @@ def forecast(fire: Automaton, state: WorldState) -> Forecast:
 def air(fire: Automaton, wind: Tensor, moisture: Tensor | None, ground: Ground) -> Air:
     """Return a wind with all that follows from it on some ground; the arguments are those of ``Automaton.air``."""
     made = fire.air(wind, moisture, ground)
-    if not isinstance(fire, Fire) or made.gain is None or ground.slope is not None or type(fire) not in COVERED:
+    if not isinstance(fire, Fire) or type(fire) not in COVERED:
         return made
-    return made.replace(table=pattern_table(fire, made.gain))
+    if isinstance(ground.terms, Slopes) or not isinstance(made.terms, Gains):
+        return made
+    return made.replace(terms=Tabled(made.terms.gain, pattern_table(fire, made.terms.gain)))
 
 
 def in_wind(fire: Automaton, state: WorldState, wind: Tensor, moisture: Tensor | None) -> WorldState:
@@ -126,7 +108,7 @@ def in_wind(fire: Automaton, state: WorldState, wind: Tensor, moisture: Tensor |
     Under law ``rate``, whose air is dear, a CPU makes that of the worlds alone where it differs.
     """
     old = state.air
-    if old.travel is None or not _may_read(wind.device):
+    if not isinstance(fire, RateFire) or not _may_read(wind.device):
         return fire.in_air(state, air(fire, wind, moisture, state.ground))
     differs = (wind != old.wind).flatten(1).any(dim=1)
     if moisture is not None and old.moisture is not None:
@@ -143,7 +125,7 @@ def in_wind(fire: Automaton, state: WorldState, wind: Tensor, moisture: Tensor |
 
 
 def _follows_air(name: str) -> bool:
-    return name.startswith(("air.", "arrivals."))
+    return name.startswith(("air.", f"extras.{RATE}."))
 
 
 def advance_rows(
@@ -164,16 +146,3 @@ def advance_rows(
     before, after, leaves = rows.leaves(), advance(rows, ticks_now[index]).leaves(), state.leaves()
     changed = [name for name, leaf in after.items() if leaf is not before[name]]
     return state.with_leaves({**leaves, **{name: leaves[name].index_copy(0, index, after[name]) for name in changed}})
-
-
-_FLAGS = ("initial", "extinguished", "burned", "firebreak")
-
-
-def in_bytes(state: WorldState) -> WorldState:
-    """Return worlds whose planes of flags are read as uint8, 0 and 1, as functions that are compiled need them."""
-    return state.replace(**{name: getattr(state, name).view(torch.uint8) for name in _FLAGS})
-
-
-def in_flags(state: WorldState) -> WorldState:
-    """Return the worlds of ``in_bytes`` as they are elsewhere."""
-    return state.replace(**{name: getattr(state, name).view(torch.bool) for name in _FLAGS})
