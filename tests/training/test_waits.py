@@ -64,7 +64,7 @@ def test_a_step_and_an_update_do_not_wait(tmp_path):
 
 
 def test_the_same_is_learned_without_reading(tmp_path):
-    """The dense roads and masks of a GPU come to what a CPU comes to, but for the last digits of sums."""
+    """The dense backends and masks of a GPU compute what a CPU computes, but for the last digits of sums."""
 
     def two_iterations():
         run = training(tmp_path)

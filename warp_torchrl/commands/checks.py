@@ -109,11 +109,11 @@ def check_training(values: Mapping[str, Any], overrides: Sequence[str], build: B
         CheckpointError: If what it begins with or resumes is not sound.
     """
     if values["resume"] is None:
-        plan = build(values)
-        plan.check_training()
-        _check_demonstrations(plan)
+        run_config = build(values)
+        run_config.check_training()
+        _check_demonstrations(run_config)
         if values["start_from"] is not None:
-            check_start(plan, checkpoints.newest(find_policy(values["start_from"]))[0])
+            check_start(run_config, checkpoints.newest(find_policy(values["start_from"]))[0])
         return
     others = [each for each in overrides if each.split("=")[0] not in ("resume", "debug", "total_frames")]
     if others:
@@ -124,19 +124,19 @@ def check_training(values: Mapping[str, Any], overrides: Sequence[str], build: B
     folder = Path(str(values["resume"]))
     if (folder / checkpoints.MANIFEST).exists():
         raise ConfigError(f"resume must be a run folder, got one of its checkpoints: {folder}")
-    plan = resumption(folder, new_total(values, overrides), build).run_config
-    plan.check_training()
-    _check_demonstrations(plan)
+    run_config = resumption(folder, new_total(values, overrides), build).run_config
+    run_config.check_training()
+    _check_demonstrations(run_config)
 
 
-def _check_demonstrations(plan: RunConfig) -> None:
+def _check_demonstrations(run_config: RunConfig) -> None:
     """Check that there is what people did for a training to learn from, where it should.
 
     Raises:
         ConfigError: If there is not, or it does not fit.
     """
-    if plan.imitation.demonstrations is not None:
-        demonstrations(plan, plan.make_env(1, 0))
+    if run_config.imitation.demonstrations is not None:
+        demonstrations(run_config, run_config.make_env(1, 0))
 
 
 def new_total(values: Mapping[str, Any], overrides: Sequence[str]) -> Any:
@@ -158,12 +158,12 @@ def _check_evaluation(values: Mapping[str, Any], overrides: Sequence[str], build
     if fires is None and any(each.startswith("maps_fires=") for each in overrides):
         raise ConfigError(f"maps_fires must come with maps=true, got {values['maps_fires']} alone")
     if checkpoint is None:
-        plan, found = build(without_checkpoint(values)), policy
+        run_config, found = build(without_checkpoint(values)), policy
     else:
         found, _ = checkpoints.newest(find_policy(str(checkpoint)))
-        plan = build(plain(restore(found.saved_config(), of_worlds(overrides))))
-    check_maps(plan, fires)
-    check_policy(plan, found)
+        run_config = build(plain(restore(found.saved_config(), of_worlds(overrides))))
+    check_maps(run_config, fires)
+    check_policy(run_config, found)
 
 
 def map_fires(values: Mapping[str, Any]) -> int | None:
@@ -199,15 +199,15 @@ def picture(values: Mapping[str, Any]) -> PictureKind | None:
     return kind
 
 
-def check_maps(plan: RunConfig, fires: int | None) -> None:
+def check_maps(run_config: RunConfig, fires: int | None) -> None:
     """Check that the fires of the maps have seeds that no training has.
 
     Raises:
         ConfigError: If the last one's is beyond those of evaluations.
     """
     highest = BEYOND_EVALUATION - (fires or 0)
-    if plan.evaluation.first_seed > highest:
-        first = plan.evaluation.first_seed
+    if run_config.evaluation.first_seed > highest:
+        first = run_config.evaluation.first_seed
         raise ConfigError(f"evaluation.first_seed must be in 0..{highest} for {fires} fires of the maps, got {first}")
 
 

@@ -78,12 +78,12 @@ def _start(folder: Path, config: DictConfig) -> None:
         return
     if (folder / "evaluation.json").exists():
         raise ConfigError(f"hydra.run.dir: {folder} holds an evaluation, which training would replace; take another")
-    plan = CheckFirst.build(plain(config)).settled()
-    config.processes = plan.processes
+    run_config = CheckFirst.build(plain(config)).settled()
+    config.processes = run_config.processes
     disk.replace(folder / "config.yaml", OmegaConf.to_yaml(config, resolve=True))
-    record = SavedConfig(choices=_choices(config), values=_values(config))
-    with parallel.processes(plan.n_processes(), plain(config), FOLLOWING):
-        training = Training(plan, record, folder)
+    saved_config = SavedConfig(choices=_choices(config), values=_values(config))
+    with parallel.processes(run_config.n_processes(), plain(config), FOLLOWING):
+        training = Training(run_config, saved_config, folder)
         if config.start_from is not None:
             training.start_from(_newest(find_policy(config.start_from)))
         _train(training)

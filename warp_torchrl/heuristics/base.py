@@ -97,7 +97,7 @@ def list_cells(mask: Tensor) -> tuple[Tensor, Tensor]:
 
     Returns:
         Flat indices, int64 [B, K], with K the largest count of any world, at least 1; and which indices are not
-        padding, bool [B, K]. On a device that is not read freely, every cell: K = H W, and the mask.
+        padding, bool [B, K]. On a device that would have to synchronise, every cell: K = H W, and the mask.
     """
     marked = mask.flatten(1)
     if not needs_no_sync(mask.device):

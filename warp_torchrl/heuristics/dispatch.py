@@ -23,8 +23,8 @@ from warp_torchrl.world.mechanics.water.supply import mark_base
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.role import ROLES
 from warp_torchrl.world.state.state import Action, Cover, WorldState
-from warp_torchrl.world.team.abilities import Extinguish, Situation, own_cell, places
-from warp_torchrl.world.team.team import is_second
+from warp_torchrl.world.team.abilities import AgentContext, Extinguish, own_cell, places
+from warp_torchrl.world.team.acting import is_second
 
 _LAST = 4096.0
 """By how much less cells are worth to agents that cannot extinguish: they choose after the others."""
@@ -67,7 +67,7 @@ class Dispatch(Coordinated):
         gain = gain.masked_fill(~valid[:, None] | (tank == 0)[..., None], -math.inf)
         claims = match_cells(state, cells, gain, spacing=3, discount=6.0, taken=1000.0)
         move = self._move(state, mask, self._target_or_water(state, claims, front))
-        nearby, _ = Extinguish.nearby_fire(Situation(state, table, 1.0, world.fire.last_spreading))
+        nearby, _ = Extinguish.nearby_fire(AgentContext(state, table, 1.0, world.fire.last_spreading))
         second = is_second(nearby, mask[..., Action.EXTINGUISH])
         return torch.where(second, move, extinguish_or(move, mask))
 

@@ -29,7 +29,7 @@ from warp_torchrl.models.signature import (
     canonical_key,
     observation_key,
 )
-from warp_torchrl.models.trust import Trust, told_to_trust
+from warp_torchrl.models.trust import Trust, trust_entries
 
 
 class Inputs:
@@ -104,7 +104,7 @@ class Inputs:
         if not trust:
             return []
         actions = self.signature.actions
-        found = self._telling(told_to_trust(actions))
+        found = self._telling(trust_entries(actions))
         if found is None:
             raise ValueError(
                 "model.trust must be 0 where agents are not advised and told the rules, observation.advice and "

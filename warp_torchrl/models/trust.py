@@ -7,7 +7,7 @@ from warp_torchrl.entries import ADVICE, LARGEST_TEAM, TEAM_SIZE
 from warp_torchrl.models.signature import LOGITS, Key
 
 
-def told_to_trust(actions: tuple[str, ...]) -> list[str]:
+def trust_entries(actions: tuple[str, ...]) -> list[str]:
     """Return the names of the numbers that ``Trust`` reads: the size of the team, and the advice by action."""
     return [TEAM_SIZE, *(f"{ADVICE}{action}" for action in actions)]
 
@@ -21,7 +21,7 @@ class Trust(TensorDictModuleBase):
     smaller part in the team's reward, and learns that part with more noise.
 
     Args:
-        key: Key of the vector with the numbers of ``told_to_trust``.
+        key: Key of the vector with the numbers of ``trust_entries``.
         names: Names of that vector's numbers, in order.
         actions: Names of the actions, in the order of the logits.
         trust: Added for each doubling of the team.
@@ -30,7 +30,7 @@ class Trust(TensorDictModuleBase):
     def __init__(self, key: Key, names: tuple[str, ...], actions: tuple[str, ...], trust: float) -> None:
         super().__init__()
         self.in_keys, self.out_keys = [LOGITS, key], [LOGITS]
-        self._team, *self._advice = (names.index(name) for name in told_to_trust(actions))
+        self._team, *self._advice = (names.index(name) for name in trust_entries(actions))
         self._gain = trust * LARGEST_TEAM
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:

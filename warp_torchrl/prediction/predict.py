@@ -11,7 +11,8 @@ from warp_torchrl.prediction.counts import Counter
 from warp_torchrl.prediction.tally import Tally
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.arrays.random import world_key
-from warp_torchrl.world.fires.alone import Fires, Spell
+from warp_torchrl.world.fires.alone import Fires
+from warp_torchrl.world.fires.spell import Spell
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.state.window import Window

@@ -34,7 +34,7 @@ class FiniteSteps:
             frames: World steps so far, for the message.
 
         Raises:
-            NumericalFailure: If the loss or the norm is not finite, and the device is read freely.
+            NumericalFailure: If the loss or the norm is not finite, and reading them needs no synchronisation.
         """
         if needs_no_sync(loss.device):
             if not torch.isfinite(norm + loss):

@@ -7,7 +7,7 @@ import torch
 
 from warp_torchrl.prediction.calibration.candidates import arrivals, median_pace
 from warp_torchrl.prediction.calibration.case import FireCase
-from warp_torchrl.world.fires.alone import Spell
+from warp_torchrl.world.fires.spell import Spell
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.state.state import Landscape
 

@@ -12,7 +12,7 @@ from warp_torchrl.world.arrays.random import Stream, uniform, uniform_among
 from warp_torchrl.world.backends.backend import Reference, fastest
 from warp_torchrl.world.backends.edge import AtEdge
 from warp_torchrl.world.backends.join import in_place
-from warp_torchrl.world.backends.planes import Planes
+from warp_torchrl.world.backends.planes import WholeMaps
 from warp_torchrl.world.backends.rows import probability_from_rows
 from warp_torchrl.world.backends.table import table_in
 from warp_torchrl.world.backends.tick import advance
@@ -59,10 +59,10 @@ def test_planes_come_to_what_the_law_does(fire: Fire, relief: float, wind: Wind)
     lit, ticks_now = 0, torch.arange(6) != 4
     for state in burning(fire, relief, wind):
         q = fire.ignition_probability(state)
-        expected, probability = Planes(fire).forecast(state)
+        expected, probability = WholeMaps(fire).forecast(state)
         assert torch.equal(probability, q) and torch.equal(expected, fire.expected_ignitions(state))
         after = fire.tick(state, whole_map(state), ticks_now)
-        for each in (Reference(fire), Planes(fire), fastest(fire, state.cells.device)):
+        for each in (Reference(fire), WholeMaps(fire), fastest(fire, state.cells.device)):
             assert differing(each.tick(state, ticks_now), after) == []
         lit += int((q > 0.0).sum())
     assert lit > 100
@@ -91,8 +91,8 @@ def test_rows_come_to_what_the_table_does(fire: Fire) -> None:
     for state in burning(fire, 0.0, Uniform(speed=7.0), ticks=5):
         assert table_in(state) is not None
         without = state.replace(air=state.air.replace(terms=Gains(state.air.terms.gain)))
-        q = Planes(fire).ignition_probability(without)
-        assert torch.equal(Planes(fire).ignition_probability(state), q)
+        q = WholeMaps(fire).ignition_probability(without)
+        assert torch.equal(WholeMaps(fire).ignition_probability(state), q)
         made = probability_from_rows(
             in_place(fire.law),
             fire.spreads(state),

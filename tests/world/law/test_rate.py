@@ -9,7 +9,8 @@ from tests.world.drawing import draw, drawn
 from warp_torchrl.world.air.wind import Calm, Uniform
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.backends.tick import advance, in_wind
-from warp_torchrl.world.fires.alone import Spell, arrival_minutes, spread_in
+from warp_torchrl.world.fires.alone import arrival_minutes
+from warp_torchrl.world.fires.spell import Spell, spread_in
 from warp_torchrl.world.law.arrivals import arrivals_in
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER

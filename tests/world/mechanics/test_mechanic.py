@@ -88,7 +88,7 @@ def test_no_mechanic_has_the_name_of_planes_that_the_law_keeps():
         name = "rate"
 
     small_world(mechanics=(Rate(),))
-    with pytest.raises(ValueError, match="mechanics must be one of each name, got rate, .*rate"):
+    with pytest.raises(ValueError, match=r"mechanics must be one of each name, got rate, .*rate"):
         small_world(mechanics=(Rate(),), fire=RateFire())
 
 

@@ -17,7 +17,7 @@ from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.models import ACTION, OBSERVATION
 from warp_torchrl.system.shipped import policy_names
 from warp_torchrl.world.state.role import ROLES, Role, add_role
-from warp_torchrl.world.team.abilities import ABILITIES, Ability, Deed, Situation, ability
+from warp_torchrl.world.team.abilities import ABILITIES, Ability, AgentContext, Effect, ability
 from warp_torchrl.world.team.team import Team
 
 E, CLEAR = 2, 9
@@ -32,11 +32,11 @@ def sprinkler() -> Iterator[None]:
     class Sprinkle(Ability):
         actions = ("sprinkle",)
 
-        def mask(self, now: Situation) -> torch.Tensor:
+        def mask(self, now: AgentContext) -> torch.Tensor:
             return (now.at(now.state.cells, now.own_cell) > 0)[..., None]
 
-        def act(self, now: Situation, choice: torch.Tensor) -> Deed:
-            return Deed(self.mask(now)[..., 0], {"wet": 5})
+        def act(self, now: AgentContext, choice: torch.Tensor) -> Effect:
+            return Effect(self.mask(now)[..., 0], {"wet": 5})
 
     @ability("jump")
     @dataclass(frozen=True)
@@ -44,15 +44,15 @@ def sprinkler() -> Iterator[None]:
         actions = ("jump_south_east", "jump_back")
         moves = True
 
-        def mask(self, now: Situation) -> torch.Tensor:
+        def mask(self, now: AgentContext) -> torch.Tensor:
             place = now.state.vehicles.position
             height, width = now.state.cells.shape[1:]
             room = (place[..., 0] < height - 1) & (place[..., 1] < width - 1)
             return torch.stack((room, (place > 0).all(-1)), dim=-1)
 
-        def act(self, now: Situation, choice: torch.Tensor) -> Deed:
+        def act(self, now: AgentContext, choice: torch.Tensor) -> Effect:
             possible = self.mask(now).gather(-1, choice[..., None])[..., 0]
-            return Deed(possible, step=(1 - 2 * choice)[..., None].expand(*choice.shape, 2))
+            return Effect(possible, step=(1 - 2 * choice)[..., None].expand(*choice.shape, 2))
 
     add_role("sprinkler", Role("sprinkler", ("sprinkle", "jump")))
     yield
@@ -97,7 +97,7 @@ def test_each_acts_by_its_own_abilities(allow_stay: bool) -> None:
     assert after.vehicles.acts.tolist() == [[0, 0]]
 
 
-def test_two_deeds_at_one_tree_are_one() -> None:
+def test_two_acts_at_one_tree_are_one() -> None:
     state = draw(".T. ...", team=team(4), at=[(0, 1)] * 4)
     after, result = team(4).act(state, torch.tensor([[E, 11, CLEAR, 11]]), torch.tensor([True]), 14, 10)
     assert after.wet[0, 0].tolist() == [0, 5, 0] and drawn(after) == ".T. ..."

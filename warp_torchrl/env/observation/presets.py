@@ -107,7 +107,7 @@ class Local:
         shape, highs = (len(features), side, side), tuple(each.high for each in features)
         symmetry, content = Planes(len(features), target_of(features, world)), content_of(features, world)
         return {
-            "view": Space(shape, torch.uint8, 0, highs, self.channels, symmetry, self._contents(content)),
+            "view": Space(shape, torch.uint8, 0, highs, self.channels, symmetry, self._content_of(content)),
             "status": Space((len(own.names),), torch.float32, -3.0, 3.0, own.names, own),
         }
 
@@ -128,8 +128,8 @@ class Local:
             features=self.features,
         )
 
-    def _contents(self, content: tuple[Content, ...]) -> tuple[Content, ...]:
-        """Return what is told of channels; nothing for a subclass that shows them in a way of its own."""
+    def _content_of(self, content: tuple[Content, ...]) -> tuple[Content, ...]:
+        """Return what channels can hold; nothing for a subclass that redefines how they are shown."""
         return content if type(self).__call__.__module__ == __name__ else ()
 
 
@@ -191,7 +191,7 @@ class Surroundings(Local):
             tuple(each.high for each in features) if centred else 1.0,
             names,
             Planes(len(names), target),
-            self._contents(content_of(features, world)),
+            self._content_of(content_of(features, world)),
         )
 
 

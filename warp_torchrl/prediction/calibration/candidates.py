@@ -7,7 +7,7 @@ from torch import Tensor
 
 from warp_torchrl.prediction.calibration.case import FireCase
 from warp_torchrl.world.backends.spreading import Hour, Spreading
-from warp_torchrl.world.fires.alone import Spell, can_ignite, hour_of
+from warp_torchrl.world.fires.spell import Spell, can_ignite, hour_of
 from warp_torchrl.world.law.rate import RateFire
 
 

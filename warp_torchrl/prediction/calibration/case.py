@@ -10,7 +10,7 @@ from torch import Tensor
 from warp_torchrl.prediction.calibration.null_models import mean_wind
 from warp_torchrl.prediction.calibration.observed import Outcome, read_arrival, read_perimeters, read_scar
 from warp_torchrl.world.air.weather import Weather
-from warp_torchrl.world.fires.alone import Spell
+from warp_torchrl.world.fires.spell import Spell
 from warp_torchrl.world.state.state import OLDEST, Cover, Landscape
 from warp_torchrl.world.terrain.cells import read_cells
 from warp_torchrl.world.terrain.features import SUFFIXES

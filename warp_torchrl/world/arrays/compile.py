@@ -1,4 +1,4 @@
-"""What functions of tensors know of the compiler: whether it fuses them, and operators that it leaves alone.
+"""The compiler, for functions of tensors: whether it fuses them, and operators that it leaves alone.
 
 No other module of the world speaks of it. ``system.compiler`` fuses functions.
 """
@@ -22,9 +22,9 @@ _FUNCTIONS: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {}
 
 
 def opaque_op(schema: str, like: Callable[..., Any] | None = None) -> Callable[[Callable[P, T]], Callable[P, T]]:
-    """Return what makes a function one that compiled functions call as it is, and whose result they keep in memory.
+    """Return a decorator: compiled functions call the function without compiling it, and keep its result in memory.
 
-    A compiler would write it out again for each who asks, or make a question of each element of what is a slice.
+    A compiler would repeat the function's code at every call, or test each element where the function takes a slice.
 
     Args:
         schema: Of its arguments and its result, in torch's language.

@@ -66,8 +66,8 @@ def grow(mask: Tensor, radius: int = 1) -> Tensor:
 def flood(seeds: Tensor, open_cells: Tensor) -> Tensor:
     """Return the open cells that are reached from the seeds over open cells, eight neighbours each.
 
-    The walk is followed for 2 (H + W) steps: only a labyrinth holds longer shortest paths. Where the device is read
-    freely it ends as soon as nothing new is reached.
+    The walk is followed for 2 (H + W) steps: only a labyrinth holds longer shortest paths. Where reading a
+    result needs no synchronisation, it ends as soon as nothing new is reached.
 
     Args:
         seeds: bool [B, H, W]; a seed need not be open.

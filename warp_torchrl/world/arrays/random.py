@@ -1,4 +1,4 @@
-"""Counter-based randomness: every draw is a pure function of who asks and when.
+"""Counter-based randomness: every draw is a pure function of its key, tick, stream and place.
 
 A draw depends on (world seed, episode, tick, stream, cell), and on nothing else: not on the batch a world is in,
 its place there, the device, or what was drawn before. So worlds are batch-invariant, policies that are compared on

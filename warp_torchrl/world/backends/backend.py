@@ -16,7 +16,7 @@ from warp_torchrl.world.arrays.compile import is_fused
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.backends.band import AtBand
 from warp_torchrl.world.backends.edge import AtEdge
-from warp_torchrl.world.backends.planes import Planes
+from warp_torchrl.world.backends.planes import WholeMaps
 from warp_torchrl.world.backends.table import Tabled, pattern_table
 from warp_torchrl.world.law.arrivals import RATE
 from warp_torchrl.world.law.automaton import Automaton
@@ -75,7 +75,7 @@ def fastest(fire: Automaton, device: torch.device) -> Backend:
     if not isinstance(fire, Fire) or type(fire) not in COVERED:
         return Reference(fire)
     spreads_alone = not fire.growth and fire.beta == 0.0 and fire.p_regrow == 0.0
-    return AtEdge(fire) if spreads_alone and on_cpu else Planes(fire)
+    return AtEdge(fire) if spreads_alone and on_cpu else WholeMaps(fire)
 
 
 def _may_read(device: torch.device) -> bool:

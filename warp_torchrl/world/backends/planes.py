@@ -30,7 +30,7 @@ from warp_torchrl.world.state.cells import holds_trees, is_burning
 from warp_torchrl.world.state.state import EMBER, FIRST_FIRE, OLDEST, WorldState
 
 
-class Planes:
+class WholeMaps:
     """Ticks and forecasts from whole maps.
 
     Args:

@@ -18,7 +18,7 @@ _STRIP = 2**16  # cells of a strip, at least: their planes lie in a cache
 _KEPT = 2**24  # numbers of planes that are kept, 64 MiB
 
 
-class Planes:
+class PlanesOfSpells:
     """The latest planes, up to a number of cells together.
 
     Args:

@@ -14,49 +14,18 @@ from torch import Tensor
 
 from warp_torchrl.system import memory
 from warp_torchrl.world.backends.growing import GrowingFires, Land, SpellInWindows
-from warp_torchrl.world.backends.spells import Highest, Planes, in_window, on_strips
-from warp_torchrl.world.backends.spreading import Hour
-from warp_torchrl.world.behaviour.moistures import moisture_row
-from warp_torchrl.world.behaviour.spread import Spread
-from warp_torchrl.world.law.fuel_bed import gradient
-from warp_torchrl.world.law.rate import TICKS_PER_CELL, RateFire
+from warp_torchrl.world.backends.spells import Highest, PlanesOfSpells, in_window, on_strips
+from warp_torchrl.world.fires.spell import BUT_FASTEST, Spell, can_ignite, heads, spread_in, ticks_of
+from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER, travel
 from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.state.window import Window
 
-_LEAST_TICKS = 4  # of a spell: the fire's edge goes on from the times of the tick before
-_BUT_FASTEST = 0.999  # share of the cells whose rates set the ticks
 _AT_ONCE = 64  # fires, whose planes a CPU's cache holds
 _MOST_CELLS = 2**24  # of the windows of fires that burn at once
 _BYTES_A_FIRE, _BYTES_A_CELL = 64, 200  # that a cell of a window takes at most, for each fire and for the map
 _PLANES = ("head", "backing", "intensity", "flame_length")
 T = TypeVar("T")
-
-
-@dataclass(frozen=True, eq=False)
-class Spell:
-    """A time of constant weather."""
-
-    wind: Tensor  # (u east, v north) of the air's motion at 10 m, float32 [2] [m/s]
-    minutes: float  # how long it lasts
-    moisture: Tensor | None = None  # float32 [7], in the order of ``moistures.MOISTURES``, NaN where not known
-
-
-def spread_in(
-    fire: RateFire, landscape: Landscape, cell_size: float, spell: Spell, window: Window | None = None
-) -> Spread:
-    """Return the behaviour of a fire's head in each cell of a landscape in a spell, [1, H, W], or of a window."""
-    row = moisture_row(fire.moisture)
-    moisture = row if spell.moisture is None else torch.where(spell.moisture.isnan(), row, spell.moisture)
-    air = spell.wind[None, :, None, None], moisture[None], cell_size
-    if window is None:
-        return fire.bed.spread(landscape, *air)
-    return fire.bed.spread(window.landscape(landscape), *air, rise=_rise(landscape, window, cell_size))
-
-
-def can_ignite(fire: RateFire, landscape: Landscape) -> Tensor:
-    """Return the cells of one landscape that can ignite, bool [H, W]."""
-    return (fire.flammability(landscape)[0] > 0.0) & (landscape.age[0] >= fire.youngest_fuel)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,9 +76,9 @@ class Fires:
         return can_ignite(self.fire, self.landscape)
 
     @cached_property
-    def planes(self) -> Planes:
+    def planes(self) -> PlanesOfSpells:
         """Return the function of a spell and a window that gives travel times and then ``Heads``, float32 [7, h, w]."""
-        return Planes(lambda number, window: in_window(partial(self._planes, number), window))
+        return PlanesOfSpells(lambda number, window: in_window(partial(self._planes, number), window))
 
     def fastest(self, number: int) -> tuple[float, float]:
         """Return the rates of a spell's fastest heads but one in a thousand [m/min].
@@ -199,7 +168,7 @@ class Fires:
         place = None if window.is_whole else window
         spread = spread_in(self.fire, self.landscape, self.cell_size, self.spells[number], place)
         made = travel(spread.head, spread.direction, spread.length_to_breadth, self.cell_size)
-        return torch.cat((made[0], _heads(spread)))
+        return torch.cat((made[0], heads(spread)))
 
     def _head(self, number: int, strip: Window) -> Tensor:
         if strip.is_whole:
@@ -208,8 +177,8 @@ class Fires:
 
     def _fastest_of(self, number: int) -> tuple[float, float]:
         n_fuel, n_cells = int(self.fuel.sum()), self.fuel.numel()
-        of_fuel = Highest(n_fuel - max(1, math.ceil(_BUT_FASTEST * n_fuel)) + 1)
-        of_all = Highest(n_cells - max(1, round(_BUT_FASTEST * n_cells)) + 1)
+        of_fuel = Highest(n_fuel - max(1, math.ceil(BUT_FASTEST * n_fuel)) + 1)
+        of_all = Highest(n_cells - max(1, round(BUT_FASTEST * n_cells)) + 1)
         for strip, head in on_strips(partial(self._head, number), self.size, self.workers):
             of_fuel.add(head[strip.cut(self.fuel, False)])
             of_all.add(head.flatten())
@@ -247,47 +216,6 @@ def _on_map(burned: Burned) -> Tensor:
         return burned.minutes.clone()
     plane = burned.minutes.new_full((len(burned.minutes), *burned.window.map), NEVER)
     return burned.window.put(burned.minutes, plane)
-
-
-def hour_of(fire: RateFire, landscape: Landscape, cell_size: float, spell: Spell, fuel: Tensor) -> Hour:
-    """Return the travel times in a spell, and ticks as short as its fastest cells but one in a thousand need.
-
-    Args:
-        fire: The automaton.
-        landscape: One landscape, batch size [1].
-        cell_size: Side of a cell [m].
-        spell: The weather.
-        fuel: Cells that can ignite, bool [H, W].
-    """
-    spread = spread_in(fire, landscape, cell_size, spell)
-    rates = spread.head[0][fuel]
-    fastest = float(rates.kthvalue(max(1, math.ceil(_BUT_FASTEST * len(rates)))).values) if len(rates) else 0.0
-    ticks = ticks_of(spell.minutes, fastest, cell_size)
-    made = travel(spread.head, spread.direction, spread.length_to_breadth, cell_size)[0]
-    return Hour(made, spell.minutes / ticks, ticks)
-
-
-def ticks_of(minutes: float, fastest: float, cell_size: float) -> int:
-    """Return the ticks of some minutes in which the fastest fire [m/min] crosses half a cell [m]."""
-    return max(_LEAST_TICKS, math.ceil(TICKS_PER_CELL * minutes * fastest / cell_size))
-
-
-def _rise(landscape: Landscape, window: Window, cell_size: float) -> Tensor:
-    """Return the gradient of a window's ground, float32 [1, 2, h, w]."""
-    cover = window.around(landscape.cover)
-    if landscape.elevation is None:
-        return gradient(None, cover, cell_size)
-    return gradient(window.around(landscape.elevation, margin=1), cover, cell_size)[:, :, 1:-1, 1:-1]
-
-
-def _heads(spread: Spread) -> Tensor:
-    """Return the fields of ``HeadBehaviour`` for a spread [1, h, w], float32 [4, h, w].
-
-    The rear spreads at R_head (1 - e) / (1 + e), e the eccentricity of the ellipse.
-    """
-    focus = (1.0 - spread.length_to_breadth.pow(-2)).clamp(min=0.0).sqrt()
-    backing = spread.head * (1.0 - focus) / (1.0 + focus)
-    return torch.cat((spread.head, backing, spread.intensity, spread.flame_length))
 
 
 class _TooMany(Exception):  # noqa: N818

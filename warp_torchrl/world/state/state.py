@@ -1,4 +1,4 @@
-"""What the world is made of: the batches every other module reads, and the public codes.
+"""State of the worlds: the batches that every other module reads, and the public codes.
 
 Letters, everywhere: B worlds, A agents, H rows, W columns.
 """

@@ -27,7 +27,7 @@ _NEIGHBOURHOOD = ((0, 0), (-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), 
 
 
 @dataclass(frozen=True, eq=False)
-class Situation:
+class AgentContext:
     """What an ability reads: the worlds and the rules of team and fire."""
 
     state: WorldState
@@ -47,7 +47,7 @@ class Situation:
         return plane.flatten(1).gather(1, index)
 
 
-class Deed(NamedTuple):
+class Effect(NamedTuple):
     """What an action would do if each agent chose it."""
 
     possible: Tensor  # bool [B, A], whether it would do anything
@@ -70,11 +70,11 @@ class Ability:
     actions: ClassVar[tuple[str, ...]] = ()
     moves: ClassVar[bool] = False
 
-    def mask(self, now: Situation) -> Tensor:
+    def mask(self, now: AgentContext) -> Tensor:
         """Return which of its actions would do something, bool [B, A, actions], as if every agent had it."""
         raise TypeError(f"{type(self).__name__} does not say what is possible: define mask()")
 
-    def act(self, now: Situation, choice: Tensor) -> Deed:
+    def act(self, now: AgentContext, choice: Tensor) -> Effect:
         """Return what its actions would do, for each agent's choice of them, int64 [B, A].
 
         Of an ability with one action the choice means nothing.
@@ -112,7 +112,7 @@ class Move(Ability):
     actions = ("north", "north_east", "east", "south_east", "south", "south_west", "west", "north_west")
     moves = True
 
-    def mask(self, now: Situation) -> Tensor:
+    def mask(self, now: AgentContext) -> Tensor:
         """Return which of the eight moves each agent can make, bool [B, A, 8]; nobody leaves the map."""
         state, roles = now.state, now.roles
         index, inside = places(state, offsets(state.cells.device) * roles.stride[:, None, None])
@@ -121,10 +121,10 @@ class Move(Ability):
         blocked = ((ground == int(Cover.LAKE)) | is_burning(cells)).view_as(inside)
         return inside & (~blocked | roles.flies[:, None])
 
-    def act(self, now: Situation, choice: Tensor) -> Deed:
+    def act(self, now: AgentContext, choice: Tensor) -> Effect:
         """Return the moves."""
         step = offsets(choice.device)[choice] * now.roles.stride[:, None]
-        return Deed(self.mask(now).gather(-1, choice[..., None])[..., 0], step=step)
+        return Effect(self.mask(now).gather(-1, choice[..., None])[..., 0], step=step)
 
 
 @ability("extinguish")
@@ -133,12 +133,12 @@ class Extinguish(Ability):
 
     actions = ("extinguish",)
 
-    def mask(self, now: Situation) -> Tensor:
+    def mask(self, now: AgentContext) -> Tensor:
         """Return where there is such a fire, and water, bool [B, A, 1]."""
         _, has_fire = self.nearby_fire(now)
         return (has_fire & (now.state.vehicles.tank != 0))[..., None]
 
-    def act(self, now: Situation, choice: Tensor) -> Deed:
+    def act(self, now: AgentContext, choice: Tensor) -> Effect:
         """Return what putting it out would do; it takes water even where it fails."""
         state = now.state
         fire, has_fire = self.nearby_fire(now)
@@ -151,10 +151,10 @@ class Extinguish(Ability):
             "extinguished": 1,
             "wet": now.wet_ticks,
         }
-        return Deed(possible, becomes, fire, takes_water=has_fire)
+        return Effect(possible, becomes, fire, takes_water=has_fire)
 
     @staticmethod
-    def nearby_fire(now: Situation) -> tuple[Tensor, Tensor]:
+    def nearby_fire(now: AgentContext) -> tuple[Tensor, Tensor]:
         """Return the youngest fire of each agent's 3 x 3 neighbourhood.
 
         Ties go to the agent's own cell, then in row-major order.
@@ -175,13 +175,13 @@ class Clear(Ability):
 
     actions = ("clear",)
 
-    def mask(self, now: Situation) -> Tensor:
+    def mask(self, now: AgentContext) -> Tensor:
         """Return where there is a tree that does not burn, bool [B, A, 1]."""
         return is_tree(now.at(now.state.cells, now.own_cell))[..., None]
 
-    def act(self, now: Situation, choice: Tensor) -> Deed:
+    def act(self, now: AgentContext, choice: Tensor) -> Effect:
         """Return what clearing it would do."""
-        return Deed(self.mask(now)[..., 0], {"cells": 0, "firebreak": 1})
+        return Effect(self.mask(now)[..., 0], {"cells": 0, "firebreak": 1})
 
 
 PAPER_ABILITIES = tuple(ABILITIES)

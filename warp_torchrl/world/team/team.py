@@ -1,60 +1,24 @@
 """The vehicles: where they start, and how a step makes one of what each of them does."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, reduce
-from operator import add, or_
-from typing import Literal, NamedTuple, Protocol
+from operator import or_
+from typing import Literal
 
 import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.arrays.bytes import scatter_add
 from warp_torchrl.world.state.role import ROLES, RoleTable, role_names, role_table
 from warp_torchrl.world.state.state import Action, ActionResult, Cover, Vehicles, WorldState
-from warp_torchrl.world.team.abilities import ABILITIES, PAPER_ABILITIES, Ability, Deed, Situation, neighbourhood
+from warp_torchrl.world.team.abilities import ABILITIES, PAPER_ABILITIES, AgentContext, neighbourhood
+from warp_torchrl.world.team.acting import MoveRule, TeamAbility, changed, grounded_by, is_second
 from warp_torchrl.world.team.radio import Radio
 from warp_torchrl.world.team.start import starting_cells
 
 STAY = "stay"
 """Name of the action that does nothing."""
-
-
-class Skill(NamedTuple):
-    """An ability of a team."""
-
-    name: str
-    ability: Ability
-    first: int  # code of its first action
-    of_all: bool  # whether every agent has it
-
-    def is_chosen(self, action: Tensor) -> Tensor:
-        """Return where an action is one of its own, bool, shape of the actions, int64."""
-        count = len(self.ability.actions)
-        if count == 1:
-            return action == self.first
-        below = action < self.first + count
-        return below & (action >= self.first) if self.first else below
-
-    def act(self, now: Situation, action: Tensor) -> tuple[Tensor, Deed]:
-        """Return which agents would do something if their action is one of its own, bool [B, A], and what."""
-        count = len(self.ability.actions)
-        choice = (action - self.first if self.first else action).clamp(0, count - 1) if count > 1 else action
-        deed = self.ability.act(now, choice)
-        return deed.possible if self.of_all else deed.possible & now.roles.can[self.name], deed
-
-
-class MoveRule(Protocol):
-    """What binds vehicles that move, beside their abilities; see ``world.mechanics.Mechanic``."""
-
-    def grounded(self, state: WorldState, roles: RoleTable) -> Tensor | None:
-        """Return which agents cannot move, bool [B, A]; None where it keeps none."""
-        ...
-
-    def moved(self, state: WorldState, roles: RoleTable, running: Tensor) -> WorldState:
-        """Return worlds after the agents' moves, in those that go on, bool [B]."""
-        ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,12 +80,12 @@ class Team:
         return [name for name in dict.fromkeys(named) if name not in PAPER_ABILITIES]
 
     @cached_property
-    def skills(self) -> tuple[Skill, ...]:
+    def abilities(self) -> tuple[TeamAbility, ...]:
         """Return the abilities of the team, in the order of its actions."""
         names, codes = (*PAPER_ABILITIES, *self._further), self.action_names
         kinds = [ROLES[role] for role in self.roles]
         return tuple(
-            Skill(name, made, codes.index(made.actions[0]), all(name in kind.abilities for kind in kinds))
+            TeamAbility(name, made, codes.index(made.actions[0]), all(name in kind.abilities for kind in kinds))
             for name, made in ((name, ABILITIES[name]) for name in names)
         )
 
@@ -147,7 +111,7 @@ class Team:
 
     @cached_property
     def _named(self) -> tuple[tuple[str, ...], ...]:
-        return tuple(self.agent_roles), self.role_names, tuple(skill.name for skill in self.skills)
+        return tuple(self.agent_roles), self.role_names, tuple(each.name for each in self.abilities)
 
     def place(self, key: Tensor, cover: Tensor, burning: Tensor) -> Vehicles:
         """Return the team at the start of an episode; see ``starting_cells``."""
@@ -165,7 +129,7 @@ class Team:
 
     def open_moves(self, state: WorldState, rules: Sequence[MoveRule] = ()) -> Tensor:
         """Return which of the eight moves each agent can make under some rules, bool [B, A, 8]."""
-        return self._mask(self.skills[0], self._situation(state, 0), rules)
+        return self.abilities[0].mask(self._context(state, 0), rules)
 
     def action_mask(self, state: WorldState, last_spreading: int, rules: Sequence[MoveRule] = ()) -> Tensor:
         """Return which actions would do something, bool [B, A, actions].
@@ -178,8 +142,8 @@ class Team:
             last_spreading: Cell code of the last stage that can be put out.
             rules: What binds moves.
         """
-        now = self._situation(state, last_spreading)
-        can = [self._mask(skill, now, rules) for skill in self.skills]
+        now = self._context(state, last_spreading)
+        can = [each.mask(now, rules) for each in self.abilities]
         if self.allow_stay:
             can.insert(len(PAPER_ABILITIES), torch.ones_like(can[-1][..., :1]))
         open_actions = torch.cat(can, dim=-1)
@@ -213,26 +177,26 @@ class Team:
         """
         state, moved = self._move(state, action, running, rules)
         running = running[:, None]
-        now = self._situation(state, last_spreading, wet_ticks)
+        now = self._context(state, last_spreading, wet_ticks)
         target = now.own_cell
         vehicles, tank = state.vehicles, state.vehicles.tank
-        chosen, deeds = [], []
-        for skill in self.skills:
-            if skill.ability.moves:
+        chosen, effects = [], []
+        for each in self.abilities:
+            if each.ability.moves:
                 continue
-            wanted = skill.is_chosen(action) & running
-            possible, deed = skill.act(now, action)
+            wanted = each.is_chosen(action) & running
+            possible, effect = each.act(now, action)
             done = wanted & possible
-            if deed.target is not None:
-                target = torch.where(done, deed.target, target)
-            if deed.takes_water is not None:
-                tank = tank - (wanted & deed.takes_water & (vehicles.tank > 0)).to(torch.int32)
+            if effect.target is not None:
+                target = torch.where(done, effect.target, target)
+            if effect.takes_water is not None:
+                tank = tank - (wanted & effect.takes_water & (vehicles.tank > 0)).to(torch.int32)
             chosen.append(wanted)
-            deeds.append((done, deed.becomes))
-        acting = reduce(or_, [done for done, _ in deeds])
+            effects.append((done, effect.becomes))
+        acting = reduce(or_, [done for done, _ in effects])
         redundant = is_second(target, acting)
         credited = acting & ~redundant
-        after = changed(state, target, [(done & credited, becomes) for done, becomes in deeds])
+        after = changed(state, target, [(done & credited, becomes) for done, becomes in effects])
         after = after.replace(
             vehicles=vehicles.replace(
                 tank=self._refill(state, tank),
@@ -244,29 +208,22 @@ class Team:
         )
         return after, ActionResult(action=action, moved=moved, credited=credited, redundant=redundant, target=target)
 
-    def _situation(self, state: WorldState, last_spreading: int, wet_ticks: int = 0) -> Situation:
-        return Situation(state, self.table(state.cells.device), self.extinguish_p, last_spreading, wet_ticks)
-
-    def _mask(self, skill: Skill, now: Situation, rules: Sequence[MoveRule]) -> Tensor:
-        mask = skill.ability.mask(now)
-        if skill.ability.moves:
-            for grounded in _grounded(now, rules):
-                mask = mask & ~grounded[..., None]
-        return mask if skill.of_all else mask & now.roles.can[skill.name][:, None]
+    def _context(self, state: WorldState, last_spreading: int, wet_ticks: int = 0) -> AgentContext:
+        return AgentContext(state, self.table(state.cells.device), self.extinguish_p, last_spreading, wet_ticks)
 
     def _move(
         self, state: WorldState, action: Tensor, running: Tensor, rules: Sequence[MoveRule]
     ) -> tuple[WorldState, Tensor]:
         """Return the worlds after the moves, and which agents moved, bool [B, A]."""
-        now, position, moved = self._situation(state, 0), state.vehicles.position, []
-        for skill in self.skills:
-            if skill.ability.moves:
-                possible, deed = skill.act(now, action)
-                for grounded in _grounded(now, rules):
+        now, position, moved = self._context(state, 0), state.vehicles.position, []
+        for each in self.abilities:
+            if each.ability.moves:
+                possible, effect = each.act(now, action)
+                for grounded in grounded_by(rules, now):
                     possible = possible & ~grounded
-                moved.append(skill.is_chosen(action) & running[:, None] & possible)
-                if deed.step is not None:
-                    position = position + deed.step * moved[-1][..., None]
+                moved.append(each.is_chosen(action) & running[:, None] & possible)
+                if effect.step is not None:
+                    position = position + effect.step * moved[-1][..., None]
         state = state.replace(vehicles=state.vehicles.replace(position=position))
         for rule in rules:
             state = rule.moved(state, now.roles, running)
@@ -277,39 +234,7 @@ class Team:
         if self.tank is None:
             return tank
         index, inside = neighbourhood(state)
-        cover = Situation.at(state.cover, index.flatten(1)).view_as(index)
+        cover = AgentContext.at(state.cover, index.flatten(1)).view_as(index)
         by_lake = ((cover == int(Cover.LAKE)) & inside).any(dim=-1)
         at_base = (state.vehicles.position == state.vehicles.base[:, None]).all(dim=-1)
         return torch.where(by_lake | at_base, self.tank, tank)
-
-
-def _grounded(now: Situation, rules: Sequence[MoveRule]) -> list[Tensor]:
-    """Return which agents cannot move by each rule that keeps some where they are, bool [B, A] each."""
-    found = (rule.grounded(now.state, now.roles) for rule in rules)
-    return [each for each in found if each is not None]
-
-
-def changed(state: WorldState, target: Tensor, deeds: list[tuple[Tensor, Mapping[str, Tensor | int]]]) -> WorldState:
-    """Return worlds with what credited acts make of their targets, int64 [B, A].
-
-    It is written as sums of differences, so that the order of the agents does not matter.
-
-    Args:
-        state: The worlds before.
-        target: Flat index of the cell of each agent's act.
-        deeds: Of each ability the agents whose act is credited, bool [B, A], and what planes hold there afterwards.
-    """
-    planes = {name: getattr(state, name) for _, becomes in deeds for name in becomes}
-    after = {}
-    for name, plane in planes.items():
-        codes = plane.view(torch.uint8).flatten(1)
-        old = codes.gather(1, target)
-        changes = [credited * (becomes[name] - old) for credited, becomes in deeds if name in becomes]
-        after[name] = scatter_add(codes, target, reduce(add, changes)).view_as(plane).view(plane.dtype)
-    return state.replace(**after)
-
-
-def is_second(target: Tensor, acting: Tensor) -> Tensor:
-    """Return which agents act on a target that an acting agent of lower index has, bool [B, A]."""
-    same = (target[:, :, None] == target[:, None, :]) & acting[:, :, None] & acting[:, None, :]
-    return same.tril(diagonal=-1).any(dim=-1)

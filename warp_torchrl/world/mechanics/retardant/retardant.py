@@ -18,8 +18,9 @@ from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.role import Role, add_role
 from warp_torchrl.world.state.state import ActionResult, Vehicles, WorldState
 from warp_torchrl.world.team.abilities import own_cell
+from warp_torchrl.world.team.acting import MoveRule, changed, is_second
 from warp_torchrl.world.team.places import approach_move, has_reached
-from warp_torchrl.world.team.team import MoveRule, Team, changed, is_second
+from warp_torchrl.world.team.team import Team
 
 TANKER = "tanker"
 """The role of these aircraft."""

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from warp_torchrl.world.behaviour.spread import Spread
-from warp_torchrl.world.fires.alone import _heads
+from warp_torchrl.world.fires.spell import heads
 
 
 @pytest.mark.parametrize(("ratio", "rear"), [(2.0, 0.718), (1.0, 10.0)], ids=["an ellipse", "a round fire has no rear"])
@@ -18,4 +18,4 @@ def test_the_rear_goes_slower_by_the_eccentricity(ratio, rear):
         intensity=3000.0 * cell,
         flame_length=2.0 * cell,
     )
-    assert _heads(spread).flatten().tolist() == pytest.approx([10.0, rear, 3000.0, 2.0], abs=1e-3)
+    assert heads(spread).flatten().tolist() == pytest.approx([10.0, rear, 3000.0, 2.0], abs=1e-3)
