@@ -6,7 +6,7 @@ import pytest
 from warp_torchrl.env.reward import Adaptive, Efficiency
 from warp_torchrl.models import Mlp
 from warp_torchrl.runs.config.construction import ConfigError, construct
-from warp_torchrl.runs.config.search_options import SearchOptions
+from warp_torchrl.runs.config.options import SearchOptions
 from warp_torchrl.runs.logging import Wandb
 from warp_torchrl.validation import closest_names, did_you_mean, dotted
 from warp_torchrl.world.air.wind import Uniform

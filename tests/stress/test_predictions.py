@@ -12,7 +12,7 @@ from warp_torchrl.commands import predict as command
 from warp_torchrl.commands.predict import OUTPUTS, REPORT
 from warp_torchrl.prediction.case import read_case
 from warp_torchrl.runs import output
-from warp_torchrl.runs.config.prediction_options import PredictionOptions
+from warp_torchrl.runs.config.options import PredictionOptions
 from warp_torchrl.runs.output import DRAFT, output_folder
 from warp_torchrl.system import disk
 

@@ -6,9 +6,8 @@ import torch
 
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.runs.config.building import check_keys
-from warp_torchrl.runs.config.components import build_components
 from warp_torchrl.runs.config.compose import compose_config, plain
-from warp_torchrl.runs.config.groups import ENVIRONMENT
+from warp_torchrl.runs.config.construction import ENVIRONMENT, build_components
 from warp_torchrl.system.modes import apart
 
 

@@ -22,9 +22,8 @@ from warp_torchrl.evaluation.evaluate import evaluate_policy
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config.building import BuildOnce
 from warp_torchrl.runs.config.compose import HYDRA_ERRORS, conf_folder, explain, option_of, plain, without_targets
-from warp_torchrl.runs.config.construction import ConfigError
+from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError
 from warp_torchrl.runs.config.grammar import check_flags, check_overrides, flags_first
-from warp_torchrl.runs.config.groups import COMPONENTS
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore, world_overrides
 from warp_torchrl.runs.destination import check_free
 from warp_torchrl.runs.policies.find import find_policy

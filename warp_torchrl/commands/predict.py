@@ -21,7 +21,7 @@ from warp_torchrl.prediction.report import page, report_numbers, warnings
 from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
 from warp_torchrl.runs.config.construction import ConfigError, build, construct
 from warp_torchrl.runs.config.grammar import check_flags
-from warp_torchrl.runs.config.prediction_options import PredictionOptions
+from warp_torchrl.runs.config.options import PredictionOptions
 from warp_torchrl.runs.output import output_folder
 from warp_torchrl.system import disk
 from warp_torchrl.system.provenance import Provenance, gathered

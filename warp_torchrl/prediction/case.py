@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.prediction.files import MapPlace
-from warp_torchrl.runs.config.prediction_options import PredictionOptions
+from warp_torchrl.runs.config.options import PredictionOptions
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.ignition.file import read_ignition
 from warp_torchrl.world.law.rate import RateFire

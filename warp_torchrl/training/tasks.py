@@ -10,9 +10,9 @@ from warp_torchrl.collection.collectors import InProcess
 from warp_torchrl.collection.running import Collection
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.models import joint, signature
-from warp_torchrl.runs.config.kinds import KindOfWorld
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.runs.config.seeds import first_world_seed
+from warp_torchrl.runs.config.worlds import KindOfWorld
 from warp_torchrl.training.reward_scale import RewardScale
 
 

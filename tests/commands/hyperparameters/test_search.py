@@ -16,7 +16,7 @@ from warp_torchrl.commands.hyperparameters.storage import JOURNAL, open_study
 from warp_torchrl.runs import process
 from warp_torchrl.runs.checkpoint import newest
 from warp_torchrl.runs.config.construction import ConfigError
-from warp_torchrl.runs.config.search_options import SearchOptions
+from warp_torchrl.runs.config.options import SearchOptions
 from warp_torchrl.runs.config.space import dimension
 from warp_torchrl.runs.process import SearchEnded
 from warp_torchrl.system.lock import RunFolderInUse, RunFolderLock

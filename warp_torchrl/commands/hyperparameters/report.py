@@ -15,8 +15,8 @@ from optuna.trial import FrozenTrial, TrialState
 
 from warp_torchrl.commands.hyperparameters.search import TRIALS, best_of
 from warp_torchrl.runs.config.compose import GROUPS, choices, compose_config, plain
-from warp_torchrl.runs.config.groups import COMPONENTS
-from warp_torchrl.runs.config.search_options import SearchOptions
+from warp_torchrl.runs.config.construction import COMPONENTS
+from warp_torchrl.runs.config.options import SearchOptions
 from warp_torchrl.runs.config.space import Dimension, value_of
 from warp_torchrl.system import disk
 

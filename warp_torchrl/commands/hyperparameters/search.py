@@ -13,7 +13,7 @@ from optuna.trial import FrozenTrial, TrialState
 from warp_torchrl.commands.hyperparameters.measures import saved_at_the_end, saved_by_share, saved_in_evaluation
 from warp_torchrl.commands.hyperparameters.storage import ask, draw_values, goes_on
 from warp_torchrl.runs.checkpoint import holds_any, leave_policy
-from warp_torchrl.runs.config.search_options import SearchOptions
+from warp_torchrl.runs.config.options import SearchOptions
 from warp_torchrl.runs.config.space import Dimension, Value
 from warp_torchrl.runs.process import STOPPED, SearchEnded, StartedTraining
 from warp_torchrl.system.exit_codes import DISK, DONE, NUMERICAL

@@ -15,7 +15,7 @@ from optuna.storages.journal import JournalFileBackend
 
 from warp_torchrl.commands.hyperparameters.measures import COMPARED_EVERY
 from warp_torchrl.runs.config.construction import ConfigError
-from warp_torchrl.runs.config.search_options import SearchOptions
+from warp_torchrl.runs.config.options import SearchOptions
 from warp_torchrl.runs.config.space import Dimension, Value
 from warp_torchrl.system.foreign import read_bytes
 

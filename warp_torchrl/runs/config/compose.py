@@ -1,4 +1,4 @@
-"""Configuration: composes the yaml files of ``conf/``.
+"""Composition of configurations from the yaml files of ``conf/``.
 
 A component's types, defaults and rules stand in its dataclass and nowhere else. The yaml files name the class, always
 one of this package's own; nothing that is read from a run folder is ever instantiated by name.
@@ -20,10 +20,9 @@ from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf, open_dict
 from omegaconf.errors import OmegaConfBaseException
 
-from warp_torchrl.runs.config.construction import ConfigError, UnknownKeyError, component
+from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError, UnknownKeyError, component
 from warp_torchrl.runs.config.defaults import defaults
 from warp_torchrl.runs.config.grammar import check_overrides, several_values
-from warp_torchrl.runs.config.groups import COMPONENTS
 from warp_torchrl.validation import did_you_mean
 
 OmegaConf.register_new_resolver("pid", os.getpid, replace=True, use_cache=True)  # a sweep's jobs get its own process's

@@ -5,12 +5,26 @@ A node names its class, one of this package's dataclasses, in ``_target_``; noth
 
 import importlib
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
 from inspect import isabstract
 from typing import Any, get_origin, get_type_hints
 
 from warp_torchrl.validation import did_you_mean, fit
+from warp_torchrl.world.mechanics.mechanic import Mechanic
+from warp_torchrl.world.mechanics.table import mechanics
+from warp_torchrl.world.world import World
+
+OF_WORLDS = ("landscape", "wind", "fire", "team", "ignition", "sensing", "agencies")
+"""Groups whose options make a world."""
+ENVIRONMENT = (*OF_WORLDS, "observation", "reward")
+"""Those that make an environment."""
+COMPONENTS = (*ENVIRONMENT, "model", "algorithm", "collector", "curriculum", "mixture", "logger")
+"""All groups whose options are classes."""
+WORLD_KEYS = ("scenario", *OF_WORLDS, "mechanics", "steps_per_tick", "horizon", "cell_size", "action_masking")
+"""What a scenario sets."""
+COMMAND_KEYS = ("resume", "start_from", "debug", "policy", "overwrite", "maps", "maps_fires", "picture")
+"""What the commands read themselves."""
 
 
 class ConfigError(ValueError):
@@ -103,3 +117,46 @@ def _made(value: Any, hint: Any, key: str, prefix: str) -> Any:
     if isinstance(hint, type) and is_dataclass(hint) and not isabstract(hint) and not is_dataclass(value):
         return construct(hint, value, f"{prefix}{key}")
     return fit(value, hint, key)
+
+
+def build_components(config: Mapping[str, Any], names: Sequence[str] = COMPONENTS) -> dict[str, Any]:
+    """Build components of a composed configuration, and the ``world`` of those that make one.
+
+    Args:
+        config: As plain values.
+        names: Which; those of the world must be among them.
+
+    Raises:
+        ConfigError: With key, value and rule.
+    """
+    first = ("model",) if "model" in names else ()  # whose messages are the team's: mistakes are told of the model
+    built = {name: build(config[name], name) for name in dict.fromkeys((*first, *names))}
+    built["mechanics"] = build_mechanics(config.get("mechanics", {}))
+    world = construct(World, chosen(World, {**config, **built}), "")
+    if "reward" in built:
+        try:
+            built["reward"].check_world(world)
+        except ValueError as error:
+            raise ConfigError(str(error)) from None
+    return {**built, "world": world}
+
+
+def build_mechanics(values: object) -> tuple[Mechanic, ...]:
+    """Build the mechanics of a world from their values by name; a mechanic without values has its defaults.
+
+    Raises:
+        ConfigError: With key, value and rule.
+    """
+    if not isinstance(values, Mapping):
+        raise ConfigError(f"mechanics must be a mapping, got {values!r}")
+    known = mechanics()
+    for name in values:
+        if name not in known:
+            hint = did_you_mean(name, known)
+            raise ConfigError(f"mechanics must be some of {', '.join(known)}, got {name}{hint}")
+    return tuple(construct(known[name], own or {}, f"mechanics.{name}") for name, own in values.items())
+
+
+def chosen(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return those values that are fields of a dataclass."""
+    return {each.name: values[each.name] for each in fields(kind) if each.name in values}

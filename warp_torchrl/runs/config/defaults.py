@@ -1,4 +1,4 @@
-"""Default values stand once, in the dataclasses: a yaml file holds what differs from those of the class that it names.
+"""Default values, which stand once, in the dataclasses: a yaml file holds what differs from its class's.
 
 Where Hydra reads a yaml file, in ``conf/`` or in a folder of the user's own, the fields that the file leaves out are
 filled in. So ``--cfg job`` shows every value, every field can be overridden, and a key that is no field is refused.
@@ -16,11 +16,9 @@ from hydra._internal.sources_registry import SourcesRegistry
 from hydra.plugins.config_source import ConfigResult
 from omegaconf import DictConfig, OmegaConf
 
-from warp_torchrl.runs.config.construction import ConfigError, component, free_mappings
-from warp_torchrl.runs.config.groups import COMPONENTS
-from warp_torchrl.runs.config.prediction_options import PredictionOptions
+from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError, component, free_mappings
+from warp_torchrl.runs.config.options import PredictionOptions, SearchOptions
 from warp_torchrl.runs.config.run_config import RunConfig
-from warp_torchrl.runs.config.search_options import SearchOptions
 from warp_torchrl.system.foreign_yaml import read_yaml
 from warp_torchrl.world.world import World
 

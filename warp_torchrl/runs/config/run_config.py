@@ -13,12 +13,10 @@ from warp_torchrl.collection.curriculum import Curriculum
 from warp_torchrl.collection.imitation import Imitation
 from warp_torchrl.collection.mixture import Mixture, worlds_by_share
 from warp_torchrl.env import LeveledEnv, WildfireEnv
-from warp_torchrl.runs.config.checkpoint_config import CheckpointConfig
 from warp_torchrl.runs.config.construction import ConfigError
-from warp_torchrl.runs.config.evaluation_config import EvaluationConfig
-from warp_torchrl.runs.config.kinds import KindOfWorld, check_kinds
-from warp_torchrl.runs.config.levels import check_alike
+from warp_torchrl.runs.config.options import CheckpointConfig, EvaluationConfig
 from warp_torchrl.runs.config.seeds import SEEDS, WORLDS
+from warp_torchrl.runs.config.worlds import KindOfWorld, check_alike, check_kinds
 from warp_torchrl.system.compiler import check_compiler
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.world import World

@@ -1,4 +1,4 @@
-"""What run folders keep of a configuration, and how it is composed anew from that.
+"""Configurations of run folders: what is saved of them, and their composition from it.
 
 What is read from a run folder is plain values: classes come from this package's own files alone.
 """
@@ -11,8 +11,14 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from warp_torchrl.runs.config.compose import OPTION, compose_config, conf_folder, option_of, plain, without_targets
-from warp_torchrl.runs.config.construction import ConfigError, component, free_mappings
-from warp_torchrl.runs.config.groups import COMPONENTS, ENVIRONMENT, WORLD_KEYS
+from warp_torchrl.runs.config.construction import (
+    COMPONENTS,
+    ENVIRONMENT,
+    WORLD_KEYS,
+    ConfigError,
+    component,
+    free_mappings,
+)
 from warp_torchrl.validation import dotted
 
 _DEEPEST = 20

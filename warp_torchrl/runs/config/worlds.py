@@ -1,21 +1,64 @@
-"""The worlds of a curriculum's levels: the scenario with other values of some of its keys."""
+"""Worlds of a training, built: the kinds of its mixture, and the levels of its curriculum."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from typing import Any
 
 import torch
 from torch import Tensor
 
 from warp_torchrl.collection.curriculum import Curriculum
+from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.observation import Observation
+from warp_torchrl.env.reward import Reward
 from warp_torchrl.env.specs import make_specs
-from warp_torchrl.runs.config.components import build_mechanics
-from warp_torchrl.runs.config.construction import ConfigError, build, construct
+from warp_torchrl.models import differing, signature
+from warp_torchrl.runs.config.construction import ConfigError, build, build_mechanics, construct
 from warp_torchrl.validation import did_you_mean, dotted
 from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.world import World
+
+
+@dataclass(frozen=True, kw_only=True)
+class KindOfWorld:
+    """A kind of worlds, built.
+
+    Attributes:
+        name: Name of the kind.
+        world: Its rules.
+        share: Share of the worlds, in proportion to the shares of the others.
+        teacher: Teacher of its worlds; None for none.
+        teacher_weight: Factor on the weight of the cloning loss.
+    """
+
+    name: str
+    world: World
+    share: float = 1.0
+    teacher: str | None = None
+    teacher_weight: float = 1.0
+
+
+def check_kinds(kinds: Sequence[KindOfWorld], observation: Observation, reward: Reward) -> None:
+    """Check that one team can play all kinds of a mixture, and the reward can be computed in each.
+
+    Raises:
+        ConfigError: If observations, states, actions, roles or agencies differ: the first kind and entry that do.
+    """
+    first = None
+    for kind in kinds:
+        try:
+            env = WildfireEnv(kind.world, observation=observation, reward=reward, device=torch.device("cpu"))
+        except ValueError as error:
+            raise ConfigError(f"mixture.kinds.{kind.name}: {error}") from None
+        here = signature(env)
+        first = first or here
+        other = differing(first, here)
+        if other is not None:
+            raise ConfigError(
+                f"mixture.kinds.{kind.name}: one team must see and do the same in all kinds, and its {other} differs "
+                f"from that of {kinds[0].name}"
+            )
 
 
 def level_worlds(config: Mapping[str, Any], built: Mapping[str, Any], keys: tuple[str, ...]) -> list[World]:
