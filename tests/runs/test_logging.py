@@ -1,57 +1,8 @@
-"""metrics.csv is complete, and a tracker that fails does not end the run."""
-
-import csv
-import os
+"""A tracker that fails does not end the run."""
 
 import pytest
 
-from warp_torchrl.runs.logging import FRAMES, CsvOnly, MetricsFile, Tensorboard, Wandb, _TorchRlTracker
-
-
-def lines(path):
-    with path.open(newline="") as file:
-        return list(csv.reader(file))
-
-
-def test_rows_are_appended_and_holes_left_empty(tmp_path):
-    metrics = MetricsFile(tmp_path / "metrics.csv")
-    metrics.add({"a": 1, "b": 0.1 + 0.2})
-    metrics.add({"a": 2, "b": None})
-    assert lines(tmp_path / "metrics.csv") == [["a", "b"], ["1", "0.30000000000000004"], ["2", ""]]
-    with pytest.raises(ValueError, match="no columns"):
-        metrics.add({"c": 1})
-
-
-def test_a_resumed_file_is_cut_back_to_the_checkpoint(tmp_path):
-    metrics = MetricsFile(tmp_path / "metrics.csv")
-    for number in range(4):
-        metrics.add({FRAMES: number})
-    resumed = MetricsFile(tmp_path / "metrics.csv", keep_rows=2)
-    resumed.add({FRAMES: 9, "new": 1})  # a column of a later version
-    assert lines(tmp_path / "metrics.csv") == [[FRAMES], ["0"], ["1"], ["9"]] and resumed.rows == 3
-
-
-@pytest.mark.parametrize(
-    ("make", "told"),
-    [
-        (os.mkfifo, "is no file"),
-        (lambda path: path.symlink_to("/dev/zero"), "is no file"),
-        (lambda path: path.touch() or os.truncate(path, 2**40), "is too large"),
-        (lambda path: path.write_bytes(bytes(200_000)), "is no table of metrics: field larger than field limit"),
-        (lambda path: path.write_text("a,b\n1,2\n3,4\n"), "is no table of metrics: it has no column time/frames"),
-    ],
-    ids=["pipe", "device", "holes", "zeros", "another table"],
-)
-def test_a_resumed_file_that_is_none_is_refused(tmp_path, make, told):
-    make(tmp_path / "metrics.csv")
-    with pytest.raises(ValueError, match=told):
-        MetricsFile(tmp_path / "metrics.csv", keep_rows=1)
-
-
-def test_a_new_run_starts_a_new_file(tmp_path):
-    (tmp_path / "metrics.csv").write_text("old,columns\n1,2\n")
-    MetricsFile(tmp_path / "metrics.csv").add({"a": 1})
-    assert lines(tmp_path / "metrics.csv") == [["a"], ["1"]]
+from warp_torchrl.runs.logging import CsvOnly, Tensorboard, Wandb, _TorchRlTracker
 
 
 def test_a_tracker_that_cannot_open_warns_once_and_is_silent(tmp_path, caplog):
@@ -152,13 +103,6 @@ def test_a_resumed_run_is_one_run_of_wandb_with_one_point_a_step(tmp_path, monke
     (tmp_path / "wandb_id").write_text("../../else")
     Wandb().open(tmp_path, 4, 7)
     assert given[3] not in ("../../else", given[2]) and given[3].isalnum()
-
-
-def test_what_is_cut_is_told_to_trackers(tmp_path):
-    path = tmp_path / "metrics.csv"
-    path.write_text("time/frames,a\n32,1\n64,2\n96,3\n12")  # a crash has cut the last row
-    assert MetricsFile(path, keep_rows=1).cut_at == 96
-    assert MetricsFile(path, keep_rows=1).cut_at == 0
 
 
 def test_wandb_gets_the_names_of_metrics_csv(tmp_path, monkeypatch):

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from warp_torchrl.runs.logging import MetricsFile
+from warp_torchrl.runs.metrics_file import MetricsFile
 from warp_torchrl.system import disk
 
 FULL = Path("/dev/full")

@@ -1,14 +1,11 @@
-"""Loggers: ``metrics.csv`` always, and a tracker if chosen."""
+"""Trackers of runs, beside ``metrics.csv``: none, wandb or TensorBoard."""
 
-import csv
-import io
 import logging
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from secrets import token_hex
 from typing import Any, Literal, Protocol
@@ -16,96 +13,12 @@ from typing import Any, Literal, Protocol
 from torchrl.record.loggers import get_logger
 
 from warp_torchrl.system import disk
-from warp_torchrl.system.foreign import open_file
 from warp_torchrl.validation import check_fields
 
 log = logging.getLogger("warp_torchrl")
-FRAMES = "time/frames"
-"""The column that says after how many frames a row was written."""
 _ID = "wandb_id"  # a file of the run folder
 _DIGITS = 8
-_LARGEST = 1_000_000_000  # bytes of a metrics.csv
 _GIVEN = re.compile(rf"[0-9a-z]{{{_DIGITS}}}")
-
-
-class MetricsFile:
-    """``metrics.csv``: one row for each iteration, complete after a crash, truncated on resume.
-
-    The first row sets the columns; a resumed run of a former version keeps its columns. A missing value is an empty
-    cell.
-
-    Args:
-        path: The file.
-        keep_rows: Rows to keep on resume; the others were written after the checkpoint.
-
-    Attributes:
-        cut_at: Frames of the last of those others; 0 if there are none.
-
-    Raises:
-        ValueError: If the file has fewer rows.
-    """
-
-    def __init__(self, path: Path, keep_rows: int = 0) -> None:
-        self.path = path
-        self.rows = keep_rows
-        self.cut_at = 0
-        self._columns: list[str] | None = None
-        self._is_resumed = keep_rows > 0
-        if keep_rows:
-            self._columns = self._cut(keep_rows)
-
-    def add(self, row: Mapping[str, float | None]) -> None:
-        """Append a row. ``sync`` flushes it to the disk.
-
-        Raises:
-            ValueError: If a column is new to the file that this run has begun.
-            OSError: If the write fails.
-        """
-        lines = []
-        if self._columns is None:
-            self._columns = list(row)
-            lines.append(self._columns)
-        unknown = set(row) - set(self._columns)
-        if unknown and not self._is_resumed:
-            raise ValueError(f"metrics.csv has no columns {sorted(unknown)}")
-        values = [row.get(column) for column in self._columns]
-        lines.append(["" if value is None else repr(value) for value in values])
-        mode = "w" if len(lines) > 1 else "a"
-        with disk.with_path(self.path), self.path.open(mode, newline="", encoding="utf-8") as file:
-            csv.writer(file).writerows(lines)
-        self.rows += 1
-
-    def sync(self) -> None:
-        """Flush every row to the disk."""
-        if self.rows:
-            disk.sync(self.path)
-
-    def _cut(self, rows: int) -> list[str]:
-        """Truncate the file to its first rows, and return the columns."""
-        lines = []
-        if self.path.exists():
-            opened = open_file(self.path, _LARGEST)
-            with io.TextIOWrapper(opened, encoding="utf-8", errors="replace", newline="") as file:  # a crash may cut it
-                try:
-                    lines = list(islice(csv.reader(file), rows + 1))
-                    self.cut_at = _last_frames(lines[:1], csv.reader(file))
-                except csv.Error as error:
-                    raise ValueError(f"{self.path} is no table of metrics: {error}") from None
-        if lines and FRAMES not in lines[0]:
-            raise ValueError(f"{self.path} is no table of metrics: it has no column {FRAMES}")
-        if len(lines) <= rows:
-            raise ValueError(f"{self.path} must hold the {rows} rows of the checkpoint, got {max(len(lines) - 1, 0)}")
-        kept = io.StringIO(newline="")
-        csv.writer(kept).writerows(lines)
-        disk.replace(self.path, kept.getvalue())
-        return lines[0]
-
-
-def _last_frames(header: Sequence[Sequence[str]], rows: Iterable[Sequence[str]]) -> int:
-    """Return the frames of the last row that is written to its end; 0 if there is none."""
-    whole = [row for row in rows if header and len(row) == len(header[0])]
-    place = header[0].index(FRAMES) if whole and FRAMES in header[0] else None
-    return 0 if place is None or not whole[-1][place].isdigit() else int(whole[-1][place])
 
 
 class Tracker(Protocol):

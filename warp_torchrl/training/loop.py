@@ -23,7 +23,8 @@ from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.runs.config.seeds import WORLDS, first_world_seed
-from warp_torchrl.runs.logging import MetricsFile, Tracker
+from warp_torchrl.runs.logging import Tracker
+from warp_torchrl.runs.metrics_file import MetricsFile
 from warp_torchrl.runs.policies.trained import MODES
 from warp_torchrl.runs.saving import SaveClock, passes
 from warp_torchrl.system import disk
