@@ -11,11 +11,12 @@ from torch import Tensor
 from torch.nn.functional import pad
 
 from warp_torchrl.system.modes import kept
-from warp_torchrl.world.arrays.bytes import byte
+from warp_torchrl.world.arrays.bytes import above, byte
 from warp_torchrl.world.arrays.geometry import DIRECTIONS
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.backends.edge import places
-from warp_torchrl.world.law.arrivals import Arrivals, arrivals_in, reached, terms_of
+from warp_torchrl.world.backends.planes import is_fuel, spreads
+from warp_torchrl.world.law.arrivals import Arrivals, arrivals_in, beside, reached, sources, terms_of
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER, NOWHERE, Metric, Places, arrival, rate_from
 from warp_torchrl.world.state.state import WorldState
@@ -49,11 +50,13 @@ class AtBand:
         return self._arrivals(state, self._band(state))
 
     def _band(self, state: WorldState) -> "_Band":
-        return _band_of(places(byte(self.fire.beside(state)).flatten()), state)
+        burns = spreads(self.fire, state)
+        fuel = is_fuel(self.fire, state) & above(state.alpha, 0.0)
+        return _band_of(places(byte(beside(burns, fuel)).flatten()), state, burns, fuel)
 
     def _arrivals(self, state: WorldState, band: "_Band") -> Arrivals:
-        kept = arrivals_in(state)
-        around = [padded(self.fire.sources(state), NEVER), padded(kept.origin, NOWHERE)]
+        kept, times = arrivals_in(state), sources(state, self.fire.now(state), band.spreads, band.fuel)
+        around = [padded(times, NEVER), padded(kept.origin, NOWHERE)]
         times, origins = (plane.index_select(0, band.around.flatten()).view(8, -1) for plane in around)
         known = reached(state).flatten()
 
@@ -69,13 +72,13 @@ class AtBand:
         )
 
     def _expected_ignitions(self, state: WorldState, band: "_Band") -> Tensor:
-        spreads = padded(self.fire.spreads(state), 0)
+        burns = padded(band.spreads, 0)
         metric = _metric(state, band.cell)
-        total = torch.zeros_like(spreads, dtype=torch.float32)
+        total = torch.zeros_like(burns, dtype=torch.float32)
         for direction in range(8):
             source = band.around[direction]
             share = (rate_from(direction, metric) * self.fire.minutes).clamp(max=1.0)
-            total.scatter_add_(0, source, share * spreads.index_select(0, source))
+            total.scatter_add_(0, source, share * burns.index_select(0, source))
         worlds, height, width = state.cells.shape
         return total.view(worlds, height + 2, width + 2)[:, 1:-1, 1:-1].contiguous()
 
@@ -87,18 +90,19 @@ class _Band:
     row: Tensor  # int32 [N]
     column: Tensor  # int32 [N]
     around: Tensor  # flat index of each neighbour in maps with a margin of one cell, int64 [8, N]
+    spreads: Tensor  # the burning cells that ignite others, bool [B, H, W]
+    fuel: Tensor  # the trees that can ignite, bool [B, H, W]
 
 
-def _band_of(cell: Tensor, state: WorldState) -> _Band:
+def _band_of(cell: Tensor, state: WorldState, spreads: Tensor, fuel: Tensor) -> _Band:
     _, height, width = state.cells.shape
     world = cell.div(height * width, rounding_mode="floor")
     place = cell - world * (height * width)
     row = place.div(width, rounding_mode="floor")
     column = place - row * width
     here = (world * (height + 2) + row + 1) * (width + 2) + column + 1
-    return _Band(
-        cell, world * (height * width), row.to(torch.int32), column.to(torch.int32), _around(width, cell.device) + here
-    )
+    around = _around(width, cell.device) + here
+    return _Band(cell, world * (height * width), row.to(torch.int32), column.to(torch.int32), around, spreads, fuel)
 
 
 @kept(32)

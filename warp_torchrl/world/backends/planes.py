@@ -24,6 +24,7 @@ from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.backends.join import in_place
 from warp_torchrl.world.backends.rows import expected_from_rows, probability_from_rows
 from warp_torchrl.world.backends.table import probability_by_pattern, table_in
+from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.law.fire import Fire, slope_in
 from warp_torchrl.world.law.law import in_finer_time
 from warp_torchrl.world.state.cells import holds_trees, is_burning
@@ -124,11 +125,11 @@ def age_fires(fire: Fire, state: WorldState, ticks_now: Tensor) -> WorldState:
     )
 
 
-def spreads(fire: Fire, state: WorldState) -> Tensor:
-    """Return what ``Fire.spreads`` does."""
+def spreads(fire: Automaton, state: WorldState) -> Tensor:
+    """Return what ``Automaton.spreads`` does."""
     return between(state.cells, FIRST_FIRE, fire.last_spreading)
 
 
-def is_fuel(fire: Fire, state: WorldState) -> Tensor:
-    """Return what ``Fire.is_fuel`` does."""
+def is_fuel(fire: Automaton, state: WorldState) -> Tensor:
+    """Return what ``Automaton.is_fuel`` does."""
     return between(state.cells, fire.youngest_fuel, OLDEST) & equal(state.wet, 0)

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.arrays.batch import Batch
-from warp_torchrl.world.arrays.geometry import neighbour_in, neighbours
+from warp_torchrl.world.arrays.geometry import grow, neighbour_in, neighbours
 from warp_torchrl.world.law.cells import is_burning, is_tree
 from warp_torchrl.world.law.travel import NEVER, NOWHERE, Metric, Places, arrival, at_other_rates, rate_from
 from warp_torchrl.world.state.state import Air, Ground, WorldState
@@ -90,6 +90,21 @@ def in_air(state: WorldState, air: Air, now: Tensor, spreads: Tensor, fuel: Tens
     minutes = at_other_rates(arrivals_in(state).minutes, now, before, after)
     origin = torch.where(is_burning(state.cells), own_cell(state.cells), NOWHERE)
     return state.replace(air=air).with_planes(RATE, Arrivals(minutes, origin))
+
+
+def beside(spreads: Tensor, fuel: Tensor) -> Tensor:
+    """Return the cells of fuel beside those that spread fire, bool [B, H, W] as both are."""
+    return grow(spreads) & fuel
+
+
+def sources(state: WorldState, now: Tensor, spreads: Tensor, fuel: Tensor) -> Tensor:
+    """Return the times from which those of neighbours follow, float32 [B, H, W]; else ``NEVER``.
+
+    They are those of cells that burn, and of trees that the fire has not reached yet. The arguments are those of
+    ``in_air``.
+    """
+    minutes = arrivals_in(state).minutes
+    return torch.where(spreads | (fuel & (minutes > now)), minutes, NEVER)
 
 
 def reached(state: WorldState) -> Tensor:

@@ -207,28 +207,17 @@ class RateFire(Automaton):
 
     def lit(self, state: WorldState, where: Tensor) -> WorldState:
         """Return worlds whose fires have reached these cells, bool [B, H, W], now, each from itself."""
-        return arrivals.lit(state, where, self._now(state))
+        return arrivals.lit(state, where, self.now(state))
 
     def in_air(self, state: WorldState, air: Air) -> WorldState:
         """See ``Automaton``. The fire has gone as far as it has, and spreads at the new rates."""
-        return arrivals.in_air(state, air, self._now(state), self.spreads(state), self.can_ignite(state))
-
-    def beside(self, state: WorldState) -> Tensor:
-        """Return which cells can ignite and are beside a burning one, bool [B, H, W]."""
-        return grow(self.spreads(state)) & self.can_ignite(state)
-
-    def sources(self, state: WorldState) -> Tensor:
-        """Return the times that neighbours go by, float32 [B, H, W].
-
-        They are those of cells that burn, and of trees that the fire has not reached yet.
-        """
-        minutes = arrivals_in(state).minutes
-        ahead = self.can_ignite(state) & (minutes > self._now(state))
-        return torch.where(self.spreads(state) | ahead, minutes, NEVER)
+        return arrivals.in_air(state, air, self.now(state), self.spreads(state), self.can_ignite(state))
 
     def next_arrivals(self, state: WorldState) -> Arrivals:
         """Return when the fire reaches each cell that can ignite and is beside it, else ``NEVER``."""
-        return arrivals.next_arrivals(state, self.sources(state), self.beside(state))
+        spreads, fuel = self.spreads(state), self.can_ignite(state)
+        times = arrivals.sources(state, self.now(state), spreads, fuel)
+        return arrivals.next_arrivals(state, times, arrivals.beside(spreads, fuel))
 
     def tick(self, state: WorldState, u: Tensor, ticks_now: Tensor) -> WorldState:
         """See ``Automaton``. What the fire reaches within the tick ignites, at the minute when it does."""
@@ -258,7 +247,7 @@ class RateFire(Automaton):
 
     def share_of_tick(self, state: WorldState, coming: Arrivals) -> Tensor:
         """Return what ``ignition_probability`` does of these arrivals."""
-        wait = coming.minutes - self._now(state)
+        wait = coming.minutes - self.now(state)
         spread = (self.minutes / wait.clamp(min=self.minutes)) * (coming.minutes < NEVER / 2)
         return spread if self.beta == 0.0 else torch.maximum(spread, self.spontaneous(state))
 
@@ -275,7 +264,8 @@ class RateFire(Automaton):
             total = total + neighbour_in((direction + 4) % 8, share)
         return total * self.spreads(state)
 
-    def _now(self, state: WorldState) -> Tensor:
+    def now(self, state: WorldState) -> Tensor:
+        """Return the minutes since ignition, float32 [B, 1, 1]."""
         return (state.tick * self.minutes)[:, None, None]
 
     def _held(self, before: WorldState, after: WorldState) -> WorldState:
