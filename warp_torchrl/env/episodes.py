@@ -21,7 +21,7 @@ from warp_torchrl.world.world import World
 
 
 class Episodes(EnvBase):
-    """An environment whose worlds have seeds and numbered episodes; subclasses define starts, steps and observations."""
+    """An environment whose worlds have seeds and numbered episodes; subclasses define starts and observations."""
 
     world: World
     _worlds: tuple[WorldState, TreeCounts] | None  # and the counts of their trees
