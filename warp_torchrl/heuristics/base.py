@@ -14,8 +14,8 @@ from warp_torchrl.world.arrays.distances import FAR, nearest
 from warp_torchrl.world.arrays.geometry import offsets
 from warp_torchrl.world.arrays.random import Stream, uniform, uniform_at
 from warp_torchrl.world.mechanics.sensing.records import known_codes
-from warp_torchrl.world.mechanics.water.supply import mark_base
 from warp_torchrl.world.state.state import FIRST_FIRE, Action, Cover, WorldState, is_burning
+from warp_torchrl.world.team.supply import mark_base
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.world import World
 

@@ -19,10 +19,10 @@ from warp_torchrl.heuristics.firebreaks import cells_to_clear
 from warp_torchrl.world.arrays.detours import moves_around, moves_from
 from warp_torchrl.world.arrays.distances import FAR
 from warp_torchrl.world.arrays.geometry import offsets
-from warp_torchrl.world.mechanics.water.supply import mark_base
 from warp_torchrl.world.state.role import ROLES
 from warp_torchrl.world.state.state import Action, Cover, WorldState, is_burning
 from warp_torchrl.world.team.abilities import Extinguish, Situation, own_cell, places
+from warp_torchrl.world.team.supply import mark_base
 from warp_torchrl.world.team.team import is_second
 
 _LAST = 4096.0

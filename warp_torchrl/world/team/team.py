@@ -12,10 +12,11 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.bytes import scatter_add
 from warp_torchrl.world.state.role import ROLES, RoleTable, role_names, role_table
-from warp_torchrl.world.state.state import Action, ActionResult, Cover, Vehicles, WorldState
-from warp_torchrl.world.team.abilities import ABILITIES, PAPER_ABILITIES, Ability, Deed, Situation, neighbourhood
+from warp_torchrl.world.state.state import Action, ActionResult, Vehicles, WorldState
+from warp_torchrl.world.team.abilities import ABILITIES, PAPER_ABILITIES, Ability, Deed, Situation
 from warp_torchrl.world.team.radio import Radio
 from warp_torchrl.world.team.start import starting_cells
+from warp_torchrl.world.team.supply import filled
 
 STAY = "stay"
 """Name of the action that does nothing."""
@@ -235,7 +236,7 @@ class Team:
         after = changed(state, target, [(done & credited, becomes) for done, becomes in deeds])
         after = after.replace(
             vehicles=vehicles.replace(
-                tank=self._refill(state, tank),
+                tank=tank if self.tank is None else filled(state, tank, self.tank),
                 last_action=torch.where(running, action, vehicles.last_action),
                 acts=vehicles.acts + reduce(or_, chosen),
                 redundant=vehicles.redundant + redundant,
@@ -271,16 +272,6 @@ class Team:
         for rule in rules:
             state = rule.moved(state, now.roles, running)
         return state, reduce(or_, moved)
-
-    def _refill(self, state: WorldState, tank: Tensor) -> Tensor:
-        """Fill the tanks of vehicles beside a lake or at the base."""
-        if self.tank is None:
-            return tank
-        index, inside = neighbourhood(state)
-        cover = Situation.at(state.cover, index.flatten(1)).view_as(index)
-        by_lake = ((cover == int(Cover.LAKE)) & inside).any(dim=-1)
-        at_base = (state.vehicles.position == state.vehicles.base[:, None]).all(dim=-1)
-        return torch.where(by_lake | at_base, self.tank, tank)
 
 
 def _grounded(now: Situation, rules: Sequence[MoveRule]) -> list[Tensor]:
