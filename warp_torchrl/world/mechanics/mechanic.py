@@ -8,8 +8,8 @@ from torch import Tensor
 
 from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.state.role import RoleTable
-from warp_torchrl.world.state.state import WorldState
-from warp_torchrl.world.team.team import Team
+from warp_torchrl.world.state.state import ActionResult, WorldState
+from warp_torchrl.world.team.team import Acts, Team
 
 
 class Rules(Protocol):
@@ -61,6 +61,20 @@ class Mechanic:
     def begin(self, state: WorldState, world: Rules) -> WorldState:
         """Return worlds at the start of an episode, after the head start of the fire, with its planes."""
         return state
+
+    def masked(self, state: WorldState, mask: Tensor) -> Tensor:
+        """Return which actions are open, bool [B, A, actions], of those that the agents' abilities allow."""
+        return mask
+
+    def around(self, state: WorldState, running: Tensor, acts: Acts) -> tuple[WorldState, ActionResult]:
+        """Return worlds after the agents' moves and acts, and what each action came to.
+
+        Args:
+            state: The worlds before the step.
+            running: Worlds that have not ended, bool [B].
+            acts: Lets the agents act; what happens before and after it is the mechanic's.
+        """
+        return acts(state)
 
     def grounded(self, state: WorldState, roles: RoleTable) -> Tensor | None:
         """Return which agents cannot move, bool [B, A]; None where it keeps none."""

@@ -1,8 +1,8 @@
 """The vehicles: where they start, and how a step makes one of what each of them does."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, reduce
+from functools import cached_property, partial, reduce
 from operator import add, or_
 from typing import Literal, NamedTuple, Protocol
 
@@ -20,6 +20,8 @@ from warp_torchrl.world.team.supply import filled
 
 STAY = "stay"
 """Name of the action that does nothing."""
+Acts = Callable[[WorldState], tuple[WorldState, ActionResult]]
+"""Lets the agents act: returns the worlds after it, and what each action came to."""
 
 
 class Skill(NamedTuple):
@@ -46,8 +48,16 @@ class Skill(NamedTuple):
         return deed.possible if self.of_all else deed.possible & now.roles.can[self.name], deed
 
 
-class MoveRule(Protocol):
-    """What binds vehicles that move, beside their abilities; see ``world.mechanics.Mechanic``."""
+class TeamRule(Protocol):
+    """What binds vehicles beside their abilities; see ``world.mechanics.Mechanic``."""
+
+    def masked(self, state: WorldState, mask: Tensor) -> Tensor:
+        """Return which actions are open, bool [B, A, actions], of those that the agents' abilities allow."""
+        ...
+
+    def around(self, state: WorldState, running: Tensor, acts: Acts) -> tuple[WorldState, ActionResult]:
+        """Return worlds after the agents' acts, in those that go on, bool [B], and what each action came to."""
+        ...
 
     def grounded(self, state: WorldState, roles: RoleTable) -> Tensor | None:
         """Return which agents cannot move, bool [B, A]; None where it keeps none."""
@@ -164,11 +174,11 @@ class Team:
             last_useful=torch.full_like(counter, -1),
         )
 
-    def open_moves(self, state: WorldState, rules: Sequence[MoveRule] = ()) -> Tensor:
+    def open_moves(self, state: WorldState, rules: Sequence[TeamRule] = ()) -> Tensor:
         """Return which of the eight moves each agent can make under some rules, bool [B, A, 8]."""
         return self._mask(self.skills[0], self._situation(state, 0), rules)
 
-    def action_mask(self, state: WorldState, last_spreading: int, rules: Sequence[MoveRule] = ()) -> Tensor:
+    def action_mask(self, state: WorldState, last_spreading: int, rules: Sequence[TeamRule] = ()) -> Tensor:
         """Return which actions would do something, bool [B, A, actions].
 
         Stay is always open. Without it, an agent that can do nothing at all is shown ``EXTINGUISH``, which then does
@@ -177,7 +187,7 @@ class Team:
         Args:
             state: The worlds.
             last_spreading: Cell code of the last stage that can be put out.
-            rules: What binds moves.
+            rules: What binds the vehicles.
         """
         now = self._situation(state, last_spreading)
         can = [self._mask(skill, now, rules) for skill in self.skills]
@@ -186,6 +196,8 @@ class Team:
         open_actions = torch.cat(can, dim=-1)
         if not self.allow_stay:
             open_actions[..., Action.EXTINGUISH] |= ~open_actions.any(dim=-1)
+        for rule in rules:
+            open_actions = rule.masked(state, open_actions)
         return open_actions
 
     def act(
@@ -195,7 +207,7 @@ class Team:
         running: Tensor,
         last_spreading: int,
         wet_ticks: int,
-        rules: Sequence[MoveRule] = (),
+        rules: Sequence[TeamRule] = (),
     ) -> tuple[WorldState, ActionResult]:
         """Let the agents move, then let them put out fire, clear trees, and do what else their roles can.
 
@@ -207,11 +219,29 @@ class Team:
             running: Which worlds go on, bool [B]; elsewhere nothing happens.
             last_spreading: Cell code of the last stage that can be put out.
             wet_ticks: Ticks for which a tree that was put out stays wet.
-            rules: What binds moves.
+            rules: What binds the vehicles; the last of them stands around the acts of the others.
 
         Returns:
             The worlds after it, and what each action came to.
         """
+        acts: Acts = partial(
+            self._act, action=action, running=running, last_spreading=last_spreading, wet_ticks=wet_ticks, rules=rules
+        )
+        for rule in rules:
+            acts = partial(rule.around, running=running, acts=acts)
+        return acts(state)
+
+    def _act(
+        self,
+        state: WorldState,
+        *,
+        action: Tensor,
+        running: Tensor,
+        last_spreading: int,
+        wet_ticks: int,
+        rules: Sequence[TeamRule],
+    ) -> tuple[WorldState, ActionResult]:
+        """Return the worlds after the acts of the agents' abilities, and what each came to; see ``act``."""
         state, moved = self._move(state, action, running, rules)
         running = running[:, None]
         now = self._situation(state, last_spreading, wet_ticks)
@@ -248,7 +278,7 @@ class Team:
     def _situation(self, state: WorldState, last_spreading: int, wet_ticks: int = 0) -> Situation:
         return Situation(state, self.table(state.cells.device), self.extinguish_p, last_spreading, wet_ticks)
 
-    def _mask(self, skill: Skill, now: Situation, rules: Sequence[MoveRule]) -> Tensor:
+    def _mask(self, skill: Skill, now: Situation, rules: Sequence[TeamRule]) -> Tensor:
         mask = skill.ability.mask(now)
         if skill.ability.moves:
             for grounded in _grounded(now, rules):
@@ -256,7 +286,7 @@ class Team:
         return mask if skill.of_all else mask & now.roles.can[skill.name][:, None]
 
     def _move(
-        self, state: WorldState, action: Tensor, running: Tensor, rules: Sequence[MoveRule]
+        self, state: WorldState, action: Tensor, running: Tensor, rules: Sequence[TeamRule]
     ) -> tuple[WorldState, Tensor]:
         """Return the worlds after the moves, and which agents moved, bool [B, A]."""
         now, position, moved = self._situation(state, 0), state.vehicles.position, []
@@ -274,7 +304,7 @@ class Team:
         return state, reduce(or_, moved)
 
 
-def _grounded(now: Situation, rules: Sequence[MoveRule]) -> list[Tensor]:
+def _grounded(now: Situation, rules: Sequence[TeamRule]) -> list[Tensor]:
     """Return which agents cannot move by each rule that keeps some where they are, bool [B, A] each."""
     found = (rule.grounded(now.state, now.roles) for rule in rules)
     return [each for each in found if each is not None]
