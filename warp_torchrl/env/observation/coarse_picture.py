@@ -153,7 +153,7 @@ def last_seen(now: Blocks) -> Tensor:
     is_there=lambda world, choice: any(each.picture_entries(world) for each in world.loop),
 )
 def mechanics(now: Blocks) -> Tensor:
-    """Return the channels of mechanics, such as the land of the agency that a vehicle serves."""
+    """Return the channels of the world's mechanics, see ``Mechanic.picture``."""
     parts = [each for each in now.world.loop if each.picture_entries(now.world)]
     shares = torch.cat([each.picture(now.state, now.side) for each in parts], dim=2)
     return torch.stack([now.show(each) for each in shares.unbind(2)], dim=2)

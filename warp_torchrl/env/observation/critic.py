@@ -187,7 +187,7 @@ def last_seen(now: Context) -> Tensor:
     is_there=lambda world, choice: any(each.critic_entries(world) for each in world.loop),
 )
 def mechanics(now: Context) -> Tensor:
-    """Return the planes of mechanics, such as the land of agencies."""
+    """Return the planes of the world's mechanics, see ``Mechanic.critic``."""
     parts = [each for each in now.world.loop if each.critic_entries(now.world)]
     return torch.cat([each.critic(now.state, STATE_SIDE) for each in parts], dim=1)
 

@@ -32,7 +32,7 @@ def mechanic(name: str) -> Callable[[Kind], Kind]:
 
 
 def part(kind: Kind) -> Kind:
-    """Add a dataclass that fills a part of the world, such as ``agencies``, so that its ``maps`` are channels."""
+    """Add a dataclass that fills a part of the world, as ``team`` does, so that its ``maps`` are channels."""
     _PARTS.append(kind)
     return kind
 
