@@ -8,19 +8,21 @@ import pytest
 
 from tests.test_docs import ROOT, run
 
-APART = ("flight", "retardant")
+APART = ("agencies", "flight", "retardant")
 """Mechanics whose folder can be deleted."""
-WHOLE = ("flight",)
+WHOLE = ("agencies", "flight", "retardant")
 """Those whose tests all stand in their folder, so that the rest of the suite passes too."""
 TRY = """
 import pkgutil, importlib, warp_torchrl
 from warp_torchrl import make_env
-from warp_torchrl.world.mechanics.table import mechanics
+from warp_torchrl.runs.config.compose import conf_folder
+from warp_torchrl.world.mechanics.table import kinds
 for each in pkgutil.walk_packages(warp_torchrl.__path__, "warp_torchrl."):
     if each.name.split(".")[1] in ("env", "evaluation", "heuristics", "models", "runs", "training", "world"):
         importlib.import_module(each.name)
-assert "{name}" not in mechanics(), "it is deleted"
-for scenario in ("default", "hetero", "front", "agencies", "search", *(["haksar"] if "{name}" != "retardant" else [])):
+assert "{name}" not in [each.name for each in kinds()], "it is deleted"
+scenarios = [path.stem for path in (conf_folder() / "scenario").glob("*.yaml")]
+for scenario in {"default", "hetero", "front", "agencies", "search", "haksar"} & set(scenarios):
     make_env(scenario, n_worlds=2, overrides=["landscape.size=16"]).rollout(3)
 """
 
@@ -34,15 +36,16 @@ def without(request, tmp_path_factory):
         shutil.rmtree(copy / tree / "world" / "mechanics" / name)
     for path in (copy / "conf").rglob("*.yaml"):
         path.write_text(re.sub(rf"^mechanics: {{{name}: .*}}\n", "", path.read_text(), flags=re.MULTILINE))
-    delete_options(copy / "conf", f"world.mechanics.{name}.")
+    delete_options(copy, f"world.mechanics.{name}.")
     return name, copy
 
 
-def delete_options(conf: Path, text: str) -> None:
+def delete_options(copy: Path, text: str) -> None:
     """Delete the options that hold a text, and the scenarios and experiments that choose one of them."""
-    for path in [each for each in conf.rglob("*.yaml") if text in each.read_text()]:
+    options = [*(copy / "conf").rglob("*.yaml"), *(copy / "docs" / "experiment").glob("*.yaml")]
+    for path in [each for each in options if text in each.read_text()]:
         path.unlink(missing_ok=True)
-        delete_options(conf, f"override /{path.parent.name}: {path.stem}\n")
+        delete_options(copy, f"override /{path.parent.name}: {path.stem}\n")
 
 
 def check(copy: Path, *command: str) -> None:

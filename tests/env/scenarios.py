@@ -1,12 +1,11 @@
 """Every scenario, small: what of TorchRL and torch must hold for all of them is asked of each."""
 
 from functools import cache
-from importlib import import_module
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.world.mechanics import of_mechanics
 from warp_torchrl import make_env
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.runs.config.compose import conf_folder
@@ -20,15 +19,12 @@ FURTHER = {
     "told all": ("scenario=water", "observation.rules=true", "observation.water=true", "observation.near=16",
                  "observation.reach=true", "observation.advice=dispatch"),
     "paper": ("scenario=skirmish", "observation=paper"),
-    "at fire": ("scenario=haksar", "observation=at_fire", "reward=round_fire"),
     "of the map": ("scenario=skirmish", "observation.centred=false", "reward=collaborative"),
     "rates": ("scenario=skirmish", "fire=rate"),
     "talks late": ("scenario=search", "team.radio.carries=both", "team.radio.delay=2", "team.radio.loss=0.2"),
-    "lends": ("scenario=agencies", "agencies.own=1", "agencies.lending=need", "agencies.term=3"),
+    **of_mechanics("WORLDS"),
 }  # fmt: skip
 """Further worlds: what no scenario shows, does or pays."""
-for _path in sorted((Path(__file__).parents[1] / "world" / "mechanics").glob("*/worlds.py")):
-    FURTHER |= import_module(f"tests.world.mechanics.{_path.parent.name}.worlds").WORLDS
 WORLDS = (*SCENARIOS, *FURTHER)
 
 

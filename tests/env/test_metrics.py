@@ -4,7 +4,8 @@ import pytest
 import torch
 
 from tests.conftest import small_world
-from warp_torchrl.env.metrics import METRICS, WATCHING, metrics
+from warp_torchrl.env.metrics import METRICS, WATCHING, metric, metric_rows, metrics
+from warp_torchrl.world.mechanics.mechanic import Metric
 from warp_torchrl.world.mechanics.sensing.sensing import Sight
 from warp_torchrl.world.mechanics.sensing.watching import Memory, watching_of
 from warp_torchrl.world.state.cells import count_trees
@@ -16,7 +17,7 @@ def test_metrics_are_fractions_that_add_up(make_small_env):
     env = make_small_env(8)
     env.rollout(30, break_when_any_done=False)
     found = metrics(env.world_state, env.tree_counts, env.world)
-    assert tuple(found) == METRICS
+    assert list(found) == list(METRICS)
     for name, value in found.items():
         assert value.shape == (8,) and ((value >= 0) & (value <= 1)).all(), name
     total = sum(found[name] for name in ("saved", "burned", "cleared", "burning"))
@@ -54,6 +55,25 @@ def test_limited_sight_has_metrics_of_its_own(make_small_env):
     state = state.replace(step=step).with_planes("sensing", memory)
     found = metrics(state, env.tree_counts, env.world)
     assert [found[name][0].item() for name in WATCHING] == [0.25, 0.5, 0.75]
+
+
+def test_a_user_s_metric_is_one_of_every_world(make_small_env, monkeypatch):
+    monkeypatch.setattr("warp_torchrl.env.metrics.METRICS", {**METRICS})
+
+    def spilt(now):
+        return now.state.vehicles.tank.clamp(min=0).sum(1) / 100.0
+
+    def saved(now):
+        return spilt(now)
+
+    metric(better="less")(spilt)
+    env = make_small_env(2, small_world(team=Team(n_agents=2, tank=30)))
+    stay = torch.full((2, 2), int(Action.STAY))
+    now = env.step(env.reset().set(("agents", "action"), stay))["next"]
+    assert now["info", "spilt"][:, 0].tolist() == pytest.approx([0.6, 0.6])
+    assert metric_rows(env.world)[-1] == Metric("spilt", "less") and "spilt" in env_names(env)
+    with pytest.raises(ValueError, match="saved must be a new metric's name"):
+        metric()(saved)
 
 
 def env_names(env):

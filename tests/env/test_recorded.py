@@ -1,9 +1,13 @@
 """A recorded step is the step, and a GPU can record it: no size and no choice in it depends on a result."""
 
+import sys
+
 import pytest
 import torch
 from torch.fx.experimental.proxy_tensor import make_fx
+from torch.nn import functional
 
+from tests.world.mechanics import of_mechanics
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.recorded import RecordedStep
 from warp_torchrl.env.reward import Time
@@ -15,8 +19,7 @@ BRIEFLY = [
     ["scenario=skirmish"],
     ["scenario=hazard", "reward=adaptive"],
     ["scenario=smoke", "team.radio.carries=both", "team.radio.delay=2", "team.radio.loss=0.1"],
-    ["scenario=haksar", "team.tank=3", "team.approach=true", "observation=at_fire", "reward=round_fire"],
-    ["scenario=agencies", "agencies.own=1", "agencies.lending=need", "agencies.term=3"],
+    *of_mechanics("WORLDS").values(),
 ]
 AT_LENGTH = [
     ["scenario=lightning", "wind=wandering"],
@@ -55,8 +58,8 @@ def test_recorded_worlds_are_those_of_steps(overrides):
 
 @pytest.mark.parametrize("overrides", SCENARIOS, ids=" ".join)
 def test_no_size_in_a_step_depends_on_a_result(overrides, monkeypatch):
-    for module in ("status", "critic"):  # a CPU alone looks at the codes, and refuses those out of range
-        monkeypatch.setattr(f"warp_torchrl.env.observation.{module}.one_hot", one_hot)
+    for module in [each for each in sys.modules.values() if getattr(each, "one_hot", None) is functional.one_hot]:
+        monkeypatch.setattr(module, "one_hot", one_hot)  # torch's reads the codes on a CPU, to check them
     with unread():
         env = env_of(overrides)
         shown = env.rand_action(env.reset())

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 
+from tests.world.mechanics import of_mechanics
 from warp_torchrl.evaluation import cache
 from warp_torchrl.evaluation import evaluate as evaluation_module
 from warp_torchrl.evaluation.play import play_heuristics
@@ -132,9 +133,10 @@ def test_copies_of_layers_on_devices_do_not_count():
     assert cache.digest({"a": 1}) != cache.digest({"a": 2})
 
 
-@pytest.mark.parametrize(
-    "scenario", ["default", "hetero", "hazard", "water", "lightning", "paper_marl", "shift", "haksar", "agencies"]
-)
+OF_MECHANICS = [scenario.removeprefix("scenario=") for scenario, *_ in of_mechanics("WORLDS").values()]
+
+
+@pytest.mark.parametrize("scenario", ["default", "hazard", "water", "lightning", "paper_marl", "shift", *OF_MECHANICS])
 def test_all_that_episodes_of_a_scenario_follow_from_can_be_told(scenario):
     assert len(cache._paths(plan_of(scenario=scenario), list(HEURISTICS))) == len(HEURISTICS)
 

@@ -13,7 +13,6 @@ from warp_torchrl.evaluation.episode_batch import EpisodeBatch, fits
 from warp_torchrl.evaluation.play import WithoutAgent, play
 from warp_torchrl.heuristics import HEURISTICS, Greedy
 from warp_torchrl.models import Mlp, signature
-from warp_torchrl.world.mechanics.agencies.agencies import SeveralAgencies
 from warp_torchrl.world.team.team import Team
 
 
@@ -51,17 +50,6 @@ def test_a_trained_policy_plays_as_step_by_step(mode, observation, lamed, monkey
     quick = play(env, policy, 5, mode, watch=True)
     monkeypatch.setattr(play_module, "fits", lambda env, policy: False)
     assert alike(quick, play(env, policy, 5, mode, watch=True))
-
-
-def test_agencies_play_as_step_by_step(monkeypatch):
-    several = SeveralAgencies(own=1, lending="need", term=2)
-    env = WildfireEnv(small_world(team=Team(n_agents=4), agencies=several), n_worlds=9)
-    policy = trained(env, sharing="agency", symmetry="none")
-    assert fits(env, policy)
-    quick = play(env, policy, 5, "deterministic")  # a fresh policy's draws hardly depend on its networks
-    monkeypatch.setattr(play_module, "fits", lambda env, policy: False)
-    slow = play(env, policy, 5, "deterministic")
-    assert alike(quick, slow) and {"saved_agency_0", "saved_agency_1"} <= slow.keys()
 
 
 def test_heuristics_play_side_by_side_as_they_do_alone(make_small_env, monkeypatch):

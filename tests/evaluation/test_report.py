@@ -1,9 +1,10 @@
-"""The table of an evaluation where sight is limited, and where there are several agencies."""
+"""The table of an evaluation where sight is limited, and where mechanics have metrics."""
 
 import numpy as np
 
 from warp_torchrl.env.metrics import METRICS, WATCHING
 from warp_torchrl.evaluation.report import evaluation_table, report
+from warp_torchrl.world.mechanics.mechanic import Metric
 
 
 def episodes(watched, *further):
@@ -29,23 +30,36 @@ def test_what_is_watched_has_a_table_of_its_own():
     lamed = {"scout_1": episodes(0.5, *WATCHING)}
     alone = report("front", "mine", 7, episodes(0.75, *WATCHING), {}, left_out=lamed, goal="watched")
     assert "without scout_1          -25.0  -25.0 .. -25.0" in evaluation_table(alone).splitlines()
-    near = {"near_misses": np.full(4, 0.125)}
-    flown = report("front", "mine", 7, episodes(0.75, *WATCHING) | near, {"noop": episodes(0.25, *WATCHING) | near})
-    assert "mine                        75.0    75.0 .. 75.0     50.0        0.250           12.5" in evaluation_table(
-        flown
-    )
 
 
-def test_what_agencies_save_has_a_table_of_its_own():
-    shares = {"saved_agency_0": np.full(4, 0.75), "saved_agency_1": np.array([0.2, 0.2, 0.4, 0.4])}
-    none = {name: np.zeros(4) for name in shares}
-    shown = evaluation_table(
-        report("agencies", "mine", 7, episodes(0.0) | shares, {"noop": episodes(0.0) | none})
-    ).splitlines()
-    assert "saved %, by agency                    agency_0                agency_1" in shown
-    assert any(line.split() == ["noop", *("0.0 (0.0 .. 0.0)".split() * 2)] for line in shown)
-    (line,) = (line for line in shown if line.startswith("mine ") and "75.0 (75.0 .. 75.0)" in line)
-    assert " 30.0 (2" in line
+def told(further, *metrics):
+    """The last table of worlds with further metrics."""
+    none = {name: np.zeros(4) for name in further}
+    content = report("mine", "mine", 7, episodes(0.0) | further, {"noop": episodes(0.0) | none})
+    lines = evaluation_table(content, [*(row.metric for row in METRICS.values()), *metrics]).splitlines()
+    return [line for line in lines if not line.startswith("averted")][-3:]
+
+
+def test_a_metric_of_a_mechanic_has_a_table_to_itself():
+    row = Metric("near_misses", "less", title="near misses")
+    assert told({"near_misses": np.full(4, 0.125)}, row) == [
+        "near misses %, less is better",
+        "noop                                   0.0 (0.0 .. 0.0)",
+        "mine                                12.5 (12.5 .. 12.5)",
+    ]
+    assert told({"depth": np.full(4, 0.125)}, Metric("depth", unit="1"))[1:] == [
+        "noop                    0.000 (0.000 .. 0.000)",
+        "mine                    0.125 (0.125 .. 0.125)",
+    ]
+
+
+def test_metrics_of_one_table_stand_side_by_side():
+    shares = {"saved_north": np.full(4, 0.75), "saved_south": np.array([0.2, 0.2, 0.4, 0.4])}
+    rows = [Metric(name, "more", title=name.removeprefix("saved_"), table="saved by land") for name in shares]
+    title, noop, mine = told(shares, *rows)
+    assert title == "saved by land %, more is better                     north                   south"
+    assert noop.split() == ["noop", *("0.0 (0.0 .. 0.0)".split() * 2)]
+    assert "75.0 (75.0 .. 75.0)" in mine and " 30.0 (2" in mine
 
 
 def test_a_line_has_the_shares_saved_and_cleared_in_per_cent():

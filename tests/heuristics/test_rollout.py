@@ -8,6 +8,7 @@ from torch import Tensor
 
 from tests.heuristics.drawing import scene
 from tests.world.drawing import differing
+from tests.world.mechanics import of_mechanics
 from warp_torchrl import make_env
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import Dispatch, Rollout
@@ -145,8 +146,7 @@ def test_imagined_draws_differ_between_steps() -> None:
         ("hazard", ()),
         ("smoke", ("team.radio.delay=1",)),
         ("lightning", ()),
-        ("haksar", ("team.n_agents=3",)),
-        ("agencies", ()),
+        *((scenario.removeprefix("scenario="), further) for scenario, *further in of_mechanics("WORLDS").values()),
     ],
 )
 def test_it_plays_in_every_kind_of_world(scenario: str, overrides: tuple[str, ...]) -> None:

@@ -5,13 +5,12 @@ import torch
 from torch import nn
 
 from tests.conftest import small_world
-from warp_torchrl.algorithms.held_batch import ADVANTAGE, with_advantages
+from warp_torchrl.algorithms.held_batch import with_advantages
 from warp_torchrl.algorithms.ppo import Ppo
 from warp_torchrl.env.observation import Local, Paper, Surroundings
 from warp_torchrl.models import (
     ACTION,
     ACTION_ONE_HOT,
-    AGENCY,
     LOGITS,
     OBSERVATION,
     STATE_ACTION_VALUE,
@@ -21,8 +20,6 @@ from warp_torchrl.models import (
     signature,
 )
 from warp_torchrl.models.networks import LinearEncoder
-from warp_torchrl.runs.policies.trained import TrainedPolicy
-from warp_torchrl.world.mechanics.agencies.agencies import SeveralAgencies
 from warp_torchrl.world.team.team import Team
 
 
@@ -147,52 +144,6 @@ def test_networks_are_chosen_by_the_role_whatever_the_team(make_small_env):
         assert torch.equal(logits[:, agent], own[agent % 2][:, agent])
     other = make_small_env(2, small_world(team=Team(n_agents=3, roles=("uav",))))
     assert actor(other.reset())[LOGITS].shape == (2, 3, 11)
-
-
-def test_networks_are_chosen_by_the_agency_that_a_vehicle_serves(make_small_env):
-    several = small_world(team=Team(n_agents=4), agencies=SeveralAgencies(own=1, lending="need"))
-    env = make_small_env(3, several)
-    actor, now = Mlp(sharing="agency", symmetry="none").actor(signature(env)), env.reset()
-    assert now[AGENCY].tolist() == [[0, 1, 0, 1]] * 3
-    own = [network(*(now[key] for key in signature(env).observation_keys())) for network in actor.module.networks]
-    now[AGENCY] = lent = torch.tensor([[0, 1, 0, 1], [0, 1, 1, 1], [0, 1, 0, 0]])
-    logits = actor(now)[LOGITS]
-    for agent in range(4):
-        for world in range(3):
-            assert torch.equal(logits[world, agent], own[lent[world, agent]][world, agent])
-    for central in (True, False):
-        critic = Mlp(sharing="agency", symmetry="none").critic(signature(env), central)
-        assert len(critic.module.network.networks if central else critic.module.networks) == 2
-
-
-def test_networks_of_agencies_learn_from_their_own_vehicles_alone(make_small_env):
-    env = make_small_env(3, small_world(team=Team(n_agents=4), agencies=SeveralAgencies()))
-    model = Mlp(sharing="agency", actor_hidden=(16,), critic_hidden=(16,))
-    learner = Ppo(minibatch_size=12).build(env, model, 12)
-    with torch.no_grad():
-        batch = env.rollout(4, learner.explore, break_when_any_done=False)
-    made = with_advantages(learner.loss, batch, model.canonical_batch(signature(env), state=True))
-    made[ADVANTAGE][..., 2:, :] = 0.0  # as if agency 1 had nothing to learn
-    learner.loss.normalize_advantage = False
-    learner.loss(made)["loss_objective"].backward()
-    trained = {name: each.grad for name, each in learner.loss.named_parameters() if each.grad is not None}
-    sums = [sum(grad.abs().sum() for name, grad in trained.items() if f"networks.{at}." in name) for at in (0, 1)]
-    assert sums[0] > 0.0 and sums[1] == 0.0
-
-
-def test_a_network_for_each_agency_needs_agencies_and_as_many_as_it_was_trained_with(make_small_env):
-    with pytest.raises(ValueError, match=r"model\.sharing must be team, role or none where there is but one agency"):
-        Mlp(sharing="agency").actor(signature(make_small_env(1)))
-
-    def of(count):
-        return make_small_env(1, small_world(team=Team(n_agents=4), agencies=SeveralAgencies(count=count)))
-
-    policy = TrainedPolicy(Ppo().policy(signature(of(2)), Mlp(sharing="agency")), "sampled", signature(of(2)))
-    assert policy.fitted(of(2)).module is policy.module
-    with pytest.raises(ValueError, match="it has a network for each of 2 agencies, this environment has 3"):
-        policy.fitted(of(3))
-    with pytest.raises(ValueError, match="it has a network for each of 2 agencies, this environment has 1"):
-        policy.fitted(make_small_env(1))
 
 
 def test_agents_without_sharing_have_a_network_each(make_small_env):

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import torch
 
+from tests.world.mechanics import of_mechanics
 from warp_torchrl.algorithms import parallel
 from warp_torchrl.models import ACTION
 from warp_torchrl.runs import checkpoint as checkpoints
@@ -105,14 +106,13 @@ RUNS = {
               "team.radio.range=4", "team.radio.loss=0.2", "sensing.miss=0.1", "sensing.smoke=1.0"],
     "talks late": ["scenario=search", "landscape.size=12", "horizon=10", "model.messages=both", "model.message_size=8",
                    "team.radio.delay=2", "team.radio.loss=0.2"],
-    "serves": ["scenario=agencies", "landscape.size=12", "horizon=10", "agencies.own=1", "agencies.lending=need",
-               "agencies.term=3", "reward.cooperation=-0.5"],
     "mixes": ["reward.normalise=true", "model.memory=8", "imitation.teacher=local", "imitation.until=0.7",
               "imitation.weight_end=0.1", "algorithm.critic_first=0.7",
               "algorithm.minibatch_size=32", "mixture=several", "mixture.weigh=left", "mixture.worlds=2",
               "mixture.kinds={one:{scenario:single,over:{horizon:8}},"
               "two:{scenario:skirmish,share:2,teacher:greedy,over:{horizon:10}}}"],
     "compiled": ["compile=true", "imitation.teacher=greedy", "imitation.until=0.7"],
+    **of_mechanics("RUNS"),
     **{name: [f"algorithm={name}", *(REPLAY if name in REPLAYS else [])] for name in ALGORITHMS},
 }  # fmt: skip
 RUNS["dqn"] += ["algorithm.target_interval=3"]

@@ -11,7 +11,6 @@ from warp_torchrl.world.air.wind import Paper, Uniform, Wandering
 from warp_torchrl.world.ignition.ignition import Ignition
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.law.hazard import HazardFire
-from warp_torchrl.world.mechanics.agencies.agencies import SeveralAgencies
 from warp_torchrl.world.team.radio import Radio
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.array import Array
@@ -37,9 +36,6 @@ OUT_OF_RANGE = [
     (Fire, "alpha", [(0.0, 0.1, 1.0, 0.8), (0, 0, 0, 0, 0, 0), (0, 0.1, 1.1, 0.8, 0), (0, -0.1, 1, 1, 0), (NAN,) * 5]),
     (HazardFire, "refinement", [0, 65]),
     (HazardFire, "wet_ticks", [-1, 32]),  # 32 * 8 = 256
-    (SeveralAgencies, "count", [1, 17]),
-    (SeveralAgencies, "own", [-1, 257]),
-    (SeveralAgencies, "term", [0, 1_000_001]),
     (Ignition, "count", [0, 65]),
     (Ignition, "radius", [-1, 9]),
     (Ignition, "region", [0.0, -0.5, 1.1, NAN]),
@@ -88,7 +84,6 @@ NO_SUCH_OPTION = [
     (Array, "ages", ["old"]),
     (Team, "start", ["corners"]),
     (Radio, "carries", ["graphs"]),
-    (SeveralAgencies, "lending", ["needs"]),
 ]
 
 NOT_WHOLE = [
@@ -180,7 +175,6 @@ def test_every_field_with_a_range_is_in_the_list() -> None:
         Paper,
         Wandering,
         World,
-        SeveralAgencies,
     ):
         for name in (field.name for field in fields(component) if field.init):
             assert (component, name) in listed | free, f"{component.__name__}.{name}"

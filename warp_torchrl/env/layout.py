@@ -63,7 +63,7 @@ def packed(world: World, state: WorldState, observed: Observations, episode_rewa
     roles = world.team.table(device).index.repeat(*batch, 1)
     agents = {"observation": of_team(observed.entries), "action_mask": observed.action_mask, "role": roles}
     agents |= {} if observed.radio is None else {"radio": observed.radio}
-    serves = state.plane("agencies", "serves")
+    serves = world.agencies.serves(state)
     agents |= {} if serves is None else {"agency": serves.clone()}
     agents |= {"sent": of_team(sent)} if (sent := world.team.radio.shown(state)) else {}
     paid = episode_reward.clone()  # the environment adds to its own

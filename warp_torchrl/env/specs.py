@@ -9,7 +9,7 @@ import torch
 from tensordict import TensorDict
 from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 
-from warp_torchrl.env.metrics import METRICS
+from warp_torchrl.env.metrics import METRICS, metric_rows
 from warp_torchrl.env.observation import Observation, Space, critic_state
 from warp_torchrl.world.world import World
 
@@ -30,9 +30,9 @@ class Specs(NamedTuple):
 
 
 def episode_metrics(world: World) -> tuple[str, ...]:
-    """Return the entries of ``info`` of a world: ``EPISODE_METRICS``, then those that only worlds like it have."""
-    mechanics = (name for each in world.loop for name in each.metric_names(world))
-    return (*EPISODE_METRICS, *mechanics)
+    """Return the entries of ``info`` of a world: ``EPISODE_METRICS``, then those that users or its mechanics add."""
+    names = [row.name for row in metric_rows(world)]
+    return (*EPISODE_METRICS, *(name for name in names if name not in EPISODE_METRICS))
 
 
 def check_names(names: Iterable[str]) -> None:

@@ -99,7 +99,7 @@ class EpisodeBatch:
             return
         seen = self.env.observation(self.state, self.world, self.world.forecast(self.state))
         keys = {(*OBSERVATION, name) if name else OBSERVATION: value for name, value in seen.items()}
-        serves = self.state.plane("agencies", "serves")
+        serves = self.world.agencies.serves(self.state)
         agencies = {} if serves is None else {AGENCY: serves}
         for key, value in {**keys, **agencies, ACTION_MASK: self.world.action_mask(self.state)}.items():
             shown.get(key).index_copy_(0, self.rows, value)

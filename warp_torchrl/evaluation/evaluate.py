@@ -7,6 +7,7 @@ from pathlib import Path
 from tensordict.nn import TensorDictModuleBase
 
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.env.metrics import metric_rows
 from warp_torchrl.evaluation import cache
 from warp_torchrl.evaluation.goal import goal
 from warp_torchrl.evaluation.maps import maps_line, play_maps, write_maps
@@ -80,7 +81,7 @@ def evaluate_policy(
         content["maps"] = maps.numbers()
     folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / "evaluation.json", content)
-    print(evaluation_table(content), flush=True)
+    print(evaluation_table(content, metric_rows(run_config.world)), flush=True)
     if maps is not None:
         print(maps_line(content["maps"]), flush=True)
         title = f"{run_config.scenario}: {maps.seeds[1]} fires on one ground, {maps.horizon} steps"

@@ -26,8 +26,6 @@ BASELINES = ("noop", "random", "local", "greedy", "coordinated")
 """Baselines of every table."""
 SEARCHING = ("oldest", "lawnmower", "follower")
 """Those that are there too where agents know what was seen alone."""
-AGENCIES = ("own_land",)
-"""Those that are there too where there are several agencies."""
 
 _CELLS_ABREAST = 2**21
 """Of the worlds of all heuristics that play in one batch; more take much memory, and gain nothing."""
@@ -47,7 +45,7 @@ class Recorder(Protocol):
 def baselines_of(world: World) -> tuple[str, ...]:
     """Return the baselines to which a policy is compared in a world."""
     searching = SEARCHING if world.sensing.is_limited else ()
-    return (*BASELINES, *searching, *(AGENCIES if world.agencies.names else ()))
+    return (*BASELINES, *searching, *(name for each in world.loop for name in each.baselines))
 
 
 def play(

@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from warp_torchrl.env.metrics import SAVED_BY, WATCHING
+from warp_torchrl.env.metrics import WATCHING
 from warp_torchrl.env.specs import EPISODE_METRICS
 from warp_torchrl.evaluation.behaviour import BEHAVIOUR
 from warp_torchrl.evaluation.goal import Goal
 from warp_torchrl.evaluation.play import Episodes
 from warp_torchrl.evaluation.statistics import compare, summarise
 from warp_torchrl.system import disk
+from warp_torchrl.world.mechanics.mechanic import Metric
 
 EXTRA_METRICS = ("averted", *BEHAVIOUR)
 
@@ -91,17 +92,23 @@ def _number(value: float) -> float | None:
     return None if np.isnan(value) else float(value)
 
 
-def evaluation_table(content: Mapping[str, Any]) -> str:
-    """Return the report as a table for the terminal; for a team that cannot act, only the metrics of watching."""
+def evaluation_table(content: Mapping[str, Any], metrics: Sequence[Metric] = ()) -> str:
+    """Return the report as a table for the terminal; for a team that cannot act, only the metrics of watching.
+
+    Args:
+        content: The report.
+        metrics: The rows of its worlds' metrics; those that no other line shows have tables to themselves.
+    """
     lines = [f"{worlds_name(content)}: {len(content['seeds'])} fires, seeds from {content['seeds'][0]}"]
     rows = {**content["baselines"], **content["other_modes"], content["policy"]: content["metrics"]}
     if content["goal"] == "saved":
         lines += [*_saved_lines(rows), *_difference_lines(content["policy"], content["versus"], "saved")]
     if content["watching"]:
         lines += [*_watching_lines(rows), *_difference_lines(content["policy"], content["watching"], "watched")]
-    lines += _share_lines("saved %, by agency", rows, SAVED_BY)
-    for name in _further(content):
-        lines += _share_lines(f"{name.replace('_', ' ')} %", rows, name)
+    shown = {*EPISODE_METRICS, *EXTRA_METRICS, *WATCHING}
+    further = [metric for metric in metrics if metric.name not in shown]
+    for title in dict.fromkeys(metric.table or metric.name for metric in further):
+        lines += _metric_lines([metric for metric in further if title in (metric.table, metric.name)], rows)
     lines += _behaviour_lines(content) if content["goal"] == "saved" else []
     lines += _left_out_lines(content)
     return "\n".join(lines)
@@ -124,14 +131,12 @@ def _saved_lines(rows: Mapping[str, Any]) -> list[str]:
 
 def _watching_lines(rows: Mapping[str, Any]) -> list[str]:
     """Return a line for each policy: the front that it watches."""
-    lines = [
-        f"{'policy':<22}{'watched %':>10}{'95 % interval':>16}{'found %':>9}{'uncertainty':>13}{'near misses %':>15}"
-    ]
+    lines = [f"{'policy':<22}{'watched %':>10}{'95 % interval':>16}{'found %':>9}{'uncertainty':>13}"]
     for name, summary in rows.items():
-        watched, near = summary["watched"], summary.get("near_misses")
+        watched = summary["watched"]
         lines.append(
             f"{name:<22}{100 * watched['mean']:>10.1f}{_interval(watched):>16}{100 * summary['found']['mean']:>9.1f}"
-            f"{summary['uncertainty']['mean']:>13.3f}" + ("" if near is None else f"{100 * near['mean']:>15.1f}")
+            f"{summary['uncertainty']['mean']:>13.3f}"
         )
     return lines
 
@@ -152,27 +157,21 @@ def _difference_lines(policy: str, differences: Mapping[str, Any], metric: str) 
     return lines
 
 
-def _further(content: Mapping[str, Any]) -> list[str]:
-    """Return the metrics of mechanics, which no other line of the table shows."""
-    shown = {*EPISODE_METRICS, *EXTRA_METRICS, *WATCHING, *(("near_misses",) if content["watching"] else ())}
-    return [name for name in content["metrics"] if name not in shown and not name.startswith(SAVED_BY)]
-
-
-def _share_lines(title: str, rows: Mapping[str, Any], start: str) -> list[str]:
-    """Return the shares whose names begin with a text, a line for each policy; none where there is no such share."""
-    names = [name for name in next(iter(rows.values())) if name.startswith(start)]
-    if not names:
-        return []
-    lines = [f"{title:<22}" + "".join(f"{name.removeprefix(start):>24}" for name in names)]
+def _metric_lines(metrics: Sequence[Metric], rows: Mapping[str, Any]) -> list[str]:
+    """Return a table of metrics: a line of titles, then means and 95 % intervals, a line for each policy."""
+    first, are_several = metrics[0], bool(metrics[0].table)
+    title = first.table or first.title or first.name
+    title += " %" if first.unit == "%" else ""
+    title += f", {first.better} is better" if first.better else ""
+    width, factor, form = max(22, len(title) + 2), *((100.0, ".1f") if first.unit == "%" else (1.0, ".3f"))
+    columns = [metric.title or metric.name for metric in metrics] if are_several else []
+    lines = [(f"{title:<{width}}" + "".join(f"{column:>24}" for column in columns)).rstrip()]
     for policy, summary in rows.items():
-        cells = ["{:.1f} ({:.1f} .. {:.1f})".format(*_percent(summary[name])) for name in names]
-        lines.append(f"{policy:<22}" + "".join(f"{cell:>24}" for cell in cells))
+        found = [summary[metric.name] for metric in metrics]
+        numbers = [[factor * number for number in (each["mean"], *each["ci95"])] for each in found]
+        cells = (f"{mean:{form}} ({low:{form}} .. {high:{form}})" for mean, low, high in numbers)
+        lines.append(f"{policy:<{width}}" + "".join(f"{cell:>24}" for cell in cells))
     return lines
-
-
-def _percent(summary: Mapping[str, Any]) -> tuple[float, float, float]:
-    low, high = summary["ci95"]
-    return 100.0 * summary["mean"], 100.0 * low, 100.0 * high
 
 
 def worlds_name(content: Mapping[str, Any]) -> str:

@@ -14,9 +14,9 @@ from warp_torchrl.world.arrays.distances import FAR, nearest
 from warp_torchrl.world.arrays.geometry import offsets
 from warp_torchrl.world.arrays.random import Stream, uniform, uniform_at
 from warp_torchrl.world.mechanics.sensing.records import known_codes
-from warp_torchrl.world.mechanics.water.supply import mark_base
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.state import FIRST_FIRE, Action, Cover, WorldState
+from warp_torchrl.world.team.supply import mark_base
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.world import World
 
@@ -194,17 +194,15 @@ def move_towards(state: WorldState, world: World, target: Tensor) -> Tensor:
 
 
 def target_or_base(state: WorldState, world: World, target: Tensor) -> Tensor:
-    """Return the given targets, or the base for aircraft whose charge runs out, with two steps to spare.
+    """Return the given targets, or the base for agents that must set out for it, see ``Mechanic.due_at_base``.
 
     int64 [B, A, 2].
     """
-    vehicles, battery = state.vehicles, state.plane("flight", "battery")
-    if battery is None:
-        return target
-    table, base = world.team.table(target.device), vehicles.base[:, None]
-    away = (vehicles.position - base).abs().amax(dim=-1)
-    turns_back = table.flies & (battery <= away / table.stride + 2.0)
-    return torch.where(turns_back[..., None], base, target)
+    roles, base = world.team.table(target.device), state.vehicles.base[:, None]
+    for each in world.loop:
+        due = each.due_at_base(state, roles)
+        target = target if due is None else torch.where(due[..., None], base, target)
+    return target
 
 
 def target_or_supply(state: WorldState, world: World, target: Tensor) -> Tensor:

@@ -19,12 +19,12 @@ from warp_torchrl.heuristics.firebreaks import cells_to_clear
 from warp_torchrl.world.arrays.detours import moves_around, moves_from
 from warp_torchrl.world.arrays.distances import FAR
 from warp_torchrl.world.arrays.geometry import offsets
-from warp_torchrl.world.mechanics.water.supply import mark_base
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.role import ROLES
 from warp_torchrl.world.state.state import Action, Cover, WorldState
 from warp_torchrl.world.team.abilities import AgentContext, Extinguish, own_cell, places
 from warp_torchrl.world.team.acting import is_second
+from warp_torchrl.world.team.supply import mark_base
 
 _LAST = 4096.0
 """By how much less cells are worth to agents that cannot extinguish: they choose after the others."""

@@ -14,7 +14,6 @@ from warp_torchrl.heuristics.base import (
     target_or_supply,
 )
 from warp_torchrl.heuristics.coordinated import Coordinated
-from warp_torchrl.world.mechanics.agencies.agencies import own_land
 from warp_torchrl.world.state.state import WorldState
 
 
@@ -25,11 +24,12 @@ class OwnLand(Coordinated):
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
-        if not state.keeps("agencies"):
+        land = self.world.agencies.own_land(state)
+        if land is None:
             return super().choose(state, mask)
         value, front = self.value(state)
         cells, valid = list_cells(front)
-        own = own_land(state).flatten(2).gather(2, cells[:, None].expand(-1, mask.shape[1], -1)) & valid[:, None]
+        own = land.flatten(2).gather(2, cells[:, None].expand(-1, mask.shape[1], -1)) & valid[:, None]
         worth = value.flatten(1).gather(1, cells)[:, None].expand(own.shape).masked_fill(~own, -math.inf)
         claims = claim_cells(state, cells, worth, spacing=3, discount=6.0, taken=1000.0)
         move = move_towards(state, self.world, target_or_supply(state, self.world, claims))

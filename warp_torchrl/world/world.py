@@ -17,7 +17,7 @@ from warp_torchrl.world.backends.tick import advance, initial_state
 from warp_torchrl.world.ignition.ignition import Ignition, IgnitionSource
 from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.law.fire import Fire
-from warp_torchrl.world.mechanics.agencies.agencies import Agencies, OneAgency
+from warp_torchrl.world.mechanics.groups import Agencies, OneAgency
 from warp_torchrl.world.mechanics.mechanic import Mechanic
 from warp_torchrl.world.mechanics.radio.radio import RadioTurn
 from warp_torchrl.world.mechanics.sensing.sensing import Full, Sensing

@@ -64,26 +64,6 @@ def test_a_team_that_talks_acts_as_it_does_in_torchrl(delay, layout, observation
         policy.fitted(make_env("default", n_worlds=1))
 
 
-def test_agencies_act_as_they_do_in_torchrl_and_alone():
-    options = {"agencies.own": 1, "agencies.lending": "need", "agencies.term": 2}
-    ours, policy = policy_for("agencies", Mlp(actor_hidden=(32,), sharing="agency"), **options)
-    theirs, act = parallel_env("agencies", seed=3, **options), policy.numpy_policy()
-    now, (seen, infos) = ours.reset(), theirs.reset()
-    lent = []
-    for _ in range(6):
-        expected, actions = policy(now)["agents", "action"], act(seen, infos)
-        assert list(actions.values()) == expected[0].tolist()
-        assert {name: act(seen[name], infos[name]) for name in seen} == actions
-        now = ours.step(TensorDict({"agents": {"action": expected}}, batch_size=[1]))["next"]
-        lent.append(now["agents", "agency"][0].tolist())
-        seen, _, _, _, infos = theirs.step(actions)
-    assert lent[0] != lent[-1], "a vehicle was lent"
-    _, policy = policy_for("agencies", Mlp(actor_hidden=(32,), sharing="agency"), observation="paper")
-    theirs = parallel_env("agencies", seed=3, observation="paper")
-    with pytest.raises(ValueError, match="network for each agency: observations must have self, which tells it"):
-        policy.numpy_policy()(*theirs.reset())
-
-
 @pytest.mark.parametrize("algorithm", [Ppo(), Dqn()], ids=lambda each: type(each).__name__)
 @pytest.mark.parametrize("sharing", ["team", "role"])
 def test_an_agent_may_ask_alone(sharing, algorithm):

@@ -4,9 +4,7 @@ import pytest
 import torch
 
 from tests.env.observation.test_observation import drawn
-from warp_torchrl import make_env
 from warp_torchrl.env.observation.at_fire import AtFire
-from warp_torchrl.models import LOGITS, Mlp, signature
 
 
 def seen(cells, positions, **options):
@@ -36,15 +34,3 @@ def test_they_are_told_the_way_round_the_middle_and_where_the_nearest_of_them_is
 def test_agents_in_one_cell_are_told_no_direction():
     told = seen(torch.full((8, 8), 5).tolist(), [[2, 2], [2, 2]])["told"][0]
     assert told[:, 2:].tolist() == [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
-
-
-def test_networks_read_it_north_up():
-    env = make_env("haksar", n_worlds=2, overrides=["observation=at_fire", "landscape.size=16"])
-    assert Mlp(symmetry="none").actor(signature(env))(env.reset())[LOGITS].shape == (2, 10, 11)
-    with pytest.raises(ValueError, match="symmetry"):
-        Mlp().actor(signature(env))
-
-
-def test_it_is_refused_where_agents_do_not_see_all():
-    with pytest.raises(ValueError, match="sensing must be full with observation=at_fire"):
-        make_env("haksar", n_worlds=1, overrides=["observation=at_fire", "sensing=sight"])

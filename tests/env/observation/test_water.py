@@ -7,7 +7,7 @@ from tests.conftest import small_world
 from warp_torchrl.api.make import make_env
 from warp_torchrl.env.observation.water import WATER, way_to_water
 from warp_torchrl.models import signature
-from warp_torchrl.world.mechanics.water.supply import where_tanks_fill
+from warp_torchrl.world.team.supply import where_tanks_fill
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.array import Array
 

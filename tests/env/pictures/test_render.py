@@ -10,7 +10,6 @@ from warp_torchrl.env.pictures.render import EpisodeRecorder, render
 from warp_torchrl.world.backends.tick import in_wind, initial_state
 from warp_torchrl.world.ignition.ignition import Ignition
 from warp_torchrl.world.law.fire import Fire
-from warp_torchrl.world.mechanics.agencies.agencies import Lands
 from warp_torchrl.world.state.state import Cover, Landscape, WorldState
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
@@ -94,27 +93,6 @@ def test_what_nobody_saw_lately_is_in_fog():
     assert not torch.equal(fog[1], fog[4]), "fire is seen through it"
     earlier = colours(state.replace(step=torch.full_like(state.step, 16)))[0]
     assert torch.equal(earlier[1], plain[1]) and not torch.equal(earlier[4], plain[4])
-
-
-def test_a_line_parts_the_lands_of_agencies():
-    state = drawn([[6, 6, 6], [6, 6, 6]])
-    owner = torch.tensor([[[0, 0, 1], [0, 1, 1]]], dtype=torch.uint8)
-    plain = render(state, None, scale=4)[0]
-    lands = Lands(owner=owner, worth=torch.ones(1, 2), serves=torch.zeros(1, 1, dtype=torch.int64))
-    image = render(state.with_planes("agencies", lands), None, scale=4)[0]
-    differs = (image != plain).any(dim=-1)
-    rows = ["".join(".#"[cell] for cell in row) for row in differs.int().tolist()]
-    assert rows == [
-        ".......##...",
-        ".......##...",
-        ".......##...",
-        "....#####...",
-        "...#####....",
-        "...##.......",
-        "...##.......",
-        "...##.......",
-    ]
-    assert (image[differs] == torch.tensor([240, 241, 243], dtype=torch.uint8)).all()
 
 
 def test_marks_are_drawn_where_they_are():

@@ -69,7 +69,7 @@ def test_no_option_repeats_a_default_of_its_class(group, option):
 ONE_FOR_A_CLASS = [
     *("mappo", "a2c", "dqn", "sac", "ddpg"),
     *("efficiency", "coverage", "collaborative", "adaptive"),
-    *("perlin", "uniform", "wandering", "calm", "spread", "hazard", "lattice", "ugv", "retardant"),
+    *("perlin", "uniform", "wandering", "calm", "spread", "hazard", "lattice", "ugv"),
     *("central", "square", "surroundings", "local", "at_fire", "round_fire"),
     *("mlp", "cnn", "direct", "process", "csv", "wandb", "tensorboard"),
 ]
@@ -232,7 +232,7 @@ MISTAKES = [
     ("total_frames=1.5", "total_frames must be a whole number, got 1.5"),
     ("n_worlds=.inf", "n_worlds must be a whole number"),
     ("collector.steps=0.5", r"collector\.steps must be a whole number, got 0\.5"),
-    ("scenario=nowhere", r"scenario must be one of agencies, .*, water, wildland, got nowhere"),
+    ("scenario=nowhere", r"scenario must be one of .*default, .*, water, wildland, got nowhere"),
     ("algorithm=sarsa", r"algorithm must be one of a2c, ddpg, .*, got sarsa"),
     ("experiment=nowhere", r"experiment must be one of corrected, .*, got nowhere"),
     ("n_worlds=0", "n_worlds must be in 1..4096, got 0"),

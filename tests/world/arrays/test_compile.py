@@ -5,6 +5,7 @@ import torch
 from torch._inductor.cpp_builder import get_cpp_compiler
 from torch._inductor.exc import InvalidCxxCompiler
 
+from tests.world.mechanics import of_mechanics
 from warp_torchrl import make_env
 from warp_torchrl.system.compiler import compiled
 from warp_torchrl.world.arrays.compile import opaque_op
@@ -24,8 +25,7 @@ AT_LENGTH = [
     ["fire=hazard", "landscape.relief=100", "wind=wandering", "team.roles=[ugv,uav]", "team.tank=3", "reward=time"],
     ["fire=paper", "observation=paper", "team.allow_stay=false", "team.extinguish_p=0.5", "reward=paper"],
     ["fire=spread", "landscape.size=[9,16]", "observation.centred=false", "fire.neighbours=4", "reward=collaborative"],
-    ["fire=lattice", "team=retardant", "ignition=square", "wind=calm", "team.tank=3", "observation=at_fire"],
-    ["agencies=several", "agencies.own=0", "agencies.lending=need", "agencies.term=3", "reward=agency"],
+    *map(list, of_mechanics("WORLDS").values()),
 ]
 
 
@@ -48,8 +48,9 @@ def test_a_tick_is_the_same():
 @pytest.mark.parametrize("overrides", [BRIEFLY, *AT_LENGTH])
 def test_worlds_are_the_same(overrides):
     exponentials = "fire=hazard" in overrides or "wind=wandering" in overrides
-    eager = make_env("default", n_worlds=5, overrides=[*SMALL, *overrides])
-    fused = make_env("default", n_worlds=5, overrides=[*SMALL, *overrides], compile=True)
+    names = [each.removeprefix("scenario=") for each in overrides if each.startswith("scenario=")]
+    scenario, further = (names or ["default"])[0], [*SMALL, *overrides[len(names) :]]
+    eager, fused = (make_env(scenario, n_worlds=5, overrides=further, compile=each) for each in (False, True))
     one, other = eager.reset(), fused.reset()
     burning = 0
     for _ in range(50):  # past the horizon: some worlds start again

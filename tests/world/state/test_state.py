@@ -6,6 +6,7 @@ import re
 import pytest
 from torch import Tensor
 
+from tests.world.mechanics import of_mechanics
 from warp_torchrl import make_env
 from warp_torchrl.world.arrays.batch import Batch
 
@@ -31,11 +32,10 @@ def of_other_types(batch):
     ("scenario", "overrides"),
     [
         ("water", []),
-        ("agencies", ["landscape.relief=50"]),
-        ("haksar", []),
         ("front", []),
         ("smoke", ["team.radio.carries=map", "team.radio.delay=2"]),
-        ("default", ["fire=rate", "wind=wandering"]),
+        ("default", ["fire=rate", "wind=wandering", "landscape.relief=50"]),
+        *((scenario.removeprefix("scenario="), further) for scenario, *further in of_mechanics("WORLDS").values()),
     ],
 )
 def test_tensors_are_of_the_types_that_are_told(scenario, overrides):

@@ -18,7 +18,8 @@ from warp_torchrl.env.observation.features import Feature, Features, Function, H
 from warp_torchrl.env.observation.look import Look
 from warp_torchrl.validation import check_new_name
 from warp_torchrl.world.arrays.bytes import byte, to_codes
-from warp_torchrl.world.mechanics.table import mechanics
+from warp_torchrl.world.mechanics.mechanic import Mechanic
+from warp_torchrl.world.mechanics.table import kinds
 from warp_torchrl.world.state.cells import is_burning, is_tree
 from warp_torchrl.world.state.role import PAPER_ROLES
 from warp_torchrl.world.state.state import FIRST_FIRE, WorldState
@@ -152,33 +153,25 @@ def other_scout(look: Look) -> Tensor:
     return look.others[:, :, roles.index("scout")] if "scout" in roles else torch.zeros_like(look.others[:, :, 0])
 
 
-@channel(content=lambda world, names: None if world.agencies.names else Empty())
-def own_land(look: Look) -> Tensor:
-    """Return 255 on the land of the agency that the vehicle serves."""
-    owner, serves = (look.state.plane("agencies", part) for part in ("owner", "serves"))
-    if owner is None or serves is None:
-        return torch.zeros_like(look.on_map)
-    return look.on_map * byte(look.window.of(owner) == serves[..., None, None]) * 255
-
-
-def _map_of(name: str, channel_name: str, show: Callable[[WorldState], Tensor]) -> Feature:
+def _map_of(kind: type[Mechanic], name: str, show: Callable[[WorldState], Tensor]) -> Feature:
     """Return the channel that shows a map of a mechanic; it is empty in worlds without."""
 
     def shown(look: Look) -> Tensor:
-        if name not in look.state.extras.held:
+        if kind.name not in look.state.extras.held:
             return torch.zeros_like(look.on_map)
-        return look.window.of(show(look.state))
+        codes = show(look.state)
+        return look.window.of_own(codes) if codes.ndim == 4 else look.window.of(codes)
 
     def content(world: World, names: Sequence[str]) -> Content:
-        return None if name in (each.name for each in world.loop) else Empty()
+        return None if any(isinstance(each, kind) for each in world.loop) else Empty()
 
-    return Feature(shown, lambda world: [Part("plane", (channel_name,))], content, 255, None)
+    return Feature(shown, lambda world: [Part("plane", (name,))], content, 255, None)
 
 
-for _kind in mechanics().values():
+for _kind in kinds():
     for _name, _show in _kind.maps.items():
         check_new_name("channel", _name, _show, CHANNELS[_name].show if _name in CHANNELS else None)
-        CHANNELS[_name] = _map_of(_kind.name, _name, _show)
+        CHANNELS[_name] = _map_of(_kind, _name, _show)
 
 
 def check_channels(names: Sequence[str]) -> None:

@@ -7,14 +7,13 @@ A channel reads ``Blocks``. A module of a user's own adds one, which ``observati
         return now.show(block_means(..., now.side))
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
 from warp_torchrl.entries import Empty, Part
-from warp_torchrl.env.observation.blocks import block_at, block_of
 from warp_torchrl.env.observation.features import (
     NOTHING_MORE,
     Choice,
@@ -27,10 +26,10 @@ from warp_torchrl.env.observation.features import (
 )
 from warp_torchrl.world.arrays.blocks import block_means
 from warp_torchrl.world.arrays.squares import Window, window
-from warp_torchrl.world.mechanics.agencies.agencies import land_of_each, lands_of
 from warp_torchrl.world.mechanics.sensing.records import freshness, kept, known_codes, records_of
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.state import FIRST_FIRE, OLDEST, Forecast, WorldState
+from warp_torchrl.world.team.places import block_at, block_of
 from warp_torchrl.world.world import World
 
 PICTURE_SIDE = 8
@@ -64,7 +63,11 @@ class Blocks(NamedTuple):
 
 
 def picture_channel(
-    high: int = 255, content: Holds = anything, is_there: IsThere | None = None, is_target: bool = False
+    high: int = 255,
+    content: Holds = anything,
+    is_there: IsThere | None = None,
+    is_target: bool = False,
+    parts: Callable[[World], Sequence[Part]] | None = None,
 ) -> Callable[[Function], Function]:
     """Return what adds a function to the table, under the function's name; it returns what ``Blocks.show`` does.
 
@@ -73,6 +76,7 @@ def picture_channel(
         content: Returns what it can hold in a world, in a picture of channels by name.
         is_there: Returns whether a world shows it; None where an observation chooses it by name.
         is_target: Whether it shows what agents turn towards.
+        parts: Of a function that returns several channels side by side, [B, A, n, ...], returns what they are called.
 
     Raises:
         ValueError: If the number is not in 1..255, or the table has another channel of that name.
@@ -80,7 +84,7 @@ def picture_channel(
 
     def added(show: Function) -> Function:
         part = Part("target" if is_target else "plane", (show.__name__,))
-        return PICTURE.add([part], content, high, is_there)(show)
+        return PICTURE.add(parts or [part], content, high, is_there)(show)
 
     return added
 
@@ -145,12 +149,15 @@ def last_seen(now: Blocks) -> Tensor:
     return now.show(block_means(freshness(kept(now.state), now.state.step), now.side))
 
 
-@picture_channel(is_there=lambda world, choice: bool(world.agencies.names))
-def own_land(now: Blocks) -> Tensor:
-    """Return the share that is land of the agency that the vehicle serves."""
-    lands = lands_of(now.state)
-    shares = block_means(land_of_each(lands), now.side)
-    return now.show(shares.gather(1, lands.serves[..., None, None].expand(-1, -1, now.side, now.side)))
+@picture_channel(
+    parts=lambda world: [Part("plane", tuple(name for each in world.loop for name in each.picture_entries(world)))],
+    is_there=lambda world, choice: any(each.picture_entries(world) for each in world.loop),
+)
+def mechanics(now: Blocks) -> Tensor:
+    """Return the channels of the world's mechanics, see ``Mechanic.picture``."""
+    parts = [each for each in now.world.loop if each.picture_entries(now.world)]
+    shares = torch.cat([each.picture(now.state, now.side) for each in parts], dim=2)
+    return torch.stack([now.show(each) for each in shares.unbind(2)], dim=2)
 
 
 def _known(state: WorldState) -> Tensor | None:
@@ -158,7 +165,8 @@ def _known(state: WorldState) -> Tensor | None:
 
 
 def _shown(now: Blocks, choice: Choice) -> Tensor:
-    return torch.stack([each.show(now) for each in PICTURE.shown(now.world, choice)], dim=2)
+    shown = [each.show(now) for each in PICTURE.shown(now.world, choice)]
+    return torch.cat([each if each.ndim == 5 else each[:, :, None] for each in shown], dim=2)
 
 
 def _mates(now: Blocks) -> Tensor:

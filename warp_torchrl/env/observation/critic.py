@@ -12,10 +12,8 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor
-from torch.nn.functional import one_hot
 
 from warp_torchrl.entries import Content, Empty, Part, Quarters, TeamPlanes
-from warp_torchrl.env.observation.blocks import block_of
 from warp_torchrl.env.observation.channels import ELEVATION_SCALE
 from warp_torchrl.env.observation.features import (
     NOTHING_MORE,
@@ -35,10 +33,10 @@ from warp_torchrl.env.observation.features import (
 from warp_torchrl.env.observation.status import WIND_SCALE, steps_to_tick, time_left
 from warp_torchrl.world.arrays.blocks import block_means
 from warp_torchrl.world.fires.reach import distance_from_fire
-from warp_torchrl.world.mechanics.agencies.agencies import land_of_each, lands_of
 from warp_torchrl.world.mechanics.sensing.records import freshness, kept, known_codes
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.state import FIRST_FIRE, Forecast, WorldState
+from warp_torchrl.world.team.places import block_of
 from warp_torchrl.world.world import World
 
 STATE_SIDE = 16
@@ -186,24 +184,13 @@ def last_seen(now: Context) -> Tensor:
 
 
 @state_plane(
-    lambda world: [Part("plane", tuple(f"land_of_{name}" for name in world.agencies.names))],
-    is_there=lambda world, choice: bool(world.agencies.names),
+    lambda world: [Part("plane", tuple(name for each in world.loop for name in each.critic_entries(world)))],
+    is_there=lambda world, choice: any(each.critic_entries(world) for each in world.loop),
 )
-def lands(now: Context) -> Tensor:
-    """Return the land of each agency."""
-    return block_means(land_of_each(lands_of(now.state)), STATE_SIDE)
-
-
-@state_plane(
-    lambda world: [Part("plane", tuple(f"vehicles_of_{name}" for name in world.agencies.names))],
-    is_there=lambda world, choice: bool(world.agencies.names),
-)
-def serving(now: Context) -> Tensor:
-    """Return how many vehicles serve each agency."""
-    place = one_hot(block_of(now.state, STATE_SIDE), STATE_SIDE**2).to(torch.float32)
-    agencies = torch.arange(len(now.world.agencies.names), device=place.device)[:, None]
-    count = (lands_of(now.state).serves[:, None] == agencies).to(torch.float32) @ place
-    return count.unflatten(-1, (STATE_SIDE, STATE_SIDE))
+def mechanics(now: Context) -> Tensor:
+    """Return the planes of the world's mechanics, see ``Mechanic.critic``."""
+    parts = [each for each in now.world.loop if each.critic_entries(now.world)]
+    return torch.cat([each.critic(now.state, STATE_SIDE) for each in parts], dim=1)
 
 
 @state_plane([Part("plane", ("fire_reach", "team_reach"))], is_there=lambda world, choice: choice.reach)

@@ -142,6 +142,11 @@ def names_of(features: Sequence[Feature], world: World) -> tuple[str, ...]:
     return tuple(name for part in parts_of(features, world) for name in part.names)
 
 
+def highs_of(features: Sequence[Feature], world: World) -> tuple[int, ...]:
+    """Return the largest whole number of each plane of features in a world."""
+    return tuple(each.high for each in features for part in each.parts(world) for _ in part.names)
+
+
 def content_of(features: Sequence[Feature], world: World) -> tuple[Content, ...]:
     """Return what each plane of features can hold in a world."""
     names, found = names_of(features, world), list[Content]()

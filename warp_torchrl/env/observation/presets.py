@@ -24,6 +24,7 @@ from warp_torchrl.env.observation.features import (
     check_features,
     content_of,
     first_of,
+    highs_of,
     names_of,
     parts_of,
 )
@@ -188,7 +189,7 @@ class Surroundings(Local):
             (len(names), side, side),
             torch.uint8 if centred else torch.float32,
             0,
-            tuple(each.high for each in features) if centred else 1.0,
+            highs_of(features, world) if centred else 1.0,
             names,
             Planes(len(names), target),
             self._content_of(content_of(features, world)),

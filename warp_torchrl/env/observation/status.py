@@ -171,7 +171,7 @@ def further_last_action(now: Context) -> Tensor:
     lambda world, choice: any(each.entries(world) for each in world.loop),
 )
 def mechanics(now: Context) -> Tensor:
-    """Return the numbers of mechanics, such as the battery that is left and the agency that a vehicle serves."""
+    """Return the numbers of the world's mechanics, see ``Mechanic.status``."""
     return torch.cat([each.status(now.state) for each in now.world.loop if each.entries(now.world)], dim=-1)
 
 

@@ -6,8 +6,8 @@ from torch import Tensor
 from warp_torchrl.entries import Part
 from warp_torchrl.world.arrays.counting import counting
 from warp_torchrl.world.arrays.distances import chebyshev_distance
-from warp_torchrl.world.mechanics.water.supply import where_tanks_fill
 from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.world.team.supply import where_tanks_fill
 from warp_torchrl.world.world import World
 
 WATER = (Part("vector", ("water_east", "water_north")), Part("scalar", ("water_distance",)))

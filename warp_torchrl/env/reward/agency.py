@@ -7,9 +7,9 @@ from torch import Tensor
 from torch.nn.functional import one_hot
 
 from warp_torchrl.env.reward.conservation import Conservation
-from warp_torchrl.world.mechanics.agencies.agencies import by_land, lands_of, worth_of
 from warp_torchrl.world.state.cells import is_tree
 from warp_torchrl.world.state.state import Transition, WorldState
+from warp_torchrl.world.state.worth import sums_by, worth_of
 from warp_torchrl.world.world import World
 
 
@@ -55,21 +55,33 @@ class Agency(Conservation):
     def own(self, transition: Transition) -> Tensor:
         """Return each vehicle's reward before shaping, float32 [B, A]."""
         before, after = transition.before, transition.after
-        lands, serves = lands_of(before), lands_of(before).serves
-        agencies = lands.worth.shape[1]
+        worth, serves = _plane(before, "worth"), _plane(before, "serves")
+        agencies = worth.shape[1]
         gained = self.worth_by_agency(after) - self.worth_by_agency(before)
         others = (gained.sum(dim=1, keepdim=True) - gained) / (agencies - 1)
         earned = gained + self.cooperation * others
         vehicles = one_hot(serves, agencies).sum(dim=1)
         acts = after.vehicles.acts - before.vehicles.acts
-        cost = self.cost_of_an_act(torch.where(lands.worth > 0.0, lands.worth, torch.inf).gather(1, serves))
+        cost = self.cost_of_an_act(torch.where(worth > 0.0, worth, torch.inf).gather(1, serves))
         return earned.gather(1, serves) - cost * vehicles.gather(1, serves) * acts
 
     def worth_by_agency(self, state: WorldState) -> Tensor:
         """Return Q_k, float32 [B, K]; 0 where an agency has no tree."""
-        lands = lands_of(state)
+        owner, worth = _plane(state, "owner"), _plane(state, "worth")
         standing = state.initial & ~state.burned & is_tree(state.cells)
         gain = torch.where(state.extinguished, self.extinguished, self.preserved) * standing
         loss = torch.where(state.burned, self.burned, torch.where(state.firebreak, self.cleared, 0.0)) * state.initial
-        total = by_land(worth_of(state) * (gain - loss), lands.owner, lands.worth.shape[1])
-        return torch.where(lands.worth > 0.0, total / lands.worth, 0.0)
+        total = sums_by(owner, worth_of(state) * (gain - loss), worth.shape[1])
+        return torch.where(worth > 0.0, total / worth, 0.0)
+
+
+def _plane(state: WorldState, name: str) -> Tensor:
+    """Return a plane that several agencies keep.
+
+    Raises:
+        ValueError: If there is but one agency.
+    """
+    found = state.plane("agencies", name)
+    if found is None:
+        raise ValueError("reward agency needs worlds of several agencies: choose agencies=several")
+    return found

@@ -2,13 +2,14 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import ClassVar, Literal, NamedTuple, Protocol
 
 from torch import Tensor
 
 from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.state.role import RoleTable
-from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.world.state.state import ActionResult, WorldState
+from warp_torchrl.world.team.acting import Acts
 from warp_torchrl.world.team.team import Team
 
 
@@ -36,6 +37,24 @@ class Rules(Protocol):
         ...
 
 
+class Metric(NamedTuple):
+    """A row of the metrics of episodes: a number of each world in 0..1.
+
+    Attributes:
+        name: Of its entry in ``info``, ``metrics.csv`` and ``evaluation.json``.
+        better: Whether more or less of it is better; empty, neither.
+        unit: In which tables show it: ``%``, or ``1`` for the number.
+        title: What tables call it; empty, its name.
+        table: Title of a table that it shares with other metrics, of one unit; empty, it has a table to itself.
+    """
+
+    name: str
+    better: Literal["more", "less", ""] = ""
+    unit: Literal["%", "1"] = "%"
+    title: str = ""
+    table: str = ""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Mechanic:
     """A mechanic of the world. Its fields are its configuration; each method is a socket, which by default is empty.
@@ -45,11 +64,13 @@ class Mechanic:
     Attributes:
         name: Of its planes in the state, and of its values in ``mechanics`` of the configuration.
         maps: What agents may be shown of it: channels of their view by name, each a function of the worlds that returns
-            whole numbers 0..255, uint8 [B, H, W].
+            whole numbers 0..255, uint8 [B, H, W], or [B, A, H, W] where each agent is shown another.
+        baselines: Names of heuristics to which a policy is compared in its worlds, beside those of every table.
     """
 
     name: ClassVar[str] = ""
     maps: ClassVar[Mapping[str, Callable[[WorldState], Tensor]]] = {}
+    baselines: ClassVar[tuple[str, ...]] = ()
 
     def check(self, world: Rules) -> None:
         """Check that it fits a world.
@@ -61,6 +82,24 @@ class Mechanic:
     def begin(self, state: WorldState, world: Rules) -> WorldState:
         """Return worlds at the start of an episode, after the head start of the fire, with its planes."""
         return state
+
+    def masked(self, state: WorldState, mask: Tensor) -> Tensor:
+        """Return which actions are open, bool [B, A, actions], of those that the agents' abilities allow."""
+        return mask
+
+    def around(self, state: WorldState, running: Tensor, acts: Acts) -> tuple[WorldState, ActionResult]:
+        """Return worlds after the agents' moves and acts, and what each action came to.
+
+        Args:
+            state: The worlds before the step.
+            running: Worlds that have not ended, bool [B].
+            acts: Lets the agents act; what happens before and after it is the mechanic's.
+        """
+        return acts(state)
+
+    def due_at_base(self, state: WorldState, roles: RoleTable) -> Tensor | None:
+        """Return which agents must set out for their base now, bool [B, A]; None where none ever has to."""
+        return None
 
     def grounded(self, state: WorldState, roles: RoleTable) -> Tensor | None:
         """Return which agents cannot move, bool [B, A]; None where it keeps none."""
@@ -87,12 +126,12 @@ class Mechanic:
         """
         return after
 
-    def metric_names(self, world: Rules) -> tuple[str, ...]:
-        """Return the names of its metrics."""
+    def metric_rows(self, world: Rules) -> tuple[Metric, ...]:
+        """Return the rows of its metrics."""
         return ()
 
     def metrics(self, state: WorldState) -> dict[str, Tensor]:
-        """Return the metrics of each world's episode so far, shares in 0..1, float32 [B] each by name."""
+        """Return the metrics of each world's episode so far, numbers in 0..1, float32 [B] each by name."""
         return {}
 
     def entries(self, world: Rules) -> tuple[str, ...]:
@@ -102,3 +141,19 @@ class Mechanic:
     def status(self, state: WorldState) -> Tensor:
         """Return these numbers, float32 [B, A, F], in -3..3."""
         raise TypeError(f"{type(self).__name__} does not say what it tells: define status()")
+
+    def picture_entries(self, world: Rules) -> tuple[str, ...]:
+        """Return the names of its channels of ``picture``."""
+        return ()
+
+    def picture(self, state: WorldState, side: int) -> Tensor:
+        """Return these channels in side x side blocks of the map, shares in 0..1, float32 [B, A, n, side, side]."""
+        raise TypeError(f"{type(self).__name__} does not say what it shows: define picture()")
+
+    def critic_entries(self, world: Rules) -> tuple[str, ...]:
+        """Return the names of its planes of the central critic's ``state``."""
+        return ()
+
+    def critic(self, state: WorldState, side: int) -> Tensor:
+        """Return these planes in side x side blocks of the map, in -3..256, float32 [B, n, side, side]."""
+        raise TypeError(f"{type(self).__name__} does not say what the critic sees: define critic()")

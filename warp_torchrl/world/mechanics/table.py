@@ -12,6 +12,7 @@ from warp_torchrl.world.mechanics.mechanic import Mechanic
 
 Kind = TypeVar("Kind", bound=type[Mechanic])
 _TABLE: dict[str, type[Mechanic]] = {}
+_PARTS: list[type[Mechanic]] = []
 
 
 def mechanic(name: str) -> Callable[[Kind], Kind]:
@@ -28,6 +29,17 @@ def mechanic(name: str) -> Callable[[Kind], Kind]:
         return kind
 
     return add
+
+
+def part(kind: Kind) -> Kind:
+    """Add a dataclass that fills a part of the world, as ``team`` does, so that its ``maps`` are channels."""
+    _PARTS.append(kind)
+    return kind
+
+
+def kinds() -> tuple[type[Mechanic], ...]:
+    """Return all mechanics: those of the table, and those that fill a part of the world."""
+    return (*mechanics().values(), *_PARTS)
 
 
 def mechanics() -> Mapping[str, type[Mechanic]]:

@@ -1,6 +1,6 @@
 """Actions of a team: its abilities, the rules that bind moves, and the effects of acts on the worlds."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import reduce
 from operator import add
 from typing import NamedTuple, Protocol
@@ -10,12 +10,23 @@ from torch import Tensor
 
 from warp_torchrl.world.arrays.bytes import scatter_add
 from warp_torchrl.world.state.role import RoleTable
-from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.world.state.state import ActionResult, WorldState
 from warp_torchrl.world.team.abilities import Ability, AgentContext, Effect
 
+Acts = Callable[[WorldState], tuple[WorldState, ActionResult]]
+"""Lets the agents act: returns the worlds after it, and the result of each action."""
 
-class MoveRule(Protocol):
-    """Rules for vehicles that move, beside their abilities; see ``world.mechanics.Mechanic``."""
+
+class TeamRule(Protocol):
+    """Rules for vehicles beside their abilities; see ``world.mechanics.Mechanic``."""
+
+    def masked(self, state: WorldState, mask: Tensor) -> Tensor:
+        """Return which actions are open, bool [B, A, actions], of those that the agents' abilities allow."""
+        ...
+
+    def around(self, state: WorldState, running: Tensor, acts: Acts) -> tuple[WorldState, ActionResult]:
+        """Return worlds after the agents' acts, in those that go on, bool [B], and the result of each action."""
+        ...
 
     def grounded(self, state: WorldState, roles: RoleTable) -> Tensor | None:
         """Return which agents cannot move, bool [B, A]; None where it keeps none."""
@@ -49,7 +60,7 @@ class TeamAbility(NamedTuple):
         effect = self.ability.act(now, choice)
         return effect.possible if self.of_all else effect.possible & now.roles.can[self.name], effect
 
-    def mask(self, now: AgentContext, rules: Sequence[MoveRule]) -> Tensor:
+    def mask(self, now: AgentContext, rules: Sequence[TeamRule]) -> Tensor:
         """Return which of its actions would have an effect under some rules, bool [B, A, actions]."""
         mask = self.ability.mask(now)
         if self.ability.moves:
@@ -58,7 +69,7 @@ class TeamAbility(NamedTuple):
         return mask if self.of_all else mask & now.roles.can[self.name][:, None]
 
 
-def grounded_by(rules: Sequence[MoveRule], now: AgentContext) -> list[Tensor]:
+def grounded_by(rules: Sequence[TeamRule], now: AgentContext) -> list[Tensor]:
     """Return which agents cannot move by each rule that keeps some where they are, bool [B, A] each."""
     found = (rule.grounded(now.state, now.roles) for rule in rules)
     return [each for each in found if each is not None]

@@ -1,4 +1,4 @@
-"""Places of vehicles: the wind there, and distances from the map's middle and from each other."""
+"""Places of vehicles: their blocks of the map, the wind there, distances from the map's middle and each other."""
 
 import torch
 from torch import Tensor
@@ -20,6 +20,18 @@ def wind_at(state: WorldState) -> Tensor:
         return wind[:, None, :, 0, 0].expand(-1, position.shape[1], -1)
     index = position[..., 0] * wind.shape[3] + position[..., 1]
     return wind.flatten(2).gather(2, index[:, None].expand(-1, 2, -1)).transpose(1, 2)
+
+
+def block_of(state: WorldState, side: int) -> Tensor:
+    """Return in which of side x side blocks of the map each agent is, int64 [B, A]."""
+    return block_at(state.vehicles.position, state, side)
+
+
+def block_at(place: Tensor, state: WorldState, side: int) -> Tensor:
+    """Return in which of side x side blocks of the map cells are, int64 [...], of (row, column) int64 [..., 2]."""
+    height, width = state.cells.shape[1:]
+    row, column = place.unbind(-1)
+    return (row * side // height) * side + column * side // width
 
 
 def has_reached(state: WorldState) -> Tensor:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, reduce
+from functools import cached_property, partial, reduce
 from operator import or_
 from typing import Literal
 
@@ -11,11 +11,12 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.state.role import ROLES, RoleTable, role_names, role_table
-from warp_torchrl.world.state.state import Action, ActionResult, Cover, Vehicles, WorldState
-from warp_torchrl.world.team.abilities import ABILITIES, PAPER_ABILITIES, AgentContext, neighbourhood
-from warp_torchrl.world.team.acting import MoveRule, TeamAbility, changed, grounded_by, is_second
+from warp_torchrl.world.state.state import Action, ActionResult, Vehicles, WorldState
+from warp_torchrl.world.team.abilities import ABILITIES, PAPER_ABILITIES, AgentContext
+from warp_torchrl.world.team.acting import Acts, TeamAbility, TeamRule, changed, grounded_by, is_second
 from warp_torchrl.world.team.radio import Radio
 from warp_torchrl.world.team.start import starting_cells
+from warp_torchrl.world.team.supply import filled
 
 STAY = "stay"
 """Name of the action that does nothing."""
@@ -127,11 +128,11 @@ class Team:
             last_useful=torch.full_like(counter, -1),
         )
 
-    def open_moves(self, state: WorldState, rules: Sequence[MoveRule] = ()) -> Tensor:
+    def open_moves(self, state: WorldState, rules: Sequence[TeamRule] = ()) -> Tensor:
         """Return which of the eight moves each agent can make under some rules, bool [B, A, 8]."""
         return self.abilities[0].mask(self._context(state, 0), rules)
 
-    def action_mask(self, state: WorldState, last_spreading: int, rules: Sequence[MoveRule] = ()) -> Tensor:
+    def action_mask(self, state: WorldState, last_spreading: int, rules: Sequence[TeamRule] = ()) -> Tensor:
         """Return which actions would do something, bool [B, A, actions].
 
         Stay is always open. Without it, an agent that can do nothing at all is shown ``EXTINGUISH``, which then does
@@ -140,7 +141,7 @@ class Team:
         Args:
             state: The worlds.
             last_spreading: Cell code of the last stage that can be put out.
-            rules: What binds moves.
+            rules: What binds the vehicles.
         """
         now = self._context(state, last_spreading)
         can = [each.mask(now, rules) for each in self.abilities]
@@ -149,6 +150,8 @@ class Team:
         open_actions = torch.cat(can, dim=-1)
         if not self.allow_stay:
             open_actions[..., Action.EXTINGUISH] |= ~open_actions.any(dim=-1)
+        for rule in rules:
+            open_actions = rule.masked(state, open_actions)
         return open_actions
 
     def act(
@@ -158,7 +161,7 @@ class Team:
         running: Tensor,
         last_spreading: int,
         wet_ticks: int,
-        rules: Sequence[MoveRule] = (),
+        rules: Sequence[TeamRule] = (),
     ) -> tuple[WorldState, ActionResult]:
         """Let the agents move, then let them put out fire, clear trees, and do what else their roles can.
 
@@ -170,11 +173,29 @@ class Team:
             running: Which worlds go on, bool [B]; elsewhere nothing happens.
             last_spreading: Cell code of the last stage that can be put out.
             wet_ticks: Ticks for which a tree that was put out stays wet.
-            rules: What binds moves.
+            rules: What binds the vehicles; the last of them stands around the acts of the others.
 
         Returns:
             The worlds after it, and what each action came to.
         """
+        acts: Acts = partial(
+            self._act, action=action, running=running, last_spreading=last_spreading, wet_ticks=wet_ticks, rules=rules
+        )
+        for rule in rules:
+            acts = partial(rule.around, running=running, acts=acts)
+        return acts(state)
+
+    def _act(
+        self,
+        state: WorldState,
+        *,
+        action: Tensor,
+        running: Tensor,
+        last_spreading: int,
+        wet_ticks: int,
+        rules: Sequence[TeamRule],
+    ) -> tuple[WorldState, ActionResult]:
+        """Return the worlds after the acts of the agents' abilities, and what each came to; see ``act``."""
         state, moved = self._move(state, action, running, rules)
         running = running[:, None]
         now = self._context(state, last_spreading, wet_ticks)
@@ -199,7 +220,7 @@ class Team:
         after = changed(state, target, [(done & credited, becomes) for done, becomes in effects])
         after = after.replace(
             vehicles=vehicles.replace(
-                tank=self._refill(state, tank),
+                tank=tank if self.tank is None else filled(state, tank, self.tank),
                 last_action=torch.where(running, action, vehicles.last_action),
                 acts=vehicles.acts + reduce(or_, chosen),
                 redundant=vehicles.redundant + redundant,
@@ -212,7 +233,7 @@ class Team:
         return AgentContext(state, self.table(state.cells.device), self.extinguish_p, last_spreading, wet_ticks)
 
     def _move(
-        self, state: WorldState, action: Tensor, running: Tensor, rules: Sequence[MoveRule]
+        self, state: WorldState, action: Tensor, running: Tensor, rules: Sequence[TeamRule]
     ) -> tuple[WorldState, Tensor]:
         """Return the worlds after the moves, and which agents moved, bool [B, A]."""
         now, position, moved = self._context(state, 0), state.vehicles.position, []
@@ -228,13 +249,3 @@ class Team:
         for rule in rules:
             state = rule.moved(state, now.roles, running)
         return state, reduce(or_, moved)
-
-    def _refill(self, state: WorldState, tank: Tensor) -> Tensor:
-        """Fill the tanks of vehicles beside a lake or at the base."""
-        if self.tank is None:
-            return tank
-        index, inside = neighbourhood(state)
-        cover = AgentContext.at(state.cover, index.flatten(1)).view_as(index)
-        by_lake = ((cover == int(Cover.LAKE)) & inside).any(dim=-1)
-        at_base = (state.vehicles.position == state.vehicles.base[:, None]).all(dim=-1)
-        return torch.where(by_lake | at_base, self.tank, tank)

@@ -13,17 +13,16 @@ from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.mechanics.agencies.agencies import (
     Lands,
-    OneAgency,
     SeveralAgencies,
     apportioned,
-    by_land,
     lands_of,
     own_land,
     standing,
-    worth_of,
 )
+from warp_torchrl.world.mechanics.groups import OneAgency
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.state import Action, Cover
+from warp_torchrl.world.state.worth import sums_by, worth_of
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
 
@@ -42,7 +41,7 @@ def parted(drawing, owner, serves, at=None):
     state = draw(drawing, team=team, at=at)
     owner = torch.tensor([[int(cell) for cell in row] for row in owner.split()], dtype=torch.uint8)[None]
     agencies = int(owner.max()) + 1
-    worth = by_land(worth_of(state) * state.initial, owner, agencies)
+    worth = sums_by(owner, worth_of(state) * state.initial, agencies)
     return state.with_planes("agencies", Lands(owner=owner, worth=worth, serves=torch.tensor([serves])))
 
 
@@ -94,7 +93,7 @@ def test_worth_is_that_of_the_trees_of_each_land_before_the_fire():
     assert standing(state).tolist() == [[1.0, pytest.approx(2 / 3)]]
     landscape = state.landscape.with_layers(assets=torch.tensor([[[4.0, 9.0, 1.0], [1.0, 1.0, 2.0]]]))
     state = state.replace(ground=state.ground.replace(landscape=landscape))
-    worth = by_land(worth_of(state) * state.initial, lands_of(state).owner, 2)
+    worth = sums_by(lands_of(state).owner, worth_of(state) * state.initial, 2)
     assert worth.tolist() == [[5.0, 4.0]]
     state = state.with_planes("agencies", lands_of(state).replace(worth=worth))
     assert standing(state).tolist() == [[1.0, 0.75]]
@@ -160,7 +159,7 @@ def test_a_world_lends_as_it_steps():
     state = world.reset(torch.arange(16), torch.zeros(16, dtype=torch.int64))
     for _ in range(2):
         state = world.step(state, torch.full((16, 3), int(Action.STAY))).after
-    burning = by_land(is_burning(state.cells).float(), lands_of(state).owner, 2)
+    burning = sums_by(lands_of(state).owner, is_burning(state.cells).float(), 2)
     one_sided = (burning == 0).any(dim=1) & (burning > 0).any(dim=1)
     assert one_sided.any()
     assert (lands_of(state).serves[one_sided] == burning[one_sided].argmax(1, keepdim=True)).all()
@@ -179,5 +178,12 @@ def test_a_team_that_is_too_small_is_refused_in_one_line():
         make_env("agencies", n_worlds=1, overrides=["team.n_agents=3", "agencies.own=2"])
     with pytest.raises(ValueError, match="at least 2, the vehicles that 2 agencies own, got 1"):
         small_world(team=Team(n_agents=1), agencies=SeveralAgencies())
-    with pytest.raises(ValueError, match=r"^count must be in \[2, 16\], got 1$"):
-        SeveralAgencies(count=1)
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [("count", 1), ("count", 17), ("own", -1), ("own", 257), ("term", 0), ("term", 1_000_001), ("lending", "needs")],
+)
+def test_what_cannot_be_is_refused(name, wrong):
+    with pytest.raises(ValueError, match=rf"^{name} must be .*, got '?{wrong}"):
+        SeveralAgencies(**{name: wrong})

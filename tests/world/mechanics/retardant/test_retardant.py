@@ -15,7 +15,7 @@ LAW = LatticeFire()
 
 
 def act(team, state, *actions):
-    return team.act(state, torch.tensor([actions]), torch.tensor([True]), LAW.last_spreading, LAW.wet_for)
+    return team.act(state, torch.tensor([actions]), torch.tensor([True]), LAW.last_spreading, LAW.wet_for, [team])
 
 
 def over(drawing, *at, **options):
@@ -87,7 +87,7 @@ def test_bulldozers_of_a_mixed_team_drop_nothing():
 
 def test_worlds_that_have_ended_stay_as_they_are():
     team, state = over("aaT", (0, 0), tank=1)
-    after, _ = team.act(state, torch.tensor([[EAST]]), torch.tensor([False]), LAW.last_spreading, LAW.wet_for)
+    after, _ = team.act(state, torch.tensor([[EAST]]), torch.tensor([False]), LAW.last_spreading, LAW.wet_for, [team])
     assert not differing(after, state)
 
 
@@ -114,7 +114,7 @@ def test_the_way_to_the_middle_is_diagonal_and_then_along_the_axis_with_north_be
 
 def test_aircraft_that_approach_are_shown_one_action_until_they_arrive():
     team, state = over(" ".join(["TTTTTT"] * 5 + ["aTTTTT"]), (0, 0), (5, 0), approach=True)
-    shown = team.action_mask(state, LAW.last_spreading)[0]
+    shown = team.action_mask(state, LAW.last_spreading, [team])[0]
     assert shown[0].nonzero().flatten().tolist() == [3]
     assert shown[1].nonzero().flatten().tolist() == [0, 1, 2, STAY]
 

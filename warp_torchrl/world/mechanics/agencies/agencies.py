@@ -5,7 +5,6 @@ whoever needs them.
 """
 
 import math
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -15,10 +14,15 @@ from torch.nn.functional import one_hot
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.batch import Batch
+from warp_torchrl.world.arrays.blocks import block_means
 from warp_torchrl.world.arrays.random import Stream, uniform
-from warp_torchrl.world.mechanics.mechanic import Mechanic, Rules
+from warp_torchrl.world.mechanics.groups import Agencies
+from warp_torchrl.world.mechanics.mechanic import Metric, Rules
+from warp_torchrl.world.mechanics.table import part
 from warp_torchrl.world.state.cells import is_burning, is_tree
 from warp_torchrl.world.state.state import Cover, WorldState
+from warp_torchrl.world.state.worth import sums_by, worth_of
+from warp_torchrl.world.team.places import block_of
 from warp_torchrl.world.team.start import distances_to, first_free
 from warp_torchrl.world.team.team import Team
 
@@ -35,36 +39,7 @@ class Lands(Batch):
     serves: Tensor  # int64 [B,A], the agency that each vehicle serves now
 
 
-@dataclass(frozen=True, kw_only=True)
-class Agencies(Mechanic, ABC):
-    """What the world needs of a component that tells whom a team serves."""
-
-    name: ClassVar[str] = "agencies"
-
-    @property
-    @abstractmethod
-    def names(self) -> tuple[str, ...]:
-        """Return the agencies' names; none where the whole team serves all land."""
-
-    @abstractmethod
-    def groups(self, team: Team) -> dict[str, list[int]]:
-        """Return the vehicles of each group by their index: those of each agency, then those of the pool."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class OneAgency(Agencies):
-    """The whole team serves all land."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Return no name."""
-        return ()
-
-    def groups(self, team: Team) -> dict[str, list[int]]:
-        """Return the team, ``agents``."""
-        return {"agents": list(range(team.n_agents))}
-
-
+@part
 @dataclass(frozen=True, kw_only=True)
 class SeveralAgencies(Agencies):
     """Agencies with land and vehicles of their own, and a pool of vehicles that serve one of them at a time.
@@ -90,6 +65,9 @@ class SeveralAgencies(Agencies):
     own: int | None = None
     lending: Literal["fixed", "need"] = "fixed"
     term: int = 16
+
+    baselines: ClassVar[tuple[str, ...]] = ("own_land",)
+    maps: ClassVar = {"own_land": lambda state: own_land(state).to(torch.uint8) * 255}
 
     def __post_init__(self) -> None:
         check_fields(self, count=(2, 16), own=(0, 256), term=(1, 1_000_000))
@@ -122,7 +100,7 @@ class SeveralAgencies(Agencies):
         """Return worlds at the start of an episode with their lands, and the vehicles where they start."""
         team = world.team
         owner, homes = self._parted(state)
-        worth = by_land(worth_of(state) * state.initial, owner, self.count)
+        worth = sums_by(owner, worth_of(state) * state.initial, self.count)
         own, places = self._owned(team.n_agents), torch.arange(team.n_agents, device=owner.device)
         serves = torch.where(places < self.count * own, places // max(own, 1), (places - self.count * own) % self.count)
         if team.start == "corner":
@@ -137,16 +115,16 @@ class SeveralAgencies(Agencies):
         pool = serves.shape[1] - self.count * self._owned(serves.shape[1])
         if self.lending == "fixed" or pool == 0:
             return after
-        need = by_land(worth_of(after) * is_burning(after.cells), lands.owner, self.count)
+        need = sums_by(lands.owner, worth_of(after) * is_burning(after.cells), self.count)
         lent = apportioned(need, pool)
         now = running & (after.step % self.term == 0) & (need > 0.0).any(dim=1)
         lent = torch.where(now[:, None], lent, serves[:, -pool:])
         serves = torch.cat((serves[:, :-pool], lent), dim=1)
         return after.with_planes(self.name, lands.replace(serves=serves))
 
-    def metric_names(self, world: Rules) -> tuple[str, ...]:
+    def metric_rows(self, world: Rules) -> tuple[Metric, ...]:
         """Return ``saved_agency_0`` and so on."""
-        return tuple(f"saved_{name}" for name in self.names)
+        return tuple(Metric(f"saved_{name}", "more", title=name, table="saved by agency") for name in self.names)
 
     def metrics(self, state: WorldState) -> dict[str, Tensor]:
         """Return what stands of the trees on the land of each agency, by their worth; see ``standing``."""
@@ -159,6 +137,36 @@ class SeveralAgencies(Agencies):
     def status(self, state: WorldState) -> Tensor:
         """Return the agency that each vehicle serves, one-hot, float32 [B, A, K]."""
         return one_hot(lands_of(state).serves, self.count).to(torch.float32)
+
+    def serves(self, state: WorldState) -> Tensor:
+        """Return the agency that each vehicle serves, int64 [B, A]."""
+        return lands_of(state).serves
+
+    def own_land(self, state: WorldState) -> Tensor:
+        """Return the cells of the agency that each vehicle serves, bool [B, A, H, W]."""
+        return own_land(state)
+
+    def picture_entries(self, world: Rules) -> tuple[str, ...]:
+        """Return ``own_land``."""
+        return ("own_land",)
+
+    def picture(self, state: WorldState, side: int) -> Tensor:
+        """Return the share of each block that is land of the agency that the vehicle serves."""
+        lands = lands_of(state)
+        shares = block_means(land_of_each(lands), side)
+        return shares.gather(1, lands.serves[..., None, None].expand(-1, -1, side, side))[:, :, None]
+
+    def critic_entries(self, world: Rules) -> tuple[str, ...]:
+        """Return ``land_of_agency_0`` and so on, then ``vehicles_of_agency_0`` and so on."""
+        return tuple(f"{what}_{name}" for what in ("land_of", "vehicles_of") for name in self.names)
+
+    def critic(self, state: WorldState, side: int) -> Tensor:
+        """Return the land of each agency, and how many vehicles serve it."""
+        lands = lands_of(state)
+        place = one_hot(block_of(state, side), side**2).to(torch.float32)
+        agencies = torch.arange(self.count, device=place.device)[:, None]
+        serving = (lands.serves[:, None] == agencies).to(torch.float32) @ place
+        return torch.cat((block_means(land_of_each(lands), side), serving.unflatten(-1, (side, side))), dim=1)
 
     def _owned(self, n_agents: int) -> int:
         """Return how many of a team's vehicles each agency owns."""
@@ -206,24 +214,6 @@ def apportioned(need: Tensor, seats: int) -> Tensor:
     return (torch.arange(seats, device=need.device)[:, None] >= held[:, None]).sum(dim=-1)
 
 
-def worth_of(state: WorldState) -> Tensor:
-    """Return what each cell is worth, float32 [B, H, W]: the landscape's assets, or 1."""
-    assets = state.landscape.layer("assets")
-    return torch.ones_like(state.alpha) if assets is None else assets
-
-
-def by_land(plane: Tensor, owner: Tensor, count: int) -> Tensor:
-    """Return the sums of a plane, float32 [B, H, W], over the land of each agency, float32 [B, K].
-
-    Args:
-        plane: What is summed.
-        owner: Of ``Lands``.
-        count: K.
-    """
-    agencies = torch.arange(count, device=owner.device)[:, None, None]
-    return torch.where(owner[:, None] == agencies, plane[:, None], 0.0).sum(dim=(2, 3))
-
-
 def standing(state: WorldState) -> Tensor:
     """Return the share of its trees' worth that each agency has left, (T_p + T_e) / N0 of its land, float32 [B, K].
 
@@ -231,7 +221,7 @@ def standing(state: WorldState) -> Tensor:
     """
     lands = lands_of(state)
     alive = state.initial & ~state.burned & is_tree(state.cells)
-    left = by_land(worth_of(state) * alive, lands.owner, lands.worth.shape[1])
+    left = sums_by(lands.owner, worth_of(state) * alive, lands.worth.shape[1])
     return torch.where(lands.worth > 0.0, left / lands.worth, 1.0)
 
 

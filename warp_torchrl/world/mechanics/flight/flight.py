@@ -10,7 +10,7 @@ from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.arrays.geometry import offsets
 from warp_torchrl.world.arrays.random import Stream, uniform
-from warp_torchrl.world.mechanics.mechanic import Mechanic, Rules
+from warp_torchrl.world.mechanics.mechanic import Mechanic, Metric, Rules
 from warp_torchrl.world.mechanics.table import mechanic
 from warp_torchrl.world.state.role import RoleTable
 from warp_torchrl.world.state.state import WorldState
@@ -79,9 +79,20 @@ class Flight(Mechanic):
             ),
         )
 
-    def metric_names(self, world: Rules) -> tuple[str, ...]:
+    def due_at_base(self, state: WorldState, roles: RoleTable) -> Tensor | None:
+        """Return which aircraft have charge for the way to the base and two steps, or less, bool [B, A].
+
+        None where batteries do not run down.
+        """
+        vehicles, battery = state.vehicles, state.planes(self.name, Aircraft).battery
+        if battery is None:
+            return None
+        away = (vehicles.position - vehicles.base[:, None]).abs().amax(dim=-1)
+        return roles.flies & (battery <= away / roles.stride + 2.0)
+
+    def metric_rows(self, world: Rules) -> tuple[Metric, ...]:
         """Return ``near_misses`` where they are counted."""
-        return () if self.separation is None else ("near_misses",)
+        return () if self.separation is None else (Metric("near_misses", "less", title="near misses"),)
 
     def metrics(self, state: WorldState) -> dict[str, Tensor]:
         """Return ``near_misses``, those at the ends of steps, a share of the agents' steps."""

@@ -4,7 +4,6 @@ Retardant is no action: an aircraft that is over a burning tree treats it, whate
 and is less likely to after the next tick (``warp_torchrl.world.law.lattice``).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -16,9 +15,9 @@ from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.mechanics.mechanic import Mechanic, Rules
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.role import Role, add_role
-from warp_torchrl.world.state.state import ActionResult, Vehicles, WorldState
+from warp_torchrl.world.state.state import ActionResult, WorldState
 from warp_torchrl.world.team.abilities import own_cell
-from warp_torchrl.world.team.acting import MoveRule, changed, is_second
+from warp_torchrl.world.team.acting import Acts, changed, is_second
 from warp_torchrl.world.team.places import approach_move, has_reached
 from warp_torchrl.world.team.team import Team
 
@@ -67,22 +66,18 @@ class RetardantTeam(Team, Mechanic):
         super().__post_init__()
         check_fields(self)
 
-    def place(self, key: Tensor, cover: Tensor, burning: Tensor) -> Vehicles:
-        """Return the team at the start of an episode; its base is near the south-west corner."""
-        vehicles = super().place(key, cover, burning)
-        if self.start == "corner":
-            return vehicles
-        row, column = max(cover.shape[1] - _BASE, 0), min(_BASE, cover.shape[2]) - 1
-        here = torch.arange(2, device=cover.device)
-        return vehicles.replace(base=torch.where(here == 0, row, column).expand_as(vehicles.base).contiguous())
-
     def begin(self, state: WorldState, world: Rules) -> WorldState:
-        """Return worlds whose aircraft have not reached the fire."""
-        return state.with_planes(self.name, Missions(torch.zeros_like(state.vehicles.tank, dtype=torch.bool)))
+        """Return worlds whose aircraft have not reached the fire; their base is near the south-west corner."""
+        vehicles, (height, width) = state.vehicles, state.cells.shape[1:]
+        if self.start != "corner":
+            row, column = max(height - _BASE, 0), min(_BASE, width) - 1
+            axis = torch.arange(2, device=state.cells.device)
+            base = torch.where(axis == 0, row, column).expand_as(vehicles.base).contiguous()
+            state = state.replace(vehicles=vehicles.replace(base=base))
+        return state.with_planes(self.name, Missions(torch.zeros_like(vehicles.tank, dtype=torch.bool)))
 
-    def action_mask(self, state: WorldState, last_spreading: int, rules: Sequence[MoveRule] = ()) -> Tensor:
-        """Return which actions would do something, or are shown alone, bool [B, A, actions]."""
-        mask = super().action_mask(state, last_spreading, rules)
+    def masked(self, state: WorldState, mask: Tensor) -> Tensor:
+        """Return which actions are open, bool [B, A, actions]; of aircraft on their way to the fire it is one."""
         if not self.approach:
             return mask
         actions = torch.arange(mask.shape[-1], device=mask.device)
@@ -90,26 +85,18 @@ class RetardantTeam(Team, Mechanic):
         sets_out = self._drops(state.cells.device) & ~has_reached(state)
         return torch.where(sets_out[..., None], alone, mask)
 
-    def act(
-        self,
-        state: WorldState,
-        action: Tensor,
-        running: Tensor,
-        last_spreading: int,
-        wet_ticks: int,
-        rules: Sequence[MoveRule] = (),
-    ) -> tuple[WorldState, ActionResult]:
-        """Let the vehicles do as in any team, and the aircraft drop their retardant; see ``Team.act``.
+    def around(self, state: WorldState, running: Tensor, acts: Acts) -> tuple[WorldState, ActionResult]:
+        """Let the vehicles do as in any team, and the aircraft drop their retardant before and after it.
 
         An aircraft that treats a tree is credited for it, unless it was treated in this tick already: then that was
         redundant.
         """
-        drops, step = self._drops(action.device) & running[:, None], state.step
+        drops, step = self._drops(running.device) & running[:, None], state.step
         target, reached = own_cell(state), has_reached(state) & running[:, None]
         treated = first = torch.zeros_like(drops)
         if self.treats == "path":
             state, treated, first = _treat(state, drops)
-        state, result = super().act(state, action, running, last_spreading, wet_ticks, rules)
+        state, result = acts(state)
         state, ends, new = _treat(state, drops & result.moved if self.treats == "path" else drops)
         treated, first = treated | ends, first | new
         target = torch.where(drops, torch.where(ends, own_cell(state), target), result.target)

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.random import Stream, uniform
-from warp_torchrl.world.mechanics.mechanic import Mechanic, Rules
+from warp_torchrl.world.mechanics.mechanic import Mechanic, Metric, Rules
 from warp_torchrl.world.mechanics.sensing.records import kinds, recorded
 from warp_torchrl.world.mechanics.sensing.smoke import smoke
 from warp_torchrl.world.mechanics.sensing.watching import (
@@ -194,9 +194,9 @@ class Sight(Sensing):
         after = counted(state, watching, itself, newest_records(known, knows, itself, state.step), self.recent)
         return state.with_planes(self.name, Memory(records=knows, watching=_where(running, after, watching)))
 
-    def metric_names(self, world: Rules) -> tuple[str, ...]:
+    def metric_rows(self, world: Rules) -> tuple[Metric, ...]:
         """Return ``watched``, ``found`` and ``uncertainty``."""
-        return ("watched", "found", "uncertainty")
+        return (Metric("watched", "more"), Metric("found", "more"), Metric("uncertainty", "less", unit="1"))
 
     def metrics(self, state: WorldState) -> dict[str, Tensor]:
         """Return how well the team keeps the fire in sight.

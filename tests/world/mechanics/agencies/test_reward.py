@@ -13,7 +13,8 @@ from warp_torchrl.env.reward import Agency
 from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import compose_config, plain
 from warp_torchrl.runs.config.construction import ConfigError
-from warp_torchrl.world.mechanics.agencies.agencies import Lands, SeveralAgencies, by_land, lands_of
+from warp_torchrl.world.mechanics.agencies.agencies import Lands, SeveralAgencies, lands_of
+from warp_torchrl.world.state.worth import sums_by
 
 PLAIN = Agency(scale=1.0, shaping=0.0, act=0.0)
 
@@ -22,7 +23,7 @@ def parted(positions, serves):
     """The field with its left half, where the fire is, of agency 0, and its right half of agency 1; 8 trees each."""
     state, world = drawn(FIELD, positions)
     owner = torch.tensor([0, 0, 1, 1], dtype=torch.uint8).expand(1, 4, 4).contiguous()
-    worth = by_land(state.initial.float(), owner, 2)
+    worth = sums_by(owner, state.initial.float(), 2)
     state = state.with_planes("agencies", Lands(owner=owner, worth=worth, serves=torch.tensor([serves])))
     return state, replace(world, agencies=SeveralAgencies())
 
@@ -40,7 +41,7 @@ def test_trees_count_by_their_worth():
     assets = torch.ones(1, 4, 4)
     assets[0, 1, 1], assets[0, 3, 3] = 9.0, 0.0  # the burning tree, and one of the other agency's
     ground = state.ground.replace(landscape=state.landscape.with_layers(assets=assets))
-    lands = lands_of(state).replace(worth=by_land(assets * state.initial, lands_of(state).owner, 2))
+    lands = lands_of(state).replace(worth=sums_by(lands_of(state).owner, assets * state.initial, 2))
     assert lands.worth.tolist() == [[16.0, 7.0]]
     state = state.replace(ground=ground).with_planes("agencies", lands)
     assert earned(PLAIN, state, world, EXTINGUISH, STAY) == pytest.approx([0.9 * 9 / 16, 0.0])

@@ -1,1 +1,0 @@
-"""Water: where vehicles fill their tanks."""
