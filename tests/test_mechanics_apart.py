@@ -8,20 +8,22 @@ import pytest
 
 from tests.test_docs import ROOT, run
 
-APART = ("flight", "retardant")
+APART = ("flight", "radio", "retardant", "sensing")
 """Mechanics whose folder can be deleted."""
-WHOLE = ("flight",)
+WHOLE = ("flight", "radio", "sensing")
 """Those whose tests all stand in their folder, so that the rest of the suite passes too."""
 TRY = """
 import pkgutil, importlib, warp_torchrl
 from warp_torchrl import make_env
+from warp_torchrl.runs.config.compose import conf_folder
 from warp_torchrl.world.mechanics.table import mechanics
 for each in pkgutil.walk_packages(warp_torchrl.__path__, "warp_torchrl."):
     if each.name.split(".")[1] in ("env", "evaluation", "heuristics", "models", "runs", "training", "world"):
         importlib.import_module(each.name)
 assert "{name}" not in mechanics(), "it is deleted"
-for scenario in ("default", "hetero", "front", "agencies", "search", *(["haksar"] if "{name}" != "retardant" else [])):
-    make_env(scenario, n_worlds=2, overrides=["landscape.size=16"]).rollout(3)
+for scenario in ("default", "hetero", "front", "agencies", "search", "haksar"):
+    if (conf_folder() / "scenario" / f"{scenario}.yaml").exists():
+        make_env(scenario, n_worlds=2, overrides=["landscape.size=16"]).rollout(3)
 """
 
 

@@ -23,7 +23,6 @@ FURTHER = {
     "at fire": ("scenario=haksar", "observation=at_fire", "reward=round_fire"),
     "of the map": ("scenario=skirmish", "observation.centred=false", "reward=collaborative"),
     "rates": ("scenario=skirmish", "fire=rate"),
-    "talks late": ("scenario=search", "team.radio.carries=both", "team.radio.delay=2", "team.radio.loss=0.2"),
     "lends": ("scenario=agencies", "agencies.own=1", "agencies.lending=need", "agencies.term=3"),
 }  # fmt: skip
 """Further worlds: what no scenario shows, does or pays."""

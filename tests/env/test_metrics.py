@@ -3,12 +3,8 @@
 import pytest
 import torch
 
-from tests.conftest import small_world
-from warp_torchrl.env.metrics import METRICS, WATCHING, metrics
-from warp_torchrl.world.mechanics.sensing.sensing import Sight
-from warp_torchrl.world.mechanics.sensing.watching import Memory, watching_of
+from warp_torchrl.env.metrics import METRICS, metrics
 from warp_torchrl.world.state.state import Action, count_trees
-from warp_torchrl.world.team.team import Team
 
 
 def test_metrics_are_fractions_that_add_up(make_small_env):
@@ -34,26 +30,3 @@ def test_acts_are_counted_for_what_they_are(make_small_env):
     assert found["redundant"].item() == 0.5  # both at one tree
     assert found["cleared"].item() == pytest.approx(1.0 / count_trees(state).initial.item())
     assert found["control_time"].item() == pytest.approx(1.0 / env.world.horizon)
-
-
-def test_limited_sight_has_metrics_of_its_own(make_small_env):
-    env = make_small_env(4, small_world(sensing=Sight(radius=2), team=Team(n_agents=2, roles=("scout",))))
-    now = env.rollout(20, break_when_any_done=False)
-    found = metrics(env.world_state, env.tree_counts, env.world)
-    assert tuple(found) == (*METRICS, *WATCHING)
-    assert set(now["next", "info"].keys()) == {*found, "episode_reward", "episode_length"} == {*env_names(env)}
-    for name, value in found.items():
-        assert ((value >= 0) & (value <= 1)).all(), name
-        assert torch.equal(now["next", "info", name][:, -1, 0], value)
-    state = env.world_state
-    watching, fronts = watching_of(state), torch.full((4,), 4, dtype=torch.int32)
-    watching = watching.replace(fronts=fronts, watched=torch.ones(4), found=torch.full((4,), 2.0))
-    step = torch.full((4,), 8, dtype=torch.int32)
-    memory = state.planes("sensing", Memory).replace(watching=watching.replace(uncertainty=torch.full((4,), 6.0)))
-    state = state.replace(step=step).with_planes("sensing", memory)
-    found = metrics(state, env.tree_counts, env.world)
-    assert [found[name][0].item() for name in WATCHING] == [0.25, 0.5, 0.75]
-
-
-def env_names(env):
-    return env.full_observation_spec["info"].keys()

@@ -4,6 +4,7 @@ import pytest
 import torch
 from torch.fx.experimental.proxy_tensor import make_fx
 
+from tests.world.mechanics.there import can_play
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.recorded import RecordedStep
 from warp_torchrl.env.reward import Time
@@ -14,7 +15,7 @@ from warp_torchrl.system.device import unread
 BRIEFLY = [
     ["scenario=skirmish"],
     ["scenario=hazard", "reward=adaptive"],
-    ["scenario=smoke", "team.radio.carries=both", "team.radio.delay=2", "team.radio.loss=0.1"],
+    ["scenario=smoke", "mechanics.radio.carries=both", "mechanics.radio.delay=2", "mechanics.radio.loss=0.1"],
     ["scenario=haksar", "team.tank=3", "team.approach=true", "observation=at_fire", "reward=round_fire"],
     ["scenario=agencies", "agencies.own=1", "agencies.lending=need", "agencies.term=3"],
 ]
@@ -22,10 +23,13 @@ AT_LENGTH = [
     ["scenario=lightning", "wind=wandering"],
     ["scenario=default", "observation=paper", "landscape.relief=200", "fire=paper"],
     ["scenario=hetero", "reward=collaborative"],
-    ["scenario=smoke", "team.radio.carries=both", "team.radio.range=6", "team.radio.loss=0.1"],
+    ["scenario=smoke", "mechanics.radio.carries=both", "mechanics.radio.range=6", "mechanics.radio.loss=0.1"],
     ["scenario=front"],
 ]
-SCENARIOS = [*BRIEFLY, *(pytest.param(each, marks=pytest.mark.slow) for each in AT_LENGTH)]
+SCENARIOS = [
+    *filter(can_play, BRIEFLY),
+    *(pytest.param(each, marks=pytest.mark.slow) for each in AT_LENGTH if can_play(each)),
+]
 
 
 def one_hot(codes, count):

@@ -12,7 +12,6 @@ from warp_torchrl.world.ignition.ignition import Ignition
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.law.hazard import HazardFire
 from warp_torchrl.world.mechanics.agencies.agencies import SeveralAgencies
-from warp_torchrl.world.team.radio import Radio
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.landscape import Perlin
@@ -63,9 +62,6 @@ OUT_OF_RANGE = [
     (Team, "roles", [(), ("tank",), ("ugv", "boat"), "ugv"]),
     (Team, "extinguish_p", [-0.1, 1.1, NAN]),
     (Team, "tank", [-1, 10_001]),
-    (Radio, "range", [-0.1, 1.1e6, NAN]),
-    (Radio, "loss", [-0.1, 1.1, NAN]),
-    (Radio, "delay", [-1, 65]),
     (Uniform, "speed", [-0.1, 60.1, NAN]),
     (Uniform, "direction", [NAN, INF]),
     (Paper, "scale", [-0.1, 10.1, NAN]),
@@ -87,13 +83,11 @@ NO_SUCH_OPTION = [
     (Perlin, "ages", ["old"]),
     (Array, "ages", ["old"]),
     (Team, "start", ["corners"]),
-    (Radio, "carries", ["graphs"]),
     (SeveralAgencies, "lending", ["needs"]),
 ]
 
 NOT_WHOLE = [
     (Fire, "youngest_fuel", [2.5]),
-    (Radio, "delay", [0.5]),
     (Fire, "oldest", [9.5]),
     (Fire, "burning_stages", [4.5]),
     (Fire, "wet_ticks", [2.5]),
@@ -158,8 +152,6 @@ def test_every_field_with_a_range_is_in_the_list() -> None:
         (Array, "row"),
         (Array, "column"),
         (Team, "allow_stay"),
-        (Team, "radio"),
-        (Radio, "line_of_sight"),
         (Paper, "rotate"),
         *(
             (World, part)
@@ -175,7 +167,6 @@ def test_every_field_with_a_range_is_in_the_list() -> None:
         Perlin,
         Array,
         Team,
-        Radio,
         Uniform,
         Paper,
         Wandering,

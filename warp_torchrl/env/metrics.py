@@ -19,8 +19,6 @@ METRICS = (
     "success",
 )
 """Names of the metrics, in the order of tables."""
-WATCHING = ("watched", "found", "uncertainty")
-"""Further ones where sight is limited, see ``world.sensing.Sight``."""
 SAVED_BY = "saved_"
 """Of agencies, before the name of each: ``saved_agency_0``."""
 SUCCESS_LEVEL = 0.6
@@ -35,10 +33,7 @@ def metrics(state: WorldState, counts: TreeCounts, world: World) -> dict[str, Te
     ``actions``: extinguish and clear actions, a share of the agents' steps. ``redundant``: the share of those on a
     target that a team-mate had. ``success``: 1 where the fire is out and at least 60 % is saved.
 
-    Where sight is limited: ``watched``, the share of the front that the team saw burn within the last steps, as many as
-    ``sensing.recent``; ``found``, the share of the front that it knows to burn; both as means over the steps with a
-    front, see ``spreading_front``. ``uncertainty``: 1 - freshness of the team's newest records, mean over cells and
-    steps. Those of the world's mechanics, see ``Mechanic.metrics``. Where there are several agencies,
+    Then those of the world's mechanics, see ``Mechanic.metrics``. Where there are several agencies,
     ``saved_agency_0`` and so on: what stands of the trees on the land of each, by their worth.
 
     Args:

@@ -4,6 +4,7 @@ import pytest
 import torch
 
 from tests.env.observation.test_observation import drawn
+from tests.world.mechanics.there import needs
 from warp_torchrl import make_env
 from warp_torchrl.env.observation.at_fire import AtFire
 from warp_torchrl.models import LOGITS, Mlp, signature
@@ -45,6 +46,7 @@ def test_networks_read_it_north_up():
         Mlp().actor(signature(env))
 
 
+@needs("sensing")
 def test_it_is_refused_where_agents_do_not_see_all():
     with pytest.raises(ValueError, match="sensing must be full with observation=at_fire"):
         make_env("haksar", n_worlds=1, overrides=["observation=at_fire", "sensing=sight"])

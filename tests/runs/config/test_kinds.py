@@ -2,6 +2,7 @@
 
 import pytest
 
+from tests.world.mechanics.there import needs
 from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import compose_config, plain
 from warp_torchrl.runs.config.construction import ConfigError
@@ -32,9 +33,10 @@ def test_a_kind_may_have_another_name_than_its_scenario():
     assert [(kind.name, kind.world.horizon) for kind in plan.kinds] == [("a", 256), ("b", 9)]
 
 
+@needs("radio")
 def test_a_kind_has_what_the_radio_of_the_run_carries():
     plan = planned("mixture=several", TWO, "model.messages=graph")
-    assert [kind.world.team.radio.carries for kind in plan.kinds] == ["graph", "graph"]
+    assert [kind.world.hearing.carries for kind in plan.kinds] == ["graph", "graph"]
 
 
 def test_a_key_of_a_kind_that_its_file_leaves_out_can_be_given():

@@ -2,11 +2,11 @@
 
 import pytest
 
+from tests.world.mechanics.there import needs
 from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import compose_config, plain
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
-from warp_torchrl.world.team.radio import Radio
 
 SMALL = ["scenario=default", "landscape.size=12", "curriculum=success"]
 
@@ -26,10 +26,11 @@ def test_a_level_is_the_scenario_with_its_values_and_the_last_is_the_scenario():
     assert all(world.landscape is plan.world.landscape for world in plan.levels), "what is the same is the same one"
 
 
-def test_a_level_may_have_another_value_of_a_part_of_a_component():
-    plan = planned("team.radio={range:9.0,loss:0.1}", "curriculum.over.team.radio.range=[3,9]")
+@needs("radio")
+def test_a_level_may_have_another_value_of_a_mechanic():
+    plan = planned("mechanics.radio={range:9.0,loss:0.1}", "curriculum.over.mechanics.radio.range=[3,9]")
     plan.check_training()
-    assert [world.team.radio for world in plan.levels] == [Radio(range=each, loss=0.1) for each in (3.0, 9.0)]
+    assert [(world.hearing.range, world.hearing.loss) for world in plan.levels] == [(3.0, 0.1), (9.0, 0.1)]
     assert plan.levels[-1] == plan.world
 
 
@@ -67,8 +68,8 @@ def test_evaluations_are_of_the_scenario():
             "curriculum.over, level 0: steps_per_tick must be in .*, got -3",
         ),
         (
-            ["curriculum.over.team.radio.loss=[2.0,0.0]"],
-            r"curriculum.over, level 0: team.radio.loss must be in \[0, 1\], got 2",
+            ["curriculum.over.team.extinguish_p=[2.0,1.0]"],
+            r"curriculum.over, level 0: team.extinguish_p must be in \[0, 1\], got 2",
         ),
         (["curriculum.over.fire.tau=[slow,5.0]"], "curriculum.over, level 0: fire.tau must be a number, got 'slow'"),
         (

@@ -87,15 +87,15 @@ def _in_section(section: str) -> Iterator[None]:
 
 def _check_together(config: Mapping[str, Any]) -> None:
     reward, algorithm = config["reward"], config["algorithm"]
-    model, radio = config["model"]["messages"], config["team"]["radio"]["carries"]
-    if model in ("graph", "both") and radio not in ("graph", "both"):
+    model, radio = config["model"]["messages"], config["mechanics"].get("radio") or {}
+    carries, delay, rounds = radio.get("carries", "none"), radio.get("delay", 0), config["model"]["message_rounds"]
+    if model in ("graph", "both") and carries not in ("graph", "both"):
         raise ConfigError(
-            f"team.radio.carries must be graph or both where networks talk, model.messages={model}, got {radio}"
+            f"mechanics.radio.carries must be graph or both where networks talk, model.messages={model}, got {carries}"
         )
-    rounds, delay = config["model"]["message_rounds"], config["team"]["radio"]["delay"]
     if model in ("graph", "both") and delay and rounds != 1:
         raise ConfigError(
-            f"model.message_rounds must be 1 where messages come late, team.radio.delay={delay}, got {rounds}"
+            f"model.message_rounds must be 1 where messages come late, mechanics.radio.delay={delay}, got {rounds}"
         )
     trust, observation = config["model"].get("trust", 0.0), config["observation"]
     if trust and not (observation.get("advice") and observation.get("rules")):

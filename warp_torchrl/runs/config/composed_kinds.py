@@ -19,7 +19,7 @@ def kinds_of_worlds(config: Mapping[str, Any], mixture: Mixture, teacher: str | 
     """Return the kinds of a mixture, built.
 
     Args:
-        config: Composed, as plain values: what the team's radio carries is the run's in every kind.
+        config: Composed, as plain values: what the radio carries is the run's in every kind.
         mixture: Names them.
         teacher: Of kinds that name none.
 
@@ -60,6 +60,7 @@ def _world(config: Mapping[str, Any], kind: Kind) -> World:
             raise ConfigError(f"over must name keys of the worlds, {', '.join(WORLD_KEYS[1:])}, got {key}")
     overrides = [f"{key}={_written(value)}" for key, value in dotted(kind.over).items()]
     values = plain(compose_config("train", [f"scenario={kind.scenario}", *overrides]))
-    values["team"]["radio"]["carries"] = config["team"]["radio"]["carries"]
+    if "radio" in config["mechanics"]:
+        values["mechanics"].setdefault("radio", {})["carries"] = config["mechanics"]["radio"].get("carries", "none")
     world: World = build_components(values, OF_WORLDS)["world"]
     return world

@@ -9,6 +9,8 @@ from torch import Tensor
 from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.state.role import RoleTable
 from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.world.team.hearing import Hearing
+from warp_torchrl.world.team.knowledge import Sensing
 from warp_torchrl.world.team.team import Team
 
 
@@ -18,6 +20,16 @@ class Rules(Protocol):
     @property
     def team(self) -> Team:
         """Return the vehicles."""
+        ...
+
+    @property
+    def sensing(self) -> Sensing:
+        """Return what agents know."""
+        ...
+
+    @property
+    def hearing(self) -> Hearing:
+        """Return who hears whom."""
         ...
 
     @property
@@ -57,6 +69,10 @@ class Mechanic:
         Raises:
             ValueError: If not.
         """
+
+    def why_eager(self) -> str | None:
+        """Return why steps of its worlds are not compiled; None where they can be."""
+        return None
 
     def begin(self, state: WorldState, world: Rules) -> WorldState:
         """Return worlds at the start of an episode, after the head start of the fire, with its planes."""

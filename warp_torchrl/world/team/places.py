@@ -1,4 +1,4 @@
-"""Places of vehicles: the wind there, and distances from the map's middle and from each other."""
+"""Places of vehicles: the wind there, what is near them, and distances from the map's middle and from each other."""
 
 import torch
 from torch import Tensor
@@ -62,6 +62,21 @@ def nearest_mate(state: WorldState) -> Tensor:
     square = (position[:, :, None] - position[:, None]).square().sum(-1)
     alone = torch.eye(position.shape[1], dtype=torch.bool, device=position.device)
     return square.masked_fill(alone, 1 << 40).argmin(dim=-1)
+
+
+def in_reach(state: WorldState, reach: list[int]) -> Tensor:
+    """Return which cells are within each agent's reach by Chebyshev distance, bool [B, A, H, W].
+
+    Args:
+        state: The worlds.
+        reach: Of each agent [cells].
+    """
+    height, width = state.cells.shape[1:]
+    row, column = state.vehicles.position.unbind(-1)
+    far = torch.tensor(reach, device=row.device)[:, None]
+    on_row = (torch.arange(height, device=row.device) - row[..., None]).abs() <= far
+    on_column = (torch.arange(width, device=row.device) - column[..., None]).abs() <= far
+    return on_row[..., :, None] & on_column[..., None, :]
 
 
 @kept(8)
