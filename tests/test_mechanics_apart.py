@@ -41,10 +41,11 @@ def without(request, tmp_path_factory):
 
 
 def delete_options(conf: Path, text: str) -> None:
-    """Delete the options that hold a text, and the scenarios and experiments that choose one of them."""
+    """Delete the options that hold a text, and the scenarios and experiments that choose or follow one of them."""
     for path in [each for each in conf.rglob("*.yaml") if text in each.read_text()]:
         path.unlink(missing_ok=True)
         delete_options(conf, f"override /{path.parent.name}: {path.stem}\n")
+        delete_options(path.parent, f"\n  - {path.stem}\n")
 
 
 def check(copy: Path, *command: str) -> None:

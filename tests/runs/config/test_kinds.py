@@ -73,7 +73,11 @@ def test_without_a_mixture_there_is_one_kind():
         (["mixture.kinds={default:{},water:{over:{reward:{act:0}}}}"], "water: over must name keys of the worlds"),
         (["mixture.kinds={default:{},water:{over:{scenario:ring}}}"], "water: over must name keys of the worlds"),
         (["mixture.kinds={default:{},water:{over:{team:{tank:-9}}}}"], "mixture.kinds.water: team.tank must be"),
-        (["mixture.kinds={default:{},search:{}}"], "search: one team must see and do the same .* observation picture"),
+        pytest.param(
+            ["mixture.kinds={default:{},search:{}}"],
+            "search: one team must see and do the same .* observation picture",
+            marks=needs("sensing"),
+        ),
         (["mixture.kinds={default:{},paper_sarl:{}}"], "paper_sarl: one team must see and do the same .* differs"),
         ([TWO, "curriculum=success", "curriculum.over.steps_per_tick=[5,4]"], "mixture must be none with a curriculum"),
         ([TWO, "collector=process"], "mixture must be none where workers collect"),
