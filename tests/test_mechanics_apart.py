@@ -8,9 +8,9 @@ import pytest
 
 from tests.test_docs import ROOT, run
 
-APART = ("agencies", "flight", "retardant")
+APART = ("agencies", "flight", "radio", "retardant", "sensing")
 """Mechanics whose folder can be deleted."""
-WHOLE = ("agencies", "flight", "retardant")
+WHOLE = ("agencies", "flight", "radio", "retardant", "sensing")
 """Those whose tests all stand in their folder, so that the rest of the suite passes too."""
 TRY = """
 import pkgutil, importlib, warp_torchrl
@@ -41,11 +41,12 @@ def without(request, tmp_path_factory):
 
 
 def delete_options(copy: Path, text: str) -> None:
-    """Delete the options that hold a text, and the scenarios and experiments that choose one of them."""
+    """Delete the options that hold a text, and the scenarios and experiments that choose or follow one of them."""
     options = [*(copy / "conf").rglob("*.yaml"), *(copy / "docs" / "experiment").glob("*.yaml")]
     for path in [each for each in options if text in each.read_text()]:
         path.unlink(missing_ok=True)
         delete_options(copy, f"override /{path.parent.name}: {path.stem}\n")
+        delete_options(copy, f"\n  - {path.stem}\n")
 
 
 def check(copy: Path, *command: str) -> None:

@@ -8,9 +8,9 @@ from warp_torchrl.runs.config.construction import ConfigError
 
 
 def test_a_command_line_is_read():
-    asked = read_probe(["policy=outputs/run", "episodes=8", "scenario=scouts", "team.radio.range=5"])
+    asked = read_probe(["policy=outputs/run", "episodes=8", "scenario=scouts", "mechanics.radio.range=5"])
     assert (asked.policy, asked.episodes) == ("outputs/run", 8)
-    assert asked.overrides == ("scenario=scouts", "team.radio.range=5")
+    assert asked.overrides == ("scenario=scouts", "mechanics.radio.range=5")
     with pytest.raises(ConfigError, match=r"episodes must be in \[2, 4096\], got 1"):
         read_probe(["policy=run", "episodes=1"])
 

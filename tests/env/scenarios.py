@@ -21,7 +21,6 @@ FURTHER = {
     "paper": ("scenario=skirmish", "observation=paper"),
     "of the map": ("scenario=skirmish", "observation.centred=false", "reward=collaborative"),
     "rates": ("scenario=skirmish", "fire=rate"),
-    "talks late": ("scenario=search", "team.radio.carries=both", "team.radio.delay=2", "team.radio.loss=0.2"),
     **of_mechanics("WORLDS"),
 }  # fmt: skip
 """Further worlds: what no scenario shows, does or pays."""

@@ -12,8 +12,6 @@ from warp_torchrl.env.levels import LEVEL, joined
 from warp_torchrl.world.air.wind import Uniform
 from warp_torchrl.world.ignition.ignition import Ignition
 from warp_torchrl.world.law.fire import Fire
-from warp_torchrl.world.team.radio import Radio
-from warp_torchrl.world.team.team import Team
 
 TARGET = small_world(horizon=12)
 EASY = replace(TARGET, steps_per_tick=6, horizon=20)
@@ -63,7 +61,8 @@ def test_the_least_and_the_largest_draw_are_of_levels_that_have_a_chance(monkeyp
 
 
 def test_what_comes_late_comes_as_in_the_plain_environment():
-    late = replace(TARGET, team=Team(n_agents=2, radio=Radio(carries="graph", delay=2, loss=0.2)))
+    radio = pytest.importorskip("warp_torchrl.world.mechanics.radio.radio")
+    late = replace(TARGET, mechanics=(radio.Radio(carries="graph", delay=2, loss=0.2),))
     env = LeveledEnv([replace(late, steps_per_tick=6), late], n_worlds=8)
     same(played(env, 30), played(WildfireEnv(late, n_worlds=8), 30))
     env.draw_by([0.5, 0.5])

@@ -4,10 +4,8 @@ import pytest
 import torch
 
 from tests.conftest import small_world
-from warp_torchrl.env.metrics import METRICS, WATCHING, metric, metric_rows, metrics
+from warp_torchrl.env.metrics import METRICS, metric, metric_rows, metrics
 from warp_torchrl.world.mechanics.mechanic import Metric
-from warp_torchrl.world.mechanics.sensing.sensing import Sight
-from warp_torchrl.world.mechanics.sensing.watching import Memory, watching_of
 from warp_torchrl.world.state.cells import count_trees
 from warp_torchrl.world.state.state import Action
 from warp_torchrl.world.team.team import Team
@@ -36,25 +34,6 @@ def test_acts_are_counted_for_what_they_are(make_small_env):
     assert found["redundant"].item() == 0.5  # both at one tree
     assert found["cleared"].item() == pytest.approx(1.0 / count_trees(state).initial.item())
     assert found["control_time"].item() == pytest.approx(1.0 / env.world.horizon)
-
-
-def test_limited_sight_has_metrics_of_its_own(make_small_env):
-    env = make_small_env(4, small_world(sensing=Sight(radius=2), team=Team(n_agents=2, roles=("scout",))))
-    now = env.rollout(20, break_when_any_done=False)
-    found = metrics(env.world_state, env.tree_counts, env.world)
-    assert tuple(found) == (*METRICS, *WATCHING)
-    assert set(now["next", "info"].keys()) == {*found, "episode_reward", "episode_length"} == {*env_names(env)}
-    for name, value in found.items():
-        assert ((value >= 0) & (value <= 1)).all(), name
-        assert torch.equal(now["next", "info", name][:, -1, 0], value)
-    state = env.world_state
-    watching, fronts = watching_of(state), torch.full((4,), 4, dtype=torch.int32)
-    watching = watching.replace(fronts=fronts, watched=torch.ones(4), found=torch.full((4,), 2.0))
-    step = torch.full((4,), 8, dtype=torch.int32)
-    memory = state.planes("sensing", Memory).replace(watching=watching.replace(uncertainty=torch.full((4,), 6.0)))
-    state = state.replace(step=step).with_planes("sensing", memory)
-    found = metrics(state, env.tree_counts, env.world)
-    assert [found[name][0].item() for name in WATCHING] == [0.25, 0.5, 0.75]
 
 
 def test_a_user_s_metric_is_one_of_every_world(make_small_env, monkeypatch):

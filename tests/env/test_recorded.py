@@ -8,6 +8,7 @@ from torch.fx.experimental.proxy_tensor import make_fx
 from torch.nn import functional
 
 from tests.world.mechanics import of_mechanics
+from tests.world.mechanics.there import can_play
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.recorded import RecordedStep
 from warp_torchrl.env.reward import Time
@@ -18,17 +19,20 @@ from warp_torchrl.system.device import unread
 BRIEFLY = [
     ["scenario=skirmish"],
     ["scenario=hazard", "reward=adaptive"],
-    ["scenario=smoke", "team.radio.carries=both", "team.radio.delay=2", "team.radio.loss=0.1"],
+    ["scenario=smoke", "mechanics.radio.carries=both", "mechanics.radio.delay=2", "mechanics.radio.loss=0.1"],
     *of_mechanics("WORLDS").values(),
 ]
 AT_LENGTH = [
     ["scenario=lightning", "wind=wandering"],
     ["scenario=default", "observation=paper", "landscape.relief=200", "fire=paper"],
     ["scenario=hetero", "reward=collaborative"],
-    ["scenario=smoke", "team.radio.carries=both", "team.radio.range=6", "team.radio.loss=0.1"],
+    ["scenario=smoke", "mechanics.radio.carries=both", "mechanics.radio.range=6", "mechanics.radio.loss=0.1"],
     ["scenario=front"],
 ]
-SCENARIOS = [*BRIEFLY, *(pytest.param(each, marks=pytest.mark.slow) for each in AT_LENGTH)]
+SCENARIOS = [
+    *filter(can_play, BRIEFLY),
+    *(pytest.param(each, marks=pytest.mark.slow) for each in AT_LENGTH if can_play(each)),
+]
 
 
 def one_hot(codes, count):

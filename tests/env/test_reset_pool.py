@@ -4,13 +4,15 @@ import pytest
 import torch
 
 from tests.conftest import small_world
+from tests.world.mechanics.there import can_play
 from warp_torchrl import make_env
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.reset_pool import ResetPool
 from warp_torchrl.system.device import unread
 
 SHORT = ["landscape.size=10", "horizon=12"]
-LATE = ["scenario=search", "team.radio.carries=both", "team.radio.delay=2", "team.radio.loss=0.2"]
+LATE = ["scenario=search", "mechanics.radio.carries=both", "mechanics.radio.delay=2", "mechanics.radio.loss=0.2"]
+TALKS = ["mechanics.radio.carries=graph", "mechanics.radio.delay=2"]
 
 
 def played(steps, *overrides):
@@ -26,7 +28,7 @@ def played(steps, *overrides):
 
 @pytest.mark.parametrize(
     "overrides",
-    [[], ["scenario=lightning"], ["wind=wandering"], ["scenario=front"], LATE],
+    filter(can_play, [[], ["scenario=lightning"], ["wind=wandering"], ["scenario=front"], LATE, TALKS]),
     ids=" ".join,
 )
 def test_worlds_play_the_same_episodes_though_nobody_asks_which_have_ended(overrides):

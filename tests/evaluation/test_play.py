@@ -6,16 +6,11 @@ import pytest
 import torch
 
 from tests.conftest import small_world
-from warp_torchrl.env import WildfireEnv
-from warp_torchrl.env.reward import Monitor
 from warp_torchrl.evaluation import play as play_module
 from warp_torchrl.evaluation.behaviour import BEHAVIOUR
-from warp_torchrl.evaluation.goal import goal
-from warp_torchrl.evaluation.play import BASELINES, WithoutAgent, baselines_of, play
+from warp_torchrl.evaluation.play import WithoutAgent, play
 from warp_torchrl.evaluation.report import evaluation_table, report, write_json
-from warp_torchrl.heuristics import Coordinated, Follower, Greedy, NoOp, Random
-from warp_torchrl.world.mechanics.sensing.sensing import Sight
-from warp_torchrl.world.team.team import Team
+from warp_torchrl.heuristics import Coordinated, Greedy, NoOp, Random
 
 
 def test_policies_meet_the_same_worlds_and_the_generator_is_left_alone(make_small_env):
@@ -97,21 +92,3 @@ def test_heuristics_play_side_by_side_while_their_cells_fit(make_small_env, monk
     monkeypatch.setattr(play_module, "_CELLS_ABREAST", 2 * 3 * 12 * 12 - (not fits_abreast))
     play_module.play_heuristics(env, 5, ["noop", "greedy"])
     assert asked == ([["noop", "greedy"]] if fits_abreast else [])
-
-
-def test_those_that_search_are_baselines_where_sight_is_limited():
-    assert baselines_of(small_world()) == BASELINES
-    assert baselines_of(small_world(sensing=Sight())) == (*BASELINES, "oldest", "lawnmower", "follower")
-
-
-def test_a_report_of_a_team_that_watches_keeps_what_its_baselines_watched():
-    team = Team(n_agents=2, roles=("scout",))
-    env = WildfireEnv(small_world(sensing=Sight(), team=team), reward=Monitor(), n_worlds=3)
-    mine, follower = play(env, Random(env), 9), play(env, Follower(env), 9)
-    content = report("tiny", "random", 9, mine, {"follower": follower}, goal=goal(env.world))
-    assert content["goal"] == "watched"
-    assert content["baseline_episodes"]["follower"]["watched"] == follower["watched"].tolist()
-    assert report("tiny", "random", 9, mine, {"follower": follower})["baseline_episodes"]["follower"].keys() == {
-        "saved",
-        "success",
-    }

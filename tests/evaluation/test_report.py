@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from warp_torchrl.env.metrics import METRICS, WATCHING
-from warp_torchrl.evaluation.report import evaluation_table, report
+from warp_torchrl.env.metrics import METRICS
+from warp_torchrl.evaluation.report import WATCHING, evaluation_table, report
 from warp_torchrl.world.mechanics.mechanic import Metric
 
 

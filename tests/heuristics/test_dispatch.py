@@ -108,7 +108,7 @@ def test_aircraft_without_water_stay_away() -> None:
 
 @pytest.mark.parametrize(
     "scenario",
-    [*(pytest.param(name, marks=pytest.mark.slow) for name in ("default", "hetero", "scouts")), "water", "ring"],
+    [*(pytest.param(name, marks=pytest.mark.slow) for name in ("default", "hetero", "large")), "water", "ring"],
 )
 def test_it_decides_for_a_world_as_it_does_for_it_alone(scenario: str) -> None:
     env = make_env(scenario, n_worlds=6)

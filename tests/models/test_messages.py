@@ -13,6 +13,7 @@ from tests.models.canonical.test_canonical import (
     turned_actions,
     turned_world,
 )
+from tests.world.mechanics.there import needs
 from warp_torchrl.algorithms.ppo import Ppo
 from warp_torchrl.env.observation import Surroundings
 from warp_torchrl.heuristics import HEURISTICS
@@ -23,9 +24,9 @@ from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import compose_config, plain
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
-from warp_torchrl.world.team.radio import Radio
 from warp_torchrl.world.team.team import Team
 
+Radio = pytest.importorskip("warp_torchrl.world.mechanics.radio.radio").Radio
 SMALL = {"actor_hidden": (16, 16), "critic_hidden": (16,), "messages": "graph", "message_size": 16}
 MODELS = {
     "canonical": Mlp(**SMALL),
@@ -39,8 +40,8 @@ OWN = (*OBSERVATION, "status")
 @pytest.fixture
 def make_env(make_small_env):
     def make(n_worlds=4, n_agents=4, **radio):
-        team = Team(n_agents=n_agents, radio=Radio(carries="graph", **radio))
-        return make_small_env(n_worlds, small_world(team=team))
+        world = small_world(team=Team(n_agents=n_agents), mechanics=(Radio(carries="graph", **radio),))
+        return make_small_env(n_worlds, world)
 
     return make
 
@@ -119,7 +120,7 @@ def test_what_an_agent_says_is_learnt_from_what_the_others_do(make_env):
 @pytest.mark.parametrize("turn", [(-1, 1, True), (1, -1, False), (-1, -1, True)], ids=str)
 def test_a_team_that_talks_does_the_same_in_a_turned_world(turn):
     preset = PRESETS["whole map"]
-    env = fighting(preset, n_worlds=24, messages="graph")
+    env = fighting(preset, n_worlds=24, mechanics=(Radio(carries="graph"),))
     state = env.world_state.clone()
     here, there = (env.set_state(each).clone() for each in (state, turned_world(state, turn)))
     sees = pulled(preset, state, 24).all(-1)
@@ -164,12 +165,12 @@ def test_a_stored_batch_says_what_was_acted_on(make_env, name, delay):
         (["model.message_size=12"], r"model\.message_size must be a multiple of 8"),
         (["algorithm=dqn"], r"model\.messages must be none or map where the algorithm replays"),
         (
-            ["team.radio.delay=1", "model.message_rounds=2"],
-            r"model\.message_rounds must be 1 where messages come late, team\.radio\.delay=1, got 2",
+            ["mechanics.radio.delay=1", "model.message_rounds=2"],
+            r"model\.message_rounds must be 1 where messages come late, mechanics\.radio\.delay=1, got 2",
         ),
-        (["team.radio.delay=65"], r"team\.radio\.delay must be in \[0, 64\], got 65"),
-        (["team.radio.delay=0.5"], r"team\.radio\.delay must be a whole number, got 0\.5"),
-        (["team.radio.carries=none"], r"team\.radio\.carries must be graph or both where networks talk"),
+        (["mechanics.radio.delay=65"], r"mechanics\.radio\.delay must be in \[0, 64\], got 65"),
+        (["mechanics.radio.delay=0.5"], r"mechanics\.radio\.delay must be a whole number, got 0\.5"),
+        (["mechanics.radio.carries=none"], r"mechanics\.radio\.carries must be graph or both where networks talk"),
         (["imitation.demonstrations=somewhere"], r"imitation\.demonstrations must be null where agents talk"),
     ],
 )
@@ -179,7 +180,7 @@ def test_what_cannot_be_is_refused_in_one_line(overrides, rule):
 
 
 def test_one_word_lets_the_environment_tell_whom_agents_hear():
-    made = run_config(plain(compose_config("train", ["model.messages=graph", "team.radio.range=5"])))
+    made = run_config(plain(compose_config("train", ["model.messages=graph", "mechanics.radio.range=5"])))
     assert RADIO in made.make_env(2, 0).reset().keys(True, True)
     silent = run_config(plain(compose_config("train", [])))
     assert RADIO not in silent.make_env(2, 0).reset().keys(True, True)
@@ -188,26 +189,26 @@ def test_one_word_lets_the_environment_tell_whom_agents_hear():
 @pytest.mark.parametrize(("trained", "kept"), [("graph", "graph"), ("map", "none")])
 def test_another_scenario_leaves_a_talking_team_its_radio(trained, kept):
     """... and takes the maps of a team that does not see all."""
-    record = SavedConfig(
-        choices={"scenario": "search"}, values={"model": {"messages": trained}, "team": {"radio": {"carries": trained}}}
-    )
-    config = restore(record, ["scenario=large", "team.radio.range=7"])
-    assert config.team.radio.carries == kept and config.team.n_agents == 8 and config.team.radio.range == 7
+    values = {"model": {"messages": trained}, "mechanics": {"radio": {"carries": trained}}}
+    record = SavedConfig(choices={"scenario": "skirmish"}, values=values)
+    config = restore(record, ["scenario=large", "mechanics.radio.range=7"])
+    assert config.mechanics.radio == {"carries": kept, "range": 7} and config.team.n_agents == 8
 
 
+@needs("sensing")
 def test_maps_are_the_worlds_to_tell_and_any_learner_takes_them():
     told = run_config(plain(compose_config("train", ["scenario=search", "model.messages=map", "algorithm=dqn"])))
     env = told.make_env(2, 0)
-    assert env.world.team.radio.sends_maps and RADIO not in env.reset().keys(True, True)
-    with pytest.raises(ConfigError, match=r"team\.radio\.carries must be none or graph where agents see all"):
+    assert env.world.hearing.sends_maps and RADIO not in env.reset().keys(True, True)
+    with pytest.raises(ConfigError, match=r"mechanics\.radio\.carries must be none or graph where agents see all"):
         run_config(plain(compose_config("train", ["model.messages=map"])))
 
 
 @pytest.fixture
 def make_late_env(make_small_env):
     def make(n_worlds=4, n_agents=4, delay=2, **options):
-        team = Team(n_agents=n_agents, radio=Radio(carries="graph", delay=delay))
-        return make_small_env(n_worlds, small_world(team=team), seed=0, **options)
+        world = small_world(team=Team(n_agents=n_agents), mechanics=(Radio(carries="graph", delay=delay),))
+        return make_small_env(n_worlds, world, seed=0, **options)
 
     return make
 
@@ -295,7 +296,7 @@ def test_what_an_agent_said_is_learnt_from_what_the_others_do_later(make_late_en
 def test_a_team_that_hears_late_does_the_same_in_a_turned_world(turn):
     """What was sent is turned as its sender saw it then, and heard as its receiver sees it now."""
     preset = PRESETS["whole map"]
-    env = fighting(preset, n_worlds=24, messages="graph")
+    env = fighting(preset, n_worlds=24, mechanics=(Radio(carries="graph"),))
     then, rule = env.world_state.clone(), HEURISTICS["local"](env)
     for _ in range(4):
         env.step(rule(env._observe()))

@@ -14,6 +14,7 @@ import pytest
 import torch
 
 from tests.world.mechanics import of_mechanics
+from tests.world.mechanics.there import can_play
 from warp_torchrl.algorithms import parallel
 from warp_torchrl.models import ACTION
 from warp_torchrl.runs import checkpoint as checkpoints
@@ -103,9 +104,9 @@ RUNS = {
     "regrets": ["curriculum=regret", "curriculum.over.steps_per_tick=[9,6,4]", "curriculum.over.wind.speed=[0,2,4]",
                 "curriculum.episodes=2", "curriculum.worlds=4", "algorithm=dqn", *REPLAY],
     "talks": ["scenario=search", "landscape.size=12", "horizon=10", "model.messages=both", "model.message_size=8",
-              "team.radio.range=4", "team.radio.loss=0.2", "sensing.miss=0.1", "sensing.smoke=1.0"],
+              "mechanics.radio.range=4", "mechanics.radio.loss=0.2", "sensing.miss=0.1", "sensing.smoke=1.0"],
     "talks late": ["scenario=search", "landscape.size=12", "horizon=10", "model.messages=both", "model.message_size=8",
-                   "team.radio.delay=2", "team.radio.loss=0.2"],
+                   "mechanics.radio.delay=2", "mechanics.radio.loss=0.2"],
     "mixes": ["reward.normalise=true", "model.memory=8", "imitation.teacher=local", "imitation.until=0.7",
               "imitation.weight_end=0.1", "algorithm.critic_first=0.7",
               "algorithm.minibatch_size=32", "mixture=several", "mixture.weigh=left", "mixture.worlds=2",
@@ -115,6 +116,7 @@ RUNS = {
     **of_mechanics("RUNS"),
     **{name: [f"algorithm={name}", *(REPLAY if name in REPLAYS else [])] for name in ALGORITHMS},
 }  # fmt: skip
+RUNS = {name: overrides for name, overrides in RUNS.items() if can_play(overrides)}
 RUNS["dqn"] += ["algorithm.target_interval=3"]
 
 
@@ -544,8 +546,9 @@ def test_a_policy_acts_in_the_mode_that_reaches_more_of_what_its_team_is_for(mon
         return {name: np.full(2, value) for name, value in reached[mode].items()}
 
     monkeypatch.setattr(loop, "play", played)
-    for scenario, mode in (("skirmish", "sampled"), ("scouts", "sampled"), ("front", "deterministic")):
-        plan = run_config(plain(compose_config("train", [f"scenario={scenario}", "evaluation.episodes=2"])))
+    plan = run_config(plain(compose_config("train", ["evaluation.episodes=2"])))
+    for goal, mode in (("saved", "sampled"), ("watched", "deterministic")):
+        monkeypatch.setattr(loop, "goal", lambda world, goal=goal: goal)
         assert Training._better_mode(SimpleNamespace(run_config=plan, learner=SimpleNamespace(policy=None))) == mode
 
 

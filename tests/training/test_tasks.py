@@ -6,6 +6,7 @@ import pytest
 import torch
 
 from tests.training.test_loop import TINY, rows, tiny
+from tests.world.mechanics.there import needs
 from warp_torchrl.models import REWARD, differing, joint, signature
 from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import compose_config, plain
@@ -93,16 +94,23 @@ def test_rewards_are_normalised_kind_by_kind(tmp_path):
         assert torch.equal(batch["next", *REWARD], reward)
 
 
-def test_a_network_for_several_kinds_reads_whole_what_any_of_them_can_fill():
-    def shape(scenario, *overrides):
-        plan = run_config(plain(compose_config("train", [*TINY, f"scenario={scenario}", *overrides])))
-        return signature(plan.make_env(1, 0))
+def shape(scenario, *overrides):
+    plan = run_config(plain(compose_config("train", [*TINY, f"scenario={scenario}", *overrides])))
+    return signature(plan.make_env(1, 0))
 
+
+@needs("radio")
+def test_kinds_of_worlds_whose_messages_come_at_once_and_late_differ():
+    prompt, late = (
+        shape("default", "mechanics.radio.carries=graph", f"mechanics.radio.delay={each}") for each in (0, 2)
+    )
+    assert differing(prompt, late) == "mechanics.radio.delay" and joint([late, late]).is_late
+
+
+def test_a_network_for_several_kinds_reads_whole_what_any_of_them_can_fill():
     ground, air, hills = shape("default"), shape("hetero"), shape("default", "landscape.relief=200.0")
     assert differing(ground, air) is None and differing(ground, shape("default", "team.n_agents=7")) is None
     assert differing(ground, shape("default", "observation.radius=3")) == "observation view"
-    prompt, late = (shape("default", "team.radio.carries=graph", f"team.radio.delay={each}") for each in (0, 2))
-    assert differing(prompt, late) == "team.radio.delay" and joint([late, late]).is_late
     assert joint([ground, ground]) == ground
     both = joint([ground, air, hills])
     for name in ("view", "picture"):

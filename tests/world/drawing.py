@@ -8,13 +8,16 @@ A map is rows of one character a cell, with white space between rows:
 The ground under it is grassland, or drawn the same way: ~ lake, w wetland, g grassland, f forest, b bare.
 """
 
+from dataclasses import dataclass
+
 import torch
 from torch import Tensor
 
+from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.backends.tick import initial_state
 from warp_torchrl.world.law.fire import Fire
-from warp_torchrl.world.mechanics.sensing.watching import Memory, unwatched, watching_of
+from warp_torchrl.world.state.records import KNOWLEDGE
 from warp_torchrl.world.state.state import Cover, Landscape, WorldState
 from warp_torchrl.world.team.team import Team
 
@@ -95,10 +98,17 @@ def draw(
     )
 
 
+@dataclass(eq=False, repr=False)
+class Records(Batch):
+    """Records, and nothing beside."""
+
+    records: Tensor  # int32 [B,A,H,W]
+
+
 def knowing(state: WorldState, records: Tensor) -> WorldState:
     """Return the worlds whose agents have these records of the fire, int32 [B, A, H, W]."""
-    watching = watching_of(state) if state.keeps("sensing") else unwatched(state)
-    return state.with_planes("sensing", Memory(records=records, watching=watching))
+    held = state.extras.held.get(KNOWLEDGE)
+    return state.with_planes(KNOWLEDGE, Records(records) if held is None else held.replace(records=records))
 
 
 def drawn(state: WorldState, world: int = 0) -> str:

@@ -11,7 +11,6 @@ from warp_torchrl.world.air.wind import Paper, Uniform, Wandering
 from warp_torchrl.world.ignition.ignition import Ignition
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.law.hazard import HazardFire
-from warp_torchrl.world.team.radio import Radio
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.landscape import Perlin
@@ -59,9 +58,6 @@ OUT_OF_RANGE = [
     (Team, "roles", [(), ("tank",), ("ugv", "boat"), "ugv"]),
     (Team, "extinguish_p", [-0.1, 1.1, NAN]),
     (Team, "tank", [-1, 10_001]),
-    (Radio, "range", [-0.1, 1.1e6, NAN]),
-    (Radio, "loss", [-0.1, 1.1, NAN]),
-    (Radio, "delay", [-1, 65]),
     (Uniform, "speed", [-0.1, 60.1, NAN]),
     (Uniform, "direction", [NAN, INF]),
     (Paper, "scale", [-0.1, 10.1, NAN]),
@@ -83,12 +79,10 @@ NO_SUCH_OPTION = [
     (Perlin, "ages", ["old"]),
     (Array, "ages", ["old"]),
     (Team, "start", ["corners"]),
-    (Radio, "carries", ["graphs"]),
 ]
 
 NOT_WHOLE = [
     (Fire, "youngest_fuel", [2.5]),
-    (Radio, "delay", [0.5]),
     (Fire, "oldest", [9.5]),
     (Fire, "burning_stages", [4.5]),
     (Fire, "wet_ticks", [2.5]),
@@ -153,8 +147,6 @@ def test_every_field_with_a_range_is_in_the_list() -> None:
         (Array, "row"),
         (Array, "column"),
         (Team, "allow_stay"),
-        (Team, "radio"),
-        (Radio, "line_of_sight"),
         (Paper, "rotate"),
         *(
             (World, part)
@@ -170,7 +162,6 @@ def test_every_field_with_a_range_is_in_the_list() -> None:
         Perlin,
         Array,
         Team,
-        Radio,
         Uniform,
         Paper,
         Wandering,

@@ -65,7 +65,7 @@ def packed(world: World, state: WorldState, observed: Observations, episode_rewa
     agents |= {} if observed.radio is None else {"radio": observed.radio}
     serves = world.agencies.serves(state)
     agents |= {} if serves is None else {"agency": serves.clone()}
-    agents |= {"sent": of_team(sent)} if (sent := world.team.radio.shown(state)) else {}
+    agents |= {"sent": of_team(sent)} if (sent := world.hearing.shown(state)) else {}
     paid = episode_reward.clone()  # the environment adds to its own
     info = observed.metrics | {"episode_reward": paid, "episode_length": state.step.to(torch.float32)}
     return unchecked(

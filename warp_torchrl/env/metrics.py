@@ -18,8 +18,6 @@ from warp_torchrl.world.mechanics.mechanic import Metric
 from warp_torchrl.world.state.state import TreeCounts, WorldState
 from warp_torchrl.world.world import World
 
-WATCHING = ("watched", "found", "uncertainty")
-"""Metrics where sight is limited, see ``world.sensing.Sight``."""
 SUCCESS_LEVEL = 0.6
 
 

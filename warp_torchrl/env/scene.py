@@ -36,7 +36,7 @@ class Observations(NamedTuple):
     state: Tensor
     """The critic's, float32 [B, C, 16, 16]."""
     radio: Tensor | None = None
-    """Of ``Radio.observed``, float32 [B, A, A, 3]; None where agents do not talk."""
+    """Of ``Hearing.observed``, float32 [B, A, A, 3]; None where agents do not talk."""
 
 
 class Step(NamedTuple):
@@ -74,7 +74,7 @@ class Scene:
         state, faults = self.world.start(seeds, episodes)
         counts = count_trees(state)
         observed = self.observe(state, counts)
-        state = self.world.team.radio.with_shown(state, observed.entries, torch.ones_like(state.done))
+        state = self.world.hearing.with_shown(state, observed.entries, torch.ones_like(state.done))
         return state, counts, observed, faults
 
     def observe(self, state: WorldState, counts: TreeCounts) -> Observations:
@@ -87,7 +87,7 @@ class Scene:
             return self._compiled_step(before, counts, action)
         transition = self.world.step(before, action, counts)
         observed = self.observe(transition.after, transition.counts_after)
-        after = self.world.team.radio.with_shown(transition.after, observed.entries, ~before.done)
+        after = self.world.hearing.with_shown(transition.after, observed.entries, ~before.done)
         return Step(transition.replace(after=after), observed, self.reward(transition))
 
     def _compiled_step(self, before: WorldState, counts: TreeCounts, action: Tensor) -> Step:
@@ -111,12 +111,9 @@ def why_not_compiled(world: World, observation: Observation, device: torch.devic
     """
     check_compiler(device)
     why = why_eager(world.fire, device, n_worlds * math.prod(world.size))
-    if world.sensing.is_limited:
-        why = "a step of agents that do not see all is not compiled"
-    elif world.team.radio.delay:
-        why = "a step of a team whose packets come late is not compiled"
-    elif (key := searched_for(observation)) is not None:
+    if (key := searched_for(observation)) is not None:
         why = f"a step with {key} is not compiled"
+    why = next((each for mechanic in world.loop if (each := mechanic.why_eager()) is not None), why)
     if why is not None:
         _log.info("compile: %s", why)
     return why
@@ -155,7 +152,7 @@ def _observe(
         world.action_mask(state),
         metrics(state, counts, world),
         critic_state(observation, world)(state, forecast),
-        world.team.radio.observed(state, world.team.table(state.cells.device).flies)
-        if world.team.radio.sends_vectors
+        world.hearing.observed(state, world.team.table(state.cells.device).flies)
+        if world.hearing.sends_vectors
         else None,
     )

@@ -71,10 +71,10 @@ def make_specs(world: World, observation: Observation, n_worlds: int, device: to
         action_mask=Binary(n_actions, shape=(*team, n_actions), dtype=torch.bool, device=device),
         role=Categorical(len(world.team.role_names), shape=team, dtype=torch.int64, device=device),
     )
-    if world.team.radio.sends_vectors:
+    if world.hearing.sends_vectors:
         reach = float(max(world.size))
         seen["agents", "radio"] = Bounded(-reach, reach, shape=(*team, world.team.n_agents, 3), device=device)
-        if world.team.radio.delay:
+        if world.hearing.is_late:
             seen["agents", "sent"] = seen["agents", "observation"].clone()
     if agencies := len(world.agencies.names):
         seen["agents", "agency"] = Categorical(agencies, shape=team, dtype=torch.int64, device=device)

@@ -13,4 +13,4 @@ Goal = Literal["saved", "watched"]
 def goal(world: World) -> Goal:
     """Return the metric of a comparison: the trees saved, or the front watched where no member of the team can act."""
     acts = any(not ABILITIES[name].moves for role in world.team.agent_roles for name in ROLES[role].abilities)
-    return "watched" if world.sensing.is_limited and not acts else "saved"
+    return "watched" if "watched" in world.metric_names and not acts else "saved"

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from warp_torchrl.env.metrics import WATCHING
 from warp_torchrl.env.specs import EPISODE_METRICS
 from warp_torchrl.evaluation.behaviour import BEHAVIOUR
 from warp_torchrl.evaluation.goal import Goal
@@ -17,6 +16,8 @@ from warp_torchrl.system import disk
 from warp_torchrl.world.mechanics.mechanic import Metric
 
 EXTRA_METRICS = ("averted", *BEHAVIOUR)
+WATCHING = ("watched", "found", "uncertainty")
+"""Metrics of worlds that keep what a team watches."""
 
 
 def report(

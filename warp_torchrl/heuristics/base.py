@@ -13,8 +13,8 @@ from warp_torchrl.system.modes import apart
 from warp_torchrl.world.arrays.distances import FAR, nearest
 from warp_torchrl.world.arrays.geometry import offsets
 from warp_torchrl.world.arrays.random import Stream, uniform, uniform_at
-from warp_torchrl.world.mechanics.sensing.records import known_codes
 from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.records import known_codes, records_of
 from warp_torchrl.world.state.state import FIRST_FIRE, Action, Cover, WorldState
 from warp_torchrl.world.team.supply import mark_base
 from warp_torchrl.world.team.team import Team
@@ -137,7 +137,7 @@ def nearest_fire(state: WorldState, fire: Tensor) -> tuple[Tensor, Tensor]:
 
 def known_fire(state: WorldState, world: World) -> Tensor:
     """Return the burning cells that each agent knows of and could extinguish, bool [B, A, H, W]."""
-    if not state.keeps("sensing"):
+    if records_of(state) is None:
         return can_be_put_out(state, world)[:, None].expand(-1, state.vehicles.position.shape[1], -1, -1)
     codes = known_codes(state)
     return (codes >= FIRST_FIRE) & (codes <= world.fire.last_spreading)

@@ -13,8 +13,8 @@ from warp_torchrl.heuristics.base import (
 )
 from warp_torchrl.heuristics.searching import Oldest
 from warp_torchrl.world.arrays.random import Stream, uniform
-from warp_torchrl.world.mechanics.sensing.records import known_codes, records_of, steps_since
 from warp_torchrl.world.state.front import spreading_front
+from warp_torchrl.world.state.records import known_codes, records_of, steps_since
 from warp_torchrl.world.state.state import WorldState
 
 _ANOTHERS = 1e6
@@ -48,7 +48,7 @@ class Follower(Oldest):
         away = distance_to_cells(state)
         draw = uniform(state.key, 0, Stream.POLICY, (agents, height, width))
         score = since - away / team.table(device).stride[:, None, None] + draw
-        known, place_of_others = self.world.sensing.knows_where(state, team)
+        known, place_of_others = self.world.sensing.knows_where(state, team, self.world.hearing)
         theirs = distance_from(place_of_others, state)
         nearest = torch.where(known[..., None, None], theirs, height + width).amin(dim=2)
         score = score - _ANOTHERS * (nearest < away)

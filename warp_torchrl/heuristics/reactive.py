@@ -16,8 +16,9 @@ from warp_torchrl.heuristics.base import (
     target_or_supply,
 )
 from warp_torchrl.world.arrays.random import Stream, uniform
-from warp_torchrl.world.mechanics.sensing.sensing import in_reach
+from warp_torchrl.world.state.records import records_of
 from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.world.team.places import in_reach
 
 
 class NoOp(Heuristic):
@@ -60,7 +61,7 @@ class Local(Heuristic):
     def _fire_in_sight(self, state: WorldState) -> tuple[Tensor, Tensor]:
         """Return whether each agent sees fire, bool [B, A], and the flat index of the nearest."""
         world = self.world
-        if world.sensing.is_limited:
+        if records_of(state) is not None:
             return nearest_marked(state, known_fire(state, world) & in_reach(state, world.sensing.reach(world.team)))
         distance, index = nearest_fire(state, can_be_put_out(state, world))
         return distance <= self.radius, index

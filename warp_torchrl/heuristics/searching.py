@@ -19,7 +19,7 @@ from warp_torchrl.heuristics.base import (
     target_or_supply,
 )
 from warp_torchrl.world.arrays.random import Stream, uniform
-from warp_torchrl.world.mechanics.sensing.records import freshness, records_of
+from warp_torchrl.world.state.records import freshness, records_of
 from warp_torchrl.world.state.state import WorldState
 
 

@@ -58,11 +58,11 @@ class Mlp:
         memory: Units of the recurrent layer by which actors remember since their episode began, see
             ``RecurrentNetwork``, a multiple of 8; 0: no memory. Only on-policy algorithms train it.
         messages: ``graph``: actors send each other learned messages, see ``TalkingNetwork``, within
-            ``team.radio.range``; only on-policy algorithms train it. ``map``: they share their maps of the fire, a rule
-            of the world; ``both``, or ``none``.
+            ``mechanics.radio.range``; only on-policy algorithms train it. ``map``: they share their maps of the fire, a
+            rule of the world; ``both``, or ``none``.
         message_size: Numbers of a message, a multiple of 8.
         message_rounds: Messages that each agent sends in a step, each after receiving the ones before; 1 where messages
-            arrive late (``team.radio.delay``).
+            arrive late (``mechanics.radio.delay``).
         trust: Trust of agents in their adviser, ``observation.advice``: added to the logit of the advised action, times
             log2 of the team's size, see ``Trust``.
         dtype: ``bfloat16`` computes the layers in half precision (weights stay float32), several times faster on
@@ -157,7 +157,8 @@ class Mlp:
         is_late = self.talks and signature.is_late
         if is_late and self.message_rounds > 1:
             raise ValueError(
-                f"model.message_rounds must be 1 where messages come late (team.radio.delay), got {self.message_rounds}"
+                "model.message_rounds must be 1 where messages come late (mechanics.radio.delay), "
+                f"got {self.message_rounds}"
             )
         return Inputs(signature, is_canonical=self.symmetry == "canonical", is_late=is_late)
 

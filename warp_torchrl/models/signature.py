@@ -136,7 +136,7 @@ def differing(one: Signature, other: Signature) -> str | None:
         if one.observation.get(name) != other.observation.get(name):
             return f"observation {name}".strip()
     if one.is_late != other.is_late:
-        return "team.radio.delay"
+        return "mechanics.radio.delay"
     return next(
         (name for name in ("state", "actions", "roles", "agencies") if getattr(one, name) != getattr(other, name)), None
     )

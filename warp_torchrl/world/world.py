@@ -19,10 +19,10 @@ from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.mechanics.groups import Agencies, OneAgency
 from warp_torchrl.world.mechanics.mechanic import Mechanic
-from warp_torchrl.world.mechanics.radio.radio import RadioTurn
-from warp_torchrl.world.mechanics.sensing.sensing import Full, Sensing
 from warp_torchrl.world.state.cells import count_trees
 from warp_torchrl.world.state.state import EMBER, FIRST_FIRE, Cover, Forecast, Transition, TreeCounts, WorldState
+from warp_torchrl.world.team.hearing import Hearing
+from warp_torchrl.world.team.knowledge import Full, Sensing
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.terrain.source import LandscapeSource, map_size
@@ -110,12 +110,22 @@ class World:
         return self.ignition.over(self.landscape)
 
     @cached_property
+    def hearing(self) -> Hearing:
+        """Return who hears whom: as the mechanic of them says that sets limits to it, else all hear all."""
+        return next((each for each in self.mechanics if isinstance(each, Hearing)), Hearing())
+
+    @cached_property
+    def metric_names(self) -> tuple[str, ...]:
+        """Return the names of the metrics of its mechanics."""
+        return tuple(row.name for each in self.loop for row in each.metric_rows(self))
+
+    @cached_property
     def loop(self) -> tuple[Mechanic, ...]:
         """Return all mechanics in the order in which they begin and step, that of their names.
 
         They are ``mechanics``, and those of the other parts that are mechanics too.
         """
-        parts = (self.team, self.agencies, RadioTurn(), self.sensing)
+        parts = (self.team, self.agencies, self.sensing)
         found = (*self.mechanics, *(each for each in parts if isinstance(each, Mechanic)))
         return tuple(sorted(found, key=lambda each: each.name))
 

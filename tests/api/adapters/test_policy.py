@@ -5,6 +5,7 @@ import pytest
 import torch
 from tensordict import TensorDict
 
+from tests.world.mechanics.there import needs
 from warp_torchrl import make_env
 from warp_torchrl.algorithms.dqn import Dqn
 from warp_torchrl.algorithms.ppo import Ppo
@@ -38,12 +39,13 @@ def test_a_team_acts_as_it_does_in_torchrl(sharing, observation):
     assert len(set(chosen)) > 1
 
 
+@needs("radio")
 @pytest.mark.parametrize("observation", ["surroundings", "paper"])
 @pytest.mark.parametrize("layout", ["dict", "flat"])
 @pytest.mark.parametrize("delay", [0, 2])
 def test_a_team_that_talks_acts_as_it_does_in_torchrl(delay, layout, observation):
     model = Mlp(actor_hidden=(32,), messages="graph")
-    options = {"team.radio.carries": "graph", "team.radio.range": 4, "team.radio.delay": delay}
+    options = {"mechanics.radio.carries": "graph", "mechanics.radio.range": 4, "mechanics.radio.delay": delay}
     options["observation"] = observation
     ours, policy = policy_for("default", model, **options)
     theirs, act = parallel_env("default", seed=3, layout=layout, **options), policy.numpy_policy()
@@ -59,7 +61,7 @@ def test_a_team_that_talks_acts_as_it_does_in_torchrl(delay, layout, observation
     with pytest.raises(ValueError, match="must be of the whole team of 4 at once, got 1"):
         act({"bulldozer_0": seen["bulldozer_0"]}, infos)
     with pytest.raises(
-        ValueError, match=r"talk by radio, which this environment does not have: team\.radio\.carries=graph"
+        ValueError, match=r"talk by radio, which this environment does not have: mechanics\.radio\.carries=graph"
     ):
         policy.fitted(make_env("default", n_worlds=1))
 
@@ -155,23 +157,28 @@ def test_mistakes_are_told_in_one_line():
         assert "\n" not in str(error.value)
 
 
+@needs("radio")
 def test_a_policy_that_hears_late_acts_in_worlds_of_any_delay():
     model = Mlp(actor_hidden=(32,), messages="graph")
-    options = {"team.radio.carries": "graph", "team.radio.delay": 2}
+    options = {"mechanics.radio.carries": "graph", "mechanics.radio.delay": 2}
     _, late = policy_for("default", model, **options)
-    _, prompt = policy_for("default", model, **options | {"team.radio.delay": 0})
+    _, prompt = policy_for("default", model, **options | {"mechanics.radio.delay": 0})
     prompt.load_state_dict(late.state_dict())  # the same networks
-    overrides = ["team.radio.carries=graph", "team.tank=3", "team.roles=[ugv,scout]"]  # agents are shown more
-    at_once, longer = (make_env("default", n_worlds=2, overrides=[*overrides, f"team.radio.delay={n}"]) for n in (0, 5))
+    overrides = ["mechanics.radio.carries=graph", "team.tank=3", "team.roles=[ugv,scout]"]  # agents are shown more
+    at_once, longer = (
+        make_env("default", n_worlds=2, overrides=[*overrides, f"mechanics.radio.delay={n}"]) for n in (0, 5)
+    )
     now = at_once.reset()
     for _ in range(6):
         ours, theirs = (each.fitted(at_once)(now.clone())["agents", "logits"] for each in (late, prompt))
         assert torch.equal(ours, theirs)
         now = at_once.step(at_once.rand_action(now))["next"]
     longer.rollout(8, late.fitted(longer))
-    with pytest.raises(ValueError, match=r"messages come at once, and in this environment late: team\.radio\.delay=0"):
+    with pytest.raises(
+        ValueError, match=r"messages come at once, and in this environment late: mechanics\.radio\.delay=0"
+    ):
         prompt.fitted(longer)
-    worlds = parallel_env("default", seed=3, **{"team.radio.carries": "graph"})
-    now = make_env("default", n_worlds=1, seed=3, overrides=["team.radio.carries=graph"]).reset()
+    worlds = parallel_env("default", seed=3, **{"mechanics.radio.carries": "graph"})
+    now = make_env("default", n_worlds=1, seed=3, overrides=["mechanics.radio.carries=graph"]).reset()
     here = late.fitted(worlds._worlds.env)
     assert [*here.numpy_policy()(*worlds.reset()).values()] == here(now)["agents", "action"][0].tolist()

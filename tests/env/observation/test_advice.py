@@ -3,6 +3,7 @@
 import pytest
 import torch
 
+from tests.world.mechanics.there import needs
 from warp_torchrl.api.make import make_env
 from warp_torchrl.entries import ADVICE
 from warp_torchrl.env import WildfireEnv
@@ -77,10 +78,12 @@ def test_who_advises_is_checked():
         Surroundings(advice="dispatcher")
     with pytest.raises(ValueError, match="advice must be null or one of"):
         Surroundings(advice="ring")
-    with pytest.raises(
-        ValueError,
-        match=r"observation\.advice must be null or one of .*follower.* where sight is limited, got dispatch",
-    ):
+
+
+@needs("sensing")
+def test_who_sees_all_may_not_advise_those_who_do_not():
+    rule = r"observation\.advice must be null or one of .*follower.* where sight is limited, got dispatch"
+    with pytest.raises(ValueError, match=rule):
         env_of("search", "dispatch")
 
 

@@ -49,7 +49,6 @@ from warp_torchrl.world.arrays.geometry import DIRECTIONS
 from warp_torchrl.world.backends.tick import in_wind
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.state.state import Action
-from warp_torchrl.world.team.radio import Radio
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
 
@@ -68,11 +67,16 @@ STATE_SYMMETRY = CriticState(small_world()).symmetry
 ACTIONS = tuple(action.name.lower() for action in Action)
 
 
-def fighting(observation, n_worlds=6, steps=12, messages="none"):
+def fighting(observation, n_worlds=6, steps=12, mechanics=()):
     """Worlds of a windy, flat map that burn, with a team among the trees."""
-    team = Team(n_agents=3, roles=("ugv", "ugv", "uav"), start="anywhere", radio=Radio(carries=messages))
+    team = Team(n_agents=3, roles=("ugv", "ugv", "uav"), start="anywhere")
     world = small_world(
-        landscape=Perlin(size=SIZE), wind=Uniform(speed=7.0, direction=35.0), team=team, horizon=60, steps_per_tick=3
+        landscape=Perlin(size=SIZE),
+        wind=Uniform(speed=7.0, direction=35.0),
+        team=team,
+        mechanics=mechanics,
+        horizon=60,
+        steps_per_tick=3,
     )
     env = WildfireEnv(world, n_worlds=n_worlds, observation=observation, seed=3)
     env.set_state(played(world, n_worlds, steps).clone())

@@ -2,12 +2,12 @@
 
 import pytest
 
+from tests.world.mechanics.there import needs
 from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.compose import compose_config, plain
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
 from warp_torchrl.world.air.wind import Wandering
-from warp_torchrl.world.team.radio import Radio
 
 TWO = "mixture.kinds={default:{share:3},water:{over:{team:{n_agents:2},wind:wandering},teacher:local}}"
 
@@ -34,9 +34,10 @@ def test_a_kind_may_have_another_name_than_its_scenario():
     assert [(kind.name, kind.world.horizon) for kind in plan.kinds] == [("a", 256), ("b", 9)]
 
 
+@needs("radio")
 def test_a_kind_has_what_the_radio_of_the_run_carries():
     plan = with_kinds("mixture=several", TWO, "model.messages=graph")
-    assert [kind.world.team.radio.carries for kind in plan.kinds] == ["graph", "graph"]
+    assert [kind.world.hearing.carries for kind in plan.kinds] == ["graph", "graph"]
 
 
 def test_a_key_of_a_kind_that_its_file_leaves_out_can_be_given():
@@ -73,7 +74,11 @@ def test_without_a_mixture_there_is_one_kind():
         (["mixture.kinds={default:{},water:{over:{reward:{act:0}}}}"], "water: over must name keys of the worlds"),
         (["mixture.kinds={default:{},water:{over:{scenario:ring}}}"], "water: over must name keys of the worlds"),
         (["mixture.kinds={default:{},water:{over:{team:{tank:-9}}}}"], "mixture.kinds.water: team.tank must be"),
-        (["mixture.kinds={default:{},search:{}}"], "search: one team must see and do the same .* observation picture"),
+        pytest.param(
+            ["mixture.kinds={default:{},search:{}}"],
+            "search: one team must see and do the same .* observation picture",
+            marks=needs("sensing"),
+        ),
         (["mixture.kinds={default:{},paper_sarl:{}}"], "paper_sarl: one team must see and do the same .* differs"),
         ([TWO, "curriculum=success", "curriculum.over.steps_per_tick=[5,4]"], "mixture must be none with a curriculum"),
         ([TWO, "collector=process"], "mixture must be none where workers collect"),
@@ -107,10 +112,11 @@ def test_a_level_is_the_scenario_with_its_values_and_the_last_is_the_scenario():
     assert all(world.landscape is plan.world.landscape for world in plan.levels), "what is the same is the same one"
 
 
-def test_a_level_may_have_another_value_of_a_part_of_a_component():
-    plan = with_levels("team.radio={range:9.0,loss:0.1}", "curriculum.over.team.radio.range=[3,9]")
+@needs("radio")
+def test_a_level_may_have_another_value_of_a_mechanic():
+    plan = with_levels("mechanics.radio={range:9.0,loss:0.1}", "curriculum.over.mechanics.radio.range=[3,9]")
     plan.check_training()
-    assert [world.team.radio for world in plan.levels] == [Radio(range=each, loss=0.1) for each in (3.0, 9.0)]
+    assert [(world.hearing.range, world.hearing.loss) for world in plan.levels] == [(3.0, 0.1), (9.0, 0.1)]
     assert plan.levels[-1] == plan.world
 
 
@@ -148,8 +154,8 @@ def test_evaluations_are_of_the_scenario():
             "curriculum.over, level 0: steps_per_tick must be in .*, got -3",
         ),
         (
-            ["curriculum.over.team.radio.loss=[2.0,0.0]"],
-            r"curriculum.over, level 0: team.radio.loss must be in \[0, 1\], got 2",
+            ["curriculum.over.team.extinguish_p=[2.0,1.0]"],
+            r"curriculum.over, level 0: team.extinguish_p must be in \[0, 1\], got 2",
         ),
         (["curriculum.over.fire.tau=[slow,5.0]"], "curriculum.over, level 0: fire.tau must be a number, got 'slow'"),
         (

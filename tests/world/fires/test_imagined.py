@@ -3,11 +3,10 @@
 import torch
 
 from tests.world.drawing import differing, draw
-from warp_torchrl import make_env
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.air.wind import Wandering
 from warp_torchrl.world.arrays.random import Stream, uniform
-from warp_torchrl.world.fires.imagined import imagined, rules_in_sight
+from warp_torchrl.world.fires.imagined import imagined
 from warp_torchrl.world.weather.table import WeatherTable
 
 STEADY = Wandering(speed_deviation=0.0, direction_deviation=0.0)
@@ -35,14 +34,3 @@ def test_the_weather_goes_on_from_the_hour_at_which_the_episode_began() -> None:
     began = (uniform(state.key, 0, Stream.WEATHER, (1,))[:, 0] * 24).long()
     blown = weather.after_tick(imagined(state, state.key + 1)).flatten(1).norm(dim=1)
     torch.testing.assert_close(blown, (began + 1).clamp(max=23).float())
-
-
-def test_nothing_hides_fire_from_who_imagines() -> None:
-    env = make_env("smoke", n_worlds=2, overrides=["landscape.size=12", "team.radio.delay=1"])
-    env.reset()
-    world, state = rules_in_sight(env.world), imagined(env.world_state, env.world_state.key + 1)
-    assert env.world.sensing.is_limited and not world.sensing.is_limited
-    after = world.step(state, torch.zeros(2, env.n_agents, dtype=torch.int64)).after
-    assert not after.keeps("sensing") and not after.keeps("radio")
-    seen = make_env("skirmish").world
-    assert rules_in_sight(seen) is seen

@@ -27,7 +27,7 @@ class NumpyStep(NamedTuple):
     terminated: np.ndarray  # bool [B]
     truncated: np.ndarray  # bool [B]
     info: dict[str, np.ndarray]  # float64 [B] each
-    radio: np.ndarray | None  # float32 [B, A, A, 3], ``Radio.observed``; None where agents do not talk
+    radio: np.ndarray | None  # float32 [B, A, A, 3], ``Hearing.observed``; None where agents do not talk
     sent: np.ndarray | None  # float32 [B, A, n], what each observed when it sent what comes late, flat; else None
     layout: str
 

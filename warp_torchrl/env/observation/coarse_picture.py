@@ -23,11 +23,12 @@ from warp_torchrl.env.observation.features import (
     IsThere,
     anything,
     everywhere,
+    known_in_part,
 )
 from warp_torchrl.world.arrays.blocks import block_means
 from warp_torchrl.world.arrays.squares import Window, window
-from warp_torchrl.world.mechanics.sensing.records import freshness, kept, known_codes, records_of
 from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.records import freshness, kept, known_codes, records_of
 from warp_torchrl.world.state.state import FIRST_FIRE, OLDEST, Forecast, WorldState
 from warp_torchrl.world.team.places import block_at, block_of
 from warp_torchrl.world.world import World
@@ -40,7 +41,8 @@ PICTURE = Features("channel of the picture")
 class Blocks(NamedTuple):
     """What a channel of the picture reads: the worlds, and how their maps are shown in S x S blocks.
 
-    Where sight is limited (``world.sensing.Sight``) a channel shows what each agent knows: it reads ``known``.
+    Where agents keep records of the fire (``world.state.records``) a channel shows what each agent knows, and reads
+    ``known``.
     """
 
     state: WorldState
@@ -143,7 +145,7 @@ def team_mates(now: Blocks) -> Tensor:
     return (mates.clamp_(max=4) * 63).to(torch.uint8)
 
 
-@picture_channel(is_there=lambda world, choice: world.sensing.is_limited)
+@picture_channel(is_there=known_in_part)
 def last_seen(now: Blocks) -> Tensor:
     """Return how fresh is what an agent knows, see ``records.freshness``."""
     return now.show(block_means(freshness(kept(now.state), now.state.step), now.side))
@@ -171,7 +173,7 @@ def _shown(now: Blocks, choice: Choice) -> Tensor:
 
 def _mates(now: Blocks) -> Tensor:
     """Return how many others each agent takes to be in each block of the map, float32 [B, A, S, S]."""
-    known, place = now.world.sensing.knows_where(now.state, now.world.team)
+    known, place = now.world.sensing.knows_where(now.state, now.world.team, now.world.hearing)
     team = now.state.vehicles.position.shape[:2]
     index = block_at(place, now.state, now.side).expand(*team, -1)
     count = torch.zeros(*team, now.side**2, device=index.device)

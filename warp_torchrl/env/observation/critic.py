@@ -28,13 +28,14 @@ from warp_torchrl.env.observation.features import (
     content_of,
     everywhere,
     first_of,
+    known_in_part,
     names_of,
 )
 from warp_torchrl.env.observation.status import WIND_SCALE, steps_to_tick, time_left
 from warp_torchrl.world.arrays.blocks import block_means
 from warp_torchrl.world.fires.reach import distance_from_fire
-from warp_torchrl.world.mechanics.sensing.records import freshness, kept, known_codes
 from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.records import freshness, kept, known_codes
 from warp_torchrl.world.state.state import FIRST_FIRE, Forecast, WorldState
 from warp_torchrl.world.team.places import block_of
 from warp_torchrl.world.world import World
@@ -171,13 +172,13 @@ def elevation(now: Context) -> Tensor:
     return block_means(relative, STATE_SIDE).clamp(-3.0, 3.0)
 
 
-@state_plane(is_there=lambda world, choice: world.sensing.is_limited)
+@state_plane(is_there=known_in_part)
 def known_fire(now: Context) -> Tensor:
     """Return the burning cells that agents know of, mean of the agents."""
     return block_means((known_codes(now.state) >= FIRST_FIRE).to(torch.float32).mean(dim=1), STATE_SIDE)
 
 
-@state_plane(is_there=lambda world, choice: world.sensing.is_limited)
+@state_plane(is_there=known_in_part)
 def last_seen(now: Context) -> Tensor:
     """Return how fresh is what agents know, mean of the agents, see ``records.freshness``."""
     return block_means(freshness(kept(now.state), now.state.step).mean(dim=1), STATE_SIDE)

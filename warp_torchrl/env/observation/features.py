@@ -123,6 +123,11 @@ def everywhere(world: World, choice: Choice) -> bool:
     return True
 
 
+def known_in_part(world: World, choice: Choice) -> bool:
+    """Return whether agents keep records of the fire, and may not know all of it."""
+    return world.sensing.is_limited
+
+
 def parts_of(features: Sequence[Feature], world: World) -> tuple[Part, ...]:
     """Return the parts of features in a world.
 

@@ -7,7 +7,7 @@ from torch import Tensor
 
 from warp_torchrl.world.arrays.bytes import at_least, byte, equal, scatter_add, to_int32
 from warp_torchrl.world.arrays.squares import Window, window
-from warp_torchrl.world.mechanics.sensing.records import freshness, read, records_of
+from warp_torchrl.world.state.records import freshness, read, records_of
 from warp_torchrl.world.state.state import Forecast, WorldState
 from warp_torchrl.world.world import World
 
@@ -18,7 +18,7 @@ _CELLS, _BURNED, _FIREBREAK, _ON_MAP = 0x0F, 0x10, 0x20, 0x40
 class Look(NamedTuple):
     """What a channel reads: the worlds, and the square of 2 r + 1 = V cells about each agent, north up.
 
-    Where agents know of the fire what was seen alone (``world.sensing.Sight``), ``cells``, ``ash`` and ``firebreak``
+    Where agents keep records of the fire (``world.state.records``), ``cells``, ``ash`` and ``firebreak``
     are what the agent knows, ``wet`` is of cells in sight, ``others`` are those that it hears or sees, and
     ``fire_risk`` is 0.
     """
@@ -94,7 +94,7 @@ def _others(state: WorldState, world: World, radius: int) -> Tensor:
     """Return where the other agents of each role are, 63 each, at most 4 to a cell, uint8 [B, A, R, V, V]."""
     position, role = state.vehicles.position, world.team.table(state.cells.device).index
     side, roles = 2 * radius + 1, len(world.team.role_names)
-    known, place = world.sensing.knows_where(state, world.team)
+    known, place = world.sensing.knows_where(state, world.team, world.hearing)
     row, column = (place - position[:, :, None] + radius).unbind(-1)  # of each in each other's square
     is_near = (row >= 0) & (row < side) & (column >= 0) & (column < side)
     is_near &= known

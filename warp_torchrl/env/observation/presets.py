@@ -32,7 +32,7 @@ from warp_torchrl.env.observation.status import STATUS, status_vector
 from warp_torchrl.env.observation.view import egocentric_view
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.squares import window
-from warp_torchrl.world.mechanics.sensing.records import read, records_of
+from warp_torchrl.world.state.records import read, records_of
 from warp_torchrl.world.state.state import Forecast, WorldState
 from warp_torchrl.world.world import World
 

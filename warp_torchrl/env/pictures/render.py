@@ -13,8 +13,8 @@ from torch import Tensor
 from torch.nn.functional import interpolate
 
 from warp_torchrl.system.modes import kept
-from warp_torchrl.world.mechanics.sensing.records import freshness, records_of
 from warp_torchrl.world.state.cells import count_trees, is_burning
+from warp_torchrl.world.state.records import freshness, records_of
 from warp_torchrl.world.state.role import ROLES
 from warp_torchrl.world.state.state import EMPTY, FIRST_FIRE, OLDEST, Cover, WorldState
 

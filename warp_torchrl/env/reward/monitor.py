@@ -6,7 +6,7 @@ from torch import Tensor
 
 from warp_torchrl.env.reward.base import Reward
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.mechanics.sensing.watching import watching_of
+from warp_torchrl.world.state.records import KNOWLEDGE
 from warp_torchrl.world.state.state import Transition
 from warp_torchrl.world.world import World
 
@@ -54,23 +54,23 @@ class Monitor(Reward):
         check_fields(self, watched=(0.0, 1e6), found=(0.0, 1e6), uncertainty=(0.0, 1e6), near_miss=(0.0, 1e6))
 
     def check_world(self, world: World) -> None:
-        """Check that the sight of the agents is limited.
+        """Check that the worlds keep what the team watches: that the sight of the agents is limited.
 
         Raises:
             ValueError: If it is not.
         """
-        if not world.sensing.is_limited:
+        if "watched" not in world.metric_names:
             raise ValueError("sensing must be sight where reward is monitor, which pays for what was seen, got full")
 
     def own(self, transition: Transition) -> Tensor:
         """Return each agent's reward before sharing and shaping, float32 [B, A]."""
         before, after = transition.before, transition.after
-        if not after.keeps("sensing"):
+        watches, finds, uncertain = (after.plane(KNOWLEDGE, part) for part in ("watches", "finds", "uncertain"))
+        was = before.plane(KNOWLEDGE, "uncertain")
+        if watches is None or finds is None or uncertain is None or was is None:
             raise ValueError("reward monitor needs worlds whose agents' sight is limited: choose sensing=sight")
-        watching, was = watching_of(after), watching_of(before)
-        own = self.watched * watching.watches + self.found * watching.finds
+        own = self.watched * watches + self.found * finds
         misses_before, misses = (state.plane("flight", "near_misses") for state in (before, after))
         if misses_before is not None and misses is not None:
             own = own - self.near_miss * (misses - misses_before)
-        drop = was.uncertain - watching.uncertain
-        return own.shape[1] * own + self.uncertainty * drop[:, None]
+        return own.shape[1] * own + self.uncertainty * (was - uncertain)[:, None]

@@ -96,15 +96,15 @@ def _in_section(section: str) -> Iterator[None]:
 
 def _check_together(config: Mapping[str, Any]) -> None:
     reward, algorithm = config["reward"], config["algorithm"]
-    model, radio = config["model"]["messages"], config["team"]["radio"]["carries"]
-    if model in ("graph", "both") and radio not in ("graph", "both"):
+    model, radio = config["model"]["messages"], config["mechanics"].get("radio") or {}
+    carries, delay, rounds = radio.get("carries", "none"), radio.get("delay", 0), config["model"]["message_rounds"]
+    if model in ("graph", "both") and carries not in ("graph", "both"):
         raise ConfigError(
-            f"team.radio.carries must be graph or both where networks talk, model.messages={model}, got {radio}"
+            f"mechanics.radio.carries must be graph or both where networks talk, model.messages={model}, got {carries}"
         )
-    rounds, delay = config["model"]["message_rounds"], config["team"]["radio"]["delay"]
     if model in ("graph", "both") and delay and rounds != 1:
         raise ConfigError(
-            f"model.message_rounds must be 1 where messages come late, team.radio.delay={delay}, got {rounds}"
+            f"model.message_rounds must be 1 where messages come late, mechanics.radio.delay={delay}, got {rounds}"
         )
     trust, observation = config["model"].get("trust", 0.0), config["observation"]
     if trust and not (observation.get("advice") and observation.get("rules")):
@@ -128,7 +128,7 @@ def kinds_of_worlds(config: Mapping[str, Any], mixture: Mixture, teacher: str | 
     """Return the kinds of a mixture, built.
 
     Args:
-        config: Composed, as plain values: what the team's radio carries is the run's in every kind.
+        config: Composed, as plain values: what the radio carries is the run's in every kind.
         mixture: Names them.
         teacher: Of kinds that name none.
 
@@ -169,6 +169,7 @@ def _world(config: Mapping[str, Any], kind: Kind) -> World:
             raise ConfigError(f"over must name keys of the worlds, {', '.join(WORLD_KEYS[1:])}, got {key}")
     overrides = [f"{key}={_written(value)}" for key, value in dotted(kind.over).items()]
     values = plain(compose_config("train", [f"scenario={kind.scenario}", *overrides]))
-    values["team"]["radio"]["carries"] = config["team"]["radio"]["carries"]
+    if "radio" in config["mechanics"]:
+        values["mechanics"].setdefault("radio", {})["carries"] = config["mechanics"]["radio"].get("carries", "none")
     world: World = build_components(values, OF_WORLDS)["world"]
     return world

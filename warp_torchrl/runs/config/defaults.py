@@ -98,7 +98,7 @@ def _open_mappings(node: DictConfig) -> None:
     for key in (each for each in keys if not OmegaConf.is_interpolation(node, each)):
         part = node[key]
         if isinstance(part, DictConfig):
-            is_open = key in mappings or not part
+            is_open = key in mappings or not part or key == "mechanics"
             OmegaConf.set_struct(part, False if is_open else None)
             if not is_open:
                 _open_mappings(part)

@@ -25,7 +25,7 @@ _DEEPEST = 20
 """How deep what is recorded may be nested; a configuration is 5 deep."""
 _LONGEST = 4096
 """Characters of a text that is recorded; a path has no more."""
-_OF_NETWORKS = {"team.radio.carries": ("graph", "both")}
+_OF_NETWORKS = {"mechanics.radio.carries": ("graph", "both")}
 """Values of a scenario's keys that a policy's networks need: another scenario does not change them."""
 
 
@@ -141,8 +141,10 @@ def _recorded(saved_config: SavedConfig, config: DictConfig, touched: Sequence[s
         for name in sorted(free_mappings(kind) & values.keys()) if kind is not None else ():
             whole[f"{group}.{name}"] = values[name]
     whole = {path: value for path, value in whole.items() if not any(_is_in(key, path) for key in touched)}
-    leaves = dotted(saved_config.values).items()
-    return {**{key: value for key, value in leaves if not any(_is_in(key, path) for path in whole)}, **whole}
+    leaves = dotted(saved_config.values)
+    of_networks = {key: leaves[key] for key in _OF_NETWORKS if key in leaves}
+    alone = {key: value for key, value in leaves.items() if not any(_is_in(key, path) for path in whole)}
+    return {**alone, **whole, **of_networks}
 
 
 def _is_in(key: str, path: str) -> bool:
@@ -180,7 +182,7 @@ def world_overrides(values: Mapping[str, Any]) -> list[str]:
 def _of_worlds(leaf: tuple[str, Any]) -> tuple[str, Any]:
     """Return a leaf as it is for the worlds: what networks send each other changes none."""
     path, value = leaf
-    return (path, {"graph": "none", "both": "map"}.get(value, value)) if path == "team.radio.carries" else leaf
+    return (path, {"graph": "none", "both": "map"}.get(value, value)) if path == "mechanics.radio.carries" else leaf
 
 
 def _composed_worlds(choices: Sequence[str]) -> dict[str, Any]:

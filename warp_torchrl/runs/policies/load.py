@@ -66,7 +66,9 @@ def policy_of(
     overrides = [f"observation={name}" for group, name in saved_config.choices.items() if group == "observation"]
     overrides += [f"observation.{name}={json.dumps(value)}" for name, value in seen.items()]
     overrides += (
-        [f"team.radio.carries={saved_config.values['team']['radio']['carries']}"] if RADIO in policy.in_keys else []
+        [f"mechanics.radio.carries={saved_config.values['mechanics']['radio']['carries']}"]
+        if RADIO in policy.in_keys
+        else []
     )
     return TrainedPolicy(policy.requires_grad_(False).eval(), chosen, found.manifest.signature, overrides)
 

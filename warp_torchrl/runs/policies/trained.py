@@ -82,9 +82,11 @@ class TrainedPolicy(TensorDictModuleBase):
         """
         here = signature(env)
         if self.talks and RADIO not in env.full_observation_spec.keys(True, True):
-            raise ValueError("its agents talk by radio, which this environment does not have: team.radio.carries=graph")
+            raise ValueError(
+                "its agents talk by radio, which this environment does not have: mechanics.radio.carries=graph"
+            )
         if self.talks and here.is_late and not self.trained.is_late:
-            raise ValueError("its agents' messages come at once, and in this environment late: team.radio.delay=0")
+            raise ValueError("its agents' messages come at once, and in this environment late: mechanics.radio.delay=0")
         if self.is_by_agent and here.n_agents != self.trained.n_agents:
             raise ValueError(
                 f"it has a network for each of {self.trained.n_agents} agents, this team has {here.n_agents}"

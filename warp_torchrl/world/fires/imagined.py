@@ -4,17 +4,19 @@ from dataclasses import replace
 
 from torch import Tensor
 
-from warp_torchrl.world.mechanics.sensing.sensing import Full
+from warp_torchrl.world.state.records import KNOWLEDGE
 from warp_torchrl.world.state.state import WorldState
-from warp_torchrl.world.team.radio import Radio
+from warp_torchrl.world.team.hearing import HEARING, Hearing
+from warp_torchrl.world.team.knowledge import Full
 from warp_torchrl.world.world import World
 
 
 def rules_in_sight(world: World) -> World:
     """Return the rules of a world with full sight, and without a radio."""
-    if not world.sensing.is_limited and not world.team.radio.delay:
+    if not world.sensing.is_limited and not world.hearing.is_late:
         return world
-    return replace(world, sensing=Full(), team=replace(world.team, radio=Radio()))
+    others = tuple(each for each in world.mechanics if not isinstance(each, Hearing))
+    return replace(world, sensing=Full(), mechanics=others)
 
 
 def imagined(state: WorldState, key: Tensor) -> WorldState:
@@ -22,4 +24,4 @@ def imagined(state: WorldState, key: Tensor) -> WorldState:
 
     What was drawn at the start of the episode stays: the ground, the prevailing wind, the hour of the weather.
     """
-    return state.without_planes("sensing", "radio").replace(key=key, origin=state.episode_key)
+    return state.without_planes(KNOWLEDGE, HEARING).replace(key=key, origin=state.episode_key)

@@ -10,6 +10,8 @@ from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.state.role import RoleTable
 from warp_torchrl.world.state.state import ActionResult, WorldState
 from warp_torchrl.world.team.acting import Acts
+from warp_torchrl.world.team.hearing import Hearing
+from warp_torchrl.world.team.knowledge import Sensing
 from warp_torchrl.world.team.team import Team
 
 
@@ -19,6 +21,16 @@ class Rules(Protocol):
     @property
     def team(self) -> Team:
         """Return the vehicles."""
+        ...
+
+    @property
+    def sensing(self) -> Sensing:
+        """Return what agents know."""
+        ...
+
+    @property
+    def hearing(self) -> Hearing:
+        """Return who hears whom."""
         ...
 
     @property
@@ -78,6 +90,10 @@ class Mechanic:
         Raises:
             ValueError: If not.
         """
+
+    def why_eager(self) -> str | None:
+        """Return why steps of its worlds are not compiled; None where they can be."""
+        return None
 
     def begin(self, state: WorldState, world: Rules) -> WorldState:
         """Return worlds at the start of an episode, after the head start of the fire, with its planes."""

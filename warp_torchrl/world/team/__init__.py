@@ -1,1 +1,1 @@
-"""The team: vehicles, their abilities, their radio and their flight."""
+"""The team: vehicles, their abilities, and what they know and hear."""

@@ -77,6 +77,21 @@ def nearest_mate(state: WorldState) -> Tensor:
     return square.masked_fill(alone, 1 << 40).argmin(dim=-1)
 
 
+def in_reach(state: WorldState, reach: list[int]) -> Tensor:
+    """Return which cells are within each agent's reach by Chebyshev distance, bool [B, A, H, W].
+
+    Args:
+        state: The worlds.
+        reach: Of each agent [cells].
+    """
+    height, width = state.cells.shape[1:]
+    row, column = state.vehicles.position.unbind(-1)
+    far = torch.tensor(reach, device=row.device)[:, None]
+    on_row = (torch.arange(height, device=row.device) - row[..., None]).abs() <= far
+    on_column = (torch.arange(width, device=row.device) - column[..., None]).abs() <= far
+    return on_row[..., :, None] & on_column[..., None, :]
+
+
 @kept(8)
 def _in_order(device: torch.device) -> tuple[Tensor, Tensor]:
     """Return the (east, north) offset of each direction, float32 [8, 2], and what its place is worth, float32 [8]."""

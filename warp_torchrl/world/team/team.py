@@ -1,7 +1,7 @@
 """The vehicles: where they start, and how a step makes one of what each of them does."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, partial, reduce
 from operator import or_
 from typing import Literal
@@ -14,7 +14,6 @@ from warp_torchrl.world.state.role import ROLES, RoleTable, role_names, role_tab
 from warp_torchrl.world.state.state import Action, ActionResult, Vehicles, WorldState
 from warp_torchrl.world.team.abilities import ABILITIES, PAPER_ABILITIES, AgentContext
 from warp_torchrl.world.team.acting import Acts, TeamAbility, TeamRule, changed, grounded_by, is_second
-from warp_torchrl.world.team.radio import Radio
 from warp_torchrl.world.team.start import starting_cells
 from warp_torchrl.world.team.supply import filled
 
@@ -33,7 +32,6 @@ class Team:
         extinguish_p: Chance that putting a fire out succeeds.
         tank: Extinguish acts that a vehicle carries water for; None is unlimited, 0 none at all. It fills up beside a
             lake and at the corner where the team started.
-        radio: What agents tell each other, and who hears whom.
         start: ``corner`` starts the team in a corner drawn for each episode, ``anywhere`` on cells drawn over the map.
 
     Raises:
@@ -45,7 +43,6 @@ class Team:
     allow_stay: bool = True
     extinguish_p: float = 1.0
     tank: int | None = None
-    radio: Radio = field(default_factory=Radio)
     start: Literal["corner", "anywhere"] = "corner"
 
     def __post_init__(self) -> None:

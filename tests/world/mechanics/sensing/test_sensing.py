@@ -6,36 +6,23 @@ import pytest
 import torch
 
 from tests.conftest import small_world
-from tests.world.drawing import CELLS, draw
-from warp_torchrl.world.mechanics.sensing.records import freshness, kept, known_codes
-from warp_torchrl.world.mechanics.sensing.sensing import Full, Sight, others_in_sight
-from warp_torchrl.world.state.state import EMBER, FIRST_FIRE, Action
-from warp_torchrl.world.team.radio import Radio
+from tests.world.mechanics.drawing import begun, known, later
+from warp_torchrl.world.mechanics.sensing.sensing import Sight, others_in_sight
+from warp_torchrl.world.state.records import freshness, kept, known_codes
+from warp_torchrl.world.state.state import FIRST_FIRE
 from warp_torchrl.world.team.team import Team
 
 TWO = Team(n_agents=2)
 FIELD = "TTTTTTT TTTTTTT TTTTTTT TTTTTTT TTTTTTT TTTTTTT TTTTTaa"
+CORNERS = (0, 0), (6, 6)
 
 
-def started(sensing, team=TWO, at=((0, 0), (6, 6)), drawing=FIELD, worlds=1, **options):
-    return sensing.begun(draw(drawing, team=team, at=list(at), worlds=worlds, **options), team)
+def rules(sight, team=TWO):
+    return small_world(sensing=sight, team=team)
 
 
-def known(state, agent, world=0):
-    """The map of an agent as a drawing, a question mark where it has never been."""
-    fresh = freshness(kept(state), state.step)[world, agent]
-    codes = known_codes(state)[world, agent]
-    return ["".join(CELLS[c] if f > 0 else "?" for c, f in zip(*row)) for row in zip(codes.tolist(), fresh.tolist())]
-
-
-def running(state):
-    return torch.ones_like(state.done)
-
-
-def moved(state, agent, place):
-    position = state.vehicles.position.clone()
-    position[:, agent] = torch.tensor(place)
-    return state.replace(vehicles=state.vehicles.replace(position=position), step=state.step + 1)
+def started(sight, team=TWO, at=CORNERS, drawing=FIELD, worlds=1, **options):
+    return begun(rules(sight, team), *at, drawing=drawing, worlds=worlds, **options)
 
 
 def test_an_agent_knows_what_is_within_its_radius():
@@ -54,43 +41,20 @@ def test_roles_see_as_far_as_they_are_said_to():
 
 
 def test_what_was_seen_is_kept_and_grows_old():
-    sight = Sight(radius=1)
-    state = started(sight)
-    seen = moved(state, 1, (0, 3)).replace(cells=torch.full_like(state.cells, 10))
-    seen = sight.updated(seen, TWO, running(seen))
+    world = rules(Sight(radius=1))
+    state = begun(world, *CORNERS, drawing=FIELD)
+    out = " ".join(["TTTTTTT"] * 7)
+    seen = later(state, world, (0, 0), (0, 3), drawing=out)
     assert known(seen, 1)[-1] == "?????aa", "the fire is out, and it has not seen that"
     assert known(seen, 1)[0] == "??TTT??"
     assert freshness(kept(seen), seen.step)[0, 1, 6, 6].item() == pytest.approx(16 / 17)
-    back = moved(seen, 1, (6, 6))
-    assert known(sight.updated(back, TWO, running(back)), 1)[-1] == "?????TT"
-
-
-def test_maps_are_told_to_those_that_hear_and_the_newer_record_counts():
-    sight, team = Sight(radius=1), Team(n_agents=3, radio=Radio(carries="map", range=4.0))
-    at = [(0, 0), (0, 4), (0, 6)]  # the first hears the second, which hears the third
-    state = draw("TTTTTTa TTTTTTT", team=team, at=at)
-    first = sight.begun(state, team)
-    assert known(first, 0) == ["TT?TTT?", "TT?TTT?"], "of the third it has not heard yet"
-    assert known(first, 1) == ["TT?TTTa", "TT?TTTT"]
-    later = first.replace(step=first.step + 1)
-    later = sight.updated(later, team, running(later))
-    assert known(later, 0) == ["TT?TTTa", "TT?TTTT"], "from hand to hand, one a step"
-    assert freshness(kept(later), later.step)[0, 0, 0, 6].item() == pytest.approx(16 / 17)
-    alone = sight.begun(state, Team(n_agents=3, radio=Radio(carries="graph")))
-    assert known(alone, 1) == ["???TTT?", "???TTT?"]
-
-
-def test_without_range_nothing_is_shared():
-    team = Team(n_agents=2, radio=Radio(carries="map", range=0.0))
-    state = started(Sight(radius=1), team)
-    assert known(state, 0)[0] == "TT?????" and known(state, 0)[-1] == "???????"
+    assert known(later(seen, world, *CORNERS, drawing=out), 1)[-1] == "?????TT"
 
 
 def test_worlds_that_have_ended_stay_as_they_are():
-    sight = Sight(radius=1)
-    state = started(sight, worlds=2)
-    now = moved(state, 0, (0, 4))
-    after = sight.updated(now, TWO, torch.tensor([True, False]))
+    world = rules(Sight(radius=1))
+    state = begun(world, *CORNERS, drawing=FIELD, worlds=2)
+    after = later(state, world, (0, 4), (6, 6), running=[True, False])
     assert known(after, 0, 0)[0] == "TT?TTT?" and known(after, 0, 1)[0] == "TT?????"
 
 
@@ -127,24 +91,6 @@ def test_smoke_hides_cells_by_the_law_of_beer_and_lambert():
     for share, amount in zip(seen, (1.0, 1 / 2, 1 / 3)):
         assert abs(share - math.exp(-0.5 * amount)) < 0.04  # 3000 draws: over 4 standard deviations
     assert (freshness(kept(state), state.step)[:, 0, 1] == 1.0).all(), "where no smoke is"
-
-
-def test_full_sensing_keeps_no_maps():
-    world = small_world()
-    assert isinstance(world.sensing, Full) and not world.reset(torch.arange(2), torch.zeros(2).long()).keeps("sensing")
-
-
-def test_a_world_keeps_what_its_agents_know():
-    sight, team = Sight(radius=2, smoke=1.0, miss=0.1, false_alarm=0.01), Team(n_agents=2, radio=Radio(carries="both"))
-    world = small_world(sensing=sight, team=team)
-    seeds, episodes = torch.arange(4), torch.zeros(4, dtype=torch.int64)
-    state, alone = world.reset(seeds, episodes), world.reset(seeds[2:3], episodes[2:3])
-    for step in range(12):
-        action = torch.full((4, 2), int(Action.SOUTH_EAST if step % 3 else Action.EXTINGUISH))
-        state, alone = world.step(state, action).after, world.step(alone, action[2:3]).after
-    assert torch.equal(kept(alone), kept(state)[2:3])
-    assert (known_codes(state) <= EMBER).all()
-    assert "extras.sensing.records" in state.what_changes()
 
 
 @pytest.mark.parametrize(

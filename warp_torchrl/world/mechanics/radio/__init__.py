@@ -1,1 +1,1 @@
-"""Radio: packets that set out in the loop of a step."""
+"""Radio: what agents tell each other, who hears whom, and when it arrives."""

@@ -1,1 +1,1 @@
-"""Sensing: sight, records of what was seen, smoke, and how well a team watches."""
+"""Sensing: limited sight, smoke that hides fire, and how well a team watches."""

@@ -6,16 +6,17 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.arrays.batch import Batch
-from warp_torchrl.world.mechanics.sensing.records import codes, freshness, steps_since
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.front import spreading_front
+from warp_torchrl.world.state.records import KNOWLEDGE, codes, freshness, steps_since
 from warp_torchrl.world.state.state import FIRST_FIRE, WorldState
 
 
 @dataclass(eq=False, repr=False)
-class Watching(Batch):
-    """What a team of limited sight has watched of the fire so far; ``counted`` counts it."""
+class Memory(Batch):
+    """What a team of limited sight keeps of the fire: its records, and what it has watched."""
 
+    records: Tensor  # int32 [B,A,H,W], see ``world.state.records``
     itself: Tensor  # bool [B,A,H,W], whether the agent saw itself what its record tells
     watches: Tensor  # float32 [B,A], share of the front that the team watches by this agent's records, now
     finds: Tensor  # float32 [B,A], burning cells that this agent was the first to record in the last step / all of them
@@ -24,14 +25,6 @@ class Watching(Batch):
     found: Tensor  # float32 [B], sum over steps of the share of the front that the team knows to burn
     uncertainty: Tensor  # float32 [B], sum over steps of ``uncertain``
     fronts: Tensor  # int32 [B], steps at whose end there was a front
-
-
-@dataclass(eq=False, repr=False)
-class Memory(Batch):
-    """What a team of limited sight keeps of the fire."""
-
-    records: Tensor  # int32 [B,A,H,W], see ``records``
-    watching: Watching
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,20 +38,21 @@ class NewestRecords:
     holders: Tensor  # bool [B,A,H,W], the agents that hold it and saw it themselves
 
 
-def watching_of(state: WorldState) -> Watching:
-    """Return what teams have watched so far.
+def memory_of(state: WorldState) -> Memory:
+    """Return what teams keep of the fire.
 
     Raises:
         ValueError: If their sight is not limited.
     """
-    return state.planes("sensing", Memory).watching
+    return state.planes(KNOWLEDGE, Memory)
 
 
-def unwatched(state: WorldState) -> Watching:
-    """Return what teams have watched before their first look."""
+def unwatched(state: WorldState, records: Tensor) -> Memory:
+    """Return what teams keep before their first look, given their records, int32 [B, A, H, W]."""
     no = torch.zeros_like(state.vehicles.position[..., 0], dtype=torch.bool)
     zero = torch.zeros_like(state.burning_area)
-    return Watching(
+    return Memory(
+        records=records,
         itself=no[..., None, None].expand(*no.shape, *state.cells.shape[1:]).clone(),
         watches=no.to(torch.float32),
         finds=no.to(torch.float32),
@@ -70,10 +64,10 @@ def unwatched(state: WorldState) -> Watching:
     )
 
 
-def at_start(watching: Watching) -> Watching:
-    """Return what teams have watched before their first step: what they see, in no sum."""
+def at_start(memory: Memory) -> Memory:
+    """Return what teams keep before their first step: what they see, in no sum."""
     sums = ("watched", "found", "uncertainty", "fronts")
-    return watching.replace(**{name: torch.zeros_like(getattr(watching, name)) for name in sums})
+    return memory.replace(**{name: torch.zeros_like(getattr(memory, name)) for name in sums})
 
 
 def newest_records(before: Tensor, records: Tensor, itself: Tensor, step: Tensor) -> NewestRecords:
@@ -82,7 +76,7 @@ def newest_records(before: Tensor, records: Tensor, itself: Tensor, step: Tensor
     Args:
         before: The agents' records before it, int32 [B, A, H, W].
         records: The same after it.
-        itself: Of ``Watching``, after it.
+        itself: Of ``Memory``, after it.
         step: The worlds' steps after it, int32 [B].
     """
     newest = records.amax(dim=1)
@@ -95,25 +89,27 @@ def newest_records(before: Tensor, records: Tensor, itself: Tensor, step: Tensor
     )
 
 
-def counted(state: WorldState, before: Watching, itself: Tensor, newest: NewestRecords, recent: int) -> Watching:
-    """Return what teams have watched after a step.
+def counted(state: WorldState, before: Memory, records: Tensor, itself: Tensor, recent: int) -> Memory:
+    """Return what teams keep after a step.
 
     The team watches a cell of the front that it saw burn at most ``recent`` steps ago. The agents that hold the newest
     record of a cell, and saw it themselves, share the credit for it.
 
     Args:
         state: The worlds after the step.
-        before: What was watched before it.
-        itself: Of ``Watching``, after the step.
-        newest: What the team's records tell after it.
+        before: What they kept before it.
+        records: Their records after it, int32 [B, A, H, W].
+        itself: Of ``Memory``, after it.
         recent: n [steps].
     """
+    newest = newest_records(before.records, records, itself, state.step)
     front, burning = spreading_front(state.cells, state.alpha), is_burning(state.cells)
     watched = front & newest.burns & (newest.since <= recent)
     found = burning & newest.burns & ~newest.burned_before & (newest.since == 0)
     share = newest.holders / newest.holders.sum(dim=1, keepdim=True).clamp(min=1)
     size, uncertain = _count(front), (1.0 - newest.fresh).mean(dim=(1, 2))
-    return Watching(
+    return Memory(
+        records=records,
         itself=itself,
         watches=(share * watched[:, None]).sum((2, 3)) / size.clamp(min=1)[:, None],
         finds=(share * found[:, None]).sum((2, 3)) / _count(burning).clamp(min=1)[:, None],

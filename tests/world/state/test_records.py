@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from tests.world.drawing import draw
-from warp_torchrl.world.mechanics.sensing.records import codes, freshness, kept, kinds, read, recorded, steps_since
+from warp_torchrl.world.state.records import codes, freshness, kept, kinds, read, recorded, steps_since
 
 
 def of_cells(*records):

@@ -10,13 +10,14 @@ from warp_torchrl.models import Mlp, signature
 from warp_torchrl.models.messages import Round
 from warp_torchrl.runs.policies.trained import TrainedPolicy
 from warp_torchrl.world.mechanics.sensing.sensing import Sight
-from warp_torchrl.world.team.radio import Radio
 from warp_torchrl.world.team.team import Team
+
+Radio = pytest.importorskip("warp_torchrl.world.mechanics.radio.radio").Radio
 
 
 def made(make_small_env, n_worlds=6, messages="graph", delay=0, **team):
     radio = Radio(carries=messages, delay=delay)
-    world = small_world(team=Team(n_agents=2, radio=radio, **team), sensing=Sight(radius=3))
+    world = small_world(team=Team(n_agents=2, **team), sensing=Sight(radius=3), mechanics=(radio,))
     env = make_small_env(n_worlds, world)
     model = Mlp(actor_hidden=(32,), messages=messages)
     policy = Ppo().policy(signature(env), model).requires_grad_(False)

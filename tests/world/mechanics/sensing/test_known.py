@@ -1,22 +1,21 @@
 """What agents are shown where they know of the fire what was seen alone."""
 
-from pathlib import Path
-
 import pytest
 import torch
 
 from tests.conftest import small_world
-from tests.world.drawing import draw
+from tests.world.mechanics.drawing import begun, later
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.observation import CriticState, Local, Paper, Surroundings
 from warp_torchrl.env.observation.channels import DEFAULT
 from warp_torchrl.heuristics import HEURISTICS, TEACHERS
-from warp_torchrl.world.mechanics.sensing.sensing import Full, Sight, in_reach
+from warp_torchrl.world.mechanics.sensing.sensing import Sight
 from warp_torchrl.world.state.state import Forecast
-from warp_torchrl.world.team.radio import Radio
-from warp_torchrl.world.team.team import Team
+from warp_torchrl.world.team.knowledge import Full
+from warp_torchrl.world.team.places import in_reach
 
-GOLDEN = Path(__file__).parents[2] / "golden" / "0.1.0"
+Radio = pytest.importorskip("warp_torchrl.world.mechanics.radio.radio").Radio
+DEAF = Radio(range=0.0)
 CHANNELS = (*DEFAULT, "last_seen")
 KNOWING = [name for name in TEACHERS if not HEURISTICS[name].sees_all]
 PRESETS = {
@@ -29,25 +28,24 @@ PRESETS = {
 }
 
 
-def limited(sight, **team):
-    return small_world(sensing=sight, team=Team(n_agents=2, **team))
+def limited(sight, *mechanics):
+    return small_world(sensing=sight, mechanics=mechanics)
 
 
 def shown(preset, state, world):
     return preset(state, world, world.forecast(state))
 
 
-def drawn(sight, drawing, at, **team):
-    world = limited(sight, **team)
-    state = draw(drawing, team=world.team, at=at)
-    return sight.begun(state, world.team), world
+def drawn(sight, drawing, at, *mechanics):
+    world = limited(sight, *mechanics)
+    return begun(world, *at, drawing=drawing), world
 
 
 @pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)
 def test_what_nobody_has_seen_makes_no_difference_to_what_is_shown(preset):
     """A fire beyond sight, ash, a firebreak, a wet tree and a silent team-mate change no number of any entry."""
     sight = Sight(radius=2)
-    world = limited(sight, radio=Radio(range=0.0))
+    world = limited(sight, DEAF)
     env = WildfireEnv(world, observation=preset, n_worlds=4, seed=5)
     env.reset()
     state = env.world_state
@@ -66,7 +64,7 @@ def test_what_nobody_has_seen_makes_no_difference_to_what_is_shown(preset):
     moved = state.vehicles.position.clone()
     moved[:, 1] = torch.where(moved[:, 0] < 8, moved[:, 0] + 4, moved[:, 0] - 4)  # in view, beyond sight
     far = state.replace(vehicles=state.vehicles.replace(position=moved))
-    assert not world.sensing.knows_where(far, world.team)[0].any()
+    assert not world.sensing.knows_where(far, world.team, world.hearing)[0].any()
     alone = far.replace(vehicles=far.vehicles.replace(position=moved[:, :1].expand(-1, 2, -1).contiguous()))
     ours, theirs = shown(preset, far, world), shown(preset, alone, world)
     mates = [CHANNELS.index("other_ugv")]
@@ -90,12 +88,9 @@ def test_a_world_that_shows_all_shows_the_same_fire_to_who_sees_all():
 
 
 def test_a_view_shows_what_is_known_and_how_fresh_it_is():
-    state, world = drawn(Sight(radius=1), "TTTTa TTTTT TTTTT TTTTT TTTTT", [(0, 3), (4, 0)], radio=Radio(range=0.0))
-    gone = state.vehicles.position.clone()
-    gone[0, 0] = torch.tensor([0, 0])
-    later = state.replace(step=state.step + 16, vehicles=state.vehicles.replace(position=gone))
-    later = world.sensing.updated(later.replace(cells=torch.full_like(later.cells, 10)), world.team, ~later.done)
-    view = Local(channels=("fire_stage", "age", "last_seen", "threat"))(later, world, world.forecast(later))["view"][0]
+    state, world = drawn(Sight(radius=1), "TTTTa TTTTT TTTTT TTTTT TTTTT", [(0, 3), (4, 0)], DEAF)
+    now = later(state.replace(step=state.step + 15), world, (0, 0), (4, 0), drawing=" ".join(["T" * 5] * 5))
+    view = Local(channels=("fire_stage", "age", "last_seen", "threat"))(now, world, world.forecast(now))["view"][0]
     assert view[0, 0, 5, 9] == 51 and view[0, 0, 5, 5:9].sum() == 0, "the fire of before"
     assert view[0, 1, 5, 5:10].tolist() == [250, 250, 250, 250, 0]
     assert view[0, 2, 5, 5:10].tolist() == [255, 255, 127, 127, 127], "16 steps are half as fresh"
@@ -108,18 +103,13 @@ def test_a_view_shows_what_is_known_and_how_fresh_it_is():
 @pytest.mark.parametrize("centred", [True, False], ids=["centred", "whole map"])
 def test_team_mates_are_shown_where_they_were_when_they_sent_what_arrives_late(centred):
     """On a map of 16 x 16, whose picture has blocks of two cells; the second agent goes from (4, 4) to (8, 4)."""
-    world = limited(Sight(radius=1), radio=Radio(delay=1))
-    flies = world.team.table(torch.device("cpu")).flies
-    state = draw(" ".join(["T" * 16] * 16), team=world.team, at=[(6, 4), (4, 4)])
-    state = world.sensing.begun(world.team.radio.begun(state, flies), world.team)
+    world = limited(Sight(radius=1), Radio(delay=1))
+    state = begun(world, (6, 4), (4, 4), drawing=" ".join(["T" * 16] * 16))
     preset = Surroundings(channels=CHANNELS, centred=centred)
     first = shown(preset, state, world)
     mate = CHANNELS.index("other_ugv")
     assert not first["view"][0, 0, mate].any() and not first["picture"][0, 0, 2].any(), "nothing has arrived yet"
-    gone = state.vehicles.position.clone()
-    gone[0, 1] = torch.tensor([8, 4])
-    state = state.replace(step=state.step + 1, vehicles=state.vehicles.replace(position=gone))
-    state = world.sensing.updated(world.team.radio.sent(state, flies, ~state.done), world.team, ~state.done)
+    state = later(state, world, (6, 4), (8, 4))
     now = shown(preset, state, world)
     assert now["view"][0, 0, mate].nonzero().tolist() == [[3, 5]], "two cells north of the middle, which is (5, 5)"
     block = [[6, 7]] if centred else [[2, 2]]  # the block north of its own, which is (3, 2) of the map's 8 x 8
@@ -129,7 +119,7 @@ def test_team_mates_are_shown_where_they_were_when_they_sent_what_arrives_late(c
 def test_the_picture_pools_what_is_known():
     sight = Sight(radius=1)
     drawing = " ".join(["T" * 16] * 7 + ["TTTTTTTTTTTTaaTT"] * 2 + ["T" * 16] * 7)
-    state, world = drawn(sight, drawing, [(7, 12), (15, 0)], radio=Radio(range=0.0))
+    state, world = drawn(sight, drawing, [(7, 12), (15, 0)], DEAF)
     preset = Surroundings(centred=False)
     picture = preset(state, world, world.forecast(state))["picture"][0]
     assert preset.spaces(world)["picture"].names == ("fire", "fuel", "team_mates", "last_seen")

@@ -1,4 +1,6 @@
-"""The map that an agent keeps of the fire: what each cell was when it was last seen, and when that was.
+"""Records: the map that an agent keeps of the fire, what each cell was when it was last seen, and when that was.
+
+The mechanic that limits what agents know keeps them in the worlds, as ``records`` of its planes, under ``KNOWLEDGE``.
 
 A record is ``(1 + step) * 64 + 32 firebreak + 16 ash + code``, int32. A cell that the agent never saw has the step -1
 and the code that the map showed before the fire. Of two records of a cell the larger is the newer one.
@@ -12,6 +14,8 @@ from warp_torchrl.world.state.state import WorldState
 
 _CODE, _ASH, _FIREBREAK, _KIND, _STEP = 15, 16, 32, 63, 6
 """Bits of a record: its code, ash, a firebreak, all three; and how many bits are below the step's."""
+KNOWLEDGE = "sensing"
+"""Name of the planes with the records."""
 HALF_FRESH = 16.0
 """Steps after which what was seen is half as fresh as what is seen now."""
 
@@ -43,7 +47,7 @@ def known_codes(state: WorldState) -> Tensor:
 
 def records_of(state: WorldState) -> Tensor | None:
     """Return the agents' records, int32 [B, A, H, W]; None where they keep none."""
-    return state.plane("sensing", "records")
+    return state.plane(KNOWLEDGE, "records")
 
 
 def kept(state: WorldState) -> Tensor:

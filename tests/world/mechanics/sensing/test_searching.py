@@ -8,22 +8,25 @@ from tests.world.drawing import draw, knowing
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS, Lawnmower, Oldest
 from warp_torchrl.world.arrays.geometry import DIRECTIONS
-from warp_torchrl.world.mechanics.sensing.records import freshness, kept, known_codes
-from warp_torchrl.world.mechanics.sensing.sensing import Sight, in_reach
+from warp_torchrl.world.mechanics.sensing.sensing import Sight
+from warp_torchrl.world.state.records import freshness, kept, known_codes
 from warp_torchrl.world.state.state import Action
-from warp_torchrl.world.team.radio import Radio
+from warp_torchrl.world.team.places import in_reach
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.array import Array
 from warp_torchrl.world.terrain.landscape import Perlin
 
+Radio = pytest.importorskip("warp_torchrl.world.mechanics.radio.radio").Radio
+DEAF = Radio(range=0.0)
 BLIND = ("local", "oldest", "lawnmower")
 
 
-def forest(size=12, roles=("ugv",), n_agents=2, radius=1, **team):
+def forest(size=12, roles=("ugv",), n_agents=2, radius=1, mechanics=(), **team):
     world = small_world(
         landscape=Perlin(size=size, levels=(0.0, 0.0, 0.0)),
         team=Team(n_agents=n_agents, roles=roles, **team),
         sensing=Sight(radius=radius),
+        mechanics=mechanics,
         horizon=400,
     )
     return WildfireEnv(world, n_worlds=3, seed=1)
@@ -36,7 +39,7 @@ def chosen(env, policy, state):
 
 @pytest.mark.parametrize("name", BLIND)
 def test_a_fire_that_nobody_knows_of_moves_nobody(name):
-    env = forest(radio=Radio(range=0.0))
+    env = forest(mechanics=(DEAF,))
     env.reset()
     policy = HEURISTICS[name](env)
     state = env.world_state.clone()
@@ -60,7 +63,7 @@ def with_fire_known(env, place, agent=0):
 
 @pytest.mark.parametrize("name", ["oldest", "lawnmower"])
 def test_agents_go_to_the_fire_that_they_remember(name):
-    env = forest(start="anywhere", radio=Radio(range=0.0))
+    env = forest(start="anywhere", mechanics=(DEAF,))
     env.reset()
     state = with_fire_known(env, (11, 11))
     state.vehicles.position[:] = torch.tensor([[3, 3], [3, 3]])
@@ -72,7 +75,7 @@ def test_agents_go_to_the_fire_that_they_remember(name):
 
 
 def test_local_remembers_no_fire():
-    env = forest(radio=Radio(range=0.0))
+    env = forest(mechanics=(DEAF,))
     env.reset()
     state = with_fire_known(env, (11, 11))
     state.vehicles.position[:] = torch.tensor([[3, 3], [3, 3]])

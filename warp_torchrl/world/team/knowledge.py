@@ -1,0 +1,57 @@
+"""Knowledge: what agents know of the fire and of each other. A mechanic may limit it."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.world.team.hearing import Hearing
+from warp_torchrl.world.team.team import Team
+
+_EVERYWHERE = 1 << 20
+"""A sight that no map limits [cells]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensing(ABC):
+    """What the world, observations and heuristics need of a sensing component.
+
+    One that limits what agents know is a mechanic too, and keeps their maps in the worlds, see ``world.state.records``.
+    """
+
+    @property
+    @abstractmethod
+    def is_limited(self) -> bool:
+        """Return whether something may burn that agents do not know of."""
+
+    @abstractmethod
+    def reach(self, team: Team) -> list[int]:
+        """Return how far each agent sees [cells]."""
+
+    @abstractmethod
+    def knows_where(self, state: WorldState, team: Team, hearing: Hearing) -> tuple[Tensor, Tensor]:
+        """Return of which others each agent knows where they are, bool [B or 1, A, A], and what it takes for that.
+
+        The places are int64 [B, A or 1, A, 2], (row, column) [cells]: [b, i, j] is where agent i takes agent j to be.
+        """
+
+
+@dataclass(frozen=True, kw_only=True)
+class Full(Sensing):
+    """Agents are shown the fire as it is, as far as their observation reaches."""
+
+    @property
+    def is_limited(self) -> bool:
+        """Return that it is not."""
+        return False
+
+    def reach(self, team: Team) -> list[int]:
+        """Return more than any map is long [cells]."""
+        return [_EVERYWHERE] * team.n_agents
+
+    def knows_where(self, state: WorldState, team: Team, hearing: Hearing) -> tuple[Tensor, Tensor]:
+        """Return that each knows where all others are, bool [1, A, A], and where they are, int64 [B, 1, A, 2]."""
+        others = ~torch.eye(team.n_agents, dtype=torch.bool, device=state.cells.device)[None]
+        return others, state.vehicles.position[:, None]
