@@ -55,7 +55,7 @@ def read_observations(
         raise ValueError(f"observed must name a file that exists, one of {kinds}, got {path}")
     place = slice(corner[0], corner[0] + size[0]), slice(corner[1], corner[1] + size[1])
     found = _hot_spots(file, grid, place, moment) if suffix == ".csv" else _perimeters(file, grid, place, moment)
-    kept = [each for each in found if 0.0 < each.minutes <= end]
+    kept = [each for each in found if 0.0 < each.minutes < end]
     left = len(found) - len(kept)
     if not kept:
         times = f"{found[0].minutes:g} to {found[-1].minutes:g} minutes" if found else "none"

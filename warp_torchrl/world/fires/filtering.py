@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 _LEAST = 1e-12
+_ROUNDING = 1e-6  # of sums of weights
 
 
 def normalised(log_weights: Tensor) -> Tensor:
@@ -120,6 +121,6 @@ def quantiles(values: Tensor, weights: Tensor, shares: Tensor) -> Tensor:
     order = values.argsort(dim=1, stable=True)
     total = weights.gather(1, order).to(torch.float64).cumsum(dim=1)
     total = total / total[:, -1:]
-    wanted = shares.to(torch.float64).expand(len(values), -1).contiguous() - _LEAST
+    wanted = shares.to(torch.float64).expand(len(values), -1).contiguous() - _ROUNDING
     place = torch.searchsorted(total, wanted).clamp(max=values.shape[1] - 1)
     return values.gather(1, order).gather(1, place)
