@@ -48,7 +48,12 @@ def test_the_grid_is_one_of_the_package():
 
 
 def test_perimeters_are_in_the_order_of_time_whatever_form_it_has(tmp_path):
-    places = [(500_000, 4_002_000, 500), (500_500, 4_002_000, 300), (500_000, 4_001_000, 100), (500_000, 4_002_000, 200)]
+    places = [
+        (500_000, 4_002_000, 500),
+        (500_500, 4_002_000, 300),
+        (500_000, 4_001_000, 100),
+        (500_000, 4_002_000, 200),
+    ]
     times = [{"hours": 2}, {"minutes": "120"}, {"poly_DateCurrent": 1719838800000}, {"datetime": "2024-07-01T12:30"}]
     found = read(perimeters(tmp_path, *(box(*each, **time) for each, time in zip(places, times, strict=True))))
     assert [each.minutes for each in found] == [30.0, 60.0, 120.0]

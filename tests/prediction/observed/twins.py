@@ -49,5 +49,3 @@ def truth(of, rate, turn, seed, minutes):
 
 def perimeters(arrival, *minutes):
     return [Observation(minutes=each, kind="perimeter", cells=arrival <= each) for each in minutes]
-
-

@@ -21,8 +21,12 @@ def member(rate=1.0, wind_speed=1.0, bearing=0.0, moisture=1.0):
 
 def test_the_wind_turns_clockwise_and_grows():
     # A wind to the north, turned by a quarter, goes east; twice as fast
-    east, south = Members(torch.tensor([member(1.0, 2.0, 90.0), member(1.0, 1.0, 180.0)])).winds(torch.tensor([0.0, 3.0]))
-    assert east.tolist() == pytest.approx([6.0, 0.0], abs=1e-5) and south.tolist() == pytest.approx([0.0, -3.0], abs=1e-5)
+    east, south = Members(torch.tensor([member(1.0, 2.0, 90.0), member(1.0, 1.0, 180.0)])).winds(
+        torch.tensor([0.0, 3.0])
+    )
+    assert east.tolist() == pytest.approx([6.0, 0.0], abs=1e-5) and south.tolist() == pytest.approx(
+        [0.0, -3.0], abs=1e-5
+    )
 
 
 def test_dead_fuel_is_wetter_and_so_is_the_code_of_fine_fuel():
@@ -34,7 +38,9 @@ def test_dead_fuel_is_wetter_and_so_is_the_code_of_fine_fuel():
 
 
 def test_drawn_members_have_the_deviations_asked_for():
-    found = Members.drawn(world_key(torch.arange(4000)), Deviations(rate=0.4, wind_speed=0.2, bearing=15.0, moisture=0.0))
+    found = Members.drawn(
+        world_key(torch.arange(4000)), Deviations(rate=0.4, wind_speed=0.2, bearing=15.0, moisture=0.0)
+    )
     assert float(found.rate.median()) == pytest.approx(1.0, abs=0.03)
     assert float(found.rate.std() / found.rate.mean()) == pytest.approx(0.4, abs=0.03)
     assert float(found.bearing.std()) == pytest.approx(15.0, abs=0.6) and bool((found.moisture == 1.0).all())

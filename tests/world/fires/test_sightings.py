@@ -20,7 +20,7 @@ FAR = torch.hypot(ROWS, COLUMNS)
 
 
 def front(known=2.0, burned=8.0):
-    return Front(FAR <= known, FAR <= burned, torch.ones(SIDE, SIDE, dtype=torch.bool), 60.0)
+    return Front(known >= FAR, burned >= FAR, torch.ones(SIDE, SIDE, dtype=torch.bool), 60.0)
 
 
 def members(*rates):

@@ -19,9 +19,7 @@ def burnable(fire: RateFire, case: FireCase) -> Tensor:
 
 def fires_of(laws: Sequence[RateFire], case: FireCase) -> Fires:
     """Return the fires of some laws on a case; the laws differ in factors, deviations and moistures alone."""
-    return Fires(
-        fire=laws[0], beside=laws[1:], landscape=case.landscape, spells=case.spells, cell_size=case.cell_size
-    )
+    return Fires(fire=laws[0], beside=laws[1:], landscape=case.landscape, spells=case.spells, cell_size=case.cell_size)
 
 
 def arrivals(laws: Sequence[RateFire], case: FireCase, key: Tensor) -> Tensor:

@@ -1,8 +1,9 @@
 """Forecasts of a fire that are corrected by each observation when its time comes.
 
-At each observation the forecasts that were made before it are scored. Then the fire goes on from what was seen: what is
-inside has burned, its edge burns. Members are weighed by how well they said the growth since the observation before;
-where few hold most of the weight, they are drawn by it and their parameters are moved (``world.fires.filtering``).
+At each observation the forecasts that were made before it are scored. Then the fire continues from what was seen: what
+is inside has burned, its edge burns. Members are weighed by how well they forecast the growth since the observation
+before. Where few hold most of the weight, they are drawn by it and their parameters are moved
+(``world.fires.filtering``).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -148,9 +149,7 @@ class _Run:
         between = time_between(front)
         scores = {name: forecast_scores(each, between, front) for name, each in forecasts.items()}
         count, drawn = self._learn(said, seen, front)
-        self.steps.append(
-            Step(seen.minutes, front.minutes, seen.kind, scores, count, drawn, self.posterior(), burned)
-        )
+        self.steps.append(Step(seen.minutes, front.minutes, seen.kind, scores, count, drawn, self.posterior(), burned))
         self.known, self._since = burned, seen.minutes
 
     def posterior(self) -> dict[str, list[float]]:

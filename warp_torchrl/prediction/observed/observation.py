@@ -53,7 +53,9 @@ def _about(cells: Tensor, side: int) -> Tensor:
 
 def _of_groups(hot: Tensor, known: Tensor, side: int) -> Tensor:
     """Return hot cells that are near to the fire, or in groups of three pixels at least, bool [H, W]."""
-    pixels, fire = (max_pool2d(pad(each.float(), _past(each, side))[None, None], side)[0, 0] > 0.0 for each in (hot, known))
+    pixels, fire = (
+        max_pool2d(pad(each.float(), _past(each, side))[None, None], side)[0, 0] > 0.0 for each in (hot, known)
+    )
     reach = 2 * _GAP + 1
     kept, left = torch.zeros_like(pixels), pixels.clone()
     near = _about(fire, reach)

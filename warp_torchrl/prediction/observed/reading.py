@@ -133,7 +133,9 @@ def _hot_spots(file: Path, grid: Grid, place: tuple[slice, slice], moment: Momen
     bad = (np.abs(x) > 180.0) | (np.abs(y) > 90.0)
     if bad.any():
         first = int(bad.argmax())
-        raise ValueError(f"observed must have degrees for places, row {first + 1} of {file} has {y[first]:g}, {x[first]:g}")
+        raise ValueError(
+            f"observed must have degrees for places, row {first + 1} of {file} has {y[first]:g}, {x[first]:g}"
+        )
     minutes = _minutes_of(rows, names, moment, file)
     east, north = in_grid("observed", x, y, "EPSG:4326", grid)
     inverse = ~grid.transform
@@ -170,9 +172,7 @@ def _rows(file: Path) -> list[dict[str, str]]:
     return [dict(zip(table[0], row, strict=True)) for row in table[1:]]
 
 
-def _minutes_of(
-    rows: Sequence[Mapping[str, str]], names: Mapping[str, str], moment: Moment, file: Path
-) -> np.ndarray:
+def _minutes_of(rows: Sequence[Mapping[str, str]], names: Mapping[str, str], moment: Moment, file: Path) -> np.ndarray:
     """Return the minutes since the start of each hot spot, float64 [n]."""
     for name, factor in _SINCE_START.items():
         if name in names:

@@ -71,7 +71,7 @@ def observed_lines(numbers: Mapping[str, Any]) -> list[str]:
     lines = [
         "## What was seen",
         "",
-        f"{len(rows)} observations, {numbers['members']} members; maps, areas and times above are those of the forecast "
+        f"{len(rows)} observations, {numbers['members']} members; maps, areas and times above are of the forecast "
         f"from the last one on, {last:.3g} hours after the start.",
         "",
         "| learned | 5 % | half | 95 % |",
@@ -80,7 +80,11 @@ def observed_lines(numbers: Mapping[str, Any]) -> list[str]:
     for name, text in _QUANTITIES.items():
         values = numbers["posterior"][name]
         lines.append(f"| {text} | {values[0]:.3g} | {values[2]:.3g} | {values[-1]:.3g} |")
-    lines += ["", "| hours | forecast | Jaccard | kappa | of the growth | Brier | CRPS [min] |", "|---|---|---|---|---|---|---|"]
+    lines += [
+        "",
+        "| hours | forecast | Jaccard | kappa | of the growth | Brier | CRPS [min] |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for row in rows:
         lines += [_row(f"{row['minutes'] / 60.0:.2f}", name, row["forecasts"][name]) for name in FORECASTS]
     what = "mean but the first" if len(rows) > 1 else "mean"

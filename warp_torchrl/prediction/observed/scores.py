@@ -1,8 +1,8 @@
 """Scores of forecasts of a fire's growth, as forecasters give them.
 
-F(x, t) is the share of the members that reach cell x by time t, o(x, t) is 1 where the fire has. Sums are over the cells
-that had not burned by the observation before; divided by the number that then burned, they are 1 for a forecast without
-growth (persistence), whatever the fire's size:
+F(x, t) is the share of the members that reach cell x by time t, o(x, t) is 1 where the fire has. Sums are over cells
+that had not burned by the observation before. Divided by the number that then burned, the Brier score is 1 for a
+forecast without growth (persistence), whatever the fire's size:
 
     Brier = sum (F - o)^2 / sum o                        (Brier 1950)
     CRPS  = sum of the integral of (F - o)^2 dt / sum o  (Matheson and Winkler 1976) [minutes]
@@ -62,7 +62,7 @@ def forecast_scores(reached: Tensor, arrival: Tensor, front: Front) -> ForecastS
 
 
 def kappa(told: Tensor, burned: Tensor) -> float:
-    """Return Cohen's kappa, (p_o - p_e) / (1 - p_e), of two sets of cells, bool [H, W]; 1 where both are all or none."""
+    """Return Cohen's kappa of two sets of cells, bool [H, W], (p_o - p_e) / (1 - p_e); 1 where both are all or none."""
     agreed = float((told == burned).double().mean())
     one, other = float(told.double().mean()), float(burned.double().mean())
     by_chance = one * other + (1.0 - one) * (1.0 - other)

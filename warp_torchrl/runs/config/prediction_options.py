@@ -30,8 +30,8 @@ class PredictionOptions:
         start_ffmc: Fine fuel moisture code an hour before the first row, for a file without FFMC.
         bui: Buildup index, for a file without BUI, DMC and DC; None takes the law's.
         cell_size: Side of a cell [m]; None is that of the landscape.
-        observed: File of what was seen of the fire on the way: perimeters with times (GeoJSON or a shapefile), or hot spots
-            of satellites (CSV). The prediction is corrected by each, and goes on from the last one.
+        observed: File of what was seen of the fire on the way: perimeters with times (GeoJSON or a shapefile), or hot
+            spots of satellites (CSV). Each corrects the prediction, which continues from the last one.
         observed_zone: Hours that the weather's rows are ahead of UTC, for times in UTC where neither rows nor file say
             it: ``observed_zone=-7``.
         members: How far fires differ before anything is seen, where something is: ``members.rate=0.4``,

@@ -90,9 +90,7 @@ def perimeter_likelihood(arrival: Tensor, front: Front) -> Tensor:
     return _agreement(_by_sector(came, where), seen, along, (along + 1.0) / 4.0)
 
 
-def hot_spot_likelihood(
-    arrival: Tensor, hot: Tensor, front: Front, sensor: HotSpotSensor, cell_size: float
-) -> Tensor:
+def hot_spot_likelihood(arrival: Tensor, hot: Tensor, front: Front, sensor: HotSpotSensor, cell_size: float) -> Tensor:
     """Return the logarithm of the likelihood of hot spots under each member, float32 [K].
 
     What is compared are pixels in which nothing was known to have burned before; a member expects that they are marked
