@@ -27,6 +27,9 @@ def test_the_wind_turns_clockwise_and_grows():
     assert east.tolist() == pytest.approx([6.0, 0.0], abs=1e-5) and south.tolist() == pytest.approx(
         [0.0, -3.0], abs=1e-5
     )
+    assert Members(torch.tensor([member(bearing=90.0)])).winds(torch.tensor([3.0, 0.0]))[0].tolist() == pytest.approx(
+        [0.0, -3.0], abs=1e-5
+    ), "a wind to the east goes south"
 
 
 def test_dead_fuel_is_wetter_and_so_is_the_code_of_fine_fuel():

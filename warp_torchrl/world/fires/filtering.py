@@ -47,9 +47,7 @@ def resampled(weights: Tensor, draw: Tensor) -> Tensor:
     total = weights.to(torch.float64).cumsum(dim=1)
     total = total / total[:, -1:]
     places = torch.arange(members, dtype=torch.float64, device=weights.device) + draw.to(torch.float64)[:, None]
-    found = torch.searchsorted(total, (places / members).contiguous(), right=True)
-    last = (weights > 0.0).to(torch.int64).cumsum(dim=1).argmax(dim=1, keepdim=True)
-    return torch.minimum(found, last)
+    return torch.searchsorted(total, (places / members).contiguous(), right=True)
 
 
 def exponent(log_weights: Tensor, log_likelihood: Tensor, least: Tensor | float, most: Tensor | float = 1.0) -> Tensor:
