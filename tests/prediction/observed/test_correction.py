@@ -84,11 +84,11 @@ def test_lone_hot_spots_apart_from_the_fire_are_false_alarms():
 
 @pytest.mark.slow
 def test_rates_of_half_to_twice_and_a_turned_wind_are_found():
-    # A fair filter misses 20 % in about one of ten; 12 of 12 were within it when this was written
+    # 11 of 12 were within 20 % when this was written, 9 with 100 members: of a chance of 0.9, under 10 come in 1 of 9
     within, better = 0, 0
     for number, share in enumerate(torch.linspace(-1.0, 1.0, 12).tolist()):
         rate = 2.0**share
-        found = corrected(rate, 30.0 * (-1) ** number, number, times=(40.0, 70.0, 100.0, 130.0), members=100, side=71)
+        found = corrected(rate, 30.0 * (-1) ** number, number, times=(40.0, 70.0, 100.0, 130.0), members=300, side=71)
         within += abs(found.steps[2].posterior["rate"][2] / rate - 1.0) <= 0.2
         scores = found.steps[3].scores
         better += scores["corrected"].crps <= 0.6 * scores["free"].crps
