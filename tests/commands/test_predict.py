@@ -153,3 +153,30 @@ def test_a_real_fire_is_near_its_scar(tmp_path):
     assert main(arguments(fire, **more, **layers)) == 0
     chance, scar = read(tmp_path / "burn_probability.tif") >= 0.5, read(fire / "scar.asc") > 0
     assert (chance & scar).sum() / (chance | scar).sum() > 0.8
+
+
+def test_a_prediction_is_corrected_by_what_was_seen(folder, capsys):
+    assert main(arguments(folder, fires=2, hours=2, perimeter_hours=0.5)) == 0
+    seen = folder / "out" / "perimeters.geojson"
+    shapes = json.loads(seen.read_text())
+    shapes["features"] = shapes["features"][:2]
+    (folder / "seen.geojson").write_text(json.dumps(shapes))
+    out = folder / "corrected"
+    given = {"observed": folder / "seen.geojson", "members.rate": 0.3, "hours": 2, "fires": 6, "out": out}
+    capsys.readouterr()
+    assert main(arguments(folder, **given)) == 0
+    told, text = json.loads((out / "report.json").read_text())["observed"], capsys.readouterr().out
+    assert [row["minutes"] for row in told["observations"]] == [30.0, 60.0] and told["members"] == 6
+    assert told["observations"][1]["burned_ha"] == pytest.approx(shapes["features"][1]["properties"]["area_ha"])
+    assert "| factor on all rates |" in text and "| 1.00 | corrected |" in text and (out / "observed.png").exists()
+    lines = (out / "observed.csv").read_text().splitlines()
+    assert len(lines) == 1 + 2 * 5 and lines[0].startswith("minutes,lead_minutes,kind,burned_ha,forecast,jaccard")
+    chance, hours = read(out / "burn_probability.tif"), read(out / "arrival_hours.tif")
+    assert (chance == 1.0).sum() * 0.25 >= told["observations"][1]["burned_ha"] and np.nanmax(hours) <= 1.0
+
+
+def test_what_cannot_be_read_as_seen_is_one_line_and_nothing_is_written(folder, capsys):
+    (folder / "seen.csv").write_text("latitude,longitude,acq_date,acq_time\n0.0,3.0,2024-07-01,1300\n")
+    assert main(arguments(folder, observed=folder / "seen.csv")) == 2 and not (folder / "out").exists()
+    line = capsys.readouterr().err.strip().splitlines()[-1]
+    assert "the time of what is observed must have no offset where the rows have none" in line

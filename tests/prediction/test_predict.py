@@ -11,6 +11,7 @@ from warp_torchrl.prediction.passing import steepness
 from warp_torchrl.prediction.predict import lasting, predict
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.fires import alone
+from warp_torchrl.world.fires.members import Members
 from warp_torchrl.world.fires.spell import Spell, spread_in
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.state.state import Landscape
@@ -218,3 +219,16 @@ HISTORIES = {
 def test_a_history_refuses_what_its_law_cannot_do(rule):
     with pytest.raises(ValueError, match=rule):
         fire_history(ground(8).age, ground(8).cover, **HISTORIES[rule])
+
+
+def test_members_burn_each_in_its_wind_and_at_its_rates():
+    values = torch.tensor([[0.0, 0.0, 0.0, 0.0], [math.log(1.3), math.log(2.0), 20.0, 0.0]])
+    both = run(270.0, fires=2, members=Members(values), hours=0.5)
+    one, other = (run(270.0, members=Members(values[at : at + 1]), hours=0.5) for at in (0, 1))
+    came = (both.burn_probability == 1.0) & (both.arrival_minutes > 5.0)
+    for name in ("rate", "intensity"):
+        mean = (getattr(one, name) + getattr(other, name)) / 2.0
+        assert torch.allclose(getattr(both, name)[came], mean[came], rtol=0.03)
+    assert bool(came.any()) and float(other.final_area[0]) > 1.3 * float(one.final_area[0])
+    with pytest.raises(ValueError, match="members must be as many as fires, 3, got 2"):
+        run(270.0, fires=3, members=Members(values))

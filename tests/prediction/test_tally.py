@@ -29,7 +29,7 @@ def burned(*fires):
     for number, cells in enumerate(fires):
         for (row, column), minutes in cells.items():
             times[number, row, column] = minutes
-    return Burned(Window.whole(SIZE), times, torch.ones_like(times))
+    return Burned(Window.whole(SIZE), times, torch.ones_like(times), counter().fires)
 
 
 def test_rates_are_held_between_rear_and_head_and_intensity_goes_with_them():
@@ -86,7 +86,7 @@ def test_windows_of_different_fires_make_one_map():
         window = Window.about(lit(size, (row, column)))
         times = torch.full((1, window.height, window.width), NEVER)
         times[0, row - window.top, column - window.left] = minutes
-        tally.add(count(Burned(window, times, torch.ones_like(times))))
+        tally.add(count(Burned(window, times, torch.ones_like(times), count.fires)))
     seen, window = tally.burn_probability(), tally.window
     arrivals = tally.arrivals()
     for (row, column), minutes in parts.items():

@@ -16,6 +16,17 @@ from warp_torchrl.commands.program import run_program
 from warp_torchrl.prediction.animation import write_animation
 from warp_torchrl.prediction.case import Case, read_case, whole_map
 from warp_torchrl.prediction.files import MAPS_FIGURE, write_figure, write_layers, write_perimeters
+from warp_torchrl.prediction.observed.correction import Corrected, Correction, Scene
+from warp_torchrl.prediction.observed.observation import Observation
+from warp_torchrl.prediction.observed.reading import read_observations
+from warp_torchrl.prediction.observed.report import (
+    FIGURE,
+    SCORES,
+    observed_lines,
+    observed_numbers,
+    write_observed_figure,
+    write_scores,
+)
 from warp_torchrl.prediction.predict import Prediction, lasting, predict
 from warp_torchrl.prediction.report import page, report_numbers, warnings
 from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
@@ -25,8 +36,10 @@ from warp_torchrl.runs.config.options import PredictionOptions
 from warp_torchrl.runs.output import output_folder
 from warp_torchrl.system import disk
 from warp_torchrl.system.provenance import Provenance, gathered
+from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.terrain.raster import Raster
+from warp_torchrl.world.weather.table import minutes_until
 
 log = logging.getLogger("warp_torchrl")
 
@@ -34,7 +47,7 @@ _GROUPS = ("landscape", "fire")
 REPORT = "report.json"
 OUTPUTS = (
     *("burn_probability.tif", "arrival_hours.tif", "rate.tif", "intensity.tif", "flame_length.tif"),
-    *("perimeters.geojson", MAPS_FIGURE, "fire.gif", "report.md"),
+    *("perimeters.geojson", MAPS_FIGURE, "fire.gif", "report.md", FIGURE, SCORES),
 )
 """What an earlier prediction may have left, beside its report."""
 USAGE = "warp predict landscape.path=FOLDER weather=FILE.csv ignition=FILE [hours=24] [fires=1000] [KEY=VALUE ...]"
@@ -72,14 +85,23 @@ def _run(arguments: Sequence[str]) -> None:
     with output_folder(folder, "out", overwrite=options.overwrite, last=REPORT, replaced=OUTPUTS) as draft:
         with gathered() as files:
             case = read_case(_landscape(values["landscape"]), _law(values["fire"]), options)
-        prediction, seconds = _burn(case, options)
-        report = _report(prediction, case, values, files, {"fires": seconds, "all": time.perf_counter() - began})
+            seen = _observations(case, options)
+        fires_began = time.perf_counter()
+        corrected = _correct(case, options, seen) if seen else None
+        prediction = _burn(case, options, corrected)
+        seconds = {"fires": time.perf_counter() - fires_began, "all": time.perf_counter() - began}
+        report = _report(prediction, case, values, files, seconds)
         _write(draft, prediction, case, options, report["title"])
+        text = page(report)
+        if corrected is not None:
+            report["observed"] = observed_numbers(corrected, case.cell_size)
+            text += "\n" + "\n".join(observed_lines(report["observed"])) + "\n"
+            _write_observed(draft, report)
         report["seconds"]["all"] = time.perf_counter() - began
         disk.replace(draft / REPORT, json.dumps(report, indent=1))
-        disk.replace(draft / "report.md", page(report))
+        disk.replace(draft / "report.md", text)
         written = sorted(each.name for each in draft.iterdir())
-    print(page(report))
+    print(text)
     print(f"wrote {', '.join(written)} into {folder}", flush=True)
 
 
@@ -106,25 +128,62 @@ def _law(node: Mapping[str, Any]) -> RateFire:
     return law
 
 
-def _burn(case: Case, options: PredictionOptions) -> tuple[Prediction, float]:
-    """Burn the fires behind a progress bar; return the prediction and the seconds that it took."""
-    began = time.perf_counter()
+def _observations(case: Case, options: PredictionOptions) -> list[Observation]:
+    """Return what was seen of the fire on the way; none where no file is named."""
+    if options.observed is None:
+        return []
+
+    def moment(text: str) -> float:
+        path, zone = str(options.weather), options.observed_zone
+        return minutes_until(text, path, options.units, "the time of what is observed", zone) - case.start
+
+    height, width = case.ignition.shape
+    end = _minutes(case, options)
+    return read_observations(options.observed, case.place.grid, case.place.corner, (height, width), moment, end)
+
+
+def _minutes(case: Case, options: PredictionOptions) -> float:
+    """Return for how long fires are followed."""
+    return lasting(case.weather, case.start) if options.hours is None else 60.0 * options.hours
+
+
+def _correct(case: Case, options: PredictionOptions, seen: Sequence[Observation]) -> Corrected:
+    """Return what was learned from observations, behind a progress bar."""
+    scene = Scene(
+        ground=case.ground,
+        cell_size=case.cell_size,
+        fire=case.fire,
+        air=Weather(table=case.weather, convergence=case.convergence),
+        start=case.start,
+        lit=case.ignition,
+    )
+    correction = Correction(
+        members=options.fires, deviations=options.members, sensor=options.hot_spots, seed=options.seed
+    )
+    with tqdm(total=len(seen), unit="observation", disable=None, dynamic_ncols=True) as bar:
+        return correction(scene, seen, bar.update)
+
+
+def _burn(case: Case, options: PredictionOptions, corrected: Corrected | None) -> Prediction:
+    """Burn the fires behind a progress bar: from the ignition, or from what was last seen."""
+    begun = 0.0 if corrected is None else corrected.minutes
     with tqdm(total=options.fires, unit="fire", disable=None, dynamic_ncols=True) as bar:
-        found = predict(
+        return predict(
             case.ground,
             case.weather,
-            case.ignition,
-            fire=case.fire,
+            case.ignition if corrected is None else corrected.burned,
+            fire=case.fire if corrected is None else case.fire.alike(),
             cell_size=case.cell_size,
-            hours=options.hours,
+            hours=options.hours if corrected is None else (_minutes(case, options) - begun) / 60.0,
             area=options.area,
             fires=options.fires,
             seed=options.seed,
-            start=case.start,
+            start=case.start + begun,
             convergence=case.convergence,
+            members=None if corrected is None else corrected.equal_members(options.seed),
+            is_seen=corrected is not None,
             progress=bar.update,
         )
-    return found, time.perf_counter() - began
 
 
 def _report(
@@ -176,3 +235,12 @@ def _write(folder: Path, prediction: Prediction, case: Case, options: Prediction
         end = float(prediction.followed[0])
         first, ground = prediction.seen["first_fire"], prediction.ground_seen
         write_animation(folder / "fire.gif", first, ground, case.cell_size, end, case.fire.residence)
+
+
+def _write_observed(folder: Path, report: Mapping[str, Any]) -> None:
+    """Write the scores of forecasts; without Matplotlib all but the figure."""
+    write_scores(folder / SCORES, report["observed"])
+    try:
+        write_observed_figure(folder / FIGURE, report["observed"], report["title"])
+    except ImportError:
+        log.warning('no %s: Matplotlib is missing, pip install "warp_torchrl[figures]"', FIGURE)

@@ -115,7 +115,7 @@ class Counter:
             return sums
         cells = torch.cat((cells, cells[:1].expand(-count % COLUMNS)))  # vectors that are filled
         times = arrival.flatten()[cells]
-        then = self._then(cells % burned.window.cells, times, burned.window)
+        then = self._then(cells, times, burned)
         steep = steepness_from(_around(arrival, cells), times)
         for number, values in enumerate(passing(steep, burned.pace.flatten()[cells], then, self.fires.cell_size)):
             plane = torch.zeros(arrival.numel())
@@ -123,14 +123,18 @@ class Counter:
             sums[number] = plane.view(arrival.shape).sum(0)
         return sums
 
-    def _then(self, place: Tensor, times: Tensor, window: Window) -> HeadBehaviour:
-        """Return what heads do in cells of a window at some times, float32 [n]."""
+    def _then(self, cells: Tensor, times: Tensor, burned: Burned) -> HeadBehaviour:
+        """Return what heads do in cells of the fires' planes at some times, float32 [n]."""
+        window, groups = burned.window, burned.fires.groups
+        fires_each = len(burned.minutes) // groups
+        place = cells % window.cells + cells // window.cells // fires_each * window.cells
         spell = torch.bucketize(times, self._ends).clamp(max=len(self._ends) - 1)
         order = spell.argsort()
         found = torch.empty(4, len(place))
         for part in order.split(torch.bincount(spell).tolist()):
             if len(part):
-                found[:, part] = self.fires.planes(int(spell[part[0]]), window)[3:].flatten(1)[:, place[part]]
+                heads = burned.fires.planes(int(spell[part[0]]), window)[:, 3:].transpose(0, 1)
+                found[:, part] = heads.flatten(1)[:, place[part]]
         return HeadBehaviour(*found)
 
     def _by_hour(self, arrival: Tensor, came: Tensor, window: Window) -> tuple[Tensor, Tensor]:

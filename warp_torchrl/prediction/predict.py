@@ -11,7 +11,8 @@ from warp_torchrl.prediction.counts import Counter
 from warp_torchrl.prediction.tally import Tally
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.arrays.random import world_key
-from warp_torchrl.world.fires.alone import Fires
+from warp_torchrl.world.fires.members import Members
+from warp_torchrl.world.fires.sightings import beside
 from warp_torchrl.world.fires.spell import Spell
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.state.state import Landscape
@@ -113,6 +114,8 @@ def predict(
     seed: int = 0,
     start: float = 0.0,
     convergence: float = 0.0,
+    members: Members | None = None,
+    is_seen: bool = False,
     progress: Callable[[int], object] | None = None,
 ) -> Prediction:
     """Burn many fires on one map, in hourly weather, and return their maps and curves.
@@ -132,6 +135,9 @@ def predict(
         seed: Fire i has seed ``seed + i``.
         start: When the fires start, since the weather's first row began [minutes].
         convergence: Angle from true north, of the weather's bearings, to the map's grid north, clockwise [degrees].
+        members: By what fires differ in rate, wind and moisture, one for each; None: by ``fire_deviation`` alone.
+        is_seen: Whether the ignition is what a fire had burned when it was seen: its front is on average half a cell
+            ahead then.
         progress: Called with how many fires have been burned since the last call.
 
     Raises:
@@ -141,13 +147,17 @@ def predict(
     law = RateFire() if fire is None else fire
     _check(ground, ignition, cell_size)
     _check_numbers(fires, area, hours, seed)
+    if members is not None and len(members) != fires:
+        raise ValueError(f"members must be as many as fires, {fires}, got {len(members)}")
     _check_times(start, convergence)
     table = weather if isinstance(weather, WeatherTable) else read_weather(weather)
     left = lasting(table, start)
     minutes = left if hours is None else 60.0 * hours
     air = Weather(table=table, convergence=convergence)
     met = [Spell(wind, lasts, moisture) for wind, moisture, lasts in air.spells(minutes, start)]
-    burning = Fires(fire=law, landscape=ground, spells=met, cell_size=cell_size)
+    front = beside(ignition.cpu()) if is_seen else None
+    who = Members.plain(fires) if members is None else members
+    burning = who.fires(law, ground, met, cell_size, front)
     lit = ignition.cpu() & burning.fuel
     if not bool(lit.any()):
         raise ValueError(f"ignition must light a cell with fuel, none of its {int(ignition.sum())} cells has any")

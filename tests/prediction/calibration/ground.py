@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import torch
 
-from warp_torchrl.prediction.calibration.candidates import arrivals, median_pace
+from warp_torchrl.prediction.calibration.candidates import median_arrivals
 from warp_torchrl.prediction.calibration.case import FireCase
 from warp_torchrl.world.fires.spell import Spell
 from warp_torchrl.world.law.rate import RateFire
@@ -48,7 +48,7 @@ def case_of(truth, wind=(4.0, 1.0), side=41, name="drawn", turned=60.0):
         minutes=torch.tensor([60.0, 120.0, 180.0]),
         burned=torch.ones(3, side, side, dtype=torch.bool),
     )
-    times = arrivals([truth], case, median_pace([truth], case))[0, 0]
+    times = median_arrivals([truth], case)[0, 0]
     return replace(case, burned=times <= case.minutes[:, None, None])
 
 

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from tests.prediction.calibration.ground import case_of, cases_of, fire
-from warp_torchrl.prediction.calibration.candidates import arrivals, burnable, grouped, median_pace
+from warp_torchrl.prediction.calibration.candidates import burnable, fires_of, median_arrivals
 from warp_torchrl.prediction.calibration.evolution import Evolution
 from warp_torchrl.prediction.calibration.expected import burning_probability, differentiated, margin
 from warp_torchrl.prediction.calibration.fitting import check_not_in_weather, folds
@@ -63,7 +63,7 @@ def test_the_prior_adds_its_weight_times_half_of_z_squared():
 def test_in_weather_that_stays_the_margin_is_the_logarithm_of_the_time():
     start = fire()
     case = case_of(TRUTH, turned=0.0)
-    times = arrivals([start], case, median_pace([start], case))[0, 0]
+    times = median_arrivals([start], case)[0, 0]
     found = margin(start, (), torch.zeros(0), case)
     near = (times > 100.0) & (times < 178.0)
     off = found.log_factor[-1][near] - torch.log(times[near] / 180.0)
@@ -90,7 +90,7 @@ def test_times_go_down_by_their_share_where_all_rates_go_up():
     # In weather that stays t is proportional to 1 / rate, so dt / dx is -t: on the engine's own derivatives
     start = fire()
     case = case_of(TRUTH, side=25, turned=0.0)
-    hours = [grouped([start], case, spell, burnable(start, case)) for spell in case.spells]
+    hours = [fires_of([start], case).hour(number) for number in range(len(case.spells))]
     tangents = torch.stack([-hour.travel for hour in hours])
     minutes, slopes = differentiated(hours, tangents, case, burnable(start, case))
     came = minutes < NEVER / 2
@@ -100,8 +100,8 @@ def test_times_go_down_by_their_share_where_all_rates_go_up():
 def test_groups_of_laws_burn_as_each_does_alone():
     laws = [fire(), fire(rate_gain=1.4)]
     case = case_of(TRUTH, side=25)
-    both = arrivals(laws, case, median_pace(laws, case))[:, 0]
-    alone = arrivals(laws[1:], case, median_pace(laws[1:], case))[0, 0]
+    both = median_arrivals(laws, case)[:, 0]
+    alone = median_arrivals(laws[1:], case)[0, 0]
     assert torch.equal(both[1], alone), "the faster law sets the ticks of both"
     assert (both[0] <= 180.0).sum() < (both[1] <= 180.0).sum()
 

@@ -20,15 +20,11 @@ def told(batch):
 
 def of_other_types(batch):
     """The tensors of a batch that are of another type than is told; a ``Named`` tells none of its own."""
-    types, found = told(batch), {}
+    types, found, tells = told(batch), {}, not isinstance(batch, Named)
     for name, value in batch.parts():
         if isinstance(value, Batch):
             found |= {f"{name}.{inner}": each for inner, each in of_other_types(value).items()}
-        elif (
-            isinstance(value, Tensor)
-            and not isinstance(batch, Named)
-            and str(value.dtype).removeprefix("torch.") != types.get(name)
-        ):
+        elif tells and isinstance(value, Tensor) and str(value.dtype).removeprefix("torch.") != types.get(name):
             found[name] = value.dtype
     return found
 

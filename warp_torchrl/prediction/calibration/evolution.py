@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from warp_torchrl.prediction.calibration.candidates import arrivals, burnable, median_pace, paces
+from warp_torchrl.prediction.calibration.candidates import arrivals, burnable, median_arrivals
 from warp_torchrl.prediction.calibration.case import FireCase
 from warp_torchrl.prediction.calibration.losses import Loss, jaccard_loss, probability_loss
 from warp_torchrl.prediction.calibration.parameters import DEVIATIONS, Parameter, fire_at
@@ -92,8 +92,7 @@ class Evolution:
 
     def _of_case(self, laws: Sequence[RateFire], case: FireCase, drawn: bool) -> Tensor:
         key = world_key(torch.arange(_DRAWS) + self.seed)
-        pace = paces(laws, key, (case.lit.shape[0], case.lit.shape[1])) if drawn else median_pace(laws, case)
-        times = arrivals(laws, case, pace)
+        times = arrivals(laws, case, key) if drawn else median_arrivals(laws, case)
         if self.loss == "jaccard":
             return torch.tensor([jaccard_loss(each, case.minutes, case.burned) for each in times])
         probability = (times[:, None] <= case.minutes[:, None, None, None]).to(torch.float32).mean(2)

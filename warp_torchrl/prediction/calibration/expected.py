@@ -25,7 +25,7 @@ import torch
 from torch import Tensor
 from torch.autograd import forward_ad
 
-from warp_torchrl.prediction.calibration.candidates import burnable, grouped
+from warp_torchrl.prediction.calibration.candidates import burnable, fires_of
 from warp_torchrl.prediction.calibration.case import FireCase
 from warp_torchrl.prediction.calibration.parameters import Parameter, fire_at
 from warp_torchrl.world.backends.spreading import Hour, Spreading
@@ -65,8 +65,8 @@ def margin(fire: RateFire, parameters: Sequence[Parameter], z: Tensor, case: Fir
     """
     law = fire_at(fire, parameters, z)
     fuel = burnable(law, case)
-    hours = [grouped([law], case, spell, fuel) for spell in case.spells]
-    tangents = [-hour.travel for hour in hours], *_tangents(fire, parameters, z, case, fuel)
+    hours = _hours([law], case)
+    tangents = [-hour.travel for hour in hours], *_tangents(fire, parameters, z, case)
     minutes, slopes = differentiated(hours, torch.stack([torch.cat(each) for each in tangents], 1), case, fuel)
     return _margin(minutes, slopes, case.minutes, fuel)
 
@@ -81,16 +81,20 @@ def burning_probability(log_factor: Tensor, deviation: Tensor | float) -> Tensor
     return 0.5 * torch.erfc(log_factor / deviation / math.sqrt(2.0))
 
 
-def _tangents(
-    fire: RateFire, parameters: Sequence[Parameter], z: Tensor, case: FireCase, fuel: Tensor
-) -> list[list[Tensor]]:
+def _hours(laws: Sequence[RateFire], case: FireCase) -> list[Hour]:
+    """Return the spells of a case under each law, on the whole map."""
+    fires = fires_of(laws, case)
+    return [fires.hour(number) for number in range(len(case.spells))]
+
+
+def _tangents(fire: RateFire, parameters: Sequence[Parameter], z: Tensor, case: FireCase) -> list[list[Tensor]]:
     """Return the derivative of the times of ways by each z, of each spell, float32 [1, 3, H, W]."""
     found = []
     for index in range(len(parameters)):
         step = torch.zeros_like(z)
         step[index] = _STEP
         laws = [fire_at(fire, parameters, z + step), fire_at(fire, parameters, z - step)]
-        pairs = (grouped(laws, case, spell, fuel).travel for spell in case.spells)
+        pairs = (hour.travel for hour in _hours(laws, case))
         found.append([(pair[:1] - pair[1:]) / (2.0 * _STEP) for pair in pairs])
     return found
 

@@ -6,6 +6,8 @@ from typing import Any, Literal
 
 from warp_torchrl.runs.config.seeds import BEYOND_EVALUATION, FIRST_EVALUATED
 from warp_torchrl.validation import check_fields
+from warp_torchrl.world.fires.members import Deviations
+from warp_torchrl.world.fires.sightings import HotSpotSensor
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,6 +94,14 @@ class PredictionOptions:
         start_ffmc: Fine fuel moisture code an hour before the first row, for a file without FFMC.
         bui: Buildup index, for a file without BUI, DMC and DC; None takes the law's.
         cell_size: Side of a cell [m]; None is that of the landscape.
+        observed: File of what was seen of the fire on the way: perimeters with times (GeoJSON or a shapefile), or hot
+            spots of satellites (CSV). Each corrects the prediction, which continues from the last one.
+        observed_zone: Hours that the weather's rows are ahead of UTC, for times in UTC where neither rows nor file say
+            it: ``observed_zone=-7``.
+        members: How far fires differ before anything is seen, where something is: ``members.rate=0.4``,
+            ``members.wind_speed``, ``members.bearing`` [degrees], ``members.moisture``.
+        hot_spots: The satellite: ``hot_spots.pixel=375`` [m], ``hot_spots.detection``, ``hot_spots.false_alarm``,
+            ``hot_spots.lately`` [h].
         animation: Whether the first fire is written as a GIF.
         out: Folder to write to; None makes one in ``outputs/predictions``.
         overwrite: Write into a folder that holds something.
@@ -115,6 +125,10 @@ class PredictionOptions:
     start_ffmc: float = 85.0
     bui: float | None = None
     cell_size: float | None = None
+    observed: str | None = None
+    observed_zone: float | None = None
+    members: Deviations = field(default_factory=Deviations)
+    hot_spots: HotSpotSensor = field(default_factory=HotSpotSensor)
     animation: bool = False
     out: str | None = None
     overwrite: bool = False
@@ -131,6 +145,7 @@ class PredictionOptions:
             start_ffmc=(0.0, 101.0),
             bui=(0.0, 2000.0),
             cell_size=(0.01, 100_000.0),
+            observed_zone=(-14.0, 14.0),
         )
         for name, what in (("weather", "a CSV file of weather"), ("ignition", "a file of where the fire starts")):
             if getattr(self, name) is None:

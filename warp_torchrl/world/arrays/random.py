@@ -44,6 +44,7 @@ class Stream(IntEnum):
     LANDS = 21
     IMAGINED = 22
     NAMED = 23
+    MEMBERS = 24
 
 
 def world_key(seed: Tensor, episode: Tensor | int = 0) -> Tensor:
@@ -101,6 +102,12 @@ def uniform(key: Tensor, tick: Tensor | int, stream: Stream, shape: tuple[int, .
         probability 1e-8 happen as often as they should.
     """
     return uniform_at(key, tick, stream, counting(math.prod(shape), key)[None]).view(-1, *shape)
+
+
+def normal(key: Tensor, tick: Tensor | int, stream: Stream, shape: tuple[int, ...]) -> Tensor:
+    """Draw standard normals, float32 [B, *shape]; arguments as of ``uniform``."""
+    u = uniform(key, tick, stream, shape)
+    return math.sqrt(2.0) * torch.erfinv((2.0 * u - 1.0).clamp(-1.0 + 1e-6, 1.0 - 1e-6))
 
 
 def uniform_at(key: Tensor, tick: Tensor | int, stream: Stream, index: Tensor) -> Tensor:

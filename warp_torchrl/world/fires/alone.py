@@ -5,7 +5,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TypeVar
 
@@ -15,6 +15,7 @@ from torch import Tensor
 from warp_torchrl.system import memory
 from warp_torchrl.world.backends.growing import GrowingFires, Land, SpellInWindows
 from warp_torchrl.world.backends.spells import Highest, PlanesOfSpells, in_window, on_strips
+from warp_torchrl.world.backends.spreading import Hour
 from warp_torchrl.world.fires.spell import BUT_FASTEST, Spell, can_ignite, heads, spread_in, ticks_of
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER, travel
@@ -24,7 +25,8 @@ from warp_torchrl.world.state.window import Window
 _AT_ONCE = 64  # fires, whose planes a CPU's cache holds
 _MOST_CELLS = 2**24  # of the windows of fires that burn at once
 _BYTES_A_FIRE, _BYTES_A_CELL = 64, 200  # that a cell of a window takes at most, for each fire and for the map
-_PLANES = ("head", "backing", "intensity", "flame_length")
+_BYTES_OF_GROUP = 96  # that a cell takes for the planes of each group
+_N_PLANES, _HEAD = 7, 3  # three of travel, then head, backing, intensity and flame length
 T = TypeVar("T")
 
 
@@ -35,11 +37,15 @@ class Burned:
     window: Window
     minutes: Tensor  # when each fire reached each cell, float32 [b, h, w]; ``travel.NEVER`` where it does not come
     pace: Tensor  # factor on its times, float32 [b, h, w]
+    fires: "Fires"  # whose planes are those of these fires' groups
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fires:
     """Fires without vehicles on one map, in weather by the spell. Everything is computed on demand.
+
+    All fires have one law and one weather, or they form groups: of several laws, each with as many fires, or of one law
+    in several winds and moistures (``Spell``). ``Members`` makes groups of one fire each.
 
     In each spell, ticks are as short as its fastest cells need; ``fire.minutes_per_tick`` is not read.
 
@@ -48,6 +54,12 @@ class Fires:
         landscape: One landscape, batch size [1].
         spells: The weather.
         cell_size: Side of a cell [m].
+        beside: Further laws, each of another group of fires; they differ in factors, deviations and moistures alone.
+        rate: Factor on the rates of each fire, float32 [B]; None is 1.
+        swiftest: Highest of these factors; it shortens ticks.
+        half_way: Cells that the fire has come half-way to at the start, bool [H, W]: those about a perimeter, whose
+            front is half a cell ahead of the last cell inside, on average; None where it starts in its cells' middle.
+        root: All fires, where these are some of them (``of``).
         workers: Threads.
     """
 
@@ -55,6 +67,11 @@ class Fires:
     landscape: Landscape
     spells: Sequence[Spell]
     cell_size: float
+    beside: Sequence[RateFire] = ()
+    rate: Tensor | None = None
+    swiftest: float = 1.0
+    half_way: Tensor | None = None
+    root: "Fires | None" = field(default=None, repr=False)
     workers: int = field(default_factory=torch.get_num_threads)
     _lock: threading.Lock = field(init=False, repr=False, default_factory=threading.Lock)
     _fastest: dict[int, tuple[float, float]] = field(init=False, repr=False, default_factory=dict)
@@ -75,16 +92,36 @@ class Fires:
         """Return the cells that can ignite, bool [H, W]."""
         return can_ignite(self.fire, self.landscape)
 
+    @property
+    def laws(self) -> tuple[RateFire, ...]:
+        """Return the law of each group, or the one law."""
+        return self.fire, *self.beside
+
+    @property
+    def groups(self) -> int:
+        """Return the number of groups of fires that differ in law or weather."""
+        return max(len(self.laws), *(spell.groups for spell in self.spells))
+
     @cached_property
-    def planes(self) -> PlanesOfSpells:
-        """Return the function of a spell and a window that gives travel times and then ``Heads``, float32 [7, h, w]."""
+    def _made(self) -> PlanesOfSpells:
         return PlanesOfSpells(lambda number, window: in_window(partial(self._planes, number), window))
 
+    def planes(self, number: int, window: Window) -> Tensor:
+        """Return the planes of each group in a spell and a window: three of ``travel``, then those of the heads.
+
+        Returns:
+            float32 [G, 7, h, w]; the heads as in ``passing.HeadBehaviour``.
+        """
+        made = self._made(number, window)
+        return made.view(-1, _N_PLANES, *made.shape[1:])
+
     def fastest(self, number: int) -> tuple[float, float]:
-        """Return the rates of a spell's fastest heads but one in a thousand [m/min].
+        """Return the rates of a spell's fastest heads but one in a thousand [m/min], of the fastest group.
 
         Of the cells that can ignite, and of all cells.
         """
+        if self.root is not None:
+            return self.root.fastest(number)
         with self._lock:
             if number not in self._fastest:
                 self._fastest[number] = self._fastest_of(number)
@@ -93,8 +130,27 @@ class Fires:
     def spell(self, number: int) -> SpellInWindows:
         """Return a spell, in ticks as short as its fastest cells but one in a thousand need."""
         minutes = self.spells[number].minutes
-        ticks = ticks_of(minutes, self.fastest(number)[0], self.cell_size)
-        return SpellInWindows(lambda window: self.planes(number, window)[:3], minutes / ticks, ticks)
+        ticks = ticks_of(minutes, self.fastest(number)[0] * self.swiftest, self.cell_size)
+        return SpellInWindows(lambda window: self.planes(number, window)[:, :_HEAD], minutes / ticks, ticks)
+
+    def hour(self, number: int) -> Hour:
+        """Return a spell on the whole map, its travel times float32 [G, 3, H, W]."""
+        spell = self.spell(number)
+        return Hour(spell.travel(Window.whole(self.size)), spell.minutes, spell.ticks)
+
+    def of(self, fires: slice, each: int = 1) -> "Fires":
+        """Return some of the fires, in the ticks of all.
+
+        Args:
+            fires: Whole groups, or fires of one law.
+            each: Fires of each law.
+        """
+        laws = self.laws if not self.beside else self.laws[fires.start // each : -(-fires.stop // each)]
+        rate = None if self.rate is None else self.rate[fires]
+        spells = [spell.of(fires) for spell in self.spells]
+        if self.groups == 1 and rate is None:
+            return self
+        return replace(self, fire=laws[0], beside=laws[1:], spells=spells, rate=rate, root=self.root or self)
 
     def burn(self, lit: Tensor, key: Tensor, most: int | None = None) -> Burned:
         """Burn some fires at once, to the end of the weather.
@@ -110,7 +166,7 @@ class Fires:
         land = Land(lambda window: window.cut(self.fuel, False), lambda window: self.pace(key, window))
         fires = GrowingFires(lit, len(key), land, most, partial(self._check, len(key)))
         fires.burn_spells(self._going(number) for number in range(len(self.spells)))
-        return Burned(fires.window, fires.arrival(), self.pace(key, fires.window))
+        return Burned(fires.window, fires.arrival(), self.pace(key, fires.window), self)
 
     def in_parts(self, lit: Tensor, key: Tensor, then: Callable[[Burned], T], most: int | None = None) -> Iterator[T]:
         """Burn many fires, some at a time, and yield the result of each part, in order.
@@ -124,29 +180,43 @@ class Fires:
         Raises:
             ValueError: If the window of one fire does not fit in memory.
         """
-        limit = [_AT_ONCE]
+        limit, each = [_AT_ONCE], max(1, len(key) // len(self.laws))
 
-        def burned(part: tuple[Tensor, Tensor]) -> list[T]:
-            keys, begun = part
+        def burned(part: slice) -> list[T]:
+            count = part.stop - part.start
             try:
-                if len(keys) > limit[0]:
+                if count > limit[0]:
                     raise _TooMany
-                return [then(self.burn(begun, keys, most))]
+                begun = lit if lit.dim() == 2 else lit[part]
+                return [then(self.of(part, each).burn(begun, key[part], most))]
             except _TooMany:
-                half = limit[0] = min(limit[0], -(-len(keys) // 2))
-                return [each for less in _parts(keys, begun, half) for each in burned(less)]
+                half = limit[0] = min(limit[0], -(-count // 2))
+                return [each for less in parts(part, half) for each in burned(less)]
+
+        def parts(whole: slice, size: int) -> Iterator[slice]:
+            """Yield parts of whole laws where some fit, else of one law each."""
+            if size >= each or not self.beside:
+                return _parts(whole, size - size % each if self.beside else size)
+            return (less for law in _parts(whole, each) for less in _parts(law, size))
 
         self._ended.clear()
         workers = 1 if lit.is_cuda else self.workers
-        for found in _side_by_side(burned, _parts(key, lit, _AT_ONCE), workers, self._ended):
+        for found in _side_by_side(burned, parts(slice(0, len(key)), _AT_ONCE), workers, self._ended):
             yield from found
 
     def pace(self, key: Tensor, window: Window) -> Tensor:
         """Return the factor on the times of some fires in a window, float32 [b, h, w]."""
-        return self.fire.pace(key, self.size) if window.is_whole else self.fire.pace_in(key, window)
+        keys = key.chunk(len(self.laws))
+        paces = [
+            law.pace(each, self.size) if window.is_whole else law.pace_in(each, window)
+            for law, each in zip(self.laws, keys, strict=True)
+        ]
+        pace = paces[0] if len(paces) == 1 else torch.cat(paces)
+        pace = pace if self.rate is None else pace / self.rate[:, None, None]
+        return pace if self.half_way is None else torch.where(window.cut(self.half_way, False), 0.5 * pace, pace)
 
     def _going(self, number: int) -> SpellInWindows:
-        if self._ended.is_set():
+        if (self.root or self)._ended.is_set():
             raise _Ended
         return self.spell(number)
 
@@ -157,7 +227,8 @@ class Fires:
             _TooMany: If fewer fires may fit.
             ValueError: If not even one fits.
         """
-        wanted = window.cells * (fires * _BYTES_A_FIRE + _BYTES_A_CELL)
+        groups = 0 if self.groups == 1 else self.groups * _BYTES_OF_GROUP
+        wanted = window.cells * (fires * _BYTES_A_FIRE + groups + _BYTES_A_CELL)
         there = memory.available()
         if fires > 1 and (fires * window.cells > _MOST_CELLS or wanted * self.workers > there):
             raise _TooMany
@@ -165,21 +236,29 @@ class Fires:
             raise memory.too_little(f"a fire in a window of {window.height} x {window.width} cells", wanted, there)
 
     def _planes(self, number: int, window: Window) -> Tensor:
+        """Return the planes of each group, float32 [G 7, h, w]."""
         place = None if window.is_whole else window
-        spread = spread_in(self.fire, self.landscape, self.cell_size, self.spells[number], place)
-        made = travel(spread.head, spread.direction, spread.length_to_breadth, self.cell_size)
-        return torch.cat((made[0], heads(spread)))
+        made = []
+        for law in self.laws:
+            spread = spread_in(law, self.landscape, self.cell_size, self.spells[number], place)
+            times = travel(spread.head, spread.direction, spread.length_to_breadth, self.cell_size)
+            made.append(torch.cat((times, heads(spread)), dim=1))
+        return (made[0] if len(made) == 1 else torch.cat(made)).flatten(0, 1)
 
-    def _head(self, number: int, strip: Window) -> Tensor:
-        if strip.is_whole:
-            return self.planes(number, strip)[3]
-        return spread_in(self.fire, self.landscape, self.cell_size, self.spells[number], strip).head[0]
+    def _head(self, number: int, law: RateFire, strip: Window) -> Tensor:
+        if strip.is_whole and self.groups == 1:
+            return self.planes(number, strip)[0, _HEAD]
+        spell = self.spells[number].fastest or self.spells[number]
+        return spread_in(law, self.landscape, self.cell_size, spell, strip).head[0]
 
     def _fastest_of(self, number: int) -> tuple[float, float]:
+        return tuple(map(max, zip(*(self._fastest_by(law, number) for law in self.laws), strict=True)))  # type: ignore[return-value]
+
+    def _fastest_by(self, law: RateFire, number: int) -> tuple[float, float]:
         n_fuel, n_cells = int(self.fuel.sum()), self.fuel.numel()
         of_fuel = Highest(n_fuel - max(1, math.ceil(BUT_FASTEST * n_fuel)) + 1)
         of_all = Highest(n_cells - max(1, round(BUT_FASTEST * n_cells)) + 1)
-        for strip, head in on_strips(partial(self._head, number), self.size, self.workers):
+        for strip, head in on_strips(partial(self._head, number, law), self.size, self.workers):
             of_fuel.add(head[strip.cut(self.fuel, False)])
             of_all.add(head.flatten())
         return of_fuel.least if n_fuel else 0.0, of_all.least
@@ -207,11 +286,11 @@ def arrival_minutes(
         float32 [b, H, W] [minutes], in order; ``travel.NEVER`` where the fire does not come.
     """
     fires = Fires(fire=fire, landscape=landscape, spells=spells, cell_size=cell_size)
-    yield from fires.in_parts(lit, key, _on_map)
+    yield from fires.in_parts(lit, key, on_map)
 
 
-def _on_map(burned: Burned) -> Tensor:
-    """Return the minutes on the whole map."""
+def on_map(burned: Burned) -> Tensor:
+    """Return the minutes on the whole map, float32 [b, H, W]."""
     if burned.window.is_whole:
         return burned.minutes.clone()
     plane = burned.minutes.new_full((len(burned.minutes), *burned.window.map), NEVER)
@@ -226,15 +305,15 @@ class _Ended(Exception):  # noqa: N818
     """Other threads have ended the work."""
 
 
-def _parts(key: Tensor, lit: Tensor, size: int) -> Iterator[tuple[Tensor, Tensor]]:
-    """Yield the keys of ``size`` fires at a time, and where they start, bool [H, W] or [b, H, W]."""
-    parts = key.split(size)
-    yield from zip(parts, lit.split(size) if lit.dim() == 3 else [lit] * len(parts), strict=True)
+def _parts(whole: slice, size: int) -> Iterator[slice]:
+    """Yield ``size`` fires at a time."""
+    begins = range(whole.start, whole.stop, size)
+    yield from (slice(begin, min(begin + size, whole.stop)) for begin in begins)
 
 
 def _side_by_side(
-    function: Callable[[tuple[Tensor, Tensor]], T],
-    parts: Iterable[tuple[Tensor, Tensor]],
+    function: Callable[[slice], T],
+    parts: Iterable[slice],
     workers: int,
     ended: threading.Event,
 ) -> Iterator[T]:

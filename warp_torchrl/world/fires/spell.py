@@ -1,67 +1,69 @@
 """Spells of constant weather, and the heads of fires in them."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.backends.spreading import Hour
 from warp_torchrl.world.behaviour.moistures import moisture_row
 from warp_torchrl.world.behaviour.spread import Spread
 from warp_torchrl.world.law.fuel_bed import gradient
 from warp_torchrl.world.law.rate import TICKS_PER_CELL, RateFire
-from warp_torchrl.world.law.travel import travel
 from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.state.window import Window
 
 BUT_FASTEST = 0.999
 """Share of the cells whose rates set the ticks."""
+_SPREAD_AT_ONCE = 2**20  # cells of groups whose rates are computed at once
 _LEAST_TICKS = 4  # of a spell: the fire's edge follows from the times of the tick before
 
 
 @dataclass(frozen=True, eq=False)
 class Spell:
-    """A time of constant weather."""
+    """A time of constant weather: one for all fires, or one for each of G groups of fires."""
 
-    wind: Tensor  # (u east, v north) of the air's motion at 10 m, float32 [2] [m/s]
+    wind: Tensor  # (u east, v north) of the air's motion at 10 m, float32 [2] or [G, 2] [m/s]
     minutes: float  # how long it lasts
-    moisture: Tensor | None = None  # float32 [7], in the order of ``moistures.MOISTURES``, NaN where not known
+    moisture: Tensor | None = None  # float32 [7] or [G, 7], in the order of ``moistures.MOISTURES``, NaN where unknown
+    fastest: "Spell | None" = None  # weather that sets the ticks where groups differ
+
+    @property
+    def groups(self) -> int:
+        """Return the number of groups."""
+        return len(self.wind) if self.wind.dim() == 2 else 1
+
+    def of(self, groups: slice) -> "Spell":
+        """Return the weather of some groups."""
+        if self.wind.dim() == 1:
+            return self
+        moisture = self.moisture if self.moisture is None or self.moisture.dim() == 1 else self.moisture[groups]
+        return replace(self, wind=self.wind[groups], moisture=moisture)
 
 
 def spread_in(
     fire: RateFire, landscape: Landscape, cell_size: float, spell: Spell, window: Window | None = None
 ) -> Spread:
-    """Return the behaviour of a fire's head in each cell of a landscape in a spell, [1, H, W], or of a window."""
+    """Return the behaviour of a fire's head in each cell of a landscape in a spell, [G, H, W], or of a window."""
     row = moisture_row(fire.moisture)
     moisture = row if spell.moisture is None else torch.where(spell.moisture.isnan(), row, spell.moisture)
-    air = spell.wind[None, :, None, None], moisture[None], cell_size
-    if window is None:
-        return fire.bed.spread(landscape, *air)
-    return fire.bed.spread(window.landscape(landscape), *air, rise=_rise(landscape, window, cell_size))
+    winds = spell.wind.reshape(-1, 2)
+    moistures = moisture.reshape(-1, len(row)).expand(len(winds), -1)
+    ground, rise = landscape, None
+    if window is not None:
+        ground, rise = window.landscape(landscape), _rise(landscape, window, cell_size)
+    at_once = max(1, _SPREAD_AT_ONCE // ground.cover.numel())
+    parts = [
+        fire.bed.spread(ground, wind[:, :, None, None], moist, cell_size, rise)
+        for wind, moist in zip(winds.split(at_once), moistures.split(at_once), strict=True)
+    ]
+    return parts[0] if len(parts) == 1 else _joined(parts)
 
 
 def can_ignite(fire: RateFire, landscape: Landscape) -> Tensor:
     """Return the cells of one landscape that can ignite, bool [H, W]."""
     return (fire.flammability(landscape)[0] > 0.0) & (landscape.age[0] >= fire.youngest_fuel)
-
-
-def hour_of(fire: RateFire, landscape: Landscape, cell_size: float, spell: Spell, fuel: Tensor) -> Hour:
-    """Return the travel times in a spell, and ticks as short as its fastest cells but one in a thousand need.
-
-    Args:
-        fire: The automaton.
-        landscape: One landscape, batch size [1].
-        cell_size: Side of a cell [m].
-        spell: The weather.
-        fuel: Cells that can ignite, bool [H, W].
-    """
-    spread = spread_in(fire, landscape, cell_size, spell)
-    rates = spread.head[0][fuel]
-    fastest = float(rates.kthvalue(max(1, math.ceil(BUT_FASTEST * len(rates)))).values) if len(rates) else 0.0
-    ticks = ticks_of(spell.minutes, fastest, cell_size)
-    made = travel(spread.head, spread.direction, spread.length_to_breadth, cell_size)[0]
-    return Hour(made, spell.minutes / ticks, ticks)
 
 
 def ticks_of(minutes: float, fastest: float, cell_size: float) -> int:
@@ -70,13 +72,13 @@ def ticks_of(minutes: float, fastest: float, cell_size: float) -> int:
 
 
 def heads(spread: Spread) -> Tensor:
-    """Return the fields of ``HeadBehaviour`` for a spread [1, h, w], float32 [4, h, w].
+    """Return the fields of ``HeadBehaviour`` for a spread [G, h, w], float32 [G, 4, h, w].
 
     The rear spreads at R_head (1 - e) / (1 + e), e the eccentricity of the ellipse.
     """
     focus = (1.0 - spread.length_to_breadth.pow(-2)).clamp(min=0.0).sqrt()
     backing = spread.head * (1.0 - focus) / (1.0 + focus)
-    return torch.cat((spread.head, backing, spread.intensity, spread.flame_length))
+    return torch.stack((spread.head, backing, spread.intensity, spread.flame_length), dim=1)
 
 
 def _rise(landscape: Landscape, window: Window, cell_size: float) -> Tensor:
@@ -85,3 +87,8 @@ def _rise(landscape: Landscape, window: Window, cell_size: float) -> Tensor:
     if landscape.elevation is None:
         return gradient(None, cover, cell_size)
     return gradient(window.around(landscape.elevation, margin=1), cover, cell_size)[:, :, 1:-1, 1:-1]
+
+
+def _joined(parts: Sequence[Spread]) -> Spread:
+    """Return the spreads of further groups behind those of the first."""
+    return Spread(**{each.name: torch.cat([getattr(part, each.name) for part in parts]) for each in fields(Spread)})

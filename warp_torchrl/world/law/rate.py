@@ -151,6 +151,10 @@ class RateFire(Automaton):
         """Return in words how many cells of landscapes have each fuel, and which are no fuel."""
         return told_fuel(self.bed.fuel(landscape), self.bed.table)
 
+    def alike(self) -> Self:
+        """Return the law under which fires differ from cell to cell alone."""
+        return replace(self, fire_deviation=0.0)._going_by(self._by_cover)
+
     def _going_by(self, cover: bool) -> Self:
         """Return the law that takes the fuel of the cover, or of the landscape's codes."""
         law = replace(self)

@@ -37,23 +37,24 @@ class Clock:
         return replace(self, hours=since_first(hours), moments=moments, texts=self.texts[::-1], warnings=told)
 
 
-def hours_until(moment: str, clock: Clock, zone: float | None) -> float:
+def hours_until(moment: str, clock: Clock, zone: float | None, name: str = "start") -> float:
     """Return the hours from the first row to a date and time.
 
     Args:
         moment: The text. With an offset it is converted to the rows' clock, without one it is on that clock.
         clock: Of the rows.
         zone: Hours that the rows' clock is ahead of UTC, where their offsets do not say it.
+        name: What the moment is, for messages.
 
     Raises:
         ValueError: If the rows have no times, or the moment has another form.
     """
     if not clock.moments:
-        raise ValueError(f"start must be in minutes where rows tell no dates and times of their own, got {moment!r}")
+        raise ValueError(f"{name} must be in minutes where rows tell no dates and times of their own, got {moment!r}")
     stamp = read_stamp(moment)
     if stamp is None or stamp.numbers is None:
-        raise ValueError(f"start must be a date and time as the first row has it, {clock.texts[0]!r}, got {moment!r}")
-    shift = _shift(moment, stamp, clock, zone)
+        raise ValueError(f"{name} must be a date and time as the first row has it, {clock.texts[0]!r}, got {moment!r}")
+    shift = _shift(moment, stamp, clock, zone, name)
     found = set()
     for order, rows in clock.moments.items():
         for own in _own_orders(stamp, order):
@@ -65,7 +66,7 @@ def hours_until(moment: str, clock: Clock, zone: float | None) -> float:
     if len(within) != 1:
         why = "it can be read in two ways: write it as 2024-07-01 12:00" if within else "its numbers are no date"
         raise ValueError(
-            f"start must be a date and time as the first row has it, {clock.texts[0]!r}, got {moment!r}: {why}"
+            f"{name} must be a date and time as the first row has it, {clock.texts[0]!r}, got {moment!r}: {why}"
         )
     return within.pop()
 
@@ -79,16 +80,16 @@ def _own_orders(stamp: Stamp, order: str) -> tuple[str, ...]:
     return ORDERS
 
 
-def _shift(moment: str, stamp: Stamp, clock: Clock, zone: float | None) -> float:
+def _shift(moment: str, stamp: Stamp, clock: Clock, zone: float | None, name: str) -> float:
     """Return the hours that a moment, with its offset, is ahead of the rows' clock."""
     has_own, rows = stamp.offset is not None, clock.offsets
     if has_own and None in rows:
         if zone is None:
-            raise ValueError(f"start must have no offset where the rows have none, {clock.texts[0]!r}, got {moment!r}")
+            raise ValueError(f"{name} must have no offset where the rows have none, {clock.texts[0]!r}, got {moment!r}")
         return -zone
     if not has_own and None not in rows:
         if len(rows) > 1:
-            raise ValueError(f"start must have an offset where rows have several, {clock.texts[0]!r}, got {moment!r}")
+            raise ValueError(f"{name} must have an offset where rows have several, {clock.texts[0]!r}, got {moment!r}")
         return next(iter(rows)) or 0.0
     return 0.0
 

@@ -112,7 +112,13 @@ def read_weather(
     return WeatherTable(hours=hours, wind_height=height, **made)
 
 
-def minutes_until(moment: str, path: str | Path, units: Mapping[str, str] | None = None) -> float:
+def minutes_until(
+    moment: str,
+    path: str | Path,
+    units: Mapping[str, str] | None = None,
+    name: str = "start",
+    zone: float | None = None,
+) -> float:
     """Return the minutes from the first row of a file to a date and time.
 
     Args:
@@ -120,6 +126,8 @@ def minutes_until(moment: str, path: str | Path, units: Mapping[str, str] | None
             where the rows have offsets, or a zone that the file states.
         path: The file.
         units: See ``read_weather``.
+        name: What the moment is, for messages.
+        zone: Hours that the rows are ahead of UTC, where neither they nor the file say it.
 
     Raises:
         ValueError: In one line: if the file cannot be read, has no times, or they are written otherwise.
@@ -133,7 +141,7 @@ def minutes_until(moment: str, path: str | Path, units: Mapping[str, str] | None
         raise ValueError(f"{path}: {error}") from None
     stated = [zone_of(column) for column in clock.columns]
     zones = [zone for zone in (*stated, sheet.zone, source.zone if source else None) if zone is not None]
-    return 60.0 * hours_until(moment, clock, zones[0] if zones else None)
+    return 60.0 * hours_until(moment, clock, zones[0] if zones else zone, name)
 
 
 def _in_time(sheet: Sheet, units: Mapping[str, str]) -> tuple[Sheet, Clock]:

@@ -1,0 +1,76 @@
+"""Members of an ensemble: their winds, their moistures, and fires that burn as each would alone."""
+
+import math
+
+import pytest
+import torch
+
+from tests.world.backends.test_growing import land, lit, turning
+from warp_torchrl.world.arrays.random import world_key
+from warp_torchrl.world.behaviour.moistures import MOISTURES, moisture_row
+from warp_torchrl.world.fires import alone
+from warp_torchrl.world.fires.alone import on_map
+from warp_torchrl.world.fires.members import Deviations, Members
+from warp_torchrl.world.law.rate import RateFire
+from warp_torchrl.world.law.travel import NEVER
+
+
+def member(rate=1.0, wind_speed=1.0, bearing=0.0, moisture=1.0):
+    return [math.log(rate), math.log(wind_speed), bearing, math.log(moisture)]
+
+
+def test_the_wind_turns_clockwise_and_grows():
+    # A wind to the north, turned by a quarter, goes east; twice as fast
+    east, south = Members(torch.tensor([member(1.0, 2.0, 90.0), member(1.0, 1.0, 180.0)])).winds(
+        torch.tensor([0.0, 3.0])
+    )
+    assert east.tolist() == pytest.approx([6.0, 0.0], abs=1e-5) and south.tolist() == pytest.approx(
+        [0.0, -3.0], abs=1e-5
+    )
+    assert Members(torch.tensor([member(bearing=90.0)])).winds(torch.tensor([3.0, 0.0]))[0].tolist() == pytest.approx(
+        [0.0, -3.0], abs=1e-5
+    ), "a wind to the east goes south"
+
+
+def test_dead_fuel_is_wetter_and_so_is_the_code_of_fine_fuel():
+    row = Members(torch.tensor([member(moisture=1.5)])).moistures(moisture_row({}))[0]
+    at = list(MOISTURES).index("ffmc")
+    assert row[:3].tolist() == pytest.approx([9.0, 10.5, 12.0]) and row[3:at].tolist() == [60.0, 90.0]
+    # FFMC 90 is 147.2 * 11 / 149.5 = 10.83 %; half more is 16.25 %, and the code 59.5 * 233.75 / 163.45 = 85.1
+    assert float(row[at]) == pytest.approx(85.1, abs=0.05)
+
+
+def test_drawn_members_have_the_deviations_asked_for():
+    found = Members.drawn(
+        world_key(torch.arange(4000)), Deviations(rate=0.4, wind_speed=0.2, bearing=15.0, moisture=0.0)
+    )
+    assert float(found.rate.median()) == pytest.approx(1.0, abs=0.03)
+    assert float(found.rate.std() / found.rate.mean()) == pytest.approx(0.4, abs=0.03)
+    assert float(found.bearing.std()) == pytest.approx(15.0, abs=0.6) and bool((found.moisture == 1.0).all())
+
+
+@pytest.mark.parametrize("at_once", [64, 2], ids=["together", "in parts"])
+def test_members_burn_as_each_does_alone(at_once, monkeypatch):
+    size, fire = (41, 64), RateFire(model="fbp", cell_deviation=0.2)
+    ground, cells, key = land(1, size), lit(size, (20, 30)), world_key(torch.arange(4))
+    members = Members(torch.tensor([member(), member(0.7), member(1.5, 1.3, 40.0), member(1.0, 0.6, -30.0, 1.4)]))
+    fires = members.fires(fire, ground, turning(2, minutes=8.0), 30.0)
+    monkeypatch.setattr(alone, "_AT_ONCE", at_once)
+    together = torch.cat(list(fires.in_parts(cells, key, on_map)))
+    for one in range(4):
+        single = on_map(fires.of(slice(one, one + 1)).burn(cells, key[one : one + 1]))[0]
+        assert torch.allclose(together[one], single, rtol=1e-4, atol=1e-3)
+    areas = (together < NEVER / 2).flatten(1).sum(1)
+    assert areas[1] < areas[0] < areas[2]
+
+
+def test_a_fire_that_is_seen_is_half_a_cell_ahead():
+    size, fire = (40, 64), RateFire(model="fbp", cell_deviation=0.0)
+    ground = land(1, size, relief=False).with_layers(fuel=torch.full((1, *size), 2, dtype=torch.int16))
+    cells, half_way = lit(size, (20, 20)), lit(size, (20, 21))
+    times = [
+        on_map(Members.plain().fires(fire, ground, turning(1), 30.0, half).burn(cells, world_key(torch.arange(1))))[0]
+        for half in (None, half_way)
+    ]
+    assert float(times[1][20, 21]) == pytest.approx(0.5 * float(times[0][20, 21]))
+    assert float(times[1][20, 23]) == pytest.approx(float(times[0][20, 23]) * 2.5 / 3.0, rel=0.02)

@@ -1,0 +1,1 @@
+"""Prediction corrected by observations of the fire on the way."""
