@@ -16,13 +16,23 @@ TRY = """
 import pkgutil, importlib, warp_torchrl
 from warp_torchrl import make_env
 from warp_torchrl.world.mechanics.table import mechanics
-for each in pkgutil.walk_packages(warp_torchrl.__path__, "warp_torchrl."):
-    if each.name.split(".")[1] in ("env", "evaluation", "heuristics", "models", "runs", "training", "world"):
-        importlib.import_module(each.name)
-assert "{name}" not in mechanics(), "it is deleted"
-for scenario in ("default", "hetero", "front", "agencies", "search", *(["haksar"] if "{name}" != "retardant" else [])):
-    make_env(scenario, n_worlds=2, overrides=["landscape.size=16"]).rollout(3)
+
+SCENARIOS = ("default", "hetero", "front", "agencies", "search", *(["haksar"] if "{name}" != "retardant" else []))
+
+
+def test_no_word_of_it_is_imported():
+    assert warp_torchrl.__path__ == ["{copy}/warp_torchrl"], "what is tested is the copy"
+    for each in pkgutil.walk_packages(warp_torchrl.__path__, "warp_torchrl."):
+        if each.name.split(".")[1] in ("env", "evaluation", "heuristics", "models", "runs", "training", "world"):
+            importlib.import_module(each.name)
+    assert "{name}" not in mechanics(), "it is deleted"
+
+
+def test_worlds_are_played():
+    for scenario in SCENARIOS:
+        make_env(scenario, n_worlds=2, overrides=["landscape.size=16"]).rollout(3)
 """
+"""Tests of the copy, in one process with those that it has."""
 
 
 @pytest.fixture(scope="module", params=APART)
@@ -45,19 +55,16 @@ def delete_options(conf: Path, text: str) -> None:
         delete_options(conf, f"override /{path.parent.name}: {path.stem}\n")
 
 
-def check(copy: Path, *command: str) -> None:
+def passes(copy: Path, processes: str, *tests: str) -> None:
+    command = ("-m", "pytest", "-n", processes, "-p", "no:cacheprovider", *tests)
     done = run(*command, folder=copy, PYTHONPATH=str(copy))
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def passes(copy: Path, processes: str, *tests: str) -> None:
-    check(copy, "-m", "pytest", "-n", processes, "-p", "no:cacheprovider", *tests)
-
-
 def test_no_word_of_it_is_imported_and_worlds_are_played(without):
     name, copy = without
-    check(copy, "-c", TRY.replace("{name}", name))
-    passes(copy, "0", "tests/test_architecture.py", "tests/world/mechanics/test_mechanic.py")
+    (copy / "tests" / "test_try.py").write_text(TRY.replace("{name}", name).replace("{copy}", str(copy)))
+    passes(copy, "0", "tests/test_try.py", "tests/test_architecture.py", "tests/world/mechanics/test_mechanic.py")
 
 
 @pytest.mark.slow
