@@ -17,6 +17,7 @@ import torch
 from tests.demonstrations.played import played
 from tests.stress.processes import ROOT, TINY, alive, finish, rows, start, wait_for
 from tests.training.test_loop import flattened
+from warp_torchrl.commands.command import train as train_here
 from warp_torchrl.demonstrations.files import save_recording
 from warp_torchrl.runs.checkpoint import newest
 from warp_torchrl.runs.config.building import run_config
@@ -34,7 +35,14 @@ def train(folder, *overrides):
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    return train(tmp_path_factory.mktemp("together") / "whole", "reward.normalise=true")
+    """The folder of a run whose first process is this one."""
+    folder = tmp_path_factory.mktemp("together")
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(SystemExit) as end:
+        patch.chdir(folder)
+        patch.setattr(sys, "argv", ["train.py", *TINY, *LENGTH, "hydra.run.dir=run", "reward.normalise=true"])
+        train_here()
+    assert end.value.code == 0
+    return folder / "run"
 
 
 def gone(session, seconds=10.0):

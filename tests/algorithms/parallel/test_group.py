@@ -8,7 +8,7 @@ import torch
 from torchrl.modules import PopArtValueNorm
 
 from warp_torchrl.algorithms import parallel
-from warp_torchrl.algorithms.parallel import group
+from warp_torchrl.algorithms.parallel import WorkerDied, group
 from warp_torchrl.algorithms.parallel.sockets import Sockets, pairs
 from warp_torchrl.algorithms.ppo import SharedValueNorm
 from warp_torchrl.training.reward_scale import RewardScale
@@ -44,28 +44,29 @@ def talk(rank):
 def other(rank, end, answers):
     torch.set_num_threads(1)
     group.enter(Sockets(rank, 2, [end]))
-    answers.put((rank, talk(rank)))
+    answers.put(talk(rank))
     parallel.gather(None)  # so that neither ends before the other has heard it
 
 
 @pytest.fixture(scope="module")
 def said():
+    """What this process, which is the first, and another one have said."""
     context = multiprocessing.get_context("spawn")
-    answers, ((first,), (second,)) = context.Queue(), pairs(1)
-    both = [context.Process(target=other, args=(rank, end, answers)) for rank, end in enumerate((first, second))]
-    for each in both:
-        each.daemon = True
-        each.start()
-    found = {}
+    answers, ((own,), (given,)) = context.Queue(), pairs(1)
+    second = context.Process(target=other, args=(1, given, answers), daemon=True)
+    second.start()
+    given.close()  # so that this process hears of the other's end
+    group.enter(Sockets(0, 2, [own]))
     try:
-        while len(found) < 2:
-            key, value = answers.get(timeout=60)
-            found[key] = value
-    except Empty:
-        pytest.fail("the processes did not answer")
-    for each in both:
-        each.join(30)
-    return [found[rank] for rank in range(2)]
+        first = talk(0)
+        parallel.gather(None)
+        found = answers.get(timeout=60)
+    except (WorkerDied, Empty):
+        pytest.fail("the other process did not answer")
+    finally:
+        group.leave()
+    second.join(30)
+    return [first, found]
 
 
 def test_processes_know_how_many_they_are(said):
