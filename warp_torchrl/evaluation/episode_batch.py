@@ -72,9 +72,7 @@ class EpisodeBatch:
         last = torch.arange(1, len(self.policies) + 1, device=self.rows.device) * share
         ends = torch.searchsorted(self.rows, last).tolist()
         own = [slice(*each) for each in zip([0, *ends], ends)]
-        return torch.cat(
-            [each.choose(self.state[at], mask[at]) for each, at in zip(self.policies, own) if len(mask[at])]
-        )
+        return torch.cat([each.act(self.state[at], mask[at]) for each, at in zip(self.policies, own) if len(mask[at])])
 
     def _step(self, action: Tensor) -> None:
         transition = self.world.step(self.state, action, self.counts)

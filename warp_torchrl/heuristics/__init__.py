@@ -4,11 +4,12 @@ They read the state through the environment. ``local``, ``oldest``, ``lawnmower`
 of the fire what their agents know or see; the others see every cell, which no learned policy does.
 """
 
-from warp_torchrl.heuristics.base import Heuristic, Worlds, idle_action
+from warp_torchrl.heuristics.base import idle_action
 from warp_torchrl.heuristics.clockwise import Clockwise
 from warp_torchrl.heuristics.coordinated import Coordinated
 from warp_torchrl.heuristics.dispatch import Dispatch
 from warp_torchrl.heuristics.following import Follower
+from warp_torchrl.heuristics.heuristic import Heuristic, Worlds
 from warp_torchrl.heuristics.own_land import OwnLand
 from warp_torchrl.heuristics.reactive import Greedy, Local, NoOp, Random
 from warp_torchrl.heuristics.ring import Mixed, Ring

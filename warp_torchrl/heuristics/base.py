@@ -1,17 +1,13 @@
-"""Base class and shared functions of the heuristics."""
+"""Functions that the heuristics share."""
 
 import math
-from typing import ClassVar, Protocol
 
 import torch
-from tensordict import TensorDictBase
-from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
-from warp_torchrl.system.device import needs_no_sync
-from warp_torchrl.system.modes import apart
 from warp_torchrl.world.arrays.distances import FAR, nearest
 from warp_torchrl.world.arrays.geometry import offsets
+from warp_torchrl.world.arrays.listing import list_cells
 from warp_torchrl.world.arrays.random import Stream, uniform, uniform_at
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.records import known_codes, records_of
@@ -19,59 +15,6 @@ from warp_torchrl.world.state.state import FIRST_FIRE, Action, Cover, WorldState
 from warp_torchrl.world.team.supply import mark_base
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.world import World
-
-
-class Worlds(Protocol):
-    """The part of an environment that a heuristic reads."""
-
-    @property
-    def world(self) -> World:
-        """Return the rules."""
-
-    @property
-    def shared_state(self) -> WorldState:
-        """Return the present state of the worlds; it must not be changed."""
-
-
-class Heuristic(TensorDictModuleBase):
-    """A heuristic policy for one environment.
-
-    Args:
-        env: The environment whose rules and worlds it reads.
-    """
-
-    in_keys = [("agents", "action_mask")]  # noqa: RUF012
-    out_keys = [("agents", "action")]  # noqa: RUF012
-    is_stateful: ClassVar[bool] = False
-    """Whether its actions depend on more than the current state."""
-    sees_all: ClassVar[bool] = True
-    """Whether it knows of fire, where sight is limited, what its agents do not."""
-
-    def __init__(self, env: Worlds) -> None:
-        super().__init__()
-        self._env = (env,)  # in a tuple, so that the environment does not become a submodule
-
-    @property
-    def env(self) -> Worlds:
-        """Return the environment."""
-        return self._env[0]
-
-    @property
-    def world(self) -> World:
-        """Return the environment's rules."""
-        return self.env.world
-
-    @apart
-    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Write the team's actions, int64 [B, A]."""
-        state, world = self.env.shared_state, self.world
-        shown = tensordict.get(("agents", "action_mask"))
-        action = self.choose(state, shown if world.action_masking else world.possible_actions(state))
-        return tensordict.set(("agents", "action"), action)
-
-    def choose(self, state: WorldState, mask: Tensor) -> Tensor:
-        """Return the actions, int64 [B, A], for worlds and the actions that do something, bool [B, A, actions]."""
-        raise TypeError(f"{type(self).__name__} does not say what to do: define choose()")
 
 
 def idle_action(mask: Tensor, team: Team) -> Tensor:
@@ -87,26 +30,6 @@ def idle_action(mask: Tensor, team: Team) -> Tensor:
 def can_be_put_out(state: WorldState, world: World) -> Tensor:
     """Return the burning cells that an agent can extinguish, bool [B, H, W]."""
     return is_burning(state.cells) & (state.cells <= world.fire.last_spreading)
-
-
-def list_cells(mask: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the marked cells of each world in row-major order, so that later work scales with them, not with the map.
-
-    Args:
-        mask: bool [B, H, W].
-
-    Returns:
-        Flat indices, int64 [B, K], with K the largest count of any world, at least 1; and which indices are not
-        padding, bool [B, K]. On a device that would have to synchronise, every cell: K = H W, and the mask.
-    """
-    marked = mask.flatten(1)
-    if not needs_no_sync(mask.device):
-        return torch.arange(marked.shape[1], device=mask.device).expand_as(marked), marked
-    counts = marked.sum(dim=1)
-    world, cell = marked.nonzero().unbind(dim=1)
-    index = marked.new_zeros(len(marked), max(int(counts.max()), 1), dtype=torch.int64)
-    index[world, torch.arange(len(world), device=mask.device) - (counts.cumsum(0) - counts)[world]] = cell
-    return index, torch.arange(index.shape[1], device=mask.device) < counts[:, None]
 
 
 def agent_distance(state: WorldState, cells: Tensor) -> Tensor:

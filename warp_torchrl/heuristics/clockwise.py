@@ -3,7 +3,8 @@
 import torch
 from torch import Tensor
 
-from warp_torchrl.heuristics.base import Heuristic, extinguish_or, idle_action
+from warp_torchrl.heuristics.base import extinguish_or, idle_action
+from warp_torchrl.heuristics.heuristic import Heuristic
 from warp_torchrl.world.arrays.geometry import offsets, unit_vectors
 from warp_torchrl.world.arrays.squares import window
 from warp_torchrl.world.state.cells import is_burning

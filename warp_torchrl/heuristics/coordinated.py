@@ -6,14 +6,14 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.heuristics.base import (
-    Heuristic,
     can_be_put_out,
     claim_cells,
     extinguish_or,
-    list_cells,
     move_towards,
     target_or_supply,
 )
+from warp_torchrl.heuristics.heuristic import Heuristic
+from warp_torchrl.world.arrays.listing import list_cells
 from warp_torchrl.world.state.state import WorldState
 
 

@@ -9,11 +9,11 @@ from warp_torchrl.heuristics.base import (
     claim_cells,
     extinguish_or,
     idle_action,
-    list_cells,
     move_towards,
     target_or_supply,
 )
 from warp_torchrl.heuristics.coordinated import Coordinated
+from warp_torchrl.world.arrays.listing import list_cells
 from warp_torchrl.world.state.state import WorldState
 
 

@@ -4,7 +4,6 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.heuristics.base import (
-    Heuristic,
     can_be_put_out,
     extinguish_or,
     idle_action,
@@ -15,6 +14,7 @@ from warp_torchrl.heuristics.base import (
     place,
     target_or_supply,
 )
+from warp_torchrl.heuristics.heuristic import Heuristic
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.state.records import records_of
 from warp_torchrl.world.state.state import WorldState
@@ -24,7 +24,7 @@ from warp_torchrl.world.team.places import in_reach
 class NoOp(Heuristic):
     """Stays, or if the team has no such action, chooses one without effect."""
 
-    sees_all = False
+    reads_map = False
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
@@ -34,7 +34,7 @@ class NoOp(Heuristic):
 class Random(Heuristic):
     """Draws uniformly among the actions that would do something; the same seed gives the same draws."""
 
-    sees_all = False
+    reads_map = False
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
@@ -49,7 +49,7 @@ class Local(Heuristic):
     Where sight is limited (``sensing=sight``), its radius is the vehicle's sight, with all that hinders it.
     """
 
-    sees_all = False
+    reads_map = False
     radius = 5
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:

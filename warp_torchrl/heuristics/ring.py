@@ -6,16 +6,16 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.heuristics.base import (
-    Worlds,
     claim_cells,
     extinguish_or,
-    list_cells,
     move_towards,
     target_or_supply,
 )
 from warp_torchrl.heuristics.coordinated import Coordinated
+from warp_torchrl.heuristics.heuristic import Worlds
 from warp_torchrl.world.arrays.distances import distance_to_nearest
 from warp_torchrl.world.arrays.geometry import grow
+from warp_torchrl.world.arrays.listing import list_cells
 from warp_torchrl.world.state.cells import is_burning, is_tree
 from warp_torchrl.world.state.state import Action, WorldState
 

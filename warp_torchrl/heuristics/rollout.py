@@ -5,8 +5,8 @@ from typing import ClassVar
 import torch
 from torch import Tensor
 
-from warp_torchrl.heuristics.base import Heuristic, Worlds
 from warp_torchrl.heuristics.coordinated import Coordinated
+from warp_torchrl.heuristics.heuristic import Heuristic, Worlds
 from warp_torchrl.world.arrays.random import imagined_keys
 from warp_torchrl.world.fires.imagined import imagined, rules_in_sight
 from warp_torchrl.world.state.state import WorldState
@@ -112,7 +112,7 @@ class Rollout(Heuristic):
         for at in torch.arange(len(row) * count, device=row.device).split(self._at_once(state)):
             tried, future = at // count, at % count
             own = row[tried]
-            saved.append(self._play(world, imagined(state[own], keys[own, future]), action[tried]))
+            saved.append(self._play(world, imagined(state[own], keys[own, future], self.world), action[tried]))
         return torch.cat(saved).view(-1, count)
 
     def _at_once(self, state: WorldState) -> int:

@@ -9,7 +9,6 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.heuristics.base import (
-    Heuristic,
     distance_to_cells,
     extinguish_or,
     known_fire,
@@ -18,6 +17,7 @@ from warp_torchrl.heuristics.base import (
     place,
     target_or_supply,
 )
+from warp_torchrl.heuristics.heuristic import Heuristic
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.state.records import freshness, records_of
 from warp_torchrl.world.state.state import WorldState
@@ -29,7 +29,7 @@ class Searching(Heuristic):
     Agents whose role cannot extinguish always search.
     """
 
-    sees_all = False
+    reads_map = False
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TypeVar
 
 import torch
 from torch import Tensor
@@ -22,7 +23,7 @@ from warp_torchrl.world.mechanics.mechanic import Mechanic
 from warp_torchrl.world.state.cells import count_trees
 from warp_torchrl.world.state.state import EMBER, FIRST_FIRE, Cover, Forecast, Transition, TreeCounts, WorldState
 from warp_torchrl.world.team.hearing import Hearing
-from warp_torchrl.world.team.knowledge import Full, Sensing
+from warp_torchrl.world.team.knowledge import Belief, Full, Sensing
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.terrain.source import LandscapeSource, map_size
@@ -42,6 +43,7 @@ class World:
         team: The vehicles.
         ignition: Where the fire starts.
         sensing: What agents know of the fire.
+        belief: What they believe beyond that.
         agencies: Whom the vehicles serve.
         mechanics: What else holds in these worlds, see ``loop``.
         steps_per_tick: Agent steps to a fire tick.
@@ -60,6 +62,7 @@ class World:
     team: Team = field(default_factory=Team)
     ignition: IgnitionSource = field(default_factory=Ignition)
     sensing: Sensing = field(default_factory=Full)
+    belief: Belief = field(default_factory=Belief)
     agencies: Agencies = field(default_factory=OneAgency)
     mechanics: tuple[Mechanic, ...] = ()
     steps_per_tick: int = 5
@@ -121,13 +124,13 @@ class World:
 
     @cached_property
     def loop(self) -> tuple[Mechanic, ...]:
-        """Return all mechanics in the order in which they begin and step, that of their names.
+        """Return all mechanics in the order in which they begin and step, that of their turns and names.
 
         They are ``mechanics``, and those of the other parts that are mechanics too.
         """
-        parts = (self.team, self.agencies, self.sensing)
+        parts = (self.team, self.agencies, self.sensing, self.belief)
         found = (*self.mechanics, *(each for each in parts if isinstance(each, Mechanic)))
-        return tuple(sorted(found, key=lambda each: each.name))
+        return tuple(sorted(found, key=lambda each: (each.turn, each.name)))
 
     def reset(self, seed: Tensor, episode: Tensor) -> WorldState:
         """Start an episode in each world: the ground, the fire after its head start, the team.
@@ -206,7 +209,7 @@ class World:
         """Advance every world that has not ended by one agent step.
 
         Agents move; agents act; on every ``steps_per_tick``-th step the fire ticks; the clock advances;
-        mechanics step, in the order of their names: vehicles are lent, packets set out, agents look and are told.
+        mechanics step, in the order of ``loop``: vehicles are lent, packets set out, agents look and are told.
 
         Args:
             state: The worlds, batch size [B].
@@ -236,6 +239,21 @@ class World:
         """Return worlds with what follows from their landscape and wind made anew."""
         ground = self.fire.ground(state.landscape, self.side_of_cell, state.key)
         return state.replace(ground=ground, air=backend.air(self.fire, state.wind, state.air.moisture, ground))
+
+    def assumed(self, state: WorldState) -> WorldState:
+        """Return the worlds as agents assume them to be, see ``Mechanic.assumed``; where they see all, these."""
+        return _last([each.assumed(state, self) for each in self.loop], state)
+
+    def worth_seeing(self, state: WorldState) -> Tensor:
+        """Return what agents would learn of each cell if they saw it now, see ``Mechanic.worth_seeing``; else 0."""
+        nothing = torch.zeros_like(state.alpha)[:, None]
+        return _last([each.worth_seeing(state, self) for each in self.loop], nothing)
+
+    def futures(self, state: WorldState, count: int) -> WorldState:
+        """Return worlds that may be the true ones, see ``Mechanic.futures``; where nobody knows better, these."""
+        rows = torch.arange(len(state.key), device=state.key.device).repeat_interleave(count)
+        known = [each.futures(state, self, count) for each in self.loop]
+        return _last(known, None) or state[rows]
 
     def forecast(self, state: WorldState) -> Forecast:
         """Return what the fire is about to do."""
@@ -269,3 +287,11 @@ class World:
             terminated=state.terminated | terminated,
             truncated=state.truncated | (step >= self.horizon),
         )
+
+
+Answer = TypeVar("Answer")
+
+
+def _last(answers: Sequence[Answer | None], otherwise: Answer) -> Answer:
+    """Return the last answer that is given."""
+    return next((each for each in reversed(answers) if each is not None), otherwise)

@@ -26,7 +26,7 @@ class _Given(NamedTuple):
 def advised_actions(state: WorldState, world: World, adviser: str) -> Tensor:
     """Return the action that a heuristic, one of ``TEACHERS``, would choose for each agent, int64 [B, A]."""
     with torch.no_grad():
-        return HEURISTICS[adviser](_Given(world, state)).choose(state, world.possible_actions(state))
+        return HEURISTICS[adviser](_Given(world, state)).act(state, world.possible_actions(state))
 
 
 def check_adviser(name: str) -> None:
@@ -38,14 +38,3 @@ def check_adviser(name: str) -> None:
     if name not in TEACHERS:
         hint = did_you_mean(name, TEACHERS)
         raise ValueError(f"advice must be null or one of {', '.join(TEACHERS)}, got {name}{hint}")
-
-
-def check_may_advise(name: str, world: World) -> None:
-    """Check that a heuristic tells agents nothing of fire that they may not know.
-
-    Raises:
-        ValueError: If it sees all, and their sight is limited.
-    """
-    if world.sensing.is_limited and HEURISTICS[name].sees_all:
-        known = ", ".join(each for each in TEACHERS if not HEURISTICS[each].sees_all)
-        raise ValueError(f"observation.advice must be null or one of {known} where sight is limited, got {name}")

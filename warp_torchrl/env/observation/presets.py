@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.entries import Content, Planes, Target, Vector
-from warp_torchrl.env.observation.advice import check_adviser, check_may_advise
+from warp_torchrl.env.observation.advice import check_adviser
 from warp_torchrl.env.observation.channels import CHANNELS, DEFAULT, ages, check_channels, stages
 from warp_torchrl.env.observation.coarse_picture import PICTURE, PICTURE_SIDE, centred_picture, picture
 from warp_torchrl.env.observation.critic import STATE, CriticState
@@ -102,8 +102,6 @@ class Local:
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
         side, features = 2 * self.radius + 1, [CHANNELS[name] for name in self.channels]
-        if self.advice is not None:
-            check_may_advise(self.advice, world)
         own = Vector(parts_of(STATUS.shown(world, self.choice), world))
         shape, highs = (len(features), side, side), tuple(each.high for each in features)
         symmetry, content = Planes(len(features), target_of(features, world)), content_of(features, world)

@@ -3,7 +3,7 @@
 At each observation the forecasts that were made before it are scored. Then the fire continues from what was seen: what
 is inside has burned, its edge burns. Members are weighed by how well they forecast the growth since the observation
 before. Where few hold most of the weight, they are drawn by it and their parameters are moved
-(``world.fires.filtering``).
+(``world.ensemble.filtering``).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -16,8 +16,16 @@ from warp_torchrl.prediction.observed.observation import Observation
 from warp_torchrl.prediction.observed.scores import ForecastScores, forecast_scores, time_between
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.arrays.random import Stream, normal, uniform, world_key
+from warp_torchrl.world.ensemble.filtering import (
+    effective,
+    exponent,
+    jittered,
+    moments,
+    normalised,
+    quantiles,
+    resampled,
+)
 from warp_torchrl.world.fires.alone import on_map
-from warp_torchrl.world.fires.filtering import effective, exponent, jittered, moments, normalised, quantiles, resampled
 from warp_torchrl.world.fires.members import PARAMETERS, Deviations, Members
 from warp_torchrl.world.fires.sightings import Front, HotSpotSensor, beside, hot_spot_likelihood, perimeter_likelihood
 from warp_torchrl.world.fires.spell import Spell, can_ignite

@@ -15,7 +15,7 @@ from warp_torchrl.world.mechanics.mechanic import Mechanic
 from warp_torchrl.world.mechanics.table import mechanics
 from warp_torchrl.world.world import World
 
-OF_WORLDS = ("landscape", "wind", "fire", "team", "ignition", "sensing", "agencies")
+OF_WORLDS = ("landscape", "wind", "fire", "team", "ignition", "sensing", "belief", "agencies")
 """Groups whose options make a world."""
 ENVIRONMENT = (*OF_WORLDS, "observation", "reward")
 """Those that make an environment."""

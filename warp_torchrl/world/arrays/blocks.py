@@ -1,8 +1,8 @@
-"""Means of maps over blocks."""
+"""Means of maps over blocks, and sums about each cell."""
 
 import torch
 from torch import Tensor
-from torch.nn.functional import adaptive_avg_pool2d
+from torch.nn.functional import adaptive_avg_pool2d, avg_pool2d
 
 from warp_torchrl.world.arrays.bytes import byte
 from warp_torchrl.world.arrays.compile import is_fused
@@ -38,3 +38,15 @@ def _sum(parts: tuple[Tensor, ...]) -> Tensor:
     for part in parts[2:]:
         total += part
     return total
+
+
+def sums_about(maps: Tensor, radius: int) -> Tensor:
+    """Return the sums of maps over the cells within a Chebyshev distance of each cell, float32 [..., H, W].
+
+    Args:
+        maps: float32 [..., H, W].
+        radius: In cells.
+    """
+    side, flat = 2 * radius + 1, maps.flatten(0, -3)[:, None]
+    rows = avg_pool2d(flat, (side, 1), stride=1, padding=(radius, 0))
+    return avg_pool2d(rows, (1, side), stride=1, padding=(0, radius)).mul_(side * side).view_as(maps)

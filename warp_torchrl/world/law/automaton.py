@@ -88,6 +88,22 @@ class Automaton(ABC):
         """Return the names of the planes that the automaton keeps in ``WorldState.extras``."""
         return ()
 
+    @property
+    def draws(self) -> tuple[str, ...]:
+        """Return the names of those tensors of a state that are drawn with the ground, see ``drawn_again``."""
+        return ()
+
+    def drawn_again(self, ground: Ground, key: Tensor) -> Ground:
+        """Return ground in which what the law draws of it is drawn of other keys, int64 [B]."""
+        return ground
+
+    def at_rate(self, ground: Ground, factor: Tensor) -> Ground:
+        """Return ground on which fire spreads at other rates, by a factor for each world, float32 [B].
+
+        Here flammability has the factor, and is 1 at most.
+        """
+        return ground.replace(alpha=(ground.alpha * factor[:, None, None]).clamp(max=1.0))
+
     def started(self, state: WorldState) -> WorldState:
         """Return worlds at their start, whose cells are lit, with the planes of the automaton."""
         return state

@@ -2,9 +2,13 @@
 
 from dataclasses import dataclass
 
+import torch
+from torch import Tensor
+
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.law.fire import Fire
-from warp_torchrl.world.law.law import Hazard
+from warp_torchrl.world.law.law import LARGEST_ALPHA, Hazard
+from warp_torchrl.world.state.state import Ground
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,3 +46,8 @@ class HazardFire(Fire):
     def law(self) -> Hazard:
         """Return how the hazards of burning neighbours make a probability."""
         return Hazard(self.refinement)
+
+    def at_rate(self, ground: Ground, factor: Tensor) -> Ground:
+        """Return ground of ``factor`` times the hazard, float32 [B]: alpha becomes 1 - (1 - alpha)^factor."""
+        alpha = -torch.expm1(torch.log1p(-ground.alpha.clamp(max=LARGEST_ALPHA)) * factor[:, None, None])
+        return ground.replace(alpha=alpha)

@@ -184,6 +184,21 @@ class RateFire(Automaton):
         pace = self.pace(key, (landscape.cover.shape[1], landscape.cover.shape[2]))
         return Ground(landscape, self.flammability(landscape), Paces(pace), cell_size)
 
+    @property
+    def draws(self) -> tuple[str, ...]:
+        """Return that paces are drawn."""
+        return ("ground.terms.pace",)
+
+    def drawn_again(self, ground: Ground, key: Tensor) -> Ground:
+        """See ``Automaton``: each world has paces of its own."""
+        return ground.replace(terms=Paces(self.pace(key, (ground.alpha.shape[1], ground.alpha.shape[2]))))
+
+    def at_rate(self, ground: Ground, factor: Tensor) -> Ground:
+        """See ``Automaton``: times are divided by the factor."""
+        if not isinstance(ground.terms, Paces):
+            raise ValueError("the ground must be that of a fire with rates of spread")
+        return ground.replace(terms=Paces(ground.terms.pace / factor[:, None, None]))
+
     def pace(self, key: Tensor, size: tuple[int, int]) -> Tensor:
         """Return the factor on the fire's times in each cell, float32 [B, H, W]: 1 over that on its rates."""
         return self._pace(key, uniform(key, 0, Stream.PACE, size))

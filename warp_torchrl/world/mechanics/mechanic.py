@@ -6,6 +6,8 @@ from typing import ClassVar, Literal, NamedTuple, Protocol
 
 from torch import Tensor
 
+from warp_torchrl.world.air.wind import Wind
+from warp_torchrl.world.ignition.ignition import IgnitionSource
 from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.state.role import RoleTable
 from warp_torchrl.world.state.state import ActionResult, WorldState
@@ -48,6 +50,16 @@ class Rules(Protocol):
         """Return the agent steps to an episode."""
         ...
 
+    @property
+    def air(self) -> Wind:
+        """Return the wind."""
+        ...
+
+    @property
+    def lighting(self) -> IgnitionSource:
+        """Return the ignition."""
+        ...
+
 
 class Metric(NamedTuple):
     """A row of the metrics of episodes: a number of each world in 0..1.
@@ -75,12 +87,16 @@ class Mechanic:
 
     Attributes:
         name: Of its planes in the state, and of its values in ``mechanics`` of the configuration.
+        turn: Mechanics of a lower one begin and step first; those of the same one do in the order of their names.
+        is_knowledge: Whether it is about what agents know alone; worlds that are imagined do without.
         maps: What agents may be shown of it: channels of their view by name, each a function of the worlds that returns
             whole numbers 0..255, uint8 [B, H, W], or [B, A, H, W] where each agent is shown another.
         baselines: Names of heuristics to which a policy is compared in its worlds, beside those of every table.
     """
 
     name: ClassVar[str] = ""
+    turn: ClassVar[int] = 0
+    is_knowledge: ClassVar[bool] = False
     maps: ClassVar[Mapping[str, Callable[[WorldState], Tensor]]] = {}
     baselines: ClassVar[tuple[str, ...]] = ()
 
@@ -141,6 +157,28 @@ class Mechanic:
             world: Their rules.
         """
         return after
+
+    def assumed(self, state: WorldState, world: Rules) -> WorldState | None:
+        """Return the worlds as agents assume them to be; None where the mechanic says nothing of it.
+
+        Their batch size is [B] where the team knows the same, and [B * A], a world for each agent, where not. The last
+        mechanic that answers is heard.
+        """
+        return None
+
+    def worth_seeing(self, state: WorldState, world: Rules) -> Tensor | None:
+        """Return what agents would learn of each cell if they saw it now, float32 [B, 1 or A, H, W], 0 or more.
+
+        None where the mechanic says nothing of it; the last one that answers is heard.
+        """
+        return None
+
+    def futures(self, state: WorldState, world: Rules, count: int) -> WorldState | None:
+        """Return worlds that may be the true ones as far as the team knows, ``count`` to each, batch size [B * count].
+
+        None where the mechanic says nothing of it; the last one that answers is heard.
+        """
+        return None
 
     def metric_rows(self, world: Rules) -> tuple[Metric, ...]:
         """Return the rows of its metrics."""

@@ -34,6 +34,11 @@ class Hearing:
         """Return whether packets arrive steps after they were sent."""
         return False
 
+    @property
+    def is_everywhere(self) -> bool:
+        """Return whether every packet reaches every agent at once."""
+        return True
+
     def arriving(self, state: WorldState, flies: Tensor) -> Tensor:
         """Return whose packets reach whom now, bool [B, A, A]: [b, i, j] where agent i gets what agent j sent.
 

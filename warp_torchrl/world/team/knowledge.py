@@ -1,4 +1,4 @@
-"""Knowledge: what agents know of the fire and of each other. A mechanic may limit it."""
+"""Knowledge: what agents know of the fire and of each other, and believe. A mechanic may limit it, or add to it."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -30,6 +30,11 @@ class Sensing(ABC):
     def reach(self, team: Team) -> list[int]:
         """Return how far each agent sees [cells]."""
 
+    @property
+    def errors(self) -> tuple[float, float]:
+        """Return the chances that a fire in sight is taken for a tree, and a tree for a fire."""
+        return 0.0, 0.0
+
     @abstractmethod
     def knows_where(self, state: WorldState, team: Team, hearing: Hearing) -> tuple[Tensor, Tensor]:
         """Return of which others each agent knows where they are, bool [B or 1, A, A], and what it takes for that.
@@ -55,3 +60,8 @@ class Full(Sensing):
         """Return that each knows where all others are, bool [1, A, A], and where they are, int64 [B, 1, A, 2]."""
         others = ~torch.eye(team.n_agents, dtype=torch.bool, device=state.cells.device)[None]
         return others, state.vehicles.position[:, None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Belief:
+    """Agents believe of the fire what they know, and nothing more; a mechanic that is a ``Belief`` too adds to it."""

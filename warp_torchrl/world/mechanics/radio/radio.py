@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import torch
 from torch import Tensor
@@ -42,6 +42,8 @@ class Radio(Hearing, Mechanic):
         ValueError: If a value is out of its range.
     """
 
+    is_knowledge: ClassVar[bool] = True
+
     carries: Literal["none", "map", "graph", "both"] = "none"
     range: float | None = None
     loss: float = 0.0
@@ -65,6 +67,11 @@ class Radio(Hearing, Mechanic):
     def is_late(self) -> bool:
         """Return whether packets arrive steps after they were sent."""
         return self.delay > 0
+
+    @property
+    def is_everywhere(self) -> bool:
+        """Return whether every packet reaches every agent at once."""
+        return self.range is None and not (self.loss or self.line_of_sight or self.delay)
 
     def check(self, world: Rules) -> None:
         """Check that it sends no maps to agents that know all of them.

@@ -19,7 +19,7 @@ from warp_torchrl.world.mechanics.sensing.watching import (
     unwatched,
 )
 from warp_torchrl.world.state.cells import is_burning, is_tree
-from warp_torchrl.world.state.records import KNOWLEDGE, kinds, recorded
+from warp_torchrl.world.state.records import KNOWLEDGE, freshness, kept, kinds, read, recorded
 from warp_torchrl.world.state.role import ROLES
 from warp_torchrl.world.state.state import FIRST_FIRE, WorldState
 from warp_torchrl.world.team.hearing import Hearing
@@ -79,6 +79,11 @@ class Sight(Sensing, Mechanic):
         """Return that it is."""
         return True
 
+    @property
+    def errors(self) -> tuple[float, float]:
+        """Return ``miss`` and ``false_alarm``."""
+        return self.miss, self.false_alarm
+
     def reach(self, team: Team) -> list[int]:
         """Return how far each agent sees [cells]."""
         return [self.radius_of.get(role, self.radius) for role in team.agent_roles]
@@ -114,6 +119,20 @@ class Sight(Sensing, Mechanic):
             itself = itself & (told <= knows)
             knows = torch.maximum(knows, told)
         return after.with_planes(self.name, _where(running, counted(after, memory, knows, itself, self.recent), memory))
+
+    def assumed(self, state: WorldState, world: Rules) -> WorldState:
+        """Return the worlds of the newest records: the team's if it shares its maps everywhere, else each agent's."""
+        records = kept(state)
+        if world.hearing.is_everywhere and world.hearing.sends_maps:
+            records = records.amax(dim=1, keepdim=True)
+        code, ash, cleared = (each.flatten(0, 1) for each in read(records))
+        rows = torch.arange(len(state.key), device=code.device).repeat_interleave(records.shape[1])
+        own = state if records.shape[1] == 1 else state[rows]
+        return own.replace(cells=code, burned=ash, firebreak=cleared)
+
+    def worth_seeing(self, state: WorldState, world: Rules) -> Tensor:
+        """Return how stale each agent's records are, 1 - freshness, float32 [B, A, H, W]."""
+        return 1.0 - freshness(kept(state), state.step)
 
     def metric_rows(self, world: Rules) -> tuple[Metric, ...]:
         """Return ``watched``, ``found`` and ``uncertainty``."""

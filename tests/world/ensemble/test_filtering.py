@@ -5,7 +5,7 @@ import math
 import pytest
 import torch
 
-from warp_torchrl.world.fires.filtering import (
+from warp_torchrl.world.ensemble.filtering import (
     effective,
     exponent,
     jittered,

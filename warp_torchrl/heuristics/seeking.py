@@ -1,0 +1,50 @@
+"""Search: agents go where they would learn most, a step of way, apart from each other."""
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.heuristics.base import agent_distance, extinguish_or, match_cells, target_or_supply
+from warp_torchrl.heuristics.paths import first_move
+from warp_torchrl.world.arrays.blocks import sums_about
+from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.world.world import World
+
+_SETTLING = 8.0
+"""Steps that a search costs beside its way: near places are left for better ones that are not much farther."""
+_APART = 2.3
+"""By how much less, as a logarithm, a place is worth that a team-mate will see."""
+_LEAST = 1e-9
+_TAKEN = 1000.0
+
+
+def can_act_on_fire(world: World, device: torch.device) -> Tensor:
+    """Return which agents can extinguish or clear, bool [A]."""
+    can = world.team.table(device).can
+    return can["extinguish"] | can["clear"]
+
+
+def seek(state: WorldState, assumed: WorldState, world: World, mask: Tensor) -> Tensor:
+    """Return the actions of agents that search, int64 [B, A].
+
+    Each goes to the cell from which it would learn most, of those that team-mates leave:
+
+        score = log(worth of the cells in sight) - log(steps to it + 8)
+
+    It extinguishes what it can.
+
+    Args:
+        state: The worlds.
+        assumed: See ``World.assumed``: agents avoid the fires that they know.
+        world: Their rules.
+        mask: The actions that do something, bool [B, A, actions].
+    """
+    worth, agents = world.worth_seeing(state), mask.shape[1]
+    sights = [min(each, max(world.size)) for each in world.sensing.reach(world.team)]
+    about = {each: sums_about(worth, each).flatten(2) for each in dict.fromkeys(sights)}
+    sums = {each: sum_.expand(-1, agents, -1) for each, sum_ in about.items()}
+    value = torch.stack([sums[each][:, agent] for agent, each in enumerate(sights)], dim=1)
+    cells = torch.arange(value.shape[2], device=mask.device).expand(len(mask), -1)
+    gain = value.clamp(min=_LEAST).log() - (agent_distance(state, cells) + _SETTLING).log()
+    target = match_cells(state, cells, gain, spacing=2 * max(sights) + 2, discount=_APART, taken=_TAKEN)
+    own = assumed if len(assumed.key) == len(state.key) else state
+    return extinguish_or(first_move(own, world, mask, target_or_supply(state, world, target)), mask)

@@ -1,0 +1,26 @@
+"""Marked cells as lists, so that later work grows with them and not with the map."""
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.system.device import needs_no_sync
+
+
+def list_cells(mask: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the marked cells of each world in row-major order, so that later work scales with them, not with the map.
+
+    Args:
+        mask: bool [B, H, W].
+
+    Returns:
+        Flat indices, int64 [B, K], with K the largest count of any world, at least 1; and which indices are not
+        padding, bool [B, K]. On a device that would have to synchronise, every cell: K = H W, and the mask.
+    """
+    marked = mask.flatten(1)
+    if not needs_no_sync(mask.device):
+        return torch.arange(marked.shape[1], device=mask.device).expand_as(marked), marked
+    counts = marked.sum(dim=1)
+    world, cell = marked.nonzero().unbind(dim=1)
+    index = marked.new_zeros(len(marked), max(int(counts.max()), 1), dtype=torch.int64)
+    index[world, torch.arange(len(world), device=mask.device) - (counts.cumsum(0) - counts)[world]] = cell
+    return index, torch.arange(index.shape[1], device=mask.device) < counts[:, None]

@@ -1,0 +1,1 @@
+"""What a team believes of the fire: an ensemble of imagined fires that sightings correct."""

@@ -1,0 +1,108 @@
+"""What is kept of beliefs in the worlds, and what readers make of it.
+
+B worlds, G beliefs to a world (the team's, or one of each agent), K members to a belief, M hidden fires to a world.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.world.arrays.batch import Batch, Named
+from warp_torchrl.world.ensemble.members import rows_of
+from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.state import FIRST_FIRE, WorldState
+
+NAME = "belief"
+"""Of the planes in the state."""
+
+
+@dataclass(eq=False, repr=False)
+class Beliefs(Batch):
+    """What teams believe of the fire."""
+
+    members: Named  # [B,G*K,...], imagined worlds, see ``world.ensemble.members``
+    weights: Tensor  # float32 [B,G,K], of the members; their sum is 1
+    parameters: Named  # ``values`` float32 [B,G,K,3], see ``members.in_parameters``; empty where all are known
+    chances: Named  # ``values`` float32 [B,G*K,H,W], of trees to have ignited in the last tick; empty without weights
+    hidden: Named  # [B,M,...], single fires that may be anywhere, as they would have grown by now; or empty
+    possible: Tensor  # float32 [B,G,M], how likely each of them still is to be a fire that nobody saw, 0..1
+    found: Tensor  # float32 [B,G,M], how likely each of them was when it turned out to be the fire that is known
+    overlap: Tensor  # int32 [B], sum over steps of cells that burn and are believed to
+    union: Tensor  # int32 [B], sum over steps of cells that burn or are believed to
+
+
+def beliefs_of(state: WorldState) -> Beliefs:
+    """Return the beliefs.
+
+    Raises:
+        ValueError: If there are none.
+    """
+    return state.planes(NAME, Beliefs)
+
+
+def cells_of(beliefs: Beliefs) -> Tensor:
+    """Return the members' codes, uint8 [B, G, K, H, W]."""
+    codes: Tensor = beliefs.members.held["cells"]
+    return codes.unflatten(1, beliefs.weights.shape[1:])
+
+
+def mean_of(beliefs: Beliefs, planes: Tensor) -> Tensor:
+    """Return the weighted mean of the members' planes, bool [B, G, K, H, W], float32 [B, G, H, W].
+
+    They are added one after the other, so that the sum is the same in any batch.
+    """
+    total = torch.zeros_like(planes[:, :, 0], dtype=torch.float32)
+    for member in range(planes.shape[2]):  # each is whole planes of all worlds
+        total = total + planes[:, :, member] * beliefs.weights[:, :, member, None, None]
+    return total
+
+
+def known_probability(beliefs: Beliefs) -> Tensor:
+    """Return the chance of each cell to burn by the fires that are known, float32 [B, G, H, W]."""
+    return mean_of(beliefs, is_burning(cells_of(beliefs)))
+
+
+def disagreement(beliefs: Beliefs) -> Tensor:
+    """Return how much the members disagree on each cell, 4 p (1 - p), float32 [B, G, H, W] in 0..1."""
+    p = known_probability(beliefs)
+    return 4.0 * p * (1.0 - p)
+
+
+def hidden_probability(beliefs: Beliefs, fires: int) -> Tensor:
+    """Return the chance of each cell to burn by a fire that nobody saw, float32 [B, G, H, W].
+
+    A fire that is not known is one of the ``possible`` ones, or that which was found.
+
+        p = 1 - (1 - h)^m, m = fires that are not known
+
+    Args:
+        beliefs: What is believed.
+        fires: That were lit.
+    """
+    if not beliefs.hidden.held:
+        return torch.zeros_like(known_probability(beliefs))
+    burns = is_burning(beliefs.hidden.held["cells"])
+    total = (beliefs.possible + beliefs.found).sum(dim=2, keepdim=True).clamp(min=1e-6)
+    share = torch.bmm(beliefs.possible / total, burns.flatten(2).to(torch.float32)).unflatten(2, burns.shape[2:])
+    known = is_burning(cells_of(beliefs)).flatten(2).any(dim=2)
+    left = (fires - known.to(torch.int32)).clamp(min=0)
+    return 1.0 - (1.0 - share.clamp(max=1.0)).pow(left[..., None, None])
+
+
+def most_believed(state: WorldState, threshold: float) -> WorldState:
+    """Return the worlds as they are believed to be, batch size [B * G]: what the members say of each cell.
+
+    A cell burns if those that say so weigh more than ``threshold``, and is empty if those that say so weigh more than
+    half; its code is that of the heaviest member, where this says the same.
+    """
+    beliefs = beliefs_of(state)
+    codes = cells_of(beliefs)
+    groups = codes.shape[1]
+    burns, gone = known_probability(beliefs) > threshold, mean_of(beliefs, codes == 0) > 0.5
+    heaviest = beliefs.weights.argmax(dim=2)[..., None, None, None].expand(-1, -1, 1, *codes.shape[3:])
+    first = codes.gather(2, heaviest)[:, :, 0]
+    tree = torch.where((first > 0) & (first < FIRST_FIRE), first, state.landscape.age[:, None])
+    cells = torch.where(burns, torch.where(first >= FIRST_FIRE, first, FIRST_FIRE + 1), torch.where(gone, 0, tree))
+    own = state if groups == 1 else state[rows_of(state, groups)]
+    return own.replace(cells=cells.to(torch.uint8).flatten(0, 1))
