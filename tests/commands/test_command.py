@@ -143,14 +143,14 @@ def test_evaluate_repeats_what_training_found(trained, run_here, tmp_path):
 
 @pytest.mark.parametrize("given", [("policy=null",), ("policy=null", "scenario=single")])
 def test_a_policy_of_null_is_none(trained, run_here, given):
-    what = (f"checkpoint={trained[0]}", "evaluation.episodes=2", "horizon=8")
+    what = (f"checkpoint={trained[0]}", "evaluation.episodes=2", "horizon=8", "picture=null")
     code, errors, said = run_here("evaluate.py", *what, *given)
     assert code == 0, errors
     assert "trained" in said
 
 
 def test_evaluate_takes_another_scenario_for_the_same_policy(trained, run_here):
-    what = (f"checkpoint={trained[0]}", "scenario=single", "evaluation.episodes=3", "horizon=12")
+    what = (f"checkpoint={trained[0]}", "scenario=single", "evaluation.episodes=3", "horizon=12", "picture=null")
     code, errors, said = run_here("evaluate.py", *what)
     assert code == 0, errors
     assert "single horizon=12: 3 fires" in said
@@ -161,6 +161,8 @@ def contents(folder):
 
 
 NOOP = ("policy=noop", "landscape.size=12", "horizon=4", "evaluation.episodes=2")
+BLIND = (*NOOP, "picture=null")
+"""To draw the first fire is half of such an evaluation."""
 
 
 def test_an_evaluation_never_writes_into_a_run_unless_told_to(trained, run_here, tmp_path):
@@ -237,19 +239,21 @@ def test_an_evaluation_never_writes_over_another_nor_a_sweep_over_a_sweep(run_he
     (tmp_path / "seen").mkdir()
     (tmp_path / "seen" / "evaluate.log").write_text("an earlier mistake\n")
     for where, flags, held in (("hydra.run.dir=seen", (), "an evaluation: "), ("hydra.sweep.dir=sweep", ("-m",), "0")):
-        code, errors, _ = run_here("evaluate.py", *flags, *NOOP, where)
+        code, errors, _ = run_here("evaluate.py", *flags, *BLIND, where)
         assert code == 0, errors
         before = contents(tmp_path)
-        code, errors, _ = run_here("evaluate.py", *flags, *NOOP, where, "scenario=single")
+        code, errors, _ = run_here("evaluate.py", *flags, *BLIND, where, "scenario=single")
         assert code == 2 and len(errors) == 1 and f"{where.replace('=', ': ')} holds {held}" in errors[0]
         assert contents(tmp_path) == before
-    code, errors, _ = run_here("evaluate.py", "-m", *NOOP, "hydra.sweep.dir=sweep", "overwrite=true", "scenario=single")
+    code, errors, _ = run_here(
+        "evaluate.py", "-m", *BLIND, "hydra.sweep.dir=sweep", "overwrite=true", "scenario=single"
+    )
     assert code == 0, errors
     assert json.loads((tmp_path / "sweep" / "0" / "evaluation.json").read_text())["scenario"] == "single"
 
 
 def test_two_jobs_of_a_sweep_of_evaluations_do_not_share_a_folder(run_here, tmp_path):
-    what = (*NOOP, "scenario=skirmish,single", "hydra.sweep.dir=sweep", "hydra.sweep.subdir=one")
+    what = (*BLIND, "scenario=skirmish,single", "hydra.sweep.dir=sweep", "hydra.sweep.subdir=one")
     code, errors, _ = run_here("evaluate.py", "-m", *what)
     assert code == 2 and "one holds an evaluation" in errors[-1]
     assert json.loads((tmp_path / "sweep" / "one" / "evaluation.json").read_text())["scenario"] == "skirmish"
@@ -259,7 +263,7 @@ def test_a_sweep_that_is_repeated_forgets_the_jobs_that_failed(run_here, tmp_pat
     (tmp_path / "sweep" / "0").mkdir(parents=True)
     failed = {"job": 0, "overrides": "", "code": 6, "reason": "the disk was full"}
     (tmp_path / "sweep" / "0" / "failed.json").write_text(json.dumps(failed))
-    code, errors, _ = run_here("evaluate.py", "-m", *NOOP, "hydra.sweep.dir=sweep", "overwrite=true")
+    code, errors, _ = run_here("evaluate.py", "-m", *BLIND, "hydra.sweep.dir=sweep", "overwrite=true")
     assert code == 0, errors
     assert not (tmp_path / "sweep" / "0" / "failed.json").exists()
 
@@ -306,15 +310,15 @@ def test_a_mistake_in_an_evaluation_leaves_no_folder(trained, run_here, tmp_path
 
 
 def test_evaluate_takes_a_policy_that_ships_by_its_name(tmp_path, run_here):
-    what = ("checkpoint=skirmish", "horizon=12", "evaluation.episodes=2", "hydra.run.dir=seen")
+    what = ("checkpoint=skirmish", "horizon=12", "evaluation.episodes=2", "picture=null", "hydra.run.dir=seen")
     code, errors, _ = run_here("evaluate.py", *what)
     assert code == 0, errors
     assert json.loads((tmp_path / "seen" / "evaluation.json").read_text())["scenario"] == "skirmish"
 
 
 def test_evaluate_takes_a_policy_by_name(tmp_path, run_here):
-    arguments = ("policy=local", "scenario=skirmish", "horizon=12", "evaluation.episodes=4", "hydra.run.dir=seen")
-    code, errors, _ = run_here("evaluate.py", *arguments)
+    arguments = ("policy=local", "scenario=skirmish", "horizon=12", "evaluation.episodes=4", "picture=null")
+    code, errors, _ = run_here("evaluate.py", *arguments, "hydra.run.dir=seen")
     assert code == 0, errors
     content = json.loads((tmp_path / "seen" / "evaluation.json").read_text())
     assert content["policy"] == "local" and "local" not in content["versus"]
@@ -522,11 +526,11 @@ def test_a_signal_ends_a_sweep_and_a_queue_s_warning_its_job(tmp_path, run_here,
 @pytest.mark.parametrize("more", [[], ["overwrite=true"]])
 def test_a_second_evaluation_in_a_folder_is_refused(tmp_path, run_here, more):
     lock = RunFolderLock(tmp_path / "seen")
-    code, errors, _ = run_here("evaluate.py", *NOOP, "hydra.run.dir=seen", *more)
+    code, errors, _ = run_here("evaluate.py", *BLIND, "hydra.run.dir=seen", *more)
     lock.release()
     assert code == 3 and "seen is in use" in errors[-1] and not (tmp_path / "seen" / "evaluation.json").exists()
     (tmp_path / "seen" / ".lock").unlink()
-    code, *_ = run_here("evaluate.py", *NOOP, "hydra.run.dir=seen", *more)
+    code, *_ = run_here("evaluate.py", *BLIND, "hydra.run.dir=seen", *more)
     assert code == 0
     assert not (tmp_path / "seen" / ".lock").exists() and (tmp_path / "seen" / "evaluation.json").exists()
 
@@ -561,7 +565,7 @@ def test_a_run_starts_from_another_ones_networks_on_another_scenario(trained, ru
     code, errors, _ = run_here("train.py", *arguments, "scenario=shift", "landscape.size=14", f"start_from={run}")
     assert code == 0, errors
     shutil.move(tmp_path / "run", tmp_path / "moved")
-    code, errors, _ = run_here("evaluate.py", "checkpoint=moved", "hydra.run.dir=seen")
+    code, errors, _ = run_here("evaluate.py", "checkpoint=moved", "picture=null", "hydra.run.dir=seen")
     assert code == 0, errors  # where it started from is recorded, and no longer needed
 
 
@@ -584,7 +588,7 @@ def test_a_start_that_is_none_is_refused_before_anything_is_written(trained, run
 
 def test_a_policy_alone_is_evaluated_as_its_run_was(trained, run_here, tmp_path):
     checkpoint.export(checkpoint.newest(trained[0])[0], tmp_path / "alone")
-    code, errors, _ = run_here("evaluate.py", "checkpoint=alone", "hydra.run.dir=seen")
+    code, errors, _ = run_here("evaluate.py", "checkpoint=alone", "picture=null", "hydra.run.dir=seen")
     assert code == 0, errors
     ours, theirs = (json.loads((each / "evaluation.json").read_text()) for each in (tmp_path / "seen", trained[0]))
     assert ours["episodes"] == theirs["episodes"]
@@ -682,7 +686,7 @@ def test_a_launcher_that_gives_up_leaves_the_table_and_names_the_jobs_that_did_n
         return launcher
 
     monkeypatch.setattr(Plugins, "instantiate_launcher", make_weak)
-    what = ("policy=noop,greedy", "landscape.size=12", "horizon=8", "evaluation.episodes=2", "hydra.sweep.dir=sweep")
+    what = ("policy=noop,greedy", *BLIND[1:], "hydra.sweep.dir=sweep")
     code, errors, _ = run_here("evaluate.py", "-m", *what)
     assert code == 1 and "a worker was killed" in errors[-1]
     assert errors[-2] == f"error: the job in {Path('sweep', '1')} did not end"
@@ -745,8 +749,8 @@ def test_a_mistake_in_a_process_of_its_own(tmp_path):
 
 def test_a_sweep_of_evaluations_ends_in_one_table_and_one_figure(tmp_path, run_here):
     pytest.importorskip("matplotlib")
-    what = ("policy=noop,greedy", "landscape.size=12", "horizon=20", "evaluation.episodes=4", "hydra.sweep.dir=sweep")
-    code, errors, said = run_here("evaluate.py", "-m", *what)
+    what = ("landscape.size=12", "horizon=20", "evaluation.episodes=4", "picture=null", "hydra.sweep.dir=sweep")
+    code, errors, said = run_here("evaluate.py", "-m", "policy=noop,greedy", *what)
     assert code == 0, errors
     text = (tmp_path / "sweep" / "summary.md").read_text()
     assert "| skirmish landscape.size=12 horizon=20 | greedy | 1 | 4 |" in text and text.strip() in said

@@ -25,6 +25,9 @@ class Rollout(Heuristic):
     the number of trees that stand in the end, less the number if the agent, too, follows the base policy. An action
     replaces that of the base policy if its mean gain is more than ``errors`` standard errors above 0, by the most.
 
+    Where sight is limited futures begin with worlds that may be the true ones as far as the team knows
+    (``World.futures``).
+
     All actions are simulated in the first half of the futures, and only those with a gain there in the second.
 
     References: Tesauro and Galperin, "On-line policy improvement using Monte-Carlo search", NIPS 1996; Bertsekas,
@@ -57,13 +60,14 @@ class Rollout(Heuristic):
     def _plan(self, state: WorldState, mask: Tensor, action: Tensor) -> Tensor:
         """Return better actions than those of the base policy where there are any, int64 [B, A]."""
         keys = imagined_keys(state.key, state.step, self.samples)
-        saved = self._imagine(state, torch.arange(len(action), device=action.device), action, keys)
+        futures = imagined(self.world.futures(state, self.samples), keys.flatten(), self.world)
+        saved = self._imagine(futures, torch.arange(len(action), device=action.device), action, range(self.samples))
         for agent in range(action.shape[1]):  # one after the other: each knows what those before it chose
-            action, saved = self._improve(state, mask[:, agent], action, saved, keys, agent)
+            action, saved = self._improve(futures, mask[:, agent], action, saved, agent)
         return action
 
     def _improve(
-        self, state: WorldState, mask: Tensor, action: Tensor, saved: Tensor, keys: Tensor, agent: int
+        self, futures: WorldState, mask: Tensor, action: Tensor, saved: Tensor, agent: int
     ) -> tuple[Tensor, Tensor]:
         """Return the actions with a better one of an agent, and the trees that they save, as ``saved`` [B, samples]."""
         own = action[:, agent]
@@ -76,8 +80,8 @@ class Rollout(Heuristic):
             if not len(left):
                 break
             which = row[left]
-            futures = self._imagine(state, which, tried[left], keys[:, begin:end])
-            gain[left, begin:end] = futures - saved[which, begin:end]
+            stand = self._imagine(futures, which, tried[left], range(begin, end))
+            gain[left, begin:end] = stand - saved[which, begin:end]
             left = left[gain[left, :end].sum(dim=1) > 0]
         best = torch.zeros(mask.shape, dtype=torch.float64, device=mask.device)
         best[row[left], option[left]] = self._sure_gain(gain[left])
@@ -98,21 +102,21 @@ class Rollout(Heuristic):
         variance = (squares * count - total.square()).to(torch.float64) / (count * (count - 1))
         return total.to(torch.float64) / count - self.errors * (variance / count).sqrt()
 
-    def _imagine(self, state: WorldState, row: Tensor, action: Tensor, keys: Tensor) -> Tensor:
+    def _imagine(self, futures: WorldState, row: Tensor, action: Tensor, which: range) -> Tensor:
         """Return the trees that stand after ``horizon`` steps, int32 [n, S].
 
         Args:
-            state: The worlds.
-            row: Which of them each action is tried in, int64 [n].
+            futures: Imagined worlds, ``samples`` of each world, batch size [B * samples].
+            row: The world that each action is tried in, int64 [n].
             action: Of the first step, int64 [n, A].
-            keys: Of the futures, int64 [B, S].
+            which: The S of its futures in which it is tried.
         """
-        world, count = rules_in_sight(self.world), keys.shape[1]
+        world, count = rules_in_sight(self.world), len(which)
         saved = []
-        for at in torch.arange(len(row) * count, device=row.device).split(self._at_once(state)):
+        for at in torch.arange(len(row) * count, device=row.device).split(self._at_once(futures)):
             tried, future = at // count, at % count
-            own = row[tried]
-            saved.append(self._play(world, imagined(state[own], keys[own, future], self.world), action[tried]))
+            own = row[tried] * self.samples + which.start + future
+            saved.append(self._play(world, futures[own], action[tried]))
         return torch.cat(saved).view(-1, count)
 
     def _at_once(self, state: WorldState) -> int:

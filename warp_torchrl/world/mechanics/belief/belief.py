@@ -34,8 +34,9 @@ from warp_torchrl.world.mechanics.belief.sightings import sightings
 from warp_torchrl.world.mechanics.mechanic import Mechanic, Metric, Rules
 from warp_torchrl.world.mechanics.table import part
 from warp_torchrl.world.state.cells import is_burning
-from warp_torchrl.world.state.records import freshness, kept, recorded
+from warp_torchrl.world.state.records import KNOWLEDGE, freshness, kept, recorded
 from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.world.team.hearing import HEARING
 from warp_torchrl.world.team.knowledge import Belief
 
 _STALE = 1e-3
@@ -179,7 +180,7 @@ class Ensemble(Belief, Mechanic):
         return burns + _STALE * (1.0 - freshness(records, state.step))
 
     def futures(self, state: WorldState, world: Rules, count: int) -> WorldState:
-        """Return members, the heaviest as often as they weigh; of one agent's belief the first agent's."""
+        """Return members, as often as they weigh, of worlds with one belief."""
         beliefs = beliefs_of(state)
         total = beliefs.weights[:, 0].cumsum(dim=1)
         at = (torch.arange(count, device=total.device) + 0.5) / count * total[:, -1:]
@@ -188,7 +189,11 @@ class Ensemble(Belief, Mechanic):
             name: leaf.gather(1, pick.view(*pick.shape, *[1] * (leaf.ndim - 2)).expand(-1, -1, *leaf.shape[2:]))
             for name, leaf in beliefs.members.held.items()
         }
-        return worlds_of(state, Named(own), world.fire)
+        worlds, rows = worlds_of(state, Named(own), world.fire), rows_of(state, count)
+        for name, planes in state.extras.held.items():
+            if name not in (NAME, KNOWLEDGE, HEARING, *world.fire.keeps):
+                worlds = worlds.with_planes(name, planes[rows])
+        return worlds
 
     def metric_rows(self, world: Rules) -> tuple[Metric, ...]:
         """Return ``jaccard``, and ``rate_known`` and so on of what the team does not know."""

@@ -104,5 +104,33 @@ def most_believed(state: WorldState, threshold: float) -> WorldState:
     first = codes.gather(2, heaviest)[:, :, 0]
     tree = torch.where((first > 0) & (first < FIRST_FIRE), first, state.landscape.age[:, None])
     cells = torch.where(burns, torch.where(first >= FIRST_FIRE, first, FIRST_FIRE + 1), torch.where(gone, 0, tree))
-    own = state if groups == 1 else state[rows_of(state, groups)]
+    own = state
+    if groups > 1:
+        own = state.without_planes(NAME)[rows_of(state, groups)].with_planes(NAME, each_alone(beliefs))
     return own.replace(cells=cells.to(torch.uint8).flatten(0, 1))
+
+
+def each_alone(beliefs: Beliefs) -> Beliefs:
+    """Return each belief of B worlds as the one of a world, batch size [B * G]."""
+    groups = beliefs.weights.shape[1]
+
+    def parted(leaf: Tensor) -> Tensor:
+        return leaf.flatten(0, 1)[:, None]
+
+    def repeated(leaf: Tensor) -> Tensor:
+        return leaf.repeat_interleave(groups, dim=0)
+
+    def members(kept: Named) -> Named:
+        return Named({name: leaf.unflatten(1, (groups, -1)).flatten(0, 1) for name, leaf in kept.held.items()})
+
+    return Beliefs(
+        members=members(beliefs.members),
+        weights=parted(beliefs.weights),
+        parameters=Named({name: parted(leaf) for name, leaf in beliefs.parameters.held.items()}),
+        chances=members(beliefs.chances),
+        hidden=Named({name: repeated(leaf) for name, leaf in beliefs.hidden.held.items()}),
+        possible=parted(beliefs.possible),
+        found=parted(beliefs.found),
+        overlap=repeated(beliefs.overlap),
+        union=repeated(beliefs.union),
+    )
