@@ -7,7 +7,6 @@ used, which spares that process six seconds before the others begin.
 import gc
 import logging
 import os
-import pickle
 import shutil
 from pathlib import Path
 
@@ -119,17 +118,6 @@ def _conf_with_docs(tmp_path_factory):
 def all_experiments(_conf_with_docs, monkeypatch):
     """Let experiments of the docs stand beside those of the package, as ``--config-dir docs`` does."""
     monkeypatch.setattr("warp_torchrl.runs.config.compose.conf_folder", lambda: _conf_with_docs)
-
-
-@pytest.fixture(autouse=True, scope="session")
-def _copy_configurations_quickly():
-    """Copy those that are composed by packing them, in an eighth of the time of ``deepcopy``, and as deeply."""
-    from warp_torchrl.runs.config import compose, defaults
-
-    with pytest.MonkeyPatch.context() as patch:
-        for module in (compose, defaults):
-            patch.setattr(module, "deepcopy", lambda value: pickle.loads(pickle.dumps(value)))
-        yield
 
 
 @pytest.fixture(autouse=True, scope="session")
