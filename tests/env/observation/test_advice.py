@@ -8,6 +8,7 @@ from warp_torchrl.api.make import make_env
 from warp_torchrl.entries import ADVICE
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.observation import Surroundings
+from warp_torchrl.env.observation.advice import advised_actions
 from warp_torchrl.heuristics import HEURISTICS, TEACHERS
 from warp_torchrl.models import signature
 from warp_torchrl.models.canonical.orientation import Orientation
@@ -81,10 +82,13 @@ def test_who_advises_is_checked():
 
 
 @needs("sensing")
-def test_who_sees_all_may_not_advise_those_who_do_not():
-    rule = r"observation\.advice must be null or one of .*follower.* where sight is limited, got dispatch"
-    with pytest.raises(ValueError, match=rule):
-        env_of("search", "dispatch")
+def test_an_adviser_knows_what_the_team_knows():
+    env = env_of("search", "dispatch")
+    env.reset()
+    state, adviser = env.world_state, HEURISTICS["dispatch"](env)
+    mask = env.world.possible_actions(state)
+    advised = advised_actions(state, env.world, "dispatch")
+    assert torch.equal(advised, adviser.act(state, mask)) and not torch.equal(advised, adviser.choose(state, mask))
 
 
 def test_steps_with_advice_are_neither_compiled_nor_recorded():

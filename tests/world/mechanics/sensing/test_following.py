@@ -24,7 +24,7 @@ Radio = pytest.importorskip("warp_torchrl.world.mechanics.radio.radio").Radio
 
 
 @pytest.mark.parametrize("name", HEURISTICS)
-def test_who_sees_all_alone_acts_on_a_fire_that_no_agent_sees(make_small_env, name):
+def test_a_fire_that_no_agent_sees_moves_none_but_the_choice_of_who_is_shown_it(make_small_env, name):
     env = make_small_env(16, small_world(sensing=Sight(radius=1), team=Team(n_agents=2, start="anywhere")))
     env.reset()
     state, vehicles = env.world_state, env.world_state.vehicles
@@ -33,8 +33,10 @@ def test_who_sees_all_alone_acts_on_a_fire_that_no_agent_sees(make_small_env, na
     burns = unseen & (torch.rand(trees.shape, generator=torch.Generator().manual_seed(0)) < 0.5)
     vehicles = vehicles.replace(acts=torch.ones_like(vehicles.acts))  # all have been at the fire
     states = [state.replace(cells=each, vehicles=vehicles) for each in (trees, trees.masked_fill(burns, 11))]
-    acts = [HEURISTICS[name](env).choose(each, env.world.possible_actions(each)) for each in states]
-    assert torch.equal(*acts) != HEURISTICS[name].sees_all
+    masks = [env.world.possible_actions(each) for each in states]
+    assert torch.equal(*(HEURISTICS[name](env).act(*each) for each in zip(states, masks, strict=True)))
+    acts = [HEURISTICS[name](env).choose(*each) for each in zip(states, masks, strict=True)]
+    assert torch.equal(*acts) != HEURISTICS[name].reads_map
 
 
 def watched_forest(team, *mechanics, side=19):

@@ -8,7 +8,7 @@ from tests.world.mechanics.drawing import begun, later
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.observation import CriticState, Local, Paper, Surroundings
 from warp_torchrl.env.observation.channels import DEFAULT
-from warp_torchrl.heuristics import HEURISTICS, TEACHERS
+from warp_torchrl.heuristics import TEACHERS
 from warp_torchrl.world.mechanics.sensing.sensing import Sight
 from warp_torchrl.world.state.state import Forecast
 from warp_torchrl.world.team.knowledge import Full
@@ -17,13 +17,12 @@ from warp_torchrl.world.team.places import in_reach
 Radio = pytest.importorskip("warp_torchrl.world.mechanics.radio.radio").Radio
 DEAF = Radio(range=0.0)
 CHANNELS = (*DEFAULT, "last_seen")
-KNOWING = [name for name in TEACHERS if not HEURISTICS[name].sees_all]
 PRESETS = {
     "centred": Surroundings(channels=CHANNELS),
     "whole map": Surroundings(channels=CHANNELS, centred=False),
     "near": Surroundings(channels=CHANNELS, near=2),
     "local": Local(channels=CHANNELS),
-    **{f"advice by {name}": Local(radius=3, channels=CHANNELS, advice=name) for name in KNOWING},
+    **{f"advice by {name}": Local(radius=3, channels=CHANNELS, advice=name) for name in TEACHERS},
     "paper": Paper(),
 }
 

@@ -110,7 +110,7 @@ def test_steps_of_late_packets_are_not_compiled(monkeypatch):
 def test_nothing_hides_fire_from_who_imagines():
     env = make_env("smoke", n_worlds=2, overrides=["landscape.size=12", "mechanics.radio.delay=1"])
     env.reset()
-    world, state = rules_in_sight(env.world), imagined(env.world_state, env.world_state.key + 1)
+    world, state = rules_in_sight(env.world), imagined(env.world_state, env.world_state.key + 1, env.world)
     assert env.world.sensing.is_limited and not world.sensing.is_limited
     after = world.step(state, torch.zeros(2, env.n_agents, dtype=torch.int64)).after
     assert not after.keeps("sensing") and not after.keeps("radio")

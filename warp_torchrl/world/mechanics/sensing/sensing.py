@@ -50,6 +50,7 @@ class Sight(Sensing, Mechanic):
     """
 
     name: ClassVar[str] = KNOWLEDGE
+    is_knowledge: ClassVar[bool] = True
 
     radius: int = 3
     radius_of: Mapping[str, int] = field(default_factory=dict)
