@@ -84,7 +84,7 @@ def test_who_advises_is_checked():
 @needs("sensing")
 def test_an_adviser_knows_what_the_team_knows():
     env = env_of("search", "dispatch")
-    env.reset()
+    env.rollout(20)
     state, adviser = env.world_state, HEURISTICS["dispatch"](env)
     mask = env.world.possible_actions(state)
     advised = advised_actions(state, env.world, "dispatch")
