@@ -15,6 +15,7 @@ from warp_torchrl.algorithms.learner import Learner
 from warp_torchrl.collection.imitation import Imitation
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import HEURISTICS, Heuristic
+from warp_torchrl.heuristics.heuristic import seeing_all
 from warp_torchrl.models import ACTION, ACTION_MASK
 
 
@@ -29,7 +30,9 @@ def guided(learner: Learner, imitation: Imitation, env: WildfireEnv) -> Learner:
     if imitation.guide is None:
         return learner
     *acts, explores = learner.explore.module
-    return replace(learner, explore=_Guided(TensorDictSequential(*acts), explores, HEURISTICS[imitation.guide](env)))
+    return replace(
+        learner, explore=_Guided(TensorDictSequential(*acts), explores, seeing_all(HEURISTICS[imitation.guide], env))
+    )
 
 
 class _Guided(TensorDictModuleBase):

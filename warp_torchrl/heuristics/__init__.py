@@ -1,7 +1,7 @@
 """Heuristic policies, the baselines. Each is a TensorDictModule.
 
-They read the state through the environment. ``local``, ``oldest``, ``lawnmower``, ``follower`` and ``clockwise`` know
-of the fire what their agents know or see; the others see every cell, which no learned policy does.
+They read the state through the environment. Where sight is limited they act on what their agents know of the fire, see
+``Heuristic.act``; those that teach see every cell.
 """
 
 from warp_torchrl.heuristics.base import idle_action

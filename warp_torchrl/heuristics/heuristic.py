@@ -44,6 +44,8 @@ class Heuristic(TensorDictModuleBase):
     def __init__(self, env: Worlds) -> None:
         super().__init__()
         self._env = (env,)  # in a tuple, so that the environment does not become a submodule
+        self.sees_all = False
+        """Whether it acts on the true worlds where its agents' sight is limited, as teachers do."""
 
     @property
     def env(self) -> Worlds:
@@ -71,7 +73,7 @@ class Heuristic(TensorDictModuleBase):
         are left idle search (``seeking.seek``).
         """
         world = self.world
-        if not (self.reads_map and world.sensing.is_limited):
+        if self.sees_all or not (self.reads_map and world.sensing.is_limited):
             return self.choose(state, mask)
         assumed, agents = world.assumed(state), mask.shape[1]
         views = len(assumed.key) // len(mask)
@@ -85,3 +87,10 @@ class Heuristic(TensorDictModuleBase):
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A], for worlds and the actions that do something, bool [B, A, actions]."""
         raise TypeError(f"{type(self).__name__} does not say what to do: define choose()")
+
+
+def seeing_all(kind: type[Heuristic], env: Worlds) -> Heuristic:
+    """Return a heuristic that sees the true worlds, as only those may who teach and do not play."""
+    made = kind(env)
+    made.sees_all = True
+    return made

@@ -1,6 +1,6 @@
 """Advice: the action that a heuristic would have each agent do next.
 
-Of a heuristic that sees all it is what a dispatcher radios; of one that knows what its agents know, a rule of thumb.
+It is what a dispatcher radios, who knows what the team knows, see ``Heuristic.act``.
 Agents learn when to take it. The word is that of Torrey and Taylor, "Teaching on a Budget: Agents Advising Agents in
 Reinforcement Learning", AAMAS 2013.
 """

@@ -10,6 +10,7 @@ from warp_torchrl import make_env
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.evaluation.play import play
 from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.heuristics.heuristic import seeing_all
 from warp_torchrl.world.air.wind import Calm
 from warp_torchrl.world.arrays.distances import chebyshev_distance
 from warp_torchrl.world.ignition.ignition import Ignition
@@ -24,7 +25,7 @@ Radio = pytest.importorskip("warp_torchrl.world.mechanics.radio.radio").Radio
 
 
 @pytest.mark.parametrize("name", HEURISTICS)
-def test_a_fire_that_no_agent_sees_moves_none_but_the_choice_of_who_is_shown_it(make_small_env, name):
+def test_a_fire_that_no_agent_sees_moves_teachers_alone(make_small_env, name):
     env = make_small_env(16, small_world(sensing=Sight(radius=1), team=Team(n_agents=2, start="anywhere")))
     env.reset()
     state, vehicles = env.world_state, env.world_state.vehicles
@@ -35,7 +36,7 @@ def test_a_fire_that_no_agent_sees_moves_none_but_the_choice_of_who_is_shown_it(
     states = [state.replace(cells=each, vehicles=vehicles) for each in (trees, trees.masked_fill(burns, 11))]
     masks = [env.world.possible_actions(each) for each in states]
     assert torch.equal(*(HEURISTICS[name](env).act(*each) for each in zip(states, masks, strict=True)))
-    acts = [HEURISTICS[name](env).choose(*each) for each in zip(states, masks, strict=True)]
+    acts = [seeing_all(HEURISTICS[name], env).act(*each) for each in zip(states, masks, strict=True)]
     assert torch.equal(*acts) != HEURISTICS[name].reads_map
 
 
