@@ -8,7 +8,7 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
 from warp_torchrl.heuristics.base import idle_action
-from warp_torchrl.heuristics.seeking import can_act_on_fire, seek
+from warp_torchrl.heuristics.seeking import by_own_view, can_act_on_fire, seek
 from warp_torchrl.system.modes import apart
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.state import WorldState
@@ -77,9 +77,7 @@ class Heuristic(TensorDictModuleBase):
             return self.choose(state, mask)
         assumed, agents = world.assumed(state), mask.shape[1]
         views = len(assumed.key) // len(mask)
-        chosen = self.choose(assumed, mask.repeat_interleave(views, dim=0))
-        chosen = chosen.unflatten(0, (-1, views))
-        own = chosen[:, 0] if views == 1 else chosen.diagonal(dim1=1, dim2=2)
+        own = by_own_view(self.choose(assumed, mask.repeat_interleave(views, dim=0)), views)
         knows = is_burning(assumed.cells).flatten(1).any(dim=1).view(-1, views).expand(-1, agents)
         acts = knows & (own != idle_action(mask, world.team)) & can_act_on_fire(world, mask.device)
         return torch.where(acts, own, seek(state, assumed, world, mask))

@@ -46,5 +46,17 @@ def seek(state: WorldState, assumed: WorldState, world: World, mask: Tensor) -> 
     cells = torch.arange(value.shape[2], device=mask.device).expand(len(mask), -1)
     gain = value.clamp(min=_LEAST).log() - (agent_distance(state, cells) + _SETTLING).log()
     target = match_cells(state, cells, gain, spacing=2 * max(sights) + 2, discount=_APART, taken=_TAKEN)
-    own = assumed if len(assumed.key) == len(state.key) else state
-    return extinguish_or(first_move(own, world, mask, target_or_supply(state, world, target)), mask)
+    views, target = len(assumed.key) // len(mask), target_or_supply(state, world, target)
+    moves = first_move(assumed, world, *(each.repeat_interleave(views, dim=0) for each in (mask, target)))
+    return extinguish_or(by_own_view(moves, views), mask)
+
+
+def by_own_view(actions: Tensor, views: int) -> Tensor:
+    """Return what each agent does by the map that it assumes, int64 [B, A].
+
+    Args:
+        actions: Of all agents on every map, int64 [B * views, A].
+        views: Maps of a world: 1, or one of each agent.
+    """
+    actions = actions.unflatten(0, (-1, views))
+    return actions[:, 0] if views == 1 else actions.diagonal(dim1=1, dim2=2)

@@ -255,15 +255,17 @@ class Ensemble(Belief, Mechanic):
             ignites = forecast(world.fire, members).ignition_probability * now[rows][:, None, None]
             chances = chances.replace(values=ignites.unflatten(0, (-1, count)))
 
-        def grown(worlds: WorldState, count: int, parameters: Tensor | None = None) -> Named:
+        def grown(own: Named, worlds: WorldState, count: int, parameters: Tensor | None = None) -> Named:
             rows = rows_of(before, count)
             air = after.air[rows] if world.air.changes else after.air
-            return held(ticked(worlds, world.fire, world.air, now[rows], air, parameters), count, world.fire)
+            new = held(ticked(worlds, world.fire, world.air, now[rows], air, parameters), count, world.fire)
+            drawn = (name for name in world.fire.draws if name in own.held)
+            return new.replace(**{name: own.held[name] for name in drawn})  # without the factor on their rate
 
         hidden = beliefs.hidden
         if self.hidden:
-            hidden = grown(worlds_of(before, hidden, world.fire), self.hidden)
-        return beliefs.replace(members=grown(members, count, values), chances=chances, hidden=hidden)
+            hidden = grown(hidden, worlds_of(before, hidden, world.fire), self.hidden)
+        return beliefs.replace(members=grown(beliefs.members, members, count, values), chances=chances, hidden=hidden)
 
     def _no_chances(self, state: WorldState, groups: int) -> Named:
         if not self.weighs:

@@ -73,6 +73,7 @@ def _drawn_again(state: WorldState, beliefs: Beliefs, poor: Tensor) -> Beliefs:
         return leaf.gather(1, flat.view(*flat.shape, *[1] * (leaf.ndim - 2)).expand_as(leaf))
 
     own = {name: leaf if name == "key" else drawn(leaf) for name, leaf in beliefs.members.held.items()}
+    chances = {name: drawn(leaf) for name, leaf in beliefs.chances.held.items()}
     parameters = beliefs.parameters
     if parameters.held:
         values: Tensor = parameters.held["values"]
@@ -83,6 +84,7 @@ def _drawn_again(state: WorldState, beliefs: Beliefs, poor: Tensor) -> Beliefs:
         parameters = parameters.replace(values=torch.where(poor[..., None, None], moved.view_as(values), values))
     return beliefs.replace(
         members=Named(own),
+        chances=Named(chances),
         parameters=parameters,
         weights=torch.where(poor[..., None], 1.0 / count, beliefs.weights),
     )

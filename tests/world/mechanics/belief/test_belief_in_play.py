@@ -1,0 +1,94 @@
+"""Beliefs in play: what nobody saw changes nothing, any batch gives the same, and what was kept goes on."""
+
+import pytest
+import torch
+
+from tests.world.drawing import differing
+from tests.world.mechanics.belief.worlds import LAWS, alight, begun, reset, rules, stay
+from warp_torchrl.env import WildfireEnv
+from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.world.mechanics.belief.belief import Ensemble
+from warp_torchrl.world.mechanics.belief.beliefs import beliefs_of, cells_of
+from warp_torchrl.world.team.knowledge import Belief
+
+UNKNOWN = Ensemble(members=4, hidden=8, rate_deviation=0.4, wind_speed_deviation=0.3, bearing_deviation=20.0)
+AT = (5, 0), (5, 1)
+BELIEFS = (None, Belief(), UNKNOWN, Ensemble(of="agent", members=2, hidden=4))
+METRIC = ("overlap", "union")
+
+
+def acted(world, state, name):
+    """What a heuristic does in worlds."""
+    env = WildfireEnv(world, n_worlds=len(state.key), seed=0)
+    env.set_state(state)
+    return HEURISTICS[name](env).act(env.shared_state, world.possible_actions(state))
+
+
+def believed(state):
+    """The names and values of what is believed; two sums for a metric compare it with the fire."""
+    leaves = state.leaves().items()
+    return {name: leaf for name, leaf in leaves if name.startswith("extras.belief") and name[14:] not in METRIC}
+
+
+@pytest.mark.parametrize("knows", [True, False], ids=["known fire", "none"])
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("belief", BELIEFS, ids=["none, apart", "none", "team", "agent"])
+def test_what_nobody_saw_changes_nothing(law, belief, knows):
+    world = rules(law, belief=belief or Belief(), shares=belief is not None and getattr(belief, "of", "team") == "team")
+    state = begun(world, reset(world), *AT, drop=True)
+    state = begun(world, alight(world, state, (11, 11), *[(5, 2)] * knows), *AT)
+    wall = [(row, 5) for row in range(10)]
+    ours, theirs = state, begun(world, alight(world, state, *wall), *AT)
+    for _ in range(4):
+        own = believed(theirs)
+        assert not [name for name, leaf in believed(ours).items() if not torch.equal(leaf, own[name])]
+        for name in ("dispatch", "coordinated"):
+            assert torch.equal(acted(world, ours, name), acted(world, theirs, name)), name
+        ours, theirs = (world.step(each, stay(each)).after for each in (ours, theirs))
+
+
+def played(world, state, steps):
+    for _ in range(steps):
+        state = world.step(state, stay(state)).after
+    return state
+
+
+@pytest.mark.parametrize("sight", [{}, {"miss": 0.2, "false_alarm": 0.05}], ids=["exact", "errors"])
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("belief", [UNKNOWN, Ensemble(of="agent", members=3, hidden=5)], ids=["team", "agent"])
+def test_a_batch_of_worlds_is_what_each_is_alone(law, belief, sight):
+    world = rules(law, radius=2, sight=sight, belief=belief, shares=belief.of == "team")
+    fires = ((5, 3),)
+    state = begun(world, alight(world, reset(world, 3), *fires), *AT)
+    together = played(world, state, 6)
+    for one in range(3):
+        alone, among = played(world, state[one : one + 1], 6), together[one : one + 1]
+        assert law == "rate" or not differing(alone, among)
+        for name, leaf in believed(among).items():  # rates of spread of one world are rounded otherwise
+            torch.testing.assert_close(leaf, believed(alone)[name], rtol=1e-3, atol=1e-4)
+
+
+def test_ended_worlds_do_not_change():
+    world = rules(radius=2, belief=UNKNOWN)
+    state = begun(world, alight(world, reset(world, 2), (5, 3)), *AT)
+    ended = state.replace(truncated=torch.tensor([False, True]))
+    after = played(world, ended, 4)
+    assert not differing(after[1:], ended[1:])
+    assert not differing(after[:1], played(world, state[:1], 4))
+    assert not torch.equal(believed(after)["extras.belief.members.cells"][0], cells_of(beliefs_of(state))[0, 0])
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_what_is_kept_goes_on_exactly(law):
+    env, other = (WildfireEnv(rules(law, radius=2, belief=UNKNOWN), n_worlds=2, seed=seed) for seed in (3, 9))
+    env.rollout(5, break_when_any_done=False), other.reset()
+    other.load_state_dict(env.state_dict())
+    ours, theirs = (played(each.world, each.world_state, 4) for each in (env, other))
+    assert not differing(ours, theirs) and "extras.belief.parameters.values" in ours.leaves()
+
+
+def test_what_a_law_draws_of_the_ground_has_the_factor_of_the_rate_once():
+    world = rules("rate", belief=UNKNOWN)
+    state = begun(world, reset(world))
+    pace = "extras.belief.members.ground.terms.pace"
+    assert torch.equal(played(world, state, 4).leaves()[pace], state.leaves()[pace])
