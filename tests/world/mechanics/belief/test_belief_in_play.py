@@ -14,6 +14,7 @@ from warp_torchrl.world.team.knowledge import Belief
 UNKNOWN = Ensemble(members=4, hidden=8, rate_deviation=0.4, wind_speed_deviation=0.3, bearing_deviation=20.0)
 AT = (5, 0), (5, 1)
 BELIEFS = (None, Belief(), UNKNOWN, Ensemble(of="agent", members=2, hidden=4))
+OF_FIRE = ("cells", "burned", "firebreak", "age", "stage_age", "wet", "extras.rate.minutes", "extras.rate.origin")
 METRIC = ("overlap", "union")
 
 
@@ -42,6 +43,8 @@ def test_what_nobody_saw_changes_nothing(law, belief, knows):
     for _ in range(4):
         own = believed(theirs)
         assert not [name for name, leaf in believed(ours).items() if not torch.equal(leaf, own[name])]
+        fire = OF_FIRE if world.belief in BELIEFS[2:] else OF_FIRE[:3]
+        assert not {*differing(world.assumed(ours), world.assumed(theirs))} & {*fire}
         for name in ("dispatch", "coordinated"):
             assert torch.equal(acted(world, ours, name), acted(world, theirs, name)), name
         ours, theirs = (world.step(each, stay(each)).after for each in (ours, theirs))

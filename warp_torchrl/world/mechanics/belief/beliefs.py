@@ -10,7 +10,7 @@ from torch import Tensor
 
 from warp_torchrl.world.arrays.batch import Batch, Named
 from warp_torchrl.world.ensemble.members import rows_of
-from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.cells import is_burning, is_tree
 from warp_torchrl.world.state.state import FIRST_FIRE, WorldState
 
 NAME = "belief"
@@ -94,20 +94,29 @@ def most_believed(state: WorldState, threshold: float) -> WorldState:
     """Return the worlds as they are believed to be, batch size [B * G]: what the members say of each cell.
 
     A cell burns if those that say so weigh more than ``threshold``, and is empty if those that say so weigh more than
-    half; its code is that of the heaviest member, where this says the same.
+    half; its code is that of the heaviest member, where this says the same. All else of the fire is this member's.
     """
     beliefs = beliefs_of(state)
     codes = cells_of(beliefs)
-    groups = codes.shape[1]
+    heaviest = beliefs.weights.argmax(dim=2, keepdim=True)
+
+    def of_heaviest(leaf: Tensor) -> Tensor:
+        each = leaf.unflatten(1, codes.shape[1:3])
+        index = heaviest.view(*heaviest.shape, *[1] * (each.ndim - 3)).expand(-1, -1, 1, *each.shape[3:])
+        return each.gather(2, index)[:, :, 0]
+
+    held = beliefs.members.held.items()
+    first = {name: of_heaviest(leaf) for name, leaf in held if name not in ("key", "extinguished")}
+    code, says = first["cells"], is_burning(first["cells"])
     burns, gone = known_probability(beliefs) > threshold, mean_of(beliefs, codes == 0) > 0.5
-    heaviest = beliefs.weights.argmax(dim=2)[..., None, None, None].expand(-1, -1, 1, *codes.shape[3:])
-    first = codes.gather(2, heaviest)[:, :, 0]
-    tree = torch.where((first > 0) & (first < FIRST_FIRE), first, state.landscape.age[:, None])
-    cells = torch.where(burns, torch.where(first >= FIRST_FIRE, first, FIRST_FIRE + 1), torch.where(gone, 0, tree))
-    own = state
+    tree = torch.where(is_tree(code), code, state.landscape.age[:, None])
+    cells = torch.where(burns, torch.where(says, code, FIRST_FIRE + 1), torch.where(gone, 0, tree))
+    first["age"] = torch.where(burns, torch.where(says, first["age"], tree), 0)
+    first["cells"] = cells.to(torch.uint8)
+    own, groups = state, codes.shape[1]
     if groups > 1:
         own = state.without_planes(NAME)[rows_of(state, groups)].with_planes(NAME, each_alone(beliefs))
-    return own.replace(cells=cells.to(torch.uint8).flatten(0, 1))
+    return own.with_leaves({**own.leaves(), **{name: leaf.flatten(0, 1) for name, leaf in first.items()}})
 
 
 def each_alone(beliefs: Beliefs) -> Beliefs:
