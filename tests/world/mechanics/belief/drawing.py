@@ -37,7 +37,7 @@ def believing(drawing, *members, weights=None, hidden=(), possible=None, chances
         members=Named({**own, "extinguished": no.clone(), "key": torch.arange(count)[None]}),
         weights=torch.tensor([[weights or [1.0 / count] * count]]),
         parameters=Named(),
-        chances=Named({"values": torch.tensor([chances or [0.0] * len(members)])[..., None, None] * (cells > 0)}),
+        chances=Named({"values": torch.tensor([chances or [0.0] * count])[..., None, None] * (cells > 0)}),
         hidden=Named() if lit is None else Named({"cells": lit, "age": none[:, :1].expand_as(lit), "burned": lit == 0}),
         possible=torch.tensor([[possible or [1.0] * m]]),
         found=torch.zeros(1, 1, m),

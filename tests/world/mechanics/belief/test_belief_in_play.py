@@ -1,5 +1,7 @@
 """Beliefs in play: what nobody saw changes nothing, any batch gives the same, and what was kept goes on."""
 
+from typing import NamedTuple
+
 import pytest
 import torch
 
@@ -10,6 +12,7 @@ from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.world.mechanics.belief.belief import Ensemble
 from warp_torchrl.world.mechanics.belief.beliefs import beliefs_of, cells_of
 from warp_torchrl.world.team.knowledge import Belief
+from warp_torchrl.world.world import World
 
 UNKNOWN = Ensemble(members=4, hidden=8, rate_deviation=0.4, wind_speed_deviation=0.3, bearing_deviation=20.0)
 AT = (5, 0), (5, 1)
@@ -18,11 +21,15 @@ OF_FIRE = ("cells", "burned", "firebreak", "age", "stage_age", "wet", "extras.ra
 METRIC = ("overlap", "union")
 
 
+class Rules(NamedTuple):
+    """What a heuristic reads of an environment."""
+
+    world: World
+
+
 def acted(world, state, name):
     """What a heuristic does in worlds."""
-    env = WildfireEnv(world, n_worlds=len(state.key), seed=0)
-    env.set_state(state)
-    return HEURISTICS[name](env).act(env.shared_state, world.possible_actions(state))
+    return HEURISTICS[name](Rules(world)).act(state, world.possible_actions(state))
 
 
 def believed(state):
@@ -95,3 +102,4 @@ def test_what_a_law_draws_of_the_ground_has_the_factor_of_the_rate_once():
     state = begun(world, reset(world))
     pace = "extras.belief.members.ground.terms.pace"
     assert torch.equal(played(world, state, 4).leaves()[pace], state.leaves()[pace])
+    assert not torch.equal(state.leaves()[pace][:, 0], state.leaves()[pace][:, 1]), "each member's are drawn"

@@ -4,19 +4,19 @@ import pytest
 import torch
 
 from tests.conftest import small_world
+from tests.world.mechanics.there import is_there
 from warp_torchrl.world.ensemble.members import lit
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.law.hazard import HazardFire
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.mechanics.belief.belief import Ensemble
-from warp_torchrl.world.mechanics.table import mechanics
 from warp_torchrl.world.state.state import Action
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
 
 LAWS = {"paper": Fire(), "hazard": HazardFire(), "rate": RateFire()}
 BELIEVES = ("scenario=search", "belief=ensemble", "belief.members=3", "belief.hidden=6", "belief.rate_deviation=0.3")
-WORLDS = {"believes": BELIEVES} if {"radio", "sensing"} <= set(mechanics()) else {}
+WORLDS = {"believes": BELIEVES} if is_there("radio", "sensing") else {}
 
 
 def rules(law="paper", radius=1, sight=None, belief=None, shares=True, size=12, **changes):
