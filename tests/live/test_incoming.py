@@ -42,7 +42,7 @@ def page(tmp_path_factory):
 
 @pytest.fixture
 def browser(page):
-    """Connect a browser; all are closed at the end."""
+    """Connect a browser; all are closed at the end, and what they asked for is dropped before the next test."""
     made = []
 
     def connect(**options):
@@ -52,6 +52,7 @@ def browser(page):
     yield connect
     for each in made:
         each.close()
+    until(lambda: not page._clients)
 
 
 def gui_of(page):
