@@ -24,7 +24,9 @@ FURTHER = {
     **of_mechanics("WORLDS"),
 }  # fmt: skip
 """Further worlds: what no scenario shows, does or pays."""
-WORLDS = (*SCENARIOS, *FURTHER)
+BRIEFLY = ("default", "skirmish", "smoke", "agencies", "wildland", "paper", *of_mechanics("WORLDS"))
+"""Worlds that hold every kind of plane, role and law between them; the others are played by ``-m slow``."""
+WORLDS = [each if each in BRIEFLY else pytest.param(each, marks=pytest.mark.slow) for each in (*SCENARIOS, *FURTHER)]
 
 
 def ground(folder):

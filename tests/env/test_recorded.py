@@ -18,11 +18,11 @@ from warp_torchrl.system.device import unread
 
 BRIEFLY = [
     ["scenario=skirmish"],
-    ["scenario=hazard", "reward=adaptive"],
-    ["scenario=smoke", "mechanics.radio.carries=both", "mechanics.radio.delay=2", "mechanics.radio.loss=0.1"],
     *of_mechanics("WORLDS").values(),
 ]
 AT_LENGTH = [
+    ["scenario=hazard", "reward=adaptive"],
+    ["scenario=smoke", "mechanics.radio.carries=both", "mechanics.radio.delay=2", "mechanics.radio.loss=0.1"],
     ["scenario=lightning", "wind=wandering"],
     ["scenario=default", "observation=paper", "landscape.relief=200", "fire=paper"],
     ["scenario=hetero", "reward=collaborative"],

@@ -13,6 +13,7 @@ from warp_torchrl.system.device import unread
 SHORT = ["landscape.size=10", "horizon=12"]
 LATE = ["scenario=search", "mechanics.radio.carries=both", "mechanics.radio.delay=2", "mechanics.radio.loss=0.2"]
 TALKS = ["mechanics.radio.carries=graph", "mechanics.radio.delay=2"]
+AT_LENGTH = [["scenario=lightning"], ["wind=wandering"], LATE]
 
 
 def played(steps, *overrides):
@@ -28,7 +29,10 @@ def played(steps, *overrides):
 
 @pytest.mark.parametrize(
     "overrides",
-    filter(can_play, [[], ["scenario=lightning"], ["wind=wandering"], ["scenario=front"], LATE, TALKS]),
+    [
+        *filter(can_play, [[], ["scenario=front"], TALKS]),
+        *(pytest.param(each, marks=pytest.mark.slow) for each in AT_LENGTH if can_play(each)),
+    ],
     ids=" ".join,
 )
 def test_worlds_play_the_same_episodes_though_nobody_asks_which_have_ended(overrides):

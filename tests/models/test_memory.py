@@ -158,7 +158,7 @@ def test_what_was_shown_at_first_is_learnt_to_matter_later_by_those_who_remember
     rates = {"learning_rate": 1e-2, "learning_rate_end": 1.0, "gamma": 0.5, "entropy_coeff": 0.0}
     learner = kind(minibatch_size=24, **rates).build(env, model, 48)
     shares = []
-    for _ in range(60):
+    for _ in range(40):
         cue = torch.randint(2, (16, 2))
         batch, right = asked(env, learner, cue)
         shares.append(right.float().mean().item())

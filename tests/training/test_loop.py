@@ -139,7 +139,6 @@ def never_stopped(tmp_path_factory):
 
 FAST = {
     ("all that moves", 1),
-    ("remembers", 3),
     ("regrets", 3),
     ("talks late", 3),
     ("mixes", 3),

@@ -73,7 +73,7 @@ def test_in_weather_that_stays_the_margin_is_the_logarithm_of_the_time():
 
 def test_the_gradient_is_that_of_finite_differences():
     start = fire()
-    case, parameters, step = case_of(TRUTH, side=31), parameters_of(NAMES, start), 0.2
+    case, parameters, step = case_of(TRUTH, side=25), parameters_of(NAMES, start), 0.2
     at = margin(start, parameters, torch.zeros(2), case)
 
     def burned(z):
