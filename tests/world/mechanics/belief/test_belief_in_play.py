@@ -94,7 +94,7 @@ def test_what_is_kept_goes_on_exactly(law):
     env.rollout(5, break_when_any_done=False), other.reset()
     other.load_state_dict(env.state_dict())
     ours, theirs = (played(each.world, each.world_state, 4) for each in (env, other))
-    assert not differing(ours, theirs) and "extras.belief.parameters.values" in ours.leaves()
+    assert not differing(ours, theirs) and "extras.belief.learning.particles" in ours.leaves()
 
 
 def test_what_a_law_draws_of_the_ground_has_the_factor_of_the_rate_once():
