@@ -234,7 +234,7 @@ class Ensemble(Belief, Mechanic):
         if known is None:
             return found
         values, weights = known.particles.flatten(0, 1), known.weights.flatten(0, 1)
-        mean, covariance = moments(values, weights)
+        _, covariance = moments(values, weights)
         deviation = covariance.diagonal(dim1=1, dim2=2).clamp(min=0.0).sqrt().unflatten(0, (len(state.key), -1)).mean(1)
         for name, index in self._unknown:
             low, high = quantiles(values[..., index], weights, values.new_tensor([0.05, 0.95])).unbind(1)

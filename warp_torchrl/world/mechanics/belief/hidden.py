@@ -73,17 +73,14 @@ def struck(state: WorldState, beliefs: Beliefs, seen: Sightings, doubt: float, r
         surprised = new.any(dim=2)
         beliefs = beliefs.replace(fires=beliefs.fires + surprised.to(torch.int32))
         rows = surprised.any(dim=1).nonzero()[:, 0] if reads else torch.arange(len(new), device=new.device)
-        taken = _taken_up(
-            state.key[rows], state.step[rows], beliefs[rows], seen.in_worlds(rows), new[rows], recent[rows]
-        )
-        members = {
-            name: leaf.index_copy(0, rows, taken[name]) for name, leaf in beliefs.members.held.items() if name in taken
-        }
-        beliefs = beliefs.replace(members=beliefs.members.replace(**members))
-    lit = seen.put(
-        beliefs.lit[:, :, None], (seen.of(beliefs.lit[:, :, None])[:, :, 0] | (seen.burns & seen.there))[:, :, None]
-    )
-    return beliefs.replace(possible=possible * ~inside, found=beliefs.found + possible * inside, lit=lit[:, :, 0])
+        where = seen.in_worlds(rows), new[rows], recent[rows]
+        taken = _taken_up(state.key[rows], state.step[rows], beliefs[rows], *where)
+        old = beliefs.members.held
+        taken = {name: old[name].index_copy(0, rows, planes) for name, planes in taken.items()}
+        beliefs = beliefs.replace(members=beliefs.members.replace(**taken))
+    before = beliefs.lit[:, :, None]
+    lit = seen.put(before, seen.of(before) | (seen.burns & seen.there)[:, :, None])[:, :, 0]
+    return beliefs.replace(possible=possible * ~inside, found=beliefs.found + possible * inside, lit=lit)
 
 
 def _unforeseen(beliefs: Beliefs, seen: Sightings) -> Tensor:

@@ -1,8 +1,8 @@
 """How a team learns the wind and the rate of spread: particles without maps, which the fire's edge weighs.
 
-A particle is a rate and a wind, theta. At each tick the trees beside the known fire burn or do not, and the law says how
-likely each was to ignite under each theta. Particles of little weight are replaced (Gordon, Salmond and Smith 1993) and
-moved by a kernel that keeps mean and variance (Liu and West 2001). Members take their parameters from the particles.
+A particle is a rate and a wind, theta. At each tick the trees beside the known fire burn or do not, and the law says
+how likely each was to ignite under each theta. Particles of little weight are replaced (Gordon, Salmond and Smith 1993)
+and moved by a kernel that keeps mean and variance (Liu and West 2001). Members take their parameters from them.
 """
 
 import math
@@ -34,7 +34,7 @@ _POOR = 0.5
 _STAGES = 4
 _TINY = 1e-30
 NOT_BESIDE, UNSEEN, STANDS, BURNS = range(4)
-"""What a cell was at the last tick, and is known to have become: no tree beside known fire, or one that was seen since."""
+"""What is known of a cell since the last tick: no tree beside known fire then, or one that was seen since, or not."""
 
 OF_WORLD = ("hidden", "prior", "wind", "moisture")
 """What of ``Learning`` all beliefs of a world have in common."""
@@ -136,9 +136,9 @@ def learned(state: WorldState, known: Learning, fire: Automaton, errors: tuple[f
 
         log L = sum log(b p' + (1 - b) (1 - p')),   p' = p (1 - miss) + (1 - p) false_alarm,   p = c + (1 - c) q(theta)
 
-    b is 1 where a tree is seen to burn, else 0; q(theta) is its chance to ignite, and c that it burned before. Where few
-    particles would count, a power of L weighs them that leaves half of them, they are drawn again and moved, and the
-    rest of L weighs these (Del Moral, Doucet and Jasra 2006).
+    b is 1 where a tree is seen to burn, else 0; q(theta) is its chance to ignite, and c that it burned before. Where
+    few particles would count, a power of L weighs them that leaves half of them, they are drawn again and moved, and
+    the rest of L weighs these (Del Moral, Doucet and Jasra 2006).
 
     Args:
         state: The worlds before the next tick.
@@ -170,7 +170,7 @@ def learned(state: WorldState, known: Learning, fire: Automaton, errors: tuple[f
 def _likelihood(
     state: WorldState, known: Learning, fire: Automaton, errors: tuple[float, float], cell: Tensor, there: Tensor
 ) -> Tensor:
-    """Return log L of the particles, float32 [B * G, P], by trees int64 [B * G, n] that are ``there``; see ``learned``."""
+    """Return log L of the particles, float32 [B * G, P], by the trees that are ``there``; see ``learned``."""
     groups, count = known.weights.shape[1:]
     rows = torch.arange(len(state.key), device=cell.device).repeat_interleave(groups)
     values, each = known.particles.flatten(0, 1), rows.repeat_interleave(count)
@@ -188,7 +188,7 @@ def _likelihood(
 
 def _sources(spreads: Tensor, cell: Tensor) -> Tensor:
     """Return how likely each neighbour of cells spreads fire, float32 [B, 8, n], by the direction of travel."""
-    height, width = spreads.shape[1:]
+    width = spreads.shape[2]
     wide = pad(spreads, (1, 1, 1, 1))
     row, column = cell // width + 1, cell % width + 1
     return torch.stack(
