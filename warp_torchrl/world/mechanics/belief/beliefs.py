@@ -114,7 +114,7 @@ def most_believed(state: WorldState, threshold: float) -> WorldState:
         return each.gather(2, index)[:, :, 0]
 
     held = beliefs.members.held.items()
-    first = {name: of_heaviest(leaf) for name, leaf in held if name not in ("key", "extinguished")}
+    first = {name: of_heaviest(leaf) for name, leaf in held if name != "key"}
     code, says = first["cells"], is_burning(first["cells"])
     burns, gone = known_probability(beliefs) > threshold, mean_of(beliefs, codes == 0) > 0.5
     tree = torch.where(is_tree(code), code, state.landscape.age[:, None])
