@@ -12,8 +12,6 @@ from warp_torchrl.benchmark.tables import entry, table
 from warp_torchrl.benchmark.tasks import FIRST_SEED
 from warp_torchrl.env.pictures.drawing import BLUE, GRID, ORANGE, SOFT, save_figure, sheet, style
 from warp_torchrl.heuristics import HEURISTICS
-from warp_torchrl.world.mechanics.belief.belief import Ensemble
-from warp_torchrl.world.mechanics.belief.beliefs import beliefs_of, known_probability
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.records import kept, steps_since
 from warp_torchrl.world.state.state import WorldState
@@ -34,10 +32,12 @@ def believed_chance(state: WorldState, world: World) -> Tensor:
     Raises:
         ValueError: If the team has no belief in common.
     """
-    if not isinstance(world.belief, Ensemble) or world.belief.of != "team":
-        raise ValueError("beliefs are measured with belief=ensemble and belief.of=team")
-    known, hidden = known_probability(beliefs_of(state)), world.belief.hidden_chance(state, world)
-    return (1.0 - (1.0 - known) * (1.0 - hidden))[:, 0]
+    if not hasattr(world.belief, "burn_chance"):
+        raise ValueError("beliefs are measured with belief=ensemble")
+    chance: Tensor = world.belief.burn_chance(state, world)
+    if chance.shape[1] > 1:
+        raise ValueError("beliefs are measured with belief.of=team")
+    return chance[:, 0]
 
 
 def counted(chance: Tensor, burns: Tensor, counts: Tensor) -> Tensor:

@@ -187,6 +187,11 @@ class Ensemble(Belief, Mechanic):
         p = known_probability(beliefs)
         return p * (1.0 - p) + self.hidden_chance(state, world) + _STALE * (1.0 - freshness(records, state.step))
 
+    def burn_chance(self, state: WorldState, world: Rules) -> Tensor:
+        """Return the chance of each cell to burn, by fires known and hidden, float32 [B, G, H, W]."""
+        known = known_probability(beliefs_of(state))
+        return 1.0 - (1.0 - known) * (1.0 - self.hidden_chance(state, world))
+
     def hidden_chance(self, state: WorldState, world: Rules) -> Tensor:
         """Return the chance of each cell to burn by a fire that nobody saw, float32 [B, G, H, W].
 
