@@ -1,7 +1,7 @@
 """Speed, calibration of scenarios and checks of fires: ``warp benchmark WHAT``.
 
-WHAT is tick, env, train, scaling, tasks, rewards, generalist, fires, ellipses or predict; several run one after the
-other. gpu runs alone: it measures everything on a card in under five minutes, and writes it to a file.
+WHAT is tick, env, train, scaling, tasks, rewards, generalist, fires, ellipses, predict or beliefs; several run one
+after the other. gpu runs alone: it measures everything on a card in under five minutes, and writes it to a file.
 """
 
 import argparse
@@ -16,6 +16,7 @@ from typing import Any
 
 import torch
 
+from warp_torchrl.benchmark.beliefs import belief_table, draw_reliability, reliability
 from warp_torchrl.benchmark.environments import LARGE, environment_speed, rate_table
 from warp_torchrl.benchmark.fires import ellipse_errors, fire_table, law_times
 from warp_torchrl.benchmark.generalist import PLACES, generalise, generalist_table, on_ground, table_line
@@ -143,6 +144,14 @@ def _predict(options: Namespace) -> dict[str, Rows]:
     return {"predict": prediction_costs(options.sides, options.hours)}
 
 
+def _beliefs(options: Namespace) -> dict[str, Rows]:
+    names = options.scenario or ["scouts", "search"]
+    rows = [row for name in names for row in reliability(name, options.device, options.episodes, options.set)]
+    if options.plot is not None:
+        draw_reliability(rows, options.plot)
+    return {"beliefs": rows}
+
+
 _MEASURES = {
     "tick": _tick,
     "env": _env,
@@ -154,6 +163,7 @@ _MEASURES = {
     "fires": _fires,
     "ellipses": _ellipses,
     "predict": _predict,
+    "beliefs": _beliefs,
 }
 _TABLES = {
     "tick": tick_table,
@@ -168,6 +178,7 @@ _TABLES = {
     "fires": fire_table,
     "ellipses": fire_table,
     "predict": prediction_table,
+    "beliefs": belief_table,
 }
 
 
@@ -185,7 +196,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--worlds", type=whole(1, 4096), help=f"{_WORLDS} by default, or the experiment's")
     parser.add_argument("--repeats", type=whole(1, 1000), default=7, help="times that each speed is measured")
     parser.add_argument("--no-compile", action="store_true", help="for tick and env: leave what is compiled out")
-    parser.add_argument("--plot", type=file_to_write, metavar="FILE.png", help="for scaling or generalist: draw it too")
+    parser.add_argument(
+        "--plot", type=file_to_write, metavar="FILE.png", help="for scaling, generalist or beliefs: draw it"
+    )
     parser.add_argument("--episodes", type=whole(1, 4096), default=EPISODES)
     parser.add_argument(
         "--policies", nargs="+", choices=HEURISTICS, metavar="NAME", help="for tasks: these heuristics, the last paired"

@@ -1,7 +1,7 @@
 """The world: assembles landscape, wind, fire and team, and is the only one that draws for them."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeVar
@@ -27,6 +27,8 @@ from warp_torchrl.world.team.knowledge import Belief, Full, Sensing
 from warp_torchrl.world.team.team import Team
 from warp_torchrl.world.terrain.landscape import Perlin
 from warp_torchrl.world.terrain.source import LandscapeSource, map_size
+
+Answer = TypeVar("Answer")
 
 _CELLS_AT_ONCE = {"cpu": 2**17, "cuda": 2**20}
 """Whose ground is made together: it takes some hundred bytes a cell while it is made, on a CPU best of its cache."""
@@ -242,18 +244,17 @@ class World:
 
     def assumed(self, state: WorldState) -> WorldState:
         """Return the worlds as agents assume them to be, see ``Mechanic.assumed``; where they see all, these."""
-        return _last([each.assumed(state, self) for each in self.loop], state)
+        return self._last(lambda each: each.assumed(state, self)) or state
 
     def worth_seeing(self, state: WorldState) -> Tensor:
         """Return what agents would learn of each cell if they saw it now, see ``Mechanic.worth_seeing``; else 0."""
-        nothing = torch.zeros_like(state.alpha)[:, None]
-        return _last([each.worth_seeing(state, self) for each in self.loop], nothing)
+        known = self._last(lambda each: each.worth_seeing(state, self))
+        return torch.zeros_like(state.alpha)[:, None] if known is None else known
 
     def futures(self, state: WorldState, count: int) -> WorldState:
         """Return worlds that may be the true ones, see ``Mechanic.futures``; where nobody knows better, these."""
         rows = torch.arange(len(state.key), device=state.key.device).repeat_interleave(count)
-        known = [each.futures(state, self, count) for each in self.loop]
-        return _last(known, None) or state[rows]
+        return self._last(lambda each: each.futures(state, self, count)) or state[rows]
 
     def forecast(self, state: WorldState) -> Forecast:
         """Return what the fire is about to do."""
@@ -272,6 +273,11 @@ class World:
         possible = self.possible_actions(state)
         return possible if self.action_masking else torch.ones_like(possible)
 
+    def _last(self, ask: Callable[[Mechanic], Answer | None]) -> Answer | None:
+        """Return the answer of the last mechanic that gives one; those before it are not asked."""
+        answers = (ask(each) for each in reversed(self.loop))
+        return next((each for each in answers if each is not None), None)
+
     def _tick(self, state: WorldState, ticks_now: Tensor) -> WorldState:
         if self.steps_per_tick == 1:
             return advance(state, self.fire, self.air, ticks_now)
@@ -287,11 +293,3 @@ class World:
             terminated=state.terminated | terminated,
             truncated=state.truncated | (step >= self.horizon),
         )
-
-
-Answer = TypeVar("Answer")
-
-
-def _last(answers: Sequence[Answer | None], otherwise: Answer) -> Answer:
-    """Return the last answer that is given."""
-    return next((each for each in reversed(answers) if each is not None), otherwise)

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Self
+from typing import NamedTuple, Self
 
 import torch
 from torch import Tensor
@@ -12,11 +12,36 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.air.wind import Wind
 from warp_torchrl.world.arrays.constants import numbers
+from warp_torchrl.world.arrays.geometry import DIRECTIONS
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.law import law
 from warp_torchrl.world.law.cells import holds_trees
 from warp_torchrl.world.state.state import EMBER, FIRST_FIRE, OLDEST, Air, Ground, Landscape, WorldState
 from warp_torchrl.world.terrain.source import LandscapeSource
+
+
+class Beside(NamedTuple):
+    """Some trees of B worlds, n each, and what may spread fire beside them."""
+
+    cell: Tensor  # int64 [B,n], flat index
+    spreads: Tensor  # float32 [B,8,n], chance that there is a source of fire that travels in each direction
+
+    def source(self, direction: int, width: int, cells: int) -> Tensor:
+        """Return the flat index of the source in a direction, int64 [B, n]; any cell where it is off the map."""
+        row, column = DIRECTIONS[direction]
+        return (self.cell - row * width - column).clamp(0, cells - 1)
+
+    def of(self, planes: Tensor) -> Tensor:
+        """Return what planes [B, ..., H, W] hold at the trees, [B, ..., n]."""
+        return at_cells(planes, self.cell)
+
+
+def at_cells(planes: Tensor, cell: Tensor) -> Tensor:
+    """Return what planes [B, ..., H, W] hold at cells int64 [B, n], [B, ..., n]."""
+    flat = planes.flatten(-2)
+    shape = (len(cell), *flat.shape[1:-1], cell.shape[1])
+    index = cell.view(len(cell), *[1] * (flat.ndim - 2), -1).expand(shape)
+    return flat.gather(-1, index)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,7 +127,22 @@ class Automaton(ABC):
 
         Here flammability has the factor, and is 1 at most.
         """
-        return ground.replace(alpha=(ground.alpha * factor[:, None, None]).clamp(max=1.0))
+        return ground.replace(alpha=self.faster(ground.alpha, factor[:, None, None]))
+
+    def faster(self, alpha: Tensor, factor: Tensor) -> Tensor:
+        """Return the flammability of ground on which fire spreads at another rate, float32 of their common shape."""
+        return (alpha * factor).clamp(max=1.0)
+
+    def ignition_beside(self, state: WorldState, beside: Beside, rate: Tensor, air: Air) -> Tensor:
+        """Return how likely trees ignite in a tick at P rates in P winds, float32 [B, P, n].
+
+        Args:
+            state: The worlds, of which the ground is read.
+            beside: The trees, and how likely each neighbour spreads fire.
+            rate: Factors on the rate of spread, float32 [B, P].
+            air: P winds of each world, batch size [B * P].
+        """
+        raise TypeError(f"{type(self).__name__} does not say how likely trees ignite: define ignition_beside()")
 
     def started(self, state: WorldState) -> WorldState:
         """Return worlds at their start, whose cells are lit, with the planes of the automaton."""

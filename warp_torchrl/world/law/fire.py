@@ -11,7 +11,7 @@ from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.arrays.geometry import DISTANCES
 from warp_torchrl.world.law import law
-from warp_torchrl.world.law.automaton import Automaton, of_codes
+from warp_torchrl.world.law.automaton import Automaton, Beside, at_cells, of_codes
 from warp_torchrl.world.law.wind_and_slope import alexandridis, ellipse, slope_factor
 from warp_torchrl.world.state.state import Air, Ground, Landscape, WorldState
 
@@ -143,6 +143,26 @@ class Fire(Automaton):
             self.law, self._susceptible(state), self.gain_in(state), _slope_into_cell(state), self.directions
         )
         return expected * self.spreads(state)
+
+    def ignition_beside(self, state: WorldState, beside: Beside, rate: Tensor, air: Air) -> Tensor:
+        """Return 1 - prod_d (1 - pi_d p_d), pi_d the chance of a source: see ``Automaton``."""
+        gain = self.gain(air.wind).unflatten(0, rate.shape)
+        alpha = self.faster(beside.of(state.alpha)[:, None], rate[..., None])
+        susceptible, slope = self.law.susceptibility(alpha), _slope_into_cell(state)
+        spared = torch.ones_like(susceptible)
+        for d in self.directions:
+            strength = susceptible * self._at_source(gain[:, :, d], beside, d)
+            if slope is not None:
+                strength = strength * beside.of(slope[:, d])[:, None]
+            p = self.law.probability(self.law.join(torch.zeros_like(strength), strength))
+            spared = spared * (1.0 - beside.spreads[:, None, d] * p)
+        return 1.0 - spared
+
+    def _at_source(self, gain: Tensor, beside: Beside, direction: int) -> Tensor:
+        """Return the gain at the sources, float32 [B, P, n or 1], of one wind or of that of each cell."""
+        if gain.shape[2:] == (1, 1):
+            return gain[..., 0]
+        return at_cells(gain, beside.source(direction, gain.shape[3], gain[0, 0].numel()))
 
     def gain_in(self, state: WorldState) -> Tensor:
         """Return w_d / distance_d at the source in some worlds, float32 [B, 8, h, w]."""

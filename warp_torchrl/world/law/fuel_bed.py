@@ -10,6 +10,7 @@ from torch import Tensor
 from torch.nn.functional import pad
 
 from warp_torchrl.world.air.wind import Wind
+from warp_torchrl.world.arrays.batch import Named
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.behaviour.fbp import fbp_spread
 from warp_torchrl.world.behaviour.fuel_codes import read_model
@@ -204,6 +205,13 @@ def gradient(elevation: Tensor | None, cover: Tensor, cell_size: float) -> Tenso
     east = (across[:, :-2] + 2.0 * across[:, 1:-1] + across[:, 2:]) / (8.0 * cell_size)
     north = (along[:, :, :-2] + 2.0 * along[:, :, 1:-1] + along[:, :, 2:]) / (8.0 * cell_size)
     return torch.stack((east, north), dim=1)
+
+
+def listed(landscape: Landscape, cell: Tensor) -> Landscape:
+    """Return some cells of landscapes, int64 [B, n], as maps of one row; what rises is read of the whole ones."""
+    planes = {"cover": landscape.cover, "age": landscape.age, **landscape.layers.held}
+    own = {name: plane.flatten(1).gather(1, cell)[:, None] for name, plane in planes.items()}
+    return Landscape(own.pop("cover"), own.pop("age"), None, layers=Named(own))
 
 
 def bearing(east: Tensor, north: Tensor) -> Tensor:

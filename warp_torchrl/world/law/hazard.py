@@ -8,7 +8,6 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.law.law import LARGEST_ALPHA, Hazard
-from warp_torchrl.world.state.state import Ground
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +46,6 @@ class HazardFire(Fire):
         """Return how the hazards of burning neighbours make a probability."""
         return Hazard(self.refinement)
 
-    def at_rate(self, ground: Ground, factor: Tensor) -> Ground:
-        """Return ground of ``factor`` times the hazard, float32 [B]: alpha becomes 1 - (1 - alpha)^factor."""
-        alpha = -torch.expm1(torch.log1p(-ground.alpha.clamp(max=LARGEST_ALPHA)) * factor[:, None, None])
-        return ground.replace(alpha=alpha)
+    def faster(self, alpha: Tensor, factor: Tensor) -> Tensor:
+        """Return the flammability of ``factor`` times the hazard: alpha becomes 1 - (1 - alpha)^factor."""
+        return -torch.expm1(torch.log1p(-alpha.clamp(max=LARGEST_ALPHA)) * factor)

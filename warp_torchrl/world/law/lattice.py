@@ -8,7 +8,7 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.geometry import neighbour_in
-from warp_torchrl.world.law.automaton import Automaton
+from warp_torchrl.world.law.automaton import Automaton, Beside
 from warp_torchrl.world.law.cells import holds_trees, is_burning
 from warp_torchrl.world.state.state import FIRST_FIRE, Air, Ground, Landscape, WorldState
 
@@ -93,6 +93,14 @@ class LatticeFire(Automaton):
         return sum((neighbour_in(direction, chance) for direction in _FOUR), torch.zeros_like(chance)) * self.spreads(
             state
         )
+
+    def ignition_beside(self, state: WorldState, beside: Beside, rate: Tensor, air: Air) -> Tensor:
+        """Return 1 - prod_d (1 - pi_d alpha), pi_d the chance of a source: see ``Automaton``."""
+        alpha = self.faster(beside.of(state.alpha)[:, None], rate[..., None])
+        spared = torch.ones_like(alpha)
+        for direction in _FOUR:
+            spared = spared * (1.0 - beside.spreads[:, None, direction] * alpha)
+        return 1.0 - spared
 
     def burn_out_probability(self, state: WorldState) -> Tensor:
         """Return each burning tree's chance to be burnt after the next tick, float32 [B, H, W]; 0 elsewhere."""

@@ -16,9 +16,9 @@ from warp_torchrl.world.arrays.random import Stream, uniform, uniform_at
 from warp_torchrl.world.behaviour.moistures import moisture_row
 from warp_torchrl.world.law import arrivals
 from warp_torchrl.world.law.arrivals import RATE, Arrivals, Paces, Travel, arrivals_in, metric, own_cell
-from warp_torchrl.world.law.automaton import Automaton
+from warp_torchrl.world.law.automaton import Automaton, Beside, at_cells
 from warp_torchrl.world.law.cells import is_burning, is_tree
-from warp_torchrl.world.law.fuel_bed import COVER_FUEL, FuelBed
+from warp_torchrl.world.law.fuel_bed import COVER_FUEL, FuelBed, gradient, listed
 from warp_torchrl.world.law.mapped_fuel import check_fuel, has_own_table, told_fuel
 from warp_torchrl.world.law.travel import NEVER, rate_from, travel
 from warp_torchrl.world.state.state import FIRST_FIRE, Air, Ground, Landscape, WorldState
@@ -214,11 +214,18 @@ class RateFire(Automaton):
 
     def air(self, wind: Tensor, moisture: Tensor | None, ground: Ground) -> Air:
         """See ``Automaton``."""
-        row = moisture_row(self.moisture).to(wind.device)
-        here = row.expand(len(wind), -1) if moisture is None else torch.where(moisture.isnan(), row, moisture)
-        spread = self.bed.spread(ground.landscape, wind, here, ground.cell_size)
+        spread = self.bed.spread(ground.landscape, wind, self._damp(Air(wind, moisture)), ground.cell_size)
         made = travel(spread.head, spread.direction, spread.length_to_breadth, ground.cell_size)
         return Air(wind, moisture, Travel(made))
+
+    def _damp(self, air: Air) -> Tensor:
+        """Return the moistures in force, float32 [B, 7] [%]."""
+        row = moisture_row(self.moisture).to(air.wind.device)
+        return (
+            row.expand(len(air.wind), -1)
+            if air.moisture is None
+            else torch.where(air.moisture.isnan(), row, air.moisture)
+        )
 
     def started(self, state: WorldState) -> WorldState:
         """Return worlds whose fires have reached the cells that burn at minute 0."""
@@ -269,6 +276,26 @@ class RateFire(Automaton):
         wait = coming.minutes - self.now(state)
         spread = (self.minutes / wait.clamp(min=self.minutes)) * (coming.minutes < NEVER / 2)
         return spread if self.beta == 0.0 else torch.maximum(spread, self.spontaneous(state))
+
+    def ignition_beside(self, state: WorldState, beside: Beside, rate: Tensor, air: Air) -> Tensor:
+        """Return max_d pi_d min(1, the share of a cell that fire goes in a tick): see ``Automaton``.
+
+        Of a front that passes, that share of the trees beside it is reached in a tick. Paces are not known.
+        """
+        count, size = rate.shape[1], state.ground.cell_size
+        landscape = listed(state.landscape, beside.cell)
+        rise = beside.of(gradient(state.landscape.elevation, state.cover, size))[:, :, None]
+        wind = air.wind
+        if wind.shape[2:] != (1, 1):
+            wind = at_cells(wind.unflatten(0, (-1, count)), beside.cell).flatten(0, 1)[:, :, None]
+        each = torch.arange(len(rate), device=rate.device).repeat_interleave(count)
+        spread = self.bed.spread(landscape[each], wind, self._damp(air), size, rise[each])
+        made = travel(spread.head, spread.direction, spread.length_to_breadth, size)[:, :, 0].unbind(1)
+        chance = torch.zeros_like(made[0])
+        for direction in range(8):
+            share = rate_from((direction + 4) % 8, made) * (self.minutes * rate.flatten()[:, None])
+            chance = torch.maximum(chance, share.clamp(max=1.0) * beside.spreads[each, direction])
+        return chance.unflatten(0, (-1, count))
 
     def expected_ignitions(self, state: WorldState) -> Tensor:
         """Return how many neighbours each burning cell would reach in a tick of its own, float32 [B, H, W]; else 0.

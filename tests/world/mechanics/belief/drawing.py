@@ -36,11 +36,13 @@ def believing(drawing, *members, weights=None, hidden=(), possible=None, chances
     beliefs = Beliefs(
         members=Named({**own, "extinguished": no.clone(), "key": torch.arange(count)[None]}),
         weights=torch.tensor([[weights or [1.0 / count] * count]]),
-        parameters=Named(),
+        learning=None,
         chances=Named({"values": torch.tensor([chances or [0.0] * count])[..., None, None] * (cells > 0)}),
         hidden=Named() if lit is None else Named({"cells": lit, "age": none[:, :1].expand_as(lit), "burned": lit == 0}),
         possible=torch.tensor([[possible or [1.0] * m]]),
         found=torch.zeros(1, 1, m),
+        lit=no[:, :1].clone(),
+        fires=torch.zeros(1, 1, dtype=torch.int32),
         overlap=torch.zeros_like(state.step),
         union=torch.zeros_like(state.step),
     )

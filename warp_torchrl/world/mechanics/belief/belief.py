@@ -4,7 +4,6 @@ Members tick with the world. What the team sees weighs them (Gordon, Salmond and
 seen, where it is seen (nudging; Mandel et al. 2008 for fires). A fire that was seen once goes on growing in them.
 """
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Literal
@@ -15,27 +14,30 @@ from torch import Tensor
 from warp_torchrl.system.device import needs_no_sync
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.batch import Named
-from warp_torchrl.world.arrays.random import Stream, imagined_keys, named_key, normal
+from warp_torchrl.world.arrays.random import imagined_keys, named_key
 from warp_torchrl.world.backends.backend import forecast
-from warp_torchrl.world.ensemble.filtering import quantiles
+from warp_torchrl.world.ensemble.filtering import moments, quantiles
 from warp_torchrl.world.ensemble.members import held, in_parameters, rows_of, ticked, unburned, worlds_of
 from warp_torchrl.world.mechanics.belief.beliefs import (
     NAME,
     Beliefs,
     beliefs_of,
+    cells_of,
     disagreement,
     hidden_probability,
     known_probability,
+    mean_of,
     most_believed,
 )
 from warp_torchrl.world.mechanics.belief.correcting import corrected, weighed
 from warp_torchrl.world.mechanics.belief.hidden import DOUBT, fires_lit, hidden_fires, struck
+from warp_torchrl.world.mechanics.belief.learning import PARAMETERS, Learning, begun, learned, noted, watched
 from warp_torchrl.world.mechanics.belief.sightings import sightings
 from warp_torchrl.world.mechanics.mechanic import Mechanic, Metric, Rules
 from warp_torchrl.world.mechanics.table import part
-from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.cells import is_burning, is_tree
 from warp_torchrl.world.state.records import KNOWLEDGE, freshness, kept, recorded
-from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.world.state.state import EMPTY, FIRST_FIRE, WorldState
 from warp_torchrl.world.team.hearing import HEARING
 from warp_torchrl.world.team.knowledge import Belief
 
@@ -43,7 +45,6 @@ _STALE = 1e-3
 """What a cell that was never seen is worth to see, where no fire is thought to be."""
 _NEVER = 63
 """The newest record of a cell that nobody saw."""
-_PARAMETERS = ("rate", "wind_speed", "bearing")
 
 
 def _believed_map(show: Callable[[Beliefs], Tensor]) -> Callable[[WorldState], Tensor]:
@@ -66,8 +67,9 @@ class Ensemble(Belief, Mechanic):
             for each.
         members: K. One is enough to know where a fire that was seen is by now; more weigh unknown winds and rates.
         hidden: M, fires that may be anywhere; 0 does without.
+        particles: Rates and winds without maps from which the team learns what it does not know of them.
         threshold: Share of the members' weight over which a cell is taken to burn.
-        trust: What each cell that is seen counts for in the members' weights; 0 leaves them alike.
+        trust: What each cell that is seen counts for in the members' weights; 0 leaves them alike, and all maps apart.
         error: Least chance that a member is wrong of a cell.
         rate_deviation: Coefficient of variation of the rate of spread, as far as the team knows; 0: it knows it.
         wind_speed_deviation: The same of the wind's speed.
@@ -88,8 +90,9 @@ class Ensemble(Belief, Mechanic):
     of: Literal["team", "agent"] = "team"
     members: int = 8
     hidden: int = 64
+    particles: int = 512
     threshold: float = 0.5
-    trust: float = 1.0
+    trust: float = 0.0
     error: float = 0.02
     rate_deviation: float = 0.0
     wind_speed_deviation: float = 0.0
@@ -100,6 +103,7 @@ class Ensemble(Belief, Mechanic):
             self,
             members=(1, 4096),
             hidden=(0, 4096),
+            particles=(16, 65_536),
             threshold=(0.0, 1.0),
             trust=(0.0, 1.0),
             error=(1e-6, 0.5),
@@ -142,11 +146,13 @@ class Ensemble(Belief, Mechanic):
         beliefs = Beliefs(
             members=unburned(state, keys[:, self.hidden :], world.fire),
             weights=torch.full((*shape, self.members), 1.0 / self.members, device=state.key.device),
-            parameters=self._drawn(key, groups),
+            learning=self._begun(state, key, groups),
             chances=self._no_chances(state, groups),
             hidden=hidden_fires(state, world, keys[:, : self.hidden]) if self.hidden else Named(),
             possible=possible,
             found=torch.zeros_like(possible),
+            lit=torch.zeros_like(state.burned)[:, None].expand(-1, groups, -1, -1).clone(),
+            fires=torch.zeros(shape, dtype=torch.int32, device=state.key.device),
             overlap=none.clone(),
             union=none.clone(),
         )
@@ -168,16 +174,33 @@ class Ensemble(Belief, Mechanic):
         )
 
     def assumed(self, state: WorldState, world: Rules) -> WorldState:
-        """Return the worlds as they are believed to be, see ``beliefs.most_believed``."""
-        return most_believed(state, self.threshold)
+        """Return the worlds as they are believed to be, see ``beliefs.most_believed``, in the mean wind and rate."""
+        believed, known = most_believed(state, self.threshold), beliefs_of(state).learning
+        if known is None:
+            return believed
+        mean, _ = moments(known.particles.flatten(0, 1), known.weights.flatten(0, 1))
+        return in_parameters(believed, world.fire, mean)
 
     def worth_seeing(self, state: WorldState, world: Rules) -> Tensor:
         """Return the chance of each cell to burn, known and hidden, and a little for each that was long not seen."""
-        beliefs, records = beliefs_of(state), kept(state)
-        records = records.amax(dim=1, keepdim=True) if self.of == "team" else records
+        beliefs, records = beliefs_of(state), self._records(state)
         p = known_probability(beliefs)
-        burns = p * (1.0 - p) + hidden_probability(beliefs, fires_lit(world.lighting))
-        return burns + _STALE * (1.0 - freshness(records, state.step))
+        return p * (1.0 - p) + self.hidden_chance(state, world) + _STALE * (1.0 - freshness(records, state.step))
+
+    def burn_chance(self, state: WorldState, world: Rules) -> Tensor:
+        """Return the chance of each cell to burn, by fires known and hidden, float32 [B, G, H, W]."""
+        known = known_probability(beliefs_of(state))
+        return 1.0 - (1.0 - known) * (1.0 - self.hidden_chance(state, world))
+
+    def hidden_chance(self, state: WorldState, world: Rules) -> Tensor:
+        """Return the chance of each cell to burn by a fire that nobody saw, float32 [B, G, H, W].
+
+        It is 0 of cells that cannot burn, or were seen since the last tick.
+        """
+        ticked_at = state.step - state.step % world.steps_per_tick
+        since = recorded(torch.zeros_like(ticked_at), ticked_at)
+        may = (state.alpha > 0.0)[:, None] & (self._records(state) < since[:, None, None, None])
+        return hidden_probability(beliefs_of(state), fires_lit(world.lighting)) * may
 
     def futures(self, state: WorldState, world: Rules, count: int) -> WorldState:
         """Return members, as often as they weigh, of worlds with one belief."""
@@ -185,11 +208,13 @@ class Ensemble(Belief, Mechanic):
         total = beliefs.weights[:, 0].cumsum(dim=1)
         at = (torch.arange(count, device=total.device) + 0.5) / count * total[:, -1:]
         pick = torch.searchsorted(total, at).clamp(max=self.members - 1)
-        own = {
-            name: leaf.gather(1, pick.view(*pick.shape, *[1] * (leaf.ndim - 2)).expand(-1, -1, *leaf.shape[2:]))
-            for name, leaf in beliefs.members.held.items()
-        }
-        worlds, rows = worlds_of(state, Named(own), world.fire), rows_of(state, count)
+
+        def picked(leaf: Tensor) -> Tensor:
+            return leaf.gather(1, pick.view(*pick.shape, *[1] * (leaf.ndim - 2)).expand(-1, -1, *leaf.shape[2:]))
+
+        own = Named({name: picked(leaf) for name, leaf in beliefs.members.held.items()})
+        values = None if beliefs.learning is None else picked(beliefs.learning.members[:, 0]).flatten(0, 1)
+        worlds, rows = in_parameters(worlds_of(state, own, world.fire), world.fire, values), rows_of(state, count)
         for name, planes in state.extras.held.items():
             if name not in (NAME, KNOWLEDGE, HEARING, *world.fire.keeps):
                 worlds = worlds.with_planes(name, planes[rows])
@@ -198,37 +223,41 @@ class Ensemble(Belief, Mechanic):
     def metric_rows(self, world: Rules) -> tuple[Metric, ...]:
         """Return ``jaccard``, and ``rate_known`` and so on of what the team does not know."""
         known = (Metric(f"{name}_known", "more", "%", "", "Belief") for name, _ in self._unknown)
-        return (Metric("jaccard", "more", "%", "", "Belief"), *known)
+        doubt = (Metric(f"{name}_doubt", "less", "1", "", "Doubt") for name, _ in self._unknown)
+        return (Metric("jaccard", "more", "%", "", "Belief"), *known, *doubt)
 
     def metrics(self, state: WorldState) -> dict[str, Tensor]:
         """Return how well beliefs fit the fire.
 
         ``jaccard``: cells that burn and are believed to, over those of which either holds, sums over the steps.
-        ``rate_known``, ``wind_speed_known``, ``bearing_known``: 1 where the true value lies within the members' 5 to
-        95 % quantiles now.
+        ``rate_known``, ``wind_speed_known``, ``bearing_known``: 1 where the true value lies within the particles' 5 to
+        95 % quantiles now. ``rate_doubt`` and so on: their standard deviation over that before anything was seen.
         """
         beliefs = beliefs_of(state)
         found = {"jaccard": beliefs.overlap / beliefs.union.clamp(min=1)}
+        known = beliefs.learning
+        if known is None:
+            return found
+        values, weights = known.particles.flatten(0, 1), known.weights.flatten(0, 1)
+        _, covariance = moments(values, weights)
+        deviation = covariance.diagonal(dim1=1, dim2=2).clamp(min=0.0).sqrt().unflatten(0, (len(state.key), -1)).mean(1)
         for name, index in self._unknown:
-            values = beliefs.parameters.held["values"][..., index].flatten(0, 1)
-            low, high = quantiles(values, beliefs.weights.flatten(0, 1), values.new_tensor([0.05, 0.95])).unbind(1)
+            low, high = quantiles(values[..., index], weights, values.new_tensor([0.05, 0.95])).unbind(1)
             inside = ((low <= 0.0) & (high >= 0.0)).to(torch.float32).view(len(state.key), -1)
             found[f"{name}_known"] = inside.mean(dim=1)
+            found[f"{name}_doubt"] = (deviation[:, index] / known.prior[:, index]).clamp(max=1.0)
         return found
 
     @property
     def _unknown(self) -> list[tuple[str, int]]:
         deviations = (self.rate_deviation, self.wind_speed_deviation, self.bearing_deviation)
-        return [(name, index) for index, name in enumerate(_PARAMETERS) if deviations[index]]
+        return [(name, index) for index, name in enumerate(PARAMETERS) if deviations[index]]
 
-    def _drawn(self, key: Tensor, groups: int) -> Named:
-        """Return the members' parameters: about an estimate that is off the true value as members are off it."""
+    def _begun(self, state: WorldState, key: Tensor, groups: int) -> Learning | None:
         if self.knows_parameters:
-            return Named()
-        spread = [math.sqrt(math.log1p(each**2)) for each in (self.rate_deviation, self.wind_speed_deviation)]
-        scale = torch.tensor([*spread, math.radians(self.bearing_deviation)], device=key.device)
-        draws = normal(key, 0, Stream.MEMBERS, (groups, 1 + self.members, len(_PARAMETERS)))
-        return Named({"values": (draws[:, :, :1] + draws[:, :, 1:]) * scale})
+            return None
+        deviations = self.rate_deviation, self.wind_speed_deviation, self.bearing_deviation
+        return begun(state, key, deviations, (groups, self.members, self.hidden, self.particles))
 
     def _ticked(self, before: WorldState, after: WorldState, world: Rules) -> WorldState:
         """Return worlds whose members and hidden fires have ticked where the fire has; on a CPU those alone."""
@@ -245,9 +274,11 @@ class Ensemble(Belief, Mechanic):
         return after.with_planes(NAME, beliefs)
 
     def _after_tick(self, before: WorldState, after: WorldState, now: Tensor, world: Rules) -> Beliefs:
-        beliefs = beliefs_of(after)
-
-        values = None if self.knows_parameters else beliefs.parameters.held["values"].flatten(0, 2)
+        beliefs = self._acted(before, after)
+        beliefs = self._learned(before, beliefs, now, world)
+        known, values, lit = beliefs.learning, None, None
+        if known is not None:
+            values, lit = known.members.flatten(0, 2), known.hidden.flatten(0, 1)
         members = in_parameters(worlds_of(before, beliefs.members, world.fire), world.fire, values)
         count, chances = beliefs.members.held["key"].shape[1], beliefs.chances
         rows = rows_of(before, count)
@@ -255,7 +286,7 @@ class Ensemble(Belief, Mechanic):
             ignites = forecast(world.fire, members).ignition_probability * now[rows][:, None, None]
             chances = chances.replace(values=ignites.unflatten(0, (-1, count)))
 
-        def grown(own: Named, worlds: WorldState, count: int, parameters: Tensor | None = None) -> Named:
+        def grown(own: Named, worlds: WorldState, count: int, parameters: Tensor | None) -> Named:
             rows = rows_of(before, count)
             air = after.air[rows] if world.air.changes else after.air
             new = held(ticked(worlds, world.fire, world.air, now[rows], air, parameters), count, world.fire)
@@ -264,8 +295,37 @@ class Ensemble(Belief, Mechanic):
 
         hidden = beliefs.hidden
         if self.hidden:
-            hidden = grown(hidden, worlds_of(before, hidden, world.fire), self.hidden)
+            worlds = in_parameters(worlds_of(before, hidden, world.fire), world.fire, lit)
+            hidden = grown(hidden, worlds, self.hidden, lit)
         return beliefs.replace(members=grown(beliefs.members, members, count, values), chances=chances, hidden=hidden)
+
+    def _acted(self, before: WorldState, after: WorldState) -> Beliefs:
+        """Return beliefs without the fire and trees that agents have just put out and cleared, and see so now."""
+        beliefs, now = beliefs_of(after), recorded(torch.zeros_like(after.step), after.step)
+        put_out, cleared = is_burning(before.cells) & is_tree(after.cells), after.firebreak & ~before.firebreak
+        acted = (put_out | cleared)[:, None] & (self._records(after) >= now[:, None, None, None])
+        cells = cells_of(beliefs)
+        cells = torch.where(acted[:, :, None], EMPTY, cells).to(torch.uint8).flatten(1, 2)
+        return beliefs.replace(members=beliefs.members.replace(cells=cells))
+
+    def _learned(self, before: WorldState, beliefs: Beliefs, now: Tensor, world: Rules) -> Beliefs:
+        """Return beliefs that have learned of the last tick, and keep what they know of the fire's edge before this."""
+        known = beliefs.learning
+        if known is None:
+            return beliefs
+        known = learned(before, known, world.fire, world.sensing.errors, now)
+        cells, wet = (beliefs.members.held[name].unflatten(1, beliefs.weights.shape[1:]) for name in ("cells", "wet"))
+        spreads = (cells >= FIRST_FIRE) & (cells <= world.fire.last_spreading)
+        fuel = (is_tree(cells) & (cells >= world.fire.youngest_fuel) & (wet == 0)).any(dim=2)
+        planes = mean_of(beliefs, spreads), mean_of(beliefs, is_burning(cells)), fuel & (before.alpha > 0.0)[:, None]
+        ticked_at = (before.step - before.step % world.steps_per_tick).clamp(min=0)
+        since = recorded(torch.zeros_like(ticked_at), ticked_at)
+        return beliefs.replace(learning=watched(before, known, planes, self._records(before), since))
+
+    def _records(self, state: WorldState) -> Tensor:
+        """Return the newest records of each belief, int32 [B, G, H, W]."""
+        records = kept(state)
+        return records.amax(dim=1, keepdim=True) if self.of == "team" else records
 
     def _no_chances(self, state: WorldState, groups: int) -> Named:
         if not self.weighs:
@@ -274,15 +334,18 @@ class Ensemble(Belief, Mechanic):
 
     def _looked(self, state: WorldState, before: Tensor, running: Tensor, world: Rules) -> WorldState:
         """Return worlds whose beliefs were weighed and corrected by the records that are newer than before."""
-        records = kept(state)
+        records = self._records(state)
         if self.of == "team":
-            records, before = records.amax(dim=1, keepdim=True), before.amax(dim=1, keepdim=True)
+            before = before.amax(dim=1, keepdim=True)
         ticked_at = state.step - state.step % world.steps_per_tick
-        seen = sightings(before, records, running, recorded(torch.zeros_like(ticked_at), ticked_at))
+        since = recorded(torch.zeros_like(ticked_at), ticked_at)
+        seen = sightings(before, records, running, since)
         beliefs, (miss, false_alarm) = beliefs_of(state), world.sensing.errors
         if self.weighs:
             beliefs = weighed(state, beliefs, seen, self.trust, self.error, (miss, false_alarm))
+        if beliefs.learning is not None:
+            beliefs = beliefs.replace(learning=noted(beliefs.learning, seen.cell, seen.first, seen.burns))
         if self.hidden:
-            beliefs = struck(state, beliefs, seen, max(miss, DOUBT))
+            beliefs = struck(state, beliefs, seen, max(miss, DOUBT), before >= since[:, None, None, None])
         made = corrected(state, beliefs, seen, world.fire, miss, false_alarm)
         return state.with_planes(NAME, made)

@@ -9,12 +9,16 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.arrays.batch import Batch, Named
+from warp_torchrl.world.arrays.blocks import sums_about
 from warp_torchrl.world.ensemble.members import rows_of
+from warp_torchrl.world.mechanics.belief.learning import OF_WORLD, Learning
 from warp_torchrl.world.state.cells import is_burning, is_tree
 from warp_torchrl.world.state.state import FIRST_FIRE, WorldState
 
 NAME = "belief"
 """Of the planes in the state."""
+BLUR = 4
+"""Over which the chance of hidden fires is spread, by Chebyshev distance [cells]."""
 
 
 @dataclass(eq=False, repr=False)
@@ -23,11 +27,13 @@ class Beliefs(Batch):
 
     members: Named  # [B,G*K,...], imagined worlds, see ``world.ensemble.members``
     weights: Tensor  # float32 [B,G,K], of the members; their sum is 1
-    parameters: Named  # ``values`` float32 [B,G,K,3], see ``members.in_parameters``; empty where all are known
+    learning: Learning | None  # what is known of wind and rate; None where all of it is
     chances: Named  # ``values`` float32 [B,G*K,H,W], of trees to have ignited in the last tick; empty without weights
     hidden: Named  # [B,M,...], single fires that may be anywhere, as they would have grown by now; or empty
     possible: Tensor  # float32 [B,G,M], how likely each of them still is to be a fire that nobody saw, 0..1
     found: Tensor  # float32 [B,G,M], how likely each of them was when it turned out to be the fire that is known
+    lit: Tensor  # bool [B,G,H,W], where fire was seen so far
+    fires: Tensor  # int32 [B,G], that were found so far
     overlap: Tensor  # int32 [B], sum over steps of cells that burn and are believed to
     union: Tensor  # int32 [B], sum over steps of cells that burn or are believed to
 
@@ -74,7 +80,9 @@ def hidden_probability(beliefs: Beliefs, fires: int) -> Tensor:
 
     A fire that is not known is one of the ``possible`` ones, or that which was found.
 
-        p = 1 - (1 - h)^m, m = fires that are not known
+        p = 1 - (1 - h)^m, m = fires that were not found
+
+    h is the mean over the cells within ``BLUR``: fires of one place differ, and M of them leave gaps.
 
     Args:
         beliefs: What is believed.
@@ -85,8 +93,8 @@ def hidden_probability(beliefs: Beliefs, fires: int) -> Tensor:
     burns = is_burning(beliefs.hidden.held["cells"])
     total = (beliefs.possible + beliefs.found).sum(dim=2, keepdim=True).clamp(min=1e-6)
     share = torch.bmm(beliefs.possible / total, burns.flatten(2).to(torch.float32)).unflatten(2, burns.shape[2:])
-    known = is_burning(cells_of(beliefs)).flatten(2).any(dim=2)
-    left = (fires - known.to(torch.int32)).clamp(min=0)
+    share = sums_about(share, BLUR) / sums_about(torch.ones_like(share[:1, :1]), BLUR)
+    left = (fires - beliefs.fires).clamp(min=0)
     return 1.0 - (1.0 - share.clamp(max=1.0)).pow(left[..., None, None])
 
 
@@ -106,7 +114,7 @@ def most_believed(state: WorldState, threshold: float) -> WorldState:
         return each.gather(2, index)[:, :, 0]
 
     held = beliefs.members.held.items()
-    first = {name: of_heaviest(leaf) for name, leaf in held if name not in ("key", "extinguished")}
+    first = {name: of_heaviest(leaf) for name, leaf in held if name != "key"}
     code, says = first["cells"], is_burning(first["cells"])
     burns, gone = known_probability(beliefs) > threshold, mean_of(beliefs, codes == 0) > 0.5
     tree = torch.where(is_tree(code), code, state.landscape.age[:, None])
@@ -121,7 +129,7 @@ def most_believed(state: WorldState, threshold: float) -> WorldState:
 
 def each_alone(beliefs: Beliefs) -> Beliefs:
     """Return each belief of B worlds as the one of a world, batch size [B * G]."""
-    groups = beliefs.weights.shape[1]
+    groups, known = beliefs.weights.shape[1], beliefs.learning
 
     def parted(leaf: Tensor) -> Tensor:
         return leaf.flatten(0, 1)[:, None]
@@ -135,11 +143,17 @@ def each_alone(beliefs: Beliefs) -> Beliefs:
     return Beliefs(
         members=members(beliefs.members),
         weights=parted(beliefs.weights),
-        parameters=Named({name: parted(leaf) for name, leaf in beliefs.parameters.held.items()}),
+        learning=None
+        if known is None
+        else known.with_leaves(
+            {name: (repeated if name in OF_WORLD else parted)(leaf) for name, leaf in known.leaves().items()}
+        ),
         chances=members(beliefs.chances),
         hidden=Named({name: repeated(leaf) for name, leaf in beliefs.hidden.held.items()}),
         possible=parted(beliefs.possible),
         found=parted(beliefs.found),
+        lit=parted(beliefs.lit),
+        fires=parted(beliefs.fires),
         overlap=repeated(beliefs.overlap),
         union=repeated(beliefs.union),
     )

@@ -10,8 +10,8 @@ from torch import Tensor
 
 from warp_torchrl.system.device import needs_no_sync
 from warp_torchrl.world.arrays.batch import Named
-from warp_torchrl.world.arrays.random import Stream, named_key, normal, uniform, uniform_at
-from warp_torchrl.world.ensemble.filtering import effective, jittered, moments, normalised, resampled
+from warp_torchrl.world.arrays.random import Stream, named_key, uniform, uniform_at
+from warp_torchrl.world.ensemble.filtering import effective, normalised, resampled
 from warp_torchrl.world.ensemble.members import rows_of, worlds_of
 from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.mechanics.belief.beliefs import NAME, Beliefs, cells_of
@@ -74,18 +74,9 @@ def _drawn_again(state: WorldState, beliefs: Beliefs, poor: Tensor) -> Beliefs:
 
     own = {name: leaf if name == "key" else drawn(leaf) for name, leaf in beliefs.members.held.items()}
     chances = {name: drawn(leaf) for name, leaf in beliefs.chances.held.items()}
-    parameters = beliefs.parameters
-    if parameters.held:
-        values: Tensor = parameters.held["values"]
-        noise = normal(key, state.step, Stream.MEMBERS, tuple(values.shape[1:])).flatten(0, 1)
-        moved = jittered(
-            drawn(values.flatten(1, 2)).view_as(values).flatten(0, 1), *moments(values.flatten(0, 1), weights), noise
-        )
-        parameters = parameters.replace(values=torch.where(poor[..., None, None], moved.view_as(values), values))
     return beliefs.replace(
         members=Named(own),
         chances=Named(chances),
-        parameters=parameters,
         weights=torch.where(poor[..., None], 1.0 / count, beliefs.weights),
     )
 

@@ -30,6 +30,10 @@ class Sightings(NamedTuple):
         """Return which of these cells are to be written, bool [B, G, n]: padding repeats the first cell."""
         return self.there | self.there[..., :1]
 
+    def in_worlds(self, rows: Tensor) -> "Sightings":
+        """Return those of some worlds, int64 [n]."""
+        return Sightings(*(each.index_select(0, rows) for each in self))
+
     def of(self, planes: Tensor) -> Tensor:
         """Return what planes [B, G or 1, K, H, W] hold there, [B, G, K, n]."""
         flat = planes.flatten(3)

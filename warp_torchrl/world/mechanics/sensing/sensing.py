@@ -122,14 +122,30 @@ class Sight(Sensing, Mechanic):
         return after.with_planes(self.name, _where(running, counted(after, memory, knows, itself, self.recent), memory))
 
     def assumed(self, state: WorldState, world: Rules) -> WorldState:
-        """Return the worlds of the newest records: the team's if it shares its maps everywhere, else each agent's."""
+        """Return the worlds of the newest records: the team's if it shares its maps everywhere, else each agent's.
+
+        A fire is as young as its stage allows; what is wet is known of cells that are seen now.
+        """
         records = kept(state)
         if world.hearing.is_everywhere and world.hearing.sends_maps:
             records = records.amax(dim=1, keepdim=True)
+        views, now = records.shape[1], recorded(torch.zeros_like(state.step), state.step)
+        is_seen = (records >= now[:, None, None, None]).flatten(0, 1)
         code, ash, cleared = (each.flatten(0, 1) for each in read(records))
-        rows = torch.arange(len(state.key), device=code.device).repeat_interleave(records.shape[1])
-        own = state if records.shape[1] == 1 else state[rows]
-        return own.replace(cells=code, burned=ash, firebreak=cleared)
+        burns, none = is_burning(code), torch.zeros_like(code)
+        bare = state if views == 1 else state.without_planes(KNOWLEDGE)
+        rows = torch.arange(len(state.key), device=code.device).repeat_interleave(views)
+        own = bare if views == 1 else bare[rows]
+        own = own.replace(
+            cells=code,
+            age=torch.where(burns, own.landscape.age, 0),
+            stage_age=None if own.stage_age is None else none,
+            burned=ash,
+            firebreak=cleared,
+            wet=torch.where(is_seen, own.wet, 0),
+            extinguished=torch.zeros_like(ash),
+        )
+        return world.fire.lit(world.fire.started(own), burns)
 
     def worth_seeing(self, state: WorldState, world: Rules) -> Tensor:
         """Return how stale each agent's records are, 1 - freshness, float32 [B, A, H, W]."""

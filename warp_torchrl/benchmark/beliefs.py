@@ -1,0 +1,105 @@
+"""Reliability of beliefs: of the cells believed to burn with some chance, the share that burns."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import torch
+from torch import Tensor
+
+from warp_torchrl.api.make import make_env
+from warp_torchrl.benchmark.tables import entry, table
+from warp_torchrl.benchmark.tasks import FIRST_SEED
+from warp_torchrl.env.pictures.drawing import BLUE, GRID, ORANGE, SOFT, save_figure, sheet, style
+from warp_torchrl.heuristics import HEURISTICS
+from warp_torchrl.world.state.cells import is_burning
+from warp_torchrl.world.state.records import kept, steps_since
+from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.world.world import World
+
+_BOUNDS = (0.05, 0.15, 0.25, 0.4, 0.6, 0.75, 0.85, 0.95)
+"""Between two bins; eighths, of eight members that weigh alike, lie within them."""
+POLICY = "dispatch"
+
+
+class _Played(NamedTuple):
+    world: World
+
+
+def believed_chance(state: WorldState, world: World) -> Tensor:
+    """Return the chance of each cell to burn as a team believes, by fires known and hidden, float32 [B, H, W].
+
+    Raises:
+        ValueError: If the team has no belief in common.
+    """
+    if not hasattr(world.belief, "burn_chance"):
+        raise ValueError("beliefs are measured with belief=ensemble")
+    chance: Tensor = world.belief.burn_chance(state, world)
+    if chance.shape[1] > 1:
+        raise ValueError("beliefs are measured with belief.of=team")
+    return chance[:, 0]
+
+
+def counted(chance: Tensor, burns: Tensor, counts: Tensor) -> Tensor:
+    """Return float64 [3, bins] of the cells that count: their number, the sum of their chances, and those that burn."""
+    place = torch.bucketize(chance, torch.tensor(_BOUNDS, device=chance.device))[counts]
+    weights = torch.ones_like(chance), chance, burns.to(torch.float32)
+    bins = len(_BOUNDS) + 1
+    return torch.stack([torch.bincount(place, each[counts].to(torch.float64), minlength=bins) for each in weights])
+
+
+def reliability(scenario: str, device: str, episodes: int, overrides: Sequence[str] = ()) -> list[dict[str, Any]]:
+    """Return a row for each bin of chances, of all cells that were not in sight, at every step of ``dispatch``."""
+    world = make_env(scenario, n_worlds=1, device=device, overrides=["belief=ensemble", *overrides]).world
+    seed = torch.arange(FIRST_SEED, FIRST_SEED + episodes, device=device)
+    state, policy = world.reset(seed, torch.zeros_like(seed)), HEURISTICS[POLICY](_Played(world))
+    total = torch.zeros(3, len(_BOUNDS) + 1, dtype=torch.float64, device=device)
+    for _ in range(world.horizon):
+        state = world.step(state, policy.act(state, world.possible_actions(state))).after
+        unseen = steps_since(kept(state).amax(dim=1), state.step) > 0
+        counts = unseen & ~state.done[:, None, None]
+        total += counted(believed_chance(state, world), is_burning(state.cells), counts)
+    ends = (0.0, *_BOUNDS, 1.0)
+    return [
+        {"scenario": scenario, "from": low, "to": high, "cells": int(count), "believed": p / count, "burns": b / count}
+        for low, high, (count, p, b) in zip(ends[:-1], ends[1:], total.T.tolist(), strict=True)
+        if count
+    ]
+
+
+def belief_table(rows: Sequence[dict[str, Any]]) -> str:
+    """Return the bins as a table."""
+    return table(
+        [
+            entry("scenario"),
+            ("believed to burn", lambda row: f"{row['from']:.2f} .. {row['to']:.2f}"),
+            entry("cells", pattern="{:,}"),
+            entry("mean chance", "believed", "{:.3f}"),
+            entry("burns", pattern="{:.3f}"),
+        ],
+        rows,
+    )
+
+
+def draw_reliability(rows: Sequence[dict[str, Any]], path: Path) -> None:
+    """Draw the share that burns over the chance that it was believed to, a line for each scenario.
+
+    Args:
+        rows: What ``reliability`` returns, of one scenario or several.
+        path: PNG to write.
+    """
+    with style():
+        figure, axes = sheet([["bins"]], (3.6, 3.6), "Cells that nobody saw, by the chance they were believed to burn")
+        panel = axes["bins"]
+        panel.grid(color=GRID, linewidth=0.5)
+        panel.set_axisbelow(True)
+        panel.plot([0, 1], [0, 1], color=SOFT, linewidth=0.8, linestyle="--", label="calibrated")
+        names = list(dict.fromkeys(row["scenario"] for row in rows))
+        for place, name in enumerate(names):
+            own = [row for row in rows if row["scenario"] == name]
+            points = [row["believed"] for row in own], [row["burns"] for row in own]
+            panel.plot(*points, "o-", color=(BLUE, ORANGE)[place % 2], markersize=3.0, linewidth=1.2, label=name)
+        panel.set_xlabel("believed to burn")
+        panel.set_ylabel("burns")
+        figure.legend(loc="outside lower center", ncols=3)
+        save_figure(figure, path)
