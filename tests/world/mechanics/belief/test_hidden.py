@@ -39,12 +39,13 @@ def test_the_chance_that_a_hidden_fire_burns_somewhere():
     held = beliefs_of(state)
     held = held.replace(found=torch.tensor([[[0.5, 0.0, 0.0, 0.0]]]))
     none_known = [1 - 0.75**2, 1 - 0.75**2, 1 - 0.9**2, 0.0]
-    assert hidden_probability(held, 2).flatten().tolist() == pytest.approx(none_known)
+    assert hidden_probability(held).flatten().tolist() == pytest.approx(none_known)
     burning = beliefs_of(believing("aTTT", "TTTT", "aTTT", hidden=FIRES, possible=[0.5, 0.3, 0.2, 0.5]))
     burning = burning.replace(found=held.found)
-    assert hidden_probability(burning, 2).flatten().tolist() == pytest.approx([0.25, 0.25, 0.1, 0.0])
-    assert hidden_probability(burning, 1).eq(0.0).all(), "all are known"
-    assert hidden_probability(beliefs_of(believing("TT", "TT")), 2).eq(0.0).all(), "no hidden fires are kept"
+    assert hidden_probability(burning).flatten().tolist() == pytest.approx([0.25, 0.25, 0.1, 0.0])
+    one = burning.replace(lit=torch.ones_like(burning.lit))
+    assert hidden_probability(one).eq(0.0).all(), "all are known"
+    assert hidden_probability(beliefs_of(believing("TT", "TT"))).eq(0.0).all(), "no hidden fires are kept"
 
 
 def test_members_take_up_a_fire_that_nobody_knew_of():

@@ -23,7 +23,9 @@ from warp_torchrl.world.mechanics.belief.beliefs import (
     NAME,
     Beliefs,
     beliefs_of,
+    burn_soon,
     disagreement,
+    hidden_fire,
     hidden_probability,
     known_probability,
     most_believed,
@@ -31,6 +33,7 @@ from warp_torchrl.world.mechanics.belief.beliefs import (
 from warp_torchrl.world.mechanics.belief.correcting import corrected, weighed
 from warp_torchrl.world.mechanics.belief.hidden import DOUBT, fires_lit, hidden_fires, struck
 from warp_torchrl.world.mechanics.belief.sightings import sightings
+from warp_torchrl.world.mechanics.belief.soon import foreseen
 from warp_torchrl.world.mechanics.mechanic import Mechanic, Metric, Rules
 from warp_torchrl.world.mechanics.table import part
 from warp_torchrl.world.state.cells import is_burning
@@ -72,6 +75,7 @@ class Ensemble(Belief, Mechanic):
         rate_deviation: Coefficient of variation of the rate of spread, as far as the team knows; 0: it knows it.
         wind_speed_deviation: The same of the wind's speed.
         bearing_deviation: Standard deviation of the wind's bearing, as far as the team knows [degrees].
+        soon: Ticks of the fire within which ``burn_soon`` shows what may burn.
 
     Raises:
         ValueError: If a value is out of its range.
@@ -82,7 +86,9 @@ class Ensemble(Belief, Mechanic):
     is_knowledge: ClassVar[bool] = True
     maps: ClassVar[Mapping[str, Callable[[WorldState], Tensor]]] = {
         "burn_probability": _believed_map(known_probability),
+        "burn_soon": _believed_map(burn_soon),
         "disagreement": _believed_map(disagreement),
+        "hidden_fire": _believed_map(hidden_fire),
     }
 
     of: Literal["team", "agent"] = "team"
@@ -94,6 +100,7 @@ class Ensemble(Belief, Mechanic):
     rate_deviation: float = 0.0
     wind_speed_deviation: float = 0.0
     bearing_deviation: float = 0.0
+    soon: int = 2
 
     def __post_init__(self) -> None:
         check_fields(
@@ -106,6 +113,7 @@ class Ensemble(Belief, Mechanic):
             rate_deviation=(0.0, 2.0),
             wind_speed_deviation=(0.0, 2.0),
             bearing_deviation=(0.0, 180.0),
+            soon=(1, 64),
         )
 
     @property
@@ -147,15 +155,22 @@ class Ensemble(Belief, Mechanic):
             hidden=hidden_fires(state, world, keys[:, : self.hidden]) if self.hidden else Named(),
             possible=possible,
             found=torch.zeros_like(possible),
+            lit=torch.full_like(none, fires_lit(world.lighting)),
+            soon=state.alpha.new_zeros(*shape, *state.alpha.shape[1:]),
             overlap=none.clone(),
             union=none.clone(),
         )
         state = state.with_planes(NAME, beliefs)
-        return self._looked(state, torch.full_like(kept(state), _NEVER), torch.ones_like(state.done), world)
+        always = torch.ones_like(state.done)
+        return foreseen(
+            self._looked(state, torch.full_like(kept(state), _NEVER), always, world), always, world, self.soon
+        )
 
     def step(self, before: WorldState, after: WorldState, running: Tensor, world: Rules) -> WorldState:
         """Return worlds whose beliefs have ticked, and were weighed and corrected by what is seen after the step."""
+        now = after.tick > before.tick
         after = self._looked(self._ticked(before, after, world), kept(before), running, world)
+        after = foreseen(after, now, world, self.soon)
         beliefs = beliefs_of(after)
         burns, thought = is_burning(after.cells)[:, None], known_probability(beliefs) > self.threshold
         overlap, union = (burns & thought).sum((2, 3)), (burns | thought).sum((2, 3))
@@ -176,7 +191,7 @@ class Ensemble(Belief, Mechanic):
         beliefs, records = beliefs_of(state), kept(state)
         records = records.amax(dim=1, keepdim=True) if self.of == "team" else records
         p = known_probability(beliefs)
-        burns = p * (1.0 - p) + hidden_probability(beliefs, fires_lit(world.lighting))
+        burns = p * (1.0 - p) + hidden_probability(beliefs)
         return burns + _STALE * (1.0 - freshness(records, state.step))
 
     def futures(self, state: WorldState, world: Rules, count: int) -> WorldState:

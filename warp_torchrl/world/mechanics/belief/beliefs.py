@@ -28,6 +28,8 @@ class Beliefs(Batch):
     hidden: Named  # [B,M,...], single fires that may be anywhere, as they would have grown by now; or empty
     possible: Tensor  # float32 [B,G,M], how likely each of them still is to be a fire that nobody saw, 0..1
     found: Tensor  # float32 [B,G,M], how likely each of them was when it turned out to be the fire that is known
+    lit: Tensor  # int32 [B], fires that were lit
+    soon: Tensor  # float32 [B,G,H,W], chance of each cell to burn soon, as it was after the last tick, see ``soon``
     overlap: Tensor  # int32 [B], sum over steps of cells that burn and are believed to
     union: Tensor  # int32 [B], sum over steps of cells that burn or are believed to
 
@@ -69,16 +71,12 @@ def disagreement(beliefs: Beliefs) -> Tensor:
     return 4.0 * p * (1.0 - p)
 
 
-def hidden_probability(beliefs: Beliefs, fires: int) -> Tensor:
+def hidden_probability(beliefs: Beliefs) -> Tensor:
     """Return the chance of each cell to burn by a fire that nobody saw, float32 [B, G, H, W].
 
     A fire that is not known is one of the ``possible`` ones, or that which was found.
 
         p = 1 - (1 - h)^m, m = fires that are not known
-
-    Args:
-        beliefs: What is believed.
-        fires: That were lit.
     """
     if not beliefs.hidden.held:
         return torch.zeros_like(known_probability(beliefs))
@@ -86,8 +84,18 @@ def hidden_probability(beliefs: Beliefs, fires: int) -> Tensor:
     total = (beliefs.possible + beliefs.found).sum(dim=2, keepdim=True).clamp(min=1e-6)
     share = torch.bmm(beliefs.possible / total, burns.flatten(2).to(torch.float32)).unflatten(2, burns.shape[2:])
     known = is_burning(cells_of(beliefs)).flatten(2).any(dim=2)
-    left = (fires - known.to(torch.int32)).clamp(min=0)
+    left = (beliefs.lit[:, None] - known.to(torch.int32)).clamp(min=0)
     return 1.0 - (1.0 - share.clamp(max=1.0)).pow(left[..., None, None])
+
+
+def hidden_fire(beliefs: Beliefs) -> Tensor:
+    """Return the square root of ``hidden_probability``, so that small chances can be told apart in whole numbers."""
+    return hidden_probability(beliefs).sqrt()
+
+
+def burn_soon(beliefs: Beliefs) -> Tensor:
+    """Return the chance of each cell to burn soon, float32 [B, G, H, W]."""
+    return beliefs.soon
 
 
 def most_believed(state: WorldState, threshold: float) -> WorldState:
@@ -140,6 +148,8 @@ def each_alone(beliefs: Beliefs) -> Beliefs:
         hidden=Named({name: repeated(leaf) for name, leaf in beliefs.hidden.held.items()}),
         possible=parted(beliefs.possible),
         found=parted(beliefs.found),
+        lit=repeated(beliefs.lit),
+        soon=parted(beliefs.soon),
         overlap=repeated(beliefs.overlap),
         union=repeated(beliefs.union),
     )
