@@ -43,6 +43,7 @@ def believing(drawing, *members, weights=None, hidden=(), possible=None, chances
         possible=torch.tensor([[possible or [1.0] * m]]),
         found=torch.zeros(1, 1, m),
         lit=torch.full_like(state.step, fires),
+        unseen=torch.zeros(1, 1, *cells.shape[2:]),
         soon=torch.zeros(1, 1, *cells.shape[2:]),
         overlap=torch.zeros_like(state.step),
         union=torch.zeros_like(state.step),

@@ -145,6 +145,7 @@ class Ensemble(Belief, Mechanic):
         groups = 1 if self.of == "team" else world.team.n_agents
         key, none = named_key(state.key, NAME), torch.zeros_like(state.step)
         shape = (len(state.key), groups)
+        none_burns = state.alpha.new_zeros(*shape, *state.alpha.shape[1:])
         possible = torch.ones(*shape, self.hidden, device=state.key.device)
         keys = imagined_keys(key, none, groups * self.members + self.hidden)
         beliefs = Beliefs(
@@ -156,7 +157,8 @@ class Ensemble(Belief, Mechanic):
             possible=possible,
             found=torch.zeros_like(possible),
             lit=torch.full_like(none, fires_lit(world.lighting)),
-            soon=state.alpha.new_zeros(*shape, *state.alpha.shape[1:]),
+            unseen=none_burns,
+            soon=none_burns.clone(),
             overlap=none.clone(),
             union=none.clone(),
         )
@@ -191,7 +193,7 @@ class Ensemble(Belief, Mechanic):
         beliefs, records = beliefs_of(state), kept(state)
         records = records.amax(dim=1, keepdim=True) if self.of == "team" else records
         p = known_probability(beliefs)
-        burns = p * (1.0 - p) + hidden_probability(beliefs)
+        burns = p * (1.0 - p) + beliefs.unseen
         return burns + _STALE * (1.0 - freshness(records, state.step))
 
     def futures(self, state: WorldState, world: Rules, count: int) -> WorldState:
@@ -300,4 +302,4 @@ class Ensemble(Belief, Mechanic):
         if self.hidden:
             beliefs = struck(state, beliefs, seen, max(miss, DOUBT))
         made = corrected(state, beliefs, seen, world.fire, miss, false_alarm)
-        return state.with_planes(NAME, made)
+        return state.with_planes(NAME, made.replace(unseen=hidden_probability(made)))

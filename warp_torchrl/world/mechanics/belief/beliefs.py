@@ -29,6 +29,7 @@ class Beliefs(Batch):
     possible: Tensor  # float32 [B,G,M], how likely each of them still is to be a fire that nobody saw, 0..1
     found: Tensor  # float32 [B,G,M], how likely each of them was when it turned out to be the fire that is known
     lit: Tensor  # int32 [B], fires that were lit
+    unseen: Tensor  # float32 [B,G,H,W], chance of each cell to burn by a fire that nobody saw: ``hidden_probability``
     soon: Tensor  # float32 [B,G,H,W], chance of each cell to burn soon, as it was after the last tick, see ``soon``
     overlap: Tensor  # int32 [B], sum over steps of cells that burn and are believed to
     union: Tensor  # int32 [B], sum over steps of cells that burn or are believed to
@@ -89,8 +90,11 @@ def hidden_probability(beliefs: Beliefs) -> Tensor:
 
 
 def hidden_fire(beliefs: Beliefs) -> Tensor:
-    """Return the square root of ``hidden_probability``, so that small chances can be told apart in whole numbers."""
-    return hidden_probability(beliefs).sqrt()
+    """Return the square root of the chance of each cell to burn by a fire that nobody saw, float32 [B, G, H, W].
+
+    So small chances can be told apart in whole numbers.
+    """
+    return beliefs.unseen.sqrt()
 
 
 def burn_soon(beliefs: Beliefs) -> Tensor:
@@ -149,6 +153,7 @@ def each_alone(beliefs: Beliefs) -> Beliefs:
         possible=parted(beliefs.possible),
         found=parted(beliefs.found),
         lit=repeated(beliefs.lit),
+        unseen=parted(beliefs.unseen),
         soon=parted(beliefs.soon),
         overlap=repeated(beliefs.overlap),
         union=repeated(beliefs.union),
