@@ -14,15 +14,12 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.entries import Content, Empty, Follows, Part
-from warp_torchrl.env.observation.features import Feature, Features, Function, Holds, anything
+from warp_torchrl.env.observation.features import Features, Function, Holds, Map, add_maps, anything
 from warp_torchrl.env.observation.look import Look
-from warp_torchrl.validation import check_new_name
 from warp_torchrl.world.arrays.bytes import byte, to_codes
-from warp_torchrl.world.mechanics.mechanic import Mechanic
-from warp_torchrl.world.mechanics.table import kinds
 from warp_torchrl.world.state.cells import is_burning, is_tree
 from warp_torchrl.world.state.role import PAPER_ROLES
-from warp_torchrl.world.state.state import FIRST_FIRE, WorldState
+from warp_torchrl.world.state.state import FIRST_FIRE
 from warp_torchrl.world.world import World
 
 ELEVATION_SCALE = 100.0
@@ -153,25 +150,19 @@ def other_scout(look: Look) -> Tensor:
     return look.others[:, :, roles.index("scout")] if "scout" in roles else torch.zeros_like(look.others[:, :, 0])
 
 
-def _map_of(kind: type[Mechanic], name: str, show: Callable[[WorldState], Tensor]) -> Feature:
-    """Return the channel that shows a map of a mechanic; it is empty in worlds without."""
+def _in_view(name: str, show: Map) -> Callable[[Look], Tensor]:
+    """Return the channel that shows a map of a mechanic, given the name of its planes."""
 
     def shown(look: Look) -> Tensor:
-        if kind.name not in look.state.extras.held:
+        if name not in look.state.extras.held:
             return torch.zeros_like(look.on_map)
         codes = show(look.state)
         return look.window.of_own(codes) if codes.ndim == 4 else look.window.of(codes)
 
-    def content(world: World, names: Sequence[str]) -> Content:
-        return None if any(isinstance(each, kind) for each in world.loop) else Empty()
-
-    return Feature(shown, lambda world: [Part("plane", (name,))], content, 255, None)
+    return shown
 
 
-for _kind in kinds():
-    for _name, _show in _kind.maps.items():
-        check_new_name("channel", _name, _show, CHANNELS[_name].show if _name in CHANNELS else None)
-        CHANNELS[_name] = _map_of(_kind, _name, _show)
+add_maps(CHANNELS, _in_view)
 
 
 def check_channels(names: Sequence[str]) -> None:

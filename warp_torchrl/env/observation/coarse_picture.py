@@ -21,6 +21,8 @@ from warp_torchrl.env.observation.features import (
     Function,
     Holds,
     IsThere,
+    Map,
+    add_maps,
     anything,
     everywhere,
     known_in_part,
@@ -160,6 +162,20 @@ def mechanics(now: Blocks) -> Tensor:
     parts = [each for each in now.world.loop if each.picture_entries(now.world)]
     shares = torch.cat([each.picture(now.state, now.side) for each in parts], dim=2)
     return torch.stack([now.show(each) for each in shares.unbind(2)], dim=2)
+
+
+def _in_blocks(name: str, show: Map) -> Callable[[Blocks], Tensor]:
+    """Return the channel that shows the square root of a map's means, given the name of its mechanic's planes."""
+
+    def shown(now: Blocks) -> Tensor:
+        if name not in now.state.extras.held:
+            return now.show(torch.zeros_like(block_means(now.state.alpha, now.side)))
+        return now.show(block_means(show(now.state).to(torch.float32), now.side).div_(255.0).sqrt_())
+
+    return shown
+
+
+add_maps(PICTURE, _in_blocks)
 
 
 def _known(state: WorldState) -> Tensor | None:

@@ -24,6 +24,8 @@ from warp_torchrl.env.observation.features import (
     Function,
     Holds,
     IsThere,
+    Map,
+    add_maps,
     anything,
     content_of,
     everywhere,
@@ -198,6 +200,21 @@ def mechanics(now: Context) -> Tensor:
 def reach(now: Context) -> Tensor:
     """Return how soon fire, and how soon the team, can be where, see ``reach_of_fire_and_team``."""
     return torch.stack(reach_of_fire_and_team(now.state, now.world), dim=1)
+
+
+def _in_state(name: str, show: Map) -> Callable[[Context], Tensor]:
+    """Return the plane that shows a map's means, of all agents, given the name of its mechanic's planes."""
+
+    def shown(now: Context) -> Tensor:
+        if name not in now.state.extras.held:
+            return torch.zeros_like(block_means(now.state.alpha, STATE_SIDE))
+        means = block_means(show(now.state).to(torch.float32), STATE_SIDE) / 255.0
+        return means.mean(dim=1) if means.ndim == 4 else means
+
+    return shown
+
+
+add_maps(STATE, _in_state)
 
 
 def clock_and_wind(now: Context) -> Tensor:

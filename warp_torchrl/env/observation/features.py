@@ -10,12 +10,16 @@ from typing import NamedTuple, TypeVar
 
 from torch import Tensor
 
-from warp_torchrl.entries import Content, Part
+from warp_torchrl.entries import Content, Empty, Part
 from warp_torchrl.validation import check_new_name
+from warp_torchrl.world.mechanics.mechanic import Mechanic
+from warp_torchrl.world.mechanics.table import kinds
 from warp_torchrl.world.state.state import Forecast, WorldState
 from warp_torchrl.world.world import World
 
 Function = TypeVar("Function", bound=Callable[..., Tensor])
+Map = Callable[[WorldState], Tensor]
+"""A map of a mechanic, see ``Mechanic.maps``."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,6 +115,26 @@ class Features(dict[str, Feature]):
         """Return the features that a world has, in order, then those that are chosen by name."""
         there = [each for each in self.values() if each.is_there is not None and each.is_there(world, choice)]
         return there + [self[name] for name in choice.features if name in self]
+
+
+def add_maps(table: Features, in_entry: Callable[[str, Map], Callable[..., Tensor]]) -> None:
+    """Add to a table the maps of mechanics (``Mechanic.maps``), which are chosen by name and empty in worlds without.
+
+    Args:
+        table: Of an entry.
+        in_entry: Returns the function of a row, given the name of the mechanic's planes in the state, and the map.
+    """
+    for kind in kinds():
+        for name, show in kind.maps.items():
+            check_new_name(table.what, name, show, table[name].show if name in table else None)
+            table[name] = _row_of_map(kind, name, in_entry(kind.name, show))
+
+
+def _row_of_map(kind: type[Mechanic], name: str, show: Callable[..., Tensor]) -> Feature:
+    def content(world: World, names: Sequence[str]) -> Content:
+        return None if any(isinstance(each, kind) for each in world.loop) else Empty()
+
+    return Feature(show, lambda world: [Part("plane", (name,))], content, 255, None)
 
 
 def anything(world: World, names: Sequence[str]) -> Content:

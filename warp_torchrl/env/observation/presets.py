@@ -73,8 +73,8 @@ class Local:
             choose for it, see ``advised_actions``: agents may do otherwise; None has no adviser.
         reach: Whether the central critic's ``state`` tells how soon fire and team can be where, see
             ``critic.reach_of_fire_and_team``: else it cannot tell a closed firebreak from one that lacks a cell.
-        features: Names of further numbers of ``status`` and planes of the critic's ``state``, in order, that modules of
-            a user's own add.
+        features: Names of further channels of the view, numbers of ``status`` and planes of the critic's ``state``, in
+            order: maps of mechanics, and what modules of a user's own add.
         channels: Names of the view's channels, in order.
 
     Raises:
@@ -89,7 +89,7 @@ class Local:
     reach: bool = False
     features: tuple[str, ...] = ()
     channels: tuple[str, ...] = DEFAULT
-    tables: ClassVar[tuple[Features, ...]] = (STATUS, STATE)
+    tables: ClassVar[tuple[Features, ...]] = (CHANNELS, STATUS, STATE)
     """Of features that may be chosen."""
 
     def __post_init__(self) -> None:
@@ -101,19 +101,25 @@ class Local:
 
     def spaces(self, world: World) -> dict[str, Space]:
         """Return the space of each entry."""
-        side, features = 2 * self.radius + 1, [CHANNELS[name] for name in self.channels]
+        side, names = 2 * self.radius + 1, self.view_names
+        features = [CHANNELS[name] for name in names]
         own = Vector(parts_of(STATUS.shown(world, self.choice), world))
         shape, highs = (len(features), side, side), tuple(each.high for each in features)
         symmetry, content = Planes(len(features), target_of(features, world)), content_of(features, world)
         return {
-            "view": Space(shape, torch.uint8, 0, highs, self.channels, symmetry, self._content_of(content)),
+            "view": Space(shape, torch.uint8, 0, highs, names, symmetry, self._content_of(content)),
             "status": Space((len(own.names),), torch.float32, -3.0, 3.0, own.names, own),
         }
 
     def __call__(self, state: WorldState, world: World, forecast: Forecast) -> dict[str, Tensor]:
         """Return ``view`` uint8 [B, A, C, V, V] and ``status`` float32 [B, A, F]."""
         own = status_vector(state, world, forecast, self.choice)
-        return {"view": egocentric_view(state, world, forecast, self.radius, self.channels), "status": own}
+        return {"view": egocentric_view(state, world, forecast, self.radius, self.view_names), "status": own}
+
+    @cached_property
+    def view_names(self) -> tuple[str, ...]:
+        """Return the names of the view's channels, in order."""
+        return (*self.channels, *(name for name in self.features if name in CHANNELS and name not in self.channels))
 
     @cached_property
     def choice(self) -> Choice:
@@ -138,7 +144,7 @@ class Surroundings(Local):
 
     As ``Local``, and ``picture``: what a dispatcher would radio, the whole map's fire (square root of the share of
     each block that burns), fuel and team-mates in 8 x 8 blocks: channels of ``observation.coarse_picture.PICTURE``.
-    ``features`` may name further ones.
+    ``features`` may name further ones; of a map of a mechanic it shows the square root of each block's mean.
 
     Attributes:
         centred: Whether the agent's own block is the middle of the picture, which then has 15 x 15 blocks, uint8; else

@@ -22,8 +22,10 @@ from warp_torchrl.world.mechanics.belief.beliefs import (
     NAME,
     Beliefs,
     beliefs_of,
+    burn_soon,
     cells_of,
     disagreement,
+    hidden_fire,
     hidden_probability,
     known_probability,
     mean_of,
@@ -33,6 +35,7 @@ from warp_torchrl.world.mechanics.belief.correcting import corrected, weighed
 from warp_torchrl.world.mechanics.belief.hidden import DOUBT, fires_lit, hidden_fires, struck
 from warp_torchrl.world.mechanics.belief.learning import PARAMETERS, Learning, begun, learned, noted, watched
 from warp_torchrl.world.mechanics.belief.sightings import sightings
+from warp_torchrl.world.mechanics.belief.soon import foreseen
 from warp_torchrl.world.mechanics.mechanic import Mechanic, Metric, Rules
 from warp_torchrl.world.mechanics.table import part
 from warp_torchrl.world.state.cells import is_burning, is_tree
@@ -74,6 +77,7 @@ class Ensemble(Belief, Mechanic):
         rate_deviation: Coefficient of variation of the rate of spread, as far as the team knows; 0: it knows it.
         wind_speed_deviation: The same of the wind's speed.
         bearing_deviation: Standard deviation of the wind's bearing, as far as the team knows [degrees].
+        soon: Ticks of the fire within which ``burn_soon`` shows what may burn.
 
     Raises:
         ValueError: If a value is out of its range.
@@ -84,7 +88,9 @@ class Ensemble(Belief, Mechanic):
     is_knowledge: ClassVar[bool] = True
     maps: ClassVar[Mapping[str, Callable[[WorldState], Tensor]]] = {
         "burn_probability": _believed_map(known_probability),
+        "burn_soon": _believed_map(burn_soon),
         "disagreement": _believed_map(disagreement),
+        "hidden_fire": _believed_map(hidden_fire),
     }
 
     of: Literal["team", "agent"] = "team"
@@ -97,6 +103,7 @@ class Ensemble(Belief, Mechanic):
     rate_deviation: float = 0.0
     wind_speed_deviation: float = 0.0
     bearing_deviation: float = 0.0
+    soon: int = 2
 
     def __post_init__(self) -> None:
         check_fields(
@@ -110,6 +117,7 @@ class Ensemble(Belief, Mechanic):
             rate_deviation=(0.0, 2.0),
             wind_speed_deviation=(0.0, 2.0),
             bearing_deviation=(0.0, 180.0),
+            soon=(1, 64),
         )
 
     @property
@@ -141,6 +149,7 @@ class Ensemble(Belief, Mechanic):
         groups = 1 if self.of == "team" else world.team.n_agents
         key, none = named_key(state.key, NAME), torch.zeros_like(state.step)
         shape = (len(state.key), groups)
+        none_burns = state.alpha.new_zeros(*shape, *state.alpha.shape[1:])
         possible = torch.ones(*shape, self.hidden, device=state.key.device)
         keys = imagined_keys(key, none, groups * self.members + self.hidden)
         beliefs = Beliefs(
@@ -153,15 +162,22 @@ class Ensemble(Belief, Mechanic):
             found=torch.zeros_like(possible),
             lit=torch.zeros_like(state.burned)[:, None].expand(-1, groups, -1, -1).clone(),
             fires=torch.zeros(shape, dtype=torch.int32, device=state.key.device),
+            unseen=none_burns,
+            soon=none_burns.clone(),
             overlap=none.clone(),
             union=none.clone(),
         )
         state = state.with_planes(NAME, beliefs)
-        return self._looked(state, torch.full_like(kept(state), _NEVER), torch.ones_like(state.done), world)
+        always = torch.ones_like(state.done)
+        return foreseen(
+            self._looked(state, torch.full_like(kept(state), _NEVER), always, world), always, world, self.soon
+        )
 
     def step(self, before: WorldState, after: WorldState, running: Tensor, world: Rules) -> WorldState:
         """Return worlds whose beliefs have ticked, and were weighed and corrected by what is seen after the step."""
+        now = after.tick > before.tick
         after = self._looked(self._ticked(before, after, world), kept(before), running, world)
+        after = foreseen(after, now, world, self.soon)
         beliefs = beliefs_of(after)
         burns, thought = is_burning(after.cells)[:, None], known_probability(beliefs) > self.threshold
         overlap, union = (burns & thought).sum((2, 3)), (burns | thought).sum((2, 3))
@@ -185,12 +201,12 @@ class Ensemble(Belief, Mechanic):
         """Return the chance of each cell to burn, known and hidden, and a little for each that was long not seen."""
         beliefs, records = beliefs_of(state), self._records(state)
         p = known_probability(beliefs)
-        return p * (1.0 - p) + self.hidden_chance(state, world) + _STALE * (1.0 - freshness(records, state.step))
+        return p * (1.0 - p) + beliefs.unseen + _STALE * (1.0 - freshness(records, state.step))
 
     def burn_chance(self, state: WorldState, world: Rules) -> Tensor:
         """Return the chance of each cell to burn, by fires known and hidden, float32 [B, G, H, W]."""
-        known = known_probability(beliefs_of(state))
-        return 1.0 - (1.0 - known) * (1.0 - self.hidden_chance(state, world))
+        beliefs = beliefs_of(state)
+        return 1.0 - (1.0 - known_probability(beliefs)) * (1.0 - beliefs.unseen)
 
     def hidden_chance(self, state: WorldState, world: Rules) -> Tensor:
         """Return the chance of each cell to burn by a fire that nobody saw, float32 [B, G, H, W].
@@ -348,4 +364,5 @@ class Ensemble(Belief, Mechanic):
         if self.hidden:
             beliefs = struck(state, beliefs, seen, max(miss, DOUBT), before >= since[:, None, None, None])
         made = corrected(state, beliefs, seen, world.fire, miss, false_alarm)
-        return state.with_planes(NAME, made)
+        state = state.with_planes(NAME, made)
+        return state.with_planes(NAME, made.replace(unseen=self.hidden_chance(state, world)))

@@ -34,6 +34,8 @@ class Beliefs(Batch):
     found: Tensor  # float32 [B,G,M], how likely each of them was when it turned out to be the fire that is known
     lit: Tensor  # bool [B,G,H,W], where fire was seen so far
     fires: Tensor  # int32 [B,G], that were found so far
+    unseen: Tensor  # float32 [B,G,H,W], chance of each cell to burn by a fire that nobody saw
+    soon: Tensor  # float32 [B,G,H,W], chance of each cell to burn soon, as it was after the last tick, see ``soon``
     overlap: Tensor  # int32 [B], sum over steps of cells that burn and are believed to
     union: Tensor  # int32 [B], sum over steps of cells that burn or are believed to
 
@@ -75,7 +77,7 @@ def disagreement(beliefs: Beliefs) -> Tensor:
     return 4.0 * p * (1.0 - p)
 
 
-def hidden_probability(beliefs: Beliefs, fires: int) -> Tensor:
+def hidden_probability(beliefs: Beliefs) -> Tensor:
     """Return the chance of each cell to burn by a fire that nobody saw, float32 [B, G, H, W].
 
     A fire that is not known is one of the ``possible`` ones, or that which was found.
@@ -96,6 +98,19 @@ def hidden_probability(beliefs: Beliefs, fires: int) -> Tensor:
     share = sums_about(share, BLUR) / sums_about(torch.ones_like(share[:1, :1]), BLUR)
     left = (fires - beliefs.fires).clamp(min=0)
     return 1.0 - (1.0 - share.clamp(max=1.0)).pow(left[..., None, None])
+
+
+def hidden_fire(beliefs: Beliefs) -> Tensor:
+    """Return the square root of the chance of each cell to burn by a fire that nobody saw, float32 [B, G, H, W].
+
+    So small chances can be told apart in whole numbers.
+    """
+    return beliefs.unseen.sqrt()
+
+
+def burn_soon(beliefs: Beliefs) -> Tensor:
+    """Return the chance of each cell to burn soon, float32 [B, G, H, W]."""
+    return beliefs.soon
 
 
 def most_believed(state: WorldState, threshold: float) -> WorldState:
@@ -154,6 +169,8 @@ def each_alone(beliefs: Beliefs) -> Beliefs:
         found=parted(beliefs.found),
         lit=parted(beliefs.lit),
         fires=parted(beliefs.fires),
+        unseen=parted(beliefs.unseen),
+        soon=parted(beliefs.soon),
         overlap=repeated(beliefs.overlap),
         union=repeated(beliefs.union),
     )
