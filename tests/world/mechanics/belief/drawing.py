@@ -43,6 +43,9 @@ def believing(drawing, *members, weights=None, hidden=(), possible=None, chances
         found=torch.zeros(1, 1, m),
         overlap=torch.zeros_like(state.step),
         union=torch.zeros_like(state.step),
+        skill=torch.zeros_like(state.burning_area),
+        skills=torch.zeros_like(state.burning_area),
+        alight=torch.zeros_like(state.step),
     )
     return state.with_planes(NAME, beliefs)
 

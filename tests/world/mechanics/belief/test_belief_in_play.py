@@ -18,7 +18,7 @@ UNKNOWN = Ensemble(members=4, hidden=8, rate_deviation=0.4, wind_speed_deviation
 AT = (5, 0), (5, 1)
 BELIEFS = (None, Belief(), UNKNOWN, Ensemble(of="agent", members=2, hidden=4))
 OF_FIRE = ("cells", "burned", "firebreak", "age", "stage_age", "wet", "extras.rate.minutes", "extras.rate.origin")
-METRIC = ("overlap", "union")
+METRIC = ("overlap", "union", "skill", "skills", "alight")
 
 
 class Rules(NamedTuple):
@@ -33,7 +33,7 @@ def acted(world, state, name):
 
 
 def believed(state):
-    """The names and values of what is believed; two sums for a metric compare it with the fire."""
+    """The names and values of what is believed; what metrics keep compares it with the fire."""
     leaves = state.leaves().items()
     return {name: leaf for name, leaf in leaves if name.startswith("extras.belief") and name[14:] not in METRIC}
 

@@ -23,6 +23,7 @@ from warp_torchrl.world.mechanics.belief.beliefs import (
     NAME,
     Beliefs,
     beliefs_of,
+    brier_skill,
     disagreement,
     hidden_probability,
     known_probability,
@@ -149,6 +150,9 @@ class Ensemble(Belief, Mechanic):
             found=torch.zeros_like(possible),
             overlap=none.clone(),
             union=none.clone(),
+            skill=torch.zeros_like(state.burning_area),
+            skills=torch.zeros_like(state.burning_area),
+            alight=none.clone(),
         )
         state = state.with_planes(NAME, beliefs)
         return self._looked(state, torch.full_like(kept(state), _NEVER), torch.ones_like(state.done), world)
@@ -157,13 +161,17 @@ class Ensemble(Belief, Mechanic):
         """Return worlds whose beliefs have ticked, and were weighed and corrected by what is seen after the step."""
         after = self._looked(self._ticked(before, after, world), kept(before), running, world)
         beliefs = beliefs_of(after)
-        burns, thought = is_burning(after.cells)[:, None], known_probability(beliefs) > self.threshold
+        burns, p = is_burning(after.cells)[:, None], known_probability(beliefs)
+        thought, skill = p > self.threshold, brier_skill(p, burns[:, 0])
         overlap, union = (burns & thought).sum((2, 3)), (burns | thought).sum((2, 3))
         return after.with_planes(
             NAME,
             beliefs.replace(
                 overlap=beliefs.overlap + (overlap.sum(1) * running).to(torch.int32),
                 union=beliefs.union + (union.sum(1) * running).to(torch.int32),
+                skill=torch.where(running, skill, beliefs.skill),
+                skills=beliefs.skills + skill * running,
+                alight=beliefs.alight + (burns.flatten(1).any(dim=1) & running).to(torch.int32),
             ),
         )
 
@@ -178,6 +186,11 @@ class Ensemble(Belief, Mechanic):
         p = known_probability(beliefs)
         burns = p * (1.0 - p) + hidden_probability(beliefs, fires_lit(world.lighting))
         return burns + _STALE * (1.0 - freshness(records, state.step))
+
+    def believed_fire(self, state: WorldState, world: Rules) -> tuple[Tensor, Tensor]:
+        """Return the members' share that burns, and the chance of a hidden fire, float32 [B, G, H, W] each."""
+        beliefs = beliefs_of(state)
+        return known_probability(beliefs), hidden_probability(beliefs, fires_lit(world.lighting))
 
     def futures(self, state: WorldState, world: Rules, count: int) -> WorldState:
         """Return members, as often as they weigh, of worlds with one belief."""
@@ -196,19 +209,23 @@ class Ensemble(Belief, Mechanic):
         return worlds
 
     def metric_rows(self, world: Rules) -> tuple[Metric, ...]:
-        """Return ``jaccard``, and ``rate_known`` and so on of what the team does not know."""
+        """Return ``jaccard`` and ``skill``, and ``rate_known`` and so on of what the team does not know."""
         known = (Metric(f"{name}_known", "more", "%", "", "Belief") for name, _ in self._unknown)
-        return (Metric("jaccard", "more", "%", "", "Belief"), *known)
+        return (*(Metric(name, "more", "%", "", "Belief") for name in ("jaccard", "skill")), *known)
 
     def metrics(self, state: WorldState) -> dict[str, Tensor]:
         """Return how well beliefs fit the fire.
 
         ``jaccard``: cells that burn and are believed to, over those of which either holds, sums over the steps.
-        ``rate_known``, ``wind_speed_known``, ``bearing_known``: 1 where the true value lies within the members' 5 to
-        95 % quantiles now.
+        ``skill``: the Brier skill score of the members, see ``brier_skill``, mean over the steps in which something
+        burns; no less than 0. ``rate_known``, ``wind_speed_known``, ``bearing_known``: 1 where the true value lies
+        within the members' 5 to 95 % quantiles now.
         """
         beliefs = beliefs_of(state)
-        found = {"jaccard": beliefs.overlap / beliefs.union.clamp(min=1)}
+        found = {
+            "jaccard": beliefs.overlap / beliefs.union.clamp(min=1),
+            "skill": (beliefs.skills / beliefs.alight.clamp(min=1)).clamp(0.0, 1.0),
+        }
         for name, index in self._unknown:
             values = beliefs.parameters.held["values"][..., index].flatten(0, 1)
             low, high = quantiles(values, beliefs.weights.flatten(0, 1), values.new_tensor([0.05, 0.95])).unbind(1)
