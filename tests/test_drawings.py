@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 import torch
-from drawings.__main__ import REAL_GROUND, WORLD, main
+from drawings.__main__ import FILMS, REAL_GROUND, WORLD, main
 from drawings.landscapes import burn_probability, ignition
 from drawings.laws import front
 from drawings.measures import (
@@ -39,6 +39,7 @@ SMALL = {
     "isotropy": {"reach": 12, "worlds": 4},
     "ellipses": {"speeds": (0.0, 5.0), "reach": 12, "worlds": 6},
     "house": {},
+    "belief": {"times": (0, 1), "overrides": ("landscape.size=16", "belief.hidden=4")},
     "fire_sizes": {"size": 24, "trees_per_strike": 20, "fires": 60, "discard": 5},
 }
 
@@ -61,6 +62,13 @@ def is_drawn(path):
 def test_every_figure_is_drawn(name, tmp_path, matplotlib):
     path = draw_figure(lambda: WORLD[name](**SMALL[name]), tmp_path / "new" / f"{name}.png")
     assert is_drawn(path)
+
+
+@pytest.mark.parametrize("name", FILMS)
+def test_every_animation_is_drawn_step_by_step(name, tmp_path):
+    FILMS[name](path := tmp_path / f"{name}.webp", overrides=("landscape.size=16", "belief.hidden=4", "horizon=4"))
+    film = Image.open(path)
+    assert film.n_frames == 5 and np.asarray(film.convert("L")).std() > 10.0
 
 
 @pytest.fixture
@@ -104,7 +112,7 @@ def test_it_draws_what_it_is_asked_for(tmp_path, capsys, matplotlib):
 def test_it_lists_its_figures(capsys):
     assert main(["--list"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == [*WORLD, *REAL_GROUND, "episode"]
+    assert [line.split()[0] for line in lines] == [*WORLD, *FILMS, *REAL_GROUND, "episode"]
     assert all(len(line) > 40 for line in lines)
 
 

@@ -1,6 +1,7 @@
 """Draws the figures of the world: ``python docs/drawings [FIGURE ...]``.
 
-All of them by default, as PNG; those of the paper and those that show our laws. They need the extra ``figures``.
+All of them by default, as PNG, and animations as WebP; those of the paper and those that show our laws. They need the
+extra ``figures``.
 ``python docs/drawings episode`` photographs a team at work; it needs the extra ``live``, Playwright and Chromium.
 """
 
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # of this package
 
+from drawings.belief import belief, scouts
 from drawings.episode import photograph
 from drawings.fires import fire_plain, fire_terrain_wind
 from drawings.house import house
@@ -44,8 +46,11 @@ WORLD: dict[str, Callable[..., "Figure"]] = {
     "ellipses": ellipses,
     "fire_sizes": fire_sizes,
     "house": house,
+    "belief": belief,
 }
 """Figures that need nothing, by name; a file is named as its figure."""
+FILMS: dict[str, Callable[[Path], None]] = {"scouts": scouts}
+"""Animations that need nothing, WebP, by name."""
 REAL_GROUND: dict[str, Callable[..., "Figure"]] = {"burn_probability": burn_probability}
 """Figures that need a folder of rasters."""
 _EPISODE = "episode [--policy NAME] [--seed SEED] [--steps FIRST:LAST:EVERY] [--out FOLDER] [KEY=VALUE ...]"
@@ -68,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _world(arguments: Sequence[str]) -> None:
     options = _parser().parse_args(arguments)
     if options.list:
-        print("\n".join(f"{name:<20}{_first_line(draw)}" for name, draw in (WORLD | REAL_GROUND).items()))
+        print("\n".join(f"{name:<20}{_first_line(draw)}" for name, draw in (WORLD | FILMS | REAL_GROUND).items()))
         print(f"{_EPISODE} photographs a team at work")
         return
     _check(options)
@@ -132,9 +137,9 @@ def _episode_parser() -> argparse.ArgumentParser:
 
 def _check(options: argparse.Namespace) -> None:
     """Refuse what is wrong with the command line or the installation."""
-    unknown = [name for name in options.figures if name not in WORLD | REAL_GROUND]
+    unknown = [name for name in options.figures if name not in WORLD | FILMS | REAL_GROUND]
     if unknown:
-        raise ValueError(f"figure must be one of {', '.join(WORLD | REAL_GROUND)}, got {unknown[0]}")
+        raise ValueError(f"figure must be one of {', '.join(WORLD | FILMS | REAL_GROUND)}, got {unknown[0]}")
     if options.landscape is not None and not options.landscape.is_dir():
         raise ValueError(f"landscape must be a folder of rasters that exists, got {options.landscape}")
     check_matplotlib()
@@ -145,14 +150,24 @@ def _draw_all(options: argparse.Namespace) -> None:
     if options.landscape is not None:
         ready |= {name: partial(draw, options.landscape) for name, draw in REAL_GROUND.items()}
         missing = {}
-    for name in options.figures or WORLD | REAL_GROUND:
+    for name in options.figures or WORLD | FILMS | REAL_GROUND:
         if name in missing:
             print(f"{name:<20} skipped: it needs --landscape FOLDER, a folder of rasters")
             continue
-        draw_timed(name, ready[name], options.out)
+        if name in FILMS:
+            _film(name, options.out)
+        else:
+            draw_timed(name, ready[name], options.out)
 
 
-def _first_line(draw: Callable[..., "Figure"]) -> str:
+def _film(name: str, folder: Path) -> None:
+    start, path = time.perf_counter(), folder / f"{name}.webp"
+    folder.mkdir(parents=True, exist_ok=True)
+    FILMS[name](path)
+    print(f"{name:<20}{time.perf_counter() - start:6.1f} s  {path}", flush=True)
+
+
+def _first_line(draw: Callable[..., object]) -> str:
     return str(draw.__doc__).splitlines()[0]
 
 

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from tests.world.drawing import draw
-from warp_torchrl.env.pictures.render import fire_colours, render
+from warp_torchrl.env.pictures.render import fire_colours, ground_colours
 from warp_torchrl.live import drawing
 from warp_torchrl.live.ground import ground_of
 from warp_torchrl.live.match import Match, Setting
@@ -22,7 +22,8 @@ MAP = """
 
 def test_tiles_have_the_colours_of_the_map_darker_under_trees():
     state = draw(MAP)
-    colours, painted = drawing.tiles(state, ground_of(state)), render(state, None, 1)[0].flatten(0, 1).numpy()
+    cells = ground_colours(state)[0]
+    colours, painted = drawing.tiles(state, ground_of(state), cells), cells.flatten(0, 1).numpy()
     bare_and_burning = [3, 4, 5, 6, 9, 10]
     assert (colours[bare_and_burning] == painted[bare_and_burning]).all()
     assert (colours[1] < painted[1]).all()
@@ -32,7 +33,8 @@ def test_every_tree_is_as_tall_as_it_is_old_and_where_none_is_it_has_no_size():
     state = draw(MAP)
     ground = ground_of(state)
     assert ground.trees.tolist() == [0, 1, 2, 3, 5, 6, 7, 8, 9, 10, 11], "all but the lake"
-    tall = dict(zip(ground.trees.tolist(), drawing.trees(state, ground).scale[:, 2].tolist()))
+    shown = drawing.trees(state, ground, ground_colours(state)[0])
+    tall = dict(zip(ground.trees.tolist(), shown.scale[:, 2].tolist()))
     assert tall[3] == tall[9] == 0.0, "bare ground and a firebreak"
     # 0.45 + 0.1 age, within 15 % of it; a tree that burns is as tall as it was, 10 years.
     for cell, height in {0: 0.55, 1: 0.95, 2: 1.45, 5: 1.45}.items():
@@ -119,5 +121,5 @@ def test_a_large_map_has_no_trees_of_its_own():
     match = Match(Setting(policy="noop", overrides=("landscape.size=130", "team.n_agents=2")))
     ground = ground_of(match.alone.state)
     assert len(ground.trees) == 0
-    colours = drawing.tiles(match.alone.state, ground)
-    assert (colours == render(match.alone.state, None, 1)[0].flatten(0, 1).numpy()).all()
+    cells = ground_colours(match.alone.state)[0]
+    assert (drawing.tiles(match.alone.state, ground, cells) == cells.flatten(0, 1).numpy()).all()

@@ -4,6 +4,7 @@ import time
 
 import pytest
 
+from warp_torchrl.env.pictures.veil import first_view, seen_as
 from warp_torchrl.live import drawing
 from warp_torchrl.live.ground import ground_of
 from warp_torchrl.live.match import Match, Setting
@@ -27,7 +28,9 @@ def draw(side, ground):
     drawing.headings(shown, {}, ground)
     drawing.wind_arrows(side.state, ground)
     drawing.glow(side.state, ground)
-    return [make(side.state, ground) for make in (drawing.tiles, drawing.trees, drawing.flames, drawing.smoke_puffs)]
+    state, colours = seen_as(side.state, side.env.world, first_view(side.env.world))
+    grown = [make(state, ground, colours[0]) for make in (drawing.tiles, drawing.trees)]
+    return grown + [make(state, ground) for make in (drawing.flames, drawing.smoke_puffs)]
 
 
 def test_a_step_of_a_large_map_is_played_and_drawn_in_a_tenth_of_a_second():

@@ -15,6 +15,7 @@ from warp_torchrl.heuristics.reactive import Greedy, Local, NoOp, Random
 from warp_torchrl.heuristics.ring import Mixed, Ring
 from warp_torchrl.heuristics.rollout import Rollout
 from warp_torchrl.heuristics.searching import Lawnmower, Oldest, Searching
+from warp_torchrl.heuristics.targeting import Targeted
 
 HEURISTICS: dict[str, type[Heuristic]] = {
     "noop": NoOp,
@@ -28,6 +29,7 @@ HEURISTICS: dict[str, type[Heuristic]] = {
     "oldest": Oldest,
     "lawnmower": Lawnmower,
     "follower": Follower,
+    "targeted": Targeted,
     "clockwise": Clockwise,
     "own_land": OwnLand,
     "rollout": Rollout,
@@ -55,6 +57,7 @@ __all__ = [
     "Ring",
     "Rollout",
     "Searching",
+    "Targeted",
     "Worlds",
     "idle_action",
 ]

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import avg_pool2d
 
-from warp_torchrl.env.pictures.render import fire_colours, render
+from warp_torchrl.env.pictures.render import fire_colours
 from warp_torchrl.live.ground import SceneGround
 from warp_torchrl.world.arrays.geometry import unit_vectors
 from warp_torchrl.world.state.cells import is_burning, is_tree
@@ -47,35 +47,37 @@ class Instances:
     colour: np.ndarray
 
 
-def tiles(state: WorldState, ground: SceneGround) -> np.ndarray:
-    """Return the colours of the tiles of world 0, uint8 [H W, 3].
+def tiles(state: WorldState, ground: SceneGround, cells: Tensor) -> np.ndarray:
+    """Return the colours of the tiles of world 0, uint8 [H W, 3]: those of its cells, darker under trees.
 
-    They are the colours of ``env.render``, darker under trees. They show cover, tree age, fire by stage, ash,
-    firebreaks and wet cells.
+    Args:
+        state: The worlds.
+        ground: Of world 0.
+        cells: Colour of each cell, uint8 [H, W, 3].
     """
-    colours = render(state[:1], None, scale=1)[0].flatten(0, 1)
+    colours = cells.flatten(0, 1)
     if not len(ground.trees):
         return colours.numpy()
     under = is_tree(state.cells[0]).flatten()[:, None]
     return torch.where(under, (colours.float() * _SHADE).byte(), colours).numpy()
 
 
-def trees(state: WorldState, ground: SceneGround) -> Instances:
+def trees(state: WorldState, ground: SceneGround, cells: Tensor) -> Instances:
     """Return the trees of world 0: one for each cell of ``ground.trees``, with size 0 where the cell has no tree.
 
-    A tree's height shows its age. Its colour shows cover, age, fire and wetness, as the colour of the ground does.
+    A tree's height shows its age. Its colour is that of its cell. The arguments are those of ``tiles``.
     """
-    cells = state.cells[0].flatten()[ground.trees]
-    age = torch.where(is_burning(cells), state.age[0].flatten()[ground.trees], cells).float()
+    codes = state.cells[0].flatten()[ground.trees]
+    age = torch.where(is_burning(codes), state.age[0].flatten()[ground.trees], codes).float()
     jitter = _jitter(ground.size)[ground.trees]
     tall = torch.where(age > 0, 0.45 + 0.1 * age, 0.0) * (0.85 + 0.3 * torch.from_numpy(jitter[:, 2]))
     wide = tall.clamp(max=1.0) * 0.95
-    colour = render(state[:1], None, scale=1)[0].flatten(0, 1)[ground.trees].float()
+    colour = cells.flatten(0, 1)[ground.trees].float()
     light = 0.88 + 0.24 * torch.from_numpy(jitter[:, 3:])
     position = ground.position[ground.trees] + np.pad(0.3 * (jitter[:, :2] - 0.5), ((0, 0), (0, 1)))
     return Instances(
         position=position.astype(np.float32),
-        turn=_upright(len(cells)),
+        turn=_upright(len(codes)),
         scale=torch.stack((wide, wide, tall), dim=1).numpy(),
         colour=(colour * light).clamp(max=255.0).byte().numpy(),
     )

@@ -13,6 +13,7 @@ from torch import Tensor
 
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.pictures.render import legend_colours
+from warp_torchrl.env.pictures.veil import View, first_view, veil_colours
 from warp_torchrl.live.crew import Crew
 from warp_torchrl.live.scene import aim, furnish, local_server, map_offsets, quiet
 from warp_torchrl.live.stage import Shown, Stage
@@ -43,6 +44,8 @@ class Film:
 
     def __init__(self, sides: Sequence[Shown], lines: Sequence[str]) -> None:
         self._sides, self._lines = sides, lines
+        self.view: View = first_view(sides[0].env.world)
+        """What the next pictures show."""
         size = sides[0].env.world.size
         self._server = local_server()
         furnish(self._server)
@@ -63,7 +66,7 @@ class Film:
         if self._pictures:
             self._film.insert_sleep(STEP_SECONDS)
         for stage, title in zip(self._stages, titles or [progress(side) for side in self._sides]):
-            stage.show(title)
+            stage.show(title, self.view)
         self._pictures += 1
 
     def document(self) -> str:
@@ -72,7 +75,8 @@ class Film:
         page = self._film.as_html(dark_mode=True)
         with quiet():
             self._server.stop()
-        return _framed(page, self._lines, map_colours(self._sides[0]))
+        veil = {} if self.view == "truth" else veil_colours()
+        return _framed(page, self._lines, {**map_colours(self._sides[0]), **veil})
 
 
 def progress(side: Shown) -> str:

@@ -11,6 +11,7 @@ from weakref import WeakKeyDictionary
 import viser
 
 from warp_torchrl.demonstrations.recording import OpenRecording
+from warp_torchrl.env.pictures.veil import View, checked_view, first_view
 from warp_torchrl.live import incoming, words
 from warp_torchrl.live.address import Address
 from warp_torchrl.live.door import LOG, Door, arrived
@@ -53,6 +54,7 @@ class Page:
         self.lock = threading.RLock()
         self.inbox, self.once = Inbox(), Once()
         self.playing, self.pace = False, 8.0
+        self.view: View = first_view(self.match.world)
         self.keeper, self.learning = Keeper(recordings), PageTraining(recordings)
         self._ended: OpenRecording | None = None  # of the last episode that was seen to end
         self._training = ""
@@ -128,6 +130,15 @@ class Page:
             raise ValueError(f"steps a second must be in {PACES[0]}..{PACES[1]}, got {pace}")
         self.pace = float(pace)
 
+    def set_view(self, view: str) -> None:
+        """Choose what the scene and the map show, for everybody.
+
+        Raises:
+            ValueError: If it is none of ``VIEWS``.
+        """
+        self.view = checked_view(view)
+        self.show()
+
     # What panels ask for, under the lock
 
     def open(self, match: Match) -> None:
@@ -138,6 +149,7 @@ class Page:
         """
         self._keep()
         before, self.playing = self.match, False
+        self.view = first_view(match.world)
         try:
             self._present(match)
         except Exception:
@@ -173,7 +185,7 @@ class Page:
         """Draw the match, here and on every panel; while it plays, pictures and curves are drawn less often."""
         self.once.forget()
         for stage, side in zip(self._stages, self.match.sides):
-            stage.show(f"{words.title(side)}: {side.curves.saved[-1]:.0%} saved")
+            stage.show(f"{words.title(side)}: {side.curves.saved[-1]:.0%} saved", self.view)
         began = time.monotonic()
         every = max(_PAINTED_EVERY, self._painting_took / _PAINTED_SHARE)
         paints = not self.playing or began - self._painted > every

@@ -8,6 +8,8 @@ import viser
 from torch import Tensor
 
 from warp_torchrl.env import WildfireEnv
+from warp_torchrl.env.pictures.render import painted
+from warp_torchrl.env.pictures.veil import View, seen_as
 from warp_torchrl.live import drawing
 from warp_torchrl.live.crew import Crew
 from warp_torchrl.live.drawing import Instances
@@ -99,7 +101,7 @@ class Stage:
         )
         self.tiles = scene.add_batched_meshes_simple(
             self._node("tiles"), *TILE, ground.turn, ground.position, batched_scales=ground.side,
-            batched_colors=_light(drawing.tiles(side.state, ground)), side="double", lod="off", cast_shadow=False,
+            batched_colors=np.zeros((len(ground.position), 3), np.uint8), side="double", lod="off", cast_shadow=False,
             receive_shadow=False,
         )  # fmt: skip
         self._trees = Flock(server, self._node("trees"), tree())
@@ -117,16 +119,18 @@ class Stage:
         )  # fmt: skip
         self.show("")
 
-    def show(self, title: str) -> None:
-        """Draw the present state of the side, under a title."""
-        ground, state = self.ground, self._side.state
+    def show(self, title: str, view: View = "truth") -> None:
+        """Draw the present state of the side as a view shows it, under a title; vehicles are where they are."""
+        ground = self.ground
+        state, colours = seen_as(self._side.state[:1], self._side.env.world, view)
+        cells = painted(colours, state, None, 1)[0]
         with self._server.atomic():
-            change(self.tiles, batched_colors=_light(drawing.tiles(state, ground)))
+            change(self.tiles, batched_colors=_light(drawing.tiles(state, ground, cells)))
             if len(ground.trees):
-                self._trees.show(drawing.trees(state, ground))
+                self._trees.show(drawing.trees(state, ground, cells))
             self._flames.show(drawing.flames(state, ground))
             self._smoke.show(drawing.smoke_puffs(state, ground))
-            self._show_sparks()
+            self._show_sparks(state)
             self._show_vehicles()
             place, strength = drawing.glow(state, ground)
             change(self._glow, position=place, intensity=strength)
@@ -137,8 +141,8 @@ class Stage:
         """Take the side away."""
         self._server.scene.remove_by_name(self._root)
 
-    def _show_sparks(self) -> None:
-        place, colour = drawing.sparks(self._side.state, self.ground)
+    def _show_sparks(self, state: WorldState) -> None:
+        place, colour = drawing.sparks(state, self.ground)
         self._server.scene.add_point_cloud(  # anew: places and colours change together
             self._node("sparks"), place, colour, point_size=0.09, point_shape="circle", point_shading="flat"
         )

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from warp_torchrl.demonstrations.summary import Summary
 from warp_torchrl.env.pictures.render import legend_colours
+from warp_torchrl.env.pictures.veil import can_believe, veil_colours
 from warp_torchrl.live.crew import Question
 from warp_torchrl.live.drawing import VEHICLE_COLOURS
 from warp_torchrl.live.match import Match
@@ -156,7 +157,8 @@ def numbers_html(numbers: Mapping[str, float]) -> str:
 
 def legend(side: Side) -> str:
     """Return the meaning of the colours, and the colour of each vehicle, as HTML."""
-    spans = chips({**legend_colours(), **vehicle_colours(side.env.agent_names)})
+    veil = veil_colours() if can_believe(side.env.world) else {}
+    spans = chips({**legend_colours(), **veil, **vehicle_colours(side.env.agent_names)})
     return f"<div style='{_STYLE};padding:2px 12px'>{spans}</div>"
 
 

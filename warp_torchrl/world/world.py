@@ -20,7 +20,7 @@ from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.mechanics.groups import Agencies, OneAgency
 from warp_torchrl.world.mechanics.mechanic import Mechanic
-from warp_torchrl.world.state.cells import count_trees
+from warp_torchrl.world.state.cells import count_trees, is_burning
 from warp_torchrl.world.state.state import EMBER, FIRST_FIRE, Cover, Forecast, Transition, TreeCounts, WorldState
 from warp_torchrl.world.team.hearing import Hearing
 from warp_torchrl.world.team.knowledge import Belief, Full, Sensing
@@ -250,6 +250,14 @@ class World:
         """Return what agents would learn of each cell if they saw it now, see ``Mechanic.worth_seeing``; else 0."""
         known = self._last(lambda each: each.worth_seeing(state, self))
         return torch.zeros_like(state.alpha)[:, None] if known is None else known
+
+    def believed_fire(self, state: WorldState) -> tuple[Tensor, Tensor]:
+        """Return how likely agents think each cell to burn, see ``Mechanic.believed_fire``; else what they assume."""
+        believed = self._last(lambda each: each.believed_fire(state, self))
+        if believed is not None:
+            return believed
+        burns = is_burning(self.assumed(state).cells).unflatten(0, (len(state.key), -1)).to(torch.float32)
+        return burns, torch.zeros_like(burns)
 
     def futures(self, state: WorldState, count: int) -> WorldState:
         """Return worlds that may be the true ones, see ``Mechanic.futures``; where nobody knows better, these."""

@@ -53,7 +53,12 @@ def render(state: WorldState, flies: Tensor | None, scale: int = 12) -> Tensor:
     """
     if scale < 1:
         raise ValueError(f"scale must be at least 1 pixel, got {scale}")
-    image = _ground_colours(state).repeat_interleave(scale, dim=1).repeat_interleave(scale, dim=2)
+    return painted(ground_colours(state), state, flies, scale)
+
+
+def painted(colours: Tensor, state: WorldState, flies: Tensor | None, scale: int) -> Tensor:
+    """Return ``render`` of worlds whose cells have other colours, uint8 [B, H, W, 3]."""
+    image = colours.repeat_interleave(scale, dim=1).repeat_interleave(scale, dim=2)
     owner = state.plane("agencies", "owner")
     if owner is not None:
         image = _with_borders(image, owner.repeat_interleave(scale, dim=1).repeat_interleave(scale, dim=2))
@@ -134,7 +139,7 @@ class EpisodeRecorder:
             partial.unlink(missing_ok=True)
 
 
-def _ground_colours(state: WorldState) -> Tensor:
+def ground_colours(state: WorldState) -> Tensor:
     """Return the colour of each cell, uint8 [B, H, W, 3]; in fog what no agent saw in the last 16 steps."""
     cells = state.cells.to(torch.int64)
     row = state.landscape.cover.to(torch.int64) * _AGES + cells
@@ -209,7 +214,7 @@ def _fitted_map(state: WorldState, flies: Tensor) -> np.ndarray:
     shrink = max(height, width) / _MAP_SIDE
     if shrink <= 1.5:
         return render(state, flies, max(1, round(1 / shrink)))[0].cpu().numpy()
-    colours = _ground_colours(state).movedim(3, 1).float()
+    colours = ground_colours(state).movedim(3, 1).float()
     image = interpolate(colours, (math.ceil(height / shrink), math.ceil(width / shrink)), mode="area").round()
     return _stamp(image.byte().movedim(1, 3), (state.vehicles.position / shrink).long(), flies.long())[0].cpu().numpy()
 

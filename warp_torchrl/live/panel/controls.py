@@ -5,6 +5,7 @@ from typing import Any, Protocol
 
 import viser
 
+from warp_torchrl.env.pictures.veil import View
 from warp_torchrl.live.inbox import Act
 from warp_torchrl.live.keeping import Keeper
 from warp_torchrl.live.learning import PageTraining
@@ -22,6 +23,7 @@ class Controls(Protocol):
     given: Setting
     playing: bool
     pace: float
+    view: View
     once: Once
     keeper: Keeper
     learning: PageTraining
@@ -32,6 +34,10 @@ class Controls(Protocol):
 
     def set_pace(self, pace: float) -> None:
         """Set the steps a second."""
+        ...
+
+    def set_view(self, view: str) -> None:
+        """Choose what the scene and the map show."""
         ...
 
     def open(self, match: Match) -> None:

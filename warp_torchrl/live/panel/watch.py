@@ -5,10 +5,11 @@ from typing import Any
 import numpy as np
 from viser import uplot
 
-from warp_torchrl.env.pictures.render import render
+from warp_torchrl.env.pictures.render import painted
+from warp_torchrl.env.pictures.veil import VIEWS, can_believe, seen_as
 from warp_torchrl.live import words
 from warp_torchrl.live.panel.picture import add_picture, png, show_picture
-from warp_torchrl.live.panel.tab import Tab
+from warp_torchrl.live.panel.tab import Tab, chosen_option
 from warp_torchrl.live.stage import change
 
 _LINES = ("#f2a33a", "#6bb7ea", "#9a9a9a")
@@ -25,12 +26,16 @@ class WatchTab(Tab):
         """Make the curves, the map and the table."""
         self._saved = self._curve("Saved [%]", uplot.Scale(auto=False, range=(0.0, 104.0)))
         self._burning = self._curve("Burning [%]", uplot.Scale(auto=True))
+        self._view = self.gui.add_dropdown("Shown", VIEWS, initial_value=self.page.view)
+        self._view.disabled = not can_believe(self.match.world)
+        self._view.on_update(self.guarded(lambda _: self.page.set_view(chosen_option(self._view))))
         self._map = add_picture(self.gui, "Map")
         self._acts = self.gui.add_markdown("")
         self.gui.add_html(words.legend(self.side))
 
     def paint(self) -> None:
         """Show the match so far."""
+        change(self._view, value=self.page.view)
         saved, burning, picture, acts = self.once("watch", self._shown)
         self._saved.data, self._burning.data = saved, burning
         show_picture(self._map, picture)
@@ -57,9 +62,10 @@ class WatchTab(Tab):
         )  # fmt: skip
 
     def _picture(self) -> np.ndarray:
-        state, team = self.side.state, self.side.env.world.team
-        scale = max(1, _MAP_SIDE // max(self.match.world.size))
-        return render(state, team.table(self.side.env.device).flies, scale)[0].numpy()
+        world = self.side.env.world
+        state, colours = seen_as(self.side.state, world, self.page.view)
+        scale = max(1, _MAP_SIDE // max(world.size))
+        return painted(colours, state, world.team.table(self.side.env.device).flies, scale)[0].numpy()
 
 
 def _curves(shares: list[list[float]]) -> Data:

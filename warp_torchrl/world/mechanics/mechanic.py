@@ -173,6 +173,14 @@ class Mechanic:
         """
         return None
 
+    def believed_fire(self, state: WorldState, world: Rules) -> tuple[Tensor, Tensor] | None:
+        """Return the chance of each cell to burn by fires that are known, and by those that nobody saw.
+
+        Each is float32 [B, 1 or A, H, W]. None where the mechanic says nothing of it; the last one that answers is
+        heard.
+        """
+        return None
+
     def futures(self, state: WorldState, world: Rules, count: int) -> WorldState | None:
         """Return worlds that may be the true ones as far as the team knows, ``count`` to each, batch size [B * count].
 

@@ -13,7 +13,7 @@ def planes(*drawings):
     return torch.stack([codes(each, CELLS) for each in drawings])[None]
 
 
-def believing(drawing, *members, weights=None, hidden=(), possible=None, chances=None, fires=2, **options):
+def believing(drawing, *members, weights=None, hidden=(), possible=None, chances=None, **options):
     """A world as drawn, whose team believes in members that are drawn too.
 
     Args:
@@ -23,7 +23,6 @@ def believing(drawing, *members, weights=None, hidden=(), possible=None, chances
         hidden: Hidden fires, each a drawing.
         possible: How likely each is.
         chances: Of the cells to have ignited in the last tick, a number for each member.
-        fires: That were lit.
         options: See ``draw``.
     """
     state = draw(drawing, **options)
@@ -48,6 +47,9 @@ def believing(drawing, *members, weights=None, hidden=(), possible=None, chances
         soon=torch.zeros(1, 1, *cells.shape[2:]),
         overlap=torch.zeros_like(state.step),
         union=torch.zeros_like(state.step),
+        skill=torch.zeros_like(state.burning_area),
+        skills=torch.zeros_like(state.burning_area),
+        alight=torch.zeros_like(state.step),
     )
     return state.with_planes(NAME, beliefs)
 

@@ -22,7 +22,7 @@ OF_FIRE = (
     *("extras.rate.minutes", "extras.rate.origin"),
 )
 """What of a state tells of the fire."""
-METRIC = ("overlap", "union")
+METRIC = ("overlap", "union", "skill", "skills", "alight")
 
 
 class Rules(NamedTuple):
@@ -37,7 +37,7 @@ def acted(world, state, name):
 
 
 def believed(state):
-    """The names and values of what is believed; two sums for a metric compare it with the fire."""
+    """The names and values of what is believed; what metrics keep compares it with the fire."""
     leaves = state.leaves().items()
     return {name: leaf for name, leaf in leaves if name.startswith("extras.belief") and name[14:] not in METRIC}
 

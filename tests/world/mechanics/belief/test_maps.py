@@ -12,17 +12,15 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.observation import CHANNELS, Local, Surroundings
 from warp_torchrl.models import OBSERVATION, signature
 from warp_torchrl.world.mechanics.belief.belief import Ensemble
-from warp_torchrl.world.mechanics.belief.beliefs import NAME, beliefs_of, hidden_probability
+from warp_torchrl.world.mechanics.belief.beliefs import NAME, beliefs_of
 
 MAPS = ("burn_probability", "burn_soon", "disagreement", "hidden_fire")
 
 
 def test_maps_of_a_belief_that_was_drawn():
-    # Known fire: 0.25, 0 and 1 of the weight; hidden: a third of one fire that is left, as one of two is known
-    fires = {"hidden": ["TTaT", "TaTT", "aTTT"], "possible": [1.0, 1.0, 1.0], "fires": 2}
-    state = believing("TTTT", "aTTa", "TTTa", weights=[0.25, 0.75], **fires)
-    held, soon = beliefs_of(state), torch.tensor([[[[0.5, 0.2, 0.0, 1.0]]]])
-    state = state.with_planes(NAME, held.replace(soon=soon, unseen=hidden_probability(held)))
+    state = believing("TTTT", "aTTa", "TTTa", weights=[0.25, 0.75])
+    soon, unseen = torch.tensor([[[[0.5, 0.2, 0.0, 1.0]]]]), torch.tensor([[[[1 / 3, 1 / 3, 1 / 3, 0.0]]]])
+    state = state.with_planes(NAME, beliefs_of(state).replace(soon=soon, unseen=unseen))
     shown = {name: Ensemble.maps[name](state).flatten().tolist() for name in MAPS}
     assert shown == {
         "burn_probability": [63, 0, 0, 255],  # 255 / 4

@@ -50,8 +50,8 @@ def watched_forest(team, *mechanics, side=19):
     return WildfireEnv(world, n_worlds=1, seed=0)
 
 
-def told(env, at, *, fires, step=40, heard_at=None):
-    """The worlds at a step, agents at places, who all know of fires, (row, column): when they were seen.
+def told(env, at, *, fires, step=40, heard_at=None, name="follower"):
+    """What agents at places do at a step, who all know of fires, (row, column): when they were seen.
 
     Where packets come late, those arrive that were sent at the places ``heard_at``.
     """
@@ -69,7 +69,24 @@ def told(env, at, *, fires, step=40, heard_at=None):
         state = state.with_planes("radio", packets)
     state = knowing(state, knowledge).replace(vehicles=vehicles, step=torch.full_like(state.step, step))
     now = env.set_state(state)
-    return HEURISTICS["follower"](env)(now)["agents", "action"][0].tolist()
+    return HEURISTICS[name](env)(now)["agents", "action"][0].tolist()
+
+
+def test_a_targeted_watcher_goes_where_the_next_tick_is_uncertain_and_waits_there():
+    env = watched_forest(Team(n_agents=1, roles=("scout",)))
+    fires = {(9, 3): 40}
+    assert told(env, [[9, 9]], fires=fires, name="targeted")[0] in (Action.WEST, Action.NORTH_WEST, Action.SOUTH_WEST)
+    assert told(env, [[9, 3]], fires=fires, name="targeted") == [Action.STAY]
+
+
+def test_targeted_watchers_part():
+    env = watched_forest(Team(n_agents=2, roles=("scout",)))
+    moves = told(env, [[9, 9], [9, 9]], fires={(9, 2): 40, (9, 16): 40}, name="targeted")
+    west, east = (
+        {Action.WEST, Action.NORTH_WEST, Action.SOUTH_WEST},
+        {Action.EAST, Action.NORTH_EAST, Action.SOUTH_EAST},
+    )
+    assert {*moves} & west and {*moves} & east
 
 
 def test_a_follower_goes_to_the_front_that_it_saw_longest_ago():

@@ -22,6 +22,7 @@ from warp_torchrl.world.mechanics.belief.beliefs import (
     NAME,
     Beliefs,
     beliefs_of,
+    brier_skill,
     burn_soon,
     cells_of,
     disagreement,
@@ -166,6 +167,9 @@ class Ensemble(Belief, Mechanic):
             soon=none_burns.clone(),
             overlap=none.clone(),
             union=none.clone(),
+            skill=torch.zeros_like(state.burning_area),
+            skills=torch.zeros_like(state.burning_area),
+            alight=none.clone(),
         )
         state = state.with_planes(NAME, beliefs)
         always = torch.ones_like(state.done)
@@ -179,13 +183,17 @@ class Ensemble(Belief, Mechanic):
         after = self._looked(self._ticked(before, after, world), kept(before), running, world)
         after = foreseen(after, now, world, self.soon)
         beliefs = beliefs_of(after)
-        burns, thought = is_burning(after.cells)[:, None], known_probability(beliefs) > self.threshold
+        burns, p = is_burning(after.cells)[:, None], known_probability(beliefs)
+        thought, skill = p > self.threshold, brier_skill(p, burns[:, 0])
         overlap, union = (burns & thought).sum((2, 3)), (burns | thought).sum((2, 3))
         return after.with_planes(
             NAME,
             beliefs.replace(
                 overlap=beliefs.overlap + (overlap.sum(1) * running).to(torch.int32),
                 union=beliefs.union + (union.sum(1) * running).to(torch.int32),
+                skill=torch.where(running, skill, beliefs.skill),
+                skills=beliefs.skills + skill * running,
+                alight=beliefs.alight + (burns.flatten(1).any(dim=1) & running).to(torch.int32),
             ),
         )
 
@@ -218,6 +226,11 @@ class Ensemble(Belief, Mechanic):
         may = (state.alpha > 0.0)[:, None] & (self._records(state) < since[:, None, None, None])
         return hidden_probability(beliefs_of(state), fires_lit(world.lighting)) * may
 
+    def believed_fire(self, state: WorldState, world: Rules) -> tuple[Tensor, Tensor]:
+        """Return the members' share that burns, and the chance of a hidden fire, float32 [B, G, H, W] each."""
+        beliefs = beliefs_of(state)
+        return known_probability(beliefs), beliefs.unseen
+
     def futures(self, state: WorldState, world: Rules, count: int) -> WorldState:
         """Return members, as often as they weigh, of worlds with one belief."""
         beliefs = beliefs_of(state)
@@ -237,20 +250,25 @@ class Ensemble(Belief, Mechanic):
         return worlds
 
     def metric_rows(self, world: Rules) -> tuple[Metric, ...]:
-        """Return ``jaccard``, and ``rate_known`` and so on of what the team does not know."""
+        """Return ``jaccard`` and ``skill``, and ``rate_known`` and so on of what the team does not know."""
         known = (Metric(f"{name}_known", "more", "%", "", "Belief") for name, _ in self._unknown)
         doubt = (Metric(f"{name}_doubt", "less", "1", "", "Doubt") for name, _ in self._unknown)
-        return (Metric("jaccard", "more", "%", "", "Belief"), *known, *doubt)
+        return (*(Metric(name, "more", "%", "", "Belief") for name in ("jaccard", "skill")), *known, *doubt)
 
     def metrics(self, state: WorldState) -> dict[str, Tensor]:
         """Return how well beliefs fit the fire.
 
         ``jaccard``: cells that burn and are believed to, over those of which either holds, sums over the steps.
-        ``rate_known``, ``wind_speed_known``, ``bearing_known``: 1 where the true value lies within the particles' 5 to
-        95 % quantiles now. ``rate_doubt`` and so on: their standard deviation over that before anything was seen.
+        ``skill``: the Brier skill score of the members, see ``brier_skill``, mean over the steps in which something
+        burns; no less than 0. ``rate_known``, ``wind_speed_known``, ``bearing_known``: 1 where the true value lies
+        within the particles' 5 to 95 % quantiles now. ``rate_doubt`` and so on: their standard deviation over that
+        before anything was seen.
         """
         beliefs = beliefs_of(state)
-        found = {"jaccard": beliefs.overlap / beliefs.union.clamp(min=1)}
+        found = {
+            "jaccard": beliefs.overlap / beliefs.union.clamp(min=1),
+            "skill": (beliefs.skills / beliefs.alight.clamp(min=1)).clamp(0.0, 1.0),
+        }
         known = beliefs.learning
         if known is None:
             return found

@@ -19,6 +19,7 @@ NAME = "belief"
 """Of the planes in the state."""
 BLUR = 4
 """Over which the chance of hidden fires is spread, by Chebyshev distance [cells]."""
+_ERRORS = 1 << 16
 
 
 @dataclass(eq=False, repr=False)
@@ -38,6 +39,9 @@ class Beliefs(Batch):
     soon: Tensor  # float32 [B,G,H,W], chance of each cell to burn soon, as it was after the last tick, see ``soon``
     overlap: Tensor  # int32 [B], sum over steps of cells that burn and are believed to
     union: Tensor  # int32 [B], sum over steps of cells that burn or are believed to
+    skill: Tensor  # float32 [B], Brier skill score of the members now, see ``brier_skill``
+    skills: Tensor  # float32 [B], sum of it over the steps in which something burns
+    alight: Tensor  # int32 [B], steps in which something burns
 
 
 def beliefs_of(state: WorldState) -> Beliefs:
@@ -77,7 +81,24 @@ def disagreement(beliefs: Beliefs) -> Tensor:
     return 4.0 * p * (1.0 - p)
 
 
-def hidden_probability(beliefs: Beliefs) -> Tensor:
+def brier_skill(p: Tensor, burns: Tensor) -> Tensor:
+    """Return how much less a belief errs than one in which nothing burns, float32 [B] (Brier 1950).
+
+        S = 1 - sum (p - y)^2 / sum y^2,   sums over the cells, and the mean over a world's beliefs
+
+    It is 1 where the belief is right everywhere, and 0 where nothing burns. Sums are of whole numbers, errors of
+    1 / 65,536, so that they are the same in any batch.
+
+    Args:
+        p: Believed chance of each cell to burn, float32 [B, G, H, W].
+        burns: y, cells that burn, bool [B, H, W].
+    """
+    error = ((p - burns[:, None].to(torch.float32)).square() * _ERRORS).round().to(torch.int32).sum((1, 2, 3))
+    count = burns.sum((1, 2))
+    return torch.where(count > 0, 1.0 - error / (_ERRORS * p.shape[1] * count.clamp(min=1)), 0.0)
+
+
+def hidden_probability(beliefs: Beliefs, fires: int) -> Tensor:
     """Return the chance of each cell to burn by a fire that nobody saw, float32 [B, G, H, W].
 
     A fire that is not known is one of the ``possible`` ones, or that which was found.
@@ -173,4 +194,7 @@ def each_alone(beliefs: Beliefs) -> Beliefs:
         soon=parted(beliefs.soon),
         overlap=repeated(beliefs.overlap),
         union=repeated(beliefs.union),
+        skill=repeated(beliefs.skill),
+        skills=repeated(beliefs.skills),
+        alight=repeated(beliefs.alight),
     )

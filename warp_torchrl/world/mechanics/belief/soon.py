@@ -37,8 +37,7 @@ def burns_within(state: WorldState, world: Rules, ticks: int) -> Tensor:
     The wind stays.
     """
     beliefs, fire = beliefs_of(state), world.fire
-    values = beliefs.parameters.held.get("values")
-    values = None if values is None else values.flatten(0, 2)
+    values = None if beliefs.learning is None else beliefs.learning.members.flatten(0, 2)
     worlds = in_parameters(worlds_of(state, beliefs.members, fire), fire, values)
     air = state.air[rows_of(state, beliefs.members.held["key"].shape[1])] if world.air.changes else state.air
     burns, always = is_burning(worlds.cells), torch.ones_like(worlds.done)
