@@ -33,6 +33,7 @@ def test_members_are_taken_by_their_weight_times_their_number():
     assert resampled(weights, torch.tensor([0.5, 0.0])).tolist() == [[1, 1, 3, 3], [0, 1, 1, 3]]
     assert resampled(torch.ones(2, 1), torch.tensor([0.0, 0.99])).tolist() == [[0], [0]]
     assert resampled(torch.full((1, 5), 0.2), torch.tensor([0.3])).tolist() == [[0, 1, 2, 3, 4]]
+    assert resampled(weights[:1], torch.tensor([0.5]), 2).tolist() == [[1, 3]], "places 0.25 and 0.75"
 
 
 def test_a_member_without_weight_is_never_taken():

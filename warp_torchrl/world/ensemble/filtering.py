@@ -33,21 +33,22 @@ def effective(weights: Tensor) -> Tensor:
     return 1.0 / weights.square().sum(dim=1)
 
 
-def resampled(weights: Tensor, draw: Tensor) -> Tensor:
-    """Return the member that each place takes, int64 [B, K], by systematic resampling (Kitagawa 1996).
+def resampled(weights: Tensor, draw: Tensor, places: int | None = None) -> Tensor:
+    """Return the member that each place takes, int64 [B, n], by systematic resampling (Kitagawa 1996).
 
-    Place k takes the first member whose cumulative weight is over (k + u) / K: a member of weight w is taken K w times,
+    Place k takes the first member whose cumulative weight is over (k + u) / n: a member of weight w is taken n w times,
     rounded up or down. Members without weight are never taken.
 
     Args:
         weights: That sum to 1, float [B, K].
         draw: u, one uniform draw in [0, 1) for each filter, float [B].
+        places: n; None is K.
     """
-    members = weights.shape[1]
+    count = weights.shape[1] if places is None else places
     total = weights.to(torch.float64).cumsum(dim=1)
     total = total / total[:, -1:]
-    places = torch.arange(members, dtype=torch.float64, device=weights.device) + draw.to(torch.float64)[:, None]
-    return torch.searchsorted(total, (places / members).contiguous(), right=True)
+    at = torch.arange(count, dtype=torch.float64, device=weights.device) + draw.to(torch.float64)[:, None]
+    return torch.searchsorted(total, (at / count).contiguous(), right=True)
 
 
 def exponent(log_weights: Tensor, log_likelihood: Tensor, least: Tensor | float, most: Tensor | float = 1.0) -> Tensor:
