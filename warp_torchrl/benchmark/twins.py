@@ -153,7 +153,7 @@ def _row(name: str, members: int, count: int) -> dict[str, Any]:
 
 def _result(fire: HiddenFire, deviations: Deviations, members: int) -> dict[str, float]:
     seen = perimeters(fire.arrival(TIMES[-1]), *TIMES)
-    correction = Correction(members=members, deviations=deviations, seed=1000 * fire.seed)
+    correction = Correction(members=members, deviations=deviations, longest=0.0, seed=1000 * fire.seed)
     found: Corrected = correction(fire.scene, seen)
     third, last = found.steps[2], found.steps[3].scores
     true = {"rate": math.exp(float(fire.values[0])), "pace": fire.pace(third.burned, third.minutes)}

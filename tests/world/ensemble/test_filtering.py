@@ -7,7 +7,6 @@ import torch
 
 from warp_torchrl.world.ensemble.filtering import (
     effective,
-    exponent,
     jittered,
     moments,
     normalised,
@@ -53,12 +52,6 @@ def test_a_batch_is_what_each_filter_is_alone():
         assert torch.equal(alone[0], weights[one])
         assert torch.equal(effective(alone)[0], effective(weights)[one])
         assert torch.equal(resampled(alone, draw[one : one + 1])[0], resampled(weights, draw)[one])
-
-
-def test_a_likelihood_is_tempered_until_enough_members_are_left():
-    # Two members, l = (0, -4): weights 1 : e^-4b; 1 / sum w^2 is 1.6 at 1 : 3, so b = ln 3 / 4
-    none, far = torch.zeros(2, 2), torch.tensor([[0.0, -4.0], [0.0, -0.1]])
-    assert exponent(none, far, 1.6).tolist() == pytest.approx([math.log(3.0) / 4.0, 1.0], abs=1e-4)
 
 
 def test_moved_parameters_keep_mean_and_covariance():

@@ -31,8 +31,6 @@ from warp_torchrl.world.state.window import Window
 
 STEPS = 12
 """Times at which a forecast of arrival is compared between two observations."""
-LONGEST = 150.0
-"""Lead for which a forecast is scored beyond the next observation [minutes]."""
 SHARES = (0.05, 0.25, 0.5, 0.75, 0.95)
 """Quantiles that are kept of what was learned."""
 FORECASTS = ("persistence", "free", "restart", "members", "corrected")
@@ -48,6 +46,7 @@ class Correction:
         deviations: How far they differ at first.
         sensor: The satellite that saw hot spots.
         shrinkage: Of the kernel that moves parameters, see ``filtering.jittered``.
+        longest: Lead up to which forecasts are scored beyond the next observation [minutes].
         seed: Member i has seed ``seed + i``.
     """
 
@@ -55,6 +54,7 @@ class Correction:
     deviations: Deviations = field(default_factory=Deviations)
     sensor: HotSpotSensor = field(default_factory=HotSpotSensor)
     shrinkage: float = 0.97
+    longest: float = 150.0
     seed: int = 0
 
     def __call__(
@@ -173,10 +173,10 @@ class _Run:
     def _forecasts(self, front: Front, sight: Sight) -> tuple[dict[str, Tensor], Tensor]:
         """Return F of each forecast until the next observation, and the growth of the members by sector.
 
-        Forecasts of the observations after that, up to ``LONGEST``, are kept until those come.
+        Forecasts of the observations after that, up to ``longest``, are kept until those come.
         """
         begin, number = self._since, len(self.steps)
-        later = [each for each in self._times[number + 1 :] if each - begin <= LONGEST]
+        later = [each for each in self._times[number + 1 :] if each - begin <= self._correction.longest]
         end = max((begin + front.minutes, *later))
         times = [each - begin for each in (*_steps(begin, begin + front.minutes), *later)]
         counted = ByTimes(times)

@@ -51,33 +51,6 @@ def resampled(weights: Tensor, draw: Tensor, places: int | None = None) -> Tenso
     return torch.searchsorted(total, (at / count).contiguous(), right=True)
 
 
-def exponent(log_weights: Tensor, log_likelihood: Tensor, least: Tensor | float, most: Tensor | float = 1.0) -> Tensor:
-    """Return the highest power of the likelihoods that leaves an effective number of members, float [B].
-
-    Likelihoods are tempered where few members would hold all the weight (Neal 2001; Del Moral, Doucet and Jasra 2006).
-    Found by bisection, to 2^-20 of ``most``.
-
-    Args:
-        log_weights: Of the members before, float [B, K].
-        log_likelihood: float [B, K].
-        least: Effective number, float [B] or one number; the power is 0 where it is less already.
-        most: Highest power, float [B] or one number.
-    """
-    low = torch.zeros_like(log_weights[:, 0])
-    high = low + most
-    top = high
-
-    def leaves(power: Tensor) -> Tensor:
-        return effective(normalised(log_weights + power[:, None] * log_likelihood)) >= least
-
-    whole = leaves(top)
-    for _ in range(20):
-        middle = (low + high) / 2.0
-        enough = leaves(middle)
-        low, high = torch.where(enough, middle, low), torch.where(enough, high, middle)
-    return torch.where(whole, top, low)
-
-
 def moments(values: Tensor, weights: Tensor) -> tuple[Tensor, Tensor]:
     """Return the weighted mean, float [B, P], and covariance, float [B, P, P], of parameters.
 

@@ -19,6 +19,18 @@ def log_deviation(variation: float) -> float:
     return math.sqrt(math.log1p(variation**2))
 
 
+def turned(wind: Tensor, angle: Tensor) -> Tensor:
+    """Return winds (u east, v north) that are turned to the left.
+
+    Args:
+        wind: float32 [n or 1, 2, ...].
+        angle: [rad], float32 [n].
+    """
+    east, north = wind.unbind(1)
+    angle = angle.view(-1, *[1] * (east.ndim - 1))
+    return torch.stack((east * angle.cos() - north * angle.sin(), east * angle.sin() + north * angle.cos()), dim=1)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Deviations:
     """How far members differ before anything is seen.

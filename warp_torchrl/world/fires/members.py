@@ -8,7 +8,7 @@ from torch import Tensor
 
 from warp_torchrl.world.arrays.random import Stream, normal, uniform
 from warp_torchrl.world.behaviour.moistures import MOISTURES, moisture_row
-from warp_torchrl.world.ensemble.parameters import PARAMETERS, Deviations, log_deviation
+from warp_torchrl.world.ensemble.parameters import PARAMETERS, Deviations, log_deviation, turned
 from warp_torchrl.world.fires.alone import Fires
 from warp_torchrl.world.fires.sectors import SECTORS, STOPPED, sectors_about
 from warp_torchrl.world.fires.spell import Spell, can_ignite, spread_in
@@ -174,10 +174,7 @@ class Members:
 
     def winds(self, wind: Tensor) -> Tensor:
         """Return each member's wind, float32 [K, 2] [m/s], from (u east, v north), float32 [2]."""
-        angle = torch.deg2rad(self.bearing)
-        east, north = wind
-        turned = torch.stack((east * angle.cos() + north * angle.sin(), north * angle.cos() - east * angle.sin()), 1)
-        found = turned * self.wind_speed[:, None]
+        found = turned(wind[None], -torch.deg2rad(self.bearing)) * self.wind_speed[:, None]
         speed = found.square().sum(1, keepdim=True).clamp(min=1e-12).sqrt()
         return found * (_STRONGEST / speed).clamp(max=1.0)
 
