@@ -81,7 +81,7 @@ class HiddenFire:
     place: Tensor | None = None
 
     def arrival(self, minutes: float) -> Tensor:
-        """Return when it comes to each cell, float32 [H, W] [minutes]."""
+        """Return when it reaches each cell, float32 [H, W] [minutes]."""
         of, key = self.scene, world_key(torch.tensor([10_000 + self.seed]))
         fires = Members(self.values[None]).fires(of.fire, of.ground, of.spells(0.0, minutes), of.cell_size)
         if self.factor is not None:

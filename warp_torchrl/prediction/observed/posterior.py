@@ -12,7 +12,7 @@ that was held with probability g at the observation before is so now with
 
     h = STAYS g + (1 - g) p
 
-p the share of fronts that come to be held: on most fires 0, on others any. Its posterior is that of a table of shares.
+p the share of fronts that become held: on most fires 0, on others any. Its posterior is that of a table of shares.
 What was learned long ago counts for less: weights are taken to the power e^(-t / tau).
 """
 

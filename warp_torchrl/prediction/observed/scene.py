@@ -34,7 +34,7 @@ class Scene:
     Attributes:
         ground: The map, batch size [1].
         cell_size: Side of a cell [m].
-        fire: The law; members have rates of their own in place of its ``fire_deviation``.
+        fire: The law; its ``fire_deviation`` is not read, for members have rates of their own.
         air: The weather.
         start: When the fires start, since the weather's first row began [minutes].
         lit: Where they start, bool [H, W].

@@ -2,7 +2,7 @@
 
     y = c_0 + c^T z + z^T C z + e,    z the parameters less their mean, in standard deviations
 
-Each result has a regression of its own (Box and Wilson 1951), with a ridge (Hoerl and Kennard 1970) that is chosen by
+Each result has a separate regression (Box and Wilson 1951), with a ridge (Hoerl and Kennard 1970) that is chosen by
 leaving one member out. The mean square of those errors is the variance of e: what parameters do not explain. The
 variance of a prediction grows with x^T A^-1 x, x the terms and A = X^T X + ridge: far from the members little is known.
 """
