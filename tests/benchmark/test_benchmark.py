@@ -40,6 +40,15 @@ def test_a_prediction_is_measured_as_a_process_of_its_own(capsys):
     assert float(row["CPU s"]) > 0 and 0.1 < float(row["memory GB"]) < 4.0
 
 
+def test_twin_experiments_are_a_row_for_each_size_of_ensembles(capsys):
+    out = output(capsys, "twins", "--twins", "1", "--members", "4", "6", "--hidden", "uneven")
+    rows = [line for line in out.splitlines() if line.startswith("uneven ground")]
+    assert len(rows) == 2 and "head within 20 %" in out and rows[0].count(" of 1") == 4
+    with pytest.raises(SystemExit):
+        main(["twins", "--hidden", "nothing"])
+    assert "hidden must begin one of rate, wind, moisture; " in capsys.readouterr().err
+
+
 def test_the_tick_is_compared_with_numpy(capsys):
     out = output(capsys, "tick", "--no-compile", *TINY)
     assert "ns/cell" in out and "\neager " in out and "\nnumpy " in out

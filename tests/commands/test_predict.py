@@ -168,11 +168,23 @@ def test_a_prediction_is_corrected_by_what_was_seen(folder, capsys):
     told, text = json.loads((out / "report.json").read_text())["observed"], capsys.readouterr().out
     assert [row["minutes"] for row in told["observations"]] == [30.0, 60.0] and told["members"] == 6
     assert told["observations"][1]["burned_ha"] == pytest.approx(shapes["features"][1]["properties"]["area_ha"])
-    assert "| factor on all rates |" in text and "| 1.00 | corrected |" in text and (out / "observed.png").exists()
+    assert [(row["count"], row["to_minutes"]) for row in told["leads"]] == [(1, 30.0), (1, 60.0)]
+    for line in ("| factor on all rates |", "| 30 to 60, 1 | Brier | 1.000 |", "| 1.00 | corrected |"):
+        assert line in text
+    assert (out / "observed.png").exists()
     lines = (out / "observed.csv").read_text().splitlines()
     assert len(lines) == 1 + 2 * 5 and lines[0].startswith("minutes,lead_minutes,kind,burned_ha,forecast,jaccard")
     chance, hours = read(out / "burn_probability.tif"), read(out / "arrival_hours.tif")
     assert (chance == 1.0).sum() * 0.25 >= told["observations"][1]["burned_ha"] and np.nanmax(hours) <= 1.0
+
+
+def test_fires_differ_by_members_where_that_is_said(folder, capsys):
+    assert main(arguments(folder)) == 0
+    assert main(arguments(folder, uncertain="true", out=folder / "wide")) == 0
+    plain, wide = (read(folder / out / "burn_probability.tif") for out in ("out", "wide"))
+    assert ((wide > 0.0) & (wide < 1.0)).sum() > 2 * ((plain > 0.0) & (plain < 1.0)).sum()
+    assert main(arguments(folder, **{"members.rate": 0.3}, out=folder / "none")) == 2
+    assert "members is read with uncertain=true or observed=FILE" in capsys.readouterr().err
 
 
 def test_what_cannot_be_read_as_seen_is_one_line_and_nothing_is_written(folder, capsys):

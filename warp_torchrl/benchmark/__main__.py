@@ -1,7 +1,7 @@
 """Speed, calibration of scenarios and checks of fires: ``warp benchmark WHAT``.
 
-WHAT is tick, env, train, scaling, tasks, rewards, generalist, fires, ellipses, predict or beliefs; several run one
-after the other. gpu runs alone: it measures everything on a card in under five minutes, and writes it to a file.
+WHAT is tick, env, train, scaling, tasks, rewards, generalist, fires, ellipses, predict, twins or beliefs; several run
+one after the other. gpu runs alone: it measures everything on a card in under five minutes, and writes it to a file.
 """
 
 import argparse
@@ -40,6 +40,7 @@ from warp_torchrl.benchmark.tasks import (
 )
 from warp_torchrl.benchmark.ticks import tick_cost, tick_table
 from warp_torchrl.benchmark.trainings import training_speed
+from warp_torchrl.benchmark.twins import HIDDEN, twin_experiments, twin_table
 from warp_torchrl.commands.program import one_line_end
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.runs.checkpoint import CheckpointError
@@ -152,6 +153,13 @@ def _beliefs(options: Namespace) -> dict[str, Rows]:
     return {"beliefs": rows}
 
 
+def _twins(options: Namespace) -> dict[str, Rows]:
+    names = [name for name in HIDDEN if not options.hidden or any(name.startswith(each) for each in options.hidden)]
+    if not names:
+        raise ConfigError(f"hidden must begin one of {'; '.join(HIDDEN)}, got {' '.join(options.hidden)}")
+    return {"twins": twin_experiments(names, options.members, options.twins)}
+
+
 _MEASURES = {
     "tick": _tick,
     "env": _env,
@@ -164,6 +172,7 @@ _MEASURES = {
     "ellipses": _ellipses,
     "predict": _predict,
     "beliefs": _beliefs,
+    "twins": _twins,
 }
 _TABLES = {
     "tick": tick_table,
@@ -179,6 +188,7 @@ _TABLES = {
     "ellipses": fire_table,
     "predict": prediction_table,
     "beliefs": belief_table,
+    "twins": twin_table,
 }
 
 
@@ -213,6 +223,10 @@ def _parser() -> argparse.ArgumentParser:
     told = "for predict: cells of a side of each map"
     parser.add_argument("--sides", type=whole(40, 20_000), nargs="+", default=[500, 1000, 2000], help=told)
     parser.add_argument("--hours", type=whole(1, 1000), default=12, help="for predict: how long the fire is followed")
+    parser.add_argument("--twins", type=whole(1, 10_000), default=20, help="for twins: hidden fires of each kind")
+    told = "for twins: how many forecast each"
+    parser.add_argument("--members", type=whole(2, 10_000), nargs="+", default=[100], help=told)
+    parser.add_argument("--hidden", nargs="+", metavar="WORD", help=f"for twins: first words of {'; '.join(HIDDEN)}")
     parser.add_argument("--device", help="cpu by default; for gpu cuda, and cpu shows in small that it runs")
     parser.add_argument("--file", type=file_to_write, default=Path("gpu.json"), metavar="FILE.json", help="for gpu")
     parser.add_argument("--json", action="store_true", help="print JSON instead of tables")

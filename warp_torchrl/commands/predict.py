@@ -5,18 +5,19 @@ import logging
 import os
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import torch
 from tqdm import tqdm
 
 from warp_torchrl.commands.program import run_program
 from warp_torchrl.prediction.animation import write_animation
 from warp_torchrl.prediction.case import Case, read_case, whole_map
 from warp_torchrl.prediction.files import MAPS_FIGURE, write_figure, write_layers, write_perimeters
-from warp_torchrl.prediction.observed.correction import Corrected, Correction, Scene
+from warp_torchrl.prediction.observed.correction import Corrected, Correction
 from warp_torchrl.prediction.observed.observation import Observation
 from warp_torchrl.prediction.observed.reading import read_observations
 from warp_torchrl.prediction.observed.report import (
@@ -27,6 +28,7 @@ from warp_torchrl.prediction.observed.report import (
     write_observed_figure,
     write_scores,
 )
+from warp_torchrl.prediction.observed.scene import Scene
 from warp_torchrl.prediction.predict import Prediction, lasting, predict
 from warp_torchrl.prediction.report import page, report_numbers, warnings
 from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
@@ -37,6 +39,9 @@ from warp_torchrl.runs.output import output_folder
 from warp_torchrl.system import disk
 from warp_torchrl.system.provenance import Provenance, gathered
 from warp_torchrl.world.air.weather import Weather
+from warp_torchrl.world.arrays.random import world_key
+from warp_torchrl.world.ensemble.parameters import Deviations
+from warp_torchrl.world.fires.members import Members
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.terrain.raster import Raster
 from warp_torchrl.world.weather.table import minutes_until
@@ -158,21 +163,36 @@ def _correct(case: Case, options: PredictionOptions, seen: Sequence[Observation]
         lit=case.ignition,
     )
     correction = Correction(
-        members=options.fires, deviations=options.members, sensor=options.hot_spots, seed=options.seed
+        members=options.fires, deviations=_deviations(case, options), sensor=options.hot_spots, seed=options.seed
     )
     with tqdm(total=len(seen), unit="observation", disable=None, dynamic_ncols=True) as bar:
         return correction(scene, seen, bar.update)
 
 
+def _members(case: Case, options: PredictionOptions) -> Members | None:
+    """Return by what fires differ from the ignition on, in rate, wind and moisture; None where they do not."""
+    if not options.uncertain:
+        return None
+    keys = world_key(options.seed + torch.arange(options.fires))
+    return Members.drawn(keys, _deviations(case, options), case.ignition)
+
+
+def _deviations(case: Case, options: PredictionOptions) -> Deviations:
+    """Return how far fires differ, with the law's ``fire_deviation`` as that of the rate where it has one."""
+    rate = case.fire.fire_deviation
+    return replace(options.members, rate=rate) if rate else options.members
+
+
 def _burn(case: Case, options: PredictionOptions, corrected: Corrected | None) -> Prediction:
     """Burn the fires behind a progress bar: from the ignition, or from what was last seen."""
     begun = 0.0 if corrected is None else corrected.minutes
+    members = _members(case, options) if corrected is None else corrected.members
     with tqdm(total=options.fires, unit="fire", disable=None, dynamic_ncols=True) as bar:
         return predict(
             case.ground,
             case.weather,
             case.ignition if corrected is None else corrected.burned,
-            fire=case.fire if corrected is None else case.fire.alike(),
+            fire=case.fire if members is None else case.fire.alike(),
             cell_size=case.cell_size,
             hours=options.hours if corrected is None else (_minutes(case, options) - begun) / 60.0,
             area=options.area,
@@ -180,7 +200,7 @@ def _burn(case: Case, options: PredictionOptions, corrected: Corrected | None) -
             seed=options.seed,
             start=case.start + begun,
             convergence=case.convergence,
-            members=None if corrected is None else corrected.equal_members(options.seed),
+            members=members,
             is_seen=corrected is not None,
             progress=bar.update,
         )

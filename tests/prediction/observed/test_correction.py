@@ -1,18 +1,23 @@
 """Twin experiments: what three observations of a hidden fire teach."""
 
 import math
+from dataclasses import replace
 
 import pytest
 import torch
 
-from tests.prediction.observed.twins import perimeters, scene, truth
+from warp_torchrl.benchmark.twins import HiddenFire, perimeters, scene, twin_experiments
 from warp_torchrl.prediction.observed.correction import FORECASTS, Correction
 from warp_torchrl.prediction.observed.observation import Observation
-from warp_torchrl.world.fires.members import Deviations
+from warp_torchrl.world.ensemble.parameters import Deviations
 from warp_torchrl.world.fires.sightings import HotSpotSensor
 
 TIMES = (25.0, 45.0, 65.0, 85.0)
 UNKNOWN = Deviations(wind_speed=0.0, moisture=0.0)
+
+
+def truth(of, rate, turn, seed, minutes):
+    return HiddenFire(of, torch.tensor([math.log(rate), 0.0, turn, 0.0]), seed).arrival(minutes)
 
 
 def corrected(rate, turn, number, *, times=TIMES, deviations=UNKNOWN, members=64, side=51):
@@ -40,12 +45,6 @@ def test_after_three_observations_the_rate_is_known_and_the_forecast_is_better(l
 def test_before_anything_is_seen_all_forecasts_of_members_are_one(learned):
     first = learned.steps[0].scores
     assert first["free"] == first["members"] == first["corrected"]
-
-
-def test_members_of_equal_weight_stand_for_the_weighted_ones(learned):
-    found = learned.equal_members(0)
-    assert len(found) == 64
-    assert float(found.rate.median()) == pytest.approx(learned.steps[-1].posterior["rate"][2], rel=0.1)
 
 
 def test_the_same_seed_learns_the_same():
@@ -82,27 +81,38 @@ def test_lone_hot_spots_apart_from_the_fire_are_false_alarms():
     assert int(burned[:, :20].sum()) == 0
 
 
-@pytest.mark.slow
-def test_rates_of_half_to_twice_and_a_turned_wind_are_found():
-    # 11 of 12 were within 20 % when this was written, 9 with 100 members: of a chance of 0.9, under 10 come in 1 of 9
-    within, better = 0, 0
-    for number, share in enumerate(torch.linspace(-1.0, 1.0, 12).tolist()):
-        rate = 2.0**share
-        found = corrected(rate, 30.0 * (-1) ** number, number, times=(40.0, 70.0, 100.0, 130.0), members=300, side=71)
-        within += abs(found.steps[2].posterior["rate"][2] / rate - 1.0) <= 0.2
-        scores = found.steps[3].scores
-        better += scores["corrected"].crps <= 0.6 * scores["free"].crps
-    assert within >= 10 and better >= 11
+def test_a_head_that_is_held_is_not_taken_for_a_slow_fire():
+    # A line in the east holds the head after 25 minutes; elsewhere the fire goes on at the rate that it has.
+    fire = scene(51, 0)
+    arrival = truth(fire, 1.5, 0.0, 0, 85.0)
+    seen = perimeters(arrival.masked_fill((arrival > 25.0) & (torch.arange(51) > 21), 999.0), *TIMES)
+    found, blind = (
+        Correction(members=48, deviations=replace(UNKNOWN, held=held))(fire, seen).steps for held in (0.05, 0.0)
+    )
+    assert found[-1].held > 0.1 and blind[-1].held == 0.0
+    assert found[-1].scores["corrected"].brier < blind[-1].scores["corrected"].brier
+    assert found[-1].posterior["rate"][2] > blind[-1].posterior["rate"][2]
+
+
+def test_a_fire_that_stays_is_forecast_to_stay():
+    fire = scene(51, 0)
+    arrival = truth(fire, 1.0, 0.0, 0, 25.0)
+    found = Correction(members=32, deviations=UNKNOWN)(fire, perimeters(arrival, *TIMES))
+    grown = [step.scores["corrected"].area for step in found.steps[1:]]
+    assert grown[0] > 1.2 and grown[-1] < 1.05 and found.steps[-1].held > 0.8
+
+
+def test_forecasts_are_scored_at_later_observations_too(learned):
+    # Of observations at 25, 45, 65 and 85 minutes: from the start 45, 65, 85; from 25 40, 60; from 45 40
+    assert sorted(lead.minutes for lead in learned.leads) == pytest.approx([40.0, 40.0, 45.0, 60.0, 65.0, 85.0])
+    late = max(learned.leads, key=lambda lead: lead.minutes).scores
+    assert tuple(late) == FORECASTS and late["persistence"].brier == 1.0
+    assert late["free"].brier == pytest.approx(learned.steps[-1].scores["free"].brier, rel=1.0)
 
 
 @pytest.mark.slow
-def test_the_rate_is_inside_its_interval_nine_times_of_ten():
-    # 40 fires whose rate and wind are drawn from what members are: 90 % are 36; fewer than 30 has a chance of 1 %
-    inside, draws = 0, torch.Generator().manual_seed(5)
-    for number in range(40):
-        scale = UNKNOWN.scales * torch.randn(4, generator=draws)
-        rate = math.exp(float(scale[0]))
-        found = corrected(rate, float(scale[2]), number, times=(40.0, 70.0, 100.0), members=100, side=71)
-        low, *_, high = found.steps[-1].posterior["rate"]
-        inside += low <= rate <= high
-    assert inside >= 30
+def test_the_head_is_known_and_inside_its_interval_nine_times_of_ten():
+    # 29 and 27 of the first 30 when this was written; of a chance of 0.9, fewer than 31 of 40 come in 1 of 100
+    (row,) = twin_experiments(["rate, wind, moisture"], [100], 40)
+    near, inside, of_rate = (int(row[name].split()[0]) for name in ("pace_near", "pace_in", "rate_in"))
+    assert near >= 34 and inside >= 31 and of_rate >= 31 and row["crps"] <= 0.6

@@ -33,6 +33,7 @@ def test_members_are_taken_by_their_weight_times_their_number():
     assert resampled(weights, torch.tensor([0.5, 0.0])).tolist() == [[1, 1, 3, 3], [0, 1, 1, 3]]
     assert resampled(torch.ones(2, 1), torch.tensor([0.0, 0.99])).tolist() == [[0], [0]]
     assert resampled(torch.full((1, 5), 0.2), torch.tensor([0.3])).tolist() == [[0, 1, 2, 3, 4]]
+    assert resampled(weights[:1], torch.tensor([0.5]), 2).tolist() == [[1, 3]], "places 0.25 and 0.75"
 
 
 def test_a_member_without_weight_is_never_taken():
@@ -52,12 +53,6 @@ def test_a_batch_is_what_each_filter_is_alone():
         assert torch.equal(alone[0], weights[one])
         assert torch.equal(effective(alone)[0], effective(weights)[one])
         assert torch.equal(resampled(alone, draw[one : one + 1])[0], resampled(weights, draw)[one])
-
-
-def test_a_likelihood_is_tempered_until_enough_members_are_left():
-    # Two members, l = (0, -4): weights 1 : e^-4b; 1 / sum w^2 is 1.6 at 1 : 3, so b = ln 3 / 4
-    none, far = torch.zeros(2, 2), torch.tensor([[0.0, -4.0], [0.0, -0.1]])
-    assert exponent(none, far, 1.6).tolist() == pytest.approx([math.log(3.0) / 4.0, 1.0], abs=1e-4)
 
 
 def test_moved_parameters_keep_mean_and_covariance():
@@ -80,3 +75,9 @@ def test_moments_are_weighted():
 def test_quantiles_are_the_least_values_with_their_share_of_the_weight():
     values, weights = torch.tensor([[3.0, 1.0, 2.0]]), torch.tensor([[0.2, 0.5, 0.3]])
     assert quantiles(values, weights, torch.tensor([0.05, 0.5, 0.6, 0.95])).tolist() == [[1.0, 1.0, 2.0, 3.0]]
+
+
+def test_a_likelihood_is_tempered_until_enough_members_are_left():
+    # Two members, l = (0, -4): weights 1 : e^-4b; 1 / sum w^2 is 1.6 at 1 : 3, so b = ln 3 / 4
+    none, far = torch.zeros(2, 2), torch.tensor([[0.0, -4.0], [0.0, -0.1]])
+    assert exponent(none, far, 1.6).tolist() == pytest.approx([math.log(3.0) / 4.0, 1.0], abs=1e-4)

@@ -8,11 +8,14 @@ import torch
 from tests.world.backends.test_growing import land, lit, turning
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.behaviour.moistures import MOISTURES, moisture_row
+from warp_torchrl.world.ensemble.parameters import Deviations
 from warp_torchrl.world.fires import alone
 from warp_torchrl.world.fires.alone import on_map
-from warp_torchrl.world.fires.members import Deviations, Members
+from warp_torchrl.world.fires.members import Members
+from warp_torchrl.world.fires.sectors import SECTORS
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER
+from warp_torchrl.world.state.window import Window
 
 
 def member(rate=1.0, wind_speed=1.0, bearing=0.0, moisture=1.0):
@@ -36,17 +39,26 @@ def test_dead_fuel_is_wetter_and_so_is_the_code_of_fine_fuel():
     row = Members(torch.tensor([member(moisture=1.5)])).moistures(moisture_row({}))[0]
     at = list(MOISTURES).index("ffmc")
     assert row[:3].tolist() == pytest.approx([9.0, 10.5, 12.0]) and row[3:at].tolist() == [60.0, 90.0]
-    # FFMC 90 is 147.2 * 11 / 149.5 = 10.83 %; half more is 16.25 %, and the code 59.5 * 233.75 / 163.45 = 85.1
-    assert float(row[at]) == pytest.approx(85.1, abs=0.05)
+    # FFMC 90 is (14875 - 13248) / 149.5 = 10.88 %; half more is 16.32 %, and the code 59.5 * 233.68 / 163.52 = 85.03
+    assert float(row[at]) == pytest.approx(85.03, abs=0.01)
+
+
+def test_a_member_of_no_change_has_the_weather_as_given():
+    row = moisture_row({})
+    assert torch.allclose(Members.plain().moistures(row)[0], row, atol=1e-4)
 
 
 def test_drawn_members_have_the_deviations_asked_for():
     found = Members.drawn(
-        world_key(torch.arange(4000)), Deviations(rate=0.4, wind_speed=0.2, bearing=15.0, moisture=0.0)
+        world_key(torch.arange(4000)),
+        Deviations(rate=0.4, wind_speed=0.2, bearing=15.0, moisture=0.0, held=0.1),
+        lit((20, 20), (10, 10)),
     )
     assert float(found.rate.median()) == pytest.approx(1.0, abs=0.03)
     assert float(found.rate.std() / found.rate.mean()) == pytest.approx(0.4, abs=0.03)
     assert float(found.bearing.std()) == pytest.approx(15.0, abs=0.6) and bool((found.moisture == 1.0).all())
+    assert float(found.held.float().mean()) == pytest.approx(0.1, abs=0.01)
+    assert float(found.local.log().std()) == pytest.approx(0.27, abs=0.02), "0.29, of draws within two deviations"
 
 
 @pytest.mark.parametrize("at_once", [64, 2], ids=["together", "in parts"])
@@ -62,6 +74,33 @@ def test_members_burn_as_each_does_alone(at_once, monkeypatch):
         assert torch.allclose(together[one], single, rtol=1e-4, atol=1e-3)
     areas = (together < NEVER / 2).flatten(1).sum(1)
     assert areas[1] < areas[0] < areas[2]
+
+
+def test_a_held_sector_stays_and_others_burn_at_rates_of_their_own():
+    size, fire = (40, 64), RateFire(model="fbp", cell_deviation=0.0)
+    ground, cells = land(1, size), lit(size, (20, 32))
+    sector = (torch.arange(64) > 32).long().expand(size)
+    rates, held = torch.ones(1, SECTORS), torch.zeros(1, SECTORS, dtype=torch.bool)
+    rates[0, 1], held[0, 0] = 2.0, True
+    values = torch.zeros(1, 4)
+
+    def burned(members):
+        return on_map(members.fires(fire, ground, turning(1), 30.0).burn(cells, world_key(torch.arange(1))))[0]
+
+    plain, uneven = burned(Members(values)), burned(Members(values, rates, held, sector))
+    assert float(uneven[20, 34]) == pytest.approx(0.5 * float(plain[20, 34]), rel=1e-3)
+    assert bool((uneven[:, :32] == NEVER).all())
+    masked = Members(values, rates, held, sector).stopped(burned(Members(values, rates, None, sector))[None])[0]
+    assert bool((masked[:, :32] == NEVER).all()) and torch.equal(masked[:, 33:], uneven[:, 33:])
+
+
+def test_the_pace_is_the_rate_of_heads_over_that_of_the_given_weather():
+    size, fire = (40, 64), RateFire(model="fbp")
+    spell, window = turning(1)[0], Window.whole(size)
+    found = Members(torch.tensor([member(), member(1.5), member(1.0, 2.0)])).pace(
+        fire, land(1, size), spell, 30.0, window
+    )
+    assert found[:2].tolist() == pytest.approx([1.0, 1.5], rel=1e-5) and float(found[2]) > 1.1
 
 
 def test_a_fire_that_is_seen_is_half_a_cell_ahead():

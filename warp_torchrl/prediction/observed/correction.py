@@ -1,9 +1,8 @@
 """Forecasts of a fire that are corrected by each observation when its time comes.
 
 At each observation the forecasts that were made before it are scored. Then the fire continues from what was seen: what
-is inside has burned, its edge burns. Members are weighed by how well they forecast the growth since the observation
-before. Where few hold most of the weight, they are drawn by it and their parameters are moved
-(``world.ensemble.filtering``).
+is inside has burned, its edge burns. Members are drawn from what their growth since the observation before says of the
+fire (``posterior``).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -13,61 +12,29 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.prediction.observed.observation import Observation
-from warp_torchrl.prediction.observed.scores import ForecastScores, forecast_scores, time_between
-from warp_torchrl.world.air.weather import Weather
-from warp_torchrl.world.arrays.random import Stream, normal, uniform, world_key
-from warp_torchrl.world.ensemble.filtering import (
-    effective,
-    exponent,
-    jittered,
-    moments,
-    normalised,
-    quantiles,
-    resampled,
+from warp_torchrl.prediction.observed.posterior import Posterior
+from warp_torchrl.prediction.observed.scene import ByTimes, InSteps, Scene
+from warp_torchrl.prediction.observed.scores import (
+    ForecastScores,
+    GrowthScores,
+    forecast_scores,
+    growth_scores,
+    time_between,
 )
-from warp_torchrl.world.fires.alone import on_map
-from warp_torchrl.world.fires.members import PARAMETERS, Deviations, Members
-from warp_torchrl.world.fires.sightings import Front, HotSpotSensor, beside, hot_spot_likelihood, perimeter_likelihood
-from warp_torchrl.world.fires.spell import Spell, can_ignite
-from warp_torchrl.world.law.rate import RateFire
-from warp_torchrl.world.law.travel import NEVER
-from warp_torchrl.world.state.state import Landscape
+from warp_torchrl.world.arrays.random import world_key
+from warp_torchrl.world.ensemble.parameters import PARAMETERS, Deviations
+from warp_torchrl.world.ensemble.regression import Emulator
+from warp_torchrl.world.fires.members import Members
+from warp_torchrl.world.fires.sectors import sectors_about
+from warp_torchrl.world.fires.sightings import Front, HotSpotSensor, Sight, hot_spot_sight, perimeter_sight
+from warp_torchrl.world.state.window import Window
 
 STEPS = 12
 """Times at which a forecast of arrival is compared between two observations."""
-ENOUGH = 0.5
-"""Least effective share of the members: under it they are drawn by their weight."""
-LEAST = 0.2
-"""Least effective share that an observation leaves: what it says beyond that is not taken, for so few members would say
-more than they can know."""
 SHARES = (0.05, 0.25, 0.5, 0.75, 0.95)
 """Quantiles that are kept of what was learned."""
 FORECASTS = ("persistence", "free", "restart", "members", "corrected")
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Scene:
-    """A fire and its weather.
-
-    Attributes:
-        ground: The map, batch size [1].
-        cell_size: Side of a cell [m].
-        fire: The law; members have rates of their own in place of its ``fire_deviation``.
-        air: The weather.
-        start: When the fires start, since the weather's first row began [minutes].
-        lit: Where they start, bool [H, W].
-    """
-
-    ground: Landscape
-    cell_size: float
-    fire: RateFire
-    air: Weather
-    start: float
-    lit: Tensor
-
-    def spells(self, begin: float, end: float) -> list[Spell]:
-        """Return the weather between two times since the start [minutes]."""
-        return [Spell(wind, last, wet) for wind, wet, last in self.air.spells(end - begin, self.start + begin)]
+_ABOUT = 48  # side of the ground on which the rates of heads are compared [cells]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,6 +46,7 @@ class Correction:
         deviations: How far they differ at first.
         sensor: The satellite that saw hot spots.
         shrinkage: Of the kernel that moves parameters, see ``filtering.jittered``.
+        longest: Lead up to which forecasts are scored beyond the next observation [minutes].
         seed: Member i has seed ``seed + i``.
     """
 
@@ -86,6 +54,7 @@ class Correction:
     deviations: Deviations = field(default_factory=Deviations)
     sensor: HotSpotSensor = field(default_factory=HotSpotSensor)
     shrinkage: float = 0.97
+    longest: float = 150.0
     seed: int = 0
 
     def __call__(
@@ -98,11 +67,11 @@ class Correction:
             observations: In the order of time, all after the start.
             progress: Called after each observation.
         """
-        run = _Run(self, scene, observations[-1].minutes)
+        run = _Run(self, scene, [each.minutes for each in observations])
         for seen in observations:
             run.add(seen)
             progress(1)
-        return Corrected(run.members, run.weights, run.known, observations[-1].minutes, tuple(run.steps))
+        return Corrected(run.members, run.known, observations[-1].minutes, tuple(run.steps), tuple(run.leads))
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,10 +82,17 @@ class Step:
     lead: float  # minutes since the observation before
     kind: str
     scores: Mapping[str, ForecastScores]  # by ``FORECASTS``
-    effective: float  # number of members after it was weighed
-    drawn: bool  # whether members were drawn by their weight
-    posterior: Mapping[str, Sequence[float]]  # of each parameter, quantiles ``SHARES``
+    posterior: Mapping[str, Sequence[float]]  # of each parameter and of the pace of heads, quantiles ``SHARES``
+    held: float  # mean probability of a sector of the front to be held
     burned: Tensor  # bool [H, W]
+
+
+@dataclass(frozen=True, eq=False)
+class Lead:
+    """Scores of the forecasts from one observation at a later one."""
+
+    minutes: float
+    scores: Mapping[str, GrowthScores]  # by ``FORECASTS``
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,112 +100,134 @@ class Corrected:
     """A fire after its last observation."""
 
     members: Members
-    weights: Tensor  # float32 [K]
     burned: Tensor  # bool [H, W]
     minutes: float
     steps: tuple[Step, ...]
+    leads: tuple[Lead, ...]
 
-    def equal_members(self, seed: int) -> Members:
-        """Return members of equal weight."""
-        draw = uniform(world_key(torch.tensor([seed])), 0, Stream.MEMBERS, (len(PARAMETERS) + 1,))[:, -1]
-        return self.members.taken(resampled(self.weights[None], draw)[0])
+
+@dataclass(frozen=True, eq=False)
+class _Pending:
+    """Forecasts for an observation that is still to come."""
+
+    begun: float
+    time: float
+    known: Tensor
+    reached: Mapping[str, Tensor]  # float32 [H, W]
 
 
 class _Run:
     """The filter on its way."""
 
-    def __init__(self, correction: Correction, scene: Scene, end: float) -> None:
-        self._correction, self._scene = correction, scene
+    def __init__(self, correction: Correction, scene: Scene, times: Sequence[float]) -> None:
+        self._correction, self._scene, self._times = correction, scene, times
         self._key = world_key(correction.seed + torch.arange(correction.members))
-        self._law = scene.fire.alike()
-        self.members = self._prior = Members.drawn(self._key, correction.deviations)
-        self.weights = self._equal = torch.full((correction.members,), 1.0 / correction.members)
-        self._fuel = can_ignite(self._law, scene.ground)
-        self.known, self._since = scene.lit & self._fuel, 0.0
-        self._side = correction.sensor.side(scene.cell_size)
-        self._free = self._burn(self._prior, self.known, 0.0, end)
+        self.known, self._since = scene.lit & scene.fuel, 0.0
+        self._posterior = Posterior.prior(correction.deviations, scene.lit.shape, correction.seed)
         self.steps: list[Step] = []
+        self.leads: list[Lead] = []
+        self._pending: list[_Pending] = []
+        self.members = self._prior()
+        compared = [at for begin, end in zip((0.0, *times), times, strict=False) for at in _steps(begin, end)]
+        self._free = scene.burned(self.members, self._key, self.known, (0.0, times[-1]), InSteps(compared))
 
     def add(self, seen: Observation) -> None:
         """Score the forecasts before an observation, and learn from it."""
-        burned = seen.burned(self.known, self._correction.sensor, self._side)
-        front = Front(self.known, burned, self._fuel, seen.minutes - self._since)
-        said, forecasts = self._forecasts(front)
+        scene, sensor = self._scene, self._correction.sensor
+        burned = seen.burned(self.known, sensor, sensor.side(scene.cell_size))
+        front = Front(self.known, burned, scene.fuel, seen.minutes - self._since)
+        sight = perimeter_sight(front)
+        if seen.kind == "hot_spots":
+            sight = hot_spot_sight(front, seen.cells, sensor, scene.cell_size)
+        forecasts, said = self._forecasts(front, sight)
         between = time_between(front)
         scores = {name: forecast_scores(each, between, front) for name, each in forecasts.items()}
-        count, drawn = self._learn(said, seen, front)
-        self.steps.append(Step(seen.minutes, front.minutes, seen.kind, scores, count, drawn, self.posterior(), burned))
+        self._score_leads(seen.minutes, burned)
+        edges = scene.edge(self.known), scene.edge(burned)
+        self._posterior = self._posterior.learned(self.members.values, said, sight, edges, front.minutes)
         self.known, self._since = burned, seen.minutes
+        held = self._posterior.held_by_sector(sectors_about(burned), edges[1])
+        tick = 1 + 2 * len(self.steps)
+        values = self._posterior.drawn(self._key, tick, self._correction.shrinkage)
+        local = self._correction.deviations.local
+        self.members = Members(values).by_sector(self._key, tick, local, held, sectors_about(burned))
+        learned = self._learned()
+        self.steps.append(Step(seen.minutes, front.minutes, seen.kind, scores, learned, float(held.mean()), burned))
 
-    def posterior(self) -> dict[str, list[float]]:
-        """Return quantiles of the parameters that are learned."""
-        each = {"rate": self.members.rate, "wind_speed": self.members.wind_speed, "bearing": self.members.bearing}
-        shares = torch.tensor(SHARES)
-        return {name: quantiles(of[None], self.weights[None], shares)[0].tolist() for name, of in each.items()}
+    def _prior(self) -> Members:
+        """Return members that learned nothing, on the fire as it was last seen."""
+        return Members.drawn(self._key, self._correction.deviations, self.known)
 
-    def _forecasts(self, front: Front) -> tuple[Tensor, dict[str, Tensor]]:
-        """Return when each member comes [minutes since the observation before], and F of each forecast."""
-        begin, end = self._since, self._since + front.minutes
-        times = begin + torch.arange(1, STEPS + 1) * (front.minutes / STEPS)
-        free = _reached(self._free, self._equal, times)
-        persistence = self.known.to(torch.float32).expand(STEPS, -1, -1)
-        if self.steps:
-            said = self._burn(self.members, self.known, begin, end)
-            prior = _reached(self._burn(self._prior, self.known, begin, end), self._equal, times - begin)
-        else:
-            said, prior = self._free, free
-        one = self._burn(Members.plain(), self.known, begin, end)
-        return said, {
-            "persistence": persistence,
-            "free": free,
-            "restart": _reached(one, torch.ones(1), times - begin),
-            "members": prior,
-            "corrected": _reached(said, self.weights, times - begin),
+    def _learned(self) -> dict[str, list[float]]:
+        """Return quantiles of the parameters, and of the pace of heads."""
+        of, scene = self._posterior, self._scene
+        spell = scene.spells(self._since, self._since + 1.0)[0]
+        pace = self.members.pace(scene.law, scene.ground, spell, scene.cell_size, ground_about(self.known))
+        emulator = Emulator.fitted(self.members.values, pace.clamp(min=1e-3).log()[:, None])
+        logs = {**dict(zip(PARAMETERS, of.particles.unbind(1), strict=True)), "pace": emulator(of.particles)[0][:, 0]}
+        return {
+            name: of.quantiles(values.float() if name == "bearing" else values.float().exp(), SHARES)
+            for name, values in logs.items()
         }
 
-    def _burn(self, members: Members, lit: Tensor, begin: float, end: float) -> Tensor:
-        """Return when members come [minutes since they began], float32 [K, H, W]."""
-        scene = self._scene
-        burning = lit & self._fuel
-        found = torch.full((len(members), *lit.shape), NEVER)
-        if bool(burning.any()):
-            half_way = beside(lit) if begin > 0.0 else None
-            fires = members.fires(self._law, scene.ground, scene.spells(begin, end), scene.cell_size, half_way)
-            first = 0
-            for part in fires.in_parts(burning, self._key[: len(members)], on_map):
-                found[first : first + len(part)] = part
-                first += len(part)
-        found[:, lit] = 0.0
-        return found.masked_fill_(found > end - begin, NEVER)
+    def _forecasts(self, front: Front, sight: Sight) -> tuple[dict[str, Tensor], Tensor]:
+        """Return F of each forecast until the next observation, and the growth of the members by sector.
 
-    def _learn(self, said: Tensor, seen: Observation, front: Front) -> tuple[float, bool]:
-        """Weigh the members by an observation; return their effective number, and whether they were drawn."""
-        likelihood, before = self._likelihood(said, seen, front)[None], self.weights.log()[None]
-        power = exponent(before, likelihood, LEAST * len(self.members))
-        weights = normalised(before + power[:, None] * likelihood)
-        count = float(effective(weights))
-        drawn = count < ENOUGH * len(self.members)
-        if drawn:
-            self._move(weights)
-        else:
-            self.weights = weights[0]
-        return count, drawn
+        Forecasts of the observations after that, up to ``longest``, are kept until those come.
+        """
+        begin, number = self._since, len(self.steps)
+        later = [each for each in self._times[number + 1 :] if each - begin <= self._correction.longest]
+        end = max((begin + front.minutes, *later))
+        times = [each - begin for each in (*_steps(begin, begin + front.minutes), *later)]
+        counted = ByTimes(times)
 
-    def _likelihood(self, said: Tensor, seen: Observation, front: Front) -> Tensor:
-        if seen.kind == "perimeter":
-            return perimeter_likelihood(said, front)
-        return hot_spot_likelihood(said, seen.cells, front, self._correction.sensor, self._scene.cell_size)
+        def measured(arrival: Tensor, members: Members) -> tuple[Tensor, Tensor]:
+            return counted(arrival, members), sight.of(arrival)
 
-    def _move(self, weights: Tensor) -> None:
-        """Draw the members by their weight, and move them."""
-        values, tick = self.members.values[None], len(self.steps)
-        draw = uniform(world_key(torch.tensor([self._correction.seed])), tick + 1, Stream.MEMBERS, (1,))[:, 0]
-        taken = values.gather(1, resampled(weights, draw)[:, :, None].expand_as(values))
-        noise = normal(self._key, tick + 1, Stream.MEMBERS, (values.shape[2],))[None]
-        moved = jittered(taken, *moments(values, weights), noise, self._correction.shrinkage)
-        self.members, self.weights = Members(moved[0]), self._equal
+        def burned(members: Members) -> tuple[Tensor, Tensor]:
+            parts = self._scene.burned(members, self._key[: len(members)], self.known, (begin, end), measured)
+            reached = torch.stack([counts for counts, _ in parts]).sum(0) / len(members)
+            return reached, torch.cat([growth for _, growth in parts])
+
+        corrected, said = burned(self.members)
+        first = number * STEPS
+        compared = (*range(first, first + STEPS), *(first + STEPS * (2 + n) - 1 for n in range(len(later))))
+        reached = {
+            "persistence": self.known.to(torch.float32).expand(len(times), -1, -1),
+            "free": self._freely(compared),
+            "restart": burned(Members.plain())[0],
+            "members": burned(self._prior())[0] if number else corrected,
+            "corrected": corrected,
+        }
+        for place, time in enumerate(later, STEPS):
+            each = {name: planes[place].clone() for name, planes in reached.items()}
+            self._pending.append(_Pending(begin, time, self.known, each))
+        return {name: planes[:STEPS] for name, planes in reached.items()}, said
+
+    def _freely(self, compared: Sequence[int]) -> Tensor:
+        """Return F of the free forecast at some of its times, float32 [S, H, W]."""
+        counts = [sum((part <= at).sum(0, dtype=torch.float32) for part in self._free) for at in compared]
+        return torch.stack([torch.as_tensor(each) for each in counts]) / len(self._key)
+
+    def _score_leads(self, time: float, burned: Tensor) -> None:
+        """Score what was forecast of an observation before the last one."""
+        due = [each for each in self._pending if each.time == time]
+        self._pending = [each for each in self._pending if each.time != time]
+        for each in due:
+            front = Front(each.known, burned | each.known, self._scene.fuel, time - each.begun)
+            scores = {name: growth_scores(chance, front) for name, chance in each.reached.items()}
+            self.leads.append(Lead(time - each.begun, scores))
 
 
-def _reached(arrival: Tensor, weights: Tensor, times: Tensor) -> Tensor:
-    """Return the share of the members that came by some times, float32 [S, H, W]."""
-    return torch.stack([torch.einsum("k,khw->hw", weights, (arrival <= time).to(torch.float32)) for time in times])
+def _steps(begin: float, end: float) -> list[float]:
+    """Return the times at which forecasts are compared between two observations."""
+    return [begin + (end - begin) * number / STEPS for number in range(1, STEPS)] + [end]
+
+
+def ground_about(known: Tensor) -> Window:
+    """Return the ground about the middle of what has burned."""
+    places, (height, width) = known.nonzero(), known.shape
+    row, column = places.float().mean(0).long().tolist() if len(places) else (height // 2, width // 2)
+    rows, columns = min(_ABOUT, height), min(_ABOUT, width)
+    top, left = min(max(0, row - rows // 2), height - rows), min(max(0, column - columns // 2), width - columns)
+    return Window(top, left, rows, columns, (height, width))

@@ -11,7 +11,15 @@ from warp_torchrl.system import disk
 
 FIGURE, SCORES = "observed.png", "observed.csv"
 _SCORES = ("jaccard", "kappa", "growth_jaccard", "brier", "crps", "area")
-_QUANTITIES = {"rate": "factor on all rates", "wind_speed": "factor on the wind's speed", "bearing": "turn [degrees]"}
+_QUANTITIES = {
+    "pace": "rate of the head, of the given one",
+    "rate": "factor on all rates",
+    "wind_speed": "factor on the wind's speed",
+    "bearing": "turn of the wind [degrees]",
+    "moisture": "factor on the moisture of dead fuel",
+}
+_LEADS = (15.0, 30.0, 60.0, 150.0)
+_OF_LEADS = ("growth_jaccard", "brier")
 
 
 def observed_numbers(found: Corrected, cell_size: float) -> dict[str, Any]:
@@ -23,8 +31,7 @@ def observed_numbers(found: Corrected, cell_size: float) -> dict[str, Any]:
             "lead_minutes": step.lead,
             "kind": step.kind,
             "burned_ha": float(step.burned.sum()) * hectare,
-            "effective_members": step.effective,
-            "drawn": step.drawn,
+            "held": step.held,
             "forecasts": {
                 name: {each: getattr(scores, each) for each in _SCORES} for name, scores in step.scores.items()
             },
@@ -40,6 +47,7 @@ def observed_numbers(found: Corrected, cell_size: float) -> dict[str, Any]:
         "posterior": rows[-1]["posterior"],
         "observations": rows,
         "means": {name: _means(rows, name) for name in FORECASTS},
+        "leads": _by_lead(found),
         "reliability": {name: [list(row) for row in table] for name, table in tables.items()},
     }
 
@@ -48,6 +56,23 @@ def _means(rows: Sequence[Mapping[str, Any]], name: str) -> dict[str, float]:
     """Return the mean scores of a forecast over the observations but the first, before which nothing was seen."""
     judged = rows[1:] or rows
     return {each: sum(row["forecasts"][name][each] for row in judged) / len(judged) for each in _SCORES}
+
+
+def _by_lead(found: Corrected) -> list[dict[str, Any]]:
+    """Return the mean scores of forecasts by lead, from an observation on."""
+    each = [(step.lead, step.scores) for step in found.steps[1:]] + [
+        (lead.minutes, lead.scores) for lead in found.leads
+    ]
+    rows = []
+    for least, most in zip((0.0, *_LEADS), _LEADS, strict=False):
+        here = [scores for minutes, scores in each if least < minutes <= most]
+        if here:
+            means = {
+                name: {of: sum(getattr(scores[name], of) for scores in here) / len(here) for of in _OF_LEADS}
+                for name in FORECASTS
+            }
+            rows.append({"over_minutes": least, "to_minutes": most, "count": len(here), "forecasts": means})
+    return rows
 
 
 def write_scores(path: Path, numbers: Mapping[str, Any]) -> None:
@@ -82,6 +107,8 @@ def observed_lines(numbers: Mapping[str, Any]) -> list[str]:
         lines.append(f"| {text} | {values[0]:.3g} | {values[2]:.3g} | {values[-1]:.3g} |")
     lines += [
         "",
+        f"{100.0 * rows[-1]['held']:.0f} % of the last front is taken to be held.",
+        "",
         "| hours | forecast | Jaccard | kappa | of the growth | Brier | CRPS [min] |",
         "|---|---|---|---|---|---|---|",
     ]
@@ -89,6 +116,19 @@ def observed_lines(numbers: Mapping[str, Any]) -> list[str]:
         lines += [_row(f"{row['minutes'] / 60.0:.2f}", name, row["forecasts"][name]) for name in FORECASTS]
     what = "mean but the first" if len(rows) > 1 else "mean"
     lines += [_row(what, name, numbers["means"][name]) for name in FORECASTS]
+    return lines + _lead_lines(numbers["leads"])
+
+
+def _lead_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return lines of Markdown: the scores by lead."""
+    if not rows:
+        return []
+    lines = ["", f"| lead [min], forecasts | score | {' | '.join(FORECASTS)} |", "|---|---|" + "---|" * len(FORECASTS)]
+    for row in rows:
+        lead = f"{row['over_minutes']:g} to {row['to_minutes']:g}, {row['count']}"
+        for of, title in zip(_OF_LEADS, ("Jaccard of the growth", "Brier"), strict=True):
+            values = " | ".join(f"{row['forecasts'][name][of]:.3f}" for name in FORECASTS)
+            lines.append(f"| {lead} | {title} | {values} |")
     return lines
 
 
@@ -100,7 +140,7 @@ def _row(first: str, name: str, scores: Mapping[str, float]) -> str:
 
 
 def write_observed_figure(path: Path, numbers: Mapping[str, Any], title: str) -> None:
-    """Draw the Brier score of each forecast, what was learned of the rate, and a reliability diagram.
+    """Draw the Brier score of each forecast, what was learned of the head's rate, and a reliability diagram.
 
     Raises:
         ImportError: If Matplotlib is not installed.
@@ -109,17 +149,17 @@ def write_observed_figure(path: Path, numbers: Mapping[str, Any], title: str) ->
     rows = numbers["observations"]
     hours = [row["minutes"] / 60.0 for row in rows]
     with disk.with_path(path), style():
-        figure, axes = sheet([["brier", "rate", "reliability"]], (10.5, 3.6), title)
+        figure, axes = sheet([["brier", "pace", "reliability"]], (10.5, 3.6), title)
         for name in FORECASTS:
             axes["brier"].plot(hours, [row["forecasts"][name]["brier"] for row in rows], marker="o", label=name)
         axes["brier"].set(title="Brier score over the growth", xlabel="hours since the start", yscale="log")
         axes["brier"].legend()
-        low, middle, high = ([row["posterior"]["rate"][at] for row in rows] for at in (0, 2, -1))
-        axes["rate"].fill_between(hours, low, high, alpha=0.25, label="5 % to 95 %")
-        axes["rate"].plot(hours, middle, marker="o", label="half")
-        axes["rate"].axhline(1.0, color="grey", linewidth=0.8)
-        axes["rate"].set(title="factor on all rates", xlabel="hours since the start")
-        axes["rate"].legend()
+        low, middle, high = ([row["posterior"]["pace"][at] for row in rows] for at in (0, 2, -1))
+        axes["pace"].fill_between(hours, low, high, alpha=0.25, label="5 % to 95 %")
+        axes["pace"].plot(hours, middle, marker="o", label="half")
+        axes["pace"].axhline(1.0, color="grey", linewidth=0.8)
+        axes["pace"].set(title="rate of the head, of the given one", xlabel="hours since the start")
+        axes["pace"].legend()
         axes["reliability"].plot([0, 1], [0, 1], color="grey", linewidth=0.8)
         for name in ("free", "members", "corrected"):
             bins = [row for row in numbers["reliability"][name] if row[2]]

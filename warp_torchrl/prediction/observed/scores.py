@@ -35,6 +35,24 @@ class ForecastScores:
     reliability: tuple[tuple[float, float, int], ...]  # mean probability, share that burned and cells of each bin
 
 
+@dataclass(frozen=True, kw_only=True)
+class GrowthScores:
+    """Agreement of a forecast with an observation over the growth between them."""
+
+    growth_jaccard: float
+    brier: float
+
+
+def growth_scores(chance: Tensor, front: Front) -> GrowthScores:
+    """Return the scores of F, float32 [H, W]."""
+    outside = ~front.known
+    off = ((chance - front.burned.to(torch.float32)).square() * outside).sum()
+    return GrowthScores(
+        growth_jaccard=float(jaccard((chance >= BURNS) & outside, front.growth)),
+        brier=float(off) / max(1, int(front.growth.sum())),
+    )
+
+
 def forecast_scores(reached: Tensor, arrival: Tensor, front: Front) -> ForecastScores:
     """Return the scores of a forecast.
 

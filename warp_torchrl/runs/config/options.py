@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from warp_torchrl.runs.config.seeds import BEYOND_EVALUATION, FIRST_EVALUATED
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.fires.members import Deviations
+from warp_torchrl.world.ensemble.parameters import Deviations
 from warp_torchrl.world.fires.sightings import HotSpotSensor
 
 
@@ -98,8 +98,9 @@ class PredictionOptions:
             spots of satellites (CSV). Each corrects the prediction, which continues from the last one.
         observed_zone: Hours that the weather's rows are ahead of UTC, for times in UTC where neither rows nor file say
             it: ``observed_zone=-7``.
-        members: How far fires differ before anything is seen, where something is: ``members.rate=0.4``,
-            ``members.wind_speed``, ``members.bearing`` [degrees], ``members.moisture``.
+        uncertain: Whether fires differ by ``members`` where nothing is observed, too.
+        members: How far fires differ before anything is seen: ``members.rate=0.4``, ``members.wind_speed``,
+            ``members.bearing`` [degrees], ``members.moisture``, ``members.local``, ``members.held``.
         hot_spots: The satellite: ``hot_spots.pixel=375`` [m], ``hot_spots.detection``, ``hot_spots.false_alarm``,
             ``hot_spots.lately`` [h].
         animation: Whether the first fire is written as a GIF.
@@ -127,6 +128,7 @@ class PredictionOptions:
     cell_size: float | None = None
     observed: str | None = None
     observed_zone: float | None = None
+    uncertain: bool = False
     members: Deviations = field(default_factory=Deviations)
     hot_spots: HotSpotSensor = field(default_factory=HotSpotSensor)
     animation: bool = False
@@ -150,6 +152,8 @@ class PredictionOptions:
         for name, what in (("weather", "a CSV file of weather"), ("ignition", "a file of where the fire starts")):
             if getattr(self, name) is None:
                 raise ValueError(f"{name} must name {what}, got null")
+        if self.members != Deviations() and not self.uncertain and self.observed is None:
+            raise ValueError("members is read with uncertain=true or observed=FILE, got neither")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -45,6 +45,8 @@ class Stream(IntEnum):
     IMAGINED = 22
     NAMED = 23
     MEMBERS = 24
+    SECTORS = 25
+    HELD = 26
 
 
 def world_key(seed: Tensor, episode: Tensor | int = 0) -> Tensor:

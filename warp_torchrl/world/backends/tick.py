@@ -6,7 +6,7 @@ from torch import Tensor
 from warp_torchrl.world.air.wind import Wind
 from warp_torchrl.world.backends import backend
 from warp_torchrl.world.law.automaton import Automaton
-from warp_torchrl.world.state.state import Landscape, Vehicles, WorldState
+from warp_torchrl.world.state.state import Air, Landscape, Vehicles, WorldState
 
 
 def initial_state(
@@ -55,11 +55,21 @@ def initial_state(
     )
 
 
-def advance(state: WorldState, fire: Automaton, wind: Wind, ticks_now: Tensor) -> WorldState:
-    """Advance fire and wind by one tick in the worlds that tick now, bool [B]."""
+def advance(state: WorldState, fire: Automaton, wind: Wind, ticks_now: Tensor, air: Air | None = None) -> WorldState:
+    """Advance fire and wind by one tick.
+
+    Args:
+        state: The worlds.
+        fire: The automaton.
+        wind: The air.
+        ticks_now: Worlds that tick now, bool [B].
+        air: After the tick, of imagined worlds; None: that of the worlds.
+    """
     after = backend.fastest(fire, state.cells.device).tick(state, ticks_now)
     if not wind.changes:
         return after
+    if air is not None:
+        return in_wind(after, fire, air.wind, air.moisture)
     now = torch.where(ticks_now[:, None, None, None], wind.after_tick(after), state.wind)
     return in_wind(after, fire, now, wind.moisture(after.episode_key, after.tick))
 

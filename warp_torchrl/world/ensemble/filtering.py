@@ -33,7 +33,7 @@ def effective(weights: Tensor) -> Tensor:
     return 1.0 / weights.square().sum(dim=1)
 
 
-def resampled(weights: Tensor, draw: Tensor, count: int | None = None) -> Tensor:
+def resampled(weights: Tensor, draw: Tensor, places: int | None = None) -> Tensor:
     """Return the member that each place takes, int64 [B, n], by systematic resampling (Kitagawa 1996).
 
     Place k takes the first member whose cumulative weight is over (k + u) / n: a member of weight w is taken n w times,
@@ -42,13 +42,13 @@ def resampled(weights: Tensor, draw: Tensor, count: int | None = None) -> Tensor
     Args:
         weights: That sum to 1, float [B, K].
         draw: u, one uniform draw in [0, 1) for each filter, float [B].
-        count: n, places; None has one for each member.
+        places: n; None is K.
     """
-    members = weights.shape[1] if count is None else count
+    count = weights.shape[1] if places is None else places
     total = weights.to(torch.float64).cumsum(dim=1)
     total = total / total[:, -1:]
-    places = torch.arange(members, dtype=torch.float64, device=weights.device) + draw.to(torch.float64)[:, None]
-    return torch.searchsorted(total, (places / members).contiguous(), right=True)
+    at = torch.arange(count, dtype=torch.float64, device=weights.device) + draw.to(torch.float64)[:, None]
+    return torch.searchsorted(total, (at / count).contiguous(), right=True)
 
 
 def exponent(log_weights: Tensor, log_likelihood: Tensor, least: Tensor | float, most: Tensor | float = 1.0) -> Tensor:

@@ -4,7 +4,7 @@ What differs from member to member is held by name, each tensor [B, M, ...]; the
 what everybody knows may be read there: the ground, the clock, the wind, the team.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import torch
 from torch import Tensor
@@ -12,12 +12,26 @@ from torch import Tensor
 from warp_torchrl.world.air.wind import Wind
 from warp_torchrl.world.arrays.batch import Named
 from warp_torchrl.world.backends import backend
-from warp_torchrl.world.backends.tick import in_wind
+from warp_torchrl.world.backends.tick import advance
+from warp_torchrl.world.ensemble.parameters import turned
 from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.state.state import FIRST_FIRE, Air, WorldState
 
 _OWN = ("cells", "age", "stage_age", "extinguished", "burned", "firebreak", "wet", "key")
 """What differs from member to member, of the tensors of a state by name, beside what the law keeps and draws."""
+
+
+def imagined(state: WorldState, without: Iterable[str], key: Tensor | None = None) -> WorldState:
+    """Return worlds whose future is another: what was drawn at the start of the episode stays.
+
+    So stay the ground, the prevailing wind and the hour of the weather.
+
+    Args:
+        state: The worlds.
+        without: Mechanics whose planes are left out.
+        key: Of the draws from now on, int64 [B]; None keeps it.
+    """
+    return state.without_planes(*without).replace(key=state.key if key is None else key, origin=state.episode_key)
 
 
 def rows_of(state: WorldState, count: int) -> Tensor:
@@ -27,8 +41,7 @@ def rows_of(state: WorldState, count: int) -> Tensor:
 
 def bare(state: WorldState, fire: Automaton) -> WorldState:
     """Return worlds without what mechanics keep, whose draws at the start of the episode stay the true ones'."""
-    mechanics = [name for name in state.extras.held if name not in fire.keeps]
-    return state.without_planes(*mechanics).replace(origin=state.episode_key)
+    return imagined(state, [name for name in state.extras.held if name not in fire.keeps])
 
 
 def unburned(state: WorldState, keys: Tensor, fire: Automaton) -> Named:
@@ -91,10 +104,9 @@ def ticked(
         air: Of the true world of each after the tick, batch size [n]; it is read where the wind changes.
         parameters: Of ``in_parameters``; None leaves wind and rate as they are known.
     """
-    after = backend.fastest(fire, worlds.cells.device).tick(worlds, now)
-    if not wind.changes:
-        return after
-    return in_wind(after, fire, in_other_air(air.wind, parameters), air.moisture)
+    if wind.changes:
+        air = air.replace(wind=in_other_air(air.wind, parameters))
+    return advance(worlds, fire, wind, now, air)
 
 
 def in_parameters(worlds: WorldState, fire: Automaton, parameters: Tensor | None) -> WorldState:
@@ -117,7 +129,4 @@ def in_other_air(wind: Tensor, parameters: Tensor | None) -> Tensor:
     """Return a wind [n, 2, h, w] of another speed and bearing, see ``in_parameters``."""
     if parameters is None:
         return wind
-    factor, turn = parameters[:, 1].exp()[:, None, None], parameters[:, 2][:, None, None]
-    east, north = wind.unbind(1)
-    turned = (east * turn.cos() - north * turn.sin(), east * turn.sin() + north * turn.cos())
-    return torch.stack(turned, dim=1) * factor[:, None]
+    return turned(wind, parameters[:, 2]) * parameters[:, 1].exp()[:, None, None, None]

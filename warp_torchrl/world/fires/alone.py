@@ -55,7 +55,8 @@ class Fires:
         spells: The weather.
         cell_size: Side of a cell [m].
         beside: Further laws, each of another group of fires; they differ in factors, deviations and moistures alone.
-        rate: Factor on the rates of each fire, float32 [B]; None is 1.
+        rate: Factor on the rates of each fire, float32 [B], or in each of S sectors, float32 [B, S]; None is 1.
+        sector: The sector of each cell, int64 [H, W].
         swiftest: Highest of these factors; it shortens ticks.
         half_way: Cells that the fire has come half-way to at the start, bool [H, W]: those about a perimeter, whose
             front is half a cell ahead of the last cell inside, on average; None where it starts in its cells' middle.
@@ -69,6 +70,7 @@ class Fires:
     cell_size: float
     beside: Sequence[RateFire] = ()
     rate: Tensor | None = None
+    sector: Tensor | None = None
     swiftest: float = 1.0
     half_way: Tensor | None = None
     root: "Fires | None" = field(default=None, repr=False)
@@ -212,8 +214,15 @@ class Fires:
             for law, each in zip(self.laws, keys, strict=True)
         ]
         pace = paces[0] if len(paces) == 1 else torch.cat(paces)
-        pace = pace if self.rate is None else pace / self.rate[:, None, None]
+        pace = pace if self.rate is None else pace / self._rates(self.rate, window)
         return pace if self.half_way is None else torch.where(window.cut(self.half_way, False), 0.5 * pace, pace)
+
+    def _rates(self, rate: Tensor, window: Window) -> Tensor:
+        """Return the factor on the rates of each fire in a window, float32 [b, h, w] or [b, 1, 1]."""
+        if self.sector is None:
+            return rate[:, None, None]
+        place = window.cut(self.sector, 0)
+        return rate.index_select(1, place.flatten()).view(len(rate), *place.shape)
 
     def _going(self, number: int) -> SpellInWindows:
         if (self.root or self)._ended.is_set():

@@ -1,9 +1,10 @@
-"""Simulated futures: copies of worlds that continue with other draws."""
+"""Simulated futures: copies of worlds that continue with other draws, and the rules in which they do."""
 
 from dataclasses import replace
 
 from torch import Tensor
 
+from warp_torchrl.world.ensemble import members
 from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.team.knowledge import Belief, Full
 from warp_torchrl.world.world import World
@@ -18,9 +19,5 @@ def rules_in_sight(world: World) -> World:
 
 
 def imagined(state: WorldState, key: Tensor, world: World) -> WorldState:
-    """Return worlds whose future draws have another key, int64 [B], under ``rules_in_sight``.
-
-    What was drawn at the start of the episode stays: the ground, the prevailing wind, the hour of the weather.
-    """
-    knowledge = [each.name for each in world.loop if each.is_knowledge]
-    return state.without_planes(*knowledge).replace(key=key, origin=state.episode_key)
+    """Return worlds whose future draws have another key, int64 [B], under ``rules_in_sight``."""
+    return members.imagined(state, [each.name for each in world.loop if each.is_knowledge], key)

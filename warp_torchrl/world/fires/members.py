@@ -1,54 +1,26 @@
 """Members of an ensemble: fires that differ in rate, wind and moisture from the law and the weather."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
 
-from warp_torchrl.validation import check_fields
-from warp_torchrl.world.arrays.random import Stream, normal
+from warp_torchrl.world.arrays.random import Stream, normal, uniform
 from warp_torchrl.world.behaviour.moistures import MOISTURES, moisture_row
+from warp_torchrl.world.ensemble.parameters import PARAMETERS, Deviations, log_deviation, turned
 from warp_torchrl.world.fires.alone import Fires
-from warp_torchrl.world.fires.spell import Spell
+from warp_torchrl.world.fires.sectors import SECTORS, STOPPED, sectors_about
+from warp_torchrl.world.fires.spell import Spell, can_ignite, spread_in
 from warp_torchrl.world.law.rate import RateFire
+from warp_torchrl.world.law.travel import NEVER
 from warp_torchrl.world.state.state import Landscape
+from warp_torchrl.world.state.window import Window
 
-PARAMETERS = ("rate", "wind_speed", "bearing", "moisture")
 _DEAD = 3  # moistures of dead fuel, the first of ``MOISTURES``
 _FFMC = list(MOISTURES).index("ffmc")
 _STRONGEST = 40.0  # wind [m/s] that no member is over
-
-
-@dataclass(frozen=True, kw_only=True)
-class Deviations:
-    """How far members differ before anything is seen.
-
-    Attributes:
-        rate: Coefficient of variation of the factor on all rates. Of 49 data sets a good model's error was 0.35 (Cruz
-            and Alexander 2013).
-        wind_speed: Coefficient of variation of the factor on the wind's speed.
-        bearing: Standard deviation of the turn of the wind's bearing [degrees].
-        moisture: Coefficient of variation of the factor on the moisture of dead fuel.
-
-    Raises:
-        ValueError: If a value is out of its range.
-    """
-
-    rate: float = 0.4
-    wind_speed: float = 0.25
-    bearing: float = 20.0
-    moisture: float = 0.15
-
-    def __post_init__(self) -> None:
-        check_fields(self, rate=(0.0, 2.0), wind_speed=(0.0, 2.0), bearing=(0.0, 180.0), moisture=(0.0, 1.0))
-
-    @property
-    def scales(self) -> Tensor:
-        """Return standard deviations in the order of ``PARAMETERS``, of logarithms but for the bearing, float32 [4]."""
-        logs = [math.sqrt(math.log1p(each**2)) for each in (self.rate, self.wind_speed, self.moisture)]
-        return torch.tensor([logs[0], logs[1], self.bearing, logs[2]])
+_WIDEST = 2.0  # standard deviations of rates from sector to sector
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,26 +28,64 @@ class Members:
     """An ensemble on one map: K fires, each with its parameters.
 
     Attributes:
-        values: Logarithms of the factors on rate and wind speed, the turn of the wind's bearing [degrees clockwise],
-            and the logarithm of the factor on the moisture of dead fuel, float32 [K, 4].
+        values: In the order of ``PARAMETERS``, float32 [K, 4].
+        local: Factor on the rates in each sector, float32 [K, S]; None is 1.
+        held: Sectors in which a member does not advance, bool [K, S]; None: it does in all.
+        sector: The sector of each cell, int64 [H, W]; None where nothing differs by sector.
     """
 
     values: Tensor
+    local: Tensor | None = None
+    held: Tensor | None = None
+    sector: Tensor | None = None
 
     @classmethod
-    def drawn(cls, key: Tensor, deviations: Deviations) -> "Members":
+    def drawn(cls, key: Tensor, deviations: Deviations, lit: Tensor) -> "Members":
         """Return members whose factors have median 1 and whose turns have mean 0.
 
         Args:
             key: Of the members, int64 [K].
             deviations: How far they differ.
+            lit: What burns or has burned when they begin, bool [H, W].
         """
-        return cls(normal(key, 0, Stream.MEMBERS, (len(PARAMETERS),)) * deviations.scales)
+        held = torch.full((SECTORS,), deviations.held)
+        return cls(deviations.drawn(key)).by_sector(key, 0, deviations.local, held, sectors_about(lit))
 
     @classmethod
     def plain(cls, count: int = 1) -> "Members":
         """Return members of the law and the weather as given."""
         return cls(torch.zeros(count, len(PARAMETERS)))
+
+    def by_sector(self, key: Tensor, tick: int, local: float, held: Tensor, sector: Tensor) -> "Members":
+        """Return members that differ from sector to sector of the front, too.
+
+        Args:
+            key: Of the members, int64 [K].
+            tick: Of the draws.
+            local: Coefficient of variation of the rates.
+            held: Chance of each sector that it does not advance, float32 [S].
+            sector: The sector of each cell, int64 [H, W].
+        """
+        draws = normal(key, tick, Stream.SECTORS, (SECTORS,)).clamp(-_WIDEST, _WIDEST)
+        chance = uniform(key, tick, Stream.HELD, (SECTORS,))
+        return Members(self.values, (log_deviation(local) * draws).exp(), chance < held, sector)
+
+    def part(self, members: slice) -> "Members":
+        """Return some of the members."""
+        local, held = (None if each is None else each[members] for each in (self.local, self.held))
+        return Members(self.values[members], local, held, self.sector)
+
+    def stopped(self, arrival: Tensor) -> Tensor:
+        """Return times of arrival where sectors are held, float32 [K, H, W], of members in which none was."""
+        if self.held is None or self.sector is None:
+            return arrival
+        held = self.held.index_select(1, self.sector.flatten()).view_as(arrival)
+        return arrival.masked_fill(held & (arrival > 0.0), NEVER)
+
+    @property
+    def open(self) -> "Members":
+        """Return the members as if no sector was held."""
+        return replace(self, held=None)
 
     def __len__(self) -> int:
         return len(self.values)
@@ -100,10 +110,6 @@ class Members:
         """Return the factors on the moisture of dead fuel, float32 [K]."""
         return self.values[:, 3].exp()
 
-    def taken(self, index: Tensor) -> "Members":
-        """Return the members of these places, int64 [K]."""
-        return Members(self.values[index])
-
     def fires(
         self,
         fire: RateFire,
@@ -122,16 +128,39 @@ class Members:
             half_way: See ``Fires``.
         """
         met = spells if not bool(self.values[:, 1:].any()) else [self._spell(fire, spell) for spell in spells]
-        rate = self.rate
+        rate = self._rates()
         return Fires(
             fire=fire,
             landscape=landscape,
             spells=met,
             cell_size=cell_size,
-            rate=rate if bool(self.values[:, 0].any()) else None,
-            swiftest=max(1.0, float(rate.max())),
+            rate=rate,
+            sector=self.sector,
+            swiftest=max(1.0, float(self.rate.max())),
             half_way=half_way,
         )
+
+    def pace(self, fire: RateFire, landscape: Landscape, spell: Spell, cell_size: float, window: Window) -> Tensor:
+        """Return the rate of each member's head over that of the law and the weather as given, float32 [K].
+
+        It is the median over the cells of a window that have fuel; 1 where none has.
+        """
+        fuel = window.cut(can_ignite(fire, landscape), False)
+        plain = spread_in(fire, landscape, cell_size, spell, window).head[0]
+        asked = fuel & (plain > 0.0)
+        if not bool(asked.any()):
+            return torch.ones(len(self))
+        heads = spread_in(fire, landscape, cell_size, self._spell(fire, spell), window).head
+        return self.rate * (heads[:, asked] / plain[asked]).median(1).values
+
+    def _rates(self) -> Tensor | None:
+        """Return the factors on the rates of each member, float32 [K], or by sector [K, S]; None where all are 1."""
+        rates = self.rate
+        if self.sector is not None:
+            rates = rates[:, None].expand(-1, SECTORS)
+            rates = rates if self.local is None else rates * self.local
+            rates = rates if self.held is None else torch.where(self.held, STOPPED, rates)
+        return rates if bool((rates != 1.0).any()) else None
 
     def _spell(self, fire: RateFire, spell: Spell) -> Spell:
         """Return a spell with the wind and the moisture of each member."""
@@ -145,20 +174,17 @@ class Members:
 
     def winds(self, wind: Tensor) -> Tensor:
         """Return each member's wind, float32 [K, 2] [m/s], from (u east, v north), float32 [2]."""
-        angle = torch.deg2rad(self.bearing)
-        east, north = wind
-        turned = torch.stack((east * angle.cos() + north * angle.sin(), north * angle.cos() - east * angle.sin()), 1)
-        found = turned * self.wind_speed[:, None]
+        found = turned(wind[None], -torch.deg2rad(self.bearing)) * self.wind_speed[:, None]
         speed = found.square().sum(1, keepdim=True).clamp(min=1e-12).sqrt()
         return found * (_STRONGEST / speed).clamp(max=1.0)
 
     def moistures(self, row: Tensor) -> Tensor:
         """Return each member's moistures, float32 [K, 7], from a row in the order of ``MOISTURES``, float32 [7].
 
-        The fine fuel moisture code stands for a moisture m = 147.2 (101 - F) / (59.5 + F) (Van Wagner 1987, eq. 1).
+        The fine fuel moisture code stands for a moisture m, F = 59.5 (250 - m) / (147.2 + m) (Van Wagner 1987, eq. 10).
         """
         found = row.expand(len(self), -1).clone()
         found[:, :_DEAD] = (found[:, :_DEAD] * self.moisture[:, None]).clamp(1.0, 200.0)
-        fine = 147.2 * (101.0 - row[_FFMC]) / (59.5 + row[_FFMC]) * self.moisture
+        fine = (59.5 * 250.0 - 147.2 * row[_FFMC]) / (59.5 + row[_FFMC]) * self.moisture
         found[:, _FFMC] = 59.5 * (250.0 - fine.clamp(max=250.0)) / (147.2 + fine)
         return found

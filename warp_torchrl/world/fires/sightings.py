@@ -1,16 +1,12 @@
-"""Likelihood of what was seen of a fire: perimeters, and hot spots of satellites.
+"""Growth of a fire's front by sector, as perimeters and hot spots of satellites show it.
 
-Around the middle of what had burned lie sectors of equal angle. In each one a member's growth is compared with what was
-seen. Its rates are wrong from place to place by a share of deviation s, apart from what they all are wrong by, and a
-front is known to half a cell:
-
-    ln((n_k + a) / (n + a)) is normal,    variance s^2 + q^2 / (n + a)^2
-
-of n cells seen to burn and n_k cells by member k; a is half of the f cells along the front, q^2 = f / 4 + 1 / 4. So a
-member is as wrong with half of the growth as with twice the growth, and a front that stays says little but that.
+Around the middle of what had burned lie sectors of equal angle. What is compared in each one is y = ln(n + a) of the n
+cells, or pixels, that were seen to burn, with a half of the f cells along the front: half a cell is what a front is
+known to. So a member is as wrong with half of the growth as with twice the growth, and a front that stays says little
+but that. The variance of y is q^2 / (n + a)^2, q^2 = f / 4 + 1 / 4.
 """
 
-import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
@@ -18,11 +14,7 @@ from torch import Tensor
 from torch.nn.functional import max_pool2d, pad
 
 from warp_torchrl.validation import check_fields
-
-LOCAL_DEVIATION = 0.3
-"""s: what is left of the error of a rate where the error of the whole fire is known."""
-SECTORS = 16
-_SURPRISE = 0.02  # likelihood, of the highest, of growth that no member can say: fought edges, wrong fuels
+from warp_torchrl.world.fires.sectors import by_sector, sectors_about
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,57 +68,66 @@ class Front:
         return self.burned & ~self.known
 
 
-def perimeter_likelihood(arrival: Tensor, front: Front) -> Tensor:
-    """Return the logarithm of the likelihood of a perimeter under each member, float32 [K].
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """Growth of a front in S sectors: what was seen, and how members are compared with it.
 
-    Args:
-        arrival: Minutes since the observation before, float32 [K, H, W].
-        front: What was seen.
+    Attributes:
+        seen: y, float32 [S].
+        none: What y is where nothing grew, float32 [S].
+        variance: Of y, by what is not seen, float32 [S].
+        sector: The sector of each cell, int64 [H, W].
+        of: Function from arrivals of members, float32 [K, H, W] [minutes since the observation before], to their y,
+            float32 [K, S].
     """
-    asked, edge = front.fuel & ~front.known, beside(front.known) & front.fuel
-    came = ((arrival <= front.minutes) & asked).to(torch.float32)
-    where = _sectors(front.known)
-    seen, along = (_by_sector(each.to(torch.float32)[None], where) for each in (front.growth & front.fuel, edge))
-    return _agreement(_by_sector(came, where), seen, along, (along + 1.0) / 4.0)
+
+    seen: Tensor
+    none: Tensor
+    variance: Tensor
+    sector: Tensor
+    of: Callable[[Tensor], Tensor]
 
 
-def hot_spot_likelihood(arrival: Tensor, hot: Tensor, front: Front, sensor: HotSpotSensor, cell_size: float) -> Tensor:
-    """Return the logarithm of the likelihood of hot spots under each member, float32 [K].
+def perimeter_sight(front: Front) -> Sight:
+    """Return the growth that a perimeter shows."""
+    where, asked = sectors_about(front.known), front.fuel & ~front.known
+    seen, along = (by_sector(each[None], where)[0] for each in (front.growth & front.fuel, beside(front.known) & asked))
+    half = along.clamp(min=1.0) / 2.0
 
-    What is compared are pixels in which nothing was known to have burned before; a member expects that they are marked
-    by ``detection`` where it burns there or did lately, else by ``false_alarm``. Chance adds n (1 - detection) to q^2.
+    def said(arrival: Tensor) -> Tensor:
+        return torch.log(by_sector((arrival <= front.minutes) & asked, where) + half)
+
+    variance = (along + 1.0) / 4.0 / (seen + half).square()
+    return Sight(torch.log(seen + half), torch.log(half), variance, where, said)
+
+
+def hot_spot_sight(front: Front, hot: Tensor, sensor: HotSpotSensor, cell_size: float) -> Sight:
+    """Return the growth that hot spots show, by the pixels in which nothing was known to have burned before.
+
+    A member expects that they are marked by ``detection`` where it burns there or did lately, else by ``false_alarm``.
+    Chance adds n (1 - detection) to q^2.
 
     Args:
-        arrival: Minutes since the observation before, float32 [K, H, W].
-        hot: Cells in which a hot spot lies, bool [H, W].
         front: What had burned, as hot spots show it.
+        hot: Cells in which a hot spot lies, bool [H, W].
         sensor: The satellite.
         cell_size: Side of a cell [m].
     """
     side = sensor.side(cell_size)
     known = pixels(front.known[None], side)
-    asked = pixels(front.fuel[None], side) & ~known
-    burns = (arrival <= front.minutes) & (arrival > front.minutes - 60.0 * sensor.lately) & front.fuel
-    chance = torch.where(pixels(burns, side), sensor.detection, sensor.false_alarm) * asked
-    where = _sectors(known[0])
-    seen = _by_sector((pixels(hot[None], side) & asked).to(torch.float32), where)
-    along = _by_sector((beside(known[0]) & asked).to(torch.float32), where)
-    return _agreement(_by_sector(chance, where), seen, along, (along + 1.0) / 4.0 + seen * (1.0 - sensor.detection))
-
-
-def _agreement(said: Tensor, seen: Tensor, along: Tensor, unsure: Tensor) -> Tensor:
-    """Return the logarithm of the likelihood of growth by sector, float32 [K].
-
-    Args:
-        said: n_k, float32 [K, S].
-        seen: n, float32 [1, S].
-        along: f, float32 [1, S].
-        unsure: q^2, float32 [1, S].
-    """
+    asked, where = pixels(front.fuel[None], side) & ~known, sectors_about(known[0])
+    planes = pixels(hot[None], side), beside(known[0]), torch.ones_like(known)
+    seen, along, all_of = (by_sector(each & asked, where)[0] for each in planes)
     half = along.clamp(min=1.0) / 2.0
-    variance = LOCAL_DEVIATION**2 + unsure / (seen + half).square()
-    off = torch.log((said + half) / (seen + half))
-    return torch.log(_SURPRISE + (1.0 - _SURPRISE) * torch.exp(-0.5 * off.square() / variance)).sum(1)
+
+    def said(arrival: Tensor) -> Tensor:
+        burns = (arrival <= front.minutes) & (arrival > front.minutes - 60.0 * sensor.lately) & front.fuel
+        chance = torch.where(pixels(burns, side), sensor.detection, sensor.false_alarm) * asked
+        return torch.log(by_sector(chance, where) + half)
+
+    variance = ((along + 1.0) / 4.0 + seen * (1.0 - sensor.detection)) / (seen + half).square()
+    none = torch.log(all_of * sensor.false_alarm + half)
+    return Sight(torch.log(seen + half), none, variance, sectors_about(front.known), said)
 
 
 def beside(cells: Tensor) -> Tensor:
@@ -140,20 +141,3 @@ def pixels(cells: Tensor, side: int) -> Tensor:
     height, width = cells.shape[1:]
     whole = pad(cells.to(torch.float32), (0, -width % side, 0, -height % side))
     return max_pool2d(whole[:, None], side, side)[:, 0] > 0.0
-
-
-def _sectors(known: Tensor) -> Tensor:
-    """Return the sector of each cell about the middle of some cells, int64 [H, W]; they may be none."""
-    height, width = known.shape
-    places = known.nonzero().to(torch.float32)
-    row, column = places.mean(0) if len(places) else torch.tensor([height / 2.0, width / 2.0])
-    south = torch.arange(height, device=known.device)[:, None] - row
-    east = torch.arange(width, device=known.device) - column
-    turn = torch.atan2(south, east) / (2.0 * math.pi) + 0.5
-    return (turn * SECTORS).to(torch.int64).clamp(0, SECTORS - 1)
-
-
-def _by_sector(values: Tensor, where: Tensor) -> Tensor:
-    """Return the sums of planes in each sector, float32 [K, S]."""
-    sums = torch.zeros(len(values), SECTORS, device=values.device)
-    return sums.index_add_(1, where.flatten(), values.flatten(1))
