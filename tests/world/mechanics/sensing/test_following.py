@@ -81,7 +81,7 @@ def test_a_targeted_watcher_goes_where_the_next_tick_is_uncertain_and_waits_ther
 
 def test_targeted_watchers_part():
     env = watched_forest(Team(n_agents=2, roles=("scout",)))
-    moves = told(env, [[9, 9], [9, 9]], fires={(9, 2): 40, (9, 16): 40}, name="targeted")
+    moves = told(env, [[9, 9], [9, 9]], fires={(9, 3): 40, (9, 16): 40}, name="targeted")
     west, east = (
         {Action.WEST, Action.NORTH_WEST, Action.SOUTH_WEST},
         {Action.EAST, Action.NORTH_EAST, Action.SOUTH_EAST},
