@@ -172,11 +172,15 @@ class Ensemble(Belief, Mechanic):
         return most_believed(state, self.threshold)
 
     def worth_seeing(self, state: WorldState, world: Rules) -> Tensor:
-        """Return the chance of each cell to burn, known and hidden, and a little for each that was long not seen."""
+        """Return the chance of each cell to burn, known and hidden, where smoke comes from that nobody explains, and a
+        little for each that was long not seen.
+        """
         beliefs, records = beliefs_of(state), kept(state)
         records = records.amax(dim=1, keepdim=True) if self.of == "team" else records
         p = known_probability(beliefs)
         burns = p * (1.0 - p) + hidden_probability(beliefs, fires_lit(world.lighting))
+        signs = world.sensing.signs(state, world.team, p)
+        burns = burns if signs is None else burns + signs
         return burns + _STALE * (1.0 - freshness(records, state.step))
 
     def futures(self, state: WorldState, world: Rules, count: int) -> WorldState:
