@@ -140,3 +140,10 @@ def test_it_saves_more_than_the_others(scenario: str, other: str, least: float) 
     env = make_env(scenario, n_worlds=32, seed=5_000_000)
     saved = {name: play(env, HEURISTICS[name](env), 5_000_000)["saved"].mean() for name in (other, "dispatch")}
     assert saved["dispatch"] > saved[other] + least
+
+
+@pytest.mark.parametrize("name", ["coordinated", "dispatch"])
+def test_agents_that_cannot_extinguish_leave_the_fire_to_those_that_can(name):
+    # The scout is nearer to the fire in the west, which the bulldozer takes.
+    env, state = scene("aT.......Ta" + " ..........." * 3, at=[(0, 2), (0, 3)], roles=("scout", "ugv"))
+    assert "WEST" in chosen(env, state, name)[1]

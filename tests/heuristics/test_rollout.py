@@ -14,6 +14,7 @@ from warp_torchrl import make_env
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.heuristics import Dispatch, Rollout
 from warp_torchrl.world.arrays import random
+from warp_torchrl.world.mechanics.sensing.sensing import Sight
 from warp_torchrl.world.state.state import Action, WorldState
 
 # The fire in the west has no neighbours; that in the middle ignites trees for certain at the next tick.
@@ -165,3 +166,32 @@ def test_it_plays_in_every_kind_of_world(overrides: tuple[str, ...]) -> None:
     action = policy(now)["agents", "action"]
     assert (mask.gather(-1, action[..., None])[..., 0] | (action == base)).all()
     env.step(now)
+
+
+def believing(
+    *at: tuple[int, int], drawing: str = TWO_FIRES, roles: tuple[str, ...] = ("ugv",)
+) -> tuple[WildfireEnv, WorldState]:
+    """The two fires, in a world whose agents are said to see little."""
+    env, state = scene(drawing, at=list(at), roles=roles)
+    env.world = replace(env.world, steps_per_tick=2, sensing=Sight())
+    return env, state
+
+
+class Near(Quick):
+    """The same for agents within three cells of a fire."""
+
+    near = 3
+
+
+def test_where_sight_is_limited_agents_plan_that_can_act_near_a_fire() -> None:
+    env, state = believing((0, 1))
+    assert plan(env, state, Near).tolist() == [[Action.EAST]]
+    env, state = believing((0, 1), (3, 7))
+    assert Near(env)._near_fire(state).tolist() == [[True, False]], "the fires are 4 columns from (3, 7)"
+    env, state = believing((0, 1), (0, 1), roles=("scout", "ugv"))
+    assert Near(env)._near_fire(state).tolist() == [[False, True]]
+
+
+def test_where_sight_is_limited_the_others_do_what_dispatch_does() -> None:
+    env, state = believing((1, 2), drawing="TTT~TTT TTT~TTa TTT~TTT TTTTTTT TTTTTTT")
+    assert plan(env, state, Near).tolist() == [[Action.SOUTH]], "around the lake"

@@ -48,7 +48,9 @@ def evaluate_policy(
     first, folder = run_config.evaluation.first_seed, folder.resolve()
     env, one = run_config.make_env(run_config.evaluation.episodes, first), run_config.make_env(1, first)
     name, mode, actor, filmed = _actors(run_config, found, env, one)
-    others = _baselines(run_config, env, [each for each in baselines_of(run_config.world) if each != found])
+    wanted = run_config.evaluation.baselines
+    beside = baselines_of(run_config.world) if wanted is None else dict.fromkeys(wanted)
+    others = _baselines(run_config, env, [each for each in beside if each != found])
     episodes = play(env, actor, first, mode, watch=True)
     learner, digest, frames, other_modes, left_out = None, "", None, {}, {}
     if isinstance(found, checkpoints.Checkpoint):

@@ -16,10 +16,13 @@ from warp_torchrl.heuristics.heuristic import Heuristic
 from warp_torchrl.world.arrays.listing import list_cells
 from warp_torchrl.world.state.state import WorldState
 
+LAST = 4096.0
+"""By how much less cells are worth to agents that cannot extinguish: they choose after the others."""
+
 
 class Coordinated(Heuristic):
     """Assigns distinct cells of the fire front to the agents by distance and fire risk, so that they spread around the
-    fire and attack its head first. Agents extinguish whatever they can reach.
+    fire and attack its head first. Agents extinguish whatever they can reach; those that cannot choose last.
     """
 
     risk_weight = 6.0  # value of fire risk 1 [cells of distance]
@@ -29,7 +32,9 @@ class Coordinated(Heuristic):
         value, front = self.value(state)
         cells, valid = list_cells(front)
         worth = value.flatten(1).gather(1, cells).masked_fill_(~valid, -math.inf)
-        claims = claim_cells(state, cells, worth[:, None], spacing=3, discount=6.0, taken=1000.0)
+        can = self.world.team.table(mask.device).can["extinguish"]
+        worth = worth[:, None] - LAST * (can.any() & ~can)[:, None]
+        claims = claim_cells(state, cells, worth, spacing=3, discount=6.0, taken=1000.0)
         return extinguish_or(move_towards(state, self.world, target_or_supply(state, self.world, claims)), mask)
 
     def value(self, state: WorldState) -> tuple[Tensor, Tensor]:

@@ -11,7 +11,7 @@ from warp_torchrl.heuristics.base import (
     place,
     target_or_base,
 )
-from warp_torchrl.heuristics.coordinated import Coordinated
+from warp_torchrl.heuristics.coordinated import LAST, Coordinated
 from warp_torchrl.heuristics.firebreaks import cells_to_clear
 from warp_torchrl.heuristics.paths import first_move, is_open, path_length
 from warp_torchrl.world.arrays.detours import moves_from
@@ -21,9 +21,6 @@ from warp_torchrl.world.state.state import Action, Cover, WorldState
 from warp_torchrl.world.team.abilities import AgentContext, Extinguish, own_cell
 from warp_torchrl.world.team.acting import is_second
 from warp_torchrl.world.team.supply import mark_base
-
-_LAST = 4096.0
-"""By how much less cells are worth to agents that cannot extinguish: they choose after the others."""
 
 
 class Dispatch(Coordinated):
@@ -59,7 +56,7 @@ class Dispatch(Coordinated):
         value, front = self.value(state)
         cells, valid = list_cells(front)
         gain = value.flatten(1).gather(1, cells)[:, None] - path_length(state, self.world, cells)
-        gain = gain - _LAST * ~table.can["extinguish"][:, None]
+        gain = gain - LAST * ~table.can["extinguish"][:, None]
         gain = gain.masked_fill(~valid[:, None] | (tank == 0)[..., None], -math.inf)
         claims = match_cells(state, cells, gain, spacing=3, discount=6.0, taken=1000.0)
         move = first_move(state, self.world, mask, self._target_or_water(state, claims, front))

@@ -5,10 +5,14 @@ from typing import ClassVar
 import torch
 from torch import Tensor
 
+from warp_torchrl.heuristics.base import distance_to_cells
 from warp_torchrl.heuristics.coordinated import Coordinated
+from warp_torchrl.heuristics.dispatch import Dispatch
 from warp_torchrl.heuristics.heuristic import Heuristic, Worlds
+from warp_torchrl.heuristics.seeking import can_act_on_fire
 from warp_torchrl.world.arrays.random import imagined_keys
 from warp_torchrl.world.fires.imagined import imagined, rules_in_sight
+from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.world import World
 
@@ -26,7 +30,8 @@ class Rollout(Heuristic):
     replaces that of the base policy if its mean gain is more than ``errors`` standard errors above 0, by the most.
 
     Where sight is limited futures begin with worlds that may be the true ones as far as the team knows
-    (``World.futures``).
+    (``World.futures``). There it improves ``Dispatch``, of agents that can act on fire and are ``near`` one that they
+    know; in the futures all then follow the base policy, which is faster.
 
     All actions are simulated in the first half of the futures, and only those with a gain there in the second.
 
@@ -41,6 +46,7 @@ class Rollout(Heuristic):
     """The base policy; it may read the state alone."""
     horizon: ClassVar[int] = 32  # steps
     samples: ClassVar[int] = 8  # imagined futures, at least 2
+    near: ClassVar[int] = 4  # cells
     errors: ClassVar[float] = 1.0  # standard errors that a gain must exceed
     cells: ClassVar[int] = 2**21
     """Of the worlds that are imagined at once; memory is bounded by it."""
@@ -48,17 +54,26 @@ class Rollout(Heuristic):
     def __init__(self, env: Worlds) -> None:
         super().__init__(env)
         self.policy = self.base(env)
+        self.dispatch = Dispatch(env)
 
     def choose(self, state: WorldState, mask: Tensor) -> Tensor:
         """Return the actions, int64 [B, A]."""
-        action = self.policy.choose(state, mask)
-        going = (~state.done).nonzero()[:, 0]
+        believes = self.world.sensing.is_limited and not self.sees_all
+        action = (self.dispatch if believes else self.policy).choose(state, mask)
+        plans = self._near_fire(state) if believes else torch.ones_like(action, dtype=torch.bool)
+        going = (~state.done & plans.any(dim=1)).nonzero()[:, 0]
         if not len(going):
             return action
-        return action.index_copy(0, going, self._plan(state[going], mask[going], action[going]))
+        tries = (mask & plans[..., None])[going]
+        return action.index_copy(0, going, self._plan(state[going], tries, action[going]))
+
+    def _near_fire(self, state: WorldState) -> Tensor:
+        """Return the agents that can act on fire, and are near one, bool [B, A]."""
+        burns = (distance_to_cells(state) <= self.near) & is_burning(state.cells)[:, None]
+        return burns.flatten(2).any(dim=2) & can_act_on_fire(self.world, burns.device)
 
     def _plan(self, state: WorldState, mask: Tensor, action: Tensor) -> Tensor:
-        """Return better actions than those of the base policy where there are any, int64 [B, A]."""
+        """Return better actions than these where there are any, int64 [B, A], of those that the mask allows."""
         keys = imagined_keys(state.key, state.step, self.samples)
         futures = imagined(self.world.futures(state, self.samples), keys.flatten(), self.world)
         saved = self._imagine(futures, torch.arange(len(action), device=action.device), action, range(self.samples))

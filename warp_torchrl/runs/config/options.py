@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.runs.config.seeds import BEYOND_EVALUATION, FIRST_EVALUATED
-from warp_torchrl.validation import check_fields
+from warp_torchrl.validation import check_fields, did_you_mean
 from warp_torchrl.world.ensemble.parameters import Deviations
 from warp_torchrl.world.fires.sightings import HotSpotSensor
 
@@ -46,22 +47,28 @@ class EvaluationConfig:
         episodes: Worlds.
         first_seed: Seed of the first; training has those below 1 000 000 and from 2^61 on.
         mode: ``sampled``, ``deterministic``, or ``best``: whichever did better on training seeds.
+        baselines: Heuristics beside which the policy is shown; None: those of its worlds.
         leave_one_out: Play once more for each agent, without it, to see what it is worth.
         cache: Keep the baselines' episodes in ``~/.cache/warp_torchrl`` (or ``XDG_CACHE_HOME``), and read those kept.
 
     Raises:
-        ValueError: If a value is out of its range.
+        ValueError: If a value is out of its range or a baseline is unknown.
     """
 
     interval: int = 0
     episodes: int = 256
     first_seed: int = FIRST_EVALUATED
     mode: Literal["sampled", "deterministic", "best"] = "best"
+    baselines: tuple[str, ...] | None = None
     leave_one_out: bool = False
     cache: bool = True
 
     def __post_init__(self) -> None:
         check_fields(self)
+        for name in self.baselines or ():
+            if name not in HEURISTICS:
+                hint = did_you_mean(name, list(HEURISTICS))
+                raise ValueError(f"baselines must be of {', '.join(HEURISTICS)}, got {name}{hint}")
         if self.interval < 0:
             raise ValueError(f"interval must be 0 or more frames, got {self.interval}")
         if not 1 <= self.episodes <= 1_000_000:

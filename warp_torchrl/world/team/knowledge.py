@@ -42,6 +42,19 @@ class Sensing(ABC):
         The places are int64 [B, A or 1, A, 2], (row, column) [cells]: [b, i, j] is where agent i takes agent j to be.
         """
 
+    def signs(self, state: WorldState, team: Team, known: Tensor) -> Tensor | None:
+        """Return how much points to a fire at each cell that is not known, float32 [B, G, H, W] in 0..1.
+
+        None where nothing does.
+
+        Args:
+            state: The worlds.
+            team: The vehicles.
+            known: How likely each cell burns by the fires that are known, float32 [B, G, H, W]: to the team, or to each
+                agent.
+        """
+        return None
+
 
 @dataclass(frozen=True, kw_only=True)
 class Full(Sensing):

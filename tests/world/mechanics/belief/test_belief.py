@@ -116,6 +116,12 @@ def test_worth_seeing_is_doubt_and_staleness():
     assert worth[0, 0, 1, 4:].tolist() == pytest.approx([0.001, 0.251])
 
 
+def test_smoke_without_a_known_fire_is_worth_seeing():
+    world = rules(belief=Ensemble(members=2, hidden=0), sight={"smoke": 100.0})
+    state = drawn_world(world, (0, 2), (2, 2), drawing="aTTTTT TTTTTT TTTTTT", wind=(5.0, 0.0))
+    assert world.worth_seeing(state)[0, 0, 0].argmax() < 3 and (world.worth_seeing(state)[0, 0, 0, :3] > 0.3).all()
+
+
 def test_how_well_beliefs_fit_is_measured():
     world = rules(belief=Ensemble(members=4, hidden=0, particles=16, **UNKNOWN))
     state = reset(world)

@@ -93,6 +93,20 @@ def test_smoke_hides_cells_by_the_law_of_beer_and_lambert():
     assert (freshness(kept(state), state.step)[:, 0, 1] == 1.0).all(), "where no smoke is"
 
 
+def test_smoke_that_no_known_fire_explains_points_to_its_source():
+    # The fire at (0, 0) hides (0, 1) and (0, 2), which agent 0 would see: 1/2 + 1/3 point to (0, 0), upwind of both.
+    sight = Sight(radius=1, smoke=100.0, smoke_length=2)
+    state = started(sight, TWO, [(0, 2), (2, 6)], "aTTTTTT TTTTTTT TTTTTTT", wind=(5.0, 0.0))
+    nothing = torch.zeros(1, 2, 3, 7)
+    own, others = sight.signs(state, TWO, nothing)[0]
+    assert own[0].tolist() == [pytest.approx(5 / 6), 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]
+    assert not own[1:].any() and not others.any()
+    assert torch.equal(sight.signs(state, TWO, nothing[:, :1])[0, 0], own), "of a team, what any agent would see"
+    known = nothing.index_fill(3, torch.tensor([0]), 1.0)
+    assert not sight.signs(state, TWO, known).any(), "a known fire explains it"
+    assert Sight(radius=1).signs(state, TWO, nothing) is None
+
+
 @pytest.mark.parametrize(
     ("wrong", "rule"),
     [

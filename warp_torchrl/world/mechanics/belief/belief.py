@@ -206,10 +206,15 @@ class Ensemble(Belief, Mechanic):
         return in_parameters(believed, world.fire, mean)
 
     def worth_seeing(self, state: WorldState, world: Rules) -> Tensor:
-        """Return the chance of each cell to burn, known and hidden, and a little for each that was long not seen."""
+        """Return the chance of each cell to burn, known and hidden, where smoke comes from that nobody explains, and a
+        little for each that was long not seen.
+        """
         beliefs, records = beliefs_of(state), self._records(state)
         p = known_probability(beliefs)
-        return p * (1.0 - p) + beliefs.unseen + _STALE * (1.0 - freshness(records, state.step))
+        burns = p * (1.0 - p) + beliefs.unseen
+        signs = world.sensing.signs(state, world.team, p)
+        burns = burns if signs is None else burns + signs
+        return burns + _STALE * (1.0 - freshness(records, state.step))
 
     def burn_chance(self, state: WorldState, world: Rules) -> Tensor:
         """Return the chance of each cell to burn, by fires known and hidden, float32 [B, G, H, W]."""

@@ -10,7 +10,7 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.mechanics.mechanic import Mechanic, Metric, Rules
-from warp_torchrl.world.mechanics.sensing.smoke import smoke
+from warp_torchrl.world.mechanics.sensing.smoke import drifted, smoke, sources
 from warp_torchrl.world.mechanics.sensing.watching import (
     Memory,
     at_start,
@@ -19,13 +19,16 @@ from warp_torchrl.world.mechanics.sensing.watching import (
     unwatched,
 )
 from warp_torchrl.world.state.cells import is_burning, is_tree
-from warp_torchrl.world.state.records import KNOWLEDGE, freshness, kept, kinds, read, recorded
+from warp_torchrl.world.state.records import KNOWLEDGE, freshness, kept, kinds, read, recorded, steps_since
 from warp_torchrl.world.state.role import ROLES
 from warp_torchrl.world.state.state import FIRST_FIRE, WorldState
 from warp_torchrl.world.team.hearing import Hearing
 from warp_torchrl.world.team.knowledge import Sensing
 from warp_torchrl.world.team.places import in_reach
 from warp_torchrl.world.team.team import Team
+
+_EXPLAINED = 0.05
+"""Smoke of known fires that is enough to hide a cell."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,6 +100,21 @@ class Sight(Sensing, Mechanic):
         sees, hears = others_in_sight(state, self.reach(team)), hearing.arriving(state, _flies(state, team))
         here, then = state.vehicles.position[:, None], hearing.places(state)[:, None]
         return hears | sees, torch.where(sees[..., None], here, then)
+
+    def signs(self, state: WorldState, team: Team, known: Tensor) -> Tensor | None:
+        """Return where smoke may come from that no known fire explains, float32 [B, G, H, W]; None without smoke.
+
+        A cell within reach that nobody sees lies in smoke: something burns there or upwind of it, see ``sources``.
+        """
+        if self.smoke == 0.0:
+            return None
+        groups, wind = known.shape[1], state.wind.repeat_interleave(known.shape[1], dim=0)
+        reach, unseen = in_reach(state, self.reach(team)), steps_since(kept(state), state.step) > 0
+        if groups == 1:
+            reach, unseen = reach.any(dim=1, keepdim=True), unseen.all(dim=1, keepdim=True)
+        unexplained = drifted(known.flatten(0, 1), wind, self.smoke_length) < _EXPLAINED
+        hidden = (reach & unseen).flatten(0, 1) & unexplained
+        return sources(hidden, wind, self.smoke_length).unflatten(0, (-1, groups))
 
     def why_eager(self) -> str | None:
         """Return that steps of agents that do not see all are not compiled."""
