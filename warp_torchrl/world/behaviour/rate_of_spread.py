@@ -202,7 +202,9 @@ def _canopy(given: Mapping[str, object] | None) -> dict[str, Tensor]:
         raise ValueError(f"canopy must be a mapping of numbers by name, got {given!r}")
     for name in given:
         if name not in _CANOPY:
-            raise ValueError(f"canopy must have some of {', '.join(_CANOPY)}, got {name!r}{did_you_mean(name, _CANOPY)}")
+            raise ValueError(
+                f"canopy must have some of {', '.join(_CANOPY)}, got {name!r}{did_you_mean(name, _CANOPY)}"
+            )
     for needed in (("cover", "height"), _CROWNS if any(name in given for name in _CROWNS) else ()):
         if missing := [name for name in needed if name not in given]:
             raise ValueError(f"canopy must have {' and '.join(missing)}, got {', '.join(given) or 'nothing'}")
