@@ -46,7 +46,10 @@ def test_the_example_of_the_fire_alone_runs(capsys):
 
 def test_the_example_of_a_prediction_runs(capsys):
     names: dict = {}
-    exec(blocks("prediction.md")[0], names)
+    crowns, example = blocks("prediction.md")
+    exec(crowns, names)
+    assert capsys.readouterr().out.startswith("[0.0, 1.0, 2.0] ")
+    exec(example, names)
     assert re.fullmatch(r"after an hour: \d+ ha, 5 % to 95 %: \d+ to \d+ ha\n", capsys.readouterr().out)
     assert names["prediction"].burn_probability[40, 10] == 1.0
 

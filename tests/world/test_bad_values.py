@@ -144,6 +144,8 @@ def test_every_field_with_a_range_is_in_the_list() -> None:
         (Array, "fuel"),
         (Array, "canopy_cover"),
         (Array, "canopy_height"),
+        (Array, "canopy_base_height"),
+        (Array, "canopy_bulk_density"),
         (Array, "row"),
         (Array, "column"),
         (Team, "allow_stay"),
@@ -191,6 +193,8 @@ def test_every_field_with_a_range_is_in_the_list() -> None:
         ("canopy_cover", [[NAN] * 5] * 4),
         ("canopy_height", [[-1.0] * 5] * 4),
         ("canopy_height", [[151.0] * 5] * 4),
+        ("canopy_base_height", [[-0.1] * 5] * 4),
+        ("canopy_bulk_density", [[12.0] * 5] * 4),
     ],
 )
 def test_a_bad_layer_of_an_array_is_an_error_that_names_it(field: str, value: Any) -> None:

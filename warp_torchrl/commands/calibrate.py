@@ -30,6 +30,7 @@ from warp_torchrl.runs.output import output_folder
 from warp_torchrl.system import disk
 from warp_torchrl.system.provenance import Provenance, gathered, report_file, section
 from warp_torchrl.world.law.rate import RateFire
+from warp_torchrl.world.terrain.layers import CanopyUnits
 
 log = logging.getLogger("warp_torchrl")
 
@@ -59,10 +60,13 @@ def _run(arguments: Sequence[str]) -> None:
     folder = Path(options.out or datetime.now().strftime(f"outputs/calibrations/%Y-%m-%d/%H-%M-%S-{os.getpid()}"))
     with output_folder(folder, "out", overwrite=options.overwrite, last=REPORT, replaced=OUTPUTS) as draft:
         with gathered() as files:
-            cases = [read_fire_case(each, options.hours, options.units) for each in options.fires]
+            canopy = CanopyUnits(options.height_unit, options.density_unit)
+            cases = [read_fire_case(each, options.hours, options.units, canopy) for each in options.fires]
             for case in cases:
                 check_fuel_codes(case, fire)
                 report_file(_of_map(case, fire))
+                if lack := fire.bed.lack_of_canopy(case.landscape):
+                    log.warning("%s: %s", case.name, lack)
         _check_names(cases)
         check_not_in_weather(parameters, cases)
         rows = {case.name: _before(fire, case, options) for case in cases}

@@ -51,7 +51,7 @@ log = logging.getLogger("warp_torchrl")
 _GROUPS = ("landscape", "fire")
 REPORT = "report.json"
 OUTPUTS = (
-    *("burn_probability.tif", "arrival_hours.tif", "rate.tif", "intensity.tif", "flame_length.tif"),
+    *("burn_probability.tif", "arrival_hours.tif", "rate.tif", "intensity.tif", "flame_length.tif", "crown.tif"),
     *("perimeters.geojson", MAPS_FIGURE, "fire.gif", "report.md", FIGURE, SCORES),
 )
 """What an earlier prediction may have left, beside its report."""
@@ -215,7 +215,7 @@ def _report(
 ) -> dict[str, Any]:
     from warp_torchrl import __version__
 
-    found = report_numbers(prediction)
+    found, lack = report_numbers(prediction), case.fire.bed.lack_of_canopy(case.ground)
     known = [each.name for each in fields(case.weather) if getattr(case.weather, each.name) is not None]
     inputs = {
         "landscape": values["landscape"].get("path"),
@@ -235,7 +235,7 @@ def _report(
         "title": f"Prediction from {values['landscape'].get('path') or 'a map'}",
         "version": __version__,
         **found,
-        "warnings": warnings(found, lasting(case.weather, case.start)),
+        "warnings": [*warnings(found, lasting(case.weather, case.start)), *([lack] if lack else [])],
         "inputs": inputs,
         "files": [each.as_values for each in files],
         "configuration": without_targets(values),

@@ -27,7 +27,7 @@ class Count:
 
     window: Window
     came: Tensor  # how many fires came, float32 [h, w]
-    sums: Tensor  # over them of rate [m/min], intensity [kW/m] and flame length [m], float32 [3, h, w]
+    sums: Tensor  # over them of rate [m/min], intensity [kW/m], flame length [m], and more: ``passing``; [3 or 5, h, w]
     times: Tensor  # when each fire came, int16 [b, h, w]
     area: Tensor  # burned by each hour, float32 [b, T] [ha]
     final: Tensor  # burned in the end, float32 [b] [ha]
@@ -105,12 +105,12 @@ class Counter:
         return torch.where(came, steps, LATE).to(torch.int16)
 
     def _sums(self, arrival: Tensor, burned: Burned) -> Tensor:
-        """Return the sums of rate, intensity and flame length over the fires, float32 [3, h, w].
+        """Return the sums of what ``passing`` returns over the fires, float32 [3, h, w], or 5 with crown fire.
 
         Where a fire did not come, or was lit, it adds 0.
         """
         cells = ((arrival > 0.0) & (arrival < NEVER / 2)).flatten().nonzero()[:, 0]
-        count, sums = len(cells), torch.zeros(3, *arrival.shape[1:])
+        count, sums = len(cells), torch.zeros(5 if self.fires.runs_in_crowns else 3, *arrival.shape[1:])
         if not count:
             return sums
         cells = torch.cat((cells, cells[:1].expand(-count % COLUMNS)))  # vectors that are filled
@@ -130,7 +130,7 @@ class Counter:
         place = cells % window.cells + cells // window.cells // fires_each * window.cells
         spell = torch.bucketize(times, self._ends).clamp(max=len(self._ends) - 1)
         order = spell.argsort()
-        found = torch.empty(4, len(place))
+        found = torch.empty(5 if self.fires.runs_in_crowns else 4, len(place))
         for part in order.split(torch.bincount(spell).tolist()):
             if len(part):
                 heads = burned.fires.planes(int(spell[part[0]]), window)[:, 3:].transpose(0, 1)

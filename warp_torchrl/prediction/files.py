@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.env.pictures.maps import MapPanel, save_maps
-from warp_torchrl.prediction.predict import Prediction
+from warp_torchrl.prediction.predict import CROWN_MAPS, Prediction
 from warp_torchrl.system import disk
 from warp_torchrl.world.terrain.geotiff import write_geotiff
 from warp_torchrl.world.terrain.grid import Grid
@@ -28,6 +28,7 @@ class MapPlace:
 
 def layers(prediction: Prediction) -> dict[str, dict[str, Tensor]]:
     """Return the bands of each GeoTIFF by the file's name; times in hours."""
+    crowns = {name: getattr(prediction, name) for name in CROWN_MAPS} if prediction.has_crowns else {}
     return {
         "burn_probability": {"burn_probability": prediction.burn_probability},
         "arrival_hours": {
@@ -38,6 +39,7 @@ def layers(prediction: Prediction) -> dict[str, dict[str, Tensor]]:
         "rate": {"rate_m_min": prediction.rate},
         "intensity": {"intensity_kw_m": prediction.intensity},
         "flame_length": {"flame_length_m": prediction.flame_length},
+        **({"crown": crowns} if crowns else {}),
     }
 
 
@@ -92,6 +94,8 @@ def panels(prediction: Prediction) -> list[MapPanel]:
         "flame length": (maps["flame_length"], "m"),
     }
     seen = maps["burn_probability"].masked_fill(maps["burn_probability"] == 0.0, torch.nan)
+    if prediction.has_crowns:
+        amounts = {**amounts, "crown fire": (maps["crown_fire"], "share of the fires that came")}
     chance = MapPanel(
         title=f"burn probability, {len(prediction.followed)} fires", values=seen, label="share of the fires"
     )

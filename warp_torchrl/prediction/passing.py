@@ -26,10 +26,14 @@ class HeadBehaviour:
     backing: Tensor  # and of the rear
     intensity: Tensor  # fireline intensity at the head [kW/m]
     flame_length: Tensor  # at the head [m]
+    kind: Tensor | None = None  # of fire: 0 surface, 1 passive crown fire, 2 active; None where crowns are not known
 
 
-def passing(steep: Tensor, pace: Tensor, then: HeadBehaviour, cell_size: float) -> tuple[Tensor, Tensor, Tensor]:
+def passing(steep: Tensor, pace: Tensor, then: HeadBehaviour, cell_size: float) -> tuple[Tensor, ...]:
     """Return rate [m/min], intensity [kW/m] and flame length [m] of fires on arrival, float32 of one shape.
+
+    Where crowns are known, then whether the fire was in them, and whether as active crown fire, 0 or 1: as at the head
+    in the weather of the arrival.
 
     The rate is held between those of the rear and of the head in the weather of the arrival: near its start a fire is
     smaller than a cell, and differences between cells do not give its rate.
@@ -43,7 +47,8 @@ def passing(steep: Tensor, pace: Tensor, then: HeadBehaviour, cell_size: float) 
     rate = cell_size / steep.clamp(min=_LEAST)
     rate = torch.minimum(torch.maximum(rate, then.backing / pace), then.head / pace)
     share = rate / then.head.clamp(min=_LEAST)
-    return rate, then.intensity * share, then.flame_length * share.pow(0.46)
+    found = rate, then.intensity * share, then.flame_length * share.pow(0.46)
+    return found if then.kind is None else (*found, (then.kind > 0.0).to(rate.dtype), (then.kind > 1.0).to(rate.dtype))
 
 
 def steepness(arrival: Tensor) -> Tensor:

@@ -21,6 +21,8 @@ from warp_torchrl.world.weather.table import WeatherTable, read_weather
 
 _NOWHERE = {"burn_probability": 0.0}
 """What maps hold where no fire came; the others hold NaN."""
+CROWN_MAPS = ("crown_fire", "active_crown_fire")
+"""Maps of fires that ran in crowns, where the ground knows them."""
 _LARGEST_SEED = 2**62
 _LONGEST = 1e8  # minutes: two centuries
 
@@ -81,6 +83,21 @@ class Prediction:
     def flame_length(self) -> Tensor:
         """Return the mean flame length on arrival [m], float32 [H, W]."""
         return self._map("flame_length")
+
+    @property
+    def has_crowns(self) -> bool:
+        """Return whether the ground knows its crowns, so that fires may run in them."""
+        return all(name in self.seen for name in CROWN_MAPS)
+
+    @property
+    def crown_fire(self) -> Tensor:
+        """Return the share of the fires that came which ran in crowns, float32 [H, W]; NaN where none came."""
+        return self._map("crown_fire")
+
+    @property
+    def active_crown_fire(self) -> Tensor:
+        """Return the share of the fires that came which were active crown fire, float32 [H, W]."""
+        return self._map("active_crown_fire")
 
     @property
     def first_fire(self) -> Tensor:
@@ -172,7 +189,7 @@ def predict(
 
 
 def _prediction(tally: Tally, count: Counter) -> Prediction:
-    times, (rate, intensity, flame_length) = tally.arrivals(), tally.means()
+    times, (rate, intensity, flame_length, *crowns) = tally.arrivals(), tally.means()
     window, fires = tally.window.on_map, count.fires
     lit = tally.window.cut(count.lit, False)
     maps = {
@@ -185,6 +202,7 @@ def _prediction(tally: Tally, count: Counter) -> Prediction:
         "intensity": intensity.masked_fill(lit, torch.nan),
         "flame_length": flame_length.masked_fill(lit, torch.nan),
         "first_fire": tally.first,
+        **{name: each.masked_fill(lit, torch.nan) for name, each in zip(CROWN_MAPS, crowns, strict=False)},
     }
     return Prediction(
         window=window,

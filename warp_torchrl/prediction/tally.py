@@ -36,7 +36,7 @@ class Tally:
         self._fires, self._minutes = fires, minutes
         self._counts: list[Count] = []
         self._window: Window | None = None
-        self._came, self._sums = torch.zeros(0, 0), torch.zeros(3, 0, 0)
+        self._came, self._sums = torch.zeros(0, 0), torch.zeros(0, 0, 0)
 
     def add(self, count: Count) -> None:
         """Add the counts of some fires.
@@ -45,7 +45,7 @@ class Tally:
             ValueError: If the times of all fires do not fit in memory.
         """
         self.check(count.window)
-        self._reach(count.window)
+        self._reach(count.window, len(count.sums))
         place = count.window.place_in(self.window)
         self._came[place] += count.came
         self._sums[(slice(None), *place)] += count.sums
@@ -75,7 +75,7 @@ class Tally:
         return self._came / sum(len(count.left) for count in self._counts)
 
     def means(self) -> list[Tensor]:
-        """Return the mean rate, intensity and flame length over the fires that came, float32 [h, w], NaN for none."""
+        """Return the means of ``Count.sums`` over the fires that came, float32 [h, w] each, NaN for none."""
         return [torch.where(self._came > 0.0, part / self._came, torch.nan) for part in self._sums]
 
     def arrivals(self) -> ArrivalQuantiles:
@@ -104,11 +104,11 @@ class Tally:
             size = f"{window.height} x {window.width}"
             raise memory.too_little(f"the arrival times of {left} fires in {size} cells", wanted, there)
 
-    def _reach(self, window: Window) -> None:
-        """Make room for a window."""
+    def _reach(self, window: Window, n_sums: int) -> None:
+        """Make room for a window of some sums."""
         if self._window is None:
             self._window = window
-            self._came, self._sums = (torch.zeros(*n, window.height, window.width) for n in ((), (3,)))
+            self._came, self._sums = (torch.zeros(*n, window.height, window.width) for n in ((), (n_sums,)))
             return
         before, self._window = self._window, self._window.joined(window)
         if self._window != before:

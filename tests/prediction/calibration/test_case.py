@@ -9,6 +9,7 @@ import torch
 from warp_torchrl.prediction.calibration.case import read_fire_case
 from warp_torchrl.prediction.calibration.fitting import check_fuel_codes
 from warp_torchrl.world.law.rate import RateFire
+from warp_torchrl.world.terrain.layers import CanopyUnits
 
 rasterio = pytest.importorskip("rasterio", reason="rasters need the extra gis")
 warp = pytest.importorskip("rasterio.warp")
@@ -132,6 +133,22 @@ def test_what_nobody_reads_is_named(fire):
     perimeters(fire, {"hours": 1})
     tif(fire / "canopy.tif", np.full((SIDE, SIDE), 50))
     assert read_fire_case(fire).files[-1] == "files of small that are not read: canopy.tif"
+
+
+def test_a_canopy_is_read_by_its_names_and_units(fire):
+    perimeters(fire, {"hours": 1})
+    plane = np.full((SIDE, SIDE), 50)
+    for name in ("canopy_cover", "canopy_height", "canopy_base_height", "canopy_bulk_density"):
+        tif(fire / f"{name}.tif", plane)
+    case = read_fire_case(fire, canopy=CanopyUnits(height=0.1, density=0.01))
+    expected = {"canopy_cover": 50.0, "canopy_height": 5.0, "canopy_base_height": 5.0, "canopy_bulk_density": 0.5}
+    assert {name: float(case.landscape.layer(name).unique()) for name in expected} == expected
+    assert "canopy_bulk_density: canopy_bulk_density.tif [0.01 kg/m3]" in case.files
+    with pytest.raises(ValueError, match=r"^small: height_unit must be given with canopy_height, 0.1 for LANDFIRE"):
+        read_fire_case(fire)
+    (fire / "canopy_height.tif").unlink()
+    with pytest.raises(ValueError, match=r"^small: canopy_base_height must be given with canopy_height, by which"):
+        read_fire_case(fire, canopy=CanopyUnits(0.1, 0.01))
 
 
 @pytest.mark.parametrize("kind", ["asc", "tif"])

@@ -10,6 +10,7 @@ from warp_torchrl.world.behaviour.fuel_models import FuelModel
 
 LOW = {"dead_1h": 6, "dead_10h": 7, "dead_100h": 8, "live_herbaceous": 60, "live_woody": 90}
 HEATH = {"depth": 1.0, "extinction_moisture": 25, "load_1h": 1.5, "load_live_woody": 2.0, "sav_1h": 2200}
+TREES = {"cover": 50, "height": 20}
 FIELDS = ("head", "direction", "length_to_breadth", "intensity", "flame_length")
 
 
@@ -91,9 +92,9 @@ def test_the_height_of_the_wind_matters():
     assert heights == sorted(heights) and heights[0] < 0.95 * heights[1] < 0.95 * heights[2]
     same = ask(wind=(5.75, 270.0))  # 5 m/s at 20 ft are 5.75 m/s at 10 m
     assert float(same.head) == pytest.approx(heights[1], rel=1e-5)
-    assert ask(canopy_cover=60, canopy_height=15).head < ask().head
-    sparse = {"canopy_cover": 60, "canopy_height": 15}
-    assert ask(**sparse, crown_ratio=0.4).head > ask(**sparse).head, "short crowns let more wind through"
+    trees = {"cover": 60, "height": 15}
+    assert ask(canopy=trees).head < ask().head
+    assert ask(canopy={**trees, "crown_ratio": 0.4}).head > ask(canopy=trees).head, "short crowns let more wind through"
 
 
 def test_own_fuel_models_by_code():
@@ -141,9 +142,14 @@ REFUSED = [
     ({"moisture": {"dead_10h": 6, "live_herbaceous": 60}}, "moisture must have dead_1h, got dead_10h, live_herbaceous"),
     ({"moisture": 6}, "moisture must be a mapping of per cent by name, got 6"),
     ({"wind_height": "10 m"}, "wind_height must be 10m, 20ft, midflame, got '10 m'"),
-    ({"canopy_cover": 50}, "canopy_height must be given with canopy_cover, got none"),
-    ({"canopy_height": 20}, "canopy_cover must be given with canopy_height and crown_ratio, got none"),
-    ({"canopy_cover": 50, "canopy_height": 20, "wind_height": "midflame"}, "canopy_cover must be left out where"),
+    ({"canopy": {"cover": 50}}, "canopy must have height, got cover"),
+    ({"canopy": {"height": 20, "crown_ratio": 0.5}}, "canopy must have cover, got height, crown_ratio"),
+    ({"canopy": {**TREES, "base_height": 2}}, "canopy must have bulk_density, got cover, height, base_height"),
+    ({"canopy": {**TREES, "density": 0.1}}, "bulk_density, foliar_moisture, got 'density'"),
+    ({"canopy": {**TREES, "bulk_density": 12, "base_height": 2}}, "canopy.bulk_density must be in [0, 2], got 12"),
+    ({"canopy": 50}, "canopy must be a mapping of numbers by name, got 50"),
+    ({"canopy": TREES, "wind_height": "midflame"}, "canopy must be left out where wind_height is midflame, got one"),
+    ({"crown": "van_wagner"}, "crown must be cruz, rothermel, none, got 'van_wagner'"),
     ({"fuel": [101, 102], "slope": [1, 2, 3]}, "shapes must broadcast to one, got fuel (2,), slope (3,)"),
     ({"model": "fbp", "fuel": 2, "wind_height": "midflame"}, "moisture must have some of ffmc, bui for this model"),
 ]
@@ -186,7 +192,7 @@ def test_every_canadian_name_is_a_fuel_that_burns(canadian):
     "given, message",
     [
         ({"wind_height": "midflame"}, "wind_height must be 10m or 20ft for fbp"),
-        ({"canopy_cover": 50, "canopy_height": 10}, "canopy_cover must be left out for fbp"),
+        ({"canopy": TREES}, "canopy must be left out for fbp"),
         ({"moisture": {"ffmc": 90}}, "moisture must have bui for fbp, got ffmc"),
         ({"fuel": [2, 10]}, "fuel must be codes of fbp, got 10"),
         ({"fuel": "C-8"}, "fuel must be names of fbp, got 'C-8': did you mean"),

@@ -35,12 +35,12 @@ def map_of(*shape):
 def test_gs4_in_a_cross_wind_as_behaveplus_tells():
     # firelab/behave, testBehave: 5 mph at 20 ft across a slope of 30 %, under 50 % cover of 30 ft and a crown ratio of
     # 0.5: 7.091665 chains/h. A wind across the slope does not rise, so that the wind's stretch does not matter.
-    canopy = {"canopy_cover": 50, "canopy_height": 30 * 0.3048, "crown_ratio": 0.5}
+    canopy = {"cover": 50, "height": 30 * 0.3048, "crown_ratio": 0.5}
     slope = math.degrees(math.atan(0.3))
-    across = ask(wind=(5 * MPH, 90), slope=slope, wind_height="20ft", **canopy)
+    across = ask(wind=(5 * MPH, 90), slope=slope, wind_height="20ft", canopy=canopy)
     assert float(across.head) / CHAIN_PER_HOUR == pytest.approx(7.091665, rel=1e-3)
     # Upslope it tells 8.876216; ours is 1.6 % more, for the wind is 4.4 % more along the slope than over the map.
-    upslope = ask(wind=(5 * MPH, 0), slope=slope, wind_height="20ft", **canopy)
+    upslope = ask(wind=(5 * MPH, 0), slope=slope, wind_height="20ft", canopy=canopy)
     assert float(upslope.head) / CHAIN_PER_HOUR == pytest.approx(8.876216, rel=0.02)
     assert float(upslope.direction) == pytest.approx(180.0)
 

@@ -17,5 +17,7 @@ def test_the_rear_goes_slower_by_the_eccentricity(ratio, rear):
         length_to_breadth=ratio * cell,
         intensity=3000.0 * cell,
         flame_length=2.0 * cell,
+        kind=cell,
     )
     assert heads(spread).flatten().tolist() == pytest.approx([10.0, rear, 3000.0, 2.0], abs=1e-3)
+    assert heads(spread, with_kind=True).flatten().tolist()[4:] == [1.0]

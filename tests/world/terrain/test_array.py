@@ -188,12 +188,15 @@ def test_a_window_has_the_assets_of_its_cells() -> None:
 def test_a_window_has_the_fuel_and_canopy_of_its_cells() -> None:
     place = np.arange(80.0).reshape(8, 10)
     planes = {"fuel": 101 + place, "canopy_cover": place, "canopy_height": place / 4}
+    planes |= {"canopy_base_height": place / 8, "canopy_bulk_density": place / 64}
     ground = Array(cover=np.full((8, 10), 3), **planes, size=4, row=2, column=5)(keys(2))
-    types = {"fuel": torch.int16, "canopy_cover": torch.float32, "canopy_height": torch.float32}
     for name, values in planes.items():
         plane = ground.layer(name)
-        assert plane.dtype == types[name] and plane[1].tolist() == values[2:6, 5:9].tolist()
+        assert plane.dtype == (torch.int16 if name == "fuel" else torch.float32)
+        assert plane[1].tolist() == values[2:6, 5:9].tolist()
     assert Array(cover=np.full((8, 10), 3))(keys(1)).layer("fuel") is None
+    with pytest.raises(ValueError, match=r"^canopy_bulk_density must be given with canopy_height and"):
+        Array(cover=np.full((8, 10), 3), canopy_bulk_density=place / 64, canopy_cover=place)
 
 
 def test_fuel_tells_arrays_apart_and_comes_from_files_too(tmp_path: Path) -> None:

@@ -70,24 +70,44 @@ def ground(folder, **fields):
 
 # --- Rasters of fuel, canopy and elevation
 
-LANDFIRE = ("US_ELEV2020", "US_SLPD2020", "US_ASP2020", "LC22_F40_230", "LC22_CC_230", "LC22_CH_230", "LC22_CBH_230")
+LANDFIRE = (
+    "US_ELEV2020",
+    "US_SLPD2020",
+    "US_ASP2020",
+    "LC22_F40_230",
+    "LC22_CC_230",
+    "LC22_CH_230",
+    "LC22_CBH_230",
+    "LC22_CBD_230",
+)
 UNDECLARED = "xllcorner 0\nyllcorner 0\ncellsize 30\n"
 OLD_PRJ = "Projection UTM\nZone 10\nDatum NAD83\nUnits METERS\n"
-FLAMMAP = ("Elevation", "Slope", "Aspect", "Fuel Model", "Canopy Cover", "Stand Height", "Canopy Base Height")
+FLAMMAP = (
+    "Elevation",
+    "Slope",
+    "Aspect",
+    "Fuel Model",
+    "Canopy Cover",
+    "Stand Height",
+    "Canopy Base Height",
+    "Canopy Bulk Density",
+)
 
 
 @pytest.mark.parametrize("names", [LANDFIRE, FLAMMAP], ids=["LANDFIRE", "FlamMap"])
 def test_bands_of_a_landscape_file_are_found_by_their_descriptions(tmp_path, names):
-    bands = [rising("int16"), flat(5), flat(180), flat(102), flat(60), flat(150), flat(10)]
+    bands = [rising("int16"), flat(5), flat(180), flat(102), flat(60), flat(150), flat(10), flat(20)]
     path = tif(tmp_path / "landscape.tif", *bands, names=names)
     same = {"elevation": path.name, "canopy": path.name, "canopy_height": path.name, "height_unit": 0.1}
-    source = ground(path, table="fbfm40", **same)
+    crowns = {"canopy_base_height": path.name, "canopy_bulk_density": path.name, "density_unit": 0.01}
+    source = ground(path, table="fbfm40", **same, **crowns)
     land = source(keys(1))
-    layers = {name: layer.unique().tolist() for name, layer in land.layers.held.items()}
-    assert layers == {"fuel": [102], "canopy_cover": [60], "canopy_height": [15]}
+    layers = {name.removeprefix("canopy_"): layer.unique().tolist() for name, layer in land.layers.held.items()}
+    assert layers.pop("bulk_density") == pytest.approx([0.2])
+    assert layers == {"fuel": [102], "cover": [60], "height": [15], "base_height": [1]}
     assert land.elevation[0, :, 0].tolist() == rising()[:, 0].tolist()
     assert source.files[0] == f"fuel: landscape.tif, band {names[3]} [codes of fbfm40]"
-    assert source.files[-1] == f"bands of landscape.tif that are not read: {names[1]}, {names[2]}, {names[6]}"
+    assert source.files[-1] == f"bands of landscape.tif that are not read: {names[1]}, {names[2]}"
 
 
 def test_a_band_is_chosen_where_no_description_tells_which(tmp_path):
@@ -170,10 +190,14 @@ def test_elevation_whose_unit_is_in_doubt_is_asked_for(tmp_path, units, crs, giv
 def test_the_canopy_is_in_the_unit_that_the_file_states_and_shares_are_refused(tmp_path):
     tif(tmp_path / "fuel.tif", flat(1))
     tif(tmp_path / "ch.tif", flat(15), units=("m",))
+    tif(tmp_path / "cbd.tif", flat(0.5, "float32"), units=("kg m-3",))
     tif(tmp_path / "cc.tif", flat(0.5, "float32"))
     assert (ground(tmp_path, canopy_height="ch.tif")(keys(1)).layer("canopy_height") == 15).all()
     refuse("^height_unit must be that of .* states 'm'", ground, tmp_path, canopy_height="ch.tif", height_unit=0.1)
     refuse("^canopy must be in per cent, 0 to 100", ground, tmp_path, canopy="cc.tif")
+    crowns = {name: "ch.tif" for name in ("canopy", "canopy_height", "canopy_base_height")}
+    land = ground(tmp_path, **crowns, canopy_bulk_density="cbd.tif")(keys(1))
+    assert (land.layer("canopy_bulk_density") == 0.5).all()
 
 
 @pytest.mark.parametrize(

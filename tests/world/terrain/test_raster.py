@@ -244,6 +244,31 @@ def test_canopies_are_told_in_percent_and_metres(trees):
     )
 
 
+def test_crowns_are_told_in_metres_and_kilograms(trees):
+    write(trees["path"] / "cc.tif", [[0, 15, 25, 95, 100, NODATA]] * 4, "int16")
+    write(trees["path"] / "ch.tif", [[0, 25, 75, 175, 375, NODATA]] * 4, "int16")
+    write(trees["path"] / "cbh.tif", [[0, 4, 8, 10, 100, NODATA]] * 4, "int16")
+    write(trees["path"] / "cbd.tif", [[0, 1, 12, 20, 45, NODATA]] * 4, "int16")
+    crowns = {"canopy_base_height": "cbh.tif", "canopy_bulk_density": "cbd.tif", "height_unit": 0.1}
+    whole = {**trees, **crowns, "canopy": "cc.tif", "canopy_height": "ch.tif"}
+    source = Raster(**whole, density_unit=0.01)
+    land = source(keys(2))
+    base, density = torch.tensor([0, 0.4, 0.8, 1, 10, 0]), torch.tensor([0, 0.01, 0.12, 0.2, 0.45, 0])
+    torch.testing.assert_close(land.layer("canopy_base_height"), base.expand(2, 4, 6))  # LANDFIRE's CBH is metres x 10
+    torch.testing.assert_close(land.layer("canopy_bulk_density"), density.expand(2, 4, 6))  # and CBD kg/m3 x 100
+    assert source.files[-2:] == (
+        "canopy_base_height: cbh.tif [0.1 m]",
+        "canopy_bulk_density: cbd.tif [0.01 kg/m3]",
+    )
+    refuse("^density_unit must be given with canopy_bulk_density, 0.01 for LANDFIRE or 1 for kg/m3", **whole)
+    refuse(r"^canopy_bulk_density must be in \[0, 2\] \(2 kg/m3 in units of 1 kg/m3\)", **whole, density_unit=1.0)
+    refuse(
+        "^canopy_base_height must be given with canopy and canopy_height, by which crowns burn, got none",
+        **{**trees, **crowns},
+        density_unit=0.01,
+    )
+
+
 # --- Fuel and nodata
 
 

@@ -20,6 +20,8 @@ class CalibrationOptions:
         hours: When their scars are known [h]; None is the end of each one's weather.
         units: Unit of a quantity or column of their weather where files state none, ``units.wind_speed=km/h``; for
             ``datetime`` the order of its dates, ``units.datetime=d/m/y``.
+        height_unit: Metres per unit of their canopies' heights where files state none: 0.1 for LANDFIRE.
+        density_unit: kg/m3 per unit of their canopies' bulk densities, the same: 0.01 for LANDFIRE.
         parameters: Parameters to fit, see ``prediction.calibration.parameters``; none scores the law without a fit.
         bounds: Lowest and highest value by parameter; default: the usual ones.
         scales: Deviation of the prior by parameter; default: the usual ones.
@@ -43,6 +45,8 @@ class CalibrationOptions:
     fires: tuple[str, ...] = ()
     hours: float | None = None
     units: Mapping[str, str] = field(default_factory=dict)
+    height_unit: float | None = None
+    density_unit: float | None = None
     parameters: tuple[str, ...] = ()
     bounds: Mapping[str, Any] = field(default_factory=dict)
     scales: Mapping[str, Any] = field(default_factory=dict)
@@ -60,6 +64,7 @@ class CalibrationOptions:
     debug: bool = False
 
     def __post_init__(self) -> None:
+        check_fields(self, height_unit=(1e-3, 10.0), density_unit=(1e-3, 10.0))
         check_fields(self, hours=(1e-2, 1e5), draws=(1, 100_000), steps=(1, 10_000))
         if not self.fires:
             raise ValueError("fires must name folders of fires that happened, got none")

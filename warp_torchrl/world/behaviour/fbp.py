@@ -89,6 +89,7 @@ def fbp_spread(
         length_to_breadth=torch.where(burns, length_to_breadth(fuel, net_speed), 1.0).expand(shape),
         intensity=torch.where(burns, intensity, 0.0).expand(shape),
         flame_length=torch.where(burns, byram_flame_length(intensity), 0.0).expand(shape),
+        kind=torch.where(burns, kind_of_fire(crowns), 0.0).expand(shape),
     )
 
 
@@ -180,6 +181,11 @@ def _crown(fuel: FbpFuels, index: Tensor, surface: Tensor, consumed: Tensor, fol
     gain = torch.where(fuel.is_c6, (crown_rate - surface).clamp(min=0), 0.0)
     crowns = torch.where(fuel.is_c6 & (gain == 0), 0.0, crowns)
     return surface + crowns * gain, crowns
+
+
+def kind_of_fire(crowns: Tensor) -> Tensor:
+    """Return the kind of fire by the share of crowns that burn: crown fire from 0.1, active from 0.9 (ST-X-3)."""
+    return (crowns >= 0.1).to(crowns.dtype) + (crowns >= 0.9)
 
 
 def length_to_breadth(fuel: FbpFuels, wind: Tensor) -> Tensor:

@@ -9,6 +9,14 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import did_you_mean
+from warp_torchrl.world.behaviour.crown import (
+    FOLIAR_MOISTURE,
+    KILOJOULES_PER_KG,
+    Canopy,
+    CrownModel,
+    Surroundings,
+    with_crowns,
+)
 from warp_torchrl.world.behaviour.fuel_codes import read_fuel, read_model
 from warp_torchrl.world.behaviour.fuel_models import FuelTable
 from warp_torchrl.world.behaviour.rothermel import bed_response
@@ -22,6 +30,15 @@ WindHeight = Literal["10m", "20ft", "midflame"]
 _DEAD = {"dead_1h": (1.0, 300.0), "dead_10h": (1.0, 300.0), "dead_100h": (1.0, 300.0)}
 _LIVE = {"live_herbaceous": (1.0, 1000.0), "live_woody": (1.0, 1000.0)}
 _CODES = {"ffmc": (0.0, 101.0), "bui": (0.0, 10000.0)}
+_CROWNS = ("base_height", "bulk_density")
+_CANOPY = {
+    "cover": (0.0, 100.0),
+    "height": (0.0, 150.0),
+    "crown_ratio": (0.01, 1.0),
+    "base_height": (0.0, 150.0),
+    "bulk_density": (0.0, 2.0),
+    "foliar_moisture": (20.0, 400.0),
+}
 _LATER = {"dead_10h": 1.0, "dead_100h": 2.0}
 """How much moister thicker dead fuel is where nothing is said [%]: as in the moisture scenarios of Scott and Burgan
 (2005), table 3."""
@@ -37,15 +54,15 @@ def rate_of_spread(
     *,
     moisture: Mapping[str, object],
     wind_height: WindHeight = "10m",
-    canopy_cover: object = None,
-    canopy_height: object = None,
-    crown_ratio: object = None,
+    canopy: Mapping[str, object] | None = None,
+    crown: CrownModel = "cruz",
 ) -> Spread:
-    """Return the behaviour of the head of a surface fire.
+    """Return the behaviour of the head of a surface fire, or of a crown fire where the canopy tells of its crowns.
 
     Numbers, arrays and tensors are broadcast to one shape; the fields are float32 tensors of it. Gradients flow back
     to tensors of wind, slope and moisture. Rates are steady and along the ground, not the map. See
-    ``rates.rothermel`` and ``rates.surface`` for the equations and their sources, ``rates.fbp`` for the Canadian ones.
+    ``behaviour.rothermel``, ``behaviour.surface`` and ``behaviour.crown`` for the equations and their sources,
+    ``behaviour.fbp`` for the Canadian ones.
 
     Args:
         fuel: Codes of fuel models, or their names ("GR2", "FM4", "C-2").
@@ -59,9 +76,12 @@ def rate_of_spread(
             such a load. For "fbp": "ffmc" and "bui".
         wind_height: Where the wind is measured: "10m" or "20ft" above the vegetation in the open, or "midflame". To
             midflame height the wind is reduced by the fuel's depth, or by the canopy. "fbp" needs "10m" or "20ft".
-        canopy_cover: Ground under crowns [%]; 0 if not given.
-        canopy_height: Height of trees [m]; needed with a canopy cover.
-        crown_ratio: Length of crowns over the height of trees, in (0, 1]; 1 if not given, as FlamMap and FARSITE do.
+        canopy: "cover", ground under crowns [%], and "height" of trees [m], by which the wind is reduced; with them
+            "crown_ratio", length of crowns over the height of trees, in (0, 1], 1 if not given, as FlamMap and FARSITE
+            do. Crowns burn if "base_height" [m] and "bulk_density" [kg/m3] are there too; "foliar_moisture", water in
+            needles, is 100 % of dry weight if not given. None is open ground.
+        crown: Rule of the rate of crown fire: "cruz" or "rothermel", see ``behaviour.crown``; "none" has surface fire
+            alone.
 
     Raises:
         ValueError: If a fuel is not known, a value lies out of its range or is missing, or shapes do not broadcast.
@@ -72,40 +92,46 @@ def rate_of_spread(
         raise ValueError(f"wind must be a speed and a bearing, got {wind!r}")
     if not isinstance(moisture, Mapping):
         raise ValueError(f"moisture must be a mapping of per cent by name, got {moisture!r}")
+    if crown not in get_args(CrownModel):
+        raise ValueError(f"crown must be {', '.join(get_args(CrownModel))}, got {crown!r}")
     table = read_model(model)
     codes = read_fuel(fuel, table, model)
-    place = _device(codes, *wind, slope, aspect, *moisture.values(), canopy_cover, canopy_height, crown_ratio)
+    trees = _canopy(canopy)
+    place = _device(codes, *wind, slope, aspect, *moisture.values(), *trees.values())
     ground = {
         "wind speed": _numbers("wind speed", wind[0], 0.0, 150.0),
         "wind bearing": _numbers("wind bearing", wind[1], -720.0, 720.0),
         "slope": _numbers("slope", slope, 0.0, 89.0),
         "aspect": _numbers("aspect", aspect, -720.0, 720.0),
     }
-    canopy = _canopy(canopy_cover, canopy_height, crown_ratio)
     water = _moisture(moisture, {**_DEAD, **_LIVE} if table else _CODES)
-    shape = _shape({"fuel": codes, **ground, **canopy, **{f"moisture.{name}": each for name, each in water.items()}})
+    named = {f"canopy.{name}": each for name, each in trees.items()}
+    named |= {f"moisture.{name}": each for name, each in water.items()}
+    shape = _shape({"fuel": codes, **ground, **named})
     codes = codes.to(place)
     speed, bearing, steepness, downhill = (each.to(place) for each in ground.values())
     water = {name: each.to(place) for name, each in water.items()}
+    trees = {name: each.to(place) for name, each in trees.items()}
     if table is None:
-        spread = _canadian(codes, speed, bearing, steepness, downhill, water, wind_height, canopy)
+        spread = _canadian(codes, speed, bearing, steepness, downhill, water, wind_height, trees)
     else:
         table = table.to(device=place)
         row = table.index(codes)
-        speed = speed * _to_midflame(table, row, wind_height, {name: each.to(place) for name, each in canopy.items()})
-        spread = _rothermel(table, row, speed, bearing, steepness, downhill, water)
+        levels = _levels(table, row, water)
+        midflame = speed * _to_midflame(table, row, wind_height, trees)
+        spread = _rothermel(table, row, midflame, bearing, steepness, downhill, levels)
+        if crown != "none" and "bulk_density" in trees:
+            speed = speed * TEN_METRES if wind_height == "20ft" else speed
+            air = Surroundings(speed, bearing, steepness, downhill, levels)
+            heat = table.fuels.heat[row] * KILOJOULES_PER_KG
+            foliar = trees.get("foliar_moisture", FOLIAR_MOISTURE)
+            crowns = Canopy(**{each.name: trees[each.name] for each in fields(Canopy)})
+            spread = with_crowns(spread, crowns, air, heat=heat, foliar_moisture=foliar, model=crown)
     return Spread(**{each.name: getattr(spread, each.name).float().expand(shape) for each in fields(Spread)})
 
 
-def _rothermel(
-    table: FuelTable,
-    row: Tensor,
-    speed: Tensor,
-    bearing: Tensor,
-    slope: Tensor,
-    aspect: Tensor,
-    water: dict[str, Tensor],
-) -> Spread:
+def _levels(table: FuelTable, row: Tensor, water: dict[str, Tensor]) -> Tensor:
+    """Return the moistures of the five classes of fuel, [..., 5] [%]; those that are left out are filled."""
     used = table.fuels.load[row.unique()].sum(0) > 0.0
     for column, name in ((3, "live_herbaceous"), (4, "live_woody")):
         if name not in water and bool(used[column]):
@@ -115,7 +141,18 @@ def _rothermel(
     filled = {name: water["dead_1h"] + more for name, more in _LATER.items()}
     filled |= {name: torch.full((), _NO_LIVE, device=row.device) for name in _LIVE} | water
     ordered = torch.broadcast_tensors(*(filled[name] for name in (*_DEAD, *_LIVE)))
-    levels = torch.stack(ordered, dim=-1)
+    return torch.stack(ordered, dim=-1)
+
+
+def _rothermel(
+    table: FuelTable,
+    row: Tensor,
+    speed: Tensor,
+    bearing: Tensor,
+    slope: Tensor,
+    aspect: Tensor,
+    levels: Tensor,
+) -> Spread:
     beds = bed_response(table.fuels, levels).at(row) if levels.dim() == 1 else bed_response(table.fuels.at(row), levels)
     return head_of_fire(beds, speed * 60.0, bearing, slope, aspect)
 
@@ -135,7 +172,7 @@ def _canadian(
     if wind_height == "midflame":
         raise ValueError("wind_height must be 10m or 20ft for fbp, whose wind is that at 10 m, got midflame")
     if canopy:
-        raise ValueError(f"{next(iter(canopy))} must be left out for fbp, whose fuel types have their canopy, got one")
+        raise ValueError("canopy must be left out for fbp, whose fuel types have their canopy, got one")
     if missing := [name for name in _CODES if name not in water]:
         raise ValueError(f"moisture must have {' and '.join(missing)} for fbp, got {', '.join(water) or 'nothing'}")
     if wind_height == "20ft":
@@ -149,27 +186,29 @@ def _to_midflame(table: FuelTable, row: Tensor, wind_height: str, canopy: dict[s
     """Return the midflame wind over the wind at the height where it is measured."""
     if wind_height == "midflame":
         if canopy:
-            raise ValueError(f"{next(iter(canopy))} must be left out where wind_height is midflame, got one")
+            raise ValueError("canopy must be left out where wind_height is midflame, got one")
         return torch.ones((), device=row.device)
     zero = torch.zeros((), device=row.device)
-    cover, height = canopy.get("canopy_cover", zero), canopy.get("canopy_height", zero)
+    cover, height = canopy.get("cover", zero), canopy.get("height", zero)
     factor = wind_adjustment_factor(table.fuels.depth[row], cover, height, canopy.get("crown_ratio", zero + 1.0))
     return factor / TEN_METRES if wind_height == "10m" else factor
 
 
-def _canopy(cover: object, height: object, ratio: object) -> dict[str, Tensor]:
-    """Return the canopy arguments that are given."""
-    if cover is None and (height is not None or ratio is not None):
-        raise ValueError("canopy_cover must be given with canopy_height and crown_ratio, got none")
-    if cover is None:
+def _canopy(given: Mapping[str, object] | None) -> dict[str, Tensor]:
+    """Return what is given of a canopy."""
+    if given is None:
         return {}
-    if height is None:
-        raise ValueError("canopy_height must be given with canopy_cover, got none")
-    canopy = {
-        "canopy_cover": _numbers("canopy_cover", cover, 0.0, 100.0),
-        "canopy_height": _numbers("canopy_height", height, 0.0, 120.0),
-    }
-    return canopy if ratio is None else canopy | {"crown_ratio": _numbers("crown_ratio", ratio, 0.01, 1.0)}
+    if not isinstance(given, Mapping):
+        raise ValueError(f"canopy must be a mapping of numbers by name, got {given!r}")
+    for name in given:
+        if name not in _CANOPY:
+            raise ValueError(
+                f"canopy must have some of {', '.join(_CANOPY)}, got {name!r}{did_you_mean(name, _CANOPY)}"
+            )
+    for needed in (("cover", "height"), _CROWNS if any(name in given for name in _CROWNS) else ()):
+        if missing := [name for name in needed if name not in given]:
+            raise ValueError(f"canopy must have {' and '.join(missing)}, got {', '.join(given) or 'nothing'}")
+    return {name: _numbers(f"canopy.{name}", value, *_CANOPY[name]) for name, value in given.items()}
 
 
 def _moisture(given: Mapping[str, object], ranges: Mapping[str, tuple[float, float]]) -> dict[str, Tensor]:

@@ -14,3 +14,4 @@ class Spread:
     length_to_breadth: Tensor  # of the ellipse that the fire grows into, 1 or more
     intensity: Tensor  # fireline intensity at the head (Byram 1959) [kW/m]
     flame_length: Tensor  # at the head [m]
+    kind: Tensor  # of fire at the head: 0 surface, 1 passive crown fire, 2 active crown fire

@@ -89,6 +89,7 @@ def head_of_fire(beds: BedResponse, wind: Tensor, wind_bearing: Tensor, slope: T
         length_to_breadth=length_to_breadth(effective),
         intensity=intensity,
         flame_length=flame_length(intensity),
+        kind=torch.zeros((), device=head.device).expand(head.shape),
     )
 
 

@@ -26,7 +26,7 @@ _AT_ONCE = 64  # fires, whose planes a CPU's cache holds
 _MOST_CELLS = 2**24  # of the windows of fires that burn at once
 _BYTES_A_FIRE, _BYTES_A_CELL = 64, 200  # that a cell of a window takes at most, for each fire and for the map
 _BYTES_OF_GROUP = 96  # that a cell takes for the planes of each group
-_N_PLANES, _HEAD = 7, 3  # three of travel, then head, backing, intensity and flame length
+_HEAD = 3  # planes of travel; then head, backing, intensity and flame length, and the kind of fire where crowns burn
 T = TypeVar("T")
 
 
@@ -105,6 +105,11 @@ class Fires:
         return max(len(self.laws), *(spell.groups for spell in self.spells))
 
     @cached_property
+    def runs_in_crowns(self) -> bool:
+        """Return whether the map knows its crowns, and the law burns them."""
+        return self.fire.bed.runs_in_crowns(self.landscape)
+
+    @cached_property
     def _made(self) -> PlanesOfSpells:
         return PlanesOfSpells(lambda number, window: in_window(partial(self._planes, number), window))
 
@@ -112,10 +117,10 @@ class Fires:
         """Return the planes of each group in a spell and a window: three of ``travel``, then those of the heads.
 
         Returns:
-            float32 [G, 7, h, w]; the heads as in ``passing.HeadBehaviour``.
+            float32 [G, 7, h, w], or 8 where fires run in crowns; the heads as in ``passing.HeadBehaviour``.
         """
         made = self._made(number, window)
-        return made.view(-1, _N_PLANES, *made.shape[1:])
+        return made.view(-1, 8 if self.runs_in_crowns else 7, *made.shape[1:])
 
     def fastest(self, number: int) -> tuple[float, float]:
         """Return the rates of a spell's fastest heads but one in a thousand [m/min], of the fastest group.
@@ -245,13 +250,13 @@ class Fires:
             raise memory.too_little(f"a fire in a window of {window.height} x {window.width} cells", wanted, there)
 
     def _planes(self, number: int, window: Window) -> Tensor:
-        """Return the planes of each group, float32 [G 7, h, w]."""
+        """Return the planes of each group, float32 [G 7, h, w], or G 8."""
         place = None if window.is_whole else window
         made = []
         for law in self.laws:
             spread = spread_in(law, self.landscape, self.cell_size, self.spells[number], place)
             times = travel(spread.head, spread.direction, spread.length_to_breadth, self.cell_size)
-            made.append(torch.cat((times, heads(spread)), dim=1))
+            made.append(torch.cat((times, heads(spread, self.runs_in_crowns)), dim=1))
         return (made[0] if len(made) == 1 else torch.cat(made)).flatten(0, 1)
 
     def _head(self, number: int, law: RateFire, strip: Window) -> Tensor:

@@ -71,14 +71,15 @@ def ticks_of(minutes: float, fastest: float, cell_size: float) -> int:
     return max(_LEAST_TICKS, math.ceil(TICKS_PER_CELL * minutes * fastest / cell_size))
 
 
-def heads(spread: Spread) -> Tensor:
-    """Return the fields of ``HeadBehaviour`` for a spread [G, h, w], float32 [G, 4, h, w].
+def heads(spread: Spread, with_kind: bool = False) -> Tensor:
+    """Return the fields of ``HeadBehaviour`` for a spread [G, h, w], float32 [G, 4, h, w]; 5 with the kind of fire.
 
     The rear spreads at R_head (1 - e) / (1 + e), e the eccentricity of the ellipse.
     """
     focus = (1.0 - spread.length_to_breadth.pow(-2)).clamp(min=0.0).sqrt()
     backing = spread.head * (1.0 - focus) / (1.0 + focus)
-    return torch.stack((spread.head, backing, spread.intensity, spread.flame_length), dim=1)
+    kind = (spread.kind,) if with_kind else ()
+    return torch.stack((spread.head, backing, spread.intensity, spread.flame_length, *kind), dim=1)
 
 
 def _rise(landscape: Landscape, window: Window, cell_size: float) -> Tensor:

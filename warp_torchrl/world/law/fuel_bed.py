@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, get_args
 
 import torch
 from torch import Tensor
@@ -12,13 +12,20 @@ from torch.nn.functional import pad
 from warp_torchrl.world.air.wind import Wind
 from warp_torchrl.world.arrays.batch import Named
 from warp_torchrl.world.arrays.random import world_key
+from warp_torchrl.world.behaviour.crown import (
+    FOLIAR_MOISTURE,
+    KILOJOULES_PER_KG,
+    CrownModel,
+    Surroundings,
+    with_crowns,
+)
 from warp_torchrl.world.behaviour.fbp import fbp_spread
 from warp_torchrl.world.behaviour.fuel_codes import read_model
 from warp_torchrl.world.behaviour.fuel_models import FuelTable
 from warp_torchrl.world.behaviour.moistures import MOISTURES
 from warp_torchrl.world.behaviour.spread import Spread
 from warp_torchrl.world.behaviour.surface import surface_spread
-from warp_torchrl.world.behaviour.wind_adjustment import TEN_METRES, wind_adjustment_factor
+from warp_torchrl.world.law.canopy import crowns_of, lack_of_canopy, to_midflame
 from warp_torchrl.world.law.mapped_fuel import check_codes
 from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.terrain.source import LandscapeSource, map_size
@@ -32,7 +39,6 @@ COVER_FUEL: Mapping[str, tuple[int, int, int, int, int]] = {
 
 _REFERENCE_WIND = 5.0  # m/s, of flammability
 _SAMPLES = 4  # worlds in which the fastest fire is looked for
-_UNTOLD_HEIGHT = 15.0  # m, of a canopy of which no height is known
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,9 +52,13 @@ class FuelBed:
     rate_gain: float
     wind_gain: float
     slope_gain: float
+    crown: CrownModel = "cruz"
+    foliar_moisture: float = FOLIAR_MOISTURE
     by_cover: bool = False  # the codes of landscapes are no fuels
 
     def __post_init__(self) -> None:
+        if self.crown not in get_args(CrownModel):
+            raise ValueError(f"crown must be {', '.join(get_args(CrownModel))}, got {self.crown}")
         if self.model not in COVER_FUEL:
             raise ValueError(f"model must be one of {', '.join(COVER_FUEL)}, got {self.model}")
         _ = self.table
@@ -106,8 +116,11 @@ class FuelBed:
         if self.table is None:
             spread = self._canadian(fuel, moisture, **air)
         else:
-            air["wind_speed"] = air["wind_speed"] * self._to_midflame(fuel, landscape)
-            spread = self._rothermel(fuel, moisture, **air)
+            table = _on(self.table, fuel.device)
+            factor = to_midflame(table.fuels.depth[table.index(fuel)], landscape)
+            midflame = {**air, "wind_speed": air["wind_speed"] * factor}
+            spread = self._rothermel(fuel, moisture, **midflame)
+            spread = self._with_crowns(spread, landscape, moisture, **air)
             spread = replace(spread, head=spread.head * _on_map(spread.direction, rise))
         factor = self._factor(fuel)
         return replace(
@@ -142,14 +155,32 @@ class FuelBed:
         table = _on(self.table, fuel.device)
         return surface_spread(table, table.index(fuel), **air, moisture=moisture[:, :5])
 
-    def _to_midflame(self, fuel: Tensor, landscape: Landscape) -> Tensor:
-        """Return the midflame wind over that at 10 m: under the canopy where one is known, else over the fuel bed."""
-        table = _on(self.table, fuel.device)
-        depth = table.fuels.depth[table.index(fuel)]
-        none = torch.zeros_like(depth)
-        cover, height = landscape.layer("canopy_cover"), landscape.layer("canopy_height")
-        cover, height = none if cover is None else cover, none + _UNTOLD_HEIGHT if height is None else height
-        return wind_adjustment_factor(depth, cover, height, none + 1.0) / TEN_METRES
+    def runs_in_crowns(self, landscape: Landscape) -> bool:
+        """Return whether the law burns crowns, and landscapes know theirs; Canadian rates have crown fire in them."""
+        return self.table is not None and self.crown != "none" and crowns_of(landscape) is not None
+
+    def lack_of_canopy(self, landscape: Landscape) -> str | None:
+        """Return in a line what the law cannot do for lack of a canopy; None where nothing is missing."""
+        return None if self.table is None else lack_of_canopy(landscape)
+
+    def _with_crowns(self, surface: Spread, landscape: Landscape, moisture: Tensor, **air: Tensor) -> Spread:
+        """Return the spread with crown fire where landscapes know their crowns, else the surface fire.
+
+        Gains act on the intensity of the surface fire that lights crowns, and later on the rate of both.
+        """
+        canopy = crowns_of(landscape)
+        if canopy is None or self.crown == "none":
+            return surface
+        fuel, table = self.fuel(landscape), _on(self.table, landscape.cover.device)
+        return with_crowns(
+            surface,
+            canopy,
+            Surroundings(**air, moisture=moisture[:, None, None, :5]),
+            heat=table.fuels.heat[table.index(fuel)] * KILOJOULES_PER_KG,
+            foliar_moisture=self.foliar_moisture,
+            model=self.crown,
+            gain=self._factor(fuel),
+        )
 
     def _factor(self, fuel: Tensor) -> Tensor:
         factor = torch.full(fuel.shape, self.rate_gain, device=fuel.device)

@@ -13,6 +13,7 @@ from warp_torchrl.validation import check_fields
 from warp_torchrl.world.air.wind import Wind
 from warp_torchrl.world.arrays.geometry import grow, neighbour_in
 from warp_torchrl.world.arrays.random import Stream, uniform, uniform_at
+from warp_torchrl.world.behaviour.crown import FOLIAR_MOISTURE, CrownModel
 from warp_torchrl.world.behaviour.moistures import moisture_row
 from warp_torchrl.world.law import arrivals
 from warp_torchrl.world.law.arrivals import RATE, Arrivals, Paces, Travel, arrivals_in, metric, own_cell
@@ -57,6 +58,9 @@ class RateFire(Automaton):
         rate_gain: Factor on all rates.
         wind_gain: Factor on the wind's speed.
         slope_gain: Factor on the slope's tangent.
+        crown: Rule of the rate of crown fire in Rothermel's fuels, ``cruz`` or ``rothermel`` (see ``behaviour.crown``),
+            where the landscape has canopy cover, height, base height and bulk density; ``none`` for surface fire alone.
+        foliar_moisture: Water in the needles of crowns [% of dry weight].
         cell_deviation: Coefficient of variation of the rates from cell to cell.
         fire_deviation: Coefficient of variation of the rates from fire to fire.
 
@@ -76,6 +80,8 @@ class RateFire(Automaton):
     rate_gain: float = 1.0
     wind_gain: float = 1.0
     slope_gain: float = 1.0
+    crown: CrownModel = "cruz"
+    foliar_moisture: float = FOLIAR_MOISTURE
     cell_deviation: float = 0.1
     fire_deviation: float = 0.0
     _by_cover: bool = field(default=False, init=False, repr=False)
@@ -90,6 +96,7 @@ class RateFire(Automaton):
             rate_gain=(0.0, 100.0),
             wind_gain=(0.0, 10.0),
             slope_gain=(0.0, 10.0),
+            foliar_moisture=(20.0, 400.0),
             cell_deviation=(0.0, 2.0),
             fire_deviation=(0.0, 2.0),
         )
@@ -126,6 +133,8 @@ class RateFire(Automaton):
             rate_gain=self.rate_gain,
             wind_gain=self.wind_gain,
             slope_gain=self.slope_gain,
+            crown=self.crown,
+            foliar_moisture=self.foliar_moisture,
             by_cover=self._by_cover,
         )
 

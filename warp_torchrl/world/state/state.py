@@ -68,7 +68,8 @@ class Landscape(Batch):
         """Return a layer of the source; None where it has none of this name.
 
         ``fuel`` holds class codes, int16 [B, H, W]; ``assets`` what each cell is worth, in any unit; ``canopy_cover``
-        [%] and ``canopy_height`` [m] are 0 without trees: float32 [B, H, W].
+        [%], ``canopy_height``, ``canopy_base_height`` [m] and ``canopy_bulk_density`` [kg/m3] are 0 without trees:
+        float32 [B, H, W].
         """
         return self.layers.held.get(name)
 

@@ -15,8 +15,8 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.state.state import OLDEST, Cover
-from warp_torchrl.world.terrain.crop import Crop, Cropped
-from warp_torchrl.world.terrain.landscape import TALLEST
+from warp_torchrl.world.terrain.crop import Crop, Cropped, check_crowns
+from warp_torchrl.world.terrain.landscape import DENSEST, TALLEST
 from warp_torchrl.world.terrain.layer import LARGEST_MAP
 from warp_torchrl.world.terrain.planes import HIGHEST, LOWEST
 from warp_torchrl.world.terrain.source import map_size
@@ -29,6 +29,8 @@ LAYER_TYPES = {
     "fuel": np.int16,
     "canopy_cover": np.float32,
     "canopy_height": np.float32,
+    "canopy_base_height": np.float32,
+    "canopy_bulk_density": np.float32,
 }
 """The arrays of a landscape, and the type that each is kept in."""
 _WHOLE = {"cover": (0, int(max(Cover))), "age": (0, OLDEST), "fuel": (-32768, 32767)}
@@ -38,6 +40,8 @@ _REAL = {
     "assets": (0.0, math.inf, "finite and 0 or more"),
     "canopy_cover": (0.0, 100.0, "in [0, 100]"),
     "canopy_height": (0.0, TALLEST, f"in [0, {TALLEST:g}]"),
+    "canopy_base_height": (0.0, TALLEST, f"in [0, {TALLEST:g}]"),
+    "canopy_bulk_density": (0.0, DENSEST, f"in [0, {DENSEST:g}]"),
 }
 """The others, and their ranges, in words too."""
 
@@ -60,6 +64,8 @@ class Array(Cropped):
         fuel: Class codes of a fuel model [H, W], which laws of rates of spread read; None leaves them to the cover.
         canopy_cover: Canopy cover [%], [H, W], and
         canopy_height: height of the canopy's top [m], [H, W], by which such laws slow the wind down; None: not known.
+        canopy_base_height: Height of the crowns' base [m], [H, W], and
+        canopy_bulk_density: what burns in crowns [kg/m3], [H, W], by which fires run in crowns; None: not known.
         size: Side of the world, or (rows, columns) [cells]: a window of the array. None, or the array's shape,
             takes the whole array, whatever its fuel.
         row: Top row of the window in the array. None, with ``column``, draws a window for each episode.
@@ -69,7 +75,8 @@ class Array(Cropped):
 
     Raises:
         ValueError: If there is no cover, arrays and a path are both given, the file is missing, damaged or enormous,
-            shapes differ, a value is out of its range, ``ages`` is ``oldest`` beside ages, or no window fits.
+            shapes differ, a value is out of its range, ``ages`` is ``oldest`` beside ages, a layer by which crowns
+            burn lacks the others, or no window fits.
     """
 
     path: str | PathLike[str] | None = field(default=None, compare=False)
@@ -83,6 +90,12 @@ class Array(Cropped):
         default=None, repr=False, compare=False
     )
     canopy_height: Sequence[Sequence[float]] | np.ndarray | Tensor | None = field(
+        default=None, repr=False, compare=False
+    )
+    canopy_base_height: Sequence[Sequence[float]] | np.ndarray | Tensor | None = field(
+        default=None, repr=False, compare=False
+    )
+    canopy_bulk_density: Sequence[Sequence[float]] | np.ndarray | Tensor | None = field(
         default=None, repr=False, compare=False
     )
     size: tuple[int, int] | int | None = None
@@ -107,6 +120,7 @@ class Array(Cropped):
         for name, layer in layers.items():
             if layer.shape != shape:
                 raise ValueError(f"{name} must have the shape of cover {shape}, got {layer.shape}")
+        check_crowns(tuple(layers), ("canopy_cover", "canopy_height"))
         if self.ages == "oldest" and "age" in layers:
             raise ValueError("ages must be drawn where age is given, which tells them, got oldest")
         if self.ages == "oldest":

@@ -12,6 +12,8 @@ LENGTHS: Mapping[str, float] = {
     **dict.fromkeys(("cm", "centimetre", "centimeter"), 0.01),
 }
 """Metres in each unit that a band or a vertical CRS may state."""
+DENSITIES: Mapping[str, float] = dict.fromkeys(("kg/m3", "kg m-3", "kg/m^3", "kg m**-3"), 1.0)
+"""Kilograms a cubic metre in each unit that a band may state."""
 MINUTES: Mapping[str, float] = {
     **dict.fromkeys(("min", "minute", "minutes"), 1.0),
     **dict.fromkeys(("h", "hr", "hour", "hours"), 60.0),
@@ -32,6 +34,8 @@ _LAYERS = {
     "elevation": r"elev|altitude|(?<![a-z])dem(?![a-z])",
     "canopy": r"(?<![a-z])cc(?![a-z])|canopy.?cover",
     "canopy_height": r"(?<![a-z])ch(?![a-z])|canopy.?height|stand.?height",
+    "canopy_base_height": r"(?<![a-z])cbh(?![a-z])|canopy.?base.?height",
+    "canopy_bulk_density": r"(?<![a-z])cbd(?![a-z])|canopy.?bulk.?density",
     "age": r"(?<![a-z])age(?![a-z])",
     "assets": r"asset|worth|value",
     "arrival": r"arrival",

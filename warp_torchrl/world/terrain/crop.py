@@ -15,8 +15,10 @@ from warp_torchrl.world.terrain.source import map_size
 
 DRAWN = 255
 """Age code of a cell whose age is drawn for each episode."""
+CROWN_LAYERS = ("canopy_base_height", "canopy_bulk_density")
+"""Layers by which a fire runs in crowns, beside canopy cover and height."""
 _LOWEST = -32768  # fuel code
-_LAYERS = ("cover", "age", "elevation", "assets", "fuel", "canopy_cover", "canopy_height")
+_LAYERS = ("cover", "age", "elevation", "assets", "fuel", "canopy_cover", "canopy_height", *CROWN_LAYERS)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,6 +33,8 @@ class Crop:
         fuel: Class codes of the fuel layer, int16 [rows, columns]; None where there is none.
         canopy_cover: Canopy cover [%], float32 [rows, columns]; None if not known.
         canopy_height: Height of the canopy's top [m], float32 [rows, columns]; None if not known.
+        canopy_base_height: Height of the crowns' base [m], float32 [rows, columns]; None if not known.
+        canopy_bulk_density: What burns in crowns [kg/m3], float32 [rows, columns]; None if not known.
         known: Where the map is known, bool [rows, columns]; None is everywhere.
         size: Side of a window, or (rows, columns) [cells].
         row: Top row of the only window; None, with ``column``, leaves it to the draw.
@@ -48,6 +52,8 @@ class Crop:
     fuel: np.ndarray | None = field(default=None, repr=False)
     canopy_cover: np.ndarray | None = field(default=None, repr=False)
     canopy_height: np.ndarray | None = field(default=None, repr=False)
+    canopy_base_height: np.ndarray | None = field(default=None, repr=False)
+    canopy_bulk_density: np.ndarray | None = field(default=None, repr=False)
     known: np.ndarray | None = field(default=None, repr=False)
     size: tuple[int, int] | int
     row: int | None = None
@@ -200,6 +206,22 @@ class Cropped:
             counts = np.bincount(fuel[(self._crop.cover == cover) & reach].astype(np.int32) - _LOWEST)
             cells |= {(int(place) + _LOWEST, cover): int(counts[place]) for place in counts.nonzero()[0]}
         return cells
+
+
+def check_crowns(given: tuple[str, ...], needed: tuple[str, str]) -> None:
+    """Refuse a map with some of the layers by which crowns burn, and not all.
+
+    Args:
+        given: Names of the layers of the map.
+        needed: Names of canopy cover and height.
+
+    Raises:
+        ValueError: With the layers that are missing.
+    """
+    there = [name for name in CROWN_LAYERS if name in given]
+    missing = [name for name in (*needed, *CROWN_LAYERS) if name not in given]
+    if there and missing:
+        raise ValueError(f"{there[0]} must be given with {' and '.join(missing)}, by which crowns burn, got none")
 
 
 def whereabouts(unknown: np.ndarray, inside: np.ndarray | None = None) -> str:

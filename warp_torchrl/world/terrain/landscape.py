@@ -20,6 +20,8 @@ from warp_torchrl.world.terrain.source import map_size
 
 TALLEST = 150.0
 """Height of a canopy that is believed [m]; the tallest tree known has 116."""
+DENSEST = 2.0
+"""Bulk density of a canopy that is believed [kg/m3]; LANDFIRE has 0.45 at most."""
 
 
 def draw_age(key: Tensor, cover: Tensor) -> Tensor:

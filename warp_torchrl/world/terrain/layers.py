@@ -10,10 +10,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from warp_torchrl.system import memory
-from warp_torchrl.world.terrain.bands import LENGTHS, factor_of
+from warp_torchrl.world.terrain.bands import DENSITIES, LENGTHS, factor_of
 from warp_torchrl.world.terrain.grid import Grid, check_grid
 from warp_torchrl.world.terrain.layer import RASTERS, Header, find_layer, read_header, read_layer
-from warp_torchrl.world.terrain.planes import read_worth
+from warp_torchrl.world.terrain.planes import read_worth, to_bulk_density, to_canopy_cover, to_canopy_height
 from warp_torchrl.world.terrain.resampling import regrid, resample_layer
 from warp_torchrl.world.terrain.vector import SUFFIXES
 
@@ -126,16 +126,28 @@ def elevation_unit(header: Header, given: float | None) -> float:
     return factor_of("elevation", header.path, header.unit, LENGTHS, given)
 
 
-def height_unit(header: Header, given: float | None) -> float:
+def height_unit(name: str, header: Header, given: float | None) -> float:
     """Return the metres in the unit of a layer of canopy heights: given by the user, or stated by the file.
 
     Raises:
         ValueError: If neither does, or both do and differ.
     """
     if given is None and not header.unit:
-        rule = "given with canopy_height, 0.1 for LANDFIRE or 1 for metres"
+        rule = f"given with {name}, 0.1 for LANDFIRE or 1 for metres"
         raise ValueError(f"height_unit must be {rule}: {header.path} does not state it, got null")
     return factor_of("height", header.path, header.unit, LENGTHS, given)
+
+
+def density_unit(name: str, header: Header, given: float | None) -> float:
+    """Return the kg/m3 in the unit of a layer of canopy bulk density: given by the user, or stated by the file.
+
+    Raises:
+        ValueError: If neither does, or both do and differ.
+    """
+    if given is None and not header.unit:
+        rule = f"given with {name}, 0.01 for LANDFIRE or 1 for kg/m3"
+        raise ValueError(f"density_unit must be {rule}: {header.path} does not state it, got null")
+    return factor_of("density", header.path, header.unit, DENSITIES, given)
 
 
 def unread_files(folder: Path, read: Iterable[Path]) -> list[str]:
@@ -144,6 +156,34 @@ def unread_files(folder: Path, read: Iterable[Path]) -> list[str]:
     kinds = (*RASTERS, *SUFFIXES)
     found = sorted(each for each in folder.iterdir() if each.suffix.lower() in kinds and each.is_file())
     return [each.name for each in found if each.resolve() not in there]
+
+
+class CanopyUnits(NamedTuple):
+    """Units of layers of a canopy, as the user gives them."""
+
+    height: float | None = None  # metres
+    density: float | None = None  # kg/m3
+
+
+AS_STATED = CanopyUnits()
+"""Units where files state them."""
+
+
+def canopy_plane(
+    name: str, values: np.ndarray, known: np.ndarray, header: Header, units: CanopyUnits
+) -> tuple[np.ndarray, str]:
+    """Return a layer of the canopy, float32 [H, W] in %, m or kg/m3, 0 where it is not known; and the unit of its file.
+
+    Raises:
+        ValueError: If its unit is not known, or a value lies out of its range.
+    """
+    if name.endswith("cover"):
+        return to_canopy_cover(values, known), "%"
+    if name.endswith("density"):
+        unit = density_unit(name, header, units.density)
+        return to_bulk_density(name, values, known, unit), f"{unit:g} kg/m3"
+    unit = height_unit(name, header, units.height)
+    return to_canopy_height(name, values, known, unit), "m" if unit == 1.0 else f"{unit:g} m"
 
 
 @cache

@@ -11,7 +11,7 @@ from warp_torchrl.world.state.state import OLDEST, Cover
 from warp_torchrl.world.terrain.crop import DRAWN
 from warp_torchrl.world.terrain.fuel import NO_FUEL_CODE
 from warp_torchrl.world.terrain.grid import Grid
-from warp_torchrl.world.terrain.landscape import TALLEST
+from warp_torchrl.world.terrain.landscape import DENSEST, TALLEST
 from warp_torchrl.world.terrain.vector import burn_in, read_shapes
 
 LOWEST, HIGHEST = -1000.0, 10_000.0
@@ -116,13 +116,23 @@ def to_canopy_cover(values: np.ndarray, known: np.ndarray) -> np.ndarray:
     return np.where(known, values, 0).astype(np.float32)
 
 
-def to_canopy_height(values: np.ndarray, known: np.ndarray, unit: float) -> np.ndarray:
-    """Return the height of the canopy's top, float32 [H, W] [m], of values in a unit [m]; 0 where it is not known.
+def to_canopy_height(name: str, values: np.ndarray, known: np.ndarray, unit: float) -> np.ndarray:
+    """Return a height of the canopy, float32 [H, W] [m], of values in a unit [m]; 0 where it is not known.
 
     Raises:
         ValueError: If a height is not in 0 to 150 m.
     """
-    _check("canopy_height", values, known, 0.0, TALLEST / unit, f" (150 m in units of {unit:g} m)")
+    _check(name, values, known, 0.0, TALLEST / unit, f" ({TALLEST:g} m in units of {unit:g} m)")
+    return (np.where(known, values, 0) * unit).astype(np.float32)
+
+
+def to_bulk_density(name: str, values: np.ndarray, known: np.ndarray, unit: float) -> np.ndarray:
+    """Return the canopy's bulk density, float32 [H, W] [kg/m3], of values in a unit [kg/m3]; 0 where it is not known.
+
+    Raises:
+        ValueError: If a density is not in 0 to 2 kg/m3.
+    """
+    _check(name, values, known, 0.0, DENSEST / unit, f" ({DENSEST:g} kg/m3 in units of {unit:g} kg/m3)")
     return (np.where(known, values, 0) * unit).astype(np.float32)
 
 

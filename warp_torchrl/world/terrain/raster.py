@@ -10,14 +10,15 @@ import numpy as np
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.state.state import OLDEST
-from warp_torchrl.world.terrain.crop import Crop, Cropped
+from warp_torchrl.world.terrain.crop import CROWN_LAYERS, Crop, Cropped, check_crowns
 from warp_torchrl.world.terrain.fuel import LAND_COVER, code_table, is_code, to_cover
 from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.layers import (
+    CanopyUnits,
     Layers,
+    canopy_plane,
     elevation_unit,
     find_layers,
-    height_unit,
     read_layers,
     unread_files,
 )
@@ -25,7 +26,6 @@ from warp_torchrl.world.terrain.planes import (
     check_slopes,
     to_age,
     to_canopy_cover,
-    to_canopy_height,
     to_forest_age,
     to_fuel,
     to_metres,
@@ -34,7 +34,7 @@ from warp_torchrl.world.terrain.planes import (
 from warp_torchrl.world.terrain.resampling import fill
 from warp_torchrl.world.terrain.source import map_size
 
-LAYERS = ("fuel", "elevation", "age", "canopy", "canopy_height", "assets")
+LAYERS = ("fuel", "elevation", "age", "canopy", "canopy_height", *CROWN_LAYERS, "assets")
 """The layers of a map, which have a file name or a pattern each."""
 
 
@@ -71,8 +71,12 @@ class Raster(Cropped):
             over grass and a mixture over shrub, so there, and under nodata, the age is drawn. A forest cell without
             canopy keeps a young tree, code 1, since its fuel is timber and code 0 is bare ground or ash.
         canopy_height: The same for a layer of the height of the canopy's top; nodata is 0.
-        height_unit: Metres per unit of that layer, required if the file does not state it: 0.1 for LANDFIRE's CH, 1 for
-            metres.
+        canopy_base_height: The same for a layer of the height of the crowns' base, and
+        canopy_bulk_density: of what burns in crowns; nodata is 0. With both, and with ``canopy`` and ``canopy_height``,
+            fires of law ``rate`` run in crowns.
+        height_unit: Metres per unit of the layers of heights, required if a file does not state it: 0.1 for LANDFIRE's
+            CH and CBH, 1 for metres.
+        density_unit: kg/m3 per unit of the bulk density, the same: 0.01 for LANDFIRE's CBD, 1 for kg/m3.
         assets: The same for a layer of the worth of each cell, 0 or more in any unit, for rewards that use it; nodata
             is 0. Or GeoJSON or a shapefile: a cell's worth is the sum over the shapes in it of their property ``worth``
             or ``value``, or 1. None leaves all alike.
@@ -106,7 +110,10 @@ class Raster(Cropped):
     full_age: float = 10.0
     canopy: str | None = None
     canopy_height: str | None = None
+    canopy_base_height: str | None = None
+    canopy_bulk_density: str | None = None
     height_unit: float | None = None
+    density_unit: float | None = None
     assets: str | None = None
     bands: Mapping[str, int | str] = field(default_factory=dict)
     resample: Literal["refuse", "nearest", "mode"] = "refuse"
@@ -124,6 +131,7 @@ class Raster(Cropped):
             full_age=(1e-6, 1e6),
             elevation_unit=(1e-3, 10.0),
             height_unit=(1e-3, 10.0),
+            density_unit=(1e-3, 10.0),
             resolution=(0.1, 100_000.0),
             min_fuel=(0.0, 1.0),
         )
@@ -168,6 +176,7 @@ class Raster(Cropped):
             raise ValueError(f"canopy must be null where age makes the trees, got {self.canopy} and {self.age}")
         if self.age is not None and self.ages == "oldest":
             raise ValueError(f"ages must be drawn where age, {self.age}, tells them, got oldest")
+        check_crowns(tuple(name for name in LAYERS if getattr(self, name) is not None), ("canopy", "canopy_height"))
         if self.resolution is not None and self.resample == "refuse":
             raise ValueError(f"resample must be nearest or mode where resolution is {self.resolution:g}, got refuse")
 
@@ -190,10 +199,10 @@ class Raster(Cropped):
             planes["age"] = to_forest_age(cover, values["canopy"], known["canopy"])
             planes["canopy_cover"] = to_canopy_cover(values["canopy"], known["canopy"])
             units["canopy"] = "%"
-        if "canopy_height" in values:
-            unit = height_unit(layers.headers["canopy_height"], self.height_unit)
-            planes["canopy_height"] = to_canopy_height(values["canopy_height"], known["canopy_height"], unit)
-            units["canopy_height"] = _length(unit)
+        told = CanopyUnits(self.height_unit, self.density_unit)
+        for name in ("canopy_height", *CROWN_LAYERS):
+            if name in values:
+                planes[name], units[name] = canopy_plane(name, values[name], known[name], layers.headers[name], told)
         if "assets" in values:
             planes["assets"] = to_worth(values["assets"], known["assets"])
         if self.ages == "oldest":
