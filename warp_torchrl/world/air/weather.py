@@ -13,7 +13,7 @@ from warp_torchrl.validation import check_fields
 from warp_torchrl.world.air.wind import Wind
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.behaviour.moistures import MOISTURES
-from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.world.state.state import Landscape, WorldState
 from warp_torchrl.world.terrain.source import LandscapeSource
 from warp_torchrl.world.weather.convergence import grid_convergence
 from warp_torchrl.world.weather.table import OPEN_10M_OVER_20FT, WeatherTable, read_weather
@@ -102,9 +102,7 @@ class Weather(Wind):
         """See ``Wind``; NaN where the table has no value."""
         return self._moisture.to(key.device)[self._row(key, tick)]
 
-    def hours(
-        self, key: Tensor, size: tuple[int, int], corner: Tensor | None = None
-    ) -> Iterator[tuple[Tensor, Tensor | None]]:
+    def hours(self, key: Tensor, ground: Landscape) -> Iterator[tuple[Tensor, Tensor | None]]:
         """Return the wind and moisture of each row."""
         for wind, moisture in zip(self._wind, self._moisture, strict=True):
             yield wind.expand(len(key), 2)[:, :, None, None], moisture.expand(len(key), -1)

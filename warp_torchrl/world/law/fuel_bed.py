@@ -20,7 +20,7 @@ from warp_torchrl.world.behaviour.surface import surface_spread
 from warp_torchrl.world.behaviour.wind_adjustment import TEN_METRES, wind_adjustment_factor
 from warp_torchrl.world.law.mapped_fuel import check_codes
 from warp_torchrl.world.state.state import Landscape
-from warp_torchrl.world.terrain.source import LandscapeSource, map_size
+from warp_torchrl.world.terrain.source import LandscapeSource
 
 COVER_FUEL: Mapping[str, tuple[int, int, int, int, int]] = {
     "fbfm13": (98, 8, 1, 10, 99),
@@ -170,9 +170,9 @@ class FuelBed:
     def fastest(self, landscape: LandscapeSource, wind: Wind, cell_size: float, moisture: Tensor) -> float:
         """Return the highest rate in a few worlds over the hours that the wind knows [m/min]; 1e-3 at least."""
         key = world_key(torch.arange(_SAMPLES))
-        ground = landscape(key)
+        ground = wind.shaped(landscape(key), cell_size)
         rates = [1e-3]
-        for air, damp in wind.hours(key, map_size(landscape.size), ground.corner):
+        for air, damp in wind.hours(key, ground):
             row = moisture if damp is None else torch.where(damp.isnan(), moisture, damp)
             rates.append(float(self.spread(ground, air, row.expand(len(air), -1), cell_size).head.max()))
         return max(rates)
