@@ -54,8 +54,8 @@ def test_over_a_witch_of_agnesi_it_is_height_over_half_width_and_fades_above() -
 
 
 def test_an_askervein_of_plain_shape_has_its_speed_up_within_a_fifth() -> None:
-    # 116 m high, half of it at 220 m along the wind from 210 degrees and 900 m across, roughness 0.03 m; measured on the
-    # hilltop at 10 m: 0.8 (Taylor and Teunissen 1987). The shape is a bell of these sizes, and not its contours.
+    # 116 m high, half of it at 220 m along the wind from 210 degrees and 900 m across, roughness 0.03 m; measured on
+    # the hilltop at 10 m: 0.8 (Taylor and Teunissen 1987). The shape is a bell of these sizes, and not its contours.
     x, y = places(120, 40.0), places(120, 40.0)[:, None]
     hill = 116.0 / (1.0 + (x / 220.0).square() + (y / 900.0).square())
     assert float(Hills(roughness=0.03).factors(hill[None], 40.0)[0, 0, 59:61, 59:61].mean()) - 1.0 == pytest.approx(

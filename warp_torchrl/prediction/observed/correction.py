@@ -28,7 +28,7 @@ from warp_torchrl.world.ensemble.filtering import (
 from warp_torchrl.world.fires.alone import on_map
 from warp_torchrl.world.fires.members import PARAMETERS, Deviations, Members
 from warp_torchrl.world.fires.sightings import Front, HotSpotSensor, beside, hot_spot_likelihood, perimeter_likelihood
-from warp_torchrl.world.fires.spell import Spell, can_ignite
+from warp_torchrl.world.fires.spell import Spell, can_ignite, spells_of
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER
 from warp_torchrl.world.state.state import Landscape
@@ -67,7 +67,7 @@ class Scene:
 
     def spells(self, begin: float, end: float) -> list[Spell]:
         """Return the weather between two times since the start [minutes]."""
-        return [Spell(wind, last, wet) for wind, wet, last in self.air.spells(end - begin, self.start + begin)]
+        return spells_of(self.air, end - begin, self.start + begin)
 
 
 @dataclass(frozen=True, kw_only=True)

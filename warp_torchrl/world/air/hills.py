@@ -17,7 +17,7 @@ from warp_torchrl.world.air.mass_consistency import Mesh, Wind3, consistent
 from warp_torchrl.world.state.state import Landscape
 
 FACTORS = ("wind_east_to_east", "wind_east_to_north", "wind_north_to_east", "wind_north_to_north")
-"""Layers of a landscape: what of a wind to the east, and of one to the north, is a cell's wind to the east and north."""
+"""Layers of a landscape: east and north component of a cell's wind, of a wind to the east and of one to the north."""
 _CELLS_AT_ONCE = {"cpu": 2**17, "cuda": 2**24}
 """Of air, whose wind is found together: on a CPU what its cache holds."""
 _HEIGHT = 10.0  # m, of the wind
@@ -30,13 +30,13 @@ _PROFILE_ENDS = 1000.0  # m over the ground, where the wind grows no more: the d
 class Hills:
     """How hills bend a wind.
 
-    The first guess has the speed of a logarithmic profile, ln(z / roughness), up to 1000 m over the ground, and the same
+    The first guess has the speed of a logarithmic profile, ln(z / roughness), up to 1000 m over the ground, and one
     bearing everywhere. The air ends half the map's shorter side over the highest ground, at least 500 m.
 
     Attributes:
         roughness: Roughness length of the ground [m]; 0 gives the first guess one speed at all heights.
-        alpha: Weight of horizontal changes over that of vertical ones: 1 in neutral air; less in stable air, which flows
-            around hills more than over them.
+        alpha: Weight of horizontal changes over that of vertical ones: 1 in neutral air; less in stable air, which
+            flows around hills more than over them.
         layers: Layers of air.
         columns: Most columns of air; cells of larger maps are joined for the wind, which is interpolated then.
         iterations: Of the solver.
@@ -98,7 +98,7 @@ class Hills:
         return Mesh(ground, sides, _thickness(self.layers, top), top, self.alpha)
 
     def wind(self, mesh: Mesh) -> Wind3:
-        """Return the mass-consistent winds whose first guesses blow with 1 m/s at 10 m to the east, and to the north."""
+        """Return the winds whose first guesses blow with 1 m/s at 10 m to the east, and to the north."""
         east, north = (self._profile(mesh.middle * depth) for depth in mesh.depth_at)
         none = torch.zeros_like(mesh.depth * mesh.middle)
         guess = (

@@ -91,7 +91,7 @@ class Mesh:
 
     @cached_property
     def tilt(self) -> Tensor:
-        """Return the slope of the face above each layer, as a share of the ground's, float32 [K, 1, 1]; 0 at the top."""
+        """Return the slope of the face above each layer, over the ground's, float32 [K, 1, 1]; 0 at the top."""
         return torch.cat((1.0 - self.layer.cumsum(0)[:-1], torch.zeros_like(self.layer[:1])))
 
     def divergence(self, wind: Wind3) -> Tensor:
@@ -116,7 +116,7 @@ class Mesh:
         return u / (half_u * self.layer), v / (half_v * self.layer), change * self.alpha**2 / (self.depth * self.apart)
 
     def over_level_ground(self) -> Callable[[Tensor], Tensor]:
-        """Return the solution of the equation over level ground of the same mean depth, as a function of its right side."""
+        """Return the solution over level ground of the same mean depth, as a function of the right side."""
         (height, width), device = self.ground.shape[1:], self.ground.device
         rows, across = _sines(height, self.sides[0], device), _sines(width, self.sides[1], device)
         modes, stiffness = _modes(self.thickness, device)

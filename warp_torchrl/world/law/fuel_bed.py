@@ -88,7 +88,7 @@ class FuelBed:
         Args:
             landscape: The landscapes.
             wind: (u east, v north) of the air's motion at 10 m in the open, float32 [B, 2, 1, 1] or [B, 2, H, W] [m/s].
-            moisture: float32 [B, 7], in the order of ``MOISTURES``.
+            moisture: In the order of ``MOISTURES``, float32 [B, 7], or by cell [B, H, W, 7].
             cell_size: Side of a cell [m].
             rise: How steeply the ground rises, see ``gradient``; None makes it of the landscapes' elevation.
         """
@@ -126,7 +126,8 @@ class FuelBed:
         slope: Tensor,
         aspect: Tensor,
     ) -> Spread:
-        codes = dict(zip(MOISTURES, moisture[:, :, None, None].unbind(1), strict=True))
+        of_cells = moisture if moisture.dim() == 4 else moisture[:, None, None]
+        codes = dict(zip(MOISTURES, of_cells.unbind(-1), strict=True))
         return fbp_spread(
             fuel,
             wind_speed=wind_speed,
@@ -139,7 +140,7 @@ class FuelBed:
 
     def _rothermel(self, fuel: Tensor, moisture: Tensor, **air: Tensor) -> Spread:
         table = _on(self.table, fuel.device)
-        return surface_spread(table, table.index(fuel), **air, moisture=moisture[:, :5])
+        return surface_spread(table, table.index(fuel), **air, moisture=moisture[..., :5])
 
     def _to_midflame(self, fuel: Tensor, landscape: Landscape) -> Tensor:
         """Return the midflame wind over that at 10 m: under the canopy where one is known, else over the fuel bed."""
