@@ -18,6 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # of this package
 from drawings.belief import belief, scouts
 from drawings.episode import photograph
 from drawings.fires import fire_plain, fire_terrain_wind
+from drawings.hills import hills
 from drawings.house import house
 from drawings.landscapes import burn_probability
 from drawings.laws import ellipses, fire_sizes, isotropy
@@ -41,6 +42,7 @@ WORLD: dict[str, Callable[..., "Figure"]] = {
     "fire_plain": fire_plain,
     "fire_terrain_wind": fire_terrain_wind,
     "wind": wind,
+    "hills": hills,
     "cover": cover,
     "isotropy": isotropy,
     "ellipses": ellipses,

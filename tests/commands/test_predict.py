@@ -192,3 +192,31 @@ def test_what_cannot_be_read_as_seen_is_one_line_and_nothing_is_written(folder, 
     assert main(arguments(folder, observed=folder / "seen.csv")) == 2 and not (folder / "out").exists()
     line = capsys.readouterr().err.strip().splitlines()[-1]
     assert "the time of what is observed must have no offset where the rows have none" in line
+
+
+def test_weather_is_a_folder_of_rasters_whose_wind_differs_by_place(folder):
+    # East of the fire the wind comes from the east, west of it from the west: it goes to neither side far.
+    bearing = np.where(np.arange(5.0) < 2.0, 270.0, 90.0) * np.ones((4, 1))
+    place = {"cell": 500.0, "crs": "EPSG:32631", "west": 5e5}
+    write(folder / "w_wd.tif", bearing, **place)
+    write(folder / "w_ws.tif", np.full((4, 5), 12.0), **place)
+    (folder / "ignition.csv").write_text("row,column\n20,20\n")
+    given = {"units.wind_speed": "km/h", "fires": 1}
+    assert main(arguments(folder, **given)) == 0
+    assert main(arguments(folder, weather=folder, **given, out=folder / "other")) == 0
+    straight, held = (np.isfinite(read(folder / out / "arrival_hours.tif")) for out in ("out", "other"))
+    assert straight[20, 30] and not held[20, 30]
+    told = json.loads((folder / "other" / "report.json").read_text())
+    assert [each["file"].rpartition("/")[2] for each in told["files"]][-2:] == ["w_wd.tif", "w_ws.tif"]
+
+
+def test_wind_is_bent_by_hills_where_that_is_asked(folder):
+    height = np.zeros(SHAPE)
+    height[:, 24:30] = 150.0  # a ridge across the wind
+    write(folder / "elevation.tif", height, cell=50.0, crs="EPSG:32631", west=5e5)
+    for wind in ("weather", "terrain"):
+        assert main(arguments(folder, wind=wind, **{"hills.layers": 6}, fires=1, hours=2, out=folder / wind)) == 0
+    plain, bent = (read(folder / wind / "rate.tif")[20] for wind in ("weather", "terrain"))
+    assert bent[26] > 1.1 * plain[26], "faster on top"
+    told = json.loads((folder / "terrain" / "report.json").read_text())
+    assert told["configuration"]["wind"] == "terrain" and told["configuration"]["hills"]["layers"] == 6

@@ -52,7 +52,7 @@ def run(*bearings, fire=EVEN, fires=1, **options):
 
 
 def head_of(bearing=270.0):
-    wind, moisture, _ = next(Weather(table=weather(bearing)).spells(60.0))
+    _, wind, moisture, _ = next(Weather(table=weather(bearing)).spells(60.0))
     return spread_in(EVEN, ground(), 50.0, Spell(wind, 60.0, moisture))
 
 

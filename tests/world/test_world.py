@@ -7,6 +7,8 @@ from torch import Tensor
 
 from tests.world.drawing import differing, draw, drawn
 from warp_torchrl.world.air.gridded import Gridded
+from warp_torchrl.world.air.hills import Hills
+from warp_torchrl.world.air.terrain import Terrain
 from warp_torchrl.world.air.wind import Calm, Paper, Uniform, Wandering
 from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.arrays.random import Stream, uniform
@@ -15,6 +17,7 @@ from warp_torchrl.world.backends.tick import advance, in_wind
 from warp_torchrl.world.ignition.ignition import Ignition
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.law.hazard import HazardFire
+from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.state.cells import count_trees, is_burning, is_tree
 from warp_torchrl.world.state.state import Cover, WorldState
 from warp_torchrl.world.team.team import Team
@@ -56,6 +59,13 @@ WORLDS = {
         landscape=Array(cover=MAP, elevation=MAP * 9.0, size=(12, 15)),
         wind=Gridded(u=np.stack([MAP - 2.0, 2.0 - MAP]), v=np.stack([MAP, MAP / 2.0]), ticks_per_field=4),
         fire=Fire(neighbours=4, growth=True),
+        team=SMALL_TEAM,
+        steps_per_tick=2,
+    ),
+    "a drawn wind over hills, in metres and minutes": World(
+        landscape=Perlin(size=(16, 12), relief=60.0),
+        wind=Terrain(speed=(2.0, 8.0), hills=Hills(layers=5, columns=48, iterations=4)),
+        fire=RateFire(minutes_per_tick=10.0),
         team=SMALL_TEAM,
         steps_per_tick=2,
     ),

@@ -14,7 +14,7 @@ from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.air.wind import Uniform
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.fires.alone import arrival_minutes
-from warp_torchrl.world.fires.spell import Spell, spread_in
+from warp_torchrl.world.fires.spell import Spell, spells_of, spread_in
 from warp_torchrl.world.law.fire import Fire
 from warp_torchrl.world.law.hazard import HazardFire
 from warp_torchrl.world.law.rate import RateFire
@@ -47,7 +47,7 @@ def law_times(fires: int) -> list[dict[str, Any]]:
         burned = _burn_by_ticks(fire, ground, lit, fires, _TICKS * fire.ticks_per_stage)
         rows.append(_row(name, f"{_TICKS * fire.ticks_per_stage} ticks", fires, began, burned))
     began = time.perf_counter()
-    spells = [Spell(wind, minutes, damp) for wind, damp, minutes in Weather(path="august").spells(24 * 60.0)]
+    spells = spells_of(Weather(path="august"), 24 * 60.0)
     times = arrival_minutes(RateFire(), ground, lit & _fuel(ground), world_key(torch.arange(fires)), spells, _CELL)
     burned = [(part <= 24 * 60.0).float().mean().item() for part in times]
     return [*rows, _row("rate", "24 hours", fires, began, burned)]

@@ -38,6 +38,7 @@ from warp_torchrl.runs.config.options import PredictionOptions
 from warp_torchrl.runs.output import output_folder
 from warp_torchrl.system import disk
 from warp_torchrl.system.provenance import Provenance, gathered
+from warp_torchrl.world.air.folder import times_of
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.ensemble.parameters import Deviations
@@ -68,15 +69,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def composed(overrides: Sequence[str]) -> dict[str, Any]:
     """Compose ``conf/predict.yaml`` with overrides, as plain values.
 
-    ``ignition`` names a file here, and a group of classes in Hydra's files, so it is read apart.
+    ``ignition`` and ``wind`` are values here, and groups of classes in Hydra's files, so they are read apart.
 
     Raises:
         ConfigError: If an override does not fit, in one line.
     """
     check_flags(overrides)
-    named = [each.partition("=")[2].strip("'\"") for each in overrides if each.startswith("ignition=")]
-    values = plain(compose_config("predict", [each for each in overrides if not each.startswith("ignition=")]))
-    return values | ({"ignition": named[-1]} if named else {})
+    apart = [each for each in overrides if each.startswith(("ignition=", "wind="))]
+    values = plain(compose_config("predict", [each for each in overrides if each not in apart]))
+    named = (each.partition("=") for each in apart)
+    return values | {key: value.strip("'\"") for key, _, value in named}
 
 
 def _run(arguments: Sequence[str]) -> None:
@@ -139,7 +141,7 @@ def _observations(case: Case, options: PredictionOptions) -> list[Observation]:
         return []
 
     def moment(text: str) -> float:
-        path, zone = str(options.weather), options.observed_zone
+        path, zone = times_of(str(options.weather)), options.observed_zone
         return minutes_until(text, path, options.units, "the time of what is observed", zone) - case.start
 
     height, width = case.ignition.shape
@@ -158,7 +160,7 @@ def _correct(case: Case, options: PredictionOptions, seen: Sequence[Observation]
         ground=case.ground,
         cell_size=case.cell_size,
         fire=case.fire,
-        air=Weather(table=case.weather, convergence=case.convergence),
+        air=Weather(table=case.weather, convergence=case.convergence, fields=case.fields),
         start=case.start,
         lit=case.ignition,
     )
@@ -200,6 +202,7 @@ def _burn(case: Case, options: PredictionOptions, corrected: Corrected | None) -
             seed=options.seed,
             start=case.start + begun,
             convergence=case.convergence,
+            fields=case.fields,
             members=members,
             is_seen=corrected is not None,
             progress=bar.update,

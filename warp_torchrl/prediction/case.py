@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import torch
@@ -9,6 +10,8 @@ from torch import Tensor
 
 from warp_torchrl.prediction.files import MapPlace
 from warp_torchrl.runs.config.options import PredictionOptions
+from warp_torchrl.world.air.fields import WeatherFields
+from warp_torchrl.world.air.folder import rasters_of, read_folder, times_of
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.ignition.file import read_ignition
 from warp_torchrl.world.law.rate import RateFire
@@ -35,6 +38,7 @@ class Case:
     start: float  # since the weather's first row began [minutes]
     convergence: float  # angle from true north to grid north [degrees]
     ignition: Tensor  # bool [H, W]
+    fields: WeatherFields | None = None  # the weather by place
     files: Sequence[str] = ()  # what is read of each file of the map, and what is left
 
 
@@ -54,29 +58,42 @@ def read_case(source: LandscapeSource, fire: RateFire, options: PredictionOption
     place = MapPlace(grid or local_grid((height, width), cell_size), (corner[0], corner[1]))
     lit = torch.as_tensor(read_ignition(str(options.ignition), place.grid))
     rows, columns = slice(corner[0], corner[0] + height), slice(corner[1], corner[1] + width)
-    weather = str(options.weather)
+    convergence = _convergence(place, (height, width)) if options.true_north else 0.0
+    weather, by_place = _weather(options, place, (height, width), convergence)
+    times = times_of(str(options.weather))
     return Case(
-        ground=ground,
+        ground=options.hills.shaped(ground, cell_size) if options.wind == "terrain" else ground,
         place=place,
         cell_size=cell_size,
         fire=fire,
-        weather=read_weather(
-            weather,
-            wind_height=options.wind_height,
-            start_ffmc=options.start_ffmc,
-            bui=options.bui,
-            units=options.units,
-        ),
-        start=minutes_until(options.start, weather, options.units) if isinstance(options.start, str) else options.start,
-        convergence=_convergence(place, (height, width)) if options.true_north else 0.0,
+        weather=weather,
+        start=minutes_until(options.start, times, options.units) if isinstance(options.start, str) else options.start,
+        convergence=convergence,
         ignition=lit[rows, columns],
-        files=_files(source, str(options.ignition)),
+        files=_files(source, str(options.ignition), *rasters_of(str(options.weather))),
+        fields=by_place,
     )
 
 
-def _files(source: LandscapeSource, ignition: str) -> list[str]:
-    """Return a line for each file of the map, and one for those beside it that nobody reads."""
-    left = source.unread(ignition) if isinstance(source, Raster) else []
+def _weather(
+    options: PredictionOptions, place: MapPlace, size: tuple[int, int], convergence: float
+) -> tuple[WeatherTable, WeatherFields | None]:
+    """Return the weather by the hour, and by place where it is a folder of rasters."""
+    path = Path(str(options.weather))
+    how: dict[str, Any] = {
+        "wind_height": options.wind_height,
+        "start_ffmc": options.start_ffmc,
+        "bui": options.bui,
+        "units": options.units,
+    }
+    if not path.is_dir():
+        return read_weather(str(options.weather), **how), None
+    return read_folder(path, place.grid, place.corner, size, convergence=convergence, **how)
+
+
+def _files(source: LandscapeSource, *others: str | Path) -> list[str]:
+    """Return a line for each file of the map, and one for those beside it that nobody reads, for the map or others."""
+    left = source.unread(*others) if isinstance(source, Raster) else []
     return [*getattr(source, "files", ()), *([f"files that are not read: {', '.join(left)}"] if left else [])]
 
 

@@ -9,11 +9,12 @@ from torch import Tensor
 
 from warp_torchrl.prediction.counts import Counter
 from warp_torchrl.prediction.tally import Tally
+from warp_torchrl.world.air.fields import WeatherFields
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.fires.members import Members
 from warp_torchrl.world.fires.sightings import beside
-from warp_torchrl.world.fires.spell import Spell
+from warp_torchrl.world.fires.spell import spells_of
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.state.window import Window
@@ -131,6 +132,7 @@ def predict(
     seed: int = 0,
     start: float = 0.0,
     convergence: float = 0.0,
+    fields: WeatherFields | None = None,
     members: Members | None = None,
     is_seen: bool = False,
     progress: Callable[[int], object] | None = None,
@@ -152,6 +154,7 @@ def predict(
         seed: Fire i has seed ``seed + i``.
         start: When the fires start, since the weather's first row began [minutes].
         convergence: Angle from true north, of the weather's bearings, to the map's grid north, clockwise [degrees].
+        fields: The weather's hours by place on the map, whose means are the table's rows; None: one weather for all.
         members: By what fires differ in rate, wind and moisture, one for each; None: by ``fire_deviation`` alone.
         is_seen: Whether the ignition is what a fire had burned when it was seen: its front is on average half a cell
             ahead then.
@@ -170,8 +173,7 @@ def predict(
     table = weather if isinstance(weather, WeatherTable) else read_weather(weather)
     left = lasting(table, start)
     minutes = left if hours is None else 60.0 * hours
-    air = Weather(table=table, convergence=convergence)
-    met = [Spell(wind, lasts, moisture) for wind, moisture, lasts in air.spells(minutes, start)]
+    met = spells_of(Weather(table=table, convergence=convergence, fields=fields), minutes, start)
     front = beside(ignition.cpu()) if is_seen else None
     who = Members.plain(fires) if members is None else members
     burning = who.fires(law, ground, met, cell_size, front)

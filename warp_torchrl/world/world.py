@@ -181,7 +181,7 @@ class World:
 
     def _start(self, seed: Tensor, episode: Tensor) -> tuple[WorldState, Tensor]:
         key = world_key(seed, episode)
-        ground = self.fire.aged(self.landscape(key), key)
+        ground = self.air.shaped(self.fire.aged(self.landscape(key), key), self.side_of_cell)
         fuel = (ground.age >= self.fire.youngest_fuel) & (self.fire.flammability(ground) > 0.0)
         lit = self.lighting(key, fuel)
         vehicles = self.team.place(key, ground.cover, lit)
@@ -189,7 +189,7 @@ class World:
         state = initial_state(
             ground,
             self.fire,
-            self.air(key, self.size, ground.corner),
+            self.air.on(key, ground),
             key,
             vehicles,
             self.side_of_cell,

@@ -12,7 +12,7 @@ from warp_torchrl.prediction.calibration.ground import read_ground
 from warp_torchrl.prediction.calibration.null_models import mean_wind
 from warp_torchrl.prediction.calibration.observed import Outcome, read_arrival, read_perimeters, read_scar
 from warp_torchrl.world.air.weather import Weather
-from warp_torchrl.world.fires.spell import Spell
+from warp_torchrl.world.fires.spell import Spell, spells_of
 from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.terrain.cells import read_cells
 from warp_torchrl.world.terrain.grid import Grid
@@ -134,7 +134,7 @@ def _read(folder: Path, hours: float | None, units: Mapping[str, str] | None, ca
         landscape=landscape,
         cell_size=header.grid.cell_size,
         lit=torch.from_numpy(read_cells("ignition", lit, header.grid)),
-        spells=[Spell(wind, lasts, moisture) for wind, moisture, lasts in weather.spells(last)],
+        spells=spells_of(weather, last),
         minutes=outcome.minutes,
         burned=outcome.burned,
         arrival=outcome.arrival,

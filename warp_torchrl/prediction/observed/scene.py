@@ -12,7 +12,7 @@ from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.fires.alone import Burned, on_map
 from warp_torchrl.world.fires.members import Members
 from warp_torchrl.world.fires.sightings import beside
-from warp_torchrl.world.fires.spell import Spell, can_ignite
+from warp_torchrl.world.fires.spell import Spell, can_ignite, spells_of
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER
 from warp_torchrl.world.state.state import Landscape
@@ -59,7 +59,7 @@ class Scene:
 
     def spells(self, begin: float, end: float) -> list[Spell]:
         """Return the weather between two times since the start [minutes]."""
-        return [Spell(wind, last, wet) for wind, wet, last in self.air.spells(end - begin, self.start + begin)]
+        return spells_of(self.air, end - begin, self.start + begin)
 
     def edge(self, known: Tensor) -> Tensor:
         """Return the cells along the front of what has burned that can burn, bool [H, W]."""

@@ -7,6 +7,7 @@ from typing import Any, Literal
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.runs.config.seeds import BEYOND_EVALUATION, FIRST_EVALUATED
 from warp_torchrl.validation import check_fields, did_you_mean
+from warp_torchrl.world.air.hills import Hills
 from warp_torchrl.world.ensemble.parameters import Deviations
 from warp_torchrl.world.fires.sightings import HotSpotSensor
 
@@ -85,7 +86,8 @@ class PredictionOptions:
     """Options of ``warp predict``, besides ``landscape`` and ``fire``.
 
     Attributes:
-        weather: CSV file of hourly weather, see ``warp_torchrl.world.weather.table``.
+        weather: CSV file of hourly weather, see ``warp_torchrl.world.weather.table``; or a folder of rasters with a
+            band an hour, see ``warp_torchrl.world.air.folder``.
         ignition: File of the ignition: points, a raster or a perimeter.
         hours: Time for which fires are followed [h]; None: to the end of the weather.
         area: Area at which a fire stops, even before [ha]; None for no limit.
@@ -98,6 +100,8 @@ class PredictionOptions:
             ``datetime`` the order of its dates, ``units.datetime=d/m/y``.
         true_north: Whether the weather's bearings are from true north, and are turned to the map's; else they are from
             the map's grid north already.
+        wind: ``terrain`` bends the weather's wind by hills, mass-consistently; ``weather`` takes it as given.
+        hills: How hills bend it: ``hills.roughness=0.1`` [m], ``hills.alpha``, ``hills.layers``, ``hills.columns``.
         start_ffmc: Fine fuel moisture code an hour before the first row, for a file without FFMC.
         bui: Buildup index, for a file without BUI, DMC and DC; None takes the law's.
         cell_size: Side of a cell [m]; None is that of the landscape.
@@ -130,6 +134,8 @@ class PredictionOptions:
     wind_height: Literal["10m", "20ft"] | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     true_north: bool = True
+    wind: Literal["weather", "terrain"] = "weather"
+    hills: Hills = field(default_factory=Hills)
     start_ffmc: float = 85.0
     bui: float | None = None
     cell_size: float | None = None

@@ -10,10 +10,11 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
+from warp_torchrl.world.air.fields import Field, WeatherFields
 from warp_torchrl.world.air.wind import Wind
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.behaviour.moistures import MOISTURES
-from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.world.state.state import Landscape, WorldState
 from warp_torchrl.world.terrain.source import LandscapeSource
 from warp_torchrl.world.weather.convergence import grid_convergence
 from warp_torchrl.world.weather.table import OPEN_10M_OVER_20FT, WeatherTable, read_weather
@@ -37,6 +38,7 @@ class Weather(Wind):
             they are from grid north.
         convergence: Angle from true north to grid north [degrees]; None is that at the middle of the landscape.
         minutes_per_tick: Minutes of a tick; None takes those of the fire.
+        fields: The same hours by place, for ``by_place``; the rows are their means.
 
     Raises:
         ValueError: If there is no table, or the file cannot be read.
@@ -50,6 +52,7 @@ class Weather(Wind):
     true_north: bool = True
     convergence: float | None = None
     minutes_per_tick: float | None = None
+    fields: WeatherFields | None = field(default=None, repr=False)
     _rows: WeatherTable = field(init=False, repr=False)
     _wind: Tensor = field(init=False, repr=False)  # float32 [T, 2], (u, v) [m/s]
     _moisture: Tensor = field(init=False, repr=False)  # float32 [T, 7], NaN where not known
@@ -102,15 +105,17 @@ class Weather(Wind):
         """See ``Wind``; NaN where the table has no value."""
         return self._moisture.to(key.device)[self._row(key, tick)]
 
-    def hours(
-        self, key: Tensor, size: tuple[int, int], corner: Tensor | None = None
-    ) -> Iterator[tuple[Tensor, Tensor | None]]:
+    def hours(self, key: Tensor, ground: Landscape) -> Iterator[tuple[Tensor, Tensor | None]]:
         """Return the wind and moisture of each row."""
         for wind, moisture in zip(self._wind, self._moisture, strict=True):
             yield wind.expand(len(key), 2)[:, :, None, None], moisture.expand(len(key), -1)
 
-    def spells(self, minutes: float, start: float = 0.0) -> Iterator[tuple[Tensor, Tensor, float]]:
-        """Return the wind [2], the moisture [7] and the minutes of each spell until some minutes have gone.
+    def by_place(self, row: int) -> Field | None:
+        """Return how the weather of a row differs by place; None where it is the same everywhere."""
+        return None if self.fields is None else self.fields.at(row)
+
+    def spells(self, minutes: float, start: float = 0.0) -> Iterator[tuple[int, Tensor, Tensor, float]]:
+        """Return the row, the wind [2], the moisture [7] and the minutes of each spell until some minutes have gone.
 
         Args:
             minutes: How long the spells last together.
@@ -121,7 +126,7 @@ class Weather(Wind):
         for row, (begin, end) in enumerate(zip(begins.tolist(), ends, strict=True)):
             first, last = max(begin if row else -math.inf, start), min(end, start + minutes)
             if last > first:
-                yield self._wind[row], self._moisture[row], last - first
+                yield row, self._wind[row], self._moisture[row], last - first
 
     def _row(self, key: Tensor, tick: Tensor) -> Tensor:
         """Return the row of each world, int64 [B]."""

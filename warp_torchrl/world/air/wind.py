@@ -14,7 +14,7 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.random import Stream, uniform
-from warp_torchrl.world.state.state import WorldState
+from warp_torchrl.world.state.state import Landscape, WorldState
 from warp_torchrl.world.terrain.source import LandscapeSource
 
 _FASTEST = 60.0  # m/s
@@ -38,6 +38,14 @@ class Wind(ABC):
             corner: (row, column) of each world's first cell in the landscape's source, int64 [B, 2]; None: (0, 0).
         """
 
+    def shaped(self, ground: Landscape, cell_size: float) -> Landscape:
+        """Return landscapes with layers of what it makes of their ground, for ``on`` and ``after_tick``."""
+        return ground
+
+    def on(self, key: Tensor, ground: Landscape) -> Tensor:
+        """Return the field of each world at the start on its landscape, which it has ``shaped``; see ``__call__``."""
+        return self(key, (ground.cover.shape[1], ground.cover.shape[2]), ground.corner)
+
     def after_tick(self, state: WorldState) -> Tensor:
         """Return the field of each world after its tick number ``state.tick``, shape of ``state.wind`` [m/s]."""
         return state.wind
@@ -50,11 +58,9 @@ class Wind(ABC):
         """
         return None
 
-    def hours(
-        self, key: Tensor, size: tuple[int, int], corner: Tensor | None = None
-    ) -> Iterator[tuple[Tensor, Tensor | None]]:
+    def hours(self, key: Tensor, ground: Landscape) -> Iterator[tuple[Tensor, Tensor | None]]:
         """Return the fields that it is known to have, each with its moisture: here that of the start."""
-        yield self(key, size, corner), self.moisture(key, torch.zeros_like(key))
+        yield self.on(key, ground), self.moisture(key, torch.zeros_like(key))
 
     def paced(self, minutes: float | None) -> "Wind":
         """Return the wind for ticks of ``minutes``; None where ticks have no minutes.

@@ -62,8 +62,9 @@ def start_burning(
     seeds = seed + torch.arange(cells.shape[0], device=cells.device)
     key = world_key(seeds, torch.zeros_like(seeds))
     nobody = Team(n_agents=1).place(key, ground.cover, is_burning(cells))
-    air = wind(key, (cells.shape[1], cells.shape[2]))
-    state = initial_state(ground, fire, air, key, nobody, cell_size, wind.moisture(key, torch.zeros_like(key)))
+    land = wind.shaped(ground, cell_size)
+    air, moisture = wind.on(key, land), wind.moisture(key, torch.zeros_like(key))
+    state = initial_state(land, fire, air, key, nobody, cell_size, moisture)
     state = fire.started(state)
     if state.stage_age is not None and stage_age is not None:
         state = state.replace(stage_age=stage_age)

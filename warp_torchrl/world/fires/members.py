@@ -170,7 +170,7 @@ class Members:
         strongest = winds[winds.square().sum(1).argmax()]
         driest = moisture.clone()
         driest[:_DEAD], driest[_FFMC] = moistures[:, :_DEAD].amin(0), moistures[:, _FFMC].max()
-        return replace(spell, wind=winds, moisture=moistures, fastest=Spell(strongest, spell.minutes, driest))
+        return replace(spell, wind=winds, moisture=moistures, fastest=replace(spell, wind=strongest, moisture=driest))
 
     def winds(self, wind: Tensor) -> Tensor:
         """Return each member's wind, float32 [K, 2] [m/s], from (u east, v north), float32 [2]."""

@@ -7,6 +7,9 @@ from dataclasses import dataclass, fields, replace
 import torch
 from torch import Tensor
 
+from warp_torchrl.world.air.fields import Field
+from warp_torchrl.world.air.hills import bent
+from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.behaviour.moistures import moisture_row
 from warp_torchrl.world.behaviour.spread import Spread
 from warp_torchrl.world.law.fuel_bed import gradient
@@ -28,11 +31,22 @@ class Spell:
     minutes: float  # how long it lasts
     moisture: Tensor | None = None  # float32 [7] or [G, 7], in the order of ``moistures.MOISTURES``, NaN where unknown
     fastest: "Spell | None" = None  # weather that sets the ticks where groups differ
+    field: Field | None = None  # how it differs by place; None: nowhere
 
     @property
     def groups(self) -> int:
         """Return the number of groups."""
         return len(self.wind) if self.wind.dim() == 2 else 1
+
+    def here(self, wind: Tensor, moisture: Tensor, window: Window) -> tuple[Tensor, Tensor]:
+        """Return winds [G, 2, 1, 1] or [G, 2, h, w] and moistures [G, 7] or [G, h, w, 7] of a window over level ground.
+
+        Args:
+            wind: Of some groups, float32 [G, 2] [m/s].
+            moisture: float32 [G, 7] [%].
+            window: Of the map.
+        """
+        return (wind[:, :, None, None], moisture) if self.field is None else self.field.here(wind, moisture, window)
 
     def of(self, groups: slice) -> "Spell":
         """Return the weather of some groups."""
@@ -40,6 +54,14 @@ class Spell:
             return self
         moisture = self.moisture if self.moisture is None or self.moisture.dim() == 1 else self.moisture[groups]
         return replace(self, wind=self.wind[groups], moisture=moisture)
+
+
+def spells_of(air: Weather, minutes: float, start: float = 0.0) -> list[Spell]:
+    """Return the spells of some minutes of weather, from some minutes after its first row began."""
+    return [
+        Spell(wind, lasts, moisture, field=air.by_place(row))
+        for row, wind, moisture, lasts in air.spells(minutes, start)
+    ]
 
 
 def spread_in(
@@ -54,9 +76,12 @@ def spread_in(
     if window is not None:
         ground, rise = window.landscape(landscape), _rise(landscape, window, cell_size)
     at_once = max(1, _SPREAD_AT_ONCE // ground.cover.numel())
+    place = Window.whole((landscape.cover.shape[1], landscape.cover.shape[2])) if window is None else window
     parts = [
-        fire.bed.spread(ground, wind[:, :, None, None], moist, cell_size, rise)
-        for wind, moist in zip(winds.split(at_once), moistures.split(at_once), strict=True)
+        fire.bed.spread(ground, bent(air, ground), moist, cell_size, rise)
+        for air, moist in (
+            spell.here(*each, place) for each in zip(winds.split(at_once), moistures.split(at_once), strict=True)
+        )
     ]
     return parts[0] if len(parts) == 1 else _joined(parts)
 

@@ -28,7 +28,7 @@ from warp_torchrl.world.behaviour.surface import surface_spread
 from warp_torchrl.world.law.canopy import crowns_of, lack_of_canopy, to_midflame
 from warp_torchrl.world.law.mapped_fuel import check_codes
 from warp_torchrl.world.state.state import Landscape
-from warp_torchrl.world.terrain.source import LandscapeSource, map_size
+from warp_torchrl.world.terrain.source import LandscapeSource
 
 COVER_FUEL: Mapping[str, tuple[int, int, int, int, int]] = {
     "fbfm13": (98, 8, 1, 10, 99),
@@ -99,7 +99,7 @@ class FuelBed:
         Args:
             landscape: The landscapes.
             wind: (u east, v north) of the air's motion at 10 m in the open, float32 [B, 2, 1, 1] or [B, 2, H, W] [m/s].
-            moisture: float32 [B, 7], in the order of ``MOISTURES``.
+            moisture: In the order of ``MOISTURES``, float32 [B, 7], or by cell [B, H, W, 7].
             cell_size: Side of a cell [m].
             rise: How steeply the ground rises, see ``gradient``; None makes it of the landscapes' elevation.
         """
@@ -140,7 +140,8 @@ class FuelBed:
         slope: Tensor,
         aspect: Tensor,
     ) -> Spread:
-        codes = dict(zip(MOISTURES, moisture[:, :, None, None].unbind(1), strict=True))
+        of_cells = moisture if moisture.dim() == 4 else moisture[:, None, None]
+        codes = dict(zip(MOISTURES, of_cells.unbind(-1), strict=True))
         return fbp_spread(
             fuel,
             wind_speed=wind_speed,
@@ -153,7 +154,7 @@ class FuelBed:
 
     def _rothermel(self, fuel: Tensor, moisture: Tensor, **air: Tensor) -> Spread:
         table = _on(self.table, fuel.device)
-        return surface_spread(table, table.index(fuel), **air, moisture=moisture[:, :5])
+        return surface_spread(table, table.index(fuel), **air, moisture=moisture[..., :5])
 
     def runs_in_crowns(self, landscape: Landscape) -> bool:
         """Return whether the law burns crowns, and landscapes know theirs; Canadian rates have crown fire in them."""
@@ -202,9 +203,9 @@ class FuelBed:
     def fastest(self, landscape: LandscapeSource, wind: Wind, cell_size: float, moisture: Tensor) -> float:
         """Return the highest rate in a few worlds over the hours that the wind knows [m/min]; 1e-3 at least."""
         key = world_key(torch.arange(_SAMPLES))
-        ground = landscape(key)
+        ground = wind.shaped(landscape(key), cell_size)
         rates = [1e-3]
-        for air, damp in wind.hours(key, map_size(landscape.size), ground.corner):
+        for air, damp in wind.hours(key, ground):
             row = moisture if damp is None else torch.where(damp.isnan(), moisture, damp)
             rates.append(float(self.spread(ground, air, row.expand(len(air), -1), cell_size).head.max()))
         return max(rates)

@@ -111,7 +111,7 @@ def regrid(name: str, grid: Grid, resolution: float) -> Grid:
     if not grid.is_on_earth:
         raise ValueError(f"{name} must have a CRS, projected or in degrees, to be resampled, got {grid.crs}")
     crs = grid.crs if grid.crs.is_projected and not grid.distortion else _find_utm(name, grid)
-    west, south, east, north = _project_bounds(name, grid, crs)
+    west, south, east, north = project_bounds(name, grid, crs)
     side = resolution / crs.linear_units_factor[1]
     sides = [(north - south) / side + 1e-6, (east - west) / side + 1e-6]  # 6 cells are 5.999.. in floating point
     if not all(1 <= each <= LARGEST_MAP for each in sides) or int(sides[0]) * int(sides[1]) > LARGEST_MAP:
@@ -126,7 +126,7 @@ def regrid(name: str, grid: Grid, resolution: float) -> Grid:
 
 def _find_utm(name: str, grid: Grid) -> Any:
     """Return the UTM zone of a grid's middle."""
-    west, south, east, north = _project_bounds(name, grid, stated_crs(name, WGS84))
+    west, south, east, north = project_bounds(name, grid, stated_crs(name, WGS84))
     longitude, latitude = (west + east) / 2, (south + north) / 2
     if not (-80.0 <= latitude <= 84.0 and -180.0 <= longitude <= 180.0):
         raise ValueError(f"{name} must lie in 80 S to 84 N to be put on a UTM grid, its middle is at {latitude:g}")
@@ -134,7 +134,7 @@ def _find_utm(name: str, grid: Grid) -> Any:
     return stated_crs(name, (32600 if latitude >= 0.0 else 32700) + zone)
 
 
-def _project_bounds(name: str, grid: Grid, crs: Any) -> tuple[float, float, float, float]:
+def project_bounds(name: str, grid: Grid, crs: Any) -> tuple[float, float, float, float]:
     """Return a grid's (west, south, east, north) in another CRS; infinite where it cannot be seen there."""
     if crs == grid.crs:
         return grid.bounds
@@ -148,7 +148,7 @@ def _check_overlap(name: str, source: Grid, grid: Grid) -> None:
     if not (source.is_on_earth and grid.is_on_earth):
         rule = "have a CRS, projected or in degrees, and so must the grid that it is resampled to"
         raise ValueError(f"{name} must {rule}, it has {source.crs}, the grid {grid.crs}")
-    west, south, east, north = _project_bounds(name, source, grid.crs)
+    west, south, east, north = project_bounds(name, source, grid.crs)
     left, bottom, right, top = grid.bounds
     if not (west < right and left < east and south < top and bottom < north):
         got = tuple(round(each, 1) for each in (west, south, east, north))
