@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -20,10 +20,6 @@ from warp_torchrl.world.world import World
 _BOUNDS = (0.05, 0.15, 0.25, 0.4, 0.6, 0.75, 0.85, 0.95)
 """Between two bins; eighths, of eight members that weigh alike, lie within them."""
 POLICY = "dispatch"
-
-
-class _Played(NamedTuple):
-    world: World
 
 
 def believed_chance(state: WorldState, world: World) -> Tensor:
@@ -50,9 +46,10 @@ def counted(chance: Tensor, burns: Tensor, counts: Tensor) -> Tensor:
 
 def reliability(scenario: str, device: str, episodes: int, overrides: Sequence[str] = ()) -> list[dict[str, Any]]:
     """Return a row for each bin of chances, of all cells that were not in sight, at every step of ``dispatch``."""
-    world = make_env(scenario, n_worlds=1, device=device, overrides=["belief=ensemble", *overrides]).world
+    env = make_env(scenario, n_worlds=1, device=device, overrides=["belief=ensemble", *overrides])
+    world = env.world
     seed = torch.arange(FIRST_SEED, FIRST_SEED + episodes, device=device)
-    state, policy = world.reset(seed, torch.zeros_like(seed)), HEURISTICS[POLICY](_Played(world))
+    state, policy = world.reset(seed, torch.zeros_like(seed)), HEURISTICS[POLICY](env)
     total = torch.zeros(3, len(_BOUNDS) + 1, dtype=torch.float64, device=device)
     for _ in range(world.horizon):
         state = world.step(state, policy.act(state, world.possible_actions(state))).after
