@@ -85,6 +85,22 @@ def test_units_that_the_file_does_not_state_are_those_that_the_user_says(folder)
     assert "WindSpeed [wind_speed, km/h]" in (folder / "other" / "report.md").read_text()
 
 
+def test_a_map_of_rothermels_fuels_without_a_canopy_is_warned_of(folder, capsys):
+    write(folder / "fuel.tif", np.full(SHAPE, 102), "int16", cell=50.0, crs="EPSG:32631", west=5e5)
+    own = {"landscape.table": "fbfm40", "fire.model": "fbfm40", "fires": 1}
+    assert main(arguments(folder, **own)) == 0
+    assert "- warning: no canopy cover is read: the wind is that over open ground" in capsys.readouterr().out
+    for name, value in (("cover", 70), ("height", 20), ("base_height", 1), ("bulk_density", 0.15)):
+        plane = np.full(SHAPE, float(value))
+        write(folder / f"{name}.tif", plane, "float32", cell=50.0, crs="EPSG:32631", west=5e5)
+    crowns = {f"landscape.canopy_{name}": f"{name}.tif" for name in ("height", "base_height", "bulk_density")}
+    units = {"landscape.canopy": "cover.tif", "landscape.height_unit": 1, "landscape.density_unit": 1}
+    assert main(arguments(folder, **own, **crowns, **units, overwrite="true")) == 0
+    assert "warning" not in capsys.readouterr().out
+    share = read(folder / "out" / "crown.tif")
+    assert np.nanmax(share) <= 1.0 and not np.isnan(share).all()
+
+
 def test_a_window_is_predicted_on_its_own(folder):
     window = {"landscape.size": "[20,24]", "landscape.row": 10, "landscape.column": 2}
     assert main(arguments(folder, **window)) == 0

@@ -16,3 +16,9 @@ def test_the_bounds_of_a_rate_move_with_the_pace_of_the_fire(pace):
     assert rate.tolist() == pytest.approx([min(6.0, head), head, rear])
     share = rate / 10.0
     assert torch.allclose(intensity, 10_000.0 * share) and torch.allclose(flame, 2.0 * share.pow(0.46))
+
+
+def test_the_kind_of_fire_on_arrival_is_that_of_the_head():
+    then = HeadBehaviour(*torch.ones(4, 3), kind=torch.tensor([0.0, 1.0, 2.0]))
+    *_, crowns, active = passing(torch.full((3,), 30.0), torch.ones(3), then, 30.0)
+    assert crowns.tolist() == [0.0, 1.0, 1.0] and active.tolist() == [0.0, 0.0, 1.0]

@@ -225,3 +225,11 @@ def test_crowns_of_c6_burn_only_where_they_carry_the_fire_faster():
     assert dry.head > wet.head and (dry.intensity / (300 * dry.head)).item() == pytest.approx(
         surface.item() + 1.8, rel=1e-2
     )
+
+
+def test_the_kind_of_fire_is_that_of_the_share_of_crowns_that_burn():
+    # C-2 with crowns from 3 m: none in damp air, some, then nine tenths. Aspen has no crowns to burn.
+    damp = torch.tensor([70.0, 84.0, 95.0])
+    conifers, aspen = (fbp_spread(torch.tensor([code]), **LEVEL, wind_speed=3.0, ffmc=damp) for code in (2, 11))
+    assert conifers.kind.tolist() == [0.0, 1.0, 2.0] and aspen.kind.tolist() == [0.0] * 3
+    assert fbp_spread(torch.tensor([102]), **LEVEL, wind_speed=3.0, ffmc=damp).kind.tolist() == [0.0] * 3

@@ -68,6 +68,11 @@ def test_a_gain_lights_crowns_and_acts_on_their_rate():
     torch.testing.assert_close(twice.flame_length, 2.0**0.46 * one.flame_length)
 
 
+def test_wet_needles_do_not_burn():
+    kinds = [float(spread(land(**TREES), 5.0, foliar_moisture=water).kind.unique()) for water in (100.0, 180.0)]
+    assert kinds == [2.0, 0.0]
+
+
 def test_the_rule_of_rothermel_is_another():
     assert (spread(land(**TREES), crown="rothermel").head != spread(land(**TREES)).head).all()
 
