@@ -34,7 +34,7 @@ def test_each_episode_draws_its_speed_and_bearing() -> None:
     assert speed.min() >= 2.0 and speed.max() <= 8.0
     # Uniform: mean 5, deviation 6 / sqrt(12) / sqrt(2000) = 0.039; five of them. Bearings do not follow from speeds.
     assert speed.mean() == pytest.approx(5.0, abs=0.2)
-    assert torch.corrcoef(torch.stack((speed, wind[:, 0] / speed)))[0, 1].abs() < 0.12
+    assert torch.corrcoef(torch.stack((speed, wind[:, 1] / speed)))[0, 1].abs() < 0.12
     assert torch.equal(Terrain(speed=3.0)(SEEDS, (5, 5)), Uniform(speed=3.0)(SEEDS, (5, 5)))
 
 
