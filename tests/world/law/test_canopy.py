@@ -26,9 +26,11 @@ def land(tilt=0.0, **layers):
     return ground.with_layers(fuel=torch.full(shape, CODE, dtype=torch.int16), **planes)
 
 
-def spread(ground, wind=10.0, **law):
+def spread(ground, wind=10.0, by_cell=False, **law):
     air = torch.tensor([wind, 0.0]).expand(2, 2)[:, :, None, None]
-    return RateFire(**law).bed.spread(ground, air, moisture_row({}).expand(2, -1), 30.0)
+    moisture = moisture_row({}).expand(2, -1)
+    moisture = moisture[:, None, None].expand(-1, 4, 5, -1) if by_cell else moisture
+    return RateFire(**law).bed.spread(ground, air, moisture, 30.0)
 
 
 def same(one, other):
@@ -44,6 +46,12 @@ def test_fires_run_in_crowns_as_users_are_told():
     for each in fields(Spread):
         expected = getattr(told, each.name).expand(2, 4, 5)
         torch.testing.assert_close(getattr(found, each.name), expected, rtol=1e-5, atol=1e-4)
+
+
+def test_moisture_may_differ_by_place():
+    one, other = (spread(land(**TREES), by_cell=by_cell) for by_cell in (False, True))
+    for each in fields(Spread):
+        torch.testing.assert_close(getattr(one, each.name), getattr(other, each.name))
 
 
 def test_a_crown_fire_up_a_slope_goes_less_far_on_the_map():

@@ -140,8 +140,7 @@ class FuelBed:
         slope: Tensor,
         aspect: Tensor,
     ) -> Spread:
-        of_cells = moisture if moisture.dim() == 4 else moisture[:, None, None]
-        codes = dict(zip(MOISTURES, of_cells.unbind(-1), strict=True))
+        codes = dict(zip(MOISTURES, _of_cells(moisture).unbind(-1), strict=True))
         return fbp_spread(
             fuel,
             wind_speed=wind_speed,
@@ -176,7 +175,7 @@ class FuelBed:
         return with_crowns(
             surface,
             canopy,
-            Surroundings(**air, moisture=moisture[:, None, None, :5]),
+            Surroundings(**air, moisture=_of_cells(moisture)[..., :5]),
             heat=table.fuels.heat[table.index(fuel)] * KILOJOULES_PER_KG,
             foliar_moisture=self.foliar_moisture,
             model=self.crown,
@@ -249,3 +248,8 @@ def listed(landscape: Landscape, cell: Tensor) -> Landscape:
 def bearing(east: Tensor, north: Tensor) -> Tensor:
     """Return where a vector points, degrees clockwise from grid north in [0, 360)."""
     return torch.rad2deg(torch.atan2(east, north + (north == 0.0) * (east == 0.0))) % 360.0
+
+
+def _of_cells(moisture: Tensor) -> Tensor:
+    """Return moistures [B, 7] or [B, H, W, 7] as those of cells, [B, 1, 1, 7] or [B, H, W, 7]."""
+    return moisture if moisture.dim() == 4 else moisture[:, None, None]
