@@ -47,5 +47,5 @@ def test_a_run_names_its_baselines(names: list[str], tmp_path: Path) -> None:
 
 
 def test_a_baseline_must_be_known() -> None:
-    with pytest.raises(ConfigError, match=r"evaluation.baselines must be of .*, got dispach: did you mean dispatch"):
-        run_config(plain(compose_config("train", ["evaluation.baselines=[dispach]"])))
+    with pytest.raises(ConfigError, match=r"evaluation.baselines must be of .*, got dispatc: did you mean dispatch"):
+        run_config(plain(compose_config("train", ["evaluation.baselines=[dispatc]"])))
