@@ -24,6 +24,7 @@ POLICY = "dispatch"
 
 class _Played(NamedTuple):
     world: World
+    shared_state: WorldState
 
 
 def believed_chance(state: WorldState, world: World) -> Tensor:
@@ -52,7 +53,8 @@ def reliability(scenario: str, device: str, episodes: int, overrides: Sequence[s
     """Return a row for each bin of chances, of all cells that were not in sight, at every step of ``dispatch``."""
     world = make_env(scenario, n_worlds=1, device=device, overrides=["belief=ensemble", *overrides]).world
     seed = torch.arange(FIRST_SEED, FIRST_SEED + episodes, device=device)
-    state, policy = world.reset(seed, torch.zeros_like(seed)), HEURISTICS[POLICY](_Played(world))
+    state = world.reset(seed, torch.zeros_like(seed))
+    policy = HEURISTICS[POLICY](_Played(world, state))
     total = torch.zeros(3, len(_BOUNDS) + 1, dtype=torch.float64, device=device)
     for _ in range(world.horizon):
         state = world.step(state, policy.act(state, world.possible_actions(state))).after
@@ -89,7 +91,7 @@ def draw_reliability(rows: Sequence[dict[str, Any]], path: Path) -> None:
         path: PNG to write.
     """
     with style():
-        figure, axes = sheet([["bins"]], (3.6, 3.6), "Cells that nobody saw, by the chance they were believed to burn")
+        figure, axes = sheet([["bins"]], (3.6, 3.6), "Cells out of sight")
         panel = axes["bins"]
         panel.grid(color=GRID, linewidth=0.5)
         panel.set_axisbelow(True)

@@ -290,10 +290,10 @@ class RateFire(Automaton):
             wind = at_cells(wind.unflatten(0, (-1, count)), beside.cell).flatten(0, 1)[:, :, None]
         each = torch.arange(len(rate), device=rate.device).repeat_interleave(count)
         spread = self.bed.spread(landscape[each], wind, self._damp(air), size, rise[each])
-        made = travel(spread.head, spread.direction, spread.length_to_breadth, size)[:, :, 0].unbind(1)
-        chance = torch.zeros_like(made[0])
+        made = travel(spread.head, spread.direction, spread.length_to_breadth, size)[:, :, 0]
+        rates, chance = (made[:, 0], made[:, 1], made[:, 2]), torch.zeros_like(made[:, 0])
         for direction in range(8):
-            share = rate_from((direction + 4) % 8, made) * (self.minutes * rate.flatten()[:, None])
+            share = rate_from((direction + 4) % 8, rates) * (self.minutes * rate.flatten()[:, None])
             chance = torch.maximum(chance, share.clamp(max=1.0) * beside.spreads[each, direction])
         return chance.unflatten(0, (-1, count))
 

@@ -101,6 +101,12 @@ def test_worth_seeing_is_doubt_and_staleness():
     assert worth[0, 0, 1, 4:].tolist() == pytest.approx([0.001, 0.251])
 
 
+def test_members_are_weighed_where_sight_errs_unless_one_says_otherwise():
+    exact, errs = rules(), rules(sight={"miss": 0.1})
+    assert exact.belief.trusts(exact) == 0.0 and errs.belief.trusts(errs) == 1.0
+    assert Ensemble(trust=0.3).trusts(exact) == 0.3 and Ensemble(members=1).trusts(errs) == 0.0
+
+
 def test_how_well_beliefs_fit_is_measured():
     world = rules(belief=Ensemble(members=4, hidden=0, particles=16, **UNKNOWN))
     state = reset(world)
