@@ -86,7 +86,7 @@ def draw_reliability(rows: Sequence[dict[str, Any]], path: Path) -> None:
         path: PNG to write.
     """
     with style():
-        figure, axes = sheet([["bins"]], (3.6, 3.6), "Cells that nobody saw, by the chance they were believed to burn")
+        figure, axes = sheet([["bins"]], (3.6, 3.6), "Cells out of sight")
         panel = axes["bins"]
         panel.grid(color=GRID, linewidth=0.5)
         panel.set_axisbelow(True)

@@ -122,6 +122,12 @@ def test_smoke_without_a_known_fire_is_worth_seeing():
     assert world.worth_seeing(state)[0, 0, 0].argmax() < 3 and (world.worth_seeing(state)[0, 0, 0, :3] > 0.3).all()
 
 
+def test_members_are_weighed_where_sight_errs_unless_one_says_otherwise():
+    exact, errs = rules(), rules(sight={"miss": 0.1})
+    assert exact.belief.trusts(exact) == 0.0 and errs.belief.trusts(errs) == 1.0
+    assert Ensemble(trust=0.3).trusts(exact) == 0.3 and Ensemble(members=1).trusts(errs) == 0.0
+
+
 def test_how_well_beliefs_fit_is_measured():
     world = rules(belief=Ensemble(members=4, hidden=0, particles=16, **UNKNOWN))
     state = reset(world)

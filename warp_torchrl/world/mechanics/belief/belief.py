@@ -73,7 +73,8 @@ class Ensemble(Belief, Mechanic):
         hidden: M, fires that may be anywhere; 0 does without.
         particles: Rates and winds without maps from which the team learns what it does not know of them.
         threshold: Share of the members' weight over which a cell is taken to burn.
-        trust: What each cell that is seen counts for in the members' weights; 0 leaves them alike, and all maps apart.
+        trust: What each cell that is seen counts for in the members' weights; 0 leaves them alike and maps apart.
+            None is 1 where sight errs, else 0.
         error: Least chance that a member is wrong of a cell.
         rate_deviation: Coefficient of variation of the rate of spread, as far as the team knows; 0: it knows it.
         wind_speed_deviation: The same of the wind's speed.
@@ -99,7 +100,7 @@ class Ensemble(Belief, Mechanic):
     hidden: int = 64
     particles: int = 512
     threshold: float = 0.5
-    trust: float = 0.0
+    trust: float | None = None
     error: float = 0.02
     rate_deviation: float = 0.0
     wind_speed_deviation: float = 0.0
@@ -121,10 +122,11 @@ class Ensemble(Belief, Mechanic):
             soon=(1, 64),
         )
 
-    @property
-    def weighs(self) -> bool:
-        """Return whether sightings weigh members."""
-        return self.members > 1 and self.trust > 0.0
+    def trusts(self, world: Rules) -> float:
+        """Return what each cell that is seen counts for in the members' weights; 0 where they stay alike."""
+        if self.members == 1:
+            return 0.0
+        return float(any(world.sensing.errors)) if self.trust is None else self.trust
 
     @property
     def knows_parameters(self) -> bool:
@@ -157,7 +159,7 @@ class Ensemble(Belief, Mechanic):
             members=unburned(state, keys[:, self.hidden :], world.fire),
             weights=torch.full((*shape, self.members), 1.0 / self.members, device=state.key.device),
             learning=self._begun(state, key, groups),
-            chances=self._no_chances(state, groups),
+            chances=self._no_chances(state, groups, world),
             hidden=hidden_fires(state, world, keys[:, : self.hidden]) if self.hidden else Named(),
             possible=possible,
             found=torch.zeros_like(possible),
@@ -321,7 +323,7 @@ class Ensemble(Belief, Mechanic):
         members = in_parameters(worlds_of(before, beliefs.members, world.fire), world.fire, values)
         count, chances = beliefs.members.held["key"].shape[1], beliefs.chances
         rows = rows_of(before, count)
-        if self.weighs:
+        if self.trusts(world):
             ignites = forecast(world.fire, members).ignition_probability * now[rows][:, None, None]
             chances = chances.replace(values=ignites.unflatten(0, (-1, count)))
 
@@ -366,8 +368,8 @@ class Ensemble(Belief, Mechanic):
         records = kept(state)
         return records.amax(dim=1, keepdim=True) if self.of == "team" else records
 
-    def _no_chances(self, state: WorldState, groups: int) -> Named:
-        if not self.weighs:
+    def _no_chances(self, state: WorldState, groups: int, world: Rules) -> Named:
+        if not self.trusts(world):
             return Named()
         return Named({"values": state.alpha.new_zeros(len(state.key), groups * self.members, *state.alpha.shape[1:])})
 
@@ -380,8 +382,8 @@ class Ensemble(Belief, Mechanic):
         since = recorded(torch.zeros_like(ticked_at), ticked_at)
         seen = sightings(before, records, running, since)
         beliefs, (miss, false_alarm) = beliefs_of(state), world.sensing.errors
-        if self.weighs:
-            beliefs = weighed(state, beliefs, seen, self.trust, self.error, (miss, false_alarm))
+        if self.trusts(world):
+            beliefs = weighed(state, beliefs, seen, self.trusts(world), self.error, (miss, false_alarm))
         if beliefs.learning is not None:
             beliefs = beliefs.replace(learning=noted(beliefs.learning, seen.cell, seen.first, seen.burns))
         if self.hidden:
