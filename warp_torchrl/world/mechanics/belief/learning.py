@@ -1,4 +1,4 @@
-"""How a team learns the wind and the rate of spread: particles without maps, which the fire's edge weighs.
+"""Learning of the wind and the rate of spread: particles without maps, which the fire's edge weighs.
 
 A particle is a rate and a wind, theta. At each tick the trees beside the known fire burn or do not, and the law says
 how likely each was to ignite under each theta. Particles of little weight are replaced (Gordon, Salmond and Smith 1993)

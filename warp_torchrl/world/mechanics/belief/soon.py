@@ -1,4 +1,4 @@
-"""Where fire may burn soon: members that are ticked on, with the draws that they will have."""
+"""Chances to burn soon: members that are ticked on, with the draws that they will have."""
 
 import torch
 from torch import Tensor
