@@ -28,12 +28,10 @@ def believed_chance(state: WorldState, world: World) -> Tensor:
     Raises:
         ValueError: If the team has no belief in common.
     """
-    if not hasattr(world.belief, "burn_chance"):
-        raise ValueError("beliefs are measured with belief=ensemble")
-    chance: Tensor = world.belief.burn_chance(state, world)
-    if chance.shape[1] > 1:
+    known, hidden = world.believed_fire(state)
+    if known.shape[1] > 1:
         raise ValueError("beliefs are measured with belief.of=team")
-    return chance[:, 0]
+    return (1.0 - (1.0 - known) * (1.0 - hidden))[:, 0]
 
 
 def counted(chance: Tensor, burns: Tensor, counts: Tensor) -> Tensor:

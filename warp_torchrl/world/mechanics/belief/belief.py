@@ -16,13 +16,12 @@ from warp_torchrl.validation import check_fields
 from warp_torchrl.world.arrays.batch import Named
 from warp_torchrl.world.arrays.random import imagined_keys, named_key
 from warp_torchrl.world.backends.backend import forecast
-from warp_torchrl.world.ensemble.filtering import moments, quantiles
+from warp_torchrl.world.ensemble.filtering import moments, resampled
 from warp_torchrl.world.ensemble.members import held, in_parameters, rows_of, ticked, unburned, worlds_of
 from warp_torchrl.world.mechanics.belief.beliefs import (
     NAME,
     Beliefs,
     beliefs_of,
-    brier_skill,
     burn_soon,
     cells_of,
     disagreement,
@@ -33,6 +32,7 @@ from warp_torchrl.world.mechanics.belief.beliefs import (
     most_believed,
 )
 from warp_torchrl.world.mechanics.belief.correcting import corrected, weighed
+from warp_torchrl.world.mechanics.belief.fit import counted, metrics_of
 from warp_torchrl.world.mechanics.belief.hidden import DOUBT, fires_lit, hidden_fires, struck
 from warp_torchrl.world.mechanics.belief.learning import PARAMETERS, Learning, begun, learned, noted, watched
 from warp_torchrl.world.mechanics.belief.sightings import sightings
@@ -59,6 +59,12 @@ def _believed_map(show: Callable[[Beliefs], Tensor]) -> Callable[[WorldState], T
         return codes[:, 0] if codes.shape[1] == 1 else codes
 
     return shown
+
+
+def _since_tick(state: WorldState, world: Rules) -> Tensor:
+    """Return the least record of what was seen since the last tick of the fire, int32 [B]."""
+    ticked_at = state.step - state.step % world.steps_per_tick
+    return recorded(torch.zeros_like(ticked_at), ticked_at)
 
 
 @part
@@ -185,19 +191,7 @@ class Ensemble(Belief, Mechanic):
         after = self._looked(self._ticked(before, after, world), kept(before), running, world)
         after = foreseen(after, now, world, self.soon)
         beliefs = beliefs_of(after)
-        burns, p = is_burning(after.cells)[:, None], known_probability(beliefs)
-        thought, skill = p > self.threshold, brier_skill(p, burns[:, 0])
-        overlap, union = (burns & thought).sum((2, 3)), (burns | thought).sum((2, 3))
-        return after.with_planes(
-            NAME,
-            beliefs.replace(
-                overlap=beliefs.overlap + (overlap.sum(1) * running).to(torch.int32),
-                union=beliefs.union + (union.sum(1) * running).to(torch.int32),
-                skill=torch.where(running, skill, beliefs.skill),
-                skills=beliefs.skills + skill * running,
-                alight=beliefs.alight + (burns.flatten(1).any(dim=1) & running).to(torch.int32),
-            ),
-        )
+        return after.with_planes(NAME, counted(beliefs, is_burning(after.cells), running, self.threshold))
 
     def assumed(self, state: WorldState, world: Rules) -> WorldState:
         """Return the worlds as they are believed to be, see ``beliefs.most_believed``, in the mean wind and rate."""
@@ -218,19 +212,12 @@ class Ensemble(Belief, Mechanic):
         burns = burns if signs is None else burns + signs
         return burns + _STALE * (1.0 - freshness(records, state.step))
 
-    def burn_chance(self, state: WorldState, world: Rules) -> Tensor:
-        """Return the chance of each cell to burn, by fires known and hidden, float32 [B, G, H, W]."""
-        beliefs = beliefs_of(state)
-        return 1.0 - (1.0 - known_probability(beliefs)) * (1.0 - beliefs.unseen)
-
     def hidden_chance(self, state: WorldState, world: Rules) -> Tensor:
         """Return the chance of each cell to burn by a fire that nobody saw, float32 [B, G, H, W].
 
         It is 0 of cells that cannot burn, or were seen since the last tick.
         """
-        ticked_at = state.step - state.step % world.steps_per_tick
-        since = recorded(torch.zeros_like(ticked_at), ticked_at)
-        may = (state.alpha > 0.0)[:, None] & (self._records(state) < since[:, None, None, None])
+        may = (state.alpha > 0.0)[:, None] & (self._records(state) < _since_tick(state, world)[:, None, None, None])
         return hidden_probability(beliefs_of(state), fires_lit(world.lighting)) * may
 
     def believed_fire(self, state: WorldState, world: Rules) -> tuple[Tensor, Tensor]:
@@ -241,9 +228,8 @@ class Ensemble(Belief, Mechanic):
     def futures(self, state: WorldState, world: Rules, count: int) -> WorldState:
         """Return members, as often as they weigh, of worlds with one belief."""
         beliefs = beliefs_of(state)
-        total = beliefs.weights[:, 0].cumsum(dim=1)
-        at = (torch.arange(count, device=total.device) + 0.5) / count * total[:, -1:]
-        pick = torch.searchsorted(total, at).clamp(max=self.members - 1)
+        half = torch.full_like(beliefs.weights[:, 0, 0], 0.5)
+        pick = resampled(beliefs.weights[:, 0], half, count)
 
         def picked(leaf: Tensor) -> Tensor:
             return leaf.gather(1, pick.view(*pick.shape, *[1] * (leaf.ndim - 2)).expand(-1, -1, *leaf.shape[2:]))
@@ -263,31 +249,8 @@ class Ensemble(Belief, Mechanic):
         return (*(Metric(name, "more", "%", "", "Belief") for name in ("jaccard", "skill")), *known, *doubt)
 
     def metrics(self, state: WorldState) -> dict[str, Tensor]:
-        """Return how well beliefs fit the fire.
-
-        ``jaccard``: cells that burn and are believed to, over those of which either holds, sums over the steps.
-        ``skill``: the Brier skill score of the members, see ``brier_skill``, mean over the steps in which something
-        burns; no less than 0. ``rate_known``, ``wind_speed_known``, ``bearing_known``: 1 where the true value lies
-        within the particles' 5 to 95 % quantiles now. ``rate_doubt`` and so on: their standard deviation over that
-        before anything was seen.
-        """
-        beliefs = beliefs_of(state)
-        found = {
-            "jaccard": beliefs.overlap / beliefs.union.clamp(min=1),
-            "skill": (beliefs.skills / beliefs.alight.clamp(min=1)).clamp(0.0, 1.0),
-        }
-        known = beliefs.learning
-        if known is None:
-            return found
-        values, weights = known.particles.flatten(0, 1), known.weights.flatten(0, 1)
-        _, covariance = moments(values, weights)
-        deviation = covariance.diagonal(dim1=1, dim2=2).clamp(min=0.0).sqrt().unflatten(0, (len(state.key), -1)).mean(1)
-        for name, index in self._unknown:
-            low, high = quantiles(values[..., index], weights, values.new_tensor([0.05, 0.95])).unbind(1)
-            inside = ((low <= 0.0) & (high >= 0.0)).to(torch.float32).view(len(state.key), -1)
-            found[f"{name}_known"] = inside.mean(dim=1)
-            found[f"{name}_doubt"] = (deviation[:, index] / known.prior[:, index]).clamp(max=1.0)
-        return found
+        """Return how well beliefs fit the fire, see ``fit.metrics_of``."""
+        return metrics_of(beliefs_of(state), self._unknown)
 
     @property
     def _unknown(self) -> list[tuple[str, int]]:
@@ -359,8 +322,7 @@ class Ensemble(Belief, Mechanic):
         spreads = (cells >= FIRST_FIRE) & (cells <= world.fire.last_spreading)
         fuel = (is_tree(cells) & (cells >= world.fire.youngest_fuel) & (wet == 0)).any(dim=2)
         planes = mean_of(beliefs, spreads), mean_of(beliefs, is_burning(cells)), fuel & (before.alpha > 0.0)[:, None]
-        ticked_at = (before.step - before.step % world.steps_per_tick).clamp(min=0)
-        since = recorded(torch.zeros_like(ticked_at), ticked_at)
+        since = _since_tick(before, world)
         return beliefs.replace(learning=watched(before, known, planes, self._records(before), since))
 
     def _records(self, state: WorldState) -> Tensor:
@@ -378,8 +340,7 @@ class Ensemble(Belief, Mechanic):
         records = self._records(state)
         if self.of == "team":
             before = before.amax(dim=1, keepdim=True)
-        ticked_at = state.step - state.step % world.steps_per_tick
-        since = recorded(torch.zeros_like(ticked_at), ticked_at)
+        since = _since_tick(state, world)
         seen = sightings(before, records, running, since)
         beliefs, (miss, false_alarm) = beliefs_of(state), world.sensing.errors
         if self.trusts(world):

@@ -19,7 +19,6 @@ NAME = "belief"
 """Of the planes in the state."""
 BLUR = 4
 """Over which the chance of hidden fires is spread, by Chebyshev distance [cells]."""
-_ERRORS = 1 << 16
 
 
 @dataclass(eq=False, repr=False)
@@ -79,23 +78,6 @@ def disagreement(beliefs: Beliefs) -> Tensor:
     """Return how much the members disagree on each cell, 4 p (1 - p), float32 [B, G, H, W] in 0..1."""
     p = known_probability(beliefs)
     return 4.0 * p * (1.0 - p)
-
-
-def brier_skill(p: Tensor, burns: Tensor) -> Tensor:
-    """Return how much less a belief errs than one in which nothing burns, float32 [B] (Brier 1950).
-
-        S = 1 - sum (p - y)^2 / sum y^2,   sums over the cells, and the mean over a world's beliefs
-
-    It is 1 where the belief is right everywhere, and 0 where nothing burns. Sums are of whole numbers, errors of
-    1 / 65,536, so that they are the same in any batch.
-
-    Args:
-        p: Believed chance of each cell to burn, float32 [B, G, H, W].
-        burns: y, cells that burn, bool [B, H, W].
-    """
-    error = ((p - burns[:, None].to(torch.float32)).square() * _ERRORS).round().to(torch.int32).sum((1, 2, 3))
-    count = burns.sum((1, 2))
-    return torch.where(count > 0, 1.0 - error / (_ERRORS * p.shape[1] * count.clamp(min=1)), 0.0)
 
 
 def hidden_probability(beliefs: Beliefs, fires: int) -> Tensor:
