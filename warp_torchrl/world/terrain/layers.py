@@ -18,6 +18,9 @@ from warp_torchrl.world.terrain.resampling import regrid, resample_layer
 from warp_torchrl.world.terrain.vector import SUFFIXES
 
 _log = logging.getLogger("warp_torchrl")
+_HEIGHT = ("height", LENGTHS, "0.1 for LANDFIRE or 1 for metres")
+_DENSITY = ("density", DENSITIES, "0.01 for LANDFIRE or 1 for kg/m3")
+"""What a layer of a canopy measures, units that a file may state, and how users say theirs."""
 _BYTES = 30  # of a cell of a layer while it is read
 
 
@@ -126,28 +129,17 @@ def elevation_unit(header: Header, given: float | None) -> float:
     return factor_of("elevation", header.path, header.unit, LENGTHS, given)
 
 
-def height_unit(name: str, header: Header, given: float | None) -> float:
-    """Return the metres in the unit of a layer of canopy heights: given by the user, or stated by the file.
+def canopy_unit(name: str, header: Header, given: float | None) -> float:
+    """Return the metres in the unit of a layer of canopy heights, or the kg/m3 in that of its bulk density.
 
     Raises:
-        ValueError: If neither does, or both do and differ.
+        ValueError: If neither user nor file states it, or both do and differ.
     """
+    quantity, units, ways = _DENSITY if name.endswith("density") else _HEIGHT
     if given is None and not header.unit:
-        rule = f"given with {name}, 0.1 for LANDFIRE or 1 for metres"
-        raise ValueError(f"height_unit must be {rule}: {header.path} does not state it, got null")
-    return factor_of("height", header.path, header.unit, LENGTHS, given)
-
-
-def density_unit(name: str, header: Header, given: float | None) -> float:
-    """Return the kg/m3 in the unit of a layer of canopy bulk density: given by the user, or stated by the file.
-
-    Raises:
-        ValueError: If neither does, or both do and differ.
-    """
-    if given is None and not header.unit:
-        rule = f"given with {name}, 0.01 for LANDFIRE or 1 for kg/m3"
-        raise ValueError(f"density_unit must be {rule}: {header.path} does not state it, got null")
-    return factor_of("density", header.path, header.unit, DENSITIES, given)
+        rule = f"given with {name}, {ways}"
+        raise ValueError(f"{quantity}_unit must be {rule}: {header.path} does not state it, got null")
+    return factor_of(quantity, header.path, header.unit, units, given)
 
 
 def unread_files(folder: Path, read: Iterable[Path]) -> list[str]:
@@ -180,9 +172,9 @@ def canopy_plane(
     if name.endswith("cover"):
         return to_canopy_cover(values, known), "%"
     if name.endswith("density"):
-        unit = density_unit(name, header, units.density)
+        unit = canopy_unit(name, header, units.density)
         return to_bulk_density(name, values, known, unit), f"{unit:g} kg/m3"
-    unit = height_unit(name, header, units.height)
+    unit = canopy_unit(name, header, units.height)
     return to_canopy_height(name, values, known, unit), "m" if unit == 1.0 else f"{unit:g} m"
 
 
