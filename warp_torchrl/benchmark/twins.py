@@ -14,8 +14,8 @@ from warp_torchrl.prediction.observed.correction import Corrected, Correction, g
 from warp_torchrl.prediction.observed.observation import Observation
 from warp_torchrl.prediction.observed.scene import Scene
 from warp_torchrl.world.air.weather import Weather
-from warp_torchrl.world.arrays.random import world_key
-from warp_torchrl.world.ensemble.parameters import PARAMETERS, Deviations, log_deviation
+from warp_torchrl.world.arrays.random import log_deviation, world_key
+from warp_torchrl.world.ensemble.parameters import PARAMETERS, Deviations
 from warp_torchrl.world.fires.alone import on_map
 from warp_torchrl.world.fires.members import Members
 from warp_torchrl.world.fires.sectors import STOPPED

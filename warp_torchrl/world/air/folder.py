@@ -14,6 +14,7 @@ from torch import Tensor
 from warp_torchrl.system.provenance import Provenance, report_file
 from warp_torchrl.world.air.fields import Lattice, WeatherFields
 from warp_torchrl.world.air.gridded import STRONGEST
+from warp_torchrl.world.air.wind import turned
 from warp_torchrl.world.behaviour.moistures import MOISTURES
 from warp_torchrl.world.terrain.bands import DEGREES, SPEED_UNITS, factor_of
 from warp_torchrl.world.terrain.grid import Grid
@@ -182,11 +183,7 @@ def _wind(headers: Mapping[str, Header], points: Grid, hours: int, factor: float
             u, v = -a * np.sin(angle), -a * np.cos(angle)
         _check_strength(one.path, u[known & also], v[known & also])
         made.append([_put(name, each, known & also, one.grid, points) for name, each in (("u", u), ("v", v))])
-    east, north = torch.tensor(np.array(made), dtype=torch.float32).unbind(1)
-    turn = math.radians(convergence)
-    return torch.stack(
-        (east * math.cos(turn) - north * math.sin(turn), east * math.sin(turn) + north * math.cos(turn)), dim=1
-    )
+    return turned(torch.tensor(np.array(made), dtype=torch.float32), torch.deg2rad(torch.tensor([convergence])))
 
 
 def _check_strength(path: Path, u: np.ndarray, v: np.ndarray) -> None:

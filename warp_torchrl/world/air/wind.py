@@ -250,3 +250,15 @@ def _normals(key: Tensor, tick: Tensor) -> Tensor:
     first, second = uniform(key, tick, Stream.GUST, (2,)).unbind(dim=1)
     radius, angle = (-2.0 * torch.log1p(-first)).sqrt(), second * (2.0 * math.pi)
     return torch.stack(_cosine_and_sine(angle), dim=1) * radius[:, None]
+
+
+def turned(wind: Tensor, angle: Tensor) -> Tensor:
+    """Return winds (u east, v north) that are turned to the left.
+
+    Args:
+        wind: float32 [n or 1, 2, ...].
+        angle: [rad], float32 [n].
+    """
+    east, north = wind.unbind(1)
+    angle = angle.view(-1, *[1] * (east.ndim - 1))
+    return torch.stack((east * angle.cos() - north * angle.sin(), east * angle.sin() + north * angle.cos()), dim=1)

@@ -112,6 +112,11 @@ def normal(key: Tensor, tick: Tensor | int, stream: Stream, shape: tuple[int, ..
     return math.sqrt(2.0) * torch.erfinv((2.0 * u - 1.0).clamp(-1.0 + 1e-6, 1.0 - 1e-6))
 
 
+def log_deviation(variation: float) -> float:
+    """Return the standard deviation of the logarithm of a log-normal factor of a coefficient of variation."""
+    return math.sqrt(math.log1p(variation**2))
+
+
 def uniform_at(key: Tensor, tick: Tensor | int, stream: Stream, index: Tensor) -> Tensor:
     """Draw what ``uniform`` draws, at some places only.
 

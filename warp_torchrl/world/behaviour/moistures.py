@@ -30,3 +30,8 @@ def moisture_row(given: Mapping[str, float]) -> Tensor:
         if not 0.0 <= value <= 400.0:
             raise ValueError(f"moisture must be in [0, 400], got {name}: {value}")
     return torch.tensor([float(given.get(name, usual)) for name, usual in MOISTURES.items()])
+
+
+def in_force(told: Tensor | None, row: Tensor) -> Tensor:
+    """Return what weather tells of moistures, float32 [..., 7], and those of a row where it tells nothing (NaN)."""
+    return row if told is None else torch.where(told.isnan(), row, told)

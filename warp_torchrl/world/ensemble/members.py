@@ -9,11 +9,10 @@ from collections.abc import Iterable, Mapping
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.air.wind import Wind
+from warp_torchrl.world.air.wind import Wind, turned
 from warp_torchrl.world.arrays.batch import Named
 from warp_torchrl.world.backends import backend
 from warp_torchrl.world.backends.tick import advance
-from warp_torchrl.world.ensemble.parameters import turned
 from warp_torchrl.world.law.automaton import Automaton
 from warp_torchrl.world.state.state import FIRST_FIRE, Air, WorldState
 

@@ -1,34 +1,16 @@
 """Parameters in which imagined fires differ from the law and the weather, and how far."""
 
-import math
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
-from warp_torchrl.world.arrays.random import Stream, normal
+from warp_torchrl.world.arrays.random import Stream, log_deviation, normal
 
 PARAMETERS = ("rate", "wind_speed", "bearing", "moisture")
 """Logarithms of the factors on all rates and on the wind's speed, the turn of the wind's bearing [degrees clockwise],
 and the logarithm of the factor on the moisture of dead fuel."""
-
-
-def log_deviation(variation: float) -> float:
-    """Return the standard deviation of the logarithm of a log-normal factor of a coefficient of variation."""
-    return math.sqrt(math.log1p(variation**2))
-
-
-def turned(wind: Tensor, angle: Tensor) -> Tensor:
-    """Return winds (u east, v north) that are turned to the left.
-
-    Args:
-        wind: float32 [n or 1, 2, ...].
-        angle: [rad], float32 [n].
-    """
-    east, north = wind.unbind(1)
-    angle = angle.view(-1, *[1] * (east.ndim - 1))
-    return torch.stack((east * angle.cos() - north * angle.sin(), east * angle.sin() + north * angle.cos()), dim=1)
 
 
 @dataclass(frozen=True, kw_only=True)

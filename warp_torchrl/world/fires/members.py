@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from warp_torchrl.world.arrays.random import Stream, normal, uniform
-from warp_torchrl.world.behaviour.moistures import MOISTURES, moisture_row
-from warp_torchrl.world.ensemble.parameters import PARAMETERS, Deviations, log_deviation, turned
+from warp_torchrl.world.air.wind import turned
+from warp_torchrl.world.arrays.random import Stream, log_deviation, normal, uniform
+from warp_torchrl.world.behaviour.moistures import MOISTURES, in_force, moisture_row
+from warp_torchrl.world.ensemble.parameters import PARAMETERS, Deviations
 from warp_torchrl.world.fires.alone import Fires
 from warp_torchrl.world.fires.sectors import SECTORS, STOPPED, sectors_about
 from warp_torchrl.world.fires.spell import Spell, can_ignite, spread_in
@@ -164,8 +165,7 @@ class Members:
 
     def _spell(self, fire: RateFire, spell: Spell) -> Spell:
         """Return a spell with the wind and the moisture of each member."""
-        row = moisture_row(fire.moisture)
-        moisture = row if spell.moisture is None else torch.where(spell.moisture.isnan(), row, spell.moisture)
+        moisture = in_force(spell.moisture, moisture_row(fire.moisture))
         winds, moistures = self.winds(spell.wind), self.moistures(moisture)
         strongest = winds[winds.square().sum(1).argmax()]
         driest = moisture.clone()

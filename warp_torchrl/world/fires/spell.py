@@ -10,7 +10,7 @@ from torch import Tensor
 from warp_torchrl.world.air.fields import Field
 from warp_torchrl.world.air.hills import bent
 from warp_torchrl.world.air.weather import Weather
-from warp_torchrl.world.behaviour.moistures import moisture_row
+from warp_torchrl.world.behaviour.moistures import in_force, moisture_row
 from warp_torchrl.world.behaviour.spread import Spread
 from warp_torchrl.world.law.fuel_bed import gradient
 from warp_torchrl.world.law.rate import TICKS_PER_CELL, RateFire
@@ -69,7 +69,7 @@ def spread_in(
 ) -> Spread:
     """Return the behaviour of a fire's head in each cell of a landscape in a spell, [G, H, W], or of a window."""
     row = moisture_row(fire.moisture)
-    moisture = row if spell.moisture is None else torch.where(spell.moisture.isnan(), row, spell.moisture)
+    moisture = in_force(spell.moisture, row)
     winds = spell.wind.reshape(-1, 2)
     moistures = moisture.reshape(-1, len(row)).expand(len(winds), -1)
     ground, rise = landscape, None

@@ -22,7 +22,7 @@ from warp_torchrl.world.behaviour.crown import (
 from warp_torchrl.world.behaviour.fbp import fbp_spread
 from warp_torchrl.world.behaviour.fuel_codes import read_model
 from warp_torchrl.world.behaviour.fuel_models import FuelTable
-from warp_torchrl.world.behaviour.moistures import MOISTURES
+from warp_torchrl.world.behaviour.moistures import MOISTURES, in_force
 from warp_torchrl.world.behaviour.spread import Spread
 from warp_torchrl.world.behaviour.surface import surface_spread
 from warp_torchrl.world.law.canopy import crowns_of, lack_of_canopy, to_midflame
@@ -205,8 +205,9 @@ class FuelBed:
         ground = wind.shaped(landscape(key), cell_size)
         rates = [1e-3]
         for air, damp in wind.hours(key, ground):
-            row = moisture if damp is None else torch.where(damp.isnan(), moisture, damp)
-            rates.append(float(self.spread(ground, air, row.expand(len(air), -1), cell_size).head.max()))
+            rates.append(
+                float(self.spread(ground, air, in_force(damp, moisture).expand(len(air), -1), cell_size).head.max())
+            )
         return max(rates)
 
 

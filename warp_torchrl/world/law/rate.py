@@ -12,9 +12,9 @@ from torch import Tensor
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.air.wind import Wind
 from warp_torchrl.world.arrays.geometry import grow, neighbour_in
-from warp_torchrl.world.arrays.random import Stream, uniform, uniform_at
+from warp_torchrl.world.arrays.random import Stream, log_deviation, uniform, uniform_at
 from warp_torchrl.world.behaviour.crown import FOLIAR_MOISTURE, CrownModel
-from warp_torchrl.world.behaviour.moistures import moisture_row
+from warp_torchrl.world.behaviour.moistures import in_force, moisture_row
 from warp_torchrl.world.law import arrivals
 from warp_torchrl.world.law.arrivals import RATE, Arrivals, Paces, Travel, arrivals_in, metric, own_cell
 from warp_torchrl.world.law.automaton import Automaton, Beside, at_cells
@@ -230,11 +230,7 @@ class RateFire(Automaton):
     def _damp(self, air: Air) -> Tensor:
         """Return the moistures in force, float32 [B, 7] [%]."""
         row = moisture_row(self.moisture).to(air.wind.device)
-        return (
-            row.expand(len(air.wind), -1)
-            if air.moisture is None
-            else torch.where(air.moisture.isnan(), row, air.moisture)
-        )
+        return in_force(air.moisture, row.expand(len(air.wind), -1))
 
     def started(self, state: WorldState) -> WorldState:
         """Return worlds whose fires have reached the cells that burn at minute 0."""
@@ -337,5 +333,6 @@ class RateFire(Automaton):
 
 def _log_normal(u: Tensor, variation: float) -> Tensor:
     """Return log-normal factors of median 1 and a coefficient of variation, from uniform draws in [0, 1)."""
-    deviation = math.sqrt(math.log1p(variation * variation))
-    return torch.exp(deviation * math.sqrt(2.0) * torch.erfinv((2.0 * u - 1.0).clamp(-1.0 + 1e-6, 1.0 - 1e-6)))
+    return torch.exp(
+        log_deviation(variation) * math.sqrt(2.0) * torch.erfinv((2.0 * u - 1.0).clamp(-1.0 + 1e-6, 1.0 - 1e-6))
+    )

@@ -16,7 +16,7 @@ from warp_torchrl.system.device import needs_no_sync
 from warp_torchrl.world.arrays.batch import Batch
 from warp_torchrl.world.arrays.geometry import DIRECTIONS, grow
 from warp_torchrl.world.arrays.listing import list_cells
-from warp_torchrl.world.arrays.random import Stream, named_key, normal, uniform
+from warp_torchrl.world.arrays.random import Stream, log_deviation, named_key, normal, uniform
 from warp_torchrl.world.ensemble.filtering import effective, exponent, jittered, moments, normalised, resampled
 from warp_torchrl.world.ensemble.members import in_other_air
 from warp_torchrl.world.law.automaton import Automaton, Beside, at_cells
@@ -70,7 +70,7 @@ def begun(
         counts: G, K, M and P.
     """
     groups, members, hidden, particles = counts
-    spread = [math.sqrt(math.log1p(each**2)) for each in deviations[:2]]
+    spread = [log_deviation(each) for each in deviations[:2]]
     scale = torch.tensor([*spread, math.radians(deviations[2])], device=key.device)
     draws = normal(key, 0, Stream.MEMBERS, (1 + groups * (members + particles) + hidden, len(PARAMETERS)))
     values = (draws[:, :1] + draws[:, 1:]) * scale
