@@ -85,7 +85,7 @@ class World:
         names = [*self.fire.keeps, *(each.name for each in self.loop)]
         if len(set(names)) < len(names):
             raise ValueError(f"mechanics must be one of each name, got {', '.join(names)}")
-        for each in self.loop:
+        for each in reversed(self.loop):  # the last ones build on those before, and say what the user chose
             each.check(self)
         _ = self.lighting  # refuses an ignition that does not fit the landscape
 
