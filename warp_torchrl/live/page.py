@@ -148,11 +148,12 @@ class Page:
             Refused: If the one before is to be kept and cannot be saved; it stays then, as with any other error.
         """
         self._keep()
-        before, self.playing = self.match, False
+        before, view, self.playing = self.match, self.view, False
         self.view = first_view(match.world)
         try:
             self._present(match)
         except Exception:
+            self.view = view
             self._present(before)
             raise
 

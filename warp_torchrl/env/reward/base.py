@@ -3,6 +3,7 @@
 from dataclasses import dataclass, fields
 from typing import Literal
 
+import torch
 from torch import Tensor
 
 from warp_torchrl.validation import check_fields
@@ -81,3 +82,11 @@ class Reward:
     def _shaping(self, transition: Transition) -> Tensor:
         after = self.phi(transition.after, transition.counts_after) * ~transition.after.terminated[:, None]
         return self.gamma * after - self.phi(transition.before, transition.counts_before)
+
+
+def near_misses(transition: Transition) -> Tensor:
+    """Return 1 for each aircraft that ends the step with a near miss, float32 [B, A]; 0 without a separation."""
+    before, after = (state.plane("flight", "near_misses") for state in (transition.before, transition.after))
+    if before is None or after is None:
+        return torch.zeros_like(transition.after.vehicles.position[..., 0], dtype=torch.float32)
+    return (after - before).to(torch.float32)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from torch import Tensor
 
-from warp_torchrl.env.reward.base import Reward
+from warp_torchrl.env.reward.base import Reward, near_misses
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.state.state import Transition
 from warp_torchrl.world.world import World
@@ -50,13 +50,8 @@ class Brier(Reward):
 
     def own(self, transition: Transition) -> Tensor:
         """Return each agent's reward before sharing and shaping, float32 [B, A]."""
-        before, after = transition.before, transition.after
-        skill = after.plane("belief", "skill")
+        skill = transition.after.plane("belief", "skill")
         if skill is None:
             raise ValueError("reward brier needs worlds with beliefs: choose belief=ensemble")
-        agents = after.vehicles.position.shape[1]
-        own = (self.skill * skill)[:, None].expand(-1, agents)
-        misses_before, misses = (state.plane("flight", "near_misses") for state in (before, after))
-        if misses_before is not None and misses is not None:
-            own = own - agents * self.near_miss * (misses - misses_before)
-        return own
+        misses = near_misses(transition)
+        return self.skill * skill[:, None] - misses.shape[1] * self.near_miss * misses

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from torch import Tensor
 
-from warp_torchrl.env.reward.base import Reward
+from warp_torchrl.env.reward.base import Reward, near_misses
 from warp_torchrl.validation import check_fields
 from warp_torchrl.world.state.records import KNOWLEDGE
 from warp_torchrl.world.state.state import Transition
@@ -70,7 +70,5 @@ class Monitor(Reward):
         if watches is None or finds is None or uncertain is None or was is None:
             raise ValueError("reward monitor needs worlds whose agents' sight is limited: choose sensing=sight")
         own = self.watched * watches + self.found * finds
-        misses_before, misses = (state.plane("flight", "near_misses") for state in (before, after))
-        if misses_before is not None and misses is not None:
-            own = own - self.near_miss * (misses - misses_before)
+        own = own - self.near_miss * near_misses(transition)
         return own.shape[1] * own + self.uncertainty * (was - uncertain)[:, None]

@@ -136,5 +136,5 @@ def test_the_option_shares_maps_and_leaves_the_radio_to_the_user():
     env = make_env("scouts", n_worlds=1, overrides=[*far, "belief.of=agent"])
     env.rollout(2)
     assert env.world.hearing.range == 5.0 and beliefs_of(env.world_state).weights.shape[1] == env.n_agents
-    with pytest.raises(ConfigError, match="^belief must be none where agents see all"):
+    with pytest.raises(ConfigError, match=r"^belief must be none where agents see all"):
         make_env("scouts", n_worlds=1, overrides=["belief=ensemble", "sensing=full"])
