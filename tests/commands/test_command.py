@@ -259,6 +259,13 @@ def test_two_jobs_of_a_sweep_of_evaluations_do_not_share_a_folder(run_here, tmp_
     assert json.loads((tmp_path / "sweep" / "one" / "evaluation.json").read_text())["scenario"] == "skirmish"
 
 
+@pytest.mark.parametrize("sweeps", [(), ("-m",)], ids=["once", "sweep"])
+def test_what_a_scenario_says_of_an_option_goes_with_the_option(run_here, tmp_path, sweeps):
+    wind = ["scenario=hazard", "wind=calm", "landscape.size=12", "horizon=4"]  # the scenario's own wind has a speed
+    code, errors, _ = run_here("evaluate.py", *sweeps, "policy=noop", "evaluation.episodes=2", "picture=null", *wind)
+    assert code == 0, errors
+
+
 def test_a_sweep_that_is_repeated_forgets_the_jobs_that_failed(run_here, tmp_path):
     (tmp_path / "sweep" / "0").mkdir(parents=True)
     failed = {"job": 0, "overrides": "", "code": 6, "reason": "the disk was full"}

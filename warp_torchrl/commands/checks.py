@@ -21,7 +21,7 @@ from warp_torchrl.evaluation.picture import PictureKind
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config.building import BuildOnce, run_config
-from warp_torchrl.runs.config.compose import HYDRA_ERRORS, check_choices, explain, plain
+from warp_torchrl.runs.config.compose import HYDRA_ERRORS, check_choices, explain, plain, without_values_of_others
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.runs.config.saved_config import restore
@@ -80,6 +80,7 @@ def _fatal(config: DictConfig) -> Iterator[None]:
 def _check(name: str | None, config: DictConfig) -> None:
     overrides = list(config.hydra.overrides.task)
     check_choices(overrides)
+    config = without_values_of_others(config, overrides)
     values = plain(OmegaConf.masked_copy(config, [str(key) for key in config if key != "hydra"]))
     _check_hydra(list(config.hydra.overrides.hydra))
     if not isinstance(values["debug"], bool):

@@ -21,7 +21,15 @@ from warp_torchrl.commands.sweep import SweepSummary, remove_failure, save_failu
 from warp_torchrl.evaluation.evaluate import evaluate_policy
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config.building import BuildOnce
-from warp_torchrl.runs.config.compose import HYDRA_ERRORS, conf_folder, explain, option_of, plain, without_targets
+from warp_torchrl.runs.config.compose import (
+    HYDRA_ERRORS,
+    conf_folder,
+    explain,
+    option_of,
+    plain,
+    without_targets,
+    without_values_of_others,
+)
 from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError
 from warp_torchrl.runs.config.grammar import check_flags, check_overrides, flags_first
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore, world_overrides
@@ -225,7 +233,7 @@ def _start_hydra(name: str, job: Callable[[DictConfig], None], arguments: list[s
         with queued() as queue:
             try:
                 remove_failure()
-                job(config)
+                job(without_values_of_others(config, HydraConfig.get().overrides.task))
             except Exception as error:
                 code, line = fail(queue.explain(error), debug)
                 if is_orphaned():

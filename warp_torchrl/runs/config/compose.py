@@ -84,14 +84,14 @@ def _compose(name: str, overrides: Sequence[str]) -> DictConfig:
     try:
         folder = conf_folder()
         config = deepcopy(_composed(folder, _last_change(folder), name, tuple(overrides)))
-        return _without_values_of_others(config, overrides)
+        return without_values_of_others(config, overrides)
     except HYDRA_ERRORS as error:
         raise explain(error, name, overrides) from None
     except ValueError as error:
         raise ConfigError(f"{one_line(error)}, in {' '.join(overrides)}") from None
 
 
-def _without_values_of_others(config: DictConfig, overrides: Sequence[str]) -> DictConfig:
+def without_values_of_others(config: DictConfig, overrides: Sequence[str]) -> DictConfig:
     """Return a configuration without the scenario's values for options that the overrides replace.
 
     ``ignition=file`` in a scenario with ``ignition: {count: 3}`` has no count. What is no field of any option stays, to
