@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -11,6 +12,7 @@ from warp_torchrl.api.make import make_env
 from warp_torchrl.benchmark.tables import entry, table
 from warp_torchrl.benchmark.tasks import FIRST_SEED
 from warp_torchrl.env.pictures.drawing import BLUE, GRID, ORANGE, SOFT, save_figure, sheet, style
+from warp_torchrl.evaluation.statistics import interval
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.records import kept, steps_since
@@ -35,11 +37,18 @@ def believed_chance(state: WorldState, world: World) -> Tensor:
 
 
 def counted(chance: Tensor, burns: Tensor, counts: Tensor) -> Tensor:
-    """Return float64 [3, bins] of the cells that count: their number, the sum of their chances, and those that burn."""
-    place = torch.bucketize(chance, torch.tensor(_BOUNDS, device=chance.device))[counts]
-    weights = torch.ones_like(chance), chance, burns.to(torch.float32)
-    bins = len(_BOUNDS) + 1
-    return torch.stack([torch.bincount(place, each[counts].to(torch.float64), minlength=bins) for each in weights])
+    """Return of the cells that count their number, the sum of their chances and those that burn, float64 [B, 3, bins].
+
+    Args:
+        chance: To burn, as is believed, float32 [B, ...].
+        burns: Whether they do, bool [B, ...].
+        counts: Which count, bool [B, ...].
+    """
+    bins = torch.bucketize(chance, torch.tensor(_BOUNDS, device=chance.device)).flatten(1)
+    values = torch.stack([torch.ones_like(chance), chance, burns.to(chance.dtype)], dim=1).to(torch.float64)
+    values = values.flatten(2) * counts.flatten(1)[:, None]
+    total = values.new_zeros(len(chance), 3, len(_BOUNDS) + 1)
+    return total.scatter_add_(2, bins[:, None].expand(values.shape), values)
 
 
 def reliability(scenario: str, device: str, episodes: int, overrides: Sequence[str] = ()) -> list[dict[str, Any]]:
@@ -48,18 +57,26 @@ def reliability(scenario: str, device: str, episodes: int, overrides: Sequence[s
     world = env.world
     seed = torch.arange(FIRST_SEED, FIRST_SEED + episodes, device=device)
     state, policy = world.reset(seed, torch.zeros_like(seed)), HEURISTICS[POLICY](env)
-    total = torch.zeros(3, len(_BOUNDS) + 1, dtype=torch.float64, device=device)
+    total = torch.zeros(episodes, 3, len(_BOUNDS) + 1, dtype=torch.float64, device=device)
     for _ in range(world.horizon):
         state = world.step(state, policy.act(state, world.possible_actions(state))).after
         unseen = steps_since(kept(state).amax(dim=1), state.step) > 0
         counts = unseen & ~state.done[:, None, None]
         total += counted(believed_chance(state, world), is_burning(state.cells), counts)
     ends = (0.0, *_BOUNDS, 1.0)
-    return [
-        {"scenario": scenario, "from": low, "to": high, "cells": int(count), "believed": p / count, "burns": b / count}
-        for low, high, (count, p, b) in zip(ends[:-1], ends[1:], total.T.tolist(), strict=True)
-        if count
-    ]
+    bins = zip(ends[:-1], ends[1:], total.cpu().numpy().transpose(2, 1, 0), strict=True)
+    return [{"scenario": scenario, "from": low, "to": high, **_row(*own)} for low, high, own in bins if own[0].any()]
+
+
+def _row(cells: np.ndarray, chances: np.ndarray, burns: np.ndarray) -> dict[str, Any]:
+    """Return the means over the cells of a bin, each [fires], and the interval over fires of those that burn."""
+
+    def share(fires: np.ndarray) -> np.ndarray:
+        return burns[fires].sum(axis=-1) / np.maximum(cells[fires].sum(axis=-1), 1.0)
+
+    total = cells.sum()
+    bounds = interval(np.arange(len(cells)), share)
+    return {"cells": int(total), "believed": chances.sum() / total, "burns": burns.sum() / total, "ci95": bounds}
 
 
 def belief_table(rows: Sequence[dict[str, Any]]) -> str:
@@ -71,6 +88,7 @@ def belief_table(rows: Sequence[dict[str, Any]]) -> str:
             entry("cells", pattern="{:,}"),
             entry("mean chance", "believed", "{:.3f}"),
             entry("burns", pattern="{:.3f}"),
+            ("95 % over fires", lambda row: "{:.3f} .. {:.3f}".format(*row["ci95"])),
         ],
         rows,
     )
@@ -92,8 +110,11 @@ def draw_reliability(rows: Sequence[dict[str, Any]], path: Path) -> None:
         names = list(dict.fromkeys(row["scenario"] for row in rows))
         for place, name in enumerate(names):
             own = [row for row in rows if row["scenario"] == name]
-            points = [row["believed"] for row in own], [row["burns"] for row in own]
-            panel.plot(*points, "o-", color=(BLUE, ORANGE)[place % 2], markersize=3.0, linewidth=1.2, label=name)
+            believed, burns = ([row[each] for row in own] for each in ("believed", "burns"))
+            low, high = zip(*(row["ci95"] for row in own), strict=True)
+            color = (BLUE, ORANGE)[place % 2]
+            panel.plot(believed, burns, "o-", color=color, markersize=3.0, linewidth=1.2, label=name)
+            panel.vlines(believed, low, high, color=color, linewidth=0.8)
         panel.set_xlabel("believed to burn")
         panel.set_ylabel("burns")
         figure.legend(loc="outside lower center", ncols=3)
