@@ -9,7 +9,7 @@ from tests.world.mechanics.drawing import begun as drawn_world
 from warp_torchrl.world.arrays.random import imagined_keys
 from warp_torchrl.world.ignition.ignition import Ignition
 from warp_torchrl.world.mechanics.belief.belief import Ensemble
-from warp_torchrl.world.mechanics.belief.beliefs import NAME, beliefs_of, hidden_probability
+from warp_torchrl.world.mechanics.belief.beliefs import NAME, beliefs_of, cells_of, hidden_probability
 from warp_torchrl.world.mechanics.belief.hidden import DOUBT, fires_lit, hidden_fires, struck
 
 NONE = torch.zeros(1, 1, 1, 4, dtype=torch.bool)
@@ -45,6 +45,15 @@ def test_the_chance_that_a_hidden_fire_burns_somewhere():
     assert hidden_probability(one, 2).flatten().tolist() == pytest.approx([0.15] * 4), "one was found, and may be out"
     assert hidden_probability(one, 1).eq(0.0).all(), "all are known"
     assert hidden_probability(beliefs_of(believing("TT", "TT")), 2).eq(0.0).all(), "no hidden fires are kept"
+
+
+def test_of_several_hidden_fires_the_first_to_arrive_counts_and_nothing_burns_twice():
+    # Means over the cells: 1 / 4 burns and 1 / 4 has burned out.
+    held = beliefs_of(believing("TTTT", "TTT.", "TTTT", hidden=("a.TT", "T.aT")))
+    assert hidden_probability(held, 2).flatten().tolist() == pytest.approx([0.75**2 - 0.5**2] * 4)
+    assert hidden_probability(held, 1).flatten().tolist() == pytest.approx([0.25] * 4)
+    burned = held.replace(members=held.members.replace(burned=cells_of(held)[:, 0] == 0))
+    assert hidden_probability(burned, 1).flatten().tolist() == pytest.approx([0.25] * 3 + [0.125])
 
 
 def test_the_chance_of_a_hidden_fire_is_spread_over_cells_nearby():

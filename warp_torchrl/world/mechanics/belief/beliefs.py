@@ -85,9 +85,11 @@ def hidden_probability(beliefs: Beliefs, fires: int) -> Tensor:
 
     A fire that is not known is one of the ``possible`` ones, or that which was found.
 
-        p = 1 - (1 - h)^m, m = fires that were not found
+        p = (1 - o) ((1 - g)^m - (1 - g - h)^m), m = fires that were not found
 
-    h is the mean over the cells within ``BLUR``: fires of one place differ, and M of them leave gaps.
+    h is the share that burns in a cell, and g the share that has burned out there, so that of several fires the first
+    to arrive counts. Both are means over the cells within ``BLUR``: fires of one place differ, and M of them leave gaps.
+    o is the share of the members in which the cell has burned out.
 
     Args:
         beliefs: What is believed.
@@ -95,12 +97,24 @@ def hidden_probability(beliefs: Beliefs, fires: int) -> Tensor:
     """
     if not beliefs.hidden.held:
         return torch.zeros_like(known_probability(beliefs))
-    burns = is_burning(beliefs.hidden.held["cells"])
-    total = (beliefs.possible + beliefs.found).sum(dim=2, keepdim=True).clamp(min=1e-6)
-    share = torch.bmm(beliefs.possible / total, burns.flatten(2).to(torch.float32)).unflatten(2, burns.shape[2:])
-    share = sums_about(share, BLUR) / sums_about(torch.ones_like(share[:1, :1]), BLUR)
-    left = (fires - beliefs.fires).clamp(min=0)
-    return 1.0 - (1.0 - share.clamp(max=1.0)).pow(left[..., None, None])
+    cells, burned = (beliefs.hidden.held[name] for name in ("cells", "burned"))
+    share = beliefs.possible / (beliefs.possible + beliefs.found).sum(dim=2, keepdim=True).clamp(min=1e-6)
+    burns, gone = (_spread(share, each) for each in (is_burning(cells), _is_ash(cells, burned)))
+    left = (fires - beliefs.fires).clamp(min=0)[..., None, None]
+    first = (1.0 - gone).clamp(min=0.0).pow(left) - (1.0 - gone - burns).clamp(min=0.0).pow(left)
+    known = beliefs.members.held["burned"].unflatten(1, beliefs.weights.shape[1:])
+    return first * (1.0 - mean_of(beliefs, _is_ash(cells_of(beliefs), known)))
+
+
+def _is_ash(cells: Tensor, burned: Tensor) -> Tensor:
+    """Return which cells have burned out and hold no tree since."""
+    return burned & (cells == 0)
+
+
+def _spread(share: Tensor, planes: Tensor) -> Tensor:
+    """Return the means, over the cells near each, of planes bool [B, M, H, W] by shares [B, G, M], [B, G, H, W]."""
+    total = torch.bmm(share, planes.flatten(2).to(torch.float32)).unflatten(2, planes.shape[2:])
+    return sums_about(total, BLUR) / sums_about(torch.ones_like(total[:1, :1]), BLUR)
 
 
 def hidden_fire(beliefs: Beliefs) -> Tensor:
