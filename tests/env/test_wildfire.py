@@ -12,6 +12,7 @@ from torchrl.envs.utils import check_env_specs
 from tests.conftest import small_world
 from warp_torchrl import WildfireEnv, make_env
 from warp_torchrl.env import scene
+from warp_torchrl.env.layout import packed
 from warp_torchrl.env.observation import Local, Paper, Surroundings
 from warp_torchrl.env.reward import Efficiency
 from warp_torchrl.world import eager
@@ -55,6 +56,17 @@ def test_keys_are_those_of_the_contract(make_small_env):
     assert rollout["next", "info", "saved"].shape == (2, 5, 1)
     assert env.group_map == {"agents": ["bulldozer_0", "bulldozer_1"]}
     assert env.reward_keys == [("agents", "reward")] and set(env.done_keys) == {"done", "terminated", "truncated"}
+
+
+@pytest.mark.parametrize("observation", [Surroundings(), Paper()], ids=lambda each: type(each).__name__)
+def test_to_advance_is_a_step_without_the_critic_s_state(make_small_env, observation):
+    ours, theirs = (make_small_env(3, observation=observation) for _ in range(2))
+    ours.reset(), theirs.reset()
+    for action in (0, 8, 9, STAY):
+        seen, expected = packed(ours.advance(team_of(ours, action))), stepped(theirs, team_of(theirs, action))
+        assert list(seen.keys(True, True)) == [key for key in expected.keys(True, True) if key != "state"]
+        assert (seen == expected.exclude("state")).all()
+    assert not expected["done"].all() and expected["info", "episode_reward"].abs().sum() > 0
 
 
 def test_world_i_draws_with_seed_plus_i(make_small_env):

@@ -1,4 +1,4 @@
-"""TorchRL's layout of what an environment is given and gives: actions checked, observations packed."""
+"""TorchRL's layout of what an environment is given and gives: actions checked, observations laid out and packed."""
 
 from typing import Any
 
@@ -41,8 +41,8 @@ def checked_action(
     return action
 
 
-def packed(world: World, state: WorldState, observed: Observations, episode_reward: Tensor) -> TensorDict:
-    """Return what is observed of worlds as a tensordict [B], without rewards.
+def laid_out(world: World, state: WorldState, observed: Observations, episode_reward: Tensor) -> dict[str, Any]:
+    """Return what is observed of worlds by TorchRL's names, nested as in a tensordict, without rewards.
 
     Args:
         world: Their rules.
@@ -50,17 +50,11 @@ def packed(world: World, state: WorldState, observed: Observations, episode_rewa
         observed: Of them.
         episode_reward: Of their episodes so far, float32 [B].
     """
-    batch, device = state.batch_size, state.cells.device  # without a device a tensordict copies those that it holds
-    team = torch.Size([*batch, world.team.n_agents])
 
-    def unchecked(entries: dict[str, Any], shape: torch.Size) -> TensorDict:
-        # Of one world, to check shapes and devices of our own is a sixth of the calls of a step.
-        return TensorDict._new_unsafe(entries, shape, device)
+    def of_team(entries: dict[str, Tensor]) -> Tensor | dict[str, Tensor]:
+        return entries.get("", entries)
 
-    def of_team(entries: dict[str, Tensor]) -> Tensor | TensorDict:
-        return entries[""] if "" in entries else TensorDict(entries, batch_size=team, device=device)
-
-    roles = world.team.table(device).index.repeat(*batch, 1)
+    roles = world.team.table(state.cells.device).index.repeat(len(state.step), 1)
     agents = {"observation": of_team(observed.entries), "action_mask": observed.action_mask, "role": roles}
     agents |= {} if observed.radio is None else {"radio": observed.radio}
     serves = world.agencies.serves(state)
@@ -68,14 +62,28 @@ def packed(world: World, state: WorldState, observed: Observations, episode_rewa
     agents |= {"sent": of_team(sent)} if (sent := world.hearing.shown(state)) else {}
     paid = episode_reward.clone()  # the environment adds to its own
     info = observed.metrics | {"episode_reward": paid, "episode_length": state.step.to(torch.float32)}
-    return unchecked(
-        {
-            "agents": unchecked(agents, team),
-            "state": observed.state,
-            "info": unchecked({name: value[:, None] for name, value in info.items()}, batch),
-            "done": state.done[:, None],
-            "terminated": state.terminated[:, None].clone(),
-            "truncated": state.truncated[:, None].clone(),
-        },
-        batch,
-    )
+    return {
+        "agents": agents,
+        **({} if observed.state is None else {"state": observed.state}),
+        "info": {name: value[:, None] for name, value in info.items()},
+        "done": state.done[:, None],
+        "terminated": state.terminated[:, None].clone(),
+        "truncated": state.truncated[:, None].clone(),
+    }
+
+
+def packed(entries: dict[str, Any]) -> TensorDict:
+    """Return what ``laid_out`` returned as a tensordict [B]."""
+    mask = entries["agents"]["action_mask"]
+    team, device = mask.shape[:2], mask.device  # without a device a tensordict copies those that it holds
+
+    def unchecked(entries: dict[str, Any], shape: torch.Size) -> TensorDict:
+        # Of one world, to check shapes and devices of our own is a sixth of the calls of a step.
+        return TensorDict._new_unsafe(entries, shape, device)
+
+    agents = {
+        name: TensorDict(each, batch_size=team, device=device) if isinstance(each, dict) else each
+        for name, each in entries["agents"].items()
+    }
+    nested = {"agents": unchecked(agents, team), "info": unchecked(entries["info"], team[:1])}
+    return unchecked({**entries, **nested}, team[:1])

@@ -136,12 +136,14 @@ class LeveledEnv(WildfireEnv):
         seen = self._pack(state, self._by_level(self.level, observe), self._episode_reward)
         return seen.set(LEVEL, self.level[:, None].clone())
 
-    def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
-        return super()._step(tensordict).set(LEVEL, self.level[:, None].clone())
+    def _acted(self, action: Tensor, critic: bool = True) -> dict[str, Any]:
+        out = super()._acted(action, critic)
+        out["info"]["level"] = self.level[:, None].clone()
+        return out
 
-    def _advance(self, before: WorldState, counts: TreeCounts, action: Tensor) -> Step:
+    def _advance(self, before: WorldState, counts: TreeCounts, action: Tensor, critic: bool) -> Step:
         def step(scene: Scene, rows: Tensor) -> tuple[ActionResult, WorldState, TreeCounts, Observations, Tensor]:
-            made, observed, reward = scene.step(before[rows], counts[rows], action[rows])
+            made, observed, reward = scene.step(before[rows], counts[rows], action[rows], critic)
             return made.result, made.after.replace(ground=None), made.counts_after, observed, reward
 
         result, after, counts_after, observed, reward = self._by_level(self.level, step)

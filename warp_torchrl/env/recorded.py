@@ -43,15 +43,15 @@ class RecordedStep:
 def _tensors(step: Step) -> list[Tensor]:
     seen = step.observations
     parts = step.transition.leaves(), seen.entries, seen.metrics
-    radio = [] if seen.radio is None else [seen.radio]
-    return [*(each for part in parts for each in part.values()), *radio, seen.action_mask, seen.state, step.reward]
+    optional = [each for each in (seen.state, seen.radio) if each is not None]
+    return [*(each for part in parts for each in part.values()), *optional, seen.action_mask, step.reward]
 
 
 def _with_tensors(like: Step, tensors: list[Tensor]) -> Step:
-    *several, mask, state, reward = tensors
+    *several, mask, reward = tensors
     given, seen = iter(several), like.observations
     transition = like.transition.with_leaves({name: next(given) for name in like.transition.leaves()})
     entries = {name: next(given) for name in seen.entries}
     metrics = {name: next(given) for name in seen.metrics}
-    radio = None if seen.radio is None else next(given)
+    state, radio = (None if each is None else next(given) for each in (seen.state, seen.radio))
     return Step(transition, Observations(entries, mask, metrics, state, radio), reward)

@@ -1,6 +1,7 @@
 """One step of the worlds with its observations and rewards.
 
-Compiled, it is two functions: one moves the agents, ticks the fire and makes the forecast; the other observes.
+Compiled, it is one function of few cells, and two of many: one moves the agents, ticks the fire and makes the
+forecast; the other observes.
 """
 
 import logging
@@ -14,7 +15,7 @@ from torch import Tensor
 from warp_torchrl.env.metrics import metrics
 from warp_torchrl.env.observation import Observation, critic_state, searched_for
 from warp_torchrl.env.reward import Collaborative, Efficiency, Reward, Time
-from warp_torchrl.system.compiler import check_compiler, compiled
+from warp_torchrl.system.compiler import FEW_CELLS, check_compiler, compiled
 from warp_torchrl.world.eager import why_eager
 from warp_torchrl.world.state.cells import count_trees
 from warp_torchrl.world.state.flags import in_bytes, in_flags
@@ -33,8 +34,8 @@ class Observations(NamedTuple):
     """bool [B, A, actions]."""
     metrics: dict[str, Tensor]
     """float32 [B] each."""
-    state: Tensor
-    """The critic's, float32 [B, C, 16, 16]."""
+    state: Tensor | None
+    """The critic's, float32 [B, C, 16, 16]; None where nobody reads it."""
     radio: Tensor | None = None
     """Of ``Hearing.observed``, float32 [B, A, A, 3]; None where agents do not talk."""
 
@@ -81,25 +82,33 @@ class Scene:
         """Observe the worlds, given their counts of trees."""
         return _observe(self.world, self.observation, state, counts, self.world.forecast(state))
 
-    def step(self, before: WorldState, counts: TreeCounts, action: Tensor) -> Step:
-        """Step the worlds, given their counts of trees, with actions int64 [B, A]."""
+    def step(self, before: WorldState, counts: TreeCounts, action: Tensor, critic: bool = True) -> Step:
+        """Step the worlds.
+
+        Args:
+            before: The worlds.
+            counts: Of their trees.
+            action: int64 [B, A].
+            critic: Whether the central critic's state is observed.
+        """
         if self.compile:
-            return self._compiled_step(before, counts, action)
+            return self._compiled_step(before, counts, action, critic)
         transition = self.world.step(before, action, counts)
-        observed = self.observe(transition.after, transition.counts_after)
-        after = self.world.hearing.with_shown(transition.after, observed.entries, ~before.done)
+        after, counts_after = transition.after, transition.counts_after
+        observed = _observe(self.world, self.observation, after, counts_after, self.world.forecast(after), critic)
+        after = self.world.hearing.with_shown(after, observed.entries, ~before.done)
         return Step(transition.replace(after=after), observed, self.reward(transition))
 
-    def _compiled_step(self, before: WorldState, counts: TreeCounts, action: Tensor) -> Step:
+    def _compiled_step(self, before: WorldState, counts: TreeCounts, action: Tensor, critic: bool) -> Step:
         given, earns = in_bytes(before), self.reward if compiles(self.reward) else None
-        after, result, counts_after, forecast = compiled(_advance)(self.world, given, counts, action)
+        in_two = before.cells.numel() > FEW_CELLS
+        step = _step if in_two else compiled(_step, in_parts=True)
+        after, result, counts_after, observed, reward = step(
+            self.world, self.observation, earns, given, counts, action, critic, in_two
+        )
         transition = Transition(
-            before=given, result=result, after=after, counts_before=counts, counts_after=counts_after
+            before=before, result=result, after=in_flags(after), counts_before=counts, counts_after=counts_after
         )
-        observed, reward = compiled(_observe_and_earn, in_parts=True)(
-            self.world, self.observation, earns, transition, forecast
-        )
-        transition = transition.replace(before=before, after=in_flags(after))
         return Step(transition, observed, self.reward(transition) if reward is None else reward)
 
 
@@ -128,6 +137,29 @@ def compiles(reward: Reward) -> bool:
     return reads_counts and (reward.shaping == 0.0 or reward.potential == "distance")
 
 
+def _step(
+    world: World,
+    observation: Observation,
+    reward: Reward | None,
+    state: WorldState,
+    counts: TreeCounts,
+    action: Tensor,
+    critic: bool,
+    in_two: bool,
+) -> tuple[WorldState, ActionResult, TreeCounts, Observations, Tensor | None]:
+    """Return the worlds after a step, its results, the counts of trees, the observations, and a reward if one is given.
+
+    It is compiled as a whole, or calls two compiled functions.
+    """
+    advance, observe_and_earn = _advance, _observe_and_earn
+    if in_two:
+        advance, observe_and_earn = compiled(_advance), compiled(_observe_and_earn, in_parts=True)
+    after, result, counts_after, forecast = advance(world, state, counts, action)
+    transition = Transition(before=state, result=result, after=after, counts_before=counts, counts_after=counts_after)
+    observed, earned = observe_and_earn(world, observation, reward, transition, forecast, critic)
+    return after, result, counts_after, observed, earned
+
+
 def _advance(
     world: World, state: WorldState, counts: TreeCounts, action: Tensor
 ) -> tuple[WorldState, ActionResult, TreeCounts, Forecast]:
@@ -137,21 +169,31 @@ def _advance(
 
 
 def _observe_and_earn(
-    world: World, observation: Observation, reward: Reward | None, transition: Transition, forecast: Forecast
+    world: World,
+    observation: Observation,
+    reward: Reward | None,
+    transition: Transition,
+    forecast: Forecast,
+    critic: bool,
 ) -> tuple[Observations, Tensor | None]:
     """Return the observations after a step, and its reward if one is given."""
-    observed = _observe(world, observation, transition.after, transition.counts_after, forecast)
+    observed = _observe(world, observation, transition.after, transition.counts_after, forecast, critic)
     return observed, None if reward is None else reward(transition)
 
 
 def _observe(
-    world: World, observation: Observation, state: WorldState, counts: TreeCounts, forecast: Forecast
+    world: World,
+    observation: Observation,
+    state: WorldState,
+    counts: TreeCounts,
+    forecast: Forecast,
+    critic: bool = True,
 ) -> Observations:
     return Observations(
         observation(state, world, forecast),
         world.action_mask(state),
         metrics(state, counts, world),
-        critic_state(observation, world)(state, forecast),
+        critic_state(observation, world)(state, forecast) if critic else None,
         world.hearing.observed(state, world.team.table(state.cells.device).flies)
         if world.hearing.sends_vectors
         else None,

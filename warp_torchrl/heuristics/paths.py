@@ -8,7 +8,6 @@ from torch import Tensor
 from warp_torchrl.heuristics.base import agent_distance, idle_action
 from warp_torchrl.world.arrays.detours import moves_around
 from warp_torchrl.world.arrays.distances import FAR
-from warp_torchrl.world.arrays.geometry import offsets
 from warp_torchrl.world.state.cells import is_burning
 from warp_torchrl.world.state.state import Cover, WorldState
 from warp_torchrl.world.team.abilities import own_cell, places
@@ -46,10 +45,10 @@ def first_move(state: WorldState, world: World, mask: Tensor, target: Tensor) ->
         target: (row, column) of each agent's, int64 [B, A, 2].
     """
     team = world.team
-    step = offsets(mask.device) * team.table(mask.device).stride[:, None, None]
+    step = team.table(mask.device).moves
     reached, _ = places(state, step)
     goal = target[..., 0] * state.cells.shape[2] + target[..., 1]
-    gap = (state.vehicles.position[:, :, None] + step - target[:, :, None]).abs().to(torch.float32)
+    gap = (state.vehicles.position[:, :, None] + step.mT - target[:, :, None]).abs().to(torch.float32)
     can = world.open_moves(state)
     around = torch.where(can, reached, goal[..., None])  # open moves alone
     moves = moves_around(goal, open_to_agents(state, world), around)

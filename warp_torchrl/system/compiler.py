@@ -14,14 +14,17 @@ import torch
 P = ParamSpec("P")
 T = TypeVar("T")
 
+FEW_CELLS = 2**12
+"""Of all worlds; in a step of so many at most, to call a function takes longer than what it computes."""
 _SHAPES = 256  # that one function may be compiled for; torch stops at 8
 _IN_REGISTERS: dict[str, Any] = {
+    "size_asserts": False,  # of what a guard has checked
     "realize_opcount_threshold": 200,
     "realize_reads_threshold": 1000,
     "realize_acc_reads_threshold": 1000,
 }
 # Else each element of a stack asks which of its parts it is of.
-_IN_PARTS: dict[str, Any] = {"max_pointwise_cat_inputs": 0}
+_IN_PARTS: dict[str, Any] = {"size_asserts": False, "max_pointwise_cat_inputs": 0}
 _NOISE = (
     "Dynamo detected a call to a `functools.lru_cache`-wrapped function",  # of constants, which stay what they are
     "torch._dynamo.config.inline_inbuilt_nn_modules is deprecated",  # in tensordict

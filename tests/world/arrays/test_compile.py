@@ -1,5 +1,7 @@
 """Fused worlds are the eager ones to the bit, but for the last places of exponentials, and of sums in what is seen."""
 
+from itertools import cycle
+
 import pytest
 import torch
 from torch._inductor.cpp_builder import get_cpp_compiler
@@ -7,7 +9,9 @@ from torch._inductor.exc import InvalidCxxCompiler
 
 from tests.world.mechanics import of_mechanics
 from warp_torchrl import make_env
-from warp_torchrl.system.compiler import compiled
+from warp_torchrl.env import scene
+from warp_torchrl.system.compiler import FEW_CELLS, compiled
+from warp_torchrl.world.arrays import compile as operators
 from warp_torchrl.world.arrays.compile import opaque_op
 from warp_torchrl.world.backends.tick import advance
 from warp_torchrl.world.state.cells import count_trees
@@ -45,8 +49,10 @@ def test_a_tick_is_the_same():
 
 
 @pytest.mark.slow  # they take as long as fifty others to compile; `.ci/run compile` plays the first
-@pytest.mark.parametrize("overrides", [BRIEFLY, *AT_LENGTH])
-def test_worlds_are_the_same(overrides):
+@pytest.mark.parametrize(("overrides", "few_cells"), zip([BRIEFLY, BRIEFLY, *AT_LENGTH], cycle((FEW_CELLS, 0))))
+def test_worlds_are_the_same_in_one_function_and_in_two(overrides, few_cells, monkeypatch):
+    for each in (scene, operators):
+        monkeypatch.setattr(each, "FEW_CELLS", few_cells)
     exponentials = "fire=hazard" in overrides or "wind=wandering" in overrides
     names = [each.removeprefix("scenario=") for each in overrides if each.startswith("scenario=")]
     scenario, further = (names or ["default"])[0], [*SMALL, *overrides[len(names) :]]

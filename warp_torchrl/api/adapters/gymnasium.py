@@ -31,6 +31,8 @@ class FireExtinguishingEnv(gymnasium.Env[Observation, int]):
         layout: ``dict``; or ``flat``, in every preset ``observation``, one float32 vector, beside ``action_mask``: the
             entries in the order of their names, bytes divided by 255.
         device: Where the world lives; observations come back as numpy.
+        compile: Whether steps are compiled with ``torch.compile``: the first then takes half a minute, or some seconds
+            once such an environment has been compiled on this machine.
         overrides: In the command line's grammar, ``["fire=paper", "horizon=64"]``.
         more: Further overrides by name, ``observation="paper"``.
 
@@ -52,11 +54,19 @@ class FireExtinguishingEnv(gymnasium.Env[Observation, int]):
         render_mode: str | None = None,
         layout: str = "dict",
         device: torch.device | str = "cpu",
+        compile: bool = False,
         overrides: Sequence[str] = (),
         **more: object,
     ) -> None:
         self._worlds = NumpyWorlds(
-            scenario, n_worlds=1, seed=seed, layout=layout, device=device, overrides=overrides, more=more
+            scenario,
+            n_worlds=1,
+            seed=seed,
+            layout=layout,
+            device=device,
+            compile=compile,
+            overrides=overrides,
+            more=more,
         )
         check_alone(self._worlds, scenario)
         self.render_mode = render_mode

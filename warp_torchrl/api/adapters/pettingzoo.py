@@ -33,6 +33,8 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
         layout: ``dict``; or ``flat``, in every preset ``observation``, one float32 vector, beside ``action_mask``: the
             entries in the order of their names, bytes divided by 255.
         device: Device of the world; observations are numpy arrays.
+        compile: Whether steps are compiled with ``torch.compile``: the first then takes half a minute, or some seconds
+            once such an environment has been compiled on this machine.
         max_cycles: Steps to an episode, ``horizon``; None leaves the scenario's.
         overrides: In the command line's grammar, ``["fire=paper", "team.n_agents=3"]``.
         more: Further overrides by name, ``observation="paper"``.
@@ -64,13 +66,21 @@ class FireExtinguishingEnvParallel(ParallelEnv[str, Observation, int]):
         render_mode: str | None = None,
         layout: str = "dict",
         device: torch.device | str = "cpu",
+        compile: bool = False,
         max_cycles: int | None = None,
         overrides: Sequence[str] = (),
         **more: object,
     ) -> None:
         more = more if max_cycles is None else {**more, "horizon": max_cycles}
         self._worlds = NumpyWorlds(
-            scenario, n_worlds=1, seed=seed, layout=layout, device=device, overrides=overrides, more=more
+            scenario,
+            n_worlds=1,
+            seed=seed,
+            layout=layout,
+            device=device,
+            compile=compile,
+            overrides=overrides,
+            more=more,
         )
         self.render_mode = render_mode
         self._screen = Screen(self._worlds.picture, render_mode, RENDER_MODES, f"{scenario} (warp_torchrl)")

@@ -31,6 +31,8 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
         layout: ``dict``; or ``flat``, in every preset ``observation``, one float32 vector, beside ``action_mask``: the
             entries in the order of their names, bytes divided by 255.
         device: Device of the worlds; observations are numpy arrays.
+        compile: Whether steps are compiled with ``torch.compile``: the first then takes half a minute, or some seconds
+            once such an environment has been compiled on this machine.
         overrides: In the command line's grammar.
         more: Further overrides by name.
 
@@ -56,6 +58,7 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         layout: str = "dict",
         device: torch.device | str = "cpu",
+        compile: bool = False,
         overrides: Sequence[str] = (),
         **more: object,
     ) -> None:
@@ -66,7 +69,14 @@ class FireExtinguishingVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray])
             raise ValueError(f"autoreset_mode must be NextStep or SameStep, got {mode!r}")
         num_envs = whole_number("num_envs", num_envs)
         self._worlds = NumpyWorlds(
-            scenario, n_worlds=num_envs, seed=seed, layout=layout, device=device, overrides=overrides, more=more
+            scenario,
+            n_worlds=num_envs,
+            seed=seed,
+            layout=layout,
+            device=device,
+            compile=compile,
+            overrides=overrides,
+            more=more,
         )
         check_alone(self._worlds, scenario)
         self.num_envs, self.render_mode = num_envs, render_mode

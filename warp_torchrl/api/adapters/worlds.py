@@ -8,10 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import torch
 from gymnasium import spaces
-from tensordict import TensorDict, TensorDictBase
+from tensordict import TensorDictBase
 
 from warp_torchrl.api.make import make_env
 from warp_torchrl.env.flat import FLAT, flattened
+from warp_torchrl.env.layout import packed
+from warp_torchrl.env.observation import critic_state
 from warp_torchrl.runs.config.construction import ConfigError, UnknownKeyError
 
 LAYOUTS = ("dict", "flat")
@@ -65,6 +67,7 @@ class NumpyWorlds:
         seed: World i draws with ``seed + i``; None draws a seed at the first reset, so that copies made before differ.
         layout: ``dict`` or ``flat``.
         device: Where the worlds live.
+        compile: Whether steps are compiled.
         overrides: In the command line's grammar.
         more: Further overrides by name.
 
@@ -81,6 +84,7 @@ class NumpyWorlds:
         seed: int | None,
         layout: str,
         device: torch.device | str,
+        compile: bool,
         overrides: Sequence[str],
         more: Mapping[str, object],
     ) -> None:
@@ -91,13 +95,19 @@ class NumpyWorlds:
         first = None if seed is None else whole_number("seed", seed)
         try:
             self.env = make_env(
-                scenario, n_worlds=n_worlds, device=device, seed=first, overrides=[*overrides, *named], validate=False
+                scenario,
+                n_worlds=n_worlds,
+                device=device,
+                seed=first,
+                overrides=[*overrides, *named],
+                validate=False,
+                compile=compile,
             )
         except UnknownKeyError as error:
             if error.key not in more:
                 raise
             raise UnknownKeywordError(f"got an unexpected keyword argument {error.key!r}: {error}") from None
-        self._now: TensorDictBase | None = None
+        self._now: TensorDictBase | dict[str, Any] | None = None
 
     @property
     def observation_space(self) -> spaces.Box | spaces.Dict:
@@ -126,8 +136,8 @@ class NumpyWorlds:
         return self.env.world.team.n_actions
 
     @property
-    def now(self) -> TensorDictBase:
-        """Return the environment's last output.
+    def now(self) -> TensorDictBase | dict[str, Any]:
+        """Return the environment's last output, of ``reset`` or of ``advance``.
 
         Raises:
             RuntimeError: Before the first reset.
@@ -166,9 +176,8 @@ class NumpyWorlds:
         Args:
             action: Valid actions, int64 [B, A].
         """
-        given = torch.from_numpy(action).to(self.env.device)
-        self._now = self.env.step(TensorDict({"agents": {"action": given}}, batch_size=self.env.batch_size))["next"]
-        return self._to_numpy(self.now["agents", "reward"][..., 0].numpy(force=True))
+        self._now = now = self.env.advance(torch.from_numpy(action).to(self.env.device))
+        return self._to_numpy(now["agents"]["reward"][..., 0].numpy(force=True))
 
     def restart(self, which: np.ndarray, reward: np.ndarray) -> NumpyStep:
         """Start the next episode in some worlds.
@@ -178,12 +187,15 @@ class NumpyWorlds:
             reward: Rewards of the last step, float32 [B, A].
         """
         asked = torch.from_numpy(which).to(self.env.device)[:, None]
-        self._now = self.env.reset(self.now.exclude(("agents", "reward")).set("_reset", asked))
+        now = packed(self.now) if isinstance(self.now, dict) else self.now
+        self._now = self.env.reset(now.exclude(("agents", "reward")).set("_reset", asked))
         return self._to_numpy(reward)
 
     def state(self) -> np.ndarray:
         """Return the central state, float32 [B, C, 16, 16]."""
-        return self.now["state"].numpy(force=True).copy()
+        worlds = self.env.shared_state
+        shown = critic_state(self.env.observation, self.env.world)
+        return shown(worlds, self.env.world.forecast(worlds)).numpy(force=True)
 
     def frames(self) -> np.ndarray:
         """Return a frame of each world, uint8 [B, H * s, W * s, 3]."""

@@ -140,7 +140,8 @@ def team_mates(now: Blocks) -> Tensor:
     """Return how many others there are, a quarter each, four at most."""
     if now.about is None or now.known is not None:
         return now.show(_mates(now).mul_(0.25).clamp_(max=1.0), 252)
-    block, middle = block_of(now.state, now.side), now.about.radius  # all are seen: one map for the whole team
+    row, column = now.about.position.unbind(-1)
+    block, middle = torch.add(column, row, alpha=now.side), now.about.radius
     counts = block.new_zeros(len(block), now.side**2).scatter_add_(1, block, torch.ones_like(block))
     mates = now.about.of(counts.view(-1, now.side, now.side))
     mates[..., middle, middle] -= 1

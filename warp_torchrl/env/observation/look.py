@@ -95,9 +95,9 @@ def _others(state: WorldState, world: World, radius: int) -> Tensor:
     position, role = state.vehicles.position, world.team.table(state.cells.device).index
     side, roles = 2 * radius + 1, len(world.team.role_names)
     known, place = world.sensing.knows_where(state, world.team, world.hearing)
-    row, column = (place - position[:, :, None] + radius).unbind(-1)  # of each in each other's square
-    is_near = (row >= 0) & (row < side) & (column >= 0) & (column < side)
-    is_near &= known
+    cell = place - position[:, :, None] + radius  # of each in each other's square
+    is_near = (cell == cell.clamp(0, side - 1)).all(-1) & known
+    row, column = cell.unbind(-1)
     index = torch.where(is_near, (role * side + row) * side + column, roles * side**2)
     count = torch.zeros(*row.shape[:2], roles * side**2 + 1, dtype=torch.uint8, device=role.device)
     count = scatter_add(count, index, torch.ones_like(index, dtype=torch.uint8))[..., :-1]

@@ -214,8 +214,8 @@ def _of_each(number: Tensor, now: Context) -> Tensor:
 
 def _one_hot_role(now: Context) -> Tensor:
     """Return the agents' roles one-hot, int64 [B, A, roles]."""
-    team, shape = now.world.team, now.state.vehicles.tank.shape
-    return one_hot(team.table(now.state.cells.device).index, len(team.role_names)).expand(*shape, -1)
+    known = now.world.team.table(now.state.cells.device).one_hot
+    return known.expand(len(now.state.step), -1, -1)
 
 
 def _one_hot_action(code: Tensor, team: Team) -> Tensor:

@@ -9,6 +9,8 @@ from typing import Any, ParamSpec, TypeVar
 
 import torch
 
+from warp_torchrl.system.compiler import FEW_CELLS
+
 P = ParamSpec("P")
 T = TypeVar("T")
 
@@ -24,7 +26,8 @@ _FUNCTIONS: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {}
 def opaque_op(schema: str, like: Callable[..., Any] | None = None) -> Callable[[Callable[P, T]], Callable[P, T]]:
     """Return a decorator: compiled functions call the function without compiling it, and keep its result in memory.
 
-    A compiler would repeat the function's code at every call, or test each element where the function takes a slice.
+    A compiler would repeat the function's code at every call, or test each element where the function takes a slice. Of
+    few cells it does, since a call takes longer.
 
     Args:
         schema: Of its arguments and its result, in torch's language.
@@ -44,8 +47,13 @@ def opaque_op(schema: str, like: Callable[..., Any] | None = None) -> Callable[[
 
         @wraps(function)
         def either(*args: P.args, **kwargs: P.kwargs) -> T:
-            return (operator if is_fused() else function)(*args, **kwargs)
+            return (operator if is_fused() and not _are_few(args) else function)(*args, **kwargs)
 
         return either
 
     return opaque
+
+
+def _are_few(given: tuple[Any, ...]) -> bool:
+    """Return whether tensors that a function is given have few cells."""
+    return all(each.numel() <= FEW_CELLS for each in given if isinstance(each, torch.Tensor))

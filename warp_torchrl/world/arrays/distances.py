@@ -27,10 +27,9 @@ def chebyshev_distance(position: Tensor, mask: Tensor) -> Tensor:
 def _moves(position: Tensor, mask: Tensor, dtype: torch.dtype, far: int) -> Tensor:
     """Return what ``chebyshev_distance`` does, of another type and ``far`` where the mask is False."""
     height, width = mask.shape[-2:]
-    place = position.to(torch.int32)
-    row_distance = (counting(height, position) - place[..., :1]).abs_().to(dtype)
-    column_distance = (counting(width, position) - place[..., 1:]).abs_().to(dtype)
-    distance = torch.maximum(row_distance[..., :, None], column_distance[..., None, :])
+    lines = counting(max(height, width), position) - position.to(torch.int32)[..., None]
+    rows, columns = lines.abs_().to(dtype).unbind(-2)
+    distance = torch.maximum(rows[..., :height, None], columns[..., None, :width])
     beyond = (byte(mask) ^ 1).to(dtype) * far  # a maximum is many times faster than masked_fill
     return torch.maximum(distance, beyond[:, None])
 

@@ -61,13 +61,24 @@ def window(position: Tensor, size: Sequence[int], radius: int) -> Window:
         size: (H, W) of the map [cells].
         radius: r [cells]; V = 2 r + 1.
     """
-    height, width = size
+    _, width = size
     lines = position[..., None] + _away(radius, position.device)  # the square's rows, then its columns
-    on_map = torch.clamp(lines, *_bounds(height, width, position.device))
+    on_map, is_on_map = clamped(lines, size)
     row, column = on_map.unbind(-2)
-    has_row, has_column = byte(on_map == lines).unbind(-2)
+    has_row, has_column = byte(is_on_map).unbind(-2)
     index = torch.add(column[..., None, :], row[..., None], alpha=width)
     return Window(position, radius, index.flatten(1), to_uint8(has_row[..., None] * has_column[..., None, :]))
+
+
+def clamped(lines: Tensor, size: Sequence[int]) -> tuple[Tensor, Tensor]:
+    """Return rows and columns moved to the edge of a map of (H, W) where they are beyond it, and which are not, bool.
+
+    Args:
+        lines: The rows, then the columns, int64 [..., 2, n].
+        size: (H, W).
+    """
+    on_map = torch.clamp(lines, *_bounds(*size, lines.device))
+    return on_map, on_map == lines
 
 
 @kept(32)

@@ -6,8 +6,10 @@ from typing import NamedTuple
 
 import torch
 from torch import Tensor
+from torch.nn.functional import one_hot
 
 from warp_torchrl.system.modes import kept
+from warp_torchrl.world.arrays.geometry import offsets
 
 
 class Role(NamedTuple):
@@ -47,7 +49,9 @@ class RoleTable:
     """The roles of a team's agents, as tensors."""
 
     index: Tensor  # int64 [A], into ``role_names``
+    one_hot: Tensor  # int64 [A, roles], the same
     stride: Tensor  # int64 [A]
+    moves: Tensor  # int64 [A,2,8], (rows, columns) of the eight moves [cells]
     flies: Tensor  # bool [A]
     can: Mapping[str, Tensor]  # which agents have each ability of the table, bool [A]
 
@@ -70,9 +74,13 @@ def role_table(
         device: Where the tensors are.
     """
     kinds = [ROLES[role] for role in agents]
+    index = torch.tensor([roles.index(role) for role in agents], device=device)
+    stride = torch.tensor([kind.stride for kind in kinds], device=device)
     return RoleTable(
-        index=torch.tensor([roles.index(role) for role in agents], device=device),
-        stride=torch.tensor([kind.stride for kind in kinds], device=device),
+        index=index,
+        one_hot=one_hot(index, len(roles)),
+        stride=stride,
+        moves=offsets(device).T * stride[:, None, None],
         flies=torch.tensor([kind.flies for kind in kinds], device=device),
         can={name: torch.tensor([name in kind.abilities for kind in kinds], device=device) for name in abilities},
     )

@@ -19,6 +19,7 @@ from warp_torchrl.system.modes import kept
 from warp_torchrl.validation import check_new_name
 from warp_torchrl.world.arrays.geometry import offsets
 from warp_torchrl.world.arrays.random import Stream, uniform
+from warp_torchrl.world.arrays.squares import clamped
 from warp_torchrl.world.state.cells import is_burning, is_tree
 from warp_torchrl.world.state.role import RoleTable
 from warp_torchrl.world.state.state import FIRST_FIRE, Cover, WorldState
@@ -115,7 +116,7 @@ class Move(Ability):
     def mask(self, now: AgentContext) -> Tensor:
         """Return which of the eight moves each agent can make, bool [B, A, 8]; nobody leaves the map."""
         state, roles = now.state, now.roles
-        index, inside = places(state, offsets(state.cells.device) * roles.stride[:, None, None])
+        index, inside = places(state, roles.moves)
         flat = index.flatten(1)
         ground, cells = now.at(state.cover, flat), now.at(state.cells, flat)
         blocked = ((ground == int(Cover.LAKE)) | is_burning(cells)).view_as(inside)
@@ -190,8 +191,8 @@ PAPER_ABILITIES = tuple(ABILITIES)
 
 def own_cell(state: WorldState) -> Tensor:
     """Return the flat index of each agent's cell, row * W + column, int64 [B, A]."""
-    position = state.vehicles.position
-    return position[..., 0] * state.cells.shape[2] + position[..., 1]
+    row, column = state.vehicles.position.unbind(-1)
+    return torch.add(column, row, alpha=state.cells.shape[2])
 
 
 def neighbourhood(state: WorldState) -> tuple[Tensor, Tensor]:
@@ -206,15 +207,15 @@ def places(state: WorldState, away: Tensor) -> tuple[Tensor, Tensor]:
 
     Args:
         state: The worlds.
-        away: (rows, columns) from an agent to each, int64 [n, 2] or [A, n, 2] [cells].
+        away: (rows, columns) from an agent to each, int64 [2, n] or [A, 2, n] [cells].
 
     Returns:
         int64 [B, A, n] and bool [B, A, n].
     """
-    position, (height, width) = state.vehicles.position, state.cells.shape[1:]
-    row, column = position[..., 0, None] + away[..., 0], position[..., 1, None] + away[..., 1]
-    on_row, on_column = row.clamp(0, height - 1), column.clamp(0, width - 1)
-    return on_row * width + on_column, (on_row == row) & (on_column == column)
+    size = state.cells.shape[1:]
+    on_map, is_on_map = clamped(state.vehicles.position[..., None] + away, size)
+    (row, column), (has_row, has_column) = on_map.unbind(-2), is_on_map.unbind(-2)
+    return torch.add(column, row, alpha=size[1]), has_row & has_column
 
 
 @kept(8)
@@ -224,4 +225,4 @@ def _order(device: torch.device) -> Tensor:
 
 @kept(8)
 def _around(device: torch.device) -> Tensor:
-    return torch.tensor(_NEIGHBOURHOOD, device=device)
+    return torch.tensor(tuple(zip(*_NEIGHBOURHOOD)), device=device)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from warp_torchrl.system.modes import kept
 from warp_torchrl.world.state.state import WorldState
 from warp_torchrl.world.team.hearing import Hearing
 from warp_torchrl.world.team.team import Team
@@ -71,8 +72,13 @@ class Full(Sensing):
 
     def knows_where(self, state: WorldState, team: Team, hearing: Hearing) -> tuple[Tensor, Tensor]:
         """Return that each knows where all others are, bool [1, A, A], and where they are, int64 [B, 1, A, 2]."""
-        others = ~torch.eye(team.n_agents, dtype=torch.bool, device=state.cells.device)[None]
-        return others, state.vehicles.position[:, None]
+        return _others(team.n_agents, state.cells.device), state.vehicles.position[:, None]
+
+
+@kept(32)
+def _others(agents: int, device: torch.device) -> Tensor:
+    """Return for each agent which are the others, bool [1, A, A]."""
+    return ~torch.eye(agents, dtype=torch.bool, device=device)[None]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -29,9 +29,13 @@ def block_of(state: WorldState, side: int) -> Tensor:
 
 def block_at(place: Tensor, state: WorldState, side: int) -> Tensor:
     """Return in which of side x side blocks of the map cells are, int64 [...], of (row, column) int64 [..., 2]."""
-    height, width = state.cells.shape[1:]
-    row, column = place.unbind(-1)
-    return (row * side // height) * side + column * side // width
+    row, column = (place * side // _size(*state.cells.shape[1:], place.device)).unbind(-1)
+    return torch.add(column, row, alpha=side)
+
+
+@kept(32)
+def _size(height: int, width: int, device: torch.device) -> Tensor:
+    return torch.tensor([height, width], device=device)
 
 
 def has_reached(state: WorldState) -> Tensor:
