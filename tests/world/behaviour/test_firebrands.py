@@ -5,8 +5,8 @@ import math
 import pytest
 import torch
 
-from warp_torchrl.world.arrays.random import Stream, uniform, world_key
-from warp_torchrl.world.behaviour.firebrands import Firebrands, Plume, flight_minutes, ignition_chance, landing
+from warp_torchrl.world.arrays.random import Stream, named_key, uniform, world_key
+from warp_torchrl.world.behaviour.firebrands import FLIGHT, Firebrands, Plume, flight_minutes, ignition_chance, landing
 
 
 def plume(worlds: int, intensity: float, east: float, north: float = 0.0) -> Plume:
@@ -26,7 +26,7 @@ def test_distances_have_the_mean_and_the_share_beyond_100_m_of_the_equations(fir
     mu, sigma, sideways = (each.item() for each in landing(torch.tensor(intensity), torch.tensor(speed)))
     assert (mu, sigma) == pytest.approx(BY_HAND[fire], rel=2e-3)
     key, brands = world_key(torch.arange(6250)), Firebrands(decay=1e6)
-    along, across = (uniform(key, 0, stream, (16,)) for stream in (Stream.FLIGHT, Stream.SIDE))
+    along, across = (uniform(named_key(key, name), 0, Stream.NAMED, (16,)) for name in FLIGHT)
     flown = brands.flown(plume(6250, intensity, 0.0, speed), along, across)  # 10^5 draws
     assert flown.north.mean().item() == pytest.approx(math.exp(mu + sigma**2 / 2.0), rel=0.05)
     beyond = 0.5 * math.erfc((math.log(100.0) - mu) / sigma / math.sqrt(2.0))

@@ -47,10 +47,6 @@ class Stream(IntEnum):
     MEMBERS = 24
     SECTORS = 25
     HELD = 26
-    FLIGHT = 27
-    SIDE = 28
-    LANDING = 29
-    BREACH = 30
 
 
 def world_key(seed: Tensor, episode: Tensor | int = 0) -> Tensor:

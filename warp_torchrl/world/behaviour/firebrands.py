@@ -16,6 +16,8 @@ from torch import Tensor
 
 from warp_torchrl.validation import check_fields
 
+FLIGHT, LANDING = ("embers.along", "embers.across"), "embers.landing"
+"""Names of the draws of distances along and across the wind, and of ignition."""
 _GRAVITY = 9.81  # m/s2
 _HEAT_OF_AIR = 1.1 * 1.0 * 300.0  # density [kg/m3] x heat capacity [kJ/kg/K] x temperature [K] (Sardoy et al. 2008)
 _SLOWEST = 3.0
@@ -102,8 +104,8 @@ class Firebrands:
         mu, sigma, sideways = landing(plume.intensity, speed)
         part = (each + along) / along.shape[-1]
         calm = (speed / _SLOWEST).clamp(max=1.0)
-        downwind = calm[..., None] * torch.exp(mu[..., None] + sigma[..., None] * _normal(part))
-        aside = (calm * sideways)[..., None] * _normal(across)
+        downwind = calm[..., None] * lognormal(mu[..., None], sigma[..., None], part)
+        aside = (calm * sideways)[..., None] * normal_of(across)
         east, north = (each[..., None] / speed.clamp(min=_LEAST)[..., None] for each in (plume.east, plume.north))
         survives = torch.exp(-torch.sqrt(downwind.square() + aside.square()) / self.decay)
         return Flight(
@@ -180,6 +182,17 @@ def flight_minutes(flame_length: Tensor) -> Tensor:
     return 2.0 / 2.3 * z.sqrt() / 60.0 * (1.2 + 5.963 / 3.0 * (height * height.sqrt() - 1.0))
 
 
-def _normal(u: Tensor) -> Tensor:
+def lognormal(mu: Tensor, sigma: Tensor, u: Tensor) -> Tensor:
+    """Return log-normal numbers from uniform draws in [0, 1).
+
+    Args:
+        mu: Mean of the logarithm.
+        sigma: Its standard deviation.
+        u: The draws.
+    """
+    return torch.exp(mu + sigma * normal_of(u))
+
+
+def normal_of(u: Tensor) -> Tensor:
     """Return the standard normals of uniform draws in [0, 1)."""
     return math.sqrt(2.0) * torch.erfinv((2.0 * u - 1.0).clamp(-1.0 + 1e-6, 1.0 - 1e-6))

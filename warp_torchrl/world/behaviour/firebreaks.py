@@ -8,7 +8,7 @@ _PLOT = 100.0  # m, side of the smallest plots there, of one hectare
 
 
 def breach_chance(intensity: Tensor, width: float, trees: Tensor, length: float) -> Tensor:
-    """Return the chance that a fire breaches a part of a firebreak (Wilson 1988, 113 grass fires at breaks of 1.5-15 m).
+    """Return the chance that a fire breaches a part of a firebreak, from 113 grass fires at 1.5 to 15 m (Wilson 1988).
 
         P = 1 / (1 + exp(-x)),   x = 1.36 + 0.00036 I - b W,   b = 0.38 with trees within 20 m, else 0.99
 
@@ -26,5 +26,5 @@ def breach_chance(intensity: Tensor, width: float, trees: Tensor, length: float)
 
 
 def intensity_of(flame_length: float) -> float:
-    """Return the fireline intensity of flames [kW/m], (L / 0.0775)^(1 / 0.46) of their length in metres (Byram 1959)."""
+    """Return the fireline intensity of flames of a length [m], (L / 0.0775)^(1 / 0.46) [kW/m] (Byram 1959)."""
     return float((flame_length / 0.0775) ** (1.0 / 0.46))

@@ -13,6 +13,7 @@ from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.behaviour.moistures import in_force, moisture_row
 from warp_torchrl.world.behaviour.spread import Spread
 from warp_torchrl.world.law.fuel_bed import gradient
+from warp_torchrl.world.law.passing import head_behaviour
 from warp_torchrl.world.law.rate import TICKS_PER_CELL, RateFire
 from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.state.window import Window
@@ -97,14 +98,9 @@ def ticks_of(minutes: float, fastest: float, cell_size: float) -> int:
 
 
 def heads(spread: Spread, with_kind: bool = False) -> Tensor:
-    """Return the fields of ``HeadBehaviour`` for a spread [G, h, w], float32 [G, 4, h, w]; 5 with the kind of fire.
-
-    The rear spreads at R_head (1 - e) / (1 + e), e the eccentricity of the ellipse.
-    """
-    focus = (1.0 - spread.length_to_breadth.pow(-2)).clamp(min=0.0).sqrt()
-    backing = spread.head * (1.0 - focus) / (1.0 + focus)
-    kind = (spread.kind,) if with_kind else ()
-    return torch.stack((spread.head, backing, spread.intensity, spread.flame_length, *kind), dim=1)
+    """Return the fields of ``HeadBehaviour`` for a spread [G, h, w], float32 [G, 4, h, w]; 5 with the kind of fire."""
+    then, kind = head_behaviour(spread), (spread.kind,) if with_kind else ()
+    return torch.stack((then.head, then.backing, then.intensity, then.flame_length, *kind), dim=1)
 
 
 def _rise(landscape: Landscape, window: Window, cell_size: float) -> Tensor:
