@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.air.fields import Field
-from warp_torchrl.world.air.hills import bent
+from warp_torchrl.world.air.hills import FACTORS, bent
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.behaviour.moistures import in_force, moisture_row
 from warp_torchrl.world.behaviour.spread import Spread
@@ -85,6 +85,14 @@ def spread_in(
         )
     ]
     return parts[0] if len(parts) == 1 else _joined(parts)
+
+
+def air_in(fire: RateFire, landscape: Landscape, spell: Spell, window: Window) -> tuple[Tensor, Tensor]:
+    """Return winds [G, 2, 1, 1] or [G, 2, h, w] [m/s] and moistures [G, 7] or [G, h, w, 7] [%] in a window."""
+    winds, row = spell.wind.reshape(-1, 2), moisture_row(fire.moisture)
+    moistures = in_force(spell.moisture, row).reshape(-1, len(row)).expand(len(winds), -1)
+    air, moist = spell.here(winds, moistures, window)
+    return (air if landscape.layer(FACTORS[0]) is None else bent(air, window.landscape(landscape))), moist
 
 
 def can_ignite(fire: RateFire, landscape: Landscape) -> Tensor:

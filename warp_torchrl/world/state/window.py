@@ -84,6 +84,18 @@ class Window:
             self.map,
         )
 
+    def with_cells(self, row: Tensor, column: Tensor) -> "Window":
+        """Return the least window that has it and some cells of the map, int64 [n], off its outermost cells."""
+        if bool(((row > self.top) & (row < self.top + self.height - 1)).all()) and bool(
+            ((column > self.left) & (column < self.left + self.width - 1)).all()
+        ):
+            return self
+        return self._between(
+            (min(self.top, int(row.min()) - _MARGIN), max(self.top + self.height, int(row.max()) + 1 + _MARGIN)),
+            (min(self.left, int(column.min()) - _MARGIN), max(self.left + self.width, int(column.max()) + 1 + _MARGIN)),
+            self.map,
+        )
+
     def rim(self) -> tuple[Tensor, ...]:
         """Return the outermost cells in the north, south, west and east, bool [h, w] each; none at the map's sides."""
         sides = torch.zeros(4, self.height, self.width, dtype=torch.bool)
