@@ -56,7 +56,8 @@ def test_without_heat_for_any_nothing_changes_to_the_bit() -> None:
 
 
 def test_a_fire_is_the_same_in_any_window_and_batch(monkeypatch: pytest.MonkeyPatch) -> None:
-    wide: dict[str, Any] = {"height": 160, "width": 192, "minutes": 30.0}
+    wide: dict[str, Any] = {"height": 160, "width": 192, "minutes": 40.0}
+    monkeypatch.setattr(window, "SIDE", 16)
     many = arrivals(BRANDS, fires=3, **wide)
     assert torch.equal(many[:1], arrivals(BRANDS, fires=1, **wide))
     monkeypatch.setattr(window, "SIDE", 192)

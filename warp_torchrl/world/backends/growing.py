@@ -120,10 +120,10 @@ class GrowingFires(Spreading):
             began = self._now
             for tick in range(1, spell.ticks + 1):
                 end, window = began + tick * spell.minutes, self.window
-                if embers is not None:
-                    self._light(*embers.due(end))
                 if self._is_cramped():
                     self._grow()
+                if embers is not None:
+                    self._light(*embers.due(end))
                 if self.window != window:
                     travel = self._planes(spell.travel(self.window))
                 self._tick(travel, end)
@@ -216,7 +216,6 @@ class GrowingFires(Spreading):
         self._burned, self._beside = relaid(self._burned, False), relaid(self._beside, False)
         self._origins = relaid(torch.where(self._origins < 0, NOWHERE, moved(self._origins)), NOWHERE)
         self._waiting, self._changed = listed(self._waiting), listed(self._changed)
-        self._spotted = listed(self._spotted)
         self._lay_out((worlds, after.height, after.width), self._land.fuel(after), self._land.pace(after))
         self.window = after
         self._measure_rim()

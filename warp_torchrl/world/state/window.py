@@ -85,14 +85,14 @@ class Window:
         )
 
     def with_cells(self, row: Tensor, column: Tensor) -> "Window":
-        """Return the least window that has it and some cells of the map, int64 [n], off its outermost cells."""
-        if bool(((row > self.top) & (row < self.top + self.height - 1)).all()) and bool(
-            ((column > self.left) & (column < self.left + self.width - 1)).all()
-        ):
+        """Return this window, or one that has it and some cells of the map, int64 [n], two cells off its sides."""
+        (top, bottom), (left, right) = ((int(each.min()), int(each.max()) + 1) for each in (row, column))
+        ends = self.top + self.height, self.left + self.width
+        if top >= self.top + 2 and left >= self.left + 2 and bottom <= ends[0] - 2 and right <= ends[1] - 2:
             return self
         return self._between(
-            (min(self.top, int(row.min()) - _MARGIN), max(self.top + self.height, int(row.max()) + 1 + _MARGIN)),
-            (min(self.left, int(column.min()) - _MARGIN), max(self.left + self.width, int(column.max()) + 1 + _MARGIN)),
+            (min(self.top, top - _MARGIN), max(ends[0], bottom + _MARGIN)),
+            (min(self.left, left - _MARGIN), max(ends[1], right + _MARGIN)),
             self.map,
         )
 
