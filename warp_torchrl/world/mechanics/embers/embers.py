@@ -175,7 +175,7 @@ class Embers(Mechanic):
         downwind = self.distance * lognormal(torch.zeros_like(speed), torch.full_like(speed, self.deviation), along)
         aside = downwind * self.sideways * normal_of(across)
         landed, on_map = _landed(cell, east * downwind + north * aside, north * downwind - east * aside, state)
-        flies = throws & on_map & (speed > 0.0)
+        flies = throws & on_map
         fuel = (fire.can_ignite(state) * state.alpha).flatten(1).gather(1, landed)
         ignites = flies & (_draws(state, LANDING, cell, 1)[..., 0] < fuel)
         return _Landing(
