@@ -35,6 +35,7 @@ SMALL = {
     "fire_plain": {"size": 24, "at": (4, 8)},
     "fire_terrain_wind": {"size": 24, "at": (4, 8)},
     "wind": {"size": 20, "ticks": 20},
+    "embers": {"size": 24, "minutes": 20.0, "brands": 320},
     "hills": {"size": 24, "ridges": (20.0,)},
     "cover": {"size": 24},
     "isotropy": {"reach": 12, "worlds": 4},

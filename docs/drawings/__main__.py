@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 sys.path.insert(0, str(Path(__file__).parents[1]))  # of this package
 
 from drawings.belief import belief, scouts
+from drawings.embers import embers
 from drawings.episode import photograph
 from drawings.fires import fire_plain, fire_terrain_wind
 from drawings.hills import hills
@@ -43,6 +44,7 @@ WORLD: dict[str, Callable[..., "Figure"]] = {
     "fire_terrain_wind": fire_terrain_wind,
     "wind": wind,
     "hills": hills,
+    "embers": embers,
     "cover": cover,
     "isotropy": isotropy,
     "ellipses": ellipses,

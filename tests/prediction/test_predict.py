@@ -7,12 +7,12 @@ import torch
 
 from warp_torchrl import fire_history
 from warp_torchrl import predict as exported
-from warp_torchrl.prediction.passing import steepness
 from warp_torchrl.prediction.predict import lasting, predict
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.fires import alone
 from warp_torchrl.world.fires.members import Members
 from warp_torchrl.world.fires.spell import Spell, spread_in
+from warp_torchrl.world.law.passing import steepness
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.weather.table import WeatherTable

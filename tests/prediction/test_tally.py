@@ -5,11 +5,11 @@ import torch
 
 from tests.world.backends.test_growing import land, lit
 from warp_torchrl.prediction.counts import Counter
-from warp_torchrl.prediction.passing import HeadBehaviour, passing, steepness_from
 from warp_torchrl.prediction.tally import Tally
 from warp_torchrl.system import memory
 from warp_torchrl.world.fires.alone import Burned, Fires
 from warp_torchrl.world.fires.spell import Spell
+from warp_torchrl.world.law.passing import HeadBehaviour, passing, steepness_from
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER
 from warp_torchrl.world.state.window import Window

@@ -205,6 +205,7 @@ def _burn(case: Case, options: PredictionOptions, corrected: Corrected | None) -
             fields=case.fields,
             members=members,
             is_seen=corrected is not None,
+            embers=options.firebrands if options.embers else None,
             progress=bar.update,
         )
 

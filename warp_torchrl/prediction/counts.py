@@ -8,9 +8,9 @@ import torch
 from torch import Tensor
 from torch.nn.functional import pad
 
-from warp_torchrl.prediction.passing import HeadBehaviour, passing, steepness_from
 from warp_torchrl.world.arrays.geometry import DIRECTIONS
 from warp_torchrl.world.fires.alone import Burned, Fires
+from warp_torchrl.world.law.passing import HeadBehaviour, passing, steepness_from
 from warp_torchrl.world.law.travel import NEVER
 from warp_torchrl.world.state.window import COLUMNS, Window
 

@@ -12,6 +12,7 @@ from warp_torchrl.prediction.tally import Tally
 from warp_torchrl.world.air.fields import WeatherFields
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.arrays.random import world_key
+from warp_torchrl.world.behaviour.firebrands import Firebrands
 from warp_torchrl.world.fires.members import Members
 from warp_torchrl.world.fires.sightings import beside
 from warp_torchrl.world.fires.spell import spells_of
@@ -135,6 +136,7 @@ def predict(
     fields: WeatherFields | None = None,
     members: Members | None = None,
     is_seen: bool = False,
+    embers: Firebrands | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> Prediction:
     """Burn many fires on one map, in hourly weather, and return their maps and curves.
@@ -158,6 +160,7 @@ def predict(
         members: By what fires differ in rate, wind and moisture, one for each; None: by ``fire_deviation`` alone.
         is_seen: Whether the ignition is what a fire had burned when it was seen: its front is on average half a cell
             ahead then.
+        embers: Firebrands that start fires ahead; None: none fly.
         progress: Called with how many fires have been burned since the last call.
 
     Raises:
@@ -176,7 +179,7 @@ def predict(
     met = spells_of(Weather(table=table, convergence=convergence, fields=fields), minutes, start)
     front = beside(ignition.cpu()) if is_seen else None
     who = Members.plain(fires) if members is None else members
-    burning = who.fires(law, ground, met, cell_size, front)
+    burning = who.fires(law, ground, met, cell_size, front, embers)
     lit = ignition.cpu() & burning.fuel
     if not bool(lit.any()):
         raise ValueError(f"ignition must light a cell with fuel, none of its {int(ignition.sum())} cells has any")

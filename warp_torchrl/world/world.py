@@ -134,6 +134,11 @@ class World:
         found = (*self.mechanics, *(each for each in parts if isinstance(each, Mechanic)))
         return tuple(sorted(found, key=lambda each: (each.turn, each.name)))
 
+    @cached_property
+    def _igniting(self) -> tuple[Mechanic, ...]:
+        """Return the mechanics that light cells after a tick."""
+        return tuple(each for each in self.loop if type(each).after_tick is not Mechanic.after_tick)
+
     def reset(self, seed: Tensor, episode: Tensor) -> WorldState:
         """Start an episode in each world: the ground, the fire after its head start, the team.
 
@@ -210,8 +215,9 @@ class World:
     def step(self, state: WorldState, action: Tensor, counts: TreeCounts | None = None) -> Transition:
         """Advance every world that has not ended by one agent step.
 
-        Agents move; agents act; on every ``steps_per_tick``-th step the fire ticks; the clock advances;
-        mechanics step, in the order of ``loop``: vehicles are lent, packets set out, agents look and are told.
+        Agents move; agents act; on every ``steps_per_tick``-th step the fire ticks, and its embers fall; the clock
+        advances; mechanics step, in the order of ``loop``: vehicles are lent, packets set out, agents look and are
+        told.
 
         Args:
             state: The worlds, batch size [B].
@@ -225,6 +231,8 @@ class World:
         after, result = self.team.act(state, action, running, self.fire.last_spreading, self.fire.wet_for, self.loop)
         ticks_now = running & ((state.step + 1) % self.steps_per_tick == 0)
         after = self._tick(after, ticks_now)
+        for each in self._igniting:
+            after = each.after_tick(after, ticks_now, self)
         counts_after = count_trees(after)
         after = self._advance_clock(after, counts_after, running)
         for each in self.loop:
@@ -294,6 +302,9 @@ class World:
     def _advance_clock(self, state: WorldState, counts: TreeCounts, running: Tensor) -> WorldState:
         step = state.step + running
         terminated = (counts.alight == 0) & self.fire.burns_out
+        for each in self._igniting:
+            smoulders = each.smoulders(state)
+            terminated = terminated if smoulders is None else terminated & ~smoulders
         share_burning = counts.burning / counts.initial
         return state.replace(
             step=step,

@@ -8,6 +8,7 @@ from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.runs.config.seeds import BEYOND_EVALUATION, FIRST_EVALUATED
 from warp_torchrl.validation import check_fields, did_you_mean
 from warp_torchrl.world.air.hills import Hills
+from warp_torchrl.world.behaviour.firebrands import Firebrands
 from warp_torchrl.world.ensemble.parameters import Deviations
 from warp_torchrl.world.fires.sightings import HotSpotSensor
 
@@ -114,6 +115,10 @@ class PredictionOptions:
             ``members.bearing`` [degrees], ``members.moisture``, ``members.local``, ``members.held``.
         hot_spots: The satellite: ``hot_spots.pixel=375`` [m], ``hot_spots.detection``, ``hot_spots.false_alarm``,
             ``hot_spots.lately`` [h].
+        embers: Whether firebrands fly ahead and start fires.
+        firebrands: How many, how far and how long: ``firebrands.per_heat=1`` [1/GJ], ``firebrands.least_intensity``
+            [kW/m], ``firebrands.decay`` [m], ``firebrands.temperature`` [C], ``firebrands.delay`` [minutes],
+            ``firebrands.followed``.
         animation: Whether the first fire is written as a GIF.
         out: Folder to write to; None makes one in ``outputs/predictions``.
         overwrite: Write into a folder that holds something.
@@ -144,6 +149,8 @@ class PredictionOptions:
     uncertain: bool = False
     members: Deviations = field(default_factory=Deviations)
     hot_spots: HotSpotSensor = field(default_factory=HotSpotSensor)
+    embers: bool = False
+    firebrands: Firebrands = field(default_factory=Firebrands)
     animation: bool = False
     out: str | None = None
     overwrite: bool = False
@@ -165,6 +172,8 @@ class PredictionOptions:
         for name, what in (("weather", "a CSV file of weather"), ("ignition", "a file of where the fire starts")):
             if getattr(self, name) is None:
                 raise ValueError(f"{name} must name {what}, got null")
+        if self.firebrands != Firebrands() and not self.embers:
+            raise ValueError("firebrands is read with embers=true, got embers=false")
         if self.members != Deviations() and not self.uncertain and self.observed is None:
             raise ValueError("members is read with uncertain=true or observed=FILE, got neither")
 

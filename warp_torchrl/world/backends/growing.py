@@ -6,12 +6,14 @@ tick, and all that their times follow from, lie in the window.
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Protocol
 
 import torch
 from torch import Tensor
 from torch.nn.functional import pad
 
 from warp_torchrl.world.backends.spreading import Spreading
+from warp_torchrl.world.law.passing import steepness_from
 from warp_torchrl.world.law.travel import NEVER, NOWHERE
 from warp_torchrl.world.state.window import Window
 
@@ -31,6 +33,46 @@ class Land:
 
     fuel: Callable[[Window], Tensor]  # cells that can ignite, bool [h, w]
     pace: Callable[[Window], Tensor]  # factor on the times of each fire, float32 [B, h, w]
+
+
+@dataclass(frozen=True, eq=False)
+class Caught:
+    """Cells of some fires that caught fire in a tick; tensors are [n], of which the first ``count`` are different."""
+
+    window: Window
+    fire: Tensor  # index of the fire, int64
+    cell: Tensor  # flat index in the map, int64
+    minutes: Tensor  # when the fire came, float32
+    steep: Tensor  # |grad T| then, float32 [minutes a cell]; see ``passing.steepness_from``
+    pace: Tensor  # factor on the fire's times there, float32
+    count: int
+
+    def filled(self, length: int) -> "Caught":
+        """Return them with the first one repeated until their number is a multiple of a length."""
+        more = -self.count % length if self.count else 0
+
+        def longer(values: Tensor) -> Tensor:
+            return torch.cat((values, values[:1].expand(more)))
+
+        planes = (longer(each) for each in (self.fire, self.cell, self.minutes, self.steep, self.pace))
+        return Caught(self.window, *planes, self.count)
+
+
+class Embers(Protocol):
+    """What starts fires ahead of others."""
+
+    @property
+    def smoulder(self) -> bool:
+        """Return whether any fire is still to start."""
+        ...
+
+    def due(self, end: float) -> tuple[Tensor, Tensor, Tensor]:
+        """Return what starts until a time [minutes]: of which fire, in which cell of the map, and when, [n] each."""
+        ...
+
+    def thrown(self, number: int, caught: Caught) -> None:
+        """Take the cells that caught fire in a tick of a spell of this number."""
+        ...
 
 
 class GrowingFires(Spreading):
@@ -61,30 +103,73 @@ class GrowingFires(Spreading):
         self._count = self._burned.view(fires, -1).sum(1)
         self._going = torch.ones(fires, dtype=torch.bool, device=lit.device)
         self._measure_rim()
+        self._spotted = self._lit[:0]
 
     @property
     def is_over(self) -> bool:
         """Return whether nothing can burn any more."""
         return not len(self._waiting)
 
-    def burn_spells(self, spells: Iterable[SpellInWindows]) -> None:
+    def burn_spells(self, spells: Iterable[SpellInWindows], embers: Embers | None = None) -> None:
         """Advance by some spells, one after the other, as long as anything can burn; later ones are not asked for."""
         before: Tensor | None = None
-        for spell in spells:
+        for number, spell in enumerate(spells):
             travel = self._planes(spell.travel(self.window))
             if before is not None:
                 self._change(before, travel)
             began = self._now
             for tick in range(1, spell.ticks + 1):
+                end, window = began + tick * spell.minutes, self.window
                 if self._is_cramped():
                     self._grow()
+                if embers is not None:
+                    self._light(*embers.due(end))
+                if self.window != window:
                     travel = self._planes(spell.travel(self.window))
-                self._tick(travel, began + tick * spell.minutes)
+                self._tick(travel, end)
+                if embers is not None:
+                    self._lit = torch.cat((self._lit, self._spotted))
+                    embers.thrown(number, self._caught())
                 if self._most is not None:
                     self._stop_at(self._most)
-                if self.is_over:
+                if self.is_over and not (embers is not None and embers.smoulder):
                     return
             before = travel
+
+    def _light(self, fire: Tensor, cell: Tensor, minutes: Tensor) -> None:
+        """Light cells of the map, int64 [n], at some minutes where the fire has not come before; see ``Embers.due``."""
+        self._spotted, goes = self._lit[:0], self._going[fire]
+        fire, cell, minutes = fire[goes], cell[goes], minutes[goes]
+        if not len(fire):
+            return
+        row, column = cell // self.window.map[1], cell % self.window.map[1]
+        self._move(self.window.with_cells(row, column))
+        place = (row - self.window.top + 1) * self._width + column - self.window.left + 1
+        lit = fire * self._map + place
+        new = self._fuel[place] & ~self._burned[lit] & (minutes < self._times[lit])
+        self._times.scatter_reduce_(0, lit[new], minutes[new], "amin")
+        lit = self._once(lit[new])
+        self._burned[lit] = True
+        self.minutes[lit] = self._times[lit]
+        self._origins[lit] = self._place(lit)
+        self._waiting = self._waiting[~self._burned[self._waiting]]
+        self._changed = torch.cat((self._changed, self._lighted(lit)))
+        self._spotted = lit
+
+    def _caught(self) -> Caught:
+        """Return the cells that caught fire in the last tick."""
+        lit, place = self._lit, self._place(self._lit).long()
+        around = self.minutes[(self._offsets[:, None] + lit).flatten()].view(8, -1)
+        row, column = place // self._width - 1 + self.window.top, place % self._width - 1 + self.window.left
+        return Caught(
+            window=self.window,
+            fire=lit // self._map,
+            cell=row * self.window.map[1] + column,
+            minutes=self.minutes[lit],
+            steep=steepness_from(around, self.minutes[lit]),
+            pace=self._pace[lit],
+            count=len(lit),
+        )
 
     def _is_cramped(self) -> bool:
         """Return whether the fire may come to the outermost cells in the next tick."""
@@ -103,7 +188,13 @@ class GrowingFires(Spreading):
     def _grow(self) -> None:
         """Go on in a window that is twice as long to the sides that the fire nears."""
         near = self._place(self._waiting).long()
-        before, after = self.window, self.window.grown(*(bool(side[near].any()) for side in self._rim or ()))
+        self._move(self.window.grown(*(bool(side[near].any()) for side in self._rim or ())))
+
+    def _move(self, after: Window) -> None:
+        """Go on in another window, which has this one."""
+        before = self.window
+        if after == before:
+            return
         self._check(after)
         rows, columns = before.on_map.place_in(after)
         width, cells = after.width + 2, (after.height + 2) * (after.width + 2)

@@ -16,6 +16,7 @@ MOISTURES: Mapping[str, float] = {
 }
 """Moisture where nothing else is said: per cent of dry weight, "low" dead and two-thirds cured fuels (Scott and Burgan
 2005, tables 3 and 4); of the Canadian model its two codes."""
+_DEAD_1H, _FFMC = (list(MOISTURES).index(name) for name in ("dead_1h", "ffmc"))
 
 
 def moisture_row(given: Mapping[str, float]) -> Tensor:
@@ -35,3 +36,17 @@ def moisture_row(given: Mapping[str, float]) -> Tensor:
 def in_force(told: Tensor | None, row: Tensor) -> Tensor:
     """Return what weather tells of moistures, float32 [..., 7], and those of a row where it tells nothing (NaN)."""
     return row if told is None else torch.where(told.isnan(), row, told)
+
+
+def fine_moisture(moisture: Tensor, by_code: bool) -> Tensor:
+    """Return the moisture of fine dead fuel [% of dry weight], float32 [...].
+
+    Args:
+        moisture: In the order of ``MOISTURES``, float32 [..., 7].
+        by_code: Whether it is that of the fine fuel moisture code F, 147.2 (101 - F) / (59.5 + F) (Van Wagner 1987), as
+            in the Canadian system, or that of dead fuel of one hour.
+    """
+    if not by_code:
+        return moisture[..., _DEAD_1H]
+    code = moisture[..., _FFMC]
+    return 147.2 * (101.0 - code) / (59.5 + code)

@@ -16,7 +16,9 @@ from warp_torchrl.system import memory
 from warp_torchrl.world.backends.growing import GrowingFires, Land, SpellInWindows
 from warp_torchrl.world.backends.spells import Highest, PlanesOfSpells, in_window, on_strips
 from warp_torchrl.world.backends.spreading import Hour
-from warp_torchrl.world.fires.spell import BUT_FASTEST, Spell, can_ignite, heads, spread_in, ticks_of
+from warp_torchrl.world.behaviour.firebrands import Firebrands
+from warp_torchrl.world.fires.spell import BUT_FASTEST, Spell, air_in, can_ignite, heads, spread_in, ticks_of
+from warp_torchrl.world.fires.spotting import EmberGround, SpotFires
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER, travel
 from warp_torchrl.world.state.state import Landscape
@@ -60,6 +62,7 @@ class Fires:
         swiftest: Highest of these factors; it shortens ticks.
         half_way: Cells that the fire has come half-way to at the start, bool [H, W]: those about a perimeter, whose
             front is half a cell ahead of the last cell inside, on average; None where it starts in its cells' middle.
+        embers: Firebrands that start fires ahead; None: none fly.
         root: All fires, where these are some of them (``of``).
         workers: Threads.
     """
@@ -73,6 +76,7 @@ class Fires:
     sector: Tensor | None = None
     swiftest: float = 1.0
     half_way: Tensor | None = None
+    embers: Firebrands | None = None
     root: "Fires | None" = field(default=None, repr=False)
     workers: int = field(default_factory=torch.get_num_threads)
     _lock: threading.Lock = field(init=False, repr=False, default_factory=threading.Lock)
@@ -172,7 +176,8 @@ class Fires:
         """
         land = Land(lambda window: window.cut(self.fuel, False), lambda window: self.pace(key, window))
         fires = GrowingFires(lit, len(key), land, most, partial(self._check, len(key)))
-        fires.burn_spells(self._going(number) for number in range(len(self.spells)))
+        embers = None if self.embers is None else SpotFires(self.embers, self._ember_ground(), key)
+        fires.burn_spells((self._going(number) for number in range(len(self.spells))), embers)
         return Burned(fires.window, fires.arrival(), self.pace(key, fires.window), self)
 
     def in_parts(self, lit: Tensor, key: Tensor, then: Callable[[Burned], T], most: int | None = None) -> Iterator[T]:
@@ -228,6 +233,17 @@ class Fires:
             return rate[:, None, None]
         place = window.cut(self.sector, 0)
         return rate.index_select(1, place.flatten()).view(len(rate), *place.shape)
+
+    def _ember_ground(self) -> EmberGround:
+        """Return what firebrands fly over, by the first law."""
+        return EmberGround(
+            fuel=self.fuel,
+            heads=lambda number, window: self.planes(number, window)[:, _HEAD:],
+            air=lambda number, window: air_in(self.fire, self.landscape, self.spells[number], window),
+            groups=self.groups,
+            by_code=self.fire.bed.table is None,
+            cell_size=self.cell_size,
+        )
 
     def _going(self, number: int) -> SpellInWindows:
         if (self.root or self)._ended.is_set():

@@ -8,6 +8,7 @@ from torch import Tensor
 
 from warp_torchrl.world.air.wind import turned
 from warp_torchrl.world.arrays.random import Stream, log_deviation, normal, uniform
+from warp_torchrl.world.behaviour.firebrands import Firebrands
 from warp_torchrl.world.behaviour.moistures import MOISTURES, in_force, moisture_row
 from warp_torchrl.world.ensemble.parameters import PARAMETERS, Deviations
 from warp_torchrl.world.fires.alone import Fires
@@ -118,6 +119,7 @@ class Members:
         spells: Sequence[Spell],
         cell_size: float,
         half_way: Tensor | None = None,
+        embers: Firebrands | None = None,
     ) -> Fires:
         """Return the members' fires on a map, one of each.
 
@@ -127,6 +129,7 @@ class Members:
             spells: The weather, one for all.
             cell_size: Side of a cell [m].
             half_way: See ``Fires``.
+            embers: See ``Fires``.
         """
         met = spells if not bool(self.values[:, 1:].any()) else [self._spell(fire, spell) for spell in spells]
         rate = self._rates()
@@ -139,6 +142,7 @@ class Members:
             sector=self.sector,
             swiftest=max(1.0, float(self.rate.max())),
             half_way=half_way,
+            embers=embers,
         )
 
     def pace(self, fire: RateFire, landscape: Landscape, spell: Spell, cell_size: float, window: Window) -> Tensor:

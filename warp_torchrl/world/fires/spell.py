@@ -8,11 +8,12 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.air.fields import Field
-from warp_torchrl.world.air.hills import bent
+from warp_torchrl.world.air.hills import FACTORS, bent
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.behaviour.moistures import in_force, moisture_row
 from warp_torchrl.world.behaviour.spread import Spread
 from warp_torchrl.world.law.fuel_bed import gradient
+from warp_torchrl.world.law.passing import head_behaviour
 from warp_torchrl.world.law.rate import TICKS_PER_CELL, RateFire
 from warp_torchrl.world.state.state import Landscape
 from warp_torchrl.world.state.window import Window
@@ -86,6 +87,14 @@ def spread_in(
     return parts[0] if len(parts) == 1 else _joined(parts)
 
 
+def air_in(fire: RateFire, landscape: Landscape, spell: Spell, window: Window) -> tuple[Tensor, Tensor]:
+    """Return winds [G, 2, 1, 1] or [G, 2, h, w] [m/s] and moistures [G, 7] or [G, h, w, 7] [%] in a window."""
+    winds, row = spell.wind.reshape(-1, 2), moisture_row(fire.moisture)
+    moistures = in_force(spell.moisture, row).reshape(-1, len(row)).expand(len(winds), -1)
+    air, moist = spell.here(winds, moistures, window)
+    return (air if landscape.layer(FACTORS[0]) is None else bent(air, window.landscape(landscape))), moist
+
+
 def can_ignite(fire: RateFire, landscape: Landscape) -> Tensor:
     """Return the cells of one landscape that can ignite, bool [H, W]."""
     return (fire.flammability(landscape)[0] > 0.0) & (landscape.age[0] >= fire.youngest_fuel)
@@ -97,14 +106,9 @@ def ticks_of(minutes: float, fastest: float, cell_size: float) -> int:
 
 
 def heads(spread: Spread, with_kind: bool = False) -> Tensor:
-    """Return the fields of ``HeadBehaviour`` for a spread [G, h, w], float32 [G, 4, h, w]; 5 with the kind of fire.
-
-    The rear spreads at R_head (1 - e) / (1 + e), e the eccentricity of the ellipse.
-    """
-    focus = (1.0 - spread.length_to_breadth.pow(-2)).clamp(min=0.0).sqrt()
-    backing = spread.head * (1.0 - focus) / (1.0 + focus)
-    kind = (spread.kind,) if with_kind else ()
-    return torch.stack((spread.head, backing, spread.intensity, spread.flame_length, *kind), dim=1)
+    """Return the fields of ``HeadBehaviour`` for a spread [G, h, w], float32 [G, 4, h, w]; 5 with the kind of fire."""
+    then, kind = head_behaviour(spread), (spread.kind,) if with_kind else ()
+    return torch.stack((then.head, then.backing, then.intensity, then.flame_length, *kind), dim=1)
 
 
 def _rise(landscape: Landscape, window: Window, cell_size: float) -> Tensor:

@@ -14,7 +14,8 @@ from warp_torchrl.world.air.wind import Wind
 from warp_torchrl.world.arrays.geometry import grow, neighbour_in
 from warp_torchrl.world.arrays.random import Stream, log_deviation, uniform, uniform_at
 from warp_torchrl.world.behaviour.crown import FOLIAR_MOISTURE, CrownModel
-from warp_torchrl.world.behaviour.moistures import in_force, moisture_row
+from warp_torchrl.world.behaviour.moistures import fine_moisture, in_force, moisture_row
+from warp_torchrl.world.behaviour.spread import Spread
 from warp_torchrl.world.law import arrivals
 from warp_torchrl.world.law.arrivals import RATE, Arrivals, Paces, Travel, arrivals_in, metric, own_cell
 from warp_torchrl.world.law.automaton import Automaton, Beside, at_cells
@@ -226,6 +227,17 @@ class RateFire(Automaton):
         spread = self.bed.spread(ground.landscape, wind, self._damp(Air(wind, moisture)), ground.cell_size)
         made = travel(spread.head, spread.direction, spread.length_to_breadth, ground.cell_size)
         return Air(wind, moisture, Travel(made))
+
+    def head_at(self, state: WorldState, cell: Tensor) -> Spread:
+        """Return the behaviour of the fire's head in some cells now, float32 [B, 1, n] each; cell is int64 [B, n]."""
+        size, wind = state.ground.cell_size, state.wind
+        rise = at_cells(gradient(state.landscape.elevation, state.cover, size), cell)[:, :, None]
+        wind = wind if wind.shape[2:] == (1, 1) else at_cells(wind, cell)[:, :, None]
+        return self.bed.spread(listed(state.landscape, cell), wind, self._damp(state.air), size, rise)
+
+    def fine_moisture(self, air: Air) -> Tensor:
+        """Return the moisture of fine dead fuel, float32 [B] [%]."""
+        return fine_moisture(self._damp(air), self.bed.table is None)
 
     def _damp(self, air: Air) -> Tensor:
         """Return the moistures in force, float32 [B, 7] [%]."""

@@ -147,6 +147,23 @@ class Mechanic:
         """
         return state
 
+    def after_tick(self, state: WorldState, ticks_now: Tensor, world: Rules) -> WorldState:
+        """Return worlds after a tick of the fire, in which more cells may have caught fire.
+
+        Args:
+            state: The worlds after the tick and before the clock advances.
+            ticks_now: Worlds in which the fire has ticked, bool [B]; the others stay the same.
+            world: Their rules.
+        """
+        return state
+
+    def smoulders(self, state: WorldState) -> Tensor | None:
+        """Return in which worlds cells will catch fire though none may burn now, bool [B]; None: in none.
+
+        Their episodes do not end without fire.
+        """
+        return None
+
     def step(self, before: WorldState, after: WorldState, running: Tensor, world: Rules) -> WorldState:
         """Return worlds after a step: agents have acted, the fire has ticked, and the clock has advanced.
 

@@ -84,6 +84,18 @@ class Window:
             self.map,
         )
 
+    def with_cells(self, row: Tensor, column: Tensor) -> "Window":
+        """Return this window, or one that has it and some cells of the map, int64 [n], two cells off its sides."""
+        (top, bottom), (left, right) = ((int(each.min()), int(each.max()) + 1) for each in (row, column))
+        ends = self.top + self.height, self.left + self.width
+        if top >= self.top + 2 and left >= self.left + 2 and bottom <= ends[0] - 2 and right <= ends[1] - 2:
+            return self
+        return self._between(
+            (min(self.top, top - _MARGIN), max(ends[0], bottom + _MARGIN)),
+            (min(self.left, left - _MARGIN), max(ends[1], right + _MARGIN)),
+            self.map,
+        )
+
     def rim(self) -> tuple[Tensor, ...]:
         """Return the outermost cells in the north, south, west and east, bool [h, w] each; none at the map's sides."""
         sides = torch.zeros(4, self.height, self.width, dtype=torch.bool)

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from warp_torchrl.prediction.passing import HeadBehaviour, passing
+from warp_torchrl.world.law.passing import HeadBehaviour, passing
 
 
 @pytest.mark.parametrize("pace", [1.0, 2.0, 0.5])

@@ -13,6 +13,7 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.arrays.geometry import neighbours
+from warp_torchrl.world.behaviour.spread import Spread
 from warp_torchrl.world.law.travel import NEVER
 
 _LEAST = 1e-9
@@ -49,6 +50,16 @@ def passing(steep: Tensor, pace: Tensor, then: HeadBehaviour, cell_size: float) 
     share = rate / then.head.clamp(min=_LEAST)
     found = rate, then.intensity * share, then.flame_length * share.pow(0.46)
     return found if then.kind is None else (*found, (then.kind > 0.0).to(rate.dtype), (then.kind > 1.0).to(rate.dtype))
+
+
+def head_behaviour(spread: Spread) -> HeadBehaviour:
+    """Return the behaviour of heads, without the kind of fire; the rear has R_head (1 - e) / (1 + e) (Richards 1990).
+
+    e is the eccentricity of the ellipse.
+    """
+    focus = (1.0 - spread.length_to_breadth.pow(-2)).clamp(min=0.0).sqrt()
+    backing = spread.head * (1.0 - focus) / (1.0 + focus)
+    return HeadBehaviour(spread.head, backing, spread.intensity, spread.flame_length)
 
 
 def steepness(arrival: Tensor) -> Tensor:

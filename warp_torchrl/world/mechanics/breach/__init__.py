@@ -1,0 +1,1 @@
+"""Breach: flames that reach over firebreaks."""
