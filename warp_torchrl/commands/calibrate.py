@@ -53,7 +53,7 @@ def _run(arguments: Sequence[str]) -> None:
     check_flags(arguments)
     values = plain(compose_config("calibrate", arguments))
     options: CalibrationOptions = construct(
-        CalibrationOptions, {key: value for key, value in values.items() if key != "fire"}, ""
+        CalibrationOptions, {key: value for key, value in values.items() if key not in ("fire", "plugins")}, ""
     )
     fire = _law(values["fire"])
     parameters = parameters_of(options.parameters, fire, options.bounds, options.scales)

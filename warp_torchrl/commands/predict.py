@@ -49,7 +49,7 @@ from warp_torchrl.world.weather.table import minutes_until
 
 log = logging.getLogger("warp_torchrl")
 
-_GROUPS = ("landscape", "fire")
+_APART = ("landscape", "fire", "plugins")
 REPORT = "report.json"
 OUTPUTS = (
     *("burn_probability.tif", "arrival_hours.tif", "rate.tif", "intensity.tif", "flame_length.tif", "crown.tif"),
@@ -86,7 +86,7 @@ def _run(arguments: Sequence[str]) -> None:
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     values = composed(arguments)
     options: PredictionOptions = construct(
-        PredictionOptions, {key: value for key, value in values.items() if key not in _GROUPS}, ""
+        PredictionOptions, {key: value for key, value in values.items() if key not in _APART}, ""
     )
     folder = Path(options.out or datetime.now().strftime(f"outputs/predictions/%Y-%m-%d/%H-%M-%S-{os.getpid()}"))
     with output_folder(folder, "out", overwrite=options.overwrite, last=REPORT, replaced=OUTPUTS) as draft:

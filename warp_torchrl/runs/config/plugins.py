@@ -94,7 +94,7 @@ def register(kind: str, name: str | None = None, **options: Any) -> Callable[[Ad
             ``mechanic``, ``term``, ``ability``, ``channel``, ``number``, ``picture_channel``, ``state_plane``,
             ``metric``, a table of functions or classes.
         name: Of the option or the row; None: the class's in snake case, or the function's.
-        options: Of the rows of a table, ``high=250`` of a channel.
+        options: Of a function's row, ``high=250`` of a channel.
 
     Raises:
         ValueError: If the kind is unknown, the name is taken, or it is no frozen dataclass where it should be.
@@ -102,17 +102,20 @@ def register(kind: str, name: str | None = None, **options: Any) -> Callable[[Ad
     if kind not in KINDS:
         raise ValueError(f"kind must be one of {', '.join(KINDS)}, got {kind!r}{did_you_mean(kind, KINDS)}")
 
+    if options and kind not in _FUNCTIONS:
+        raise ValueError(f"{kind} takes no options, got {', '.join(options)}")
+
     def add(made: Added) -> Added:
         called = name or _snake(made.__name__)
         if kind in COMPONENTS:
             _add_option(kind, called, made)
-            _own(_path(made), made.__module__)
         elif kind in _NAMED:
-            _NAMED[kind](called, **options)(made)
-            _own(called, made.__module__)
-        else:
+            _NAMED[kind](called)(made)
+        elif name in (None, made.__name__):
             _FUNCTIONS[kind](**options)(made)
-            _own(made.__name__, made.__module__)
+        else:
+            raise ValueError(f"{kind} must have the name of its function, {made.__name__}, got {name}")
+        _own(_path(made) if kind in COMPONENTS else called, made.__module__)
         return made
 
     return add
@@ -195,7 +198,11 @@ def load(plugins: Iterable[Plugin] = ()) -> None:
     """
     if isinstance(plugins, str | ModuleType):
         raise ConfigError(f"plugins must be a list, plugins=[{plugins}], got {plugins}")
-    for name in (*_installed(), *(each if isinstance(each, str) else each.__name__ for each in plugins)):
+    listed = [each if isinstance(each, str) else each.__name__ for each in plugins]
+    here = str(Path.cwd())
+    if listed and here not in sys.path:
+        sys.path.append(here)  # as the last: nothing there hides an installed module
+    for name in (*_installed(), *listed):
         if name not in _LOADED:
             _load(name)
 
@@ -208,17 +215,12 @@ def _installed() -> tuple[str, ...]:
 def _load(name: str) -> None:
     if not _MODULE.fullmatch(name):
         raise ConfigError(f"plugins must be names of modules, got {name!r}")
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.append(here)  # as the last: nothing there hides a module of Python's
     try:
         module = importlib.import_module(name)
     except ModuleNotFoundError as error:
         if not f"{name}.".startswith(f"{error.name}."):
             raise  # a module that the plug-in imports
-        raise ConfigError(
-            f"plugins must be modules that Python finds, installed or in this folder, got {name}"
-        ) from None
+        raise ConfigError(f"plugins must be modules, installed or in this folder, and there is no {name}") from None
     for folder in [Path(each) / "conf" for each in getattr(module, "__path__", ())][:1]:
         _add_folder(name, folder)
     _LOADED.append(name)
@@ -259,9 +261,8 @@ def needed(values: Mapping[str, Any]) -> list[str]:
     check_loaded(listed)
     texts = {*_texts(values), f"scenario={values.get('scenario')}"}
     modules = {module for text, module in _OWNERS.items() if text in texts}
-    modules |= {
-        name for name, folder in _FOLDERS.items() if (folder / f"scenario/{values.get('scenario')}.yaml").exists()
-    }
+    file = f"scenario/{values.get('scenario')}.yaml"
+    modules |= {name for name, folder in _FOLDERS.items() if (folder / file).exists()}
     return list(dict.fromkeys([*listed, *sorted(map(_plugin_of, modules))]))
 
 
@@ -271,16 +272,14 @@ def check_loaded(names: Any) -> None:
     Raises:
         ConfigError: If not, with what to list.
     """
-    if not (
-        isinstance(names, list | tuple) and all(isinstance(each, str) and _MODULE.fullmatch(each) for each in names)
-    ):
+    if not (isinstance(names, list | tuple) and all(_MODULE.fullmatch(str(each)) for each in names)):
         raise ConfigError(f"plugins must be a list of modules, plugins=[my_lab], got {names!r:.80}")
     here = {*_LOADED, *_OWNERS.values()}
     missing = [name for name in names if not any(f"{each}.".startswith(f"{name}.") for each in here)]
     if missing:
         raise ConfigError(
-            f"plugins=[{','.join(missing)}] must be listed on the command line or by the caller: it was made with them, "
-            "and no file that is read imports a plug-in"
+            f"plugins=[{','.join(missing)}] must be given: components are of these plug-ins, and no file that is read "
+            "imports one"
         )
 
 
