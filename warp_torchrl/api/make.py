@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import torch
 
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.runs.config.compose import compose_worlds
 from warp_torchrl.runs.config.construction import ENVIRONMENT, build_components
+from warp_torchrl.runs.config.environment import compose_environment
 from warp_torchrl.runs.config.grammar import listed_plugins
 from warp_torchrl.runs.config.plugins import Plugin, load
 from warp_torchrl.system.modes import apart
@@ -50,7 +50,7 @@ def make_env(
     """
     load([*plugins, *listed_plugins(overrides)])
     named = [each for each in overrides if not each.startswith("plugins=")]
-    config = compose_worlds([f"scenario={scenario}", *named])
+    config = compose_environment([f"scenario={scenario}", *named])
     parts = build_components(config, ENVIRONMENT)
     return WildfireEnv(
         parts["world"],

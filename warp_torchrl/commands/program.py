@@ -9,6 +9,9 @@ from warp_torchrl.runs.config.grammar import listed_plugins
 from warp_torchrl.runs.config.plugins import load
 from warp_torchrl.system.signals import exit_on_signal
 
+PLUGINS = "plugins: Modules of your own, in this folder or installed, plugins=[my_lab]."
+"""A line of ``--help``."""
+
 
 def run_program(arguments: Sequence[str] | None, about: str, do: Callable[[list[str]], int | None]) -> int:
     """Run a command, and return its exit code; an error prints one line, and a signal ends the process with one.

@@ -270,6 +270,12 @@ def test_worlds_are_composed_as_a_training_composes_them(scenario):
         assert alone[key] == whole[key], key
 
 
+def test_an_environment_of_a_training_s_keys_has_no_others(here):
+    assert make_env("skirmish", n_worlds=1, overrides=["experiment=quick", "mechanics.flight={}"]).world.mechanics
+    with pytest.raises(ConfigError, match="mine is not a key of the configuration"):
+        make_env("skirmish", overrides=["+mine=1"])
+
+
 def test_a_library_that_a_component_lacks_is_named(monkeypatch):
     def lacking(name):
         raise ModuleNotFoundError("No module named 'torchrl.objectives'", name="torchrl.objectives")

@@ -21,14 +21,7 @@ from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf, open_dict
 from omegaconf.errors import OmegaConfBaseException
 
-from warp_torchrl.runs.config.construction import (
-    COMPONENTS,
-    ENVIRONMENT,
-    WORLD_KEYS,
-    ConfigError,
-    UnknownKeyError,
-    component,
-)
+from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError, UnknownKeyError, component
 from warp_torchrl.runs.config.defaults import defaults
 from warp_torchrl.runs.config.files import FileConfigSource
 from warp_torchrl.runs.config.grammar import check_overrides, several_values
@@ -61,18 +54,6 @@ def compose_config(name: str, overrides: Sequence[str] = ()) -> DictConfig:
     except OmegaConfBaseException as error:
         raise ConfigError(one_line(error)) from None
     return config
-
-
-def compose_worlds(overrides: Sequence[str]) -> dict[str, Any]:
-    """Compose what makes an environment, as plain values; overrides of a training compose one.
-
-    Without those no learner is imported, so that a library which a learner lacks breaks no environment.
-
-    Raises:
-        ConfigError: If an override does not fit, in one line.
-    """
-    keys = {re.split(r"[=.]", override)[0] for override in overrides}
-    return plain(compose_config("worlds" if keys <= {*WORLD_KEYS, *ENVIRONMENT} else "train", overrides))
 
 
 def choices(overrides: Sequence[str]) -> dict[str, str]:
@@ -245,7 +226,7 @@ def option_of(group: str, target: str) -> str:
         if named == target:
             return option
     raise ConfigError(
-        f"{group}._target_ must be a class that an option of conf/{group} or of a plug-in names, got {target}"
+        f"{group}._target_ must be a class that an option of conf/{group} names, or one of a plug-in, got {target}"
     )
 
 
