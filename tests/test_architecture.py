@@ -214,7 +214,9 @@ def test_adapters_are_views_that_nothing_needs():
                 *(
                     "runs/config/compose",
                     "runs/config/defaults",
+                    "runs/config/files",
                     "runs/config/grammar",
+                    "runs/config/plugins",
                     "runs/config/saved_config",
                     "runs/config/space",
                 ),

@@ -2,6 +2,7 @@
 
 import importlib
 import os
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -68,6 +69,48 @@ def test_the_wheel_runs_from_any_folder(wheel, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines() == [str(tmp_path / "installed" / "warp_torchrl" / "__init__.py"), *["(2, 3)"] * 3]
+
+
+TINY = (
+    *("landscape.size=12", "horizon=16", "n_worlds=4", "processes=1", "collector.steps=8", "total_frames=32"),
+    *("algorithm.minibatch_size=32", "model.actor_hidden=[8]", "model.critic_hidden=[8]", "evaluation.episodes=2"),
+)
+
+
+@pytest.mark.slow
+def test_the_template_of_a_plug_in_runs_beside_the_wheel(wheel, tmp_path):
+    ZipFile(wheel).extractall(tmp_path / "installed")
+    folder, warp = tmp_path / "lab", tmp_path / "warp"  # the program's folder, which Python searches, is not the lab's
+    warp.write_text("import sys\nfrom warp_torchrl.__main__ import main\nsys.exit(main())\n")
+    shutil.copytree(ROOT / "docs" / "examples" / "my_lab", folder)
+
+    def run(*command):
+        return subprocess.run(
+            [sys.executable, *command],
+            cwd=folder,
+            env={**os.environ, "PYTHONPATH": str(tmp_path / "installed"), "OMP_NUM_THREADS": "1"},
+            capture_output=True,
+            text=True,
+            timeout=300,
+            check=False,
+        )
+
+    lab, quick = "plugins=[my_lab]", ("evaluation.episodes=2", "picture=null")
+    gap = ("scenario=gap", "algorithm=surrogate", "evaluation.baselines=[sentry]")
+    for command in (
+        ("-m", "pytest", "-q", "-p", "no:cacheprovider"),
+        (warp, "train", lab, *gap, *TINY, "hydra.run.dir=run"),
+        (warp, "train", lab, "resume=run", "total_frames=64"),
+        (warp, "evaluate", lab, "checkpoint=run", *quick),
+        (warp, "evaluate", lab, "policy=sentry", "scenario=gap", *quick),
+        (warp, "export", "run", "mine", lab),
+        ("-c", "import warp_torchrl; warp_torchrl.load_policy('mine', plugins=['my_lab'])"),
+    ):
+        done = run(*map(str, command))
+        assert done.returncode == 0, (command, done.stderr)
+    for command in (("evaluate", "checkpoint=run"), ("train", "resume=run"), ("export", "run", "other")):
+        done = run(str(warp), *command)
+        assert done.returncode == 2 and "error: plugins=[my_lab] must be given" in done.stderr, done.stderr
 
 
 @pytest.mark.parametrize("name", PROJECT["scripts"])

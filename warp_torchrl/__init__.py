@@ -25,12 +25,24 @@ import gymnasium
 import pettingzoo
 
 if TYPE_CHECKING:
+    from warp_torchrl.algorithms.off_policy import OffPolicy
+    from warp_torchrl.algorithms.on_policy import OnPolicy
+    from warp_torchrl.algorithms.ppo import Ppo
     from warp_torchrl.api.make import make_env
     from warp_torchrl.env import WildfireEnv
+    from warp_torchrl.env.observation import Look, Surroundings
+    from warp_torchrl.env.reward import Reward
+    from warp_torchrl.heuristics import Heuristic
+    from warp_torchrl.models import Mlp
     from warp_torchrl.prediction.predict import predict
     from warp_torchrl.prediction.simulation import fire_history, simulate
+    from warp_torchrl.runs.config.plugins import add_scenario, register
     from warp_torchrl.runs.policies.load import load_policy
+    from warp_torchrl.world.air.wind import Uniform
     from warp_torchrl.world.behaviour.rate_of_spread import rate_of_spread
+    from warp_torchrl.world.law.fire import Fire
+    from warp_torchrl.world.mechanics.mechanic import Mechanic
+    from warp_torchrl.world.state.state import Transition, WorldState
 
 gymnasium.register(
     "Wildfire-v0",
@@ -43,22 +55,52 @@ if hasattr(pettingzoo, "register"):  # older ones have no registry
 
 __version__ = "0.1.0"
 _PLACES = {
+    "Fire": "world.law.fire",
+    "Heuristic": "heuristics",
+    "Look": "env.observation",
+    "Mechanic": "world.mechanics.mechanic",
+    "Mlp": "models",
+    "OffPolicy": "algorithms.off_policy",
+    "OnPolicy": "algorithms.on_policy",
+    "Ppo": "algorithms.ppo",
+    "Reward": "env.reward",
+    "Surroundings": "env.observation",
+    "Transition": "world.state.state",
+    "Uniform": "world.air.wind",
     "WildfireEnv": "env",
+    "WorldState": "world.state.state",
+    "add_scenario": "runs.config.plugins",
     "fire_history": "prediction.simulation",
     "load_policy": "runs.policies.load",
     "make_env": "api.make",
     "predict": "prediction.predict",
+    "register": "runs.config.plugins",
     "rate_of_spread": "world.behaviour.rate_of_spread",
     "simulate": "prediction.simulation",
 }
 __all__ = [
+    "Fire",
+    "Heuristic",
+    "Look",
+    "Mechanic",
+    "Mlp",
+    "OffPolicy",
+    "OnPolicy",
+    "Ppo",
+    "Reward",
+    "Surroundings",
+    "Transition",
+    "Uniform",
     "WildfireEnv",
+    "WorldState",
     "__version__",
+    "add_scenario",
     "fire_history",
     "load_policy",
     "make_env",
     "predict",
     "rate_of_spread",
+    "register",
     "simulate",
 ]
 

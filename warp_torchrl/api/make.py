@@ -5,9 +5,10 @@ from collections.abc import Sequence
 import torch
 
 from warp_torchrl.env import WildfireEnv
-from warp_torchrl.runs.config.building import check_keys
-from warp_torchrl.runs.config.compose import compose_config, plain
 from warp_torchrl.runs.config.construction import ENVIRONMENT, build_components
+from warp_torchrl.runs.config.environment import compose_environment
+from warp_torchrl.runs.config.grammar import listed_plugins
+from warp_torchrl.runs.config.plugins import Plugin, load
 from warp_torchrl.system.modes import apart
 
 
@@ -20,6 +21,7 @@ def make_env(
     seed: int | None = 0,
     seeds: Sequence[int] | None = None,
     overrides: Sequence[str] = (),
+    plugins: Sequence[Plugin] = (),
     validate: bool | None = None,
     compile: bool = False,
     graph: bool = False,
@@ -27,12 +29,14 @@ def make_env(
     """Make the environment of a scenario.
 
     Args:
-        scenario: One of ``conf/scenario``.
+        scenario: One of ``conf/scenario``, or of a plug-in.
         n_worlds: B.
         device: Where the worlds live.
         seed: World i has seed ``seed + i``; None draws a seed on first use, so that copies differ.
         seeds: Seed of each world, instead of ``seed``.
         overrides: In the command line's grammar, ``["fire=paper", "team.n_agents=3"]``.
+        plugins: Modules, or their names, of the user's own that register components; imported from the current folder
+            too.
         validate: Check actions on CUDA too.
         compile: Compile the step with ``torch.compile``.
         graph: Record the step as one CUDA graph, where the device is cuda.
@@ -42,9 +46,11 @@ def make_env(
 
     Raises:
         ConfigError: A ``ValueError``, with key, value and rule.
+        ImportError: If a library that a component needs is missing.
     """
-    config = plain(compose_config("train", [f"scenario={scenario}", *overrides]))
-    check_keys(config)
+    load([*plugins, *listed_plugins(overrides)])
+    named = [each for each in overrides if not each.startswith("plugins=")]
+    config = compose_environment([f"scenario={scenario}", *named])
     parts = build_components(config, ENVIRONMENT)
     return WildfireEnv(
         parts["world"],

@@ -41,7 +41,7 @@ from warp_torchrl.benchmark.tasks import (
 from warp_torchrl.benchmark.ticks import tick_cost, tick_table
 from warp_torchrl.benchmark.trainings import training_speed
 from warp_torchrl.benchmark.twins import HIDDEN, twin_experiments, twin_table
-from warp_torchrl.commands.program import one_line_end
+from warp_torchrl.commands.program import flag_arguments, one_line_end
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.runs.checkpoint import CheckpointError
 from warp_torchrl.runs.config.construction import ConfigError
@@ -248,7 +248,7 @@ def _gpu(parser: argparse.ArgumentParser, options: Namespace) -> None:
 def main(arguments: list[str] | None = None) -> None:
     """Run the benchmarks that the command line names, and print the results."""
     parser = _parser()
-    options = parser.parse_args(arguments)
+    options = parser.parse_args(flag_arguments(arguments))
     if options.plot is not None and find_spec("matplotlib") is None:
         parser.error("--plot needs matplotlib (extra figures)")
     if "gpu" in options.what:

@@ -9,7 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from warp_torchrl.commands.program import run_program
+from warp_torchrl.commands.program import PLUGINS, run_program
 from warp_torchrl.prediction.calibration.case import FireCase, read_fire_case
 from warp_torchrl.prediction.calibration.fitting import (
     check_fuel_codes,
@@ -44,7 +44,8 @@ OUTPUTS = (LAW, "calibration.md")
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Score and fit on the command line's fires, and return the exit code."""
-    return run_program(arguments, f"{USAGE}\n\n{CalibrationOptions.__doc__}\nfire.KEY as for train.py.", _run)
+    about = f"{USAGE}\n\n{CalibrationOptions.__doc__}\nfire.KEY as for train.py.\n{PLUGINS}"
+    return run_program(arguments, about, _run)
 
 
 def _run(arguments: Sequence[str]) -> None:
@@ -53,7 +54,7 @@ def _run(arguments: Sequence[str]) -> None:
     check_flags(arguments)
     values = plain(compose_config("calibrate", arguments))
     options: CalibrationOptions = construct(
-        CalibrationOptions, {key: value for key, value in values.items() if key != "fire"}, ""
+        CalibrationOptions, {key: value for key, value in values.items() if key not in ("fire", "plugins")}, ""
     )
     fire = _law(values["fire"])
     parameters = parameters_of(options.parameters, fire, options.bounds, options.scales)

@@ -21,7 +21,7 @@ from warp_torchrl.evaluation.picture import PictureKind
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config.building import BuildOnce, run_config
-from warp_torchrl.runs.config.compose import HYDRA_ERRORS, check_choices, explain, plain, without_values_of_others
+from warp_torchrl.runs.config.compose import HYDRA_ERRORS, check_choices, explain, plain, tidied
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.runs.config.saved_config import restore
@@ -80,11 +80,14 @@ def _fatal(config: DictConfig) -> Iterator[None]:
 def _check(name: str | None, config: DictConfig) -> None:
     overrides = list(config.hydra.overrides.task)
     check_choices(overrides)
-    config = without_values_of_others(config, overrides)
+    config = tidied(config, overrides)
     values = plain(OmegaConf.masked_copy(config, [str(key) for key in config if key != "hydra"]))
     _check_hydra(list(config.hydra.overrides.hydra))
     if not isinstance(values["debug"], bool):
         raise ConfigError(f"debug must be true or false, got {values['debug']!r}")
+    option = config.hydra.runtime.choices.scenario
+    if values["scenario"] != option:
+        raise ConfigError(f"scenario must be the name of its file, {option}, got {values['scenario']}")
     (_check_evaluation if name == "evaluate" else check_training)(values, overrides, CheckFirst.build)
 
 
@@ -116,7 +119,7 @@ def check_training(values: Mapping[str, Any], overrides: Sequence[str], build: B
         if values["start_from"] is not None:
             check_start(run_config, checkpoints.newest(find_policy(values["start_from"]))[0])
         return
-    others = [each for each in overrides if each.split("=")[0] not in ("resume", "debug", "total_frames")]
+    others = [each for each in overrides if each.split("=")[0] not in ("resume", "debug", "plugins", "total_frames")]
     if others:
         raise ConfigError(
             f"resume goes on with the folder's own configuration, of which total_frames alone may change; leave out "

@@ -27,11 +27,12 @@ from warp_torchrl.runs.config.compose import (
     explain,
     option_of,
     plain,
+    tidied,
     without_targets,
-    without_values_of_others,
 )
 from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError
-from warp_torchrl.runs.config.grammar import check_flags, check_overrides, flags_first
+from warp_torchrl.runs.config.grammar import check_flags, check_overrides, flags_first, listed_plugins
+from warp_torchrl.runs.config.plugins import load, registered
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore, world_overrides
 from warp_torchrl.runs.destination import check_free
 from warp_torchrl.runs.policies.find import find_policy
@@ -184,11 +185,16 @@ def _evaluate_into(folder: Path, config: DictConfig) -> None:
 
 
 def _choices(config: DictConfig) -> dict[str, str]:
-    """Return the option of each group; for one of a user's own folder ours of its class, as every value is kept too."""
+    """Return the option of each group; for one of another folder that of its class, as every value is kept too."""
     chosen = HydraConfig.get().runtime.choices
     options = {group: chosen[group] for group in _RECORDED}
-    own = [group for group in COMPONENTS if not (conf_folder() / group / f"{options[group]}.yaml").is_file()]
+    known = {group: (*registered(group), *_stems(conf_folder() / group)) for group in COMPONENTS}
+    own = [group for group in COMPONENTS if options[group] not in known[group]]
     return options | {group: option_of(group, config[group]["_target_"]) for group in own}
+
+
+def _stems(folder: Path) -> set[str]:
+    return {path.stem for path in folder.glob("*.yaml")}
 
 
 def _values(config: DictConfig) -> dict[str, Any]:
@@ -212,6 +218,7 @@ def _run(name: str, job: Callable[[DictConfig], None]) -> None:
     with exit_on_signal():
         try:
             _check_grammar(arguments)
+            load(listed_plugins(arguments))
             if parallel.torchrun_rank():
                 with folder_of_its_own() as quiet:
                     _start_hydra(name, job, [*_without_folder(arguments), *quiet], debug)
@@ -233,7 +240,9 @@ def _start_hydra(name: str, job: Callable[[DictConfig], None], arguments: list[s
         with queued() as queue:
             try:
                 remove_failure()
-                job(without_values_of_others(config, HydraConfig.get().overrides.task))
+                overrides = list(HydraConfig.get().overrides.task)
+                load(listed_plugins(overrides))  # again: a sweep's launcher may run the job in another process
+                job(tidied(config, overrides))
             except Exception as error:
                 code, line = fail(queue.explain(error), debug)
                 if is_orphaned():

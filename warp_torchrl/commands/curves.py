@@ -2,12 +2,11 @@
 
 import argparse
 import math
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from warp_torchrl.commands.failure import DONE, fail
-from warp_torchrl.commands.program import one_line_end
+from warp_torchrl.commands.program import flag_arguments, one_line_end
 from warp_torchrl.env.pictures.files import check_matplotlib, draw_timed
 from warp_torchrl.evaluation.runs import kinds, reached, saved_at
 from warp_torchrl.evaluation.runs.curves import curve_figures, lines_of
@@ -21,7 +20,7 @@ _USAGE = "curves [NAME=]RUN [[NAME=]RUN ...] [--out FOLDER]"
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw the learning curves of the runs that the command line names, and return the exit code."""
     try:
-        _draw(_parser().parse_args(sys.argv[1:] if arguments is None else arguments))
+        _draw(_parser().parse_args(flag_arguments(arguments)))
     except (ValueError, OSError, CheckpointError) as error:  # of the command line, or of a folder to read or write
         return fail(error, debug=False)[0]
     return DONE

@@ -73,6 +73,7 @@ def _read(arguments: Sequence[str]) -> DemonstrationOptions:
     if len(folders) != 1:
         raise ConfigError(f"one folder of recordings is expected, got {' '.join(folders) or 'none'}: {USAGE}")
     given = [each for each in arguments if "=" in each]
+    given = [each for each in given if not each.startswith("plugins=")]  # imported, and nobody's option
     values, _ = own_values(given, [each.partition("=")[0] for each in given], texts=("export", "html"))
     return construct(DemonstrationOptions, {"folder": folders[0], **values}, "")
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import torch
 
-from warp_torchrl.commands.program import one_line_end
+from warp_torchrl.commands.program import flag_arguments, one_line_end
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.runs.policies.find import find_policy
@@ -35,7 +35,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--mode", choices=("sampled", "deterministic"), help=told)
     told = "others with the same networks, given as RUN is: it is the mean of all, weighed alike"
     parser.add_argument("--average", nargs="+", default=[], metavar="OTHER", help=told)
-    options = parser.parse_args(arguments)
+    options = parser.parse_args(flag_arguments(arguments))
     if options.folder.exists():
         parser.error(f"FOLDER must be new: {options.folder} exists")
     found, skipped = checkpoints.newest(find_policy(options.run))

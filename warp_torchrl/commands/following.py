@@ -14,6 +14,7 @@ import torch
 
 from warp_torchrl.algorithms import parallel
 from warp_torchrl.runs.config.building import run_config
+from warp_torchrl.runs.config.plugins import load
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.system.malloc import keep_freed_memory
 from warp_torchrl.system.signals import Stopped
@@ -35,6 +36,7 @@ def follow_training(values: dict[str, Any]) -> None:
     if torch.device(values["device"]).type == "cuda":
         place = int(os.environ.get("LOCAL_RANK", parallel.rank()))
         values = {**values, "device": f"cuda:{place % torch.cuda.device_count()}"}
+    load(values["plugins"])
     training = Training(run_config(values), SavedConfig(), Path())
     try:
         training.train()

@@ -13,7 +13,7 @@ from typing import Any
 import torch
 from tqdm import tqdm
 
-from warp_torchrl.commands.program import run_program
+from warp_torchrl.commands.program import PLUGINS, run_program
 from warp_torchrl.prediction.animation import write_animation
 from warp_torchrl.prediction.case import Case, read_case, whole_map
 from warp_torchrl.prediction.files import MAPS_FIGURE, write_figure, write_layers, write_perimeters
@@ -49,7 +49,7 @@ from warp_torchrl.world.weather.table import minutes_until
 
 log = logging.getLogger("warp_torchrl")
 
-_GROUPS = ("landscape", "fire")
+_APART = ("landscape", "fire", "plugins")
 REPORT = "report.json"
 OUTPUTS = (
     *("burn_probability.tif", "arrival_hours.tif", "rate.tif", "intensity.tif", "flame_length.tif", "crown.tif"),
@@ -61,9 +61,8 @@ USAGE = "warp predict landscape.path=FOLDER weather=FILE.csv ignition=FILE [hour
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Predict the fires of the command line, and return the exit code."""
-    return run_program(
-        arguments, f"{USAGE}\n\n{PredictionOptions.__doc__}\nlandscape.KEY and fire.KEY as for train.py.", _run
-    )
+    about = f"{USAGE}\n\n{PredictionOptions.__doc__}\nlandscape.KEY and fire.KEY as for train.py.\n{PLUGINS}"
+    return run_program(arguments, about, _run)
 
 
 def composed(overrides: Sequence[str]) -> dict[str, Any]:
@@ -86,7 +85,7 @@ def _run(arguments: Sequence[str]) -> None:
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     values = composed(arguments)
     options: PredictionOptions = construct(
-        PredictionOptions, {key: value for key, value in values.items() if key not in _GROUPS}, ""
+        PredictionOptions, {key: value for key, value in values.items() if key not in _APART}, ""
     )
     folder = Path(options.out or datetime.now().strftime(f"outputs/predictions/%Y-%m-%d/%H-%M-%S-{os.getpid()}"))
     with output_folder(folder, "out", overwrite=options.overwrite, last=REPORT, replaced=OUTPUTS) as draft:

@@ -5,7 +5,12 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from warp_torchrl.commands.failure import DONE, fail
+from warp_torchrl.runs.config.grammar import listed_plugins
+from warp_torchrl.runs.config.plugins import load
 from warp_torchrl.system.signals import exit_on_signal
+
+PLUGINS = "plugins: Modules of your own, in this folder or installed, plugins=[my_lab]."
+"""A line of ``--help``."""
 
 
 def run_program(arguments: Sequence[str] | None, about: str, do: Callable[[list[str]], int | None]) -> int:
@@ -22,9 +27,17 @@ def run_program(arguments: Sequence[str] | None, about: str, do: Callable[[list[
         return DONE
     try:
         with exit_on_signal():
+            load(listed_plugins(given))
             return do(given) or DONE
     except Exception as error:
         return fail(error, "debug=true" in given)[0]
+
+
+def flag_arguments(arguments: Sequence[str] | None) -> list[str]:
+    """Return the arguments of a command with flags, without the plug-ins that they list, which it imports."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    load(listed_plugins(given))
+    return [each for each in given if not each.startswith("plugins=")]
 
 
 @contextmanager

@@ -66,7 +66,8 @@ def store(run_config: RunConfig, played: dict[str, Episodes]) -> None:
 
 def _paths(run_config: RunConfig, names: Sequence[str]) -> dict[str, Path]:
     """Return the file of each heuristic's episodes; none where they have no digest."""
-    if not run_config.evaluation.cache or run_config.evaluation.episodes > _MOST_EPISODES:
+    many = run_config.evaluation.episodes > _MOST_EPISODES
+    if many or run_config.plugins or not run_config.evaluation.cache:  # whose rows of tables have unknown sources
         return {}
     try:
         worlds = digest(_of_worlds(run_config))

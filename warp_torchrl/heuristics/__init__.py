@@ -4,6 +4,8 @@ They read the state through the environment. Where sight is limited they act on 
 ``Heuristic.act``; those that teach see every cell.
 """
 
+from collections.abc import Callable
+
 from warp_torchrl.heuristics.base import idle_action
 from warp_torchrl.heuristics.clockwise import Clockwise
 from warp_torchrl.heuristics.coordinated import Coordinated
@@ -16,6 +18,7 @@ from warp_torchrl.heuristics.ring import Mixed, Ring
 from warp_torchrl.heuristics.rollout import Rollout
 from warp_torchrl.heuristics.searching import Lawnmower, Oldest, Searching
 from warp_torchrl.heuristics.targeting import Targeted
+from warp_torchrl.validation import check_new_name
 
 HEURISTICS: dict[str, type[Heuristic]] = {
     "noop": NoOp,
@@ -34,9 +37,29 @@ HEURISTICS: dict[str, type[Heuristic]] = {
     "own_land": OwnLand,
     "rollout": Rollout,
 }
-"""Heuristic policies by name."""
-TEACHERS = tuple(name for name, heuristic in HEURISTICS.items() if not heuristic.is_stateful)
+"""Heuristic policies by name; ``heuristic`` adds to them."""
+TEACHERS = {name: kind for name, kind in HEURISTICS.items() if not kind.is_stateful}
 """Those whose action depends on the state alone: they can teach, guide and advise."""
+
+
+def heuristic(name: str) -> Callable[[type[Heuristic]], type[Heuristic]]:
+    """Return what adds a heuristic to the table under a name.
+
+    Raises:
+        ValueError: If it is no ``Heuristic``, or the table has another module's heuristic of that name.
+    """
+
+    def add(kind: type[Heuristic]) -> type[Heuristic]:
+        if not (isinstance(kind, type) and issubclass(kind, Heuristic)):
+            raise ValueError(f"{name} must be a class that extends Heuristic, got {kind!r}")
+        check_new_name("heuristic", name, kind, HEURISTICS.get(name))
+        HEURISTICS[name] = kind
+        if not kind.is_stateful:
+            TEACHERS[name] = kind
+        return kind
+
+    return add
+
 
 __all__ = [
     "HEURISTICS",
@@ -59,5 +82,6 @@ __all__ = [
     "Searching",
     "Targeted",
     "Worlds",
+    "heuristic",
     "idle_action",
 ]

@@ -26,7 +26,7 @@ GENTLY = 0.2
 """By how much the learning rate of the policy's training is multiplied: a skilled team loses less to a new critic."""
 _LEFT_TO_THE_PAGE = (
     *("start_from", "resume", "total_frames", "debug", "experiment", "imitation", "checkpoint", "evaluation"),
-    *("device", "processes", "compile", "graph", "logger", "curriculum", "mixture"),
+    *("device", "processes", "compile", "graph", "logger", "curriculum", "mixture", "plugins"),
 )
 _EPISODES = 64  # of the evaluation at the end
 _PLAIN = re.compile(r"[A-Za-z_./][A-Za-z0-9_./-]*")
@@ -50,9 +50,11 @@ def arguments(
         ConfigError: If an override does not fit.
     """
     device = str(saved_config.values.get("device", "cpu"))
-    rate = GENTLY * float(plain(restore(saved_config, overrides))["algorithm"]["learning_rate"])
+    values = plain(restore(saved_config, overrides))
+    rate = GENTLY * float(values["algorithm"]["learning_rate"])
     return [
-        *_configuration(saved_config, overrides),
+        *((f"plugins={_literal(values['plugins'])}",) if values["plugins"] else ()),
+        *_configuration(saved_config, [each for each in overrides if not each.startswith("plugins=")]),
         *((f"device={device}",) if device.startswith("cuda") and torch.cuda.is_available() else ()),
         f"algorithm.learning_rate={rate:g}",
         f"start_from={_literal(policy)}",

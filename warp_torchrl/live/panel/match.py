@@ -3,7 +3,7 @@
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.live.match import SEED_RANGE, Match, Setting
 from warp_torchrl.live.panel.tab import Tab, chosen_option
-from warp_torchrl.runs.config.compose import conf_folder
+from warp_torchrl.runs.config.compose import option_names
 from warp_torchrl.system.shipped import policy_names
 
 _NEED_A_FOLDER = ("landfire", "wildland")
@@ -39,8 +39,8 @@ class MatchTab(Tab):
 
     def _scenarios(self) -> tuple[str, ...]:
         """Return what can be chosen: what the page was started with, and the scenarios that read no file."""
-        ready = sorted(path.stem for path in (conf_folder() / "scenario").glob("*.yaml"))
-        return (self._scenario_of(self.page.given), *(name for name in ready if name not in _NEED_A_FOLDER))
+        ready = (name for name in option_names("scenario") if name not in _NEED_A_FOLDER)
+        return (self._scenario_of(self.page.given), *ready)
 
     def _scenario_of(self, setting: Setting) -> str:
         """Return what a setting's scenario is called among ``_scenarios``."""

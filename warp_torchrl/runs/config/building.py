@@ -9,7 +9,7 @@ from typing import Any
 
 from warp_torchrl.collection.imitation import Imitation, check_teacher
 from warp_torchrl.collection.mixture import Kind, Mixture
-from warp_torchrl.runs.config.compose import OPTION, compose_config, plain
+from warp_torchrl.runs.config.compose import OPTION, compose_config, option_names, plain
 from warp_torchrl.runs.config.construction import (
     COMMAND_KEYS,
     COMPONENTS,
@@ -71,10 +71,10 @@ class BuildOnce:
 
 
 def check_keys(config: Mapping[str, Any]) -> None:
-    """Check that a composed configuration has known keys only: Hydra's ``+key`` adds any key.
+    """Check that a composed configuration has known keys only, as Hydra's ``+key`` adds any, and a known scenario.
 
     Raises:
-        ConfigError: With the first unknown key, and the known ones.
+        ConfigError: With the first unknown key, or the scenario, and the known ones.
     """
     known = {each.name for each in fields(RunConfig)} | {*COMPONENTS, *WORLD_KEYS, *COMMAND_KEYS}
     for key in config:
@@ -83,6 +83,12 @@ def check_keys(config: Mapping[str, Any]) -> None:
             raise ConfigError(f"{key} is not a key of the configuration; {has}{did_you_mean(key, known)}")
     if not isinstance(config.get("debug", False), bool):
         raise ConfigError(f"debug must be true or false, got {config['debug']!r}")
+    scenarios = option_names("scenario")
+    if config["scenario"] not in scenarios:
+        raise ConfigError(
+            f"scenario must be one of {', '.join(scenarios)}, got {config['scenario']}, of which no run could be read "
+            "again; one of your own stands in a plug-in, plugins=[...]"
+        )
 
 
 @contextmanager

@@ -1,7 +1,7 @@
 """Composition of configurations from the yaml files of ``conf/``.
 
-A component's types, defaults and rules stand in its dataclass and nowhere else. The yaml files name the class, always
-one of this package's own; nothing that is read from a run folder is ever instantiated by name.
+A component's types, defaults and rules stand in its dataclass and nowhere else. The yaml files name the class, one of
+this package's own or of a plug-in's; nothing that is read from a run folder is ever instantiated by name.
 """
 
 import os
@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from hydra import compose, initialize_config_dir
+from hydra._internal.sources_registry import SourcesRegistry
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.errors import HydraException
@@ -22,9 +23,14 @@ from omegaconf.errors import OmegaConfBaseException
 
 from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError, UnknownKeyError, component
 from warp_torchrl.runs.config.defaults import defaults
+from warp_torchrl.runs.config.files import FileConfigSource
 from warp_torchrl.runs.config.grammar import check_overrides, several_values
+from warp_torchrl.runs.config.plugins import changes, conf_folders, needed, registered
+from warp_torchrl.runs.config.plugins import conf_folder as conf_folder
 from warp_torchrl.validation import did_you_mean
 
+# Hydra's registry refuses a second source of a scheme, unless both have one name: hence the name and the assignment.
+SourcesRegistry.instance().types[FileConfigSource.scheme()] = FileConfigSource
 OmegaConf.register_new_resolver("pid", os.getpid, replace=True, use_cache=True)  # a sweep's jobs get its own process's
 HYDRA_ERRORS = (HydraException, OmegaConfBaseException)
 """What Hydra raises where a configuration has a mistake."""
@@ -33,13 +39,6 @@ GROUPS = ("scenario", "experiment")
 OPTION = re.compile(r"[A-Za-z0-9_]+")
 """What an option may be called."""
 _KEY = re.compile(r"[A-Za-z0-9_.]+")
-
-
-def conf_folder() -> Path:
-    """Return the folder of the yaml files: inside the package when installed, beside it in a checkout."""
-    package = Path(__file__).parents[2]
-    inside = package / "conf"
-    return inside if inside.is_dir() else package.parent / "conf"
 
 
 def compose_config(name: str, overrides: Sequence[str] = ()) -> DictConfig:
@@ -84,19 +83,25 @@ def _compose(name: str, overrides: Sequence[str]) -> DictConfig:
     try:
         folder = conf_folder()
         config = deepcopy(_composed(folder, _last_change(folder), name, tuple(overrides)))
-        return without_values_of_others(config, overrides)
     except HYDRA_ERRORS as error:
         raise explain(error, name, overrides) from None
     except ValueError as error:
         raise ConfigError(f"{one_line(error)}, in {' '.join(overrides)}") from None
+    return tidied(config, overrides)
 
 
-def without_values_of_others(config: DictConfig, overrides: Sequence[str]) -> DictConfig:
-    """Return a configuration without the scenario's values for options that the overrides replace.
+def tidied(config: DictConfig, overrides: Sequence[str]) -> DictConfig:
+    """Return what Hydra composed, without values of options that the overrides replace, and with all plug-ins named.
 
     ``ignition=file`` in a scenario with ``ignition: {count: 3}`` has no count. What is no field of any option stays, to
     be refused as a mistake.
+
+    Raises:
+        ConfigError: If a file names a plug-in that nobody has imported.
     """
+    if config.get("plugins") or ("plugins" in config and changes()):
+        shown = OmegaConf.masked_copy(config, [str(key) for key in config if key != "hydra"])
+        config.plugins = needed(cast("dict[str, Any]", OmegaConf.to_container(shown)))
     given = [override.partition("=")[0].lstrip("+~") for override in overrides]
     for group in (each for each in COMPONENTS if each in given and each in config):
         kind = component(config[group].get("_target_"))
@@ -121,7 +126,7 @@ def _known_keys(name: str, overrides: Sequence[str]) -> list[str]:
 
 
 @lru_cache(maxsize=256)
-def _composed(folder: Path, last_change: int, name: str, overrides: tuple[str, ...]) -> DictConfig:
+def _composed(folder: Path, last_change: object, name: str, overrides: tuple[str, ...]) -> DictConfig:
     """Return a composed configuration, once for each state of the files.
 
     Hydra takes a fifth of a second for it, so options are composed once and values set over a copy, as Hydra does.
@@ -151,8 +156,9 @@ def _composed_by_hydra(folder: Path, name: str, overrides: Sequence[str]) -> Dic
         return compose(name, overrides=list(overrides))
 
 
-def _last_change(folder: Path) -> int:
-    return max(path.stat().st_mtime_ns for path in (folder, *folder.glob("**/*")))
+def _last_change(folder: Path) -> tuple[int, int]:
+    folders = (folder, *conf_folders())
+    return max(path.stat().st_mtime_ns for each in folders for path in (each, *each.glob("**/*"))), changes()
 
 
 def explain(error: Exception, name: str, overrides: Sequence[str]) -> ConfigError:
@@ -191,25 +197,37 @@ def one_line(error: Exception, known: Sequence[str] = ()) -> str:
 def _options_with(key: str) -> list[str]:
     """Return the options of a key's group whose files have it."""
     group, _, name = key.partition(".")
-    files = sorted((conf_folder() / group).glob("*.yaml")) if group in COMPONENTS and name else []
-    return [f"{group}={path.stem}" for path in files if name in defaults(_class_of(path))]
+    kinds = {option: component(target) for option, target in _targets(group) if group in COMPONENTS and name}
+    return [f"{group}={option}" for option, kind in kinds.items() if kind is not None and name in defaults(kind)]
 
 
-def _class_of(path: Path) -> type:
-    """Return the class that an option's file names."""
-    return cast("type", component(cast("DictConfig", OmegaConf.load(path))["_target_"]))
+def option_names(group: str) -> list[str]:
+    """Return the options of a group: those of the package, and those of plug-ins."""
+    files = (path for folder in (conf_folder(), *conf_folders()) for path in sorted((folder / group).glob("*.yaml")))
+    return list(dict.fromkeys([*(path.stem for path in files), *registered(group)]))
+
+
+def _targets(group: str) -> Iterator[tuple[str, str]]:
+    """Yield the options of a group, each with the path of its class: the package's first."""
+    for folder in (conf_folder(), *conf_folders()):
+        for path in sorted((folder / group).glob("*.yaml")):
+            yield path.stem, cast("DictConfig", OmegaConf.load(path)).get("_target_", "")
+        if folder == conf_folder():
+            yield from registered(group).items()
 
 
 def option_of(group: str, target: str) -> str:
-    """Return the first of our options of a group whose file names a class.
+    """Return the first option of a group that names a class; the package's come before those of plug-ins.
 
     Raises:
         ConfigError: If none does.
     """
-    for path in sorted((conf_folder() / group).glob("*.yaml")):
-        if cast("DictConfig", OmegaConf.load(path)).get("_target_") == target:
-            return path.stem
-    raise ConfigError(f"{group}._target_ must be a class that an option of conf/{group} names, got {target}")
+    for option, named in _targets(group):
+        if named == target:
+            return option
+    raise ConfigError(
+        f"{group}._target_ must be a class that an option of conf/{group} names, or one of a plug-in, got {target}"
+    )
 
 
 def plain(config: DictConfig) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """Construction of components from plain configuration nodes: types, unknown keys and the components' rules.
 
-A node names its class, one of this package's dataclasses, in ``_target_``; nothing else is ever imported by name.
+A node names its class in ``_target_``: one of this package's dataclasses, or one that a plug-in has registered. Nothing
+else is ever imported by name.
 """
 
 import importlib
@@ -25,6 +26,7 @@ WORLD_KEYS = ("scenario", *OF_WORLDS, "mechanics", "steps_per_tick", "horizon", 
 """What a scenario sets."""
 COMMAND_KEYS = ("resume", "start_from", "debug", "policy", "overwrite", "maps", "maps_fires", "picture")
 """What the commands read themselves."""
+_ADDED: dict[str, type] = {}
 
 
 class ConfigError(ValueError):
@@ -48,28 +50,44 @@ def build(node: object, where: str) -> Any:
     """Build the component that a configuration node describes.
 
     Args:
-        node: A mapping with ``_target_``, one of this package's dataclasses, and its fields.
+        node: A mapping with ``_target_``, see ``component``, and its fields.
         where: The node's key, for messages.
 
     Raises:
-        ConfigError: If the target is not ours, a key is unknown, or a value breaks a rule.
+        ConfigError: If there is no such component, a key is unknown, or a value breaks a rule.
     """
     if not isinstance(node, Mapping) or "_target_" not in node:
         raise ConfigError(f"{where} must name one of the files of conf/{where}, got {node!r}")
     kind = component(node["_target_"])
     if kind is None:
-        raise ConfigError(f"{where}._target_ must be a component of warp_torchrl, got {node['_target_']}")
+        raise ConfigError(
+            f"{where}._target_ must be a component of warp_torchrl, got {node['_target_']}; one of a plug-in is found "
+            "where plugins=[...] lists that"
+        )
     return construct(kind, {key: value for key, value in node.items() if key != "_target_"}, where)
 
 
+def add_component(target: str, kind: type) -> None:
+    """Let a ``_target_`` name a dataclass of a plug-in."""
+    _ADDED[target] = kind
+
+
 def component(target: object) -> type | None:
-    """Return the dataclass of this package that a ``_target_`` names; None where it names anything else."""
+    """Return the dataclass that a ``_target_`` names, of this package or of a plug-in; None where it names another.
+
+    Raises:
+        ImportError: If a library that one of this package's modules needs is missing.
+    """
+    if str(target) in _ADDED:
+        return _ADDED[str(target)]
     module, _, name = str(target).rpartition(".")
     if not re.fullmatch(r"warp_torchrl(\.\w+)*", module):
         return None
     try:
         found = getattr(importlib.import_module(module), name, None)
-    except ImportError:
+    except ModuleNotFoundError as error:
+        if not f"{module}.".startswith(f"{error.name}."):
+            raise
         return None
     return found if isinstance(found, type) and is_dataclass(found) else None
 

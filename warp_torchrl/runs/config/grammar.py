@@ -126,6 +126,22 @@ def own_values(
     return values, tuple(rest)
 
 
+def listed_plugins(arguments: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of plug-ins that a command line lists, ``plugins=[my_lab,yours]``.
+
+    Raises:
+        ConfigError: If it is no list.
+    """
+    listed = ()
+    for argument in (each for each in arguments if each.lstrip("+").startswith("plugins=")):
+        check_overrides([argument])
+        value = OverridesParser.create().parse_override(argument).value()
+        if not isinstance(value, list):
+            raise ConfigError(f"plugins must be a list, plugins=[{value}], got {value}")
+        listed = tuple(map(str, value))
+    return listed
+
+
 def several_values(override: str) -> str:
     """Return the message for values with commas between them, outside of a sweep."""
     key, _, value = override.partition("=")

@@ -15,6 +15,7 @@ from warp_torchrl.collection.mixture import Mixture, worlds_by_share
 from warp_torchrl.env import LeveledEnv, WildfireEnv
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.options import CheckpointConfig, EvaluationConfig
+from warp_torchrl.runs.config.plugins import load
 from warp_torchrl.runs.config.seeds import SEEDS, WORLDS
 from warp_torchrl.runs.config.worlds import KindOfWorld, check_alike, check_kinds
 from warp_torchrl.system.compiler import check_compiler
@@ -50,6 +51,7 @@ class RunConfig:
         checkpoint: When training saves.
         evaluation: How policies are evaluated.
         imitation: Whom a team learns from beside its rewards.
+        plugins: Modules of the user's own whose components it has; see ``warp_torchrl.runs.config.plugins``.
 
     Raises:
         ValueError: If a value is out of its range.
@@ -77,6 +79,7 @@ class RunConfig:
     checkpoint: CheckpointConfig = field(default_factory=CheckpointConfig)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
     imitation: Imitation = field(default_factory=Imitation)
+    plugins: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -218,7 +221,11 @@ class RunConfig:
     def make_env(
         self, n_worlds: int, seed: int, fuse: bool = False, graph: bool = False, world: World | None = None
     ) -> WildfireEnv:
-        """Return an environment of the run's scenario, or of a world of its mixture, on the run's device."""
+        """Return an environment of the run's scenario, or of a world of its mixture, on the run's device.
+
+        Where a collector's worker makes it, the plug-ins are imported there.
+        """
+        load(self.plugins)
         return WildfireEnv(
             self.world if world is None else world,
             observation=self.observation,

@@ -1,6 +1,6 @@
 """Configurations of run folders: what is saved of them, and their composition from it.
 
-What is read from a run folder is plain values: classes come from this package's own files alone.
+What is read from a run folder is plain values: classes come from this package and from plug-ins that are imported.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,7 +10,7 @@ from typing import Any
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from warp_torchrl.runs.config.compose import OPTION, compose_config, conf_folder, option_of, plain, without_targets
+from warp_torchrl.runs.config.compose import OPTION, compose_config, option_names, option_of, plain, without_targets
 from warp_torchrl.runs.config.construction import (
     COMPONENTS,
     ENVIRONMENT,
@@ -19,6 +19,7 @@ from warp_torchrl.runs.config.construction import (
     component,
     free_mappings,
 )
+from warp_torchrl.runs.config.plugins import check_loaded
 from warp_torchrl.validation import dotted
 
 _DEEPEST = 20
@@ -83,27 +84,29 @@ def environment_config(values: Mapping[str, Any]) -> SavedConfig:
         ConfigError: If a class is none that an option of ours names.
     """
     choices = {group: option_of(group, values[group]["_target_"]) for group in ENVIRONMENT}
-    kept = {key: values[key] for key in dict.fromkeys((*WORLD_KEYS, *ENVIRONMENT)) if key in values}
+    kept = {key: values[key] for key in dict.fromkeys((*WORLD_KEYS, *ENVIRONMENT, "plugins")) if key in values}
     return SavedConfig(choices={"scenario": values["scenario"], **choices}, values=without_targets(kept))
 
 
 def restore(saved_config: SavedConfig, overrides: Sequence[str] = ()) -> DictConfig:
-    """Compose a saved configuration again from this package's files, and set its values.
+    """Compose a saved configuration again from the files of this package and of plug-ins, and set its values.
 
-    Classes come from our yaml files only. Values that an override touches are the override's; an override of
-    ``scenario`` takes the whole world from that scenario.
+    Its plug-ins must be imported. Values that an override touches are the override's; an override of ``scenario`` takes
+    the whole world from that scenario.
 
     Args:
         saved_config: From a run folder: not trusted.
         overrides: In Hydra's grammar.
 
     Raises:
-        ConfigError: If a choice or a value does not fit.
+        ConfigError: If a choice or a value does not fit, or a plug-in is not imported.
     """
+    plugins = saved_config.values.get("plugins", [])
+    check_loaded(plugins)
     for group, option in saved_config.choices.items():
         if group not in (*COMPONENTS, "scenario") or not OPTION.fullmatch(str(option)):
             raise ConfigError(f"{group}={option!r} in the run folder is not one of our options")
-    touched = [override.split("=", 1)[0].lstrip("+~") for override in overrides]
+    touched = ["plugins", *(override.split("=", 1)[0].lstrip("+~") for override in overrides)]
     if "scenario" in touched:
         touched += WORLD_KEYS
     choices = [f"{group}={option}" for group, option in saved_config.choices.items() if group not in touched]
@@ -118,6 +121,7 @@ def restore(saved_config: SavedConfig, overrides: Sequence[str] = ()) -> DictCon
             OmegaConf.update(config, path, value, merge=False, force_add=path.count(".") > 1)  # into a field's mapping
         except OmegaConfBaseException:
             raise ConfigError(f"{path} in the run folder is not a key of this version's configuration") from None
+    config.plugins = list(dict.fromkeys([*plugins, *config.plugins]))
     return config
 
 
@@ -162,7 +166,7 @@ def world_overrides(values: Mapping[str, Any]) -> list[str]:
     usual = _composed_worlds(choices)
     for group, parts in values.items():
         if group in usual and isinstance(parts, Mapping) and parts.get("_target_") != usual[group].get("_target_"):
-            options = (f"{group}={path.stem}" for path in sorted((conf_folder() / group).glob("*.yaml")))
+            options = (f"{group}={option}" for option in option_names(group))
             of_its_class = (
                 each for each in options if _composed_worlds([*choices, each])[group]["_target_"] == parts["_target_"]
             )

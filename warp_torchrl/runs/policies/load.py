@@ -1,7 +1,7 @@
 """Trained policies by name."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import torch
@@ -11,13 +11,14 @@ from warp_torchrl.models import RADIO
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config.compose import plain
 from warp_torchrl.runs.config.construction import build
+from warp_torchrl.runs.config.plugins import Plugin, load
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
 from warp_torchrl.runs.policies.find import find_policy
 from warp_torchrl.runs.policies.trained import TrainedPolicy
 from warp_torchrl.system.modes import apart
 
 
-def load_policy(path: str | Path = "generalist", mode: str = "best") -> TrainedPolicy:
+def load_policy(path: str | Path = "generalist", mode: str = "best", plugins: Sequence[Plugin] = ()) -> TrainedPolicy:
     """Load a trained decentralised policy, which reads observation and mask and writes the action.
 
     It reads only the manifest, the configuration and the policy's parameters, and verifies them first.
@@ -27,6 +28,7 @@ def load_policy(path: str | Path = "generalist", mode: str = "best") -> TrainedP
             folder has that name: ``generalist``, which plays every scenario in which a team sees the fire, or
             ``default``, ``single`` or ``skirmish``, each trained for the scenario of its name.
         mode: ``sampled``, ``deterministic``, or ``best``: the better of the two on training seeds.
+        plugins: Modules, or their names, of the user's own whose components the policy was trained with.
 
     Returns:
         A ``TensorDictModule`` for any number of worlds. It acts in its ``mode`` outside of TorchRL's
@@ -34,8 +36,10 @@ def load_policy(path: str | Path = "generalist", mode: str = "best") -> TrainedP
 
     Raises:
         CheckpointError: If there is no sound checkpoint, or it does not fit.
+        ConfigError: If it was trained with plug-ins that are not listed.
         ValueError: If the mode is unknown.
     """
+    load(plugins)
     found, _ = checkpoints.newest(find_policy(path))
     return policy_of(found, mode)
 
