@@ -9,6 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
+
+from warp_torchrl.runs.config.construction import COMPONENTS, component
+from warp_torchrl.runs.config.defaults import defaults
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
@@ -103,6 +107,36 @@ def test_the_site_builds_without_warnings(tmp_path):  # .ci/run builds it too
     assert built >= {page.stem for page in DOCS.glob("*.md")}
     assert 'id="warp_torchrl.api.make.make_env"' in (tmp_path / "site" / "api.html").read_text()
     assert "concat_vec_envs_v1" in (tmp_path / "site" / "interop.html").read_text(), "the examples stand in the page"
+
+
+# The page of keys
+
+
+def test_the_page_of_keys_has_each_key_of_each_component_with_its_default_and_words(monkeypatch):
+    monkeypatch.syspath_prepend(str(DOCS))
+    from drawings import keys
+
+    page = keys.on_page_markdown((DOCS / "keys.md").read_text())
+    rows = set(re.findall(r"(?m)^\| `([\w.]+)` \| (?:`.*`)? \| \S.* \|$", page))
+    assert page.count("\n| `") == len(re.findall(r"(?m)^\| `[\w.]+` \| (?:`.*`)? \| \S.* \|$", page)), "words for each"
+    files = [path for group in COMPONENTS for path in (ROOT / "conf" / group).glob("*.yaml")]
+    for path in files:
+        kind = component(yaml.safe_load(path.read_text())["_target_"])
+        assert {f"{path.parent.name}.{name}" for name in flat(defaults(kind))} <= rows, path
+        assert f"`{path.parent.name}={path.stem}`" in page
+    assert {"n_worlds", "checkpoint.minutes", "imitation.teacher", "steps_per_tick", "search.trials", "fires"} <= rows
+    assert (
+        "| `seed` | `0` |" in page and "| `steps_per_tick` | `5` | Agent steps to a fire tick. In 1 .. 1000. |" in page
+    )
+
+
+def flat(values: dict, prefix: str = "") -> list[str]:
+    """Names of values, those of nested mappings after dots."""
+    return [
+        name
+        for key, value in values.items()
+        for name in (flat(value, f"{prefix}{key}.") if isinstance(value, dict) and value else [f"{prefix}{key}"])
+    ]
 
 
 # What is TorchRL's
