@@ -13,6 +13,7 @@ import yaml
 
 from warp_torchrl.runs.config.construction import COMPONENTS, component
 from warp_torchrl.runs.config.defaults import defaults
+from warp_torchrl.world.mechanics.table import mechanics
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
@@ -124,6 +125,7 @@ def test_the_page_of_keys_has_each_key_of_each_component_with_its_default_and_wo
         kind = component(yaml.safe_load(path.read_text())["_target_"])
         assert {f"{path.parent.name}.{name}" for name in flat(defaults(kind))} <= rows, path
         assert f"`{path.parent.name}={path.stem}`" in page
+    assert {f"mechanics.{name}.{key}" for name, kind in mechanics().items() for key in flat(defaults(kind))} <= rows
     assert {"n_worlds", "checkpoint.minutes", "imitation.teacher", "steps_per_tick", "search.trials", "fires"} <= rows
     assert (
         "| `seed` | `0` |" in page and "| `steps_per_tick` | `5` | Agent steps to a fire tick. In 1 .. 1000. |" in page

@@ -19,6 +19,7 @@ import yaml  # noqa: E402
 from warp_torchrl.runs.config.construction import COMPONENTS, component  # noqa: E402
 from warp_torchrl.runs.config.options import PredictionOptions, SearchOptions  # noqa: E402
 from warp_torchrl.runs.config.run_config import RunConfig  # noqa: E402
+from warp_torchrl.world.mechanics.table import mechanics  # noqa: E402
 from warp_torchrl.world.world import World  # noqa: E402
 
 HERE = "<!-- the tables of keys -->"
@@ -38,6 +39,9 @@ def tables() -> str:
     parts = ["## The run", _table(RunConfig, _PARTS), "## The world of a scenario", _table(World, _PARTS)]
     for group in COMPONENTS:
         parts += [f"## {group}", *_group(group)]
+    parts.append("## mechanics")
+    for name, kind in sorted(mechanics().items()):
+        parts += [f"### `mechanics.{name}`", _first_line(kind), _table(kind, prefix=f"mechanics.{name}.")]
     parts += ["## warp predict", _table(PredictionOptions), "## warp search", _table(SearchOptions, prefix="search.")]
     return "\n\n".join(parts)
 
@@ -112,7 +116,7 @@ def attributes(kind: type) -> Mapping[str, str]:
         section = inspect.cleandoc(base.__doc__ or "").partition("Attributes:\n")[2]
         section = re.split(r"(?m)^\S", section)[0]
         for name, words in re.findall(r"(?ms)^ {4}(\w+): (.*?)(?=^ {4}\w|\Z)", section):
-            found[name] = _code(" ".join(words.split()))
+            found[name] = re.sub(r"\bNone\b", "`null`", _code(" ".join(words.split())))
     return found
 
 
@@ -132,4 +136,7 @@ def bounds(kind: type) -> Mapping[str, str]:
 
 
 def _bound(node: ast.expr) -> str:
-    return f"{node.value:g}" if isinstance(node, ast.Constant) and isinstance(node.value, float) else ast.unparse(node)
+    try:
+        return _shown(ast.literal_eval(node))
+    except ValueError:
+        return ast.unparse(node)
