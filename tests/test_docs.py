@@ -90,6 +90,10 @@ def test_a_page_links_to_nothing_outside_of_the_site(page):
     assert not re.findall(r"\]\((\.\.[^)]*)\)", page.read_text()), "such a link works on GitHub alone"
 
 
+def test_the_readme_is_short():
+    assert len((ROOT / "README.md").read_text().split()) <= 900
+
+
 # The site
 
 
