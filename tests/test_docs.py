@@ -9,6 +9,11 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
+
+from warp_torchrl.runs.config.construction import COMPONENTS, component
+from warp_torchrl.runs.config.defaults import defaults
+from warp_torchrl.world.mechanics.table import mechanics
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
@@ -56,8 +61,8 @@ def test_the_example_of_a_prediction_runs(capsys):
 
 def test_the_example_of_groups_runs():
     names: dict = {}
-    exec(blocks("agencies.md")[0], names)
-    said = re.search(r"env.group_map  # (.*)", blocks("agencies.md")[0])[1]
+    exec(blocks("tasks.md")[0], names)
+    said = re.search(r"env.group_map  # (.*)", blocks("tasks.md")[0])[1]
     assert str(names["env"].group_map) == said
 
 
@@ -85,6 +90,10 @@ def test_a_page_links_to_nothing_outside_of_the_site(page):
     assert not re.findall(r"\]\((\.\.[^)]*)\)", page.read_text()), "such a link works on GitHub alone"
 
 
+def test_the_readme_is_short():
+    assert len((ROOT / "README.md").read_text().split()) <= 900
+
+
 # The site
 
 
@@ -105,6 +114,37 @@ def test_the_site_builds_without_warnings(tmp_path):  # .ci/run builds it too
     assert "concat_vec_envs_v1" in (tmp_path / "site" / "interop.html").read_text(), "the examples stand in the page"
 
 
+# The page of keys
+
+
+def test_the_page_of_keys_has_each_key_of_each_component_with_its_default_and_words(monkeypatch):
+    monkeypatch.syspath_prepend(str(DOCS))
+    from drawings import keys
+
+    page = keys.on_page_markdown((DOCS / "keys.md").read_text())
+    rows = set(re.findall(r"(?m)^\| `([\w.]+)` \| (?:`.*`)? \| \S.* \|$", page))
+    assert page.count("\n| `") == len(re.findall(r"(?m)^\| `[\w.]+` \| (?:`.*`)? \| \S.* \|$", page)), "words for each"
+    files = [path for group in COMPONENTS for path in (ROOT / "conf" / group).glob("*.yaml")]
+    for path in files:
+        kind = component(yaml.safe_load(path.read_text())["_target_"])
+        assert {f"{path.parent.name}.{name}" for name in flat(defaults(kind))} <= rows, path
+        assert f"`{path.parent.name}={path.stem}`" in page
+    assert {f"mechanics.{name}.{key}" for name, kind in mechanics().items() for key in flat(defaults(kind))} <= rows
+    assert {"n_worlds", "checkpoint.minutes", "imitation.teacher", "steps_per_tick", "search.trials", "fires"} <= rows
+    assert (
+        "| `seed` | `0` |" in page and "| `steps_per_tick` | `5` | Agent steps to a fire tick. In 1 .. 1000. |" in page
+    )
+
+
+def flat(values: dict, prefix: str = "") -> list[str]:
+    """Names of values, those of nested mappings after dots."""
+    return [
+        name
+        for key, value in values.items()
+        for name in (flat(value, f"{prefix}{key}.") if isinstance(value, dict) and value else [f"{prefix}{key}"])
+    ]
+
+
 # What is TorchRL's
 
 
@@ -121,8 +161,9 @@ def test_what_the_table_says_is_torchrls_is_used_from_there():
 
 
 SMALL = {
-    r"total_frames=\S+": "total_frames=64",
-    r"n_worlds=\S+": "n_worlds=4 collector.steps=8 algorithm.minibatch_size=16",
+    r"total_frames=\S+": "total_frames=64 n_worlds=4 collector.steps=8 algorithm.minibatch_size=16",
+    r" n_worlds=64": "",
+    r"experiment=quick": "experiment=quick collector.first_steps=8",
     r"evaluation\.episodes=\S+": "evaluation.episodes=3 horizon=16",
 }
 
@@ -234,7 +275,8 @@ def test_the_map_of_the_code_has_every_room():
 
 
 def test_the_glossary_is_in_order():
-    terms = re.findall(r"(?m)^\| ([\w' ]+) \| ", (DOCS / "glossary.md").read_text())[1:]
+    glossary = (DOCS / "house.md").read_text().partition("\n## Glossary\n")[2].partition("\n## ")[0]
+    terms = re.findall(r"(?m)^\| ([\w' ]+) \| ", glossary)[1:]
     assert len(terms) >= 30 and terms == sorted(terms)
 
 

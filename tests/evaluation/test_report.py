@@ -1,9 +1,11 @@
 """The table of an evaluation where sight is limited, and where mechanics have metrics."""
 
+import re
+
 import numpy as np
 
 from warp_torchrl.env.metrics import METRICS
-from warp_torchrl.evaluation.report import WATCHING, evaluation_table, report
+from warp_torchrl.evaluation.report import EXTRA_METRICS, MEANING, WATCHING, evaluation_table, report
 from warp_torchrl.world.mechanics.mechanic import Metric
 
 
@@ -73,6 +75,18 @@ def test_a_line_has_the_shares_saved_and_cleared_in_per_cent():
     (line,) = (line for line in lines if line.startswith("mine "))
     mean, _, _, _, iqm, success, control, cleared = line.split()[1:]
     assert (mean, iqm, success, control, cleared) == ("40.0", "50.0", "25.0", "0.75", "1.25")
+
+
+def test_the_words_of_a_table_are_explained_under_it():
+    lines = evaluation_table(report("skirmish", "mine", 7, episodes(0.0), {"noop": episodes(0.0)})).splitlines()
+    titles = re.findall(r"[a-z]+", lines[1].replace("interval", ""))
+    legend = "\n".join(lines[-4:])
+    assert titles == ["policy", "saved", "iqm", "success", "control", "cleared"]
+    assert all(f"{title}: " in legend for title in titles[1:]) and set(MEANING) == set(EXTRA_METRICS)
+    assert "averted                  0.000    0.000 .. 0.000  trees saved beyond those of noop, a share of all" in lines
+    seen = episodes(0.75, *WATCHING)
+    watching = evaluation_table(report("front", "mine", 7, seen, {"noop": seen}, goal="watched"))
+    assert all(f"{title}: " in watching for title in WATCHING) and "saved: " not in watching
 
 
 def test_elsewhere_it_has_none():

@@ -19,6 +19,26 @@ EXTRA_METRICS = ("averted", *BEHAVIOUR)
 WATCHING = ("watched", "found", "uncertainty")
 """Metrics of worlds that keep what a team watches."""
 
+LEGEND = (
+    "saved: trees that neither burned nor were cleared; iqm: mean of the middle half of the fires; success: fires out",
+    "with 60 % saved; control: share of the horizon until no cell burns; cleared: trees cut down for firebreaks",
+)
+"""The words under the table of the forest saved."""
+WATCHING_LEGEND = (
+    "watched: share of the fire's front that the team saw burn in its last steps; found: share that it knows to burn;",
+    "uncertainty: 0 where the map was just seen, 1 where it was never, mean over map and steps",
+)
+MEANING = {
+    "averted": "trees saved beyond those of noop, a share of all",
+    "division": "bits by which agent and sector of the fire depend on each other",
+    "head_attack": "cosine of wind and act, 1 at the fire's head",
+    "contested": "share of the extinguished cells that a team-mate targeted too",
+    "containment": "share of the directions in which a line closes the fire in",
+    "lead_time": "steps from a clearing until the fire is there",
+    "unused_breaks": "share of the clearings that the fire never reached",
+}
+"""The words beside the further rows."""
+
 
 def report(
     scenario: str,
@@ -116,7 +136,7 @@ def evaluation_table(content: Mapping[str, Any], metrics: Sequence[Metric] = ())
 
 
 def _saved_lines(rows: Mapping[str, Any]) -> list[str]:
-    """Return a line for each policy: the forest that it saves."""
+    """Return a line for each policy, the forest that it saves, and what the columns mean."""
     lines = [
         f"{'policy':<22}{'saved %':>8}{'95 % interval':>16}{'iqm %':>8}{'success %':>11}{'control':>9}{'cleared %':>11}"
     ]
@@ -127,11 +147,11 @@ def _saved_lines(rows: Mapping[str, Any]) -> list[str]:
             f"{100 * summary['success']['mean']:>11.1f}{summary['control_time']['mean']:>9.2f}"
             f"{100 * summary['cleared']['mean']:>11.2f}"
         )
-    return lines
+    return [*lines, *LEGEND]
 
 
 def _watching_lines(rows: Mapping[str, Any]) -> list[str]:
-    """Return a line for each policy: the front that it watches."""
+    """Return a line for each policy, the front that it watches, and what the columns mean."""
     lines = [f"{'policy':<22}{'watched %':>10}{'95 % interval':>16}{'found %':>9}{'uncertainty':>13}"]
     for name, summary in rows.items():
         watched = summary["watched"]
@@ -139,7 +159,7 @@ def _watching_lines(rows: Mapping[str, Any]) -> list[str]:
             f"{name:<22}{100 * watched['mean']:>10.1f}{_interval(watched):>16}{100 * summary['found']['mean']:>9.1f}"
             f"{summary['uncertainty']['mean']:>13.3f}"
         )
-    return lines
+    return [*lines, *WATCHING_LEGEND]
 
 
 def _interval(summary: Mapping[str, Any]) -> str:
@@ -186,7 +206,9 @@ def _behaviour_lines(content: Mapping[str, Any]) -> list[str]:
         found = content["metrics"].get(name, {"mean": None})
         if found["mean"] is not None:
             low, high = found["ci95"]
-            lines.append(f"{name.replace('_', ' '):<22}{found['mean']:>8.3f}{f'{low:.3f} .. {high:.3f}':>18}")
+            lines.append(
+                f"{name.replace('_', ' '):<22}{found['mean']:>8.3f}{f'{low:.3f} .. {high:.3f}':>18}  {MEANING[name]}"
+            )
     return lines
 
 

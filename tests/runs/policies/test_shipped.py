@@ -1,4 +1,4 @@
-"""The policies that ship: they are whole, small, of no one's machine, and save what docs/skill.md says."""
+"""The policies that ship: they are whole, small, of no one's machine, and save what docs/results.md says."""
 
 import json
 from dataclasses import replace

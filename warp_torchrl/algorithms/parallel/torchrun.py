@@ -1,6 +1,6 @@
 """Collectives over torch's process group under ``torchrun``: Gloo between CPUs, NCCL between GPUs.
 
-They meet at the address that ``torchrun`` was given, and trust whoever can reach it: see ``docs/scaling-out.md``.
+They meet at the address that ``torchrun`` was given, and trust whoever can reach it: see ``docs/performance.md``.
 """
 
 import os
