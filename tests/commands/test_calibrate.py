@@ -80,7 +80,7 @@ def test_the_law_is_scored_fitted_and_written(tmp_path, capsys):
     assert main([*given, f"out={tmp_path / 'out'}"]) == DONE
     assert "| small | uncalibrated |" in capsys.readouterr().out
     found = json.loads((tmp_path / "out" / "calibration.json").read_text())
-    assert set(found["scores"]["small"]) == {"circle", "ellipse", "uncalibrated", "fitted"}
+    assert set(found["scores"]["small"]) == {"circle", "ellipse", "walking ellipse", "uncalibrated", "fitted"}
 
     law = build(yaml.safe_load((tmp_path / "out" / "fire" / "calibrated.yaml").read_text()), "fire")
     assert law.model == "fbp" and law.rate_gain == pytest.approx(found["parameters"]["rate_gain"], rel=1e-4) != 1.0

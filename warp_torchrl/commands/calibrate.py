@@ -22,7 +22,7 @@ from warp_torchrl.prediction.calibration.fitting import (
 from warp_torchrl.prediction.calibration.options import CalibrationOptions
 from warp_torchrl.prediction.calibration.parameters import Parameter, parameters_of
 from warp_torchrl.prediction.calibration.report import as_numbers, law_yaml, means, scores_table
-from warp_torchrl.prediction.calibration.scores import Scores
+from warp_torchrl.prediction.scores.scar import Scores
 from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
 from warp_torchrl.runs.config.construction import ConfigError, build, construct
 from warp_torchrl.runs.config.grammar import check_flags

@@ -9,8 +9,8 @@ from torch import Tensor
 
 from warp_torchrl.prediction.calibration.folder import KINDS, found, only
 from warp_torchrl.prediction.calibration.ground import read_ground
-from warp_torchrl.prediction.calibration.null_models import mean_wind
 from warp_torchrl.prediction.calibration.observed import Outcome, read_arrival, read_perimeters, read_scar
+from warp_torchrl.prediction.scores.null_models import mean_wind
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.fires.spell import Spell, spells_of
 from warp_torchrl.world.state.state import Landscape

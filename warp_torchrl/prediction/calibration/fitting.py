@@ -8,9 +8,9 @@ from torch import Tensor
 
 from warp_torchrl.prediction.calibration.candidates import burnable
 from warp_torchrl.prediction.calibration.case import FireCase
-from warp_torchrl.prediction.calibration.null_models import circle_cells, ellipse_cells
 from warp_torchrl.prediction.calibration.parameters import Parameter, fire_at
-from warp_torchrl.prediction.calibration.scores import Scores, scores_at_area, scores_of
+from warp_torchrl.prediction.scores.null_models import circle_cells, ellipse_cells, walking_ellipse_cells
+from warp_torchrl.prediction.scores.scar import Scores, scores_at_area, scores_of
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.behaviour.moistures import MOISTURES
 from warp_torchrl.world.fires.alone import arrival_minutes
@@ -39,11 +39,12 @@ def score(fire: RateFire, case: FireCase, draws: int = 64, seed: int = 1) -> Sco
 
 
 def null_scores(fire: RateFire, case: FireCase) -> dict[str, Scores]:
-    """Return the scores of the circle and of the ellipse over the cells that can burn under a law."""
+    """Return the scores of the circle and of both ellipses over the cells that can burn under a law."""
     fuel, cells = burnable(fire, case), int(case.scar.sum())
     grown = {
         "circle": circle_cells(case.lit, fuel, cells),
         "ellipse": ellipse_cells(case.lit, fuel, cells, case.wind),
+        "walking ellipse": walking_ellipse_cells(case.lit, fuel, cells, case.wind),
     }
     return {name: scores_at_area(burned, case.scar) for name, burned in grown.items()}
 

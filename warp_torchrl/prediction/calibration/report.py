@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from warp_torchrl.prediction.calibration.scores import Scores
+from warp_torchrl.prediction.scores.scar import Scores
 from warp_torchrl.world.law.rate import RateFire
 
 ScoreRows = Mapping[str, Mapping[str, Scores]]
@@ -16,8 +16,11 @@ _COLUMNS = {
     "sorensen_at_area": "Sorensen at area",
     "jaccard": "Jaccard at hour",
     "sorensen": "Sorensen at hour",
+    "kappa": "kappa",
     "area_error": "area error",
+    "brier": "Brier",
     "arrival_bias": "arrival bias [min]",
+    "arrival_mae": "arrival MAE [min]",
     "arrival_error": "arrival RMSE [min]",
 }
 

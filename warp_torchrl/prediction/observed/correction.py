@@ -14,7 +14,7 @@ from torch import Tensor
 from warp_torchrl.prediction.observed.observation import Observation
 from warp_torchrl.prediction.observed.posterior import Posterior
 from warp_torchrl.prediction.observed.scene import ByTimes, InSteps, Scene
-from warp_torchrl.prediction.observed.scores import (
+from warp_torchrl.prediction.scores.growth import (
     ForecastScores,
     GrowthScores,
     forecast_scores,
