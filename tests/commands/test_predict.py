@@ -194,6 +194,19 @@ def test_a_prediction_is_corrected_by_what_was_seen(folder, capsys):
     assert (chance == 1.0).sum() * 0.25 >= told["observations"][1]["burned_ha"] and np.nanmax(hours) <= 1.0
 
 
+def test_the_times_of_every_fire_are_written_where_that_is_said(folder):
+    assert main(arguments(folder, arrivals="true")) == 0
+    with rasterio.open(folder / "out" / "arrivals.tif") as file:
+        every, units, names = file.read(), set(file.units), file.descriptions
+    assert len(every) > 1 and units == {"h"} and names[1] == "fire 1"
+    came, chance = ~np.isnan(every), read(folder / "out" / "burn_probability.tif")
+    assert came.mean(0) == pytest.approx(chance, abs=1e-5)
+    with rasterio.open(folder / "out" / "arrival_hours.tif") as file:
+        reached = came.any(0)
+        assert np.nanmedian(every[:, reached], axis=0) == pytest.approx(file.read(1)[reached], abs=0.01)
+        assert file.descriptions[-1] == "half" and set(file.units) == {"h"}
+
+
 def test_fires_differ_by_members_where_that_is_said(folder, capsys):
     assert main(arguments(folder)) == 0
     assert main(arguments(folder, uncertain="true", out=folder / "wide")) == 0

@@ -16,7 +16,14 @@ from tqdm import tqdm
 from warp_torchrl.commands.program import run_program
 from warp_torchrl.prediction.animation import write_animation
 from warp_torchrl.prediction.case import Case, read_case, whole_map
-from warp_torchrl.prediction.files import MAPS_FIGURE, write_figure, write_layers, write_perimeters
+from warp_torchrl.prediction.files import (
+    ARRIVALS,
+    MAPS_FIGURE,
+    write_arrivals,
+    write_figure,
+    write_layers,
+    write_perimeters,
+)
 from warp_torchrl.prediction.observed.correction import Corrected, Correction
 from warp_torchrl.prediction.observed.observation import Observation
 from warp_torchrl.prediction.observed.reading import read_observations
@@ -53,7 +60,7 @@ _GROUPS = ("landscape", "fire")
 REPORT = "report.json"
 OUTPUTS = (
     *("burn_probability.tif", "arrival_hours.tif", "rate.tif", "intensity.tif", "flame_length.tif", "crown.tif"),
-    *("perimeters.geojson", MAPS_FIGURE, "fire.gif", "report.md", FIGURE, SCORES),
+    *(ARRIVALS, "perimeters.geojson", MAPS_FIGURE, "fire.gif", "report.md", FIGURE, SCORES),
 )
 """What an earlier prediction may have left, beside its report."""
 USAGE = "warp predict landscape.path=FOLDER weather=FILE.csv ignition=FILE [hours=24] [fires=1000] [KEY=VALUE ...]"
@@ -205,6 +212,7 @@ def _burn(case: Case, options: PredictionOptions, corrected: Corrected | None) -
             fields=case.fields,
             members=members,
             is_seen=corrected is not None,
+            keep_every=options.arrivals,
             progress=bar.update,
         )
 
@@ -249,6 +257,8 @@ def _report(
 def _write(folder: Path, prediction: Prediction, case: Case, options: PredictionOptions, title: str) -> None:
     """Write the maps; without Matplotlib all but the figure."""
     write_layers(folder, prediction, case.place)
+    if options.arrivals:
+        write_arrivals(folder / ARRIVALS, prediction, case.place)
     write_perimeters(folder / "perimeters.geojson", prediction, case.place, options.perimeter_hours)
     try:
         write_figure(folder / MAPS_FIGURE, prediction, title)

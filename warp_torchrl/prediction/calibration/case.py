@@ -118,7 +118,7 @@ def _read(folder: Path, hours: float | None, units: Mapping[str, str] | None, ca
     fuel = only("fuel", folder)
     header = read_header("fuel", fuel, remedy=_REMEDY)
     rows = _weather(folder / "weather.csv", units)
-    weather, end = Weather(table=rows).over(_Placed(header.grid)), _end(rows)  # type: ignore[arg-type]
+    weather, end = Weather(table=rows).over(Placed(header.grid)), _end(rows)  # type: ignore[arg-type]
     outcome, observed = _outcome(folder, header.grid, hours, end)
     last = float(outcome.minutes[-1])
     if last > end + 1e-3:
@@ -143,7 +143,7 @@ def _read(folder: Path, hours: float | None, units: Mapping[str, str] | None, ca
 
 
 @dataclass(frozen=True)
-class _Placed:
+class Placed:
     """The part of a landscape that a wind reads to turn its bearings."""
 
     grid: Grid

@@ -14,6 +14,9 @@ from warp_torchrl.prediction.scores.cells import BURNS, area_error, jaccard, kap
 from warp_torchrl.prediction.scores.probabilities import Reliability, arrival_crps, brier, reliability
 from warp_torchrl.world.fires.sightings import Front
 
+STEPS = 12
+"""Times at which a forecast of arrival is compared between two observations."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class GrowthScores:

@@ -114,6 +114,7 @@ class PredictionOptions:
             ``members.bearing`` [degrees], ``members.moisture``, ``members.local``, ``members.held``.
         hot_spots: The satellite: ``hot_spots.pixel=375`` [m], ``hot_spots.detection``, ``hot_spots.false_alarm``,
             ``hot_spots.lately`` [h].
+        arrivals: Whether the times of every fire are written, a band for each, as ``warp score`` reads them.
         animation: Whether the first fire is written as a GIF.
         out: Folder to write to; None makes one in ``outputs/predictions``.
         overwrite: Write into a folder that holds something.
@@ -144,6 +145,7 @@ class PredictionOptions:
     uncertain: bool = False
     members: Deviations = field(default_factory=Deviations)
     hot_spots: HotSpotSensor = field(default_factory=HotSpotSensor)
+    arrivals: bool = False
     animation: bool = False
     out: str | None = None
     overwrite: bool = False
