@@ -72,7 +72,7 @@ def test_one_fire_is_scored_against_rasters_and_several_files(fire):
     found = scored(fire, *given)
     kinds = [row["kind"] for row in found["observations"]]
     assert kinds == ["arrival", "arrival", "scar", "arrival", "arrival", "arrival"]
-    assert found["observations"][2]["forecast"]["crps"] is None
+    assert found["observations"][2]["forecast"]["brier"] is None, "nothing burned since the observation before"
     # Column c burned at 20 c minutes, and 30 c were predicted; by hour 5 the columns 0 to 10 of both
     assert found["arrival"]["bias"] == pytest.approx(10.0 * np.mean(range(11)))
 
@@ -91,6 +91,15 @@ def test_a_prediction_s_folder_is_read_by_its_half_of_the_fires(fire):
     write_geotiff(fire / "prediction" / "arrival_hours.tif", bands, grid, unit="h")
     found = scored(fire, f"arrival={fire}/prediction", f"observed={fire}/scar.tif", "hours=2")
     assert found["observations"][0]["forecast"]["jaccard"] == 1.0
+
+
+def test_what_was_seen_after_the_prediction_s_end_is_left_out(fire):
+    (fire / "prediction").mkdir()
+    (fire / "arrivals.tif").rename(fire / "prediction" / "arrivals.tif")
+    (fire / "prediction" / "report.json").write_text('{"followed_minutes": {"high": 90.0}}')
+    given = [f"arrival={fire}/prediction", f"observed={fire}/seen.geojson", f"start='{DAY} 12:00'"]
+    assert [row["minutes"] for row in scored(fire, *given)["observations"]] == [60.0]
+    assert len(scored(fire, *given, "until=3")["observations"]) == 2
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from warp_torchrl.prediction.calibration.ground import read_fuel
 from warp_torchrl.prediction.scores.card import write_card
 from warp_torchrl.prediction.scores.null_models import mean_wind
 from warp_torchrl.prediction.scores.options import ScoreOptions
-from warp_torchrl.prediction.scores.predicted import Predicted, read_predicted
+from warp_torchrl.prediction.scores.predicted import Predicted, followed_minutes, read_predicted
 from warp_torchrl.prediction.scores.report import score_lines, score_numbers
 from warp_torchrl.prediction.scores.scoring import Place, fire_scores
 from warp_torchrl.prediction.scores.seen import Reading, Seen, read_seen
@@ -108,7 +108,20 @@ def _seen(options: ScoreOptions, grid: Grid) -> tuple[list[Seen], Tensor | None]
         sensor=HotSpotSensor(pixel=options.pixel),
         hull=options.hull,
     )
-    return read_seen(options.observed, grid, how)
+    seen, times = read_seen(options.observed, grid, how)
+    followed = followed_minutes(options.arrival) if options.until is None else options.until * 60.0
+    kept = seen if followed is None else [each for each in seen if _is_at_end(each) or each.minutes <= followed + 1e-3]
+    if not kept:
+        raise ValueError(f"observed must hold what was seen by {followed:g} minutes, the first is {seen[0].minutes:g}")
+    if len(kept) < len(seen):
+        log.info(
+            "%d of %d observations are after the prediction's end and are left out", len(seen) - len(kept), len(seen)
+        )
+    return kept, times
+
+
+def _is_at_end(each: Seen) -> bool:
+    return each.minutes > _LONGEST
 
 
 def _minutes(text: str, options: ScoreOptions) -> float:
@@ -145,7 +158,7 @@ def _place(options: ScoreOptions, grid: Grid, last: float) -> Place | None:
     wind = None
     if options.weather is not None:
         table = read_weather(options.weather, units=options.units)
-        lasts = last if last < _LONGEST else float(table.hours[-1] - table.hours[0]) * 60.0 + 60.0
+        lasts = last if last <= _LONGEST else float(table.hours[-1] - table.hours[0]) * 60.0 + 60.0
         spells = spells_of(Weather(table=table).over(Placed(grid)), lasts, _start(options))  # type: ignore[arg-type]
         wind = mean_wind(torch.stack([each.wind for each in spells]), torch.tensor([each.minutes for each in spells]))
     return Place(lit=lit, fuel=can_ignite(law, ground), wind=wind)

@@ -18,6 +18,8 @@ class ScoreOptions:
         observed: Files of what burned: perimeters with times (GeoJSON or a shapefile), hot spots of satellites (CSV), a
             raster of arrival, or a scar (raster, GeoJSON or a shapefile).
         hours: When a scar, or perimeters without a time, are known [h after the start]; None: at the end of all times.
+        until: Time up to which the fire was predicted [h after the start]; what was seen later is left out. None: as
+            long as the folder of a prediction says, else all.
         unit: Of the times of ``arrival`` where the file states none.
         begun: When the times of ``arrival`` begin [minutes after the start], as for a forecast from an observation.
         start: Start of the fire, as for ``predict``: minutes after the weather's first row, or a date and time.
@@ -43,6 +45,7 @@ class ScoreOptions:
     probability: str | None = None
     observed: tuple[str, ...] = ()
     hours: float | None = None
+    until: float | None = None
     unit: Literal["minutes", "hours"] | None = None
     begun: float = 0.0
     start: float | str = 0.0
@@ -60,7 +63,15 @@ class ScoreOptions:
     debug: bool = False
 
     def __post_init__(self) -> None:
-        check_fields(self, hours=(1e-2, 1e5), begun=(0.0, 1e7), zone=(-14.0, 14.0), pixel=(1.0, 1e5), hull=(0.0, 1.0))
+        check_fields(
+            self,
+            hours=(1e-2, 1e5),
+            until=(1e-2, 1e5),
+            begun=(0.0, 1e7),
+            zone=(-14.0, 14.0),
+            pixel=(1.0, 1e5),
+            hull=(0.0, 1.0),
+        )
         if self.arrival is None and self.probability is None:
             raise ValueError("arrival or probability must name a raster of a predicted fire, got neither")
         if not self.observed:

@@ -1,5 +1,6 @@
 """Maps of a predicted fire: times of arrival of one fire or of an ensemble, and burn probability."""
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +19,7 @@ HALF = "half"
 """Band of the times at which half of all fires of a prediction had arrived."""
 _OF_PREDICTION = ("arrivals.tif", "arrival_hours.tif")
 _UNITS = {"minutes": 1.0, "hours": 60.0}
+_LARGEST_REPORT = 50_000_000  # bytes
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -82,6 +84,17 @@ def read_predicted(
         grid = grid or header.grid
     assert grid is not None  # the options want one of both
     return Predicted(grid=grid, arrival=times, probability=chance)
+
+
+def followed_minutes(arrival: str | None) -> float | None:
+    """Return for how long the fires of a prediction's folder were followed [minutes]; None where nothing says it."""
+    report = Path(arrival or "") / "report.json"
+    if arrival is None or not report.is_file() or report.stat().st_size > _LARGEST_REPORT:
+        return None
+    try:
+        return float(json.loads(report.read_text())["followed_minutes"]["high"])
+    except (ValueError, KeyError, TypeError):
+        raise ValueError(f"arrival must be the folder of a prediction, {report} is none of its reports") from None
 
 
 def _times(path: Path, unit: str | None, begun: float) -> tuple[Tensor, Grid]:

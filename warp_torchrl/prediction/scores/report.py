@@ -11,6 +11,7 @@ _HEADINGS = (
     *("hours", "seen [ha]", "forecast", "predicted [ha]", "5 to 95 % [ha]", "area", "Jaccard", "Sorensen", "kappa"),
     *("Jaccard of the growth", "F1 of the growth", "Brier", "CRPS [min]", "CRPS of the area [ha]"),
 )
+_SCORES = ("jaccard", "sorensen", "kappa", "growth_jaccard", "growth_sorensen", "brier")
 _LATEST = 1e7  # minutes: what is later is at the end of all times
 
 
@@ -58,11 +59,14 @@ def prediction_cells(row: Mapping[str, Any]) -> list[str]:
         f"{row['predicted_ha']:,.0f}",
         "-" if areas is None else f"{areas['low']:,.0f} to {areas['high']:,.0f}",
         f"{100.0 * (scores['area'] - 1.0):+.0f} %",
-        *(f"{scores[name]:.3f}" for name in ("jaccard", "sorensen", "kappa", "growth_jaccard", "growth_sorensen")),
-        f"{scores['brier']:.3f}",
+        *(_cell(scores[name]) for name in _SCORES),
         "-" if scores["crps"] is None else f"{scores['crps']:.0f}",
         "-" if areas is None else f"{areas['crps']:,.0f}",
     ]
+
+
+def _cell(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f}"
 
 
 def hours_of(row: Mapping[str, Any]) -> str:

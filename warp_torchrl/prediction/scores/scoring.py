@@ -17,6 +17,9 @@ from warp_torchrl.prediction.scores.scar import Scores, scores_at_area, scores_o
 from warp_torchrl.prediction.scores.seen import Seen
 from warp_torchrl.world.fires.sightings import Front
 
+_OF_GROWTH = ("growth_jaccard", "growth_sorensen", "brier", "crps")
+"""Scores that have no meaning where nothing burned since the observation before."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Areas:
@@ -129,6 +132,8 @@ def _at(predicted: Predicted, before: Seen, each: Seen, is_last: bool) -> Observ
     forecast = forecast_scores(reached, time_between(front), front)
     if predicted.arrival is None or each.kind == "scar":
         forecast = replace(forecast, crps=torch.nan)  # when cells burned, or would, is not known
+    if not bool(front.growth.any()):
+        forecast = replace(forecast, **dict.fromkeys(_OF_GROWTH, torch.nan))
     areas, seen_ha = predicted.areas(each.minutes), float(each.burned.sum()) * hectare
     return ObservationScores(
         minutes=each.minutes,
