@@ -14,6 +14,7 @@ COMMANDS = {
     "demonstrations": ("warp_torchrl.commands.demonstrations:main", "list, check and export recordings"),
     "correct": ("warp_torchrl.commands.correct:main", "let a scripted person correct a policy"),
     "predict": ("warp_torchrl.commands.predict:main", "predict fires alone on real ground"),
+    "score": ("warp_torchrl.commands.score:main", "score a predicted fire against what was seen to burn"),
     "calibrate": ("warp_torchrl.commands.calibrate:main", "score and fit the law of fires to observed ones"),
     "search": ("warp_torchrl.commands.search:main", "search values of a training's keys"),
     "summary": ("warp_torchrl.evaluation.summary:main", "summarise evaluations in one table"),

@@ -10,6 +10,7 @@ from warp_torchrl.commands import calibrate as command
 from warp_torchrl.commands.calibrate import main
 from warp_torchrl.commands.failure import DONE, IN_USE, MISTAKE
 from warp_torchrl.prediction.calibration.case import read_fire_case
+from warp_torchrl.prediction.calibration.options import CalibrationOptions
 from warp_torchrl.runs.config.compose import option_of, plain
 from warp_torchrl.runs.config.construction import ConfigError, build
 from warp_torchrl.runs.config.saved_config import SavedConfig, restore
@@ -80,7 +81,7 @@ def test_the_law_is_scored_fitted_and_written(tmp_path, capsys):
     assert main([*given, f"out={tmp_path / 'out'}"]) == DONE
     assert "| small | uncalibrated |" in capsys.readouterr().out
     found = json.loads((tmp_path / "out" / "calibration.json").read_text())
-    assert set(found["scores"]["small"]) == {"circle", "ellipse", "uncalibrated", "fitted"}
+    assert set(found["scores"]["small"]) == {"circle", "ellipse", "walking ellipse", "uncalibrated", "fitted"}
 
     law = build(yaml.safe_load((tmp_path / "out" / "fire" / "calibrated.yaml").read_text()), "fire")
     assert law.model == "fbp" and law.rate_gain == pytest.approx(found["parameters"]["rate_gain"], rel=1e-4) != 1.0
@@ -92,8 +93,8 @@ def test_the_law_is_scored_fitted_and_written(tmp_path, capsys):
         ([], "fires must name folders of fires that happened, got none"),
         (["fires=[nowhere]"], "fires must name folders that exist, got nowhere"),
         (["fires=[a]", "parameters=[speed]"], "parameters must be of"),
-        (["fires=[a]", "leave_one_out=true"], "parameters must be given where fires are left out, got none"),
-        (["fires=[a]", "leave_one_out=true", "parameters=[rate_gain]"], "fires must be two at least"),
+        (["fires=[a]", "hours_by_fire.b=3"], "hours_by_fire must name some of a, got b"),
+        (["fires=[a]", "hours_by_fire.a=0"], "hours_by_fire.a must be in [0.01, 100000], got 0"),
         (["fires=[a]", "fire=hazard"], "fire must be a law of metres and minutes, rate, got HazardFire"),
         (["fires=[a]", "draw=3"], "draw is not a key of the configuration"),
         (["fires=[a]", "method=gradients", "loss=jaccard"], "loss must be cross_entropy or brier"),
@@ -102,6 +103,11 @@ def test_the_law_is_scored_fitted_and_written(tmp_path, capsys):
 def test_a_refusal_is_one_line(given, line, capsys):
     assert main(given) == MISTAKE
     assert line in capsys.readouterr().err.strip().splitlines()[-1]
+
+
+def test_each_fire_may_have_its_own_hour():
+    options = CalibrationOptions(fires=("fires/first", "fires/second"), hours=2.0, hours_by_fire={"second": 1.0})
+    assert [options.hours_of(each) for each in options.fires] == [2.0, 1.0]
 
 
 @pytest.mark.parametrize(
@@ -134,13 +140,13 @@ def test_a_run_keeps_a_law_of_a_user_s_own_file_by_ours_of_its_class_and_every_v
 
 def test_a_calibration_replaces_an_earlier_one_and_nothing_else(tmp_path, monkeypatch):
     out, fires = tmp_path / "out", f"fires=[{write(tmp_path / 'small', scar=scar())}]"
-    monkeypatch.setattr(command, "_fit", lambda fire, *_: fire)
+    monkeypatch.setattr(command, "_fit", lambda fire, *_: (fire, 1.0))
     given = [fires, "fire.model=fbp", "draws=1", f"out={out}"]
     assert main([*given, "parameters=[rate_gain]"]) == DONE and (out / "fire" / "calibrated.yaml").exists()
     (out / "fire" / "own.yaml").write_text("mine")
     assert main(given) == MISTAKE and main([*given, "overwrite=true"]) == DONE
     there = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
-    assert there - {".lock"} == {"calibration.json", "calibration.md", "fire/own.yaml"}
+    assert there - {".lock"} == {"calibration.json", "calibration.md", "fire/own.yaml", "scores.log"}
 
 
 def test_two_calibrations_into_one_folder_are_refused_before_the_work(tmp_path, monkeypatch, capsys):
@@ -153,13 +159,32 @@ def test_two_calibrations_into_one_folder_are_refused_before_the_work(tmp_path, 
     assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_a_calibration_that_ends_in_the_middle_leaves_nothing(tmp_path, monkeypatch):
+def test_a_calibration_that_ends_in_the_middle_leaves_its_scores_alone(tmp_path, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(command, "law_yaml", interrupted)
-    monkeypatch.setattr(command, "_fit", lambda fire, *_: fire)
+    monkeypatch.setattr(command, "_fit", lambda fire, *_: (fire, 1.0))
     fires = f"fires=[{write(tmp_path / 'small', scar=scar())}]"
     with pytest.raises(KeyboardInterrupt):
         main([fires, "fire.model=fbp", "draws=1", "parameters=[rate_gain]", f"out={tmp_path / 'out'}"])
-    assert not (tmp_path / "out").exists()
+    there = {path.name for path in (tmp_path / "out").iterdir()}
+    assert there - {".lock"} == {"scores.log"}
+    models = [json.loads(line)["model"] for line in (tmp_path / "out" / "scores.log").read_text().splitlines()]
+    assert models == ["circle", "ellipse", "walking ellipse", "uncalibrated"]
+
+
+def test_a_fit_that_would_hurt_the_fire_left_out_is_shrunk_to_none(tmp_path, monkeypatch):
+    class Far:
+        def __call__(self, fire, parameters, cases, progress=None):
+            return torch.tensor([4.0])
+
+    monkeypatch.setattr(CalibrationOptions, "fit", property(lambda self: Far()))
+    fires = [write(tmp_path / name, scar=scar()) for name in ("first", "second")]
+    given = [f"fires=[{fires[0]},{fires[1]}]", "fire.model=fbp", "draws=2", "parameters=[rate_gain]", "hours=2"]
+    assert main([*given, f"out={tmp_path / 'out'}"]) == DONE
+    found = json.loads((tmp_path / "out" / "calibration.json").read_text())
+    rows = found["scores"]["first"]
+    assert rows["left out, whole fit"]["jaccard"] < rows["uncalibrated"]["jaccard"]
+    assert found["share"] < 1.0 and rows["left out"]["jaccard"] >= rows["left out, whole fit"]["jaccard"]
+    assert "share of the fit that the law has" in (tmp_path / "out" / "calibration.md").read_text()

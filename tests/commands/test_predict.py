@@ -194,13 +194,44 @@ def test_a_prediction_is_corrected_by_what_was_seen(folder, capsys):
     assert (chance == 1.0).sum() * 0.25 >= told["observations"][1]["burned_ha"] and np.nanmax(hours) <= 1.0
 
 
-def test_fires_differ_by_members_where_that_is_said(folder, capsys):
-    assert main(arguments(folder)) == 0
-    assert main(arguments(folder, uncertain="true", out=folder / "wide")) == 0
-    plain, wide = (read(folder / out / "burn_probability.tif") for out in ("out", "wide"))
-    assert ((wide > 0.0) & (wide < 1.0)).sum() > 2 * ((plain > 0.0) & (plain < 1.0)).sum()
-    assert main(arguments(folder, **{"members.rate": 0.3}, out=folder / "none")) == 2
-    assert "members is read with uncertain=true or observed=FILE" in capsys.readouterr().err
+def test_the_times_of_every_fire_are_written_where_that_is_said(folder):
+    assert main(arguments(folder, arrivals="true")) == 0
+    with rasterio.open(folder / "out" / "arrivals.tif") as file:
+        every, units, names = file.read(), set(file.units), file.descriptions
+    assert len(every) > 1 and units == {"h"} and names[1] == "fire 1"
+    came, chance = ~np.isnan(every), read(folder / "out" / "burn_probability.tif")
+    assert came.mean(0) == pytest.approx(chance, abs=1e-5)
+    with rasterio.open(folder / "out" / "arrival_hours.tif") as file:
+        reached = came.any(0)
+        assert np.nanmedian(every[:, reached], axis=0) == pytest.approx(file.read(1)[reached], abs=0.01)
+        assert file.descriptions[-1] == "half" and set(file.units) == {"h"}
+
+
+def test_fires_differ_in_their_rates_and_by_all_members_where_that_is_said(folder, capsys):
+    given = {"rate": {}, "none": {"uncertain": "none"}, "all": {"uncertain": "all"}}
+    unsure, areas = {}, {}
+    for name, more in given.items():
+        assert main(arguments(folder, **more, out=folder / name)) == 0
+        chance = read(folder / name / "burn_probability.tif")
+        unsure[name] = int(((chance > 0.0) & (chance < 1.0)).sum())
+        areas[name] = json.loads((folder / name / "report.json").read_text())["area_ha"]
+    assert unsure["all"] > unsure["rate"] > 2 * unsure["none"]
+    assert areas["rate"]["low"] < 0.8 * areas["none"]["median"] < areas["rate"]["high"]
+    for more, line in (
+        ({"members.bearing": 30}, "members but members.rate is read with uncertain=all or observed=FILE"),
+        ({"members.rate": 0.3, "uncertain": "none"}, "members is read with uncertain=all or observed=FILE"),
+    ):
+        assert main(arguments(folder, **more, out=folder / "no")) == 2
+        assert line in capsys.readouterr().err
+
+
+def test_a_single_fire_is_that_of_the_law(folder):
+    for name, more in {"one": {}, "same": {"uncertain": "none"}}.items():
+        assert main(arguments(folder, fires=1, out=folder / name, **more)) == 0
+    one, same = (read(folder / name / "arrival_hours.tif") for name in ("one", "same"))
+    assert np.array_equal(one, same, equal_nan=True)
+    one, same = (json.loads((folder / name / "report.json").read_text())["area_ha"] for name in ("one", "same"))
+    assert one == same
 
 
 def test_what_cannot_be_read_as_seen_is_one_line_and_nothing_is_written(folder, capsys):

@@ -12,17 +12,18 @@ from typing import Any
 from warp_torchrl.commands.program import PLUGINS, run_program
 from warp_torchrl.prediction.calibration.case import FireCase, read_fire_case
 from warp_torchrl.prediction.calibration.fitting import (
+    SHARES,
+    best_share,
     check_fuel_codes,
     check_not_in_weather,
-    fit_law,
     folds,
     null_scores,
     score,
 )
 from warp_torchrl.prediction.calibration.options import CalibrationOptions
-from warp_torchrl.prediction.calibration.parameters import Parameter, parameters_of
-from warp_torchrl.prediction.calibration.report import as_numbers, law_yaml, means, scores_table
-from warp_torchrl.prediction.calibration.scores import Scores
+from warp_torchrl.prediction.calibration.parameters import Parameter, fire_at, parameters_of
+from warp_torchrl.prediction.calibration.report import ScoreLog, as_numbers, law_yaml, means, scores_table
+from warp_torchrl.prediction.scores.scar import Scores
 from warp_torchrl.runs.config.compose import compose_config, plain, without_targets
 from warp_torchrl.runs.config.construction import ConfigError, build, construct
 from warp_torchrl.runs.config.grammar import check_flags
@@ -38,6 +39,8 @@ REPORT = "calibration.json"
 USAGE = "warp calibrate fires=[FOLDER,...] [parameters=[rate_gain,...]] [KEY=VALUE ...]"
 LAW = "fire/calibrated.yaml"
 """In the folder that the command writes, so that ``--config-dir`` takes that folder."""
+LOG = "scores.log"
+"""In the folder too: a line of JSON for each score, written as soon as it is known."""
 OUTPUTS = (LAW, "calibration.md")
 """What an earlier calibration may have left, beside its report."""
 
@@ -62,7 +65,7 @@ def _run(arguments: Sequence[str]) -> None:
     with output_folder(folder, "out", overwrite=options.overwrite, last=REPORT, replaced=OUTPUTS) as draft:
         with gathered() as files:
             canopy = CanopyUnits(options.height_unit, options.density_unit)
-            cases = [read_fire_case(each, options.hours, options.units, canopy) for each in options.fires]
+            cases = [read_fire_case(each, options.hours_of(each), options.units, canopy) for each in options.fires]
             for case in cases:
                 check_fuel_codes(case, fire)
                 report_file(_of_map(case, fire))
@@ -70,9 +73,12 @@ def _run(arguments: Sequence[str]) -> None:
                     log.warning("%s: %s", case.name, lack)
         _check_names(cases)
         check_not_in_weather(parameters, cases)
-        rows = {case.name: _before(fire, case, options) for case in cases}
-        law = _fit(fire, parameters, cases, rows, options) if parameters else None
-        page = _write(draft, rows, values, files, law, parameters, time.perf_counter() - began)
+        rows = ScoreLog(folder / LOG, [case.name for case in cases])
+        for case in cases:
+            for name, scores in _before(fire, case, options).items():
+                rows.add(case.name, name, scores)
+        law, share = _fit(fire, parameters, cases, rows, options) if parameters else (None, None)
+        page = _write(draft, rows.scores, values, files, law, parameters, share, time.perf_counter() - began)
         written = sorted(each.name for each in draft.iterdir())
     print(page)
     print(f"wrote {', '.join(written)} into {folder}, in {time.perf_counter() - began:.0f} s", flush=True)
@@ -106,17 +112,38 @@ def _fit(
     fire: RateFire,
     parameters: Sequence[Parameter],
     cases: Sequence[FireCase],
-    rows: dict[str, dict[str, Scores]],
+    rows: ScoreLog,
     options: CalibrationOptions,
-) -> RateFire:
-    """Fit to all fires but one in turn, and to all; add the scores to the rows; return the law fitted to all."""
-    for left_out, others in folds(cases) if options.leave_one_out else ():
-        law = fit_law(options.fit, fire, parameters, others, _progress(f"without {left_out.name}"))
-        rows[left_out.name]["left out"] = score(law, left_out, options.draws, options.seed)
-    law = fit_law(options.fit, fire, parameters, cases, _progress("all fires"))
+) -> tuple[RateFire, float]:
+    """Fit to all fires but one in turn, and to all; score each; return the law and the share of the fit that it has."""
+    share = _share(fire, parameters, cases, rows, options) if options.leave_one_out and len(cases) > 1 else 1.0
+    if share < 1.0:
+        log.info("on fires left out %g of the fit is best", share)
+    moved = options.fit(fire, parameters, cases, _progress("all fires"))
+    law = fire_at(fire, parameters, share * moved)
     for case in cases:
-        rows[case.name]["fitted"] = score(law, case, options.draws, options.seed)
-    return law
+        rows.add(case.name, "fitted", score(law, case, options.draws, options.seed))
+    return law, share
+
+
+def _share(
+    fire: RateFire,
+    parameters: Sequence[Parameter],
+    cases: Sequence[FireCase],
+    rows: ScoreLog,
+    options: CalibrationOptions,
+) -> float:
+    """Return the share of the fit that is best on fires left out; score each fire by the share of the others."""
+    found: dict[str, dict[float, Scores]] = {}
+    for left_out, others in folds(cases):
+        moved = options.fit(fire, parameters, others, _progress(f"without {left_out.name}"))
+        laws = {share: fire_at(fire, parameters, share * moved) for share in SHARES[1:]}
+        tried = {share: score(law, left_out, options.draws, options.seed) for share, law in laws.items()}
+        found[left_out.name] = {SHARES[0]: rows.scores[left_out.name]["uncalibrated"], **tried}
+        rows.add(left_out.name, "left out, whole fit", tried[1.0])
+    for name, tried in found.items():
+        rows.add(name, "left out", tried[best_share([each for other, each in found.items() if other != name])])
+    return best_share(list(found.values()))
 
 
 def _progress(fires: str) -> Callable[[int, float], None]:
@@ -130,6 +157,7 @@ def _write(
     files: Sequence[Provenance],
     law: RateFire | None,
     parameters: Sequence[Parameter],
+    share: float | None,
     seconds: float,
 ) -> str:
     """Write the report into a folder, and return its page."""
@@ -139,6 +167,7 @@ def _write(
     report = {
         "version": __version__,
         "parameters": found,
+        "share": share,
         "scores": as_numbers(rows),
         "means": means(rows),
         "files": [each.as_values for each in files],
@@ -151,6 +180,7 @@ def _write(
         (folder / LAW).parent.mkdir(exist_ok=True)
         disk.replace(folder / LAW, law_yaml(law, f"Law rate, fitted to {', '.join(rows)}."))
         page += "\n\n" + "\n".join(f"{name}: {value:.4g}" for name, value in found.items())
+        page += f"\nshare of the fit that the law has: {share:g}"
     page = "\n".join([page, *section([each.as_values for each in files])])
     disk.replace(folder / "calibration.md", page + "\n")
     return page

@@ -16,7 +16,14 @@ from tqdm import tqdm
 from warp_torchrl.commands.program import PLUGINS, run_program
 from warp_torchrl.prediction.animation import write_animation
 from warp_torchrl.prediction.case import Case, read_case, whole_map
-from warp_torchrl.prediction.files import MAPS_FIGURE, write_figure, write_layers, write_perimeters
+from warp_torchrl.prediction.files import (
+    ARRIVALS,
+    MAPS_FIGURE,
+    write_arrivals,
+    write_figure,
+    write_layers,
+    write_perimeters,
+)
 from warp_torchrl.prediction.observed.correction import Corrected, Correction
 from warp_torchrl.prediction.observed.observation import Observation
 from warp_torchrl.prediction.observed.reading import read_observations
@@ -53,7 +60,7 @@ _APART = ("landscape", "fire", "plugins")
 REPORT = "report.json"
 OUTPUTS = (
     *("burn_probability.tif", "arrival_hours.tif", "rate.tif", "intensity.tif", "flame_length.tif", "crown.tif"),
-    *("perimeters.geojson", MAPS_FIGURE, "fire.gif", "report.md", FIGURE, SCORES),
+    *(ARRIVALS, "perimeters.geojson", MAPS_FIGURE, "fire.gif", "report.md", FIGURE, SCORES),
 )
 """What an earlier prediction may have left, beside its report."""
 USAGE = "warp predict landscape.path=FOLDER weather=FILE.csv ignition=FILE [hours=24] [fires=1000] [KEY=VALUE ...]"
@@ -172,7 +179,7 @@ def _correct(case: Case, options: PredictionOptions, seen: Sequence[Observation]
 
 def _members(case: Case, options: PredictionOptions) -> Members | None:
     """Return by what fires differ from the ignition on, in rate, wind and moisture; None where they do not."""
-    if not options.uncertain:
+    if options.uncertain != "all":
         return None
     keys = world_key(options.seed + torch.arange(options.fires))
     return Members.drawn(keys, _deviations(case, options), case.ignition)
@@ -193,7 +200,7 @@ def _burn(case: Case, options: PredictionOptions, corrected: Corrected | None) -
             case.ground,
             case.weather,
             case.ignition if corrected is None else corrected.burned,
-            fire=case.fire if members is None else case.fire.alike(),
+            fire=_differing(case, options) if members is None else case.fire.alike(),
             cell_size=case.cell_size,
             hours=options.hours if corrected is None else (_minutes(case, options) - begun) / 60.0,
             area=options.area,
@@ -205,8 +212,16 @@ def _burn(case: Case, options: PredictionOptions, corrected: Corrected | None) -
             members=members,
             is_seen=corrected is not None,
             embers=options.firebrands if options.embers else None,
+            keep_every=options.arrivals,
             progress=bar.update,
         )
+
+
+def _differing(case: Case, options: PredictionOptions) -> RateFire:
+    """Return the law of fires that differ in their rates; a single fire is that of the law as given."""
+    if options.uncertain == "none" or options.fires == 1:
+        return case.fire
+    return case.fire.differing(_deviations(case, options).rate)
 
 
 def _report(
@@ -249,6 +264,8 @@ def _report(
 def _write(folder: Path, prediction: Prediction, case: Case, options: PredictionOptions, title: str) -> None:
     """Write the maps; without Matplotlib all but the figure."""
     write_layers(folder, prediction, case.place)
+    if options.arrivals:
+        write_arrivals(folder / ARRIVALS, prediction, case.place)
     write_perimeters(folder / "perimeters.geojson", prediction, case.place, options.perimeter_hours)
     try:
         write_figure(folder / MAPS_FIGURE, prediction, title)

@@ -1,5 +1,6 @@
 """The maps of a prediction as files: GeoTIFF, GeoJSON, PNG and GIF."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,12 +11,20 @@ from torch import Tensor
 
 from warp_torchrl.env.pictures.maps import MapPanel, save_maps
 from warp_torchrl.prediction.predict import CROWN_MAPS, Prediction
-from warp_torchrl.system import disk
+from warp_torchrl.system import disk, memory
 from warp_torchrl.world.terrain.geotiff import write_geotiff
 from warp_torchrl.world.terrain.grid import Grid
 from warp_torchrl.world.terrain.perimeter import perimeters, write_geojson
 
-MAPS_FIGURE = "maps.png"
+MAPS_FIGURE, ARRIVALS = "maps.png", "arrivals.tif"
+_UNITS = {
+    "burn_probability": "",
+    "arrival_hours": "h",
+    "rate": "m/min",
+    "intensity": "kW/m",
+    "flame_length": "m",
+    "crown": "",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +44,7 @@ def layers(prediction: Prediction) -> dict[str, dict[str, Tensor]]:
             "median": prediction.arrival_minutes / 60.0,
             "early_10": prediction.arrival_early / 60.0,
             "late_90": prediction.arrival_late / 60.0,
+            "half": prediction.half_minutes / 60.0,
         },
         "rate": {"rate_m_min": prediction.rate},
         "intensity": {"intensity_kw_m": prediction.intensity},
@@ -52,8 +62,28 @@ def write_layers(folder: Path, prediction: Prediction, place: MapPlace) -> list[
     """
     bands = {f"{name}.tif": each for name, each in layers(prediction).items()}
     for name, each in bands.items():
-        write_geotiff(folder / name, each, place.grid, place.corner)
+        write_geotiff(folder / name, each, place.grid, place.corner, _UNITS[name.removesuffix(".tif")])
     return list(bands)
+
+
+def write_arrivals(path: Path, prediction: Prediction, place: MapPlace) -> None:
+    """Write when each fire of a prediction came [h], on the whole map, a band for each.
+
+    Raises:
+        ValueError: If the maps of all fires do not fit in memory, or rasterio is not installed.
+        OSError: If the write fails, with the path.
+    """
+    window, every = prediction.window, prediction.every
+    if every is None:
+        raise ValueError("prediction must keep the times of every fire, predict(keep_every=True), got none")
+    wanted, there = 12.0 * len(every) * math.prod(window.map), memory.available()
+    if wanted > there:
+        raise memory.too_little(f"the times of {len(every)} fires on the whole map", wanted, there)
+    bands = {
+        f"fire {number}": window.put(times / 60.0, torch.full(window.map, torch.nan))
+        for number, times in enumerate(every)
+    }
+    write_geotiff(path, bands, place.grid, place.corner, "h")
 
 
 def write_perimeters(path: Path, prediction: Prediction, place: MapPlace, every: float) -> None:

@@ -45,6 +45,7 @@ class Prediction:
     lit: Tensor  # where fires started, bool [H, W]
     ground: Landscape  # batch size [1]
     cell_size: float  # side of a cell [m]
+    every: Tensor | None = None  # when each fire came, float32 [B, h, w] [min], NaN where it did not; where kept
 
     @property
     def burn_probability(self) -> Tensor:
@@ -137,6 +138,7 @@ def predict(
     members: Members | None = None,
     is_seen: bool = False,
     embers: Firebrands | None = None,
+    keep_every: bool = False,
     progress: Callable[[int], object] | None = None,
 ) -> Prediction:
     """Burn many fires on one map, in hourly weather, and return their maps and curves.
@@ -161,6 +163,7 @@ def predict(
         is_seen: Whether the ignition is what a fire had burned when it was seen: its front is on average half a cell
             ahead then.
         embers: Firebrands that start fires ahead; None: none fly.
+        keep_every: Whether the prediction keeps the arrival times of every fire.
         progress: Called with how many fires have been burned since the last call.
 
     Raises:
@@ -190,10 +193,10 @@ def predict(
         tally.add(part)
         if progress is not None:
             progress(len(part.left))
-    return _prediction(tally, count)
+    return _prediction(tally, count, keep_every)
 
 
-def _prediction(tally: Tally, count: Counter) -> Prediction:
+def _prediction(tally: Tally, count: Counter, keep_every: bool) -> Prediction:
     times, (rate, intensity, flame_length, *crowns) = tally.arrivals(), tally.means()
     window, fires = tally.window.on_map, count.fires
     lit = tally.window.cut(count.lit, False)
@@ -222,6 +225,7 @@ def _prediction(tally: Tally, count: Counter) -> Prediction:
         lit=count.lit,
         ground=fires.landscape,
         cell_size=fires.cell_size,
+        every=tally.every()[:, :, : window.width] if keep_every else None,
     )
 
 

@@ -78,6 +78,13 @@ class Tally:
         """Return the means of ``Count.sums`` over the fires that came, float32 [h, w] each, NaN for none."""
         return [torch.where(self._came > 0.0, part / self._came, torch.nan) for part in self._sums]
 
+    def every(self) -> Tensor:
+        """Return when each fire came, float32 [B, h, w] [minutes]; NaN where it did not."""
+        block = slice(0, self.window.height), slice(0, self.window.width)
+        times = torch.cat([self._times(count, block) for count in self._counts])
+        minutes = (times.to(torch.float32) + TIME_STEPS // 2) * (self._minutes / TIME_STEPS)
+        return torch.where(times < LATE, minutes, torch.nan)
+
     def arrivals(self) -> ArrivalQuantiles:
         """Return quantiles of the arrival times, to a 65,534th of the time that fires are followed."""
         found = torch.full((4, *self._came.shape), torch.nan)

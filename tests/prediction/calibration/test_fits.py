@@ -7,9 +7,10 @@ from tests.prediction.calibration.ground import case_of, cases_of, fire
 from warp_torchrl.prediction.calibration.candidates import burnable, fires_of, median_arrivals
 from warp_torchrl.prediction.calibration.evolution import Evolution
 from warp_torchrl.prediction.calibration.expected import burning_probability, differentiated, margin
-from warp_torchrl.prediction.calibration.fitting import check_not_in_weather, folds
+from warp_torchrl.prediction.calibration.fitting import SHARES, best_share, check_not_in_weather, folds
 from warp_torchrl.prediction.calibration.gradients import Gradients
 from warp_torchrl.prediction.calibration.parameters import fire_at, parameters_of
+from warp_torchrl.prediction.scores.scar import Scores
 from warp_torchrl.world.law.travel import NEVER
 
 TRUTH = fire(rate_gain=1.4, wind_gain=0.8)
@@ -128,3 +129,14 @@ def test_refusals_are_one_line():
     cases[0].spells[0].moisture[5] = 90.0
     with pytest.raises(ValueError, match=r"moisture\.ffmc is by that of east"):
         check_not_in_weather(parameters_of(["moisture.ffmc"], start), cases)
+
+
+def test_of_shares_of_a_fit_the_best_on_fires_left_out_is_kept_and_of_equal_ones_the_least():
+    def scored(*values):
+        return {
+            share: Scores(jaccard_at_area=value, sorensen_at_area=0.0, jaccard=value)
+            for share, value in zip(SHARES, values, strict=True)
+        }
+
+    assert best_share([scored(0.5, 0.6, 0.7, 0.6, 0.5), scored(0.5, 0.6, 0.6, 0.5, 0.5)]) == 0.5
+    assert best_share([scored(0.5, 0.5, 0.5, 0.5, 0.5)]) == 0.0, "no fit without a gain"

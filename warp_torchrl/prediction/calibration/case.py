@@ -9,8 +9,8 @@ from torch import Tensor
 
 from warp_torchrl.prediction.calibration.folder import KINDS, found, only
 from warp_torchrl.prediction.calibration.ground import read_ground
-from warp_torchrl.prediction.calibration.null_models import mean_wind
 from warp_torchrl.prediction.calibration.observed import Outcome, read_arrival, read_perimeters, read_scar
+from warp_torchrl.prediction.scores.null_models import mean_wind
 from warp_torchrl.world.air.weather import Weather
 from warp_torchrl.world.fires.spell import Spell, spells_of
 from warp_torchrl.world.state.state import Landscape
@@ -118,7 +118,7 @@ def _read(folder: Path, hours: float | None, units: Mapping[str, str] | None, ca
     fuel = only("fuel", folder)
     header = read_header("fuel", fuel, remedy=_REMEDY)
     rows = _weather(folder / "weather.csv", units)
-    weather, end = Weather(table=rows).over(_Placed(header.grid)), _end(rows)  # type: ignore[arg-type]
+    weather, end = Weather(table=rows).over(Placed(header.grid)), _end(rows)  # type: ignore[arg-type]
     outcome, observed = _outcome(folder, header.grid, hours, end)
     last = float(outcome.minutes[-1])
     if last > end + 1e-3:
@@ -143,7 +143,7 @@ def _read(folder: Path, hours: float | None, units: Mapping[str, str] | None, ca
 
 
 @dataclass(frozen=True)
-class _Placed:
+class Placed:
     """The part of a landscape that a wind reads to turn its bearings."""
 
     grid: Grid

@@ -1,6 +1,6 @@
 """Scores of laws on fires, fits to all fires, and leave-one-out cross-validation."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Protocol
 
 import torch
@@ -8,13 +8,16 @@ from torch import Tensor
 
 from warp_torchrl.prediction.calibration.candidates import burnable
 from warp_torchrl.prediction.calibration.case import FireCase
-from warp_torchrl.prediction.calibration.null_models import circle_cells, ellipse_cells
-from warp_torchrl.prediction.calibration.parameters import Parameter, fire_at
-from warp_torchrl.prediction.calibration.scores import Scores, scores_at_area, scores_of
+from warp_torchrl.prediction.calibration.parameters import Parameter
+from warp_torchrl.prediction.scores.null_models import circle_cells, ellipse_cells, walking_ellipse_cells
+from warp_torchrl.prediction.scores.scar import Scores, scores_at_area, scores_of
 from warp_torchrl.world.arrays.random import world_key
 from warp_torchrl.world.behaviour.moistures import MOISTURES
 from warp_torchrl.world.fires.alone import arrival_minutes
 from warp_torchrl.world.law.rate import RateFire
+
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Shares of a fit that are tried on fires left out: 0 is the law without a fit."""
 
 
 class FittingMethod(Protocol):
@@ -39,11 +42,12 @@ def score(fire: RateFire, case: FireCase, draws: int = 64, seed: int = 1) -> Sco
 
 
 def null_scores(fire: RateFire, case: FireCase) -> dict[str, Scores]:
-    """Return the scores of the circle and of the ellipse over the cells that can burn under a law."""
+    """Return the scores of the circle and of both ellipses over the cells that can burn under a law."""
     fuel, cells = burnable(fire, case), int(case.scar.sum())
     grown = {
         "circle": circle_cells(case.lit, fuel, cells),
         "ellipse": ellipse_cells(case.lit, fuel, cells, case.wind),
+        "walking ellipse": walking_ellipse_cells(case.lit, fuel, cells, case.wind),
     }
     return {name: scores_at_area(burned, case.scar) for name, burned in grown.items()}
 
@@ -80,12 +84,16 @@ def folds(cases: Sequence[FireCase]) -> Iterator[tuple[FireCase, list[FireCase]]
         yield left_out, [case for place, case in enumerate(cases) if place != index]
 
 
-def fit_law(
-    method: FittingMethod,
-    fire: RateFire,
-    parameters: Sequence[Parameter],
-    cases: Sequence[FireCase],
-    progress: Callable[[int, float], None] = lambda step, loss: None,
-) -> RateFire:
-    """Return the law with its parameters fitted to some fires."""
-    return fire_at(fire, parameters, method(fire, parameters, cases, progress))
+def agreement(scores: Scores) -> float:
+    """Return the mean of the Jaccard indices at the area and at the known hour."""
+    assert scores.jaccard is not None  # of a law
+    return (scores.jaccard_at_area + scores.jaccard) / 2.0
+
+
+def best_share(found: Sequence[Mapping[float, Scores]]) -> float:
+    """Return the share of a fit with the best mean agreement on fires left out; of equal ones the least.
+
+    Args:
+        found: Of each fire the scores under each share of ``SHARES`` of the fit to the others.
+    """
+    return max(SHARES, key=lambda share: (sum(agreement(each[share]) for each in found), -share))

@@ -1,5 +1,6 @@
 """Ground of a real fire: its fuel, elevation and canopy."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import torch
@@ -25,16 +26,31 @@ def read_ground(folder: Path, header: Header, units: CanopyUnits) -> tuple[Lands
     Raises:
         ValueError: If a layer does not fit, or crowns are not whole.
     """
-    codes, known = read_layer("fuel", header.path, header.number)
-    fuel = to_fuel(codes, known & is_code(codes, {}))
-    cover = torch.full((1, *header.grid.shape), int(Cover.FOREST), dtype=torch.uint8)
+    bare = _of_fuel(header)
     path = found("elevation", folder)
     elevation, told = (
         (None, ["elevation: none, the ground is level"]) if path is None else _elevation(path, header.grid)
     )
-    ground = Landscape(cover=cover, age=torch.full_like(cover, OLDEST), elevation=elevation)
     canopy, of_canopy = _canopy(folder, header.grid, units)
-    return ground.with_layers(fuel=torch.from_numpy(fuel)[None], **canopy), [*told, *of_canopy]
+    return replace(bare, elevation=elevation).with_layers(**canopy), [*told, *of_canopy]
+
+
+def read_fuel(path: Path) -> tuple[Header, Landscape]:
+    """Return the header of a raster of fuel codes, and level ground with these fuels.
+
+    Raises:
+        ValueError: If it cannot be read.
+    """
+    header = read_header("fuel", path)
+    return header, _of_fuel(header)
+
+
+def _of_fuel(header: Header) -> Landscape:
+    codes, known = read_layer("fuel", header.path, header.number)
+    fuel = to_fuel(codes, known & is_code(codes, {}))
+    cover = torch.full((1, *header.grid.shape), int(Cover.FOREST), dtype=torch.uint8)
+    bare = Landscape(cover=cover, age=torch.full_like(cover, OLDEST), elevation=None)
+    return bare.with_layers(fuel=torch.from_numpy(fuel)[None])
 
 
 def _canopy(folder: Path, grid: Grid, units: CanopyUnits) -> tuple[dict[str, Tensor], list[str]]:

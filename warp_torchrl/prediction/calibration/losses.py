@@ -5,7 +5,8 @@ from typing import Literal
 import torch
 from torch import Tensor
 
-from warp_torchrl.prediction.calibration.scores import BURNS, first_cells, jaccard, order_of_burning
+from warp_torchrl.prediction.scores.arrivals import first_cells, order_of_burning
+from warp_torchrl.prediction.scores.cells import BURNS, jaccard
 
 Loss = Literal["jaccard", "cross_entropy", "brier"]
 """``jaccard`` is the mean of 1 - J at the known hours and at the scar's area; the others compare probabilities."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
 from warp_torchrl.prediction.calibration.evolution import Evolution
@@ -18,6 +19,7 @@ class CalibrationOptions:
     Attributes:
         fires: Folders of real fires, see ``warp_torchrl.prediction.calibration.case.read_fire_case``.
         hours: When their scars are known [h]; None is the end of each one's weather.
+        hours_by_fire: The same of single fires, by the names of their folders: ``hours_by_fire.clinge=3``.
         units: Unit of a quantity or column of their weather where files state none, ``units.wind_speed=km/h``; for
             ``datetime`` the order of its dates, ``units.datetime=d/m/y``.
         height_unit: Metres per unit of their canopies' heights where files state none: 0.1 for LANDFIRE.
@@ -31,7 +33,8 @@ class CalibrationOptions:
         steps: Steps of gradients or generations of evolution; None is 8 or 15.
         population: Candidates of each generation.
         softness: Deviation of the logarithm of a fire's rates in the expected burning of gradients.
-        leave_one_out: Whether each fire is left out in turn, and scored by a law fitted to the others.
+        leave_one_out: Whether each fire of two or more is left out in turn, and scored by a law fitted to the others;
+            the fit then keeps the share that is best on fires left out, or nothing.
         draws: Fires that are run for each score.
         seed: Of all draws.
         out: Folder to write to; None makes one in ``outputs/calibrations``.
@@ -44,6 +47,7 @@ class CalibrationOptions:
 
     fires: tuple[str, ...] = ()
     hours: float | None = None
+    hours_by_fire: Mapping[str, float] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     height_unit: float | None = None
     density_unit: float | None = None
@@ -56,7 +60,7 @@ class CalibrationOptions:
     steps: int | None = None
     population: int = 8
     softness: float = 0.2
-    leave_one_out: bool = False
+    leave_one_out: bool = True
     draws: int = 64
     seed: int = 1
     out: str | None = None
@@ -68,11 +72,17 @@ class CalibrationOptions:
         check_fields(self, hours=(1e-2, 1e5), draws=(1, 100_000), steps=(1, 10_000))
         if not self.fires:
             raise ValueError("fires must name folders of fires that happened, got none")
-        if self.leave_one_out and not self.parameters:
-            raise ValueError("parameters must be given where fires are left out, got none")
-        if self.leave_one_out and len(self.fires) < 2:
-            raise ValueError(f"fires must be two at least where one is left out, got {len(self.fires)}")
+        names = [Path(each).name for each in self.fires]
+        for name, hours in self.hours_by_fire.items():
+            if name not in names:
+                raise ValueError(f"hours_by_fire must name some of {', '.join(names)}, got {name}")
+            if isinstance(hours, bool) or not isinstance(hours, int | float) or not 1e-2 <= hours <= 1e5:
+                raise ValueError(f"hours_by_fire.{name} must be in [0.01, 100000], got {hours!r}")
         _ = self.fit  # refuse what it refuses
+
+    def hours_of(self, folder: str) -> float | None:
+        """Return when the scar of a fire's folder is known [h]; None at the end of its weather."""
+        return self.hours_by_fire.get(Path(folder).name, self.hours)
 
     @property
     def fit(self) -> FittingMethod:

@@ -1,12 +1,15 @@
 """Report of a calibration: a table, and the law as a yaml that ``fire=`` takes."""
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, asdict, fields
+from pathlib import Path
 from typing import Any
 
 import yaml
 
-from warp_torchrl.prediction.calibration.scores import Scores
+from warp_torchrl.prediction.scores.scar import Scores
+from warp_torchrl.system import disk
 from warp_torchrl.world.law.rate import RateFire
 
 ScoreRows = Mapping[str, Mapping[str, Scores]]
@@ -16,10 +19,34 @@ _COLUMNS = {
     "sorensen_at_area": "Sorensen at area",
     "jaccard": "Jaccard at hour",
     "sorensen": "Sorensen at hour",
+    "kappa": "kappa",
     "area_error": "area error",
+    "brier": "Brier",
     "arrival_bias": "arrival bias [min]",
+    "arrival_mae": "arrival MAE [min]",
     "arrival_error": "arrival RMSE [min]",
 }
+
+
+class ScoreLog:
+    """Scores by fire and by what was scored; each is written as soon as it is known, a line of JSON.
+
+    Args:
+        path: The file, which is begun again.
+        fires: Their names, in the order of the rows.
+    """
+
+    def __init__(self, path: Path, fires: Sequence[str]) -> None:
+        self._path = path
+        self.scores: dict[str, dict[str, Scores]] = {name: {} for name in fires}
+        with disk.with_path(path):
+            path.write_text("")
+
+    def add(self, fire: str, model: str, scores: Scores) -> None:
+        """Add the scores of a model on a fire."""
+        self.scores[fire][model] = scores
+        with disk.with_path(self._path), self._path.open("a") as file:
+            file.write(json.dumps({"fire": fire, "model": model, **asdict(scores)}) + "\n")
 
 
 def scores_table(rows: ScoreRows) -> str:

@@ -14,7 +14,8 @@ from torch import Tensor
 from warp_torchrl.prediction.observed.observation import Observation
 from warp_torchrl.prediction.observed.posterior import Posterior
 from warp_torchrl.prediction.observed.scene import ByTimes, InSteps, Scene
-from warp_torchrl.prediction.observed.scores import (
+from warp_torchrl.prediction.scores.growth import (
+    STEPS,
     ForecastScores,
     GrowthScores,
     forecast_scores,
@@ -29,8 +30,6 @@ from warp_torchrl.world.fires.sectors import sectors_about
 from warp_torchrl.world.fires.sightings import Front, HotSpotSensor, Sight, hot_spot_sight, perimeter_sight
 from warp_torchrl.world.state.window import Window
 
-STEPS = 12
-"""Times at which a forecast of arrival is compared between two observations."""
 SHARES = (0.05, 0.25, 0.5, 0.75, 0.95)
 """Quantiles that are kept of what was learned."""
 FORECASTS = ("persistence", "free", "restart", "members", "corrected")

@@ -6,11 +6,11 @@ from typing import Any
 
 from warp_torchrl.env.pictures.drawing import save_figure, sheet, style
 from warp_torchrl.prediction.observed.correction import FORECASTS, SHARES, Corrected
-from warp_torchrl.prediction.observed.scores import joined_reliability
+from warp_torchrl.prediction.scores.probabilities import joined_reliability
 from warp_torchrl.system import disk
 
 FIGURE, SCORES = "observed.png", "observed.csv"
-_SCORES = ("jaccard", "kappa", "growth_jaccard", "brier", "crps", "area")
+_SCORES = ("jaccard", "kappa", "growth_jaccard", "growth_sorensen", "brier", "crps", "area")
 _QUANTITIES = {
     "pace": "rate of the head, of the given one",
     "rate": "factor on all rates",

@@ -110,7 +110,8 @@ class PredictionOptions:
             spots of satellites (CSV). Each corrects the prediction, which continues from the last one.
         observed_zone: Hours that the weather's rows are ahead of UTC, for times in UTC where neither rows nor file say
             it: ``observed_zone=-7``.
-        uncertain: Whether fires differ by ``members`` where nothing is observed, too.
+        uncertain: By what fires differ where nothing is observed: ``rate`` by the factor on all rates alone, ``all`` by
+            all of ``members``, ``none`` by the law's own deviations. A single fire is that of the law as given.
         members: How far fires differ before anything is seen: ``members.rate=0.4``, ``members.wind_speed``,
             ``members.bearing`` [degrees], ``members.moisture``, ``members.local``, ``members.held``.
         hot_spots: The satellite: ``hot_spots.pixel=375`` [m], ``hot_spots.detection``, ``hot_spots.false_alarm``,
@@ -119,6 +120,7 @@ class PredictionOptions:
         firebrands: How many, how far and how long: ``firebrands.per_heat=1`` [1/GJ], ``firebrands.least_intensity``
             [kW/m], ``firebrands.decay`` [m], ``firebrands.temperature`` [C], ``firebrands.delay`` [minutes],
             ``firebrands.followed``.
+        arrivals: Whether the times of every fire are written, a band for each, as ``warp score`` reads them.
         animation: Whether the first fire is written as a GIF.
         out: Folder to write to; None makes one in ``outputs/predictions``.
         overwrite: Write into a folder that holds something.
@@ -146,11 +148,12 @@ class PredictionOptions:
     cell_size: float | None = None
     observed: str | None = None
     observed_zone: float | None = None
-    uncertain: bool = False
+    uncertain: Literal["rate", "all", "none"] = "rate"
     members: Deviations = field(default_factory=Deviations)
     hot_spots: HotSpotSensor = field(default_factory=HotSpotSensor)
     embers: bool = False
     firebrands: Firebrands = field(default_factory=Firebrands)
+    arrivals: bool = False
     animation: bool = False
     out: str | None = None
     overwrite: bool = False
@@ -174,8 +177,10 @@ class PredictionOptions:
                 raise ValueError(f"{name} must name {what}, got null")
         if self.firebrands != Firebrands() and not self.embers:
             raise ValueError("firebrands is read with embers=true, got embers=false")
-        if self.members != Deviations() and not self.uncertain and self.observed is None:
-            raise ValueError("members is read with uncertain=true or observed=FILE, got neither")
+        read = {"rate": Deviations(rate=self.members.rate), "all": self.members, "none": Deviations()}
+        if self.observed is None and self.members != read[self.uncertain]:
+            what = "members" if self.uncertain == "none" else "members but members.rate"
+            raise ValueError(f"{what} is read with uncertain=all or observed=FILE, got uncertain={self.uncertain}")
 
 
 @dataclass(frozen=True, kw_only=True)

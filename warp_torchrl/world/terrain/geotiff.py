@@ -16,7 +16,11 @@ NO_RASTERIO_TO_WRITE = (
 
 
 def write_geotiff(
-    path: Path, layers: Mapping[str, Tensor | np.ndarray], grid: Grid, corner: tuple[int, int] = (0, 0)
+    path: Path,
+    layers: Mapping[str, Tensor | np.ndarray],
+    grid: Grid,
+    corner: tuple[int, int] = (0, 0),
+    unit: str = "",
 ) -> None:
     """Write layers as the bands of one GeoTIFF, compressed, whole or not at all.
 
@@ -28,6 +32,7 @@ def write_geotiff(
         layers: By the band's name, [rows, columns] each, all of one shape.
         grid: The grid that they lie on, with its CRS and transform.
         corner: (row, column) of the layers' first cell in the grid, for a window of it.
+        unit: Of all bands; nothing states none.
 
     Raises:
         ValueError: If there is no layer, shapes differ or leave the grid, a number does not fit, or rasterio is not
@@ -55,6 +60,8 @@ def write_geotiff(
             file.write(np.stack([band.astype(dtype) for band in bands.values()]))
             for number, name in enumerate(bands, start=1):
                 file.set_band_description(number, name)
+                if unit:
+                    file.set_band_unit(number, unit)
         disk.replace(path, bytes(memory.getbuffer()))
 
 

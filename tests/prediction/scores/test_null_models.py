@@ -5,7 +5,14 @@ import math
 import pytest
 import torch
 
-from warp_torchrl.prediction.calibration.null_models import circle_cells, ellipse_cells, length_to_breadth, mean_wind
+from tests.prediction.calibration.ground import drawn
+from warp_torchrl.prediction.scores.null_models import (
+    circle_cells,
+    ellipse_cells,
+    length_to_breadth,
+    mean_wind,
+    walking_ellipse_cells,
+)
 
 FUEL = torch.ones(61, 61, dtype=torch.bool)
 
@@ -55,3 +62,24 @@ def test_the_length_to_breadth_is_that_of_the_canadian_curve():
 
 def test_the_mean_wind_is_one_of_vectors_by_their_time():
     assert mean_wind(torch.tensor([[4.0, 0.0], [0.0, 2.0]]), torch.tensor([60.0, 180.0])).tolist() == [1.0, 1.5]
+
+
+def test_a_walking_ellipse_goes_round_what_cannot_burn():
+    fuel, still = drawn("#.###", "#.###", "#####", "#.###"), torch.zeros(2)
+    start = drawn("#....", ".....", ".....", ".....")
+    # Steps of 1, 2, 3 to the south; sqrt(5) to the gap, and over it 1 + sqrt(5)
+    assert torch.equal(walking_ellipse_cells(start, fuel, 6, still), drawn("#....", "#....", "###..", "#...."))
+    fuel[2, 1] = False
+    assert int(walking_ellipse_cells(start, fuel, 99, still).sum()) == 4, "beyond the rock nothing is reached"
+
+
+def test_a_walking_ellipse_over_open_fuel_is_nearly_the_plain_one():
+    wind = torch.tensor([2.0, 1.0])
+    walked, plain = walking_ellipse_cells(lit(), FUEL, 400, wind), ellipse_cells(lit(), FUEL, 400, wind)
+    assert int((walked & plain).sum()) > 0.93 * 400
+
+
+def test_a_knight_s_step_needs_one_of_the_cells_that_it_crosses():
+    start = drawn("#..", "...")
+    for fuel, reached in ((drawn("#..", "..#"), 1), (drawn("##.", "..#"), 3)):
+        assert int(walking_ellipse_cells(start, fuel, 9, torch.zeros(2)).sum()) == reached

@@ -4,16 +4,9 @@ import pytest
 import torch
 
 from tests.prediction.calibration.ground import drawn
-from warp_torchrl.prediction.calibration.scores import (
-    area_error,
-    arrival_difference,
-    burn_probability,
-    first_cells,
-    jaccard,
-    order_of_burning,
-    scores_of,
-    sorensen,
-)
+from warp_torchrl.prediction.scores.arrivals import arrival_error, burn_probability, first_cells, order_of_burning
+from warp_torchrl.prediction.scores.cells import area_error, jaccard, sorensen
+from warp_torchrl.prediction.scores.scar import scores_of
 from warp_torchrl.world.law.travel import NEVER
 
 SCAR = drawn("....", ".##.", ".##.")
@@ -67,9 +60,10 @@ def test_half_of_the_fires_are_enough_to_tell_a_cell_to_burn():
 def test_times_of_arrival_are_compared_where_both_burned():
     times = torch.tensor([[[10.0, 30.0, 50.0, NEVER]]])
     observed = torch.tensor([[12.0, 24.0, float("nan"), 5.0]])  # off by -2 and 6
-    bias, error = arrival_difference(times, observed, 60.0)
-    assert bias == pytest.approx(2.0) and error == pytest.approx((40 / 2) ** 0.5)
-    assert arrival_difference(times, torch.full_like(observed, float("nan")), 60.0) is None
+    found = arrival_error(times, observed, 60.0)
+    assert found.bias == pytest.approx(2.0) and found.mean_absolute == pytest.approx(4.0)
+    assert found.root_mean_square == pytest.approx((40 / 2) ** 0.5)
+    assert arrival_error(times, torch.full_like(observed, float("nan")), 60.0) is None
 
 
 def test_the_scores_of_a_fire_that_came_too_far():

@@ -4,13 +4,9 @@ import pytest
 import torch
 
 from tests.prediction.calibration.ground import drawn
-from warp_torchrl.prediction.observed.scores import (
-    forecast_scores,
-    joined_reliability,
-    kappa,
-    reliability,
-    time_between,
-)
+from warp_torchrl.prediction.scores.cells import kappa
+from warp_torchrl.prediction.scores.growth import forecast_scores, time_between
+from warp_torchrl.prediction.scores.probabilities import joined_reliability, reliability
 from warp_torchrl.world.fires.sightings import Front
 
 ALL = drawn("######")
@@ -39,7 +35,8 @@ def test_a_forecast_is_scored_over_the_growth_alone():
     # 0.25^2 + 0.5^2 + 0.75^2 + 0.5^2 over three cells
     assert found.brier == pytest.approx((0.0625 + 0.25 + 0.5625 + 0.25) / 3.0)
     assert found.crps == pytest.approx(60.0 * found.brier)
-    assert found.growth_jaccard == pytest.approx(2.0 / 4.0) and found.jaccard == pytest.approx(3.0 / 5.0)
+    assert found.growth_jaccard == pytest.approx(2.0 / 4.0) and found.growth_sorensen == pytest.approx(4.0 / 6.0)
+    assert found.jaccard == pytest.approx(3.0 / 5.0)
     assert found.area == pytest.approx(4.0 / 4.0)
     # told 4, burned 4, 3 of both, of 6: agreed 4/6; by chance (2/3)^2 + (1/3)^2 = 5/9
     assert found.kappa == pytest.approx((4.0 / 6.0 - 5.0 / 9.0) / (1.0 - 5.0 / 9.0))

@@ -1,0 +1,1 @@
+"""Scores of predicted fires against observed ones: one definition of each."""
