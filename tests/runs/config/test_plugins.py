@@ -313,7 +313,7 @@ def test_an_environment_needs_no_learner_and_a_learner_says_what_is_missing():
 
 def test_an_unknown_scenario_is_refused_before_training():
     values = plain(compose_config("train", []))
-    with pytest.raises(ConfigError, match=r"scenario must be one of .*, got mine, of which no run"):
+    with pytest.raises(ConfigError, match=r"scenario must be one of .*, got mine; runs in another could not be read"):
         run_config({**values, "scenario": "mine"})
 
 

@@ -86,8 +86,8 @@ def check_keys(config: Mapping[str, Any]) -> None:
     scenarios = option_names("scenario")
     if config["scenario"] not in scenarios:
         raise ConfigError(
-            f"scenario must be one of {', '.join(scenarios)}, got {config['scenario']}, of which no run could be read "
-            "again; one of your own stands in a plug-in, plugins=[...]"
+            f"scenario must be one of {', '.join(scenarios)}, got {config['scenario']}; runs in another could not be "
+            "read again: put it into a plug-in, and list that, plugins=[...]"
         )
 
 

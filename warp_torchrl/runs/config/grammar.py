@@ -132,7 +132,7 @@ def listed_plugins(arguments: Sequence[str]) -> tuple[str, ...]:
     Raises:
         ConfigError: If it is no list.
     """
-    listed = ()
+    listed: tuple[str, ...] = ()
     for argument in (each for each in arguments if each.lstrip("+").startswith("plugins=")):
         check_overrides([argument])
         value = OverridesParser.create().parse_override(argument).value()

@@ -12,7 +12,7 @@ from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from hydra.core.config_search_path import ConfigSearchPath
 from hydra.core.config_store import ConfigStore
@@ -37,9 +37,9 @@ Plugin = str | ModuleType
 """A plug-in, or its name."""
 ENTRY_POINTS = "warp_torchrl.plugins"
 """Group of the entry points by which installed packages are plug-ins."""
-_NAMED = {"heuristic": heuristic, "mechanic": mechanic, "term": term, "ability": ability}
+_NAMED: dict[str, Callable[..., Any]] = {"heuristic": heuristic, "mechanic": mechanic, "term": term, "ability": ability}
 """Tables whose rows have a name that is given."""
-_FUNCTIONS = {
+_FUNCTIONS: dict[str, Callable[..., Any]] = {
     "channel": channel,
     "number": number,
     "picture_channel": picture_channel,
@@ -101,12 +101,11 @@ def register(kind: str, name: str | None = None, **options: Any) -> Callable[[Ad
     """
     if kind not in KINDS:
         raise ValueError(f"kind must be one of {', '.join(KINDS)}, got {kind!r}{did_you_mean(kind, KINDS)}")
-
     if options and kind not in _FUNCTIONS:
         raise ValueError(f"{kind} takes no options, got {', '.join(options)}")
 
     def add(made: Added) -> Added:
-        called = name or _snake(made.__name__)
+        called = name or (_snake(made.__name__) if isinstance(made, type) else made.__name__)
         if kind in COMPONENTS:
             _add_option(kind, called, made)
         elif kind in _NAMED:
@@ -122,7 +121,7 @@ def register(kind: str, name: str | None = None, **options: Any) -> Callable[[Ad
 
 
 def add_scenario(name: str, overrides: Sequence[str]) -> None:
-    """Add a scenario that differs from the default one by overrides in the command line's grammar.
+    """Add a scenario that differs from the defaults of worlds by overrides in the command line's grammar.
 
         add_scenario("ridge", ["wind=gusts", "wind.speed=8", "landscape.size=24", "team.n_agents=3"])
 
@@ -139,14 +138,11 @@ def add_scenario(name: str, overrides: Sequence[str]) -> None:
         else:
             OmegaConf.update(node, each.key_or_group, each.value(), force_add=True)
     _check_new("scenario", name, _OWNERS.get(f"scenario={name}") == module)
-    values = {**({"defaults": chosen} if chosen else {}), **_plain(node)}
+    own = cast("dict[str, Any]", OmegaConf.to_container(node))
+    values = {**({"defaults": chosen} if chosen else {}), **own}
     ConfigStore.instance().store(name, values, group="scenario", package="_global_", provider=module)
     _OPTIONS.setdefault("scenario", {})[name] = ""
     _own(f"scenario={name}", module)
-
-
-def _plain(node: Any) -> dict[str, Any]:
-    return dict(OmegaConf.to_container(node))  # type: ignore[call-overload]
 
 
 def _add_option(group: str, name: str, kind: Any) -> None:
