@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -133,7 +134,8 @@ def _at(predicted: Predicted, before: Seen, each: Seen, is_last: bool) -> Observ
     if predicted.arrival is None or each.kind == "scar":
         forecast = replace(forecast, crps=torch.nan)  # when cells burned, or would, is not known
     if not bool(front.growth.any()):
-        forecast = replace(forecast, **dict.fromkeys(_OF_GROWTH, torch.nan))
+        of_growth: dict[str, Any] = dict.fromkeys(_OF_GROWTH, torch.nan)
+        forecast = replace(forecast, **of_growth)
     areas, seen_ha = predicted.areas(each.minutes), float(each.burned.sum()) * hectare
     return ObservationScores(
         minutes=each.minutes,

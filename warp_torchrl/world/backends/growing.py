@@ -5,8 +5,8 @@ tick, and all that their times follow from, lie in the window.
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import torch
 from torch import Tensor
@@ -54,8 +54,9 @@ class Caught:
         def longer(values: Tensor) -> Tensor:
             return torch.cat((values, values[:1].expand(more)))
 
-        planes = (longer(each) for each in (self.fire, self.cell, self.minutes, self.steep, self.pace))
-        return Caught(self.window, *planes, self.count)
+        names = ("fire", "cell", "minutes", "steep", "pace")
+        planes: dict[str, Any] = {name: longer(getattr(self, name)) for name in names}
+        return replace(self, **planes)
 
 
 class Embers(Protocol):

@@ -88,8 +88,8 @@ def hidden_probability(beliefs: Beliefs, fires: int) -> Tensor:
         p = (1 - o) ((1 - g)^m - (1 - g - h)^m), m = fires that were not found
 
     h is the share that burns in a cell, and g the share that has burned out there, so that of several fires the first
-    to arrive counts. Both are means over the cells within ``BLUR``: fires of one place differ, and M of them leave gaps.
-    o is the share of the members in which the cell has burned out.
+    to arrive counts. Both are means over the cells within ``BLUR``: fires of one place differ, and M of them leave
+    gaps. o is the share of the members in which the cell has burned out.
 
     Args:
         beliefs: What is believed.
