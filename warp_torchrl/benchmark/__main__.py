@@ -1,7 +1,8 @@
 """Speed, calibration of scenarios and checks of fires: ``warp benchmark WHAT``.
 
-WHAT is tick, env, train, scaling, tasks, rewards, generalist, fires, ellipses, predict, twins or beliefs; several run
-one after the other. gpu runs alone: it measures everything on a card in under five minutes, and writes it to a file.
+WHAT is tick, env, train, scaling, tasks, rewards, generalist, fires, ellipses, predict, twins, witness or beliefs;
+several run one after the other. gpu runs alone: it measures everything on a card in under five minutes, and writes it
+to a file.
 """
 
 import argparse
@@ -41,6 +42,7 @@ from warp_torchrl.benchmark.tasks import (
 from warp_torchrl.benchmark.ticks import tick_cost, tick_table
 from warp_torchrl.benchmark.trainings import training_speed
 from warp_torchrl.benchmark.twins import HIDDEN, twin_experiments, twin_table
+from warp_torchrl.benchmark.witness import witness_errors, witness_table
 from warp_torchrl.commands.program import flag_arguments, one_line_end
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.runs.checkpoint import CheckpointError
@@ -153,6 +155,10 @@ def _beliefs(options: Namespace) -> dict[str, Rows]:
     return {"beliefs": rows}
 
 
+def _witness(options: Namespace) -> dict[str, Rows]:
+    return {"witness": witness_errors(options.beds)}
+
+
 def _twins(options: Namespace) -> dict[str, Rows]:
     names = [name for name in HIDDEN if not options.hidden or any(name.startswith(each) for each in options.hidden)]
     if not names:
@@ -173,6 +179,7 @@ _MEASURES = {
     "predict": _predict,
     "beliefs": _beliefs,
     "twins": _twins,
+    "witness": _witness,
 }
 _TABLES = {
     "tick": tick_table,
@@ -189,6 +196,7 @@ _TABLES = {
     "predict": prediction_table,
     "beliefs": belief_table,
     "twins": twin_table,
+    "witness": witness_table,
 }
 
 
@@ -227,6 +235,7 @@ def _parser() -> argparse.ArgumentParser:
     told = "for twins: how many forecast each"
     parser.add_argument("--members", type=whole(2, 10_000), nargs="+", default=[100], help=told)
     parser.add_argument("--hidden", nargs="+", metavar="WORD", help=f"for twins: first words of {'; '.join(HIDDEN)}")
+    parser.add_argument("--beds", type=whole(1, 1_000_000), default=2000, help="for witness: random fuel beds")
     parser.add_argument("--device", help="cpu by default; for gpu cuda, and cpu shows in small that it runs")
     parser.add_argument("--file", type=file_to_write, default=Path("gpu.json"), metavar="FILE.json", help="for gpu")
     parser.add_argument("--json", action="store_true", help="print JSON instead of tables")

@@ -8,7 +8,8 @@ import csv
 import random
 from pathlib import Path
 
-from tests.world.behaviour.test_witness import DAMP, MOISTURES, crown_beds, crown_witness, witness
+from tests.world.behaviour.test_witness import DAMP, MOISTURES, witness
+from warp_torchrl.benchmark.witness import crown_beds, crown_witness
 from warp_torchrl.world.behaviour.standard_fuels import NOT_BURNABLE, anderson_13, scott_burgan_40
 
 RECORD = Path(__file__).parent / "witness.csv"

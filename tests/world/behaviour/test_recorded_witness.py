@@ -7,14 +7,11 @@ import numpy as np
 import pytest
 
 from warp_torchrl import rate_of_spread
+from warp_torchrl.benchmark.witness import of_crowns
 
 RECORD = Path(__file__).parent / "witness.csv"  # of record_witness.py
 CROWNS = RECORD.with_name("crown_witness.csv")
 MOISTURES = ("dead_1h", "dead_10h", "dead_100h", "live_herbaceous", "live_woody")
-WATER = (
-    *(f"fuel_moisture_dead_{hours}hr" for hours in (1, 10, 100)),
-    *("fuel_moisture_live_herbaceous", "fuel_moisture_live_woody"),
-)
 
 
 def read(path: Path) -> dict[str, np.ndarray]:
@@ -51,18 +48,7 @@ def test_rates_are_those_on_record(rows, model) -> None:
 
 def test_crown_fires_are_those_on_record() -> None:
     bed = read(CROWNS)
-    ours = rate_of_spread(
-        bed["fuel_model"],
-        "fbfm40",
-        (bed["wind_speed_10m"], bed["upwind_direction"]),
-        bed["slope"],
-        bed["aspect"],
-        moisture={name: bed[theirs] for name, theirs in zip(MOISTURES, WATER, strict=True)},
-        canopy={
-            **{name: bed[f"canopy_{name}"] for name in ("cover", "height", "base_height", "bulk_density")},
-            "foliar_moisture": bed["foliar_moisture"],
-        },
-    )
+    ours = of_crowns(bed)
     assert (ours.kind.numpy() == bed["kind"]).all() and np.bincount(bed["kind"].astype(int)).min() >= 5
     for name in ("head", "intensity", "flame_length"):
         assert getattr(ours, name).numpy() == pytest.approx(bed[name], rel=0.01, abs=1e-4), name

@@ -2,23 +2,18 @@
 
 import itertools
 import math
-import random
 
 import numpy as np
 import pytest
 
 from warp_torchrl import rate_of_spread
+from warp_torchrl.benchmark.witness import witness_errors
 from warp_torchrl.world.behaviour.standard_fuels import NOT_BURNABLE, anderson_13, scott_burgan_40
 
 fuel_models = pytest.importorskip("pyretechnics.fuel_models", reason="needs the extra witness, and Python below 3.13")
-from pyretechnics import burn_cells, surface_fire, vector_utils  # noqa: E402
-from pyretechnics.space_time_cube import SpaceTimeCube  # noqa: E402
+from pyretechnics import surface_fire, vector_utils  # noqa: E402
 
 MOISTURES = ("dead_1h", "dead_10h", "dead_100h", "live_herbaceous", "live_woody")
-WATER = {
-    **{f"dead_{hours}h": f"fuel_moisture_dead_{hours}hr" for hours in (1, 10, 100)},
-    **{f"live_{each}": f"fuel_moisture_live_{each}" for each in ("herbaceous", "woody")},
-}
 DAMP = [(3, 4, 5, 30, 60), (6, 7, 8, 60, 90), (6, 7, 8, 90, 60), (10, 12, 13, 120, 150), (18, 20, 22, 75, 100)]
 FIELDS = {"head": 0, "length_to_breadth": 2, "intensity": 3, "flame_length": 4}
 
@@ -34,51 +29,6 @@ def witness(code, damp, speed, bearing, slope, aspect):
     direction = vector_utils.spread_direction_vector_to_angle(fire["max_spread_direction"])
     size = fire["max_fireline_intensity"], fire["max_flame_length"]
     return fire["max_spread_rate"], direction, fire["length_to_width_ratio"], *size
-
-
-def crown_witness(bed):
-    """Kind, rate [m/min], intensity [kW/m] and flame length [m] of the head on a bed of ``crown_beds``."""
-    share = {"canopy_cover", "foliar_moisture", *WATER.values()}
-    given = {name: value / 100 if name in share else value for name, value in bed.items()}
-    given |= {"slope": math.tan(math.radians(bed["slope"])), "wind_speed_10m": 3.6 * bed["wind_speed_10m"]}
-    cubes = {name: SpaceTimeCube((1, 1, 1), value) for name, value in given.items()}
-    fire = burn_cells.burn_cell_as_head_fire(cubes, (0, 0, 0))
-    return fire["fire_type"] - 1, fire["spread_rate"], fire["fireline_intensity"], fire["flame_length"]
-
-
-def crown_beds(count, seed=0):
-    """Random fuel beds under random canopies, by the names that the witness has for them."""
-    draw = random.Random(seed)
-    codes = sorted(set(scott_burgan_40().codes.tolist()) - set(NOT_BURNABLE.values()))
-    for _ in range(count):
-        height, dead = draw.uniform(3, 40), draw.uniform(2, 14)
-        yield {
-            "fuel_model": draw.choice(codes),
-            "slope": draw.uniform(0, 40),
-            "aspect": draw.uniform(0, 360),
-            "wind_speed_10m": draw.uniform(0.5, 20),
-            "upwind_direction": draw.uniform(0, 360),
-            "canopy_cover": draw.uniform(30, 100),
-            "canopy_height": height,
-            "canopy_base_height": draw.uniform(0.0, 0.2) * height,
-            "canopy_bulk_density": draw.uniform(0.01, 0.35),
-            "foliar_moisture": draw.uniform(70, 130),
-            "fuel_moisture_dead_1hr": dead,
-            "fuel_moisture_dead_10hr": dead + 1,
-            "fuel_moisture_dead_100hr": dead + 2,
-            "fuel_moisture_live_herbaceous": draw.uniform(30, 120),
-            "fuel_moisture_live_woody": draw.uniform(60, 150),
-        }
-
-
-def told_of_crowns(beds, **options):
-    """What ``rate_of_spread`` tells of columns of ``crown_beds``."""
-    crowns = ("cover", "height", "base_height", "bulk_density")
-    canopy = {name: beds[f"canopy_{name}"] for name in crowns} | {"foliar_moisture": beds["foliar_moisture"]}
-    water = {name: beds[theirs] for name, theirs in WATER.items()}
-    wind = beds["wind_speed_10m"], beds["upwind_direction"]
-    ground = beds["fuel_model"], "fbfm40", wind, beds["slope"], beds["aspect"]
-    return rate_of_spread(*ground, moisture=water, canopy=canopy, **options)
 
 
 @pytest.fixture(scope="module", params=["fbfm13", "fbfm40"])
@@ -129,9 +79,7 @@ def test_the_wind_at_midflame_height_is_that_of_the_witness(cover, height):
 
 
 def test_crown_fire_on_random_beds_is_that_of_the_witness():
-    beds = list(crown_beds(2000))
-    kind, *theirs = np.array([crown_witness(bed) for bed in beds]).T
-    ours = told_of_crowns({name: np.array([bed[name] for bed in beds]) for name in beds[0]})
-    assert (ours.kind.numpy() == kind).all() and np.bincount(kind.astype(int)).min() > 100
-    for name, expected in zip(("head", "intensity", "flame_length"), theirs, strict=True):
-        assert getattr(ours, name).numpy() == pytest.approx(expected, rel=0.01, abs=1e-4), name
+    rows = {row["quantity"]: row for row in witness_errors(2000)}
+    kind = rows.pop("kind of fire")
+    assert kind["agree %"] == "100.00" and min(int(each.split()[0]) for each in kind["of them"].split(", ")) > 100
+    assert len(rows) == 4 and all(float(row["largest difference %"]) < 1.0 for row in rows.values())
