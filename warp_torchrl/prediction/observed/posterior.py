@@ -1,4 +1,4 @@
-"""What observations teach of a fire: its parameters, and which parts of its front are held.
+"""Posterior of a fire's parameters, and of the parts of its front that are held.
 
 Members that burned since the observation before are the points of an emulator (``world.ensemble.regression``), which
 says of any parameters theta how far the front advances in each sector, m(theta), and what they leave open, v. With it

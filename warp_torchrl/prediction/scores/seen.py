@@ -1,4 +1,4 @@
-"""What was seen of a fire: the cells that had burned by some times, from files of several kinds."""
+"""Sightings of a fire: the cells that had burned by some times, from files of several kinds."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""How strengths make a probability, as ``law`` has it, in the memory of what is used up."""
+"""Probabilities from strengths, as ``law`` has it, in the memory of what is used up."""
 
 from typing import Protocol
 

@@ -1,4 +1,4 @@
-"""What cells are worth, and sums over parts of the map."""
+"""Worth of cells, and sums over parts of the map."""
 
 import torch
 from torch import Tensor

@@ -1,4 +1,4 @@
-"""What is kept of beliefs in the worlds, and what readers make of it.
+"""Planes of beliefs in the worlds, and what readers make of them.
 
 B worlds, G beliefs to a world (the team's, or one of each agent), K members to a belief, M hidden fires to a world.
 """

@@ -1,4 +1,4 @@
-"""How sightings weigh and correct the members of a belief.
+"""Weights and corrections of a belief's members by sightings.
 
 A member's likelihood counts the cells that it tells and those that it does not; members of little weight are replaced
 by copies of heavy ones (Gordon, Salmond and Smith 1993). Then each member's cells that were seen become what was seen,
