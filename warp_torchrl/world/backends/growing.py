@@ -54,8 +54,15 @@ class Caught:
         def longer(values: Tensor) -> Tensor:
             return torch.cat((values, values[:1].expand(more)))
 
-        planes = (longer(each) for each in (self.fire, self.cell, self.minutes, self.steep, self.pace))
-        return Caught(self.window, *planes, self.count)
+        return Caught(
+            window=self.window,
+            fire=longer(self.fire),
+            cell=longer(self.cell),
+            minutes=longer(self.minutes),
+            steep=longer(self.steep),
+            pace=longer(self.pace),
+            count=self.count,
+        )
 
 
 class Embers(Protocol):
