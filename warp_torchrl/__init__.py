@@ -25,12 +25,16 @@ import gymnasium
 import pettingzoo
 
 if TYPE_CHECKING:
+    from warp_torchrl.api.evaluate import evaluate
     from warp_torchrl.api.make import make_env
+    from warp_torchrl.api.names import baselines, scenarios
+    from warp_torchrl.api.train import train
     from warp_torchrl.env import WildfireEnv
     from warp_torchrl.prediction.predict import predict
     from warp_torchrl.prediction.simulation import fire_history, simulate
     from warp_torchrl.runs.policies.load import load_policy
     from warp_torchrl.world.behaviour.rate_of_spread import rate_of_spread
+    from warp_torchrl.world.terrain.array import Array
 
 gymnasium.register(
     "Wildfire-v0",
@@ -43,23 +47,33 @@ if hasattr(pettingzoo, "register"):  # older ones have no registry
 
 __version__ = "0.1.0"
 _PLACES = {
+    "Array": "world.terrain.array",
     "WildfireEnv": "env",
+    "baselines": "api.names",
+    "evaluate": "api.evaluate",
     "fire_history": "prediction.simulation",
     "load_policy": "runs.policies.load",
     "make_env": "api.make",
     "predict": "prediction.predict",
     "rate_of_spread": "world.behaviour.rate_of_spread",
+    "scenarios": "api.names",
     "simulate": "prediction.simulation",
+    "train": "api.train",
 }
 __all__ = [
+    "Array",
     "WildfireEnv",
     "__version__",
+    "baselines",
+    "evaluate",
     "fire_history",
     "load_policy",
     "make_env",
     "predict",
     "rate_of_spread",
+    "scenarios",
     "simulate",
+    "train",
 ]
 
 

@@ -1,9 +1,11 @@
 """Environments by name."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import torch
 
+from warp_torchrl.api.keywords import as_overrides, check_list
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.runs.config.building import check_keys
 from warp_torchrl.runs.config.compose import compose_config, plain
@@ -23,6 +25,7 @@ def make_env(
     validate: bool | None = None,
     compile: bool = False,
     graph: bool = False,
+    **keywords: Any,
 ) -> WildfireEnv:
     """Make the environment of a scenario.
 
@@ -36,6 +39,9 @@ def make_env(
         validate: Check actions on CUDA too.
         compile: Compile the step with ``torch.compile``.
         graph: Record the step as one CUDA graph, where the device is cuda.
+        keywords: More of the configuration by its keys: the name of an option, ``fire="paper"``, values,
+            ``horizon=64`` or ``team=dict(n_agents=3)``, and components, ``landscape=Array(cover=cover)``: a landscape
+            has the size of its array, whatever the scenario's.
 
     Returns:
         A TorchRL ``EnvBase`` of batch size [B].
@@ -43,7 +49,9 @@ def make_env(
     Raises:
         ConfigError: A ``ValueError``, with key, value and rule.
     """
-    config = plain(compose_config("train", [f"scenario={scenario}", *overrides]))
+    check_list("overrides", overrides)
+    further, objects = as_overrides(keywords)
+    config = {**plain(compose_config("train", [f"scenario={scenario}", *overrides, *further])), **objects}
     check_keys(config)
     parts = build_components(config, ENVIRONMENT)
     return WildfireEnv(
