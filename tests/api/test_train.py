@@ -162,3 +162,32 @@ def test_a_run_is_evaluated_elsewhere(trained):
     result = evaluate(trained[0], landscape={"size": 14}, evaluation={"episodes": 3})
     assert len(result.episodes["saved"]) == 3 and result.frames == 64 and result.folder is None
     assert list(result.world_overrides)[:1] == ["landscape.size=14"]
+
+
+CELL = """
+from warp_torchrl import train
+
+class Callback:
+    def on_batch(self, training, row):
+        print("batch", training.frames)
+
+    def on_end(self, training):
+        print("end", training.frames)
+
+run = train({tiny!r}, callbacks=[Callback()], folder={folder!r})
+print(run.result.policy)
+try:
+    train(["n_worlds=0"])
+except ValueError as error:
+    print(error)
+"""
+
+
+@pytest.mark.slow
+def test_it_works_in_a_notebook(tmp_path):
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    cell = nbformat.v4.new_code_cell(CELL.format(tiny=TINY, folder=str(tmp_path / "run")))
+    book = nbclient.NotebookClient(nbformat.v4.new_notebook(cells=[cell]), kernel_name="python3").execute()
+    said = "".join(each["text"] for each in book.cells[0].outputs if each.get("name") == "stdout").splitlines()
+    assert said[:3] == ["batch 32", "batch 64", "end 64"] and said[3] == "trained, sampled"
+    assert said[4].startswith("n_worlds must be in")
