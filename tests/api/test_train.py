@@ -153,9 +153,11 @@ def test_a_mistake_is_refused_in_a_line_before_any_work(tmp_path, given, told):
     assert "\n" not in str(error.value) and not (tmp_path / "run").exists()
 
 
-def test_a_folder_that_holds_another_run_is_refused(trained):
+def test_a_folder_that_holds_another_run_is_refused(trained, tmp_path):
     with pytest.raises(ConfigError, match=f"{trained[0].folder} holds a run already"):
         train([*TINY, "seed=1"], folder=trained[0].folder)
+    with pytest.raises(ConfigError, match="folder must be left out with resume="):
+        train([f"resume={trained[0].folder}"], folder=tmp_path)
 
 
 def test_a_run_is_evaluated_elsewhere(trained):

@@ -387,7 +387,7 @@ def test_a_run_that_was_stopped_goes_on_to_a_new_total_even_if_killed_at_once(ru
         patched.setattr(Training, "_learn", signalled(Training._learn, signal.SIGTERM))
         run_here("train.py", *SHORT)
     with monkeypatch.context() as patched:
-        patched.setattr(Training, "train", lambda training: None)  # dies before it saves anything
+        patched.setattr(Training, "train", lambda training, signals: None)  # dies before it saves anything
         patched.setattr(run_module, "evaluate_policy", lambda *args: sys.exit(9))
         assert run_here("train.py", "resume=run", "total_frames=96")[0] == 9
     code, errors, _ = run_here("train.py", "resume=run")
@@ -474,9 +474,9 @@ def test_the_same_command_line_goes_on_with_a_run_that_a_queue_has_stopped(run_h
 
 def test_a_run_that_was_stopped_before_it_saved_begins_anew(run_here, tmp_path, monkeypatch):
     with monkeypatch.context() as patched:
-        patched.setattr(Training, "train", lambda training: os.kill(os.getpid(), signal.SIGTERM))
+        patched.setattr(Training, "train", lambda training, signals: os.kill(os.getpid(), signal.SIGTERM))
         assert run_here("train.py", *SHORT)[0] == 143
-        patched.setattr(Training, "train", lambda training: sys.exit(9))
+        patched.setattr(Training, "train", lambda training, signals: sys.exit(9))
         assert run_here("train.py", *SHORT)[0] == 9
 
 

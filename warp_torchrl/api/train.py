@@ -60,6 +60,8 @@ def train(
     config = compose_config("train", overrides)
     check_training(plain(config), overrides, build)
     if config.resume is not None:
+        if folder is not None:
+            raise ConfigError(f"folder must be left out with resume={config.resume}, which names it, got {folder}")
         path = Path(config.resume)
     else:
         path = Path(folder) if folder is not None else Path(f"outputs/{datetime.now():%Y-%m-%d/%H-%M-%S}-{os.getpid()}")

@@ -23,7 +23,7 @@ from warp_torchrl.runs.policies.trained import TrainedPolicy
 from warp_torchrl.runs.resumption import Resumption, is_run_of, resumption
 from warp_torchrl.system import disk
 from warp_torchrl.system.lock import RunFolderLock
-from warp_torchrl.system.signals import DeferredSignals
+from warp_torchrl.system.signals import DeferredSignals, Stopped
 from warp_torchrl.training.checks import Build
 from warp_torchrl.training.following import FOLLOWING
 from warp_torchrl.training.loop import Training
@@ -139,6 +139,8 @@ class _Work:
         try:
             with self.signals as signals:
                 training.train(signals)
+            if signals.received:  # since it looked for the last time
+                raise Stopped(signals.received, self.folder)
         except BaseException:
             training.end()
             raise
