@@ -23,7 +23,7 @@ _PICTURE_NEEDS = {"html": ("viser", "live"), "mp4": ("av", "video")}  # module, 
 def check_evaluation(
     values: Mapping[str, Any], overrides: Sequence[str], build: Callable[[Mapping[str, Any]], RunConfig]
 ) -> None:
-    """Check an evaluation as it is composed: all of its values, and its policy.
+    """Check a composed evaluation: all of its values, and its policy.
 
     Args:
         values: Composed, as plain values.
@@ -56,7 +56,7 @@ def check_evaluation(
 
 
 def map_fires(values: Mapping[str, Any]) -> int | None:
-    """Return how many fires the maps of an evaluation have, None where none are asked for.
+    """Return the number of fires of an evaluation's maps, None for no maps.
 
     Raises:
         ConfigError: If ``maps`` is no truth or ``maps_fires`` no such number, or what writes maps is not installed.

@@ -19,7 +19,7 @@ Build = Callable[[Mapping[str, Any]], RunConfig]
 
 
 def check_training(values: Mapping[str, Any], overrides: Sequence[str], build: Build = run_config) -> None:
-    """Check a training as it is composed: all of its values, and what it begins with or resumes.
+    """Check a composed training: all of its values, and what it begins with or resumes.
 
     Args:
         values: Composed, as plain values.
@@ -62,7 +62,7 @@ def _check_demonstrations(run_config: RunConfig) -> None:
 
 
 def new_total(values: Mapping[str, Any], overrides: Sequence[str]) -> Any:
-    """Return the total that a resumed run is to go on to, None where none is asked for."""
+    """Return the new total of a resumed run, None where none is given."""
     return values["total_frames"] if any(each.startswith("total_frames=") for each in overrides) else None
 
 

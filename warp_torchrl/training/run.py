@@ -39,7 +39,7 @@ class Run:
     Attributes:
         folder: Its folder: checkpoints, ``metrics.csv``, ``evaluation.json``, ``episode.gif``.
         frames: World steps that it was trained.
-        result: Its evaluation; None of a run that had come to its end before.
+        result: Its evaluation; None where nothing was left to train.
     """
 
     folder: Path
@@ -79,7 +79,7 @@ def train_composed(
         is_job: Whether it is a job of a sweep, whose finished runs stay when the sweep is repeated.
 
     Raises:
-        ConfigError: If the folder holds another run or an evaluation, or this run has come to its end and is no job.
+        ConfigError: If the folder holds another run or an evaluation, or this run is finished and is no job.
     """
     lock = RunFolderLock(folder)
     work = _Work(folder, build, callbacks, signals or nullcontext(DeferredSignals()))
@@ -161,7 +161,7 @@ def _begun(folder: Path, config: Any, build: Build, is_job: bool) -> Resumption:
     """Return how the run of this very configuration resumes: a queue that has stopped a job starts it again alike.
 
     Raises:
-        ConfigError: If the folder holds another run, or this one has come to its end and is no job of a sweep.
+        ConfigError: If the folder holds another run, or this one is finished and is no job of a sweep.
     """
     run = resumption(folder, build=build) if is_run_of(folder, as_yaml(config)) else None
     if run is None or (run.is_finished and not is_job):
