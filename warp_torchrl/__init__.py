@@ -28,7 +28,10 @@ if TYPE_CHECKING:
     from warp_torchrl.algorithms.off_policy import OffPolicy
     from warp_torchrl.algorithms.on_policy import OnPolicy
     from warp_torchrl.algorithms.ppo import Ppo
+    from warp_torchrl.api.evaluate import evaluate
     from warp_torchrl.api.make import make_env
+    from warp_torchrl.api.names import baselines, scenarios
+    from warp_torchrl.api.train import train
     from warp_torchrl.env import WildfireEnv
     from warp_torchrl.env.observation import Look, Surroundings
     from warp_torchrl.env.reward import Reward
@@ -43,6 +46,7 @@ if TYPE_CHECKING:
     from warp_torchrl.world.law.fire import Fire
     from warp_torchrl.world.mechanics.mechanic import Mechanic
     from warp_torchrl.world.state.state import Transition, WorldState
+    from warp_torchrl.world.terrain.array import Array
 
 gymnasium.register(
     "Wildfire-v0",
@@ -55,6 +59,7 @@ if hasattr(pettingzoo, "register"):  # older ones have no registry
 
 __version__ = "0.1.0"
 _PLACES = {
+    "Array": "world.terrain.array",
     "Fire": "world.law.fire",
     "Heuristic": "heuristics",
     "Look": "env.observation",
@@ -70,15 +75,20 @@ _PLACES = {
     "WildfireEnv": "env",
     "WorldState": "world.state.state",
     "add_scenario": "runs.config.plugins",
+    "baselines": "api.names",
+    "evaluate": "api.evaluate",
     "fire_history": "prediction.simulation",
     "load_policy": "runs.policies.load",
     "make_env": "api.make",
     "predict": "prediction.predict",
-    "register": "runs.config.plugins",
     "rate_of_spread": "world.behaviour.rate_of_spread",
+    "register": "runs.config.plugins",
+    "scenarios": "api.names",
     "simulate": "prediction.simulation",
+    "train": "api.train",
 }
 __all__ = [
+    "Array",
     "Fire",
     "Heuristic",
     "Look",
@@ -95,13 +105,17 @@ __all__ = [
     "WorldState",
     "__version__",
     "add_scenario",
+    "baselines",
+    "evaluate",
     "fire_history",
     "load_policy",
     "make_env",
     "predict",
     "rate_of_spread",
     "register",
+    "scenarios",
     "simulate",
+    "train",
 ]
 
 

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import torch
@@ -16,15 +17,16 @@ from hydra.core.plugins import Plugins
 
 from tests.forgery import forge
 from warp_torchrl import load_policy, make_env
-from warp_torchrl.commands import checks as checks_module
 from warp_torchrl.commands import command as command_module
 from warp_torchrl.commands.command import evaluate, train
 from warp_torchrl.commands.queue import Queue
 from warp_torchrl.commands.sweep import SweepSummary
+from warp_torchrl.evaluation import checks as checks_module
 from warp_torchrl.runs import checkpoint
 from warp_torchrl.runs.config import building
 from warp_torchrl.system.lock import RunFolderLock
 from warp_torchrl.system.signals import Stopped
+from warp_torchrl.training import run as run_module
 from warp_torchrl.training.loop import Training
 from warp_torchrl.world.world import World
 
@@ -126,7 +128,8 @@ def test_what_a_command_runs_is_built_once(program, trained, run_here, tmp_path,
     monkeypatch.setattr(building, "run_config", lambda values: built.append("run") or make(values))
     monkeypatch.setattr(World, "__post_init__", lambda world: built.append("world") or begin(world))
     monkeypatch.setattr(Training, "train", end)
-    monkeypatch.setattr(command_module, "evaluate_policy", end)
+    for module in (run_module, command_module):
+        monkeypatch.setattr(module, "evaluate_policy", end)
     given = {"train.py": TINY, "resume": ["resume=before", "total_frames=256"], "evaluate.py": ["checkpoint=before"]}
     _, errors, _ = run_here(program if program.endswith(".py") else "train.py", *given[program])
     assert "enough" in errors[-1] and built == ["run", "world"]
@@ -362,7 +365,7 @@ def test_a_finished_run_is_trained_longer_and_goes_on_to_the_new_total(run_here,
     assert code == 128 + signal.SIGTERM and checkpoint.newest(run)[0].manifest.frames == 96
     assert "total_frames was 64 and is 128: " in (run / "train.log").read_text()
     with monkeypatch.context() as patched:
-        patched.setattr(command_module, "evaluate_policy", signalled(command_module.evaluate_policy, signal.SIGTERM))
+        patched.setattr(run_module, "evaluate_policy", signalled(run_module.evaluate_policy, signal.SIGTERM))
         code, *_ = run_here("train.py", "resume=run")
     assert code == 128 + signal.SIGTERM and checkpoint.newest(run)[0].manifest.frames == 128
     assert (run / "evaluation.json").read_bytes() == first, "it is replaced by the next one alone"
@@ -384,8 +387,8 @@ def test_a_run_that_was_stopped_goes_on_to_a_new_total_even_if_killed_at_once(ru
         patched.setattr(Training, "_learn", signalled(Training._learn, signal.SIGTERM))
         run_here("train.py", *SHORT)
     with monkeypatch.context() as patched:
-        patched.setattr(Training, "train", lambda training: None)  # dies before it saves anything
-        patched.setattr(command_module, "evaluate_policy", lambda *args: sys.exit(9))
+        patched.setattr(Training, "train", lambda training, signals: None)  # dies before it saves anything
+        patched.setattr(run_module, "evaluate_policy", lambda *args: sys.exit(9))
         assert run_here("train.py", "resume=run", "total_frames=96")[0] == 9
     code, errors, _ = run_here("train.py", "resume=run")
     assert code == 0, errors
@@ -471,9 +474,9 @@ def test_the_same_command_line_goes_on_with_a_run_that_a_queue_has_stopped(run_h
 
 def test_a_run_that_was_stopped_before_it_saved_begins_anew(run_here, tmp_path, monkeypatch):
     with monkeypatch.context() as patched:
-        patched.setattr(Training, "train", lambda training: os.kill(os.getpid(), signal.SIGTERM))
+        patched.setattr(Training, "train", lambda training, signals: os.kill(os.getpid(), signal.SIGTERM))
         assert run_here("train.py", *SHORT)[0] == 143
-        patched.setattr(Training, "train", lambda training: sys.exit(9))
+        patched.setattr(Training, "train", lambda training, signals: sys.exit(9))
         assert run_here("train.py", *SHORT)[0] == 9
 
 
@@ -493,7 +496,7 @@ def test_a_sweep_that_is_started_again_leaves_what_has_come_to_its_end(trained, 
         pytest.param(checkpoint.disk, "save_tensors", 1, signal.SIGTERM, [32], marks=pytest.mark.stress),
         pytest.param(checkpoint, "_drop", 2, signal.SIGUSR1, [32, 64], marks=pytest.mark.stress),
         pytest.param(Training, "_learn", 2, signal.SIGINT, [32, 64], marks=pytest.mark.stress),
-        (command_module, "evaluate_policy", 1, signal.SIGINT, [32, 64]),
+        (run_module, "evaluate_policy", 1, signal.SIGINT, [32, 64]),
     ],
     ids=["in a save", "in the last save", "in the last iteration", "in the evaluation"],
 )
@@ -516,14 +519,14 @@ def test_a_signal_anywhere_leaves_sound_checkpoints_and_the_way_on(
     [(signal.SIGTERM, ["0"]), pytest.param(signal.SIGUSR2, ["0", "1"], marks=pytest.mark.stress)],
 )
 def test_a_signal_ends_a_sweep_and_a_queue_s_warning_its_job(tmp_path, run_here, monkeypatch, number, jobs):
-    def stopped(folder, config):
+    def stopped(config, options, folder, **more):
         raise Stopped(number, folder)
 
     def refuse(number, frame):
         raise RuntimeError("timed-out too many times")
 
     queue = Queue(signal.SIGUSR2, refuse)
-    monkeypatch.setattr(command_module, "_start", stopped)
+    monkeypatch.setattr(command_module, "train_composed", stopped)
     monkeypatch.setattr(command_module, "queued", lambda: nullcontext(queue))
     code, *_ = run_here("train.py", *SHORT[:-1], "-m", "seed=0,1", "hydra.sweep.dir=sweep")
     assert code == 128 + number
@@ -553,7 +556,7 @@ def test_a_second_run_in_a_folder_is_refused_and_the_first_goes_on(tmp_path, run
 def test_a_run_that_died_before_its_first_checkpoint_may_start_again(tmp_path, run_here, monkeypatch):
     (tmp_path / "run" / "checkpoints" / ".32.tmp").mkdir(parents=True)
     (tmp_path / "run" / "config.yaml").write_text("old: 1")
-    monkeypatch.setattr(command_module, "evaluate_policy", lambda *args, **options: None)
+    monkeypatch.setattr(run_module, "evaluate_policy", lambda *given: SimpleNamespace(folder=None))
     code, errors, _ = run_here("train.py", *SHORT)
     assert code == 0, errors
     assert "old: 1" not in (tmp_path / "run" / "config.yaml").read_text()

@@ -6,7 +6,8 @@ import re
 import pytest
 
 from warp_torchrl.evaluation.reading import read_evaluation
-from warp_torchrl.evaluation.summary import draw_summary, main, read_rows, summary_table
+from warp_torchrl.evaluation.rows import read_rows
+from warp_torchrl.evaluation.summary import draw_summary, main, summary_table
 from warp_torchrl.runs.config.construction import ConfigError
 
 SOUND = {

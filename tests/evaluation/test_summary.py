@@ -8,7 +8,8 @@ import sys
 import numpy as np
 import pytest
 
-from warp_torchrl.evaluation.summary import draw_summary, main, read_rows, summary_table
+from warp_torchrl.evaluation.rows import read_rows
+from warp_torchrl.evaluation.summary import draw_summary, main, summary_table
 
 
 def write(folder, policy, saved, scenario="tiny", configuration="", seeds=None):

@@ -24,7 +24,7 @@ from warp_torchrl.runs.config.compose import compose_config, conf_folder, plain,
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.runs.policies.load import policy_of
 from warp_torchrl.system import disk
-from warp_torchrl.system.signals import Stopped
+from warp_torchrl.system.signals import DeferredSignals, Stopped
 from warp_torchrl.training import loop
 from warp_torchrl.training.finite import NumericalFailure
 from warp_torchrl.training.loop import Training
@@ -290,8 +290,8 @@ def test_a_signal_saves_and_stops(tmp_path):
         return learn(batch)
 
     training._learn = interrupted
-    with pytest.raises(Stopped) as stopped:
-        training.train()
+    with pytest.raises(Stopped) as stopped, DeferredSignals() as signals:
+        training.train(signals)
     assert stopped.value.number == signal.SIGTERM
     assert newest(tmp_path)[0].manifest.frames == 96 and len(rows(tmp_path)) == 3
 

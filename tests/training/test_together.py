@@ -133,7 +133,7 @@ def other_process(session, first):
     for path in Path("/proc").glob("[0-9]*/stat"):
         fields = path.read_text().rpartition(")")[2].split()
         command = path.with_name("cmdline").read_text()
-        if int(fields[3]) == session and int(path.parent.name) != first and "commands.following" in command:
+        if int(fields[3]) == session and int(path.parent.name) != first and "training.following" in command:
             return int(path.parent.name)
     return None
 

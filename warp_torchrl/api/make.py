@@ -1,9 +1,11 @@
 """Environments by name."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import torch
 
+from warp_torchrl.api.keywords import as_overrides, check_list
 from warp_torchrl.env import WildfireEnv
 from warp_torchrl.runs.config.construction import ENVIRONMENT, build_components
 from warp_torchrl.runs.config.environment import compose_environment
@@ -25,6 +27,7 @@ def make_env(
     validate: bool | None = None,
     compile: bool = False,
     graph: bool = False,
+    **keywords: Any,
 ) -> WildfireEnv:
     """Make the environment of a scenario.
 
@@ -40,6 +43,9 @@ def make_env(
         validate: Check actions on CUDA too.
         compile: Compile the step with ``torch.compile``.
         graph: Record the step as one CUDA graph, where the device is cuda.
+        keywords: More of the configuration by its keys: the name of an option, ``fire="paper"``, values,
+            ``horizon=64`` or ``team=dict(n_agents=3)``, and components, ``landscape=Array(cover=cover)``: a landscape
+            has the size of its array, whatever the scenario's.
 
     Returns:
         A TorchRL ``EnvBase`` of batch size [B].
@@ -48,9 +54,11 @@ def make_env(
         ConfigError: A ``ValueError``, with key, value and rule.
         ImportError: If a library that a component needs is missing.
     """
+    check_list("overrides", overrides)
     load([*plugins, *listed_plugins(overrides)])
     named = [each for each in overrides if not each.startswith("plugins=")]
-    config = compose_environment([f"scenario={scenario}", *named])
+    further, objects = as_overrides(keywords)
+    config = {**compose_environment([f"scenario={scenario}", *named, *further]), **objects}
     parts = build_components(config, ENVIRONMENT)
     return WildfireEnv(
         parts["world"],

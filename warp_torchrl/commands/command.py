@@ -2,24 +2,26 @@
 
 import logging
 import os
+import shutil
 import sys
-from collections.abc import Callable, Sequence
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import hydra
 from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig
 
 from warp_torchrl.algorithms import parallel
-from warp_torchrl.commands.checks import CheckFirst, map_fires, new_total, of_worlds, picture, without_checkpoint
+from warp_torchrl.commands.checks import CheckFirst
 from warp_torchrl.commands.failure import fail
-from warp_torchrl.commands.following import FOLLOWING, folder_of_its_own, follow_training
 from warp_torchrl.commands.queue import queued
 from warp_torchrl.commands.sweep import SweepSummary, remove_failure, save_failure, summarise_unfinished
-from warp_torchrl.evaluation.evaluate import evaluate_policy
-from warp_torchrl.runs import checkpoint as checkpoints
+from warp_torchrl.evaluation.checks import map_fires, of_worlds, picture_kind, without_checkpoint
+from warp_torchrl.evaluation.evaluate import announce, evaluate_policy
+from warp_torchrl.evaluation.result import Result
 from warp_torchrl.runs.config.building import BuildOnce
 from warp_torchrl.runs.config.compose import (
     HYDRA_ERRORS,
@@ -28,27 +30,26 @@ from warp_torchrl.runs.config.compose import (
     option_of,
     plain,
     tidied,
-    without_targets,
 )
 from warp_torchrl.runs.config.construction import COMPONENTS, ConfigError
 from warp_torchrl.runs.config.grammar import check_flags, check_overrides, flags_first, listed_plugins
 from warp_torchrl.runs.config.plugins import load, registered
-from warp_torchrl.runs.config.saved_config import SavedConfig, restore, world_overrides
+from warp_torchrl.runs.config.saved_config import restore, world_overrides
 from warp_torchrl.runs.destination import check_free
 from warp_torchrl.runs.policies.find import find_policy
-from warp_torchrl.runs.resumption import Resumption, is_run_of, resumption
-from warp_torchrl.system import disk
 from warp_torchrl.system.lock import RunFolderLock
 from warp_torchrl.system.malloc import keep_freed_memory
 from warp_torchrl.system.parent import SECONDS_TO_SAVE, end_with, is_orphaned
-from warp_torchrl.system.signals import Stopped, exit_on_signal
-from warp_torchrl.training.loop import Training
+from warp_torchrl.system.signals import DeferredSignals, Stopped, exit_on_signal
+from warp_torchrl.training.callbacks import OngoingTraining
+from warp_torchrl.training.checks import new_total
+from warp_torchrl.training.following import follow_training
+from warp_torchrl.training.run import newest, train_composed
 
 log = logging.getLogger("warp_torchrl")
 
 _RECORDED = (*COMPONENTS, "scenario")
 _MULTIRUN = ("-m", "--multirun")
-_NOT_RECORDED = ("resume", "debug", "policy", "hydra")
 
 
 def train() -> None:
@@ -68,91 +69,26 @@ def _train_job(config: DictConfig) -> None:
     if parallel.torchrun_rank():
         parallel.follow(follow_training)
         return
-    resumed = config.resume is not None
-    folder = Path(config.resume if resumed else HydraConfig.get().runtime.output_dir)
-    lock = RunFolderLock(folder)
-    try:
-        if resumed:
-            _resume(folder, new_total(config, HydraConfig.get().overrides.task))
-        else:
-            _start(folder, config)
-    finally:
-        lock.release()
+    hydra = HydraConfig.get()
+    train_composed(
+        config,
+        _choices(config),
+        Path(hydra.runtime.output_dir if config.resume is None else config.resume),
+        build=CheckFirst.build,
+        total_frames=new_total(config, hydra.overrides.task),
+        callbacks=[_Announcer()],
+        signals=DeferredSignals(),
+        is_job=hydra.mode == RunMode.MULTIRUN,
+    )
 
 
-def _start(folder: Path, config: DictConfig) -> None:
-    if checkpoints.holds_any(folder):
-        _go_on(folder, config)
-        return
-    if (folder / "evaluation.json").exists():
-        raise ConfigError(f"hydra.run.dir: {folder} holds an evaluation, which training would replace; take another")
-    run_config = CheckFirst.build(plain(config)).settled()
-    config.processes = run_config.processes
-    disk.replace(folder / "config.yaml", OmegaConf.to_yaml(config, resolve=True))
-    saved_config = SavedConfig(choices=_choices(config), values=_values(config))
-    with parallel.processes(run_config.n_processes(), plain(config), FOLLOWING):
-        training = Training(run_config, saved_config, folder)
-        if config.start_from is not None:
-            training.start_from(_newest(find_policy(config.start_from)))
-        _train(training)
-    _evaluate(training, world_overrides(plain(config)))
+class _Announcer:
+    """A callback that prints the table of the last evaluation."""
 
-
-def _go_on(folder: Path, config: DictConfig) -> None:
-    """Resume the run of this very configuration: a queue that has stopped a job gives it the same command line again.
-
-    Raises:
-        ConfigError: If the folder holds another run, or this one has come to its end and is no job of a sweep.
-    """
-    is_same = is_run_of(folder, OmegaConf.to_yaml(config, resolve=True))
-    run = resumption(folder, build=CheckFirst.build) if is_same else None
-    if run is None or (run.is_finished and HydraConfig.get().mode != RunMode.MULTIRUN):
-        raise ConfigError(f"hydra.run.dir: {folder} holds a run already; go on with resume={folder}, or take another")
-    _resume_from(folder, run)
-
-
-def _resume(folder: Path, total_frames: Any) -> None:
-    _resume_from(folder, resumption(folder, total_frames, CheckFirst.build))
-
-
-def _resume_from(folder: Path, run: Resumption) -> None:
-    _say_skipped(run.skipped)
-    if run.is_finished:
-        log.info("%s is finished; total_frames=MORE trains it longer", folder)
-        return
-    with parallel.processes(run.run_config.n_processes(), run.values, FOLLOWING):
-        training = Training(run.run_config, run.saved_config, folder)
-        training.load_state_dict(run.found.training())
-        log.info("resumed %s at %d frames", run.found.path, training.frames)
-        if run.run_config.total_frames != run.total_before:
-            # Before the next checkpoint: a run that is killed now must resume with the new total too.
-            disk.replace(folder / "config.yaml", OmegaConf.to_yaml(restore(run.saved_config), resolve=True))
-            training.log_new_total(run.total_before)
-        _train(training)
-    _evaluate(training, world_overrides(run.values))
-
-
-def _train(training: Training) -> None:
-    try:
-        training.train()
-    finally:
-        training.close()
-
-
-def _evaluate(training: Training, worlds: Sequence[str]) -> None:
-    evaluate_policy(training.run_config, training.run, checkpoints.newest(training.run)[0], worlds)
-
-
-def _newest(path: str | Path) -> checkpoints.Checkpoint:
-    """Return the newest sound checkpoint, and log the skipped ones."""
-    found, skipped = checkpoints.newest(path)
-    _say_skipped(skipped)
-    return found
-
-
-def _say_skipped(skipped: Sequence[str]) -> None:
-    for line in skipped:
-        log.warning("skipped: %s", line)
+    def on_evaluation(self, training: OngoingTraining, result: Result) -> None:
+        """Print it once it is written."""
+        if result.folder is not None:
+            announce(result)
 
 
 def _evaluate_job(config: DictConfig) -> None:
@@ -171,14 +107,14 @@ def _evaluate_job(config: DictConfig) -> None:
 
 def _evaluate_into(folder: Path, config: DictConfig) -> None:
     given, name = config.checkpoint, config.policy
-    fires, kind = map_fires(plain(config)), picture(plain(config))
+    fires, kind = map_fires(plain(config)), picture_kind(plain(config))
     if given is None:
         values = without_checkpoint(plain(config))
-        evaluate_policy(CheckFirst.build(values), folder, name, world_overrides(values), fires, kind)
+        announce(evaluate_policy(CheckFirst.build(values), folder, name, world_overrides(values), fires, kind))
         return
-    found = _newest(find_policy(given))
+    found = newest(find_policy(given))
     values = plain(restore(found.saved_config(), of_worlds(HydraConfig.get().overrides.task)))
-    evaluate_policy(CheckFirst.build(values), folder, found, world_overrides(values), fires, kind)
+    announce(evaluate_policy(CheckFirst.build(values), folder, found, world_overrides(values), fires, kind))
 
 
 # The saved configuration
@@ -197,10 +133,6 @@ def _stems(folder: Path) -> set[str]:
     return {path.stem for path in folder.glob("*.yaml")}
 
 
-def _values(config: DictConfig) -> dict[str, Any]:
-    return {key: value for key, value in without_targets(plain(config)).items() if key not in _NOT_RECORDED}
-
-
 # The start of a command, and errors
 
 
@@ -211,8 +143,6 @@ def _run(name: str, job: Callable[[DictConfig], None]) -> None:
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra then raises its errors instead of printing them
     keep_freed_memory()
     CheckFirst.build = BuildOnce()
-    if not debug:
-        logging.getLogger("torchrl").setLevel(logging.WARNING)  # it prints a line for each of its buffers
     if parallel.is_torchrun():
         end_with(os.getppid(), SECONDS_TO_SAVE)
     with exit_on_signal():
@@ -272,6 +202,16 @@ def _check_grammar(arguments: Sequence[str]) -> None:
 def _overrides(arguments: Sequence[str]) -> list[str]:
     """Return what changes the configuration: neither flags nor what they are told, as ``job`` in ``--cfg job``."""
     return [each for each in arguments if not each.startswith("-") and ("=" in each or each.startswith("~"))]
+
+
+@contextmanager
+def folder_of_its_own() -> Iterator[list[str]]:
+    """Yield the overrides by which Hydra, in a process that ``torchrun`` has started, writes and logs nothing."""
+    folder = tempfile.mkdtemp(prefix="warp_torchrl-")
+    try:
+        yield [f"hydra.run.dir={folder}", "hydra/job_logging=disabled", "hydra/hydra_logging=disabled"]
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _without_folder(arguments: Sequence[str]) -> list[str]:

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 import torch
 
-from warp_torchrl.commands.checks import check_training
 from warp_torchrl.commands.failure import DONE
 from warp_torchrl.commands.program import run_program
 from warp_torchrl.runs.checkpoint import holds_any
@@ -29,6 +28,7 @@ from warp_torchrl.system import disk
 from warp_torchrl.system.foreign import read_json
 from warp_torchrl.system.lock import RunFolderLock
 from warp_torchrl.system.signals import DeferredSignals
+from warp_torchrl.training.checks import check_training
 
 if TYPE_CHECKING:
     import optuna

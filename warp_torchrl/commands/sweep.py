@@ -16,6 +16,7 @@ from hydra.experimental.callback import Callback
 from omegaconf import DictConfig
 
 from warp_torchrl.evaluation import summary
+from warp_torchrl.evaluation.rows import SummaryRow, read_rows
 from warp_torchrl.runs.config.construction import ConfigError, construct
 from warp_torchrl.system import disk
 from warp_torchrl.system.foreign import read_json
@@ -141,7 +142,7 @@ def summarise_unfinished() -> None:
 
 
 def _write_summary(folder: Path) -> list[Failure]:
-    entries = summary.read_rows(folder)
+    entries = read_rows(folder)
     if entries:
         _summarise(entries, folder)
     failed = failures(folder)
@@ -150,7 +151,7 @@ def _write_summary(folder: Path) -> list[Failure]:
     return failed
 
 
-def _summarise(entries: list[summary.SummaryRow], folder: Path) -> None:
+def _summarise(entries: list[SummaryRow], folder: Path) -> None:
     text = summary.summary_table(entries)
     disk.replace(folder / "summary.md", text + "\n")
     print(text, flush=True)

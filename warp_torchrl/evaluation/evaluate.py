@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TypeAlias
 
 from tensordict.nn import TensorDictModuleBase
 
@@ -10,47 +11,52 @@ from warp_torchrl.env import WildfireEnv
 from warp_torchrl.env.metrics import metric_rows
 from warp_torchrl.evaluation import cache
 from warp_torchrl.evaluation.goal import goal
-from warp_torchrl.evaluation.maps import maps_line, play_maps, write_maps
+from warp_torchrl.evaluation.maps import play_maps, write_maps
 from warp_torchrl.evaluation.method import method
 from warp_torchrl.evaluation.picture import PICTURE_KINDS, PictureKind, record_episode
 from warp_torchrl.evaluation.play import Episodes, WithoutAgent, baselines_of, play, play_heuristics
-from warp_torchrl.evaluation.report import evaluation_table, report, write_json
+from warp_torchrl.evaluation.report import write_json
+from warp_torchrl.evaluation.result import Result
 from warp_torchrl.heuristics import HEURISTICS
 from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config.construction import ConfigError
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.runs.config.saved_config import completed
 from warp_torchrl.runs.policies.load import policy_of
-from warp_torchrl.runs.policies.trained import MODES
+from warp_torchrl.runs.policies.trained import MODES, TrainedPolicy
 from warp_torchrl.system import disk
 
 log = logging.getLogger("warp_torchrl")
 
 
+Policy: TypeAlias = checkpoints.Checkpoint | TensorDictModuleBase | str
+"""What is evaluated: a checkpoint, a policy of one's own, or a heuristic by its name."""
+
+
 def evaluate_policy(
     run_config: RunConfig,
-    folder: Path,
-    found: checkpoints.Checkpoint | str,
+    folder: Path | None,
+    found: Policy,
     worlds: Sequence[str],
     map_fires: int | None = None,
     picture: PictureKind | None = "gif",
-) -> None:
-    """Evaluate a checkpoint or a heuristic beside the baselines: table, ``evaluation.json``, ``episode.gif``.
+) -> Result:
+    """Evaluate a policy beside the baselines; write ``evaluation.json``, a picture and maps.
 
     Args:
         run_config: Configuration of the worlds and the evaluation.
-        folder: The output folder.
-        found: The checkpoint, or the heuristic's name.
+        folder: The output folder; None writes nothing.
+        found: The policy.
         worlds: Overrides by which the worlds differ from their scenario.
         map_fires: Fires of the maps; None makes no maps.
         picture: As what the first fire is written, ``episode.<picture>``; None writes none.
     """
-    first, folder = run_config.evaluation.first_seed, folder.resolve()
+    first = run_config.evaluation.first_seed
     env, one = run_config.make_env(run_config.evaluation.episodes, first), run_config.make_env(1, first)
     name, mode, actor, filmed = _actors(run_config, found, env, one)
     wanted = run_config.evaluation.baselines
     beside = baselines_of(run_config.world) if wanted is None else dict.fromkeys(wanted)
-    others = _baselines(run_config, env, [each for each in beside if each != found])
+    others = _baselines(run_config, env, [each for each in beside if each != name])
     episodes = play(env, actor, first, mode, watch=True)
     learner, digest, frames, other_modes, left_out = None, "", None, {}, {}
     if isinstance(found, checkpoints.Checkpoint):
@@ -62,12 +68,17 @@ def evaluate_policy(
             agent: play(env, WithoutAgent(actor, index, env.world.team), first, mode)
             for index, agent in enumerate(env.agent_names)
         }
-    content = report(
-        run_config.scenario,
-        name,
-        first,
-        episodes,
-        others,
+    if map_fires is not None:
+        log.info("playing %d fires on one ground for the maps, without the team and with it", map_fires)
+    maps = None if map_fires is None else play_maps(run_config, lambda env: _actor(found, env, actor), mode, map_fires)
+    folder = None if folder is None else folder.resolve()
+    wrote = ["evaluation.json", *([f"episode.{picture}"] if picture else []), *([] if maps is None else ["maps"])]
+    result = Result(
+        scenario=run_config.scenario,
+        policy=name,
+        first_seed=first,
+        episodes=episodes,
+        baselines=others,
         other_modes=other_modes,
         left_out=left_out,
         method=learner,
@@ -75,32 +86,36 @@ def evaluate_policy(
         world_overrides=worlds,
         frames=frames,
         goal=goal(run_config.world),
+        maps=None if maps is None else maps.numbers(),
+        rows=metric_rows(run_config.world),
+        folder=folder,
+        wrote=() if folder is None else tuple(wrote),
     )
-    if map_fires is not None:
-        log.info("playing %d fires on one ground for the maps, without the team and with it", map_fires)
-    maps = None if map_fires is None else play_maps(run_config, lambda env: _actor(found, env, actor), mode, map_fires)
-    if maps is not None:
-        content["maps"] = maps.numbers()
+    if folder is None:
+        return result
     folder.mkdir(parents=True, exist_ok=True)
-    write_json(folder / "evaluation.json", content)
-    print(evaluation_table(content, metric_rows(run_config.world)), flush=True)
+    write_json(folder / "evaluation.json", result.report)
     if maps is not None:
-        print(maps_line(content["maps"]), flush=True)
         title = f"{run_config.scenario}: {maps.seeds[1]} fires on one ground, {maps.horizon} steps"
         write_maps(folder, maps, getattr(run_config.world.landscape, "grid", None), title, name)
-    wrote = ["evaluation.json"]
     for kind in PICTURE_KINDS:  # a former evaluation's picture would show another policy
         (folder / f"episode.{kind}").unlink(missing_ok=True)
     if picture is not None:
-        wrote += [f"episode.{picture}"]
-        with disk.with_path(folder / wrote[-1]):
-            record_episode(folder / wrote[-1], picture, one, filmed, f"{run_config.scenario}\n{name}", first, mode)
-    wrote += [] if maps is None else ["maps"]
-    log.info("wrote %s into %s", " and ".join(filter(None, (", ".join(wrote[:-1]), wrote[-1]))), folder)
+        path = folder / f"episode.{picture}"
+        with disk.with_path(path):
+            record_episode(path, picture, one, filmed, f"{run_config.scenario}\n{name}", first, mode)
+    return result
 
 
-def check_policy(run_config: RunConfig, found: checkpoints.Checkpoint | str) -> None:
-    """Check that a checkpoint or a heuristic can be evaluated, before any output is written.
+def announce(result: Result) -> None:
+    """Print a result that was written, and log where it is."""
+    print(result, flush=True)
+    wrote = result.wrote
+    log.info("wrote %s into %s", " and ".join(filter(None, (", ".join(wrote[:-1]), wrote[-1]))), result.folder)
+
+
+def check_policy(run_config: RunConfig, found: Policy) -> None:
+    """Check that a policy can be evaluated, before any output is written.
 
     Raises:
         CheckpointError: If the weights do not fit the networks.
@@ -111,21 +126,23 @@ def check_policy(run_config: RunConfig, found: checkpoints.Checkpoint | str) -> 
 
 
 def _actors(
-    run_config: RunConfig, found: checkpoints.Checkpoint | str, env: WildfireEnv, one: WildfireEnv
+    run_config: RunConfig, found: Policy, env: WildfireEnv, one: WildfireEnv
 ) -> tuple[str, str, TensorDictModuleBase, TensorDictModuleBase]:
     """Return the policy's name and mode, the policy for many worlds, and the policy for one."""
     if isinstance(found, str):
         return found, "sampled", HEURISTICS[found](env), HEURISTICS[found](one)
+    if isinstance(found, TensorDictModuleBase) and not isinstance(found, TrainedPolicy):
+        return type(found).__name__, "sampled", found, found
+    mode, place = run_config.evaluation.mode, f" in {found.path}" if isinstance(found, checkpoints.Checkpoint) else ""
     try:
-        policy = policy_of(found, run_config.evaluation.mode).to(run_config.device).fitted(env)
+        trained = found if isinstance(found, TrainedPolicy) else policy_of(found, mode)
+        policy = trained.to(run_config.device).fitted(env)
     except ValueError as error:
-        raise ConfigError(f"the policy in {found.path} does not fit here: {error}") from None
+        raise ConfigError(f"the policy{place} does not fit here: {error}") from None
     return f"trained, {policy.mode}", policy.mode, policy, policy
 
 
-def _actor(
-    found: checkpoints.Checkpoint | str, env: WildfireEnv, trained: TensorDictModuleBase
-) -> TensorDictModuleBase:
+def _actor(found: Policy, env: WildfireEnv, trained: TensorDictModuleBase) -> TensorDictModuleBase:
     """Return the policy for an environment: a heuristic reads one, a trained policy takes any."""
     return HEURISTICS[found](env) if isinstance(found, str) else trained
 

@@ -7,7 +7,7 @@ the end of the episode: at the horizon, or earlier when the fire is out. A tree 
 not count, nor does one that the team cleared.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -208,7 +208,7 @@ def _panels(maps: PolicyMaps, policy: str) -> list[MapPanel]:
     return [*chances, change]
 
 
-def maps_line(numbers: dict[str, Any]) -> str:
+def maps_line(numbers: Mapping[str, Any]) -> str:
     """Return the numbers of maps as a line for the terminal."""
     areas = []
     for name, area in numbers["burned_ha"].items():

@@ -3,17 +3,20 @@
 A sweep writes both at its end; ``warp summary FOLDER ...`` makes them for any runs.
 """
 
+import json
 import math
 import signal
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from textwrap import fill
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from warp_torchrl.evaluation.reading import read_evaluation
-from warp_torchrl.evaluation.report import worlds_name
+from warp_torchrl.env.pictures.drawing import line_style
+from warp_torchrl.evaluation.exports import draw_curves, marl_eval, rliable
+from warp_torchrl.evaluation.rows import SummaryRow, read_rows
 from warp_torchrl.evaluation.statistics import compare, performance_profile, summarise
 from warp_torchrl.system import disk
 from warp_torchrl.system.flags import FlagParser
@@ -22,75 +25,6 @@ from warp_torchrl.system.signals import exit_on_signal
 from warp_torchrl.validation import did_you_mean
 
 LEVELS = np.linspace(0.0, 1.0, 101)
-_Key = tuple[str, str, str, tuple[int, ...]]  # scenario, method, configuration, seeds
-
-
-class SummaryRow(NamedTuple):
-    """Results of a policy on a scenario, over all runs that differ in their seed only."""
-
-    scenario: str
-    policy: str
-    value: np.ndarray  # of the goal, [runs, n]
-    success: np.ndarray  # [runs, n]
-    seeds: tuple[int, ...]
-    metrics: Mapping[str, np.ndarray] = {}  # by name, [runs, n], NaN where an episode has none; empty for baselines
-    goal: str = "saved"  # what policies are compared by there
-
-
-def read_rows(*folders: Path) -> list[SummaryRow]:
-    """Return the results in the ``evaluation.json`` files under folders, baselines included.
-
-    Runs that differ in their seed only are one entry.
-
-    Raises:
-        ConfigError: If a file is no evaluation, in one line.
-        OSError: If one cannot be opened.
-    """
-    found: dict[_Key, list[Mapping[str, Any]]] = {}
-    for path in (path for folder in folders for path in sorted(folder.glob("**/evaluation.json"))):
-        content = read_evaluation(path)
-        key = (worlds_name(content), content["method"], content["configuration"], tuple(content["seeds"]))
-        found.setdefault(key, []).append(content)
-    several = {(scenario, method) for scenario, method, *_ in found if _differ(found, scenario, method)}
-    return _baselines(found) + [
-        SummaryRow(
-            scenario,
-            f"{method} {configuration[:6]}" if (scenario, method) in several else method,
-            _of_episodes(runs, runs[0]["goal"]),
-            _of_episodes(runs, "success"),
-            seeds,
-            {name: _of_episodes(runs, name) for name in runs[0]["episodes"][0] if name != "seed"},
-            runs[0]["goal"],
-        )
-        for (scenario, method, configuration, seeds), runs in found.items()
-    ]
-
-
-def _baselines(found: Mapping[_Key, Sequence[Mapping[str, Any]]]) -> list[SummaryRow]:
-    """Return the baselines in other policies' evaluations that have no evaluation of their own.
-
-    A baseline whose episodes differ between evaluations played in different worlds, and is left out.
-    """
-    held: dict[tuple[str, str, str, tuple[int, ...]], list[Mapping[str, Any]]] = {}
-    for (scenario, _, _, seeds), runs in found.items():
-        for run in runs:
-            for name, episodes in run["baseline_episodes"].items():
-                if (scenario, name, "", seeds) not in found:
-                    held.setdefault((scenario, name, run["goal"], seeds), []).append(episodes)
-    return [
-        SummaryRow(scenario, name, np.array([episodes[0][goal]]), np.array([episodes[0]["success"]]), seeds, goal=goal)
-        for (scenario, name, goal, seeds), episodes in held.items()
-        if all(each == episodes[0] for each in episodes)
-    ]
-
-
-def _of_episodes(runs: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
-    """Return a metric of each episode of each run, [runs, n]."""
-    return np.array([[episode.get(name) for episode in run["episodes"]] for run in runs], dtype=np.float64)
-
-
-def _differ(found: Mapping[_Key, Any], scenario: str, method: str) -> bool:
-    return len({key[2] for key in found if key[:2] == (scenario, method)}) > 1
 
 
 def summary_table(entries: Sequence[SummaryRow], against: str | None = None) -> str:
@@ -237,13 +171,6 @@ def _draw_bars(axes: Any, group: Sequence[SummaryRow], styles: Mapping[str, Mapp
     axes.set_title(group[0].scenario, fontsize=8.0, loc="left")
 
 
-def line_style(index: int) -> dict[str, Any]:
-    """Return the colour and the dashes of line number ``index`` of a figure."""
-    colours = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7", "#555555", "#F0E442")  # Okabe, Ito
-    dashes = ("-", "--", "-.", ":")
-    return {"color": colours[index % len(colours)], "linestyle": dashes[index // len(colours) % len(dashes)]}
-
-
 def _by_scenario(entries: Sequence[SummaryRow]) -> list[list[SummaryRow]]:
     """Return the entries of each scenario, the best first."""
     scenarios = dict.fromkeys(entry.scenario for entry in entries)
@@ -264,6 +191,10 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--against", metavar="POLICY", help="compare with this policy instead of the best")
     parser.add_argument("--show", nargs="+", metavar="METRIC", help="means of these, of what evaluation.json holds")
     parser.add_argument("--plot", type=Path, metavar="FILE", help="draw them as well")
+    told = "draw the forest saved over training, the mean over seeds with its 95 %% bootstrap interval"
+    parser.add_argument("--curves", type=Path, metavar="FILE", help=told)
+    parser.add_argument("--marl-eval", type=Path, metavar="FILE", help="write the JSON that marl-eval reads")
+    parser.add_argument("--rliable", type=Path, metavar="FILE", help="write scores and curves for rliable, as JSON")
     options = parser.parse_args(arguments)
     for folder in options.folders:
         if not folder.is_dir():
@@ -278,13 +209,28 @@ def main(arguments: list[str] | None = None) -> None:
         print(metrics_table(entries, options.show) if options.show else summary_table(entries, options.against))
     except ValueError as error:
         parser.error(plain_text(str(error)))
-    if options.plot is not None:
-        try:
-            draw_summary(entries, options.plot)
-        except (OSError, ValueError) as error:  # a format that Matplotlib does not write
-            parser.error(f"--plot: {plain_text(str(error))}")
-        except ImportError:
-            parser.error('--plot needs Matplotlib: pip install "warp_torchrl[figures]"')
+    for flag, make in (("--marl-eval", marl_eval), ("--rliable", rliable)):
+        path = getattr(options, flag[2:].replace("-", "_"))
+        if path is not None:
+            _or_refuse(parser, flag, partial(_write_json, make, entries, path))
+    for flag, draw in (("--plot", draw_summary), ("--curves", draw_curves)):
+        path = getattr(options, flag[2:])
+        if path is not None:
+            _or_refuse(parser, flag, partial(draw, entries, path))
+
+
+def _write_json(make: Callable[[Sequence[SummaryRow]], Any], entries: Sequence[SummaryRow], path: Path) -> None:
+    disk.replace(path, json.dumps(make(entries)))
+
+
+def _or_refuse(parser: FlagParser, flag: str, write: Callable[[], None]) -> None:
+    """Write a file, or end with a line where it cannot be written."""
+    try:
+        write()
+    except (OSError, ValueError) as error:  # a format that Matplotlib does not write; runs without curves
+        parser.error(f"{flag}: {plain_text(str(error))}")
+    except ImportError:
+        parser.error(f'{flag} needs Matplotlib: pip install "warp_torchrl[figures]"')
 
 
 if __name__ == "__main__":

@@ -1,19 +1,20 @@
 """Trackers of runs, beside ``metrics.csv``: none, wandb or TensorBoard."""
 
+import json
 import logging
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from secrets import token_hex
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, cast
 
-from torchrl.record.loggers import get_logger
+from PIL import Image
 
 from warp_torchrl.system import disk
-from warp_torchrl.validation import check_fields
+from warp_torchrl.validation import check_fields, dotted
 
 log = logging.getLogger("warp_torchrl")
 _ID = "wandb_id"  # a file of the run folder
@@ -21,88 +22,152 @@ _DIGITS = 8
 _GIVEN = re.compile(rf"[0-9a-z]{{{_DIGITS}}}")
 
 
-class Tracker(Protocol):
-    """A tracker of a run's metrics."""
+class Sink(Protocol):
+    """An open run of a tracker."""
 
-    def log(self, row: Mapping[str, float | None], frames: int) -> None:
-        """Send a row."""
+    def log(self, values: Mapping[str, float], frames: int) -> None:
+        """Send values by name, all at once."""
+        ...
+
+    def show(self, table: str, rows: Sequence[Sequence[Any]], picture: Path | None, frames: int) -> None:
+        """Send the table of the last evaluation, as text and as rows under a line of titles, and its picture."""
         ...
 
     def close(self) -> None:
-        """Finish the tracker's run."""
+        """Finish the run."""
         ...
 
 
-class _Silent:
-    def log(self, row: Mapping[str, float | None], frames: int) -> None:
-        """Send nothing."""
+class Tracker:
+    """A callback that sends a run to a tracker, whose first error ends the tracking, never the training.
 
-    def close(self) -> None:
-        """Do nothing."""
-
-
-class _TorchRlTracker:
-    """One of TorchRL's loggers; its first error ends the tracking, never the training.
+    Evaluations on the way are ``evaluation/<metric>``; the last one is ``final/<metric>``, with its table and picture.
 
     Args:
-        name: Its name in TorchRL.
-        run: The run folder.
-        title: Name of the run; None takes the folder's name.
+        name: Name of the tracker.
+        open_sink: Opens the tracker's run.
         sent_frames: Frames of the last row that the tracker has already.
-        begin: Called with the new logger.
-        options: Options of TorchRL's logger.
     """
 
-    def __init__(
-        self,
-        name: str,
-        run: Path,
-        title: str | None = None,
-        sent_frames: int = 0,
-        begin: Callable[[Any], None] = lambda logger: None,
-        **options: object,
-    ) -> None:
+    def __init__(self, name: str, open_sink: Callable[[], Sink], sent_frames: int = 0) -> None:
         self._name, self._sent_frames = name, sent_frames
-        try:
-            self._logger = get_logger(name, str(run), title or run.name, **options)
-            begin(self._logger)
-        except Exception as error:
-            self._fail(error)
+        self._sink: Sink | None = None
+        self._try(lambda: setattr(self, "_sink", open_sink()))
 
-    def log(self, row: Mapping[str, float | None], frames: int) -> None:
+    def on_batch(self, training: Any, row: Mapping[str, float | None]) -> None:
         """Send a row, with the column names of ``metrics.csv``."""
-        if self._logger is None or frames <= self._sent_frames:
-            return
+        self._send({name: value for name, value in row.items() if value is not None}, training.frames)
+
+    def on_evaluation(self, training: Any, result: Any) -> None:
+        """Send the means of an evaluation's metrics; of the last one the table and the picture too."""
+        several = len(training.run_config.kinds) > 1
+        part, kind = ("evaluation", f"_{result.scenario}" if several else "") if not result.folder else ("final", "")
+        means = {f"{part}/{name}{kind}": result.mean(name) for name in result.episodes}
+        own = {f"evaluation/saved{kind}"}  # which the row of ``metrics.csv`` has
+        self._send({name: mean for name, mean in means.items() if mean == mean and name not in own}, training.frames)
+        if result.folder and self._sink is not None:
+            sink = self._sink
+            self._try(lambda: sink.show(str(result), evaluation_rows(result.report), result.picture, training.frames))
+
+    def on_end(self, training: Any) -> None:
+        """Finish the tracker's run: a slow server may delay it."""
+        if self._sink is not None:
+            self._try(self._sink.close)
+
+    def _send(self, values: Mapping[str, float], frames: int) -> None:
+        if self._sink is not None and frames > self._sent_frames and values:
+            sink = self._sink
+            self._try(lambda: sink.log(values, frames))
+
+    def _try(self, do: Callable[[], object]) -> None:
         try:
-            for name, value in row.items():
-                if value is not None:
-                    self._logger.log_scalar(name, value, step=frames)
+            do()
         except Exception as error:
-            self._fail(error)
+            self._sink = None
+            reason = (str(error).splitlines() or [type(error).__name__])[0]
+            log.warning("%s does not work, the run goes on without it: %s", self._name, reason)
+
+
+def evaluation_rows(report: Mapping[str, Any]) -> list[list[Any]]:
+    """Return a report's means as a line of titles and a line for each policy; None where one has no value."""
+    policies = {**report["baselines"], **report["other_modes"], report["policy"]: report["metrics"]}
+    names = list(dict.fromkeys(name for metrics in policies.values() for name in metrics))
+    empty: dict[str, Any] = {"mean": None}
+    lines = [[policy, *(each.get(name, empty)["mean"] for name in names)] for policy, each in policies.items()]
+    return [["policy", *names], *lines]
+
+
+class _WandbRun:
+    """A run of Weights & Biases."""
+
+    def __init__(self, run: Path, config: Mapping[str, Any], **options: Any) -> None:
+        os.environ.setdefault("WANDB_SILENT", "true")
+        import wandb
+
+        self._wandb: Any = wandb
+        self._run = wandb.init(dir=str(run), name=run.name, config=dict(config), **options)
+
+    def log(self, values: Mapping[str, float], frames: int) -> None:
+        self._run.log(dict(values), step=frames)
+
+    def show(self, table: str, rows: Sequence[Sequence[Any]], picture: Path | None, frames: int) -> None:
+        titles, *lines = rows
+        shown: dict[str, Any] = {"final/table": self._wandb.Table(columns=list(titles), data=[list(x) for x in lines])}
+        if picture is not None:
+            is_page, wandb = picture.suffix == ".html", self._wandb
+            shown["final/episode"] = wandb.Html(str(picture)) if is_page else wandb.Video(str(picture))
+        self._run.log(shown, step=frames)
 
     def close(self) -> None:
-        """Finish the tracker's run."""
-        experiment = getattr(self._logger, "experiment", None)
-        finish = getattr(experiment, "finish", None) or getattr(experiment, "close", None)
-        try:
-            if finish is not None:
-                finish()
-        except Exception as error:
-            self._fail(error)
+        self._run.finish()
 
-    def _fail(self, error: Exception) -> None:
-        self._logger = None
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
-        log.warning("%s does not work, the run goes on without it: %s", self._name, reason)
+
+class _TensorboardEvents:
+    """A file of events of TensorBoard."""
+
+    def __init__(self, folder: Path, config: Mapping[str, Any], drop_after: int | None) -> None:
+        from torch.utils.tensorboard import SummaryWriter
+        from torch.utils.tensorboard.summary import hparams
+
+        self._writer = cast(Any, SummaryWriter(str(folder)))
+        if drop_after is not None:
+            _drop_after(drop_after, self._writer)
+            return
+        self._writer.add_text("config", f"```\n{json.dumps(config, indent=1)}\n```")
+        values = {
+            key: value if isinstance(value, (bool, int, float, str)) else json.dumps(value)
+            for key, value in dotted(config).items()
+        }
+        for summary in hparams(values, {"final/saved": 0.0}):
+            self._writer.file_writer.add_summary(summary)
+
+    def log(self, values: Mapping[str, float], frames: int) -> None:
+        from tensorboard.compat.proto.summary_pb2 import Summary
+
+        points = [Summary.Value(tag=name, simple_value=value) for name, value in values.items()]
+        self._writer.file_writer.add_summary(Summary(value=points), frames)
+
+    def show(self, table: str, rows: Sequence[Sequence[Any]], picture: Path | None, frames: int) -> None:
+        from tensorboard.compat.proto.summary_pb2 import Summary
+
+        self._writer.add_text("final/table", f"```\n{table}\n```", frames)
+        if picture is not None and picture.suffix == ".gif":
+            with Image.open(picture) as first:
+                width, height = first.size
+            gif = Summary.Image(encoded_image_string=picture.read_bytes(), width=width, height=height, colorspace=3)
+            self._writer.file_writer.add_summary(Summary(value=[Summary.Value(tag="final/episode", image=gif)]), frames)
+
+    def close(self) -> None:
+        self._writer.close()
 
 
 @dataclass(frozen=True, kw_only=True)
 class CsvOnly:
     """No tracker; a run always writes ``metrics.csv``."""
 
-    def open(self, run: Path, frames: int = 0, sent_frames: int = 0) -> Tracker:
-        """Return a tracker for a run folder, see ``Tensorboard.open``."""
-        return _Silent()
+    def open(self, run: Path, frames: int, sent_frames: int, config: Mapping[str, Any]) -> Tracker | None:
+        """Return no tracker, see ``Tensorboard.open``."""
+        return None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,35 +187,32 @@ class Wandb:
     def __post_init__(self) -> None:
         check_fields(self)
 
-    def open(self, run: Path, frames: int = 0, sent_frames: int = 0) -> Tracker:
+    def open(self, run: Path, frames: int, sent_frames: int, config: Mapping[str, Any]) -> Tracker:
         """Return a tracker for a run folder, see ``Tensorboard.open``: rows that it has are not sent again."""
-        os.environ.setdefault("WANDB_SILENT", "true")
         sweep = run.resolve().parent
         group = self.group or (sweep.name if (sweep / "multirun.yaml").exists() else None)
         number = _own_id(run / _ID, is_new=not frames)
-        options = {"offline": self.mode == "offline", "project": self.project, "group": group, "id": number}
-        return _TorchRlTracker("wandb", run, sent_frames=sent_frames, wandb_kwargs=options)
+        options = {"project": self.project, "mode": self.mode, "group": group, "id": number}
+        options |= {"resume": "allow"} if self.mode == "online" else {}  # offline its number joins the parts
+        return Tracker("wandb", lambda: _WandbRun(run, config, **options), sent_frames)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Tensorboard:
     """TensorBoard; needs the extra ``tensorboard``."""
 
-    def open(self, run: Path, frames: int = 0, sent_frames: int = 0) -> Tracker:
+    def open(self, run: Path, frames: int, sent_frames: int, config: Mapping[str, Any]) -> Tracker:
         """Return a tracker for a run folder.
 
         Args:
             run: The folder.
             frames: Frames of the checkpoint from which the run resumes; 0 for a new one.
             sent_frames: Frames of the last row that the run wrote before that; 0 if none is after the checkpoint.
+            config: The run's configuration, as plain values.
         """
-        before = sorted(path.parent.name for path in run.glob("*/*tfevents*"))
-
-        def begin(logger: Any) -> None:
-            if before:
-                _drop_after(frames, logger.experiment)
-
-        return _TorchRlTracker("tensorboard", run, before[0] if before else None, begin=begin)
+        before = sorted(path.parent for path in run.glob("*/*tfevents*"))
+        folder, drop_after = (before[0], frames) if before else (run / run.name, None)
+        return Tracker("tensorboard", lambda: _TensorboardEvents(folder, config, drop_after))
 
 
 def _drop_after(frames: int, writer: Any) -> None:

@@ -42,6 +42,10 @@ class MetricsFile:
         if keep_rows:
             self._columns = self._cut(keep_rows)
 
+    def on_batch(self, training: object, row: Mapping[str, float | None]) -> None:
+        """Append the row of a batch: the file is a callback of its training."""
+        self.add(row)
+
     def add(self, row: Mapping[str, float | None]) -> None:
         """Append a row. ``sync`` flushes it to the disk.
 

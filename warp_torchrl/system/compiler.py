@@ -4,6 +4,7 @@ Eager, each of their operations passes over every cell; fused, one loop does the
 same, and on the CPU every bit of a world, but for the last places of exponentials: law ``hazard``, changing winds.
 """
 
+import logging
 import warnings
 from collections.abc import Callable
 from functools import cache
@@ -29,6 +30,7 @@ _NOISE = (
     "Dynamo detected a call to a `functools.lru_cache`-wrapped function",  # of constants, which stay what they are
     "torch._dynamo.config.inline_inbuilt_nn_modules is deprecated",  # in tensordict
 )
+_EXTENSIONS = "torch.utils.cpp_extension"  # warns of CUDA_HOME on machines without a GPU, once in every process
 
 
 @cache
@@ -53,10 +55,16 @@ def compile_function(function: Callable[P, T], fullgraph: bool = False, **option
         fullgraph: Whether a part that cannot be compiled is an error.
         options: Of Inductor.
     """
-    for message in _NOISE:
-        warnings.filterwarnings("ignore", message=message)
+    _quieten()
     options["guard_filter_fn"] = torch.compiler.skip_guard_on_globals_unsafe
     return torch.compile(function, fullgraph=fullgraph, dynamic=False, options=options)
+
+
+def _quieten() -> None:
+    """Let torch's compiler warn of nothing that a user can do nothing about."""
+    for message in _NOISE:
+        warnings.filterwarnings("ignore", message=message)
+    logging.getLogger(_EXTENSIONS).setLevel(logging.ERROR)
 
 
 def vectors() -> str:
@@ -73,6 +81,7 @@ def check_compiler(device: torch.device) -> None:
     Raises:
         ValueError: If it finds no C++ compiler.
     """
+    _quieten()
     from torch._inductor.cpp_builder import get_cpp_compiler
     from torch._inductor.exc import InvalidCxxCompiler
 

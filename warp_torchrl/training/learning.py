@@ -26,7 +26,7 @@ from warp_torchrl.system.compiler import compile_function
 from warp_torchrl.training.finite import FiniteSteps, NumericalFailure
 from warp_torchrl.training.kickstarting import kickstart
 from warp_torchrl.training.level_sampler import level_sampler
-from warp_torchrl.training.progress import TRAIN_COLUMNS, episode_columns
+from warp_torchrl.training.progress import TRAIN_COLUMNS, batch_columns
 from warp_torchrl.training.recorded import RecordedUpdate
 from warp_torchrl.training.tasks import Task, TaskWorlds, learners, task_worlds
 from warp_torchrl.training.weighing import weighing
@@ -108,7 +108,8 @@ class Learning:
 
     def _learn(self, batches: Sequence[TensorDictBase]) -> dict[str, float | None]:
         """Learn from batches [B, T], one of each kind of worlds, and return their row of ``metrics.csv``."""
-        row, unsound = episode_columns(batches, [task.name for task in self.tasks])
+        teams, kinds = zip(*((task.env.world.team, task.name) for task in self.tasks), strict=True)
+        row, unsound = batch_columns(batches, teams, kinds)
         if self.level_sampler is not None:
             row |= self.level_sampler.columns(batches[0])
         if self.weighing is not None:

@@ -6,13 +6,9 @@ Every process of a run goes through it with its share of the worlds; the first o
 import logging
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
-
-from tensordict import TensorDictBase
-from tqdm import tqdm
 
 from warp_torchrl.algorithms import parallel
 from warp_torchrl.algorithms.parallel import WorkerDied
@@ -23,18 +19,18 @@ from warp_torchrl.runs import checkpoint as checkpoints
 from warp_torchrl.runs.config.run_config import RunConfig
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.runs.config.seeds import WORLDS, first_world_seed
-from warp_torchrl.runs.logging import Tracker
 from warp_torchrl.runs.metrics_file import MetricsFile
 from warp_torchrl.runs.policies.trained import MODES
 from warp_torchrl.runs.saving import SaveClock, passes
 from warp_torchrl.system import disk
 from warp_torchrl.system.finite import NumericalFailure, not_finite
 from warp_torchrl.system.signals import DeferredSignals, Stopped
+from warp_torchrl.training.callbacks import Callbacks
+from warp_torchrl.training.evaluations import EvaluationsOnTheWay
 from warp_torchrl.training.learning import Learning
-from warp_torchrl.training.progress import batch_size_notice, line
+from warp_torchrl.training.progress import ProgressBar, batch_size_notice
 
 log = logging.getLogger("warp_torchrl")
-_SECONDS_BETWEEN_LINES = 15.0
 
 
 class Training(Learning):
@@ -44,9 +40,16 @@ class Training(Learning):
         run_config: What to train.
         saved_config: The configuration that checkpoints keep.
         run: The run folder, which the first process alone writes.
+        callbacks: Objects with some of ``HOOKS``; the first process calls them.
+
+    Raises:
+        ValueError: If a callback has no hook.
     """
 
-    def __init__(self, run_config: RunConfig, saved_config: SavedConfig, run: Path) -> None:
+    def __init__(
+        self, run_config: RunConfig, saved_config: SavedConfig, run: Path, callbacks: Sequence[object] = ()
+    ) -> None:
+        self._given, self.callbacks = callbacks, Callbacks(callbacks)
         super().__init__(run_config)
         self.saved_config, self.run = saved_config, run
         self.is_first = parallel.rank() == 0
@@ -55,48 +58,57 @@ class Training(Learning):
         self.clock = SaveClock(run_config.checkpoint.minutes, self._size)
         self.mode: str | None = None
         self.metrics = MetricsFile(run / "metrics.csv")
+        self._stops = False
 
-    def train(self) -> None:
-        """Train until ``total_frames``; save checkpoints on the way and at the end.
+    def train(self, signals: DeferredSignals | None = None) -> None:
+        """Train until ``total_frames``; save checkpoints on the way and at the end. ``end`` closes the callbacks.
+
+        Args:
+            signals: Those that stop the run, for a command; None leaves signals to the caller.
 
         Raises:
             Stopped: If a signal asked the run to stop; it has saved.
             NumericalFailure: If a reward, loss or gradient is not finite.
             WorkerDied: If a worker or another process ended; the run has saved.
         """
-        with DeferredSignals() as signals:
-            tracker = self._open_tracker() if self.is_first else None
-            try:
-                self.join()
-                with self._bar() as bar:
-                    self._train(signals, tracker, bar)
-                if self.is_first:
-                    self.mode = self.mode or self._better_mode()
-                self.save()
-                if self.is_first:
-                    log.info("saved %d times, in %.2f %% of the time", self.clock.saves, 100.0 * self.clock.share())
-            except WorkerDied:
-                self._save_alone()
-                if signals.received:  # a terminal sends its signals to the workers too
-                    raise Stopped(signals.received, self.run) from None
-                raise
-            finally:
-                if tracker is not None:
-                    tracker.close()  # after the last save: a slow server may delay it
-            if signals.received:
-                raise Stopped(signals.received, self.run)
+        signals = signals or DeferredSignals()  # which records nothing before it is entered
+        self.callbacks = self._opened()
+        try:
+            self.join()
+            self._train(signals)
+            if self.is_first:
+                self.mode = self.mode or self._better_mode()
+            self.save()
+            if self.is_first:
+                log.info("saved %d times, in %.2f %% of the time", self.clock.saves, 100.0 * self.clock.share())
+        except WorkerDied:
+            self._save_alone()
+            if signals.received:  # a terminal sends its signals to the workers too
+                raise Stopped(signals.received, self.run) from None
+            raise
+        if signals.received:
+            raise Stopped(signals.received, self.run)
 
-    def _open_tracker(self) -> Tracker:
-        return self.run_config.logger.open(self.run, self.frames, self.metrics.cut_at)
+    def stop(self) -> None:
+        """Let the training end after this batch, as if it had reached ``total_frames``; for callbacks."""
+        self._stops = True
 
-    def _bar(self) -> AbstractContextManager[tqdm | None]:
-        """Return the progress bar of the first process: it has a semaphore, which a killed process would leave."""
-        total = self.run_config.total_frames
+    def end(self) -> None:
+        """Call ``on_end`` of the callbacks; they are called no more."""
+        callbacks, self.callbacks = self.callbacks, Callbacks()
+        callbacks.end(self)
+
+    def _opened(self) -> Callbacks:
+        """Return the callbacks of the first process; the bar's semaphore would stay behind of a killed other one."""
         if not self.is_first:
-            return nullcontext()
-        return tqdm(total=total, initial=self.frames, unit="frame", disable=None, dynamic_ncols=True)
+            return Callbacks()
+        config = self.run_config
+        tracker = config.logger.open(self.run, self.frames, self.metrics.cut_at, self.saved_config.values)
+        bar = ProgressBar(config.total_frames, self.frames)
+        trackers = [] if tracker is None else [tracker]
+        return Callbacks([EvaluationsOnTheWay(config), *self._given, self.metrics, *trackers, bar])
 
-    def _train(self, signals: DeferredSignals, tracker: Tracker | None, bar: tqdm | None) -> None:
+    def _train(self, signals: DeferredSignals) -> None:
         total = self.run_config.total_frames
         collector, worlds = self.collector, self.run_config.n_worlds
         end = collector.end(total, worlds)
@@ -106,46 +118,35 @@ class Training(Learning):
             log.log(logging.WARNING if total < self.frames_per_batch else logging.INFO, notice)
         self._began = time.perf_counter() - self.seconds
         for batches in self.batches() if self.frames < total else ():
-            row = self._learn(batches)
-            if tracker is not None and bar is not None:
-                self._report(row, tracker, bar)
+            self._report(self._learn(batches))
             if self.frames >= total:
                 break
             due = signals.received or self._is_regular(self.frames) or self.clock.is_due()
-            saves, received = self.go_on(bool(due), signals.received)
+            saves, received, stops = self.go_on(bool(due), signals.received, self._stops)
+            if stops:
+                break
             if saves:
                 self.save()
-                _, received = self.go_on(received=signals.received)  # one may have come while it saved
+                _, received, _ = self.go_on(received=signals.received)  # one may have come while it saved
             if received:
                 raise Stopped(received, self.run)
 
-    def go_on(self, saves: bool = False, received: int = 0) -> tuple[bool, int]:
-        """Return in every process what the first one decides after a batch: whether to save, and a signal to stop at.
+    def go_on(self, saves: bool = False, received: int = 0, stops: bool = False) -> tuple[bool, int, bool]:
+        """Return in every process what the first one decides after a batch: to save, a signal to stop at, to end.
 
         Every process must call it after each batch but the last, and after a save.
         """
-        return parallel.share((saves, received))
+        return parallel.share((saves, received, stops))
 
-    _last_seconds = _next_line = 0.0
+    _last_seconds = 0.0
 
-    def _report(self, row: dict[str, float | None], tracker: Tracker, bar: tqdm) -> None:
-        """Write a row to ``metrics.csv``, the tracker, and the bar or the log."""
-        total = self.run_config.total_frames
+    def _report(self, row: Mapping[str, float | None]) -> None:
+        """Give a row to the callbacks, with its times."""
         self.seconds = time.perf_counter() - self._began
         rate = self.last_batch / max(self.seconds - self._last_seconds, 1e-9)
         self._last_seconds = self.seconds
-        row = {"time/frames": self.frames, "time/seconds": self.seconds, "time/fps": rate, **row}
-        self.metrics.add(row)
-        tracker.log(row, self.frames)
-        bar.update(self.last_batch)
-        bar.set_postfix(saved=row["world/saved"], refresh=False)
-        if bar.disable and (self.seconds >= self._next_line or self.frames >= total):
-            self._next_line = self.seconds + _SECONDS_BETWEEN_LINES
-            log.info(line(row, total))
-
-    def _learn(self, batches: Sequence[TensorDictBase]) -> dict[str, float | None]:
-        row = super()._learn(batches)
-        return row | (self._evaluate() if self.is_first else {"evaluation/saved": None})
+        times = {"time/frames": self.frames, "time/seconds": self.seconds, "time/fps": rate}
+        self.callbacks.call("on_batch", self, {**times, **row})
 
     def _save_alone(self) -> None:
         """Save without the processes that may have ended: on resume their worlds start new episodes."""
@@ -166,19 +167,6 @@ class Training(Learning):
             "total_frames was %d and is %d: what changes over a training goes on as at %.1f %% of the new total%s",
             before, total, 100.0 * self.frames / total, f", {columns}" if columns else "",
         )  # fmt: skip
-
-    def _evaluate(self) -> dict[str, float | None]:
-        """Return the columns of an evaluation on the way: the share saved, and of each kind if there are several."""
-        options, kinds = self.run_config.evaluation, self.run_config.kinds
-        names = ["saved"] if len(kinds) == 1 else ["saved", *(f"saved_{kind.name}" for kind in kinds)]
-        if not options.interval or not passes(options.interval, self.frames, self.last_batch):
-            return {f"evaluation/{name}": None for name in names}
-        saved = []
-        for kind in kinds:
-            env = self.run_config.make_env(options.episodes, options.first_seed, world=kind.world)
-            saved.append(float(play(env, self.learner.policy, options.first_seed)["saved"].mean()))
-        values = saved if len(kinds) == 1 else [sum(saved) / len(saved), *saved]
-        return {f"evaluation/{name}": value for name, value in zip(names, values, strict=True)}
 
     def _better_mode(self) -> str:
         """Return the mode, sampled or deterministic, that does better on training seeds, see ``goal``."""
@@ -226,6 +214,7 @@ class Training(Learning):
                 stays=self._is_regular,
             )
         self.saved_at = self.frames
+        self.callbacks.call("on_checkpoint", self, path)
         return path
 
     def _size(self) -> int:

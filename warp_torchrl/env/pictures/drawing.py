@@ -272,3 +272,10 @@ def fire_legend(
         list(entries.values()), list(entries), loc="outside lower center", ncols=3,
         handler_map={tuple: HandlerTuple(ndivide=None, pad=0.0)}, handlelength=3.0,
     )  # fmt: skip
+
+
+def line_style(index: int) -> dict[str, Any]:
+    """Return the colour and the dashes of line number ``index`` of a figure."""
+    colours = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7", "#555555", "#F0E442")  # Okabe, Ito
+    dashes = ("-", "--", "-.", ":")
+    return {"color": colours[index % len(colours)], "linestyle": dashes[index // len(colours) % len(dashes)]}

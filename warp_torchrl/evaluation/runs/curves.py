@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from warp_torchrl.env.pictures.drawing import SOFT, sheet
+from warp_torchrl.env.pictures.drawing import SOFT, line_style, sheet
 from warp_torchrl.evaluation.runs.folders import FRAMES, MOST_ROWS, SAVED, SECONDS, Run, read_run, run_folders
-from warp_torchrl.evaluation.summary import line_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -102,6 +102,7 @@ def tidied(config: DictConfig, overrides: Sequence[str]) -> DictConfig:
     if config.get("plugins") or ("plugins" in config and changes()):
         shown = OmegaConf.masked_copy(config, [str(key) for key in config if key != "hydra"])
         config.plugins = needed(cast("dict[str, Any]", OmegaConf.to_container(shown)))
+    given_options = {override.replace("'", "").replace('"', "") for override in overrides}
     given = [override.partition("=")[0].lstrip("+~") for override in overrides]
     for group in (each for each in COMPONENTS if each in given and each in config):
         kind = component(config[group].get("_target_"))
@@ -110,6 +111,9 @@ def tidied(config: DictConfig, overrides: Sequence[str]) -> DictConfig:
             if kind is not None and _options_with(f"{group}.{key}"):
                 with open_dict(config):
                     del config[group][key]
+    if "landscape=array" in given_options and "landscape.size" not in given:
+        with open_dict(config):  # the scenario's size would be a window: the whole array is the world
+            config.landscape.pop("size", None)
     return config
 
 
@@ -233,6 +237,11 @@ def option_of(group: str, target: str) -> str:
 def plain(config: DictConfig) -> dict[str, Any]:
     """Return a configuration as plain, resolved values."""
     return cast("dict[str, Any]", OmegaConf.to_container(config, resolve=True))
+
+
+def as_yaml(config: DictConfig) -> str:
+    """Return a configuration as the text of a yaml file, with resolved values."""
+    return OmegaConf.to_yaml(config, resolve=True)
 
 
 def without_targets(node: Any) -> Any:

@@ -50,12 +50,14 @@ def build(node: object, where: str) -> Any:
     """Build the component that a configuration node describes.
 
     Args:
-        node: A mapping with ``_target_``, see ``component``, and its fields.
+        node: A mapping with ``_target_``, see ``component``, and its fields; or a component.
         where: The node's key, for messages.
 
     Raises:
         ConfigError: If there is no such component, a key is unknown, or a value breaks a rule.
     """
+    if is_dataclass(node) and not isinstance(node, type):
+        return node
     if not isinstance(node, Mapping) or "_target_" not in node:
         raise ConfigError(f"{where} must name one of the files of conf/{where}, got {node!r}")
     kind = component(node["_target_"])

@@ -103,7 +103,7 @@ class Array(Cropped):
     column: int | None = None
     min_fuel: float = 0.5
     cell_size: float = 30.0
-    _digest: str = field(init=False, repr=False)  # of the layers: arrays cannot be compared by ==
+    _digest: str = field(init=False)  # of the layers: arrays cannot be compared by ==, nor shown
 
     def __post_init__(self) -> None:
         check_fields(self, min_fuel=(0.0, 1.0), cell_size=(0.01, 100_000.0))

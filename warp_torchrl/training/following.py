@@ -2,11 +2,7 @@
 
 import logging
 import os
-import shutil
 import sys
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +13,11 @@ from warp_torchrl.runs.config.building import run_config
 from warp_torchrl.runs.config.plugins import load
 from warp_torchrl.runs.config.saved_config import SavedConfig
 from warp_torchrl.system.malloc import keep_freed_memory
-from warp_torchrl.system.signals import Stopped
+from warp_torchrl.system.signals import DeferredSignals, Stopped
 from warp_torchrl.training.finite import NumericalFailure
 from warp_torchrl.training.loop import Training
 
-FOLLOWING = "warp_torchrl.commands.following"
+FOLLOWING = "warp_torchrl.training.following"
 """The module that another process runs."""
 
 
@@ -39,21 +35,12 @@ def follow_training(values: dict[str, Any]) -> None:
     load(values["plugins"])
     training = Training(run_config(values), SavedConfig(), Path())
     try:
-        training.train()
+        with DeferredSignals() as signals:  # a terminal sends its signals to every process
+            training.train(signals)
     except (NumericalFailure, Stopped):
         pass
     finally:
         training.close()
-
-
-@contextmanager
-def folder_of_its_own() -> Iterator[list[str]]:
-    """Yield the overrides by which Hydra, in a process that ``torchrun`` has started, writes and logs nothing."""
-    folder = tempfile.mkdtemp(prefix="warp_torchrl-")
-    try:
-        yield [f"hydra.run.dir={folder}", "hydra/job_logging=disabled", "hydra/hydra_logging=disabled"]
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 if __name__ == "__main__":
