@@ -6,7 +6,19 @@ import pytest
 import torch
 
 from warp_torchrl.world.arrays.geometry import DIRECTIONS
-from warp_torchrl.world.law.travel import NEVER, NOWHERE, Places, along_ray, arrival, duration, from_edges, travel
+from warp_torchrl.world.law.travel import (
+    NEVER,
+    NOWHERE,
+    Places,
+    along_ray,
+    arrival,
+    duration,
+    from_edges,
+    least_ratio,
+    since,
+    travel,
+    until,
+)
 
 
 def round_fire(slowness: float = 2.0):
@@ -63,9 +75,9 @@ def test_where_nothing_burns_fire_never_comes() -> None:
 
 
 def test_fire_comes_from_one_neighbour_by_its_distance() -> None:
-    time, direction, alone = from_edges(around({"w": 1.0}), round_fire())
+    time, direction, _, alone = from_edges(around({"w": 1.0}), round_fire())
     assert (time.item(), direction.item(), alone.item()) == (3.0, 6, True)
-    time, direction, alone = from_edges(around({"sw": 1.0}), round_fire())
+    time, direction, _, alone = from_edges(around({"sw": 1.0}), round_fire())
     assert time.item() == pytest.approx(1.0 + 2.0 * math.sqrt(2.0), rel=1e-6)
     assert (direction.item(), alone.item()) == (5, True)
 
@@ -75,7 +87,7 @@ def test_a_straight_front_goes_on_at_its_rate_whichever_way_it_leans() -> None:
     slope = (math.cos(math.radians(30.0)), math.sin(math.radians(30.0)))
     times = torch.tensor([[2.0 * (column * slope[0] + row * slope[1]) + 9.0] for row, column in DIRECTIONS])
     ahead = times > 9.0
-    time, _, alone = from_edges(torch.where(ahead, NEVER, times), round_fire())
+    time, *_, alone = from_edges(torch.where(ahead, NEVER, times), round_fire())
     assert time.item() == pytest.approx(9.0, abs=1e-5)
     assert not alone.item()
 
@@ -103,12 +115,15 @@ def test_a_ray_is_exact_from_a_point() -> None:
     assert over_edge.item() > time.item() + 0.05  # what a straight front between the two would be late by
 
 
-def test_a_ray_needs_both_neighbours_to_share_the_origin() -> None:
-    begun = 2 * 9 + 2
-    times, origins = around({"w": 2.0 * math.sqrt(2.0), "nw": 2.0}), torch.full((8, 1), begun, dtype=torch.int32)
-    origins[6] = NOWHERE
-    at, metric = places(3, 4, 9, {begun: 0.0}), round_fire()
-    assert along_ray(times, origins, torch.tensor([begun], dtype=torch.int32), metric, at).item() == NEVER
+@pytest.mark.parametrize(("shut", "passes"), [("nw", True), ("w", False)])
+def test_a_ray_passes_a_cell_that_it_clips_by_less_than_half(shut: str, passes: bool) -> None:
+    # The way from (2, 2) to (3, 5) leaves column 4 at 2 + 2/3 rows: two thirds in the cell west of it.
+    begun, cells = 2 * 9 + 2, {"w": 2.0 * math.sqrt(5.0), "nw": 4.0}
+    origins = torch.full((8, 1), begun, dtype=torch.int32)
+    origins[{"w": 6, "nw": 7}[shut]] = NOWHERE
+    at = places(3, 5, 9, {begun: 0.0})
+    time = along_ray(around(cells), origins, torch.tensor([begun], dtype=torch.int32), round_fire(), at).item()
+    assert time == (pytest.approx(2.0 * math.sqrt(10.0), rel=1e-6) if passes else NEVER)
 
 
 def test_a_ray_goes_on_at_the_mean_slowness_of_its_neighbours() -> None:
@@ -124,3 +139,39 @@ def test_nothing_comes_from_neighbours_that_never_burn() -> None:
     at = places(3, 4, 9, {})
     time, _ = arrival(around({}), torch.full((8, 1), NOWHERE, dtype=torch.int32), round_fire(), at)
     assert time.item() >= NEVER / 2
+
+
+def weathers(seed: int, n: int = 64) -> tuple[torch.Tensor, ...]:
+    """Two metrics of n cells, in winds that have nothing to do with each other."""
+    draws = torch.Generator().manual_seed(seed)
+    head, ratio, bearing = (torch.rand(2, n, 1, generator=draws) for _ in range(3))
+    made = [travel(1.0 + 20.0 * head[i], 360.0 * bearing[i], 1.0 + 7.0 * ratio[i], 30.0) for i in range(2)]
+    return tuple(each.unbind(1) for each in made)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_least_ratio_of_two_weathers_is_that_of_some_direction(seed: int) -> None:
+    before, after = weathers(seed)
+    turn = torch.linspace(0.0, 2.0 * math.pi, 3600)
+    ratios = duration(after, turn.sin(), turn.cos()) / duration(before, turn.sin(), turn.cos())
+    assert torch.allclose(least_ratio(before, after), ratios.amin(1, keepdim=True), rtol=2e-3)
+    assert (least_ratio(before, before) == 1.0).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_in_another_weather_fire_comes_after_it_began_and_in_the_same_when_it_would_have(seed: int) -> None:
+    before, after = weathers(seed)
+    draws = torch.Generator().manual_seed(seed)
+    around, now = 20.0 * torch.rand(8, *before[0].shape, generator=draws), 10.0
+    times = now + 5.0 * torch.rand(before[0].shape, generator=draws)
+    assert torch.equal(until(times, now, around, before, before), times)
+    ratio = (until(times, now, around, before, after) - now) / (times - now)
+    assert (ratio >= least_ratio(before, after) * (1.0 - 1e-3)).all() and (ratio > 0.0).all()
+    assert torch.equal(since(around, now, torch.ones(())), around)
+
+
+def test_what_is_left_of_a_cell_takes_the_new_rate_of_its_own_direction() -> None:
+    # Fire left the west at 0 and needs 2 minutes for a cell; after 1.5 it needs 9 from there, and 1 from the east.
+    before, after = round_fire(2.0), (torch.tensor([5.0]), torch.tensor([-4.0]), torch.zeros(1))
+    time = until(torch.tensor([2.0]), 1.5, around({"w": 0.0}), before, after)
+    assert time.item() == pytest.approx(1.5 + 0.25 * 9.0)

@@ -16,7 +16,7 @@ from warp_torchrl.world.arrays.geometry import DIRECTIONS
 from warp_torchrl.world.arrays.random import Stream, uniform
 from warp_torchrl.world.backends.edge import places
 from warp_torchrl.world.backends.planes import is_fuel, spreads
-from warp_torchrl.world.law.arrivals import Arrivals, arrivals_in, beside, reached, sources, terms_of
+from warp_torchrl.world.law.arrivals import Arrivals, arrivals_in, beside, kindled, known, sources, terms_of
 from warp_torchrl.world.law.rate import RateFire
 from warp_torchrl.world.law.travel import NEVER, NOWHERE, Metric, Places, arrival, rate_from
 from warp_torchrl.world.state.state import WorldState
@@ -52,24 +52,34 @@ class AtBand:
     def _band(self, state: WorldState) -> "_Band":
         burns = spreads(self.fire, state)
         fuel = is_fuel(self.fire, state) & above(state.alpha, 0.0)
-        return _band_of(places(byte(beside(burns, fuel)).flatten()), state, burns, fuel)
+        near = beside(burns, fuel, kindled(state, self.fire.now(state), fuel))
+        return _band_of(places(byte(near).flatten()), state, burns, fuel)
 
     def _arrivals(self, state: WorldState, band: "_Band") -> Arrivals:
         kept, times = arrivals_in(state), sources(state, self.fire.now(state), band.spreads, band.fuel)
-        around = [padded(times, NEVER), padded(kept.origin, NOWHERE)]
-        times, origins = (plane.index_select(0, band.around.flatten()).view(8, -1) for plane in around)
-        known = reached(state).flatten()
+        at_origin = known(state, times).flatten()
+        here, own = times.flatten().index_select(0, band.cell), band.row * state.cells.shape[2] + band.column
+        around = (padded(times, NEVER), padded(kept.origin, NOWHERE), padded(band.spreads, 0))
+        times, origins, burning = (plane.index_select(0, band.around.flatten()).view(8, -1) for plane in around)
 
         def time_of(origin: Tensor) -> Tensor:
-            return known.index_select(0, band.first + origin)
+            return at_origin.index_select(0, band.first + origin)
 
         at = Places(band.row, band.column, state.cells.shape[2], time_of)
         minutes, origin = arrival(times, origins, _metric(state, band.cell), at)
+        minutes = torch.maximum(minutes, self._earliest(state, band))
+        holds = (kept.origin.flatten().index_select(0, band.cell) == own) & (here <= minutes)
+        holds &= burning.any(0)
+        minutes, origin = torch.where(holds, here, minutes), torch.where(holds, own, origin)
         never, nowhere = torch.full_like(kept.minutes, NEVER), torch.full_like(kept.origin, NOWHERE)
         return Arrivals(
             _put(never, band.cell, minutes),
             _put(nowhere, band.cell, origin),
         )
+
+    def _earliest(self, state: WorldState, band: "_Band") -> Tensor:
+        each = band.first.div(state.cells[0].numel(), rounding_mode="floor")
+        return self.fire.earliest(state).flatten().index_select(0, each)
 
     def _expected_ignitions(self, state: WorldState, band: "_Band") -> Tensor:
         burns = padded(band.spreads, 0)

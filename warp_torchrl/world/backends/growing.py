@@ -204,8 +204,12 @@ class GrowingFires(Spreading):
         def moved(place: Tensor) -> Tensor:
             return (place // old_width + rows.start) * width + place % old_width + columns.start
 
-        def relaid(plane: Tensor, beyond: float) -> Tensor:
-            grown = torch.full((worlds, after.height + 2, width), beyond, dtype=plane.dtype, device=plane.device)
+        def relaid(plane: Tensor, beyond: float | Tensor) -> Tensor:
+            grown = torch.zeros((worlds, after.height + 2, width), dtype=plane.dtype, device=plane.device)
+            if isinstance(beyond, Tensor):
+                grown[:, 1:-1, 1:-1] = beyond
+            else:
+                grown.fill_(beyond)
             inside = plane.view(self.shape)[:, 1:-1, 1 : 1 + before.on_map.width]
             grown[:, 1 + rows.start : 1 + rows.stop, 1 + columns.start : 1 + columns.stop] = inside
             return grown.flatten()
@@ -215,9 +219,12 @@ class GrowingFires(Spreading):
 
         self._times, self.minutes = relaid(self._times, NEVER), relaid(self.minutes, NEVER)
         self._burned, self._beside = relaid(self._burned, False), relaid(self._beside, False)
+        self._near, self._free = relaid(self._near, NEVER), relaid(self._free, self._land.fuel(after))
         self._origins = relaid(torch.where(self._origins < 0, NOWHERE, moved(self._origins)), NOWHERE)
-        self._waiting, self._changed = listed(self._waiting), listed(self._changed)
-        self._lay_out((worlds, after.height, after.width), self._land.fuel(after), self._land.pace(after))
+        self._waiting, self._changed, self._joined = (
+            listed(each) for each in (self._waiting, self._changed, self._joined)
+        )
+        self._lay_out((worlds, after.height, after.width), self._land.pace(after))
         self.window = after
         self._measure_rim()
 
@@ -234,3 +241,4 @@ class GrowingFires(Spreading):
                 self._going[fire] = False
         self._waiting = self._waiting[self._going[self._waiting // self._map]]
         self._changed = self._changed[self._going[self._changed // self._map]]
+        self._joined = self._joined[self._going[self._joined // self._map]]

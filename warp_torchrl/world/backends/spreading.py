@@ -12,7 +12,18 @@ from torch import Tensor
 from torch.nn.functional import pad
 
 from warp_torchrl.world.arrays.geometry import DIRECTIONS
-from warp_torchrl.world.law.travel import NEVER, NOWHERE, Metric, Places, arrival, at_other_rates, rate_from
+from warp_torchrl.world.law.travel import (
+    NEVER,
+    NOWHERE,
+    Metric,
+    Places,
+    arrival,
+    differ,
+    kindling,
+    least_ratio,
+    since,
+    until,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,24 +50,25 @@ class Spreading:
         self._times = torch.where(burned, 0.0, NEVER)
         self._origins = torch.full_like(self._times, NOWHERE, dtype=torch.int32)
         self.minutes = self._times.clone()
-        self._beside = torch.zeros_like(burned)
-        self._lay_out((lit.shape[0], lit.shape[1], lit.shape[2]), fuel, pace)
+        self._near = torch.full_like(self._times, NEVER)  # when a cell that waits kindles its neighbours
+        self._beside = torch.zeros_like(burned)  # waits
+        self._free = pad(fuel.expand_as(lit), (1, 1, 1, 1)).flatten() & ~burned  # can ignite, and does not wait yet
+        self._lay_out((lit.shape[0], lit.shape[1], lit.shape[2]), pace)
         started = burned.nonzero()[:, 0]
         self._origins[started] = self._place(started)
-        self._waiting = self._lit = started[:0]
-        self._changed = self._lighted(started)
+        self._waiting = self._changed = self._joined = self._lit = started[:0]
+        self._join(started)
         self._now = 0.0
 
-    def _lay_out(self, size: tuple[int, int, int], fuel: Tensor, pace: Tensor) -> None:
+    def _lay_out(self, size: tuple[int, int, int], pace: Tensor) -> None:
         """Make what hangs on the size of the map alone (B, H, W)."""
         worlds, height, width = size
         self.shape = (worlds, height + 2, width + 2)
         self._map = (height + 2) * (width + 2)
         self._width = width + 2
-        self._fuel = pad(fuel, (1, 1, 1, 1)).flatten()
         self._pace = pad(pace, (1, 1, 1, 1), value=1.0).flatten()
         self._slot = torch.zeros_like(self._origins)
-        self._offsets = torch.tensor([row * self._width + column for row, column in DIRECTIONS], device=fuel.device)
+        self._offsets = torch.tensor([row * self._width + column for row, column in DIRECTIONS], device=pace.device)
 
     def arrival(self) -> Tensor:
         """Return when the fire reached each cell, float32 [B, H, W] [minutes]; ``NEVER`` where it has not."""
@@ -78,42 +90,49 @@ class Spreading:
         return pad(travel, (1, 1, 1, 1), value=NEVER).view(-1, 3, self._map).transpose(0, 1).flatten(1)
 
     def _tick(self, travel: Tensor, end: float) -> None:
-        cells = self._around(self._changed)
-        times, origins = self._coming(travel, cells)
+        cells = self._once(torch.cat((self._around(self._changed), self._joined)))
+        metric = self._metric(travel, cells)
+        times, origins = self._coming(metric, cells, earliest=2.0 * self._now - end)
         differ = (times != self._times[cells]) | (origins != self._origins[cells])
-        changed = cells[differ]
-        self._times[changed], self._origins[changed] = times[differ], origins[differ]
+        changed, times = cells[differ], times[differ]
+        self._times[changed], self._origins[changed] = times, origins[differ]
+        self._near[changed] = kindling(times, metric[0][differ])
         waiting = self._waiting
-        reached = self._times[waiting] <= end
+        reached = self._times.index_select(0, waiting) <= end
         lit = waiting[reached]
         self._waiting = waiting[~reached]
-        self._burned[lit] = True
+        self._burned[lit], self._beside[lit] = True, False
         self.minutes[lit] = self._times[lit]
-        self._lit = lit
-        self._changed = torch.cat((changed, self._lighted(lit)))
+        self._lit, self._changed, self._joined = lit, changed, lit[:0]
+        self._join(lit)
         self._now = end
+        self._kindle()
 
-    def _lighted(self, lit: Tensor) -> Tensor:
-        """Return cells that have caught fire, after their neighbours have joined those that wait."""
-        around = (lit[:, None] + self._offsets).flatten()
-        around = self._once(
-            around[self._fuel[self._place(around).long()] & ~self._burned[around] & ~self._beside[around]]
-        )
-        self._beside[around] = True
+    def _kindle(self) -> None:
+        """Let the neighbours of cells that are about to burn join those that wait."""
+        near = self._waiting[self._near.index_select(0, self._waiting) <= self._now]
+        self._near[near] = NEVER
+        self._join(near)
+
+    def _join(self, cells: Tensor) -> None:
+        """Let the neighbours of cells join those that wait."""
+        around = (cells + self._offsets[:, None]).flatten()
+        around = self._once(around[self._free.index_select(0, around)])
+        self._free[around], self._beside[around] = False, True
         self._waiting = torch.cat((self._waiting, around))
-        return lit
+        self._joined = torch.cat((self._joined, around))
 
     def _around(self, cells: Tensor) -> Tensor:
-        """Return the waiting neighbours of cells, each once."""
-        around = (cells[:, None] + self._offsets).flatten()
-        return self._once(around[self._beside[around] & ~self._burned[around]])
+        """Return the waiting neighbours of cells, some more than once."""
+        around = (cells + self._offsets[:, None]).flatten()
+        return around[self._beside.index_select(0, around)]
 
     def _once(self, cells: Tensor) -> Tensor:
         number = torch.arange(len(cells), dtype=torch.int32, device=cells.device)
         self._slot[cells] = number
         return cells[self._slot[cells] == number]
 
-    def _coming(self, travel: Tensor, cells: Tensor) -> tuple[Tensor, Tensor]:
+    def _coming(self, metric: Metric, cells: Tensor, earliest: float) -> tuple[Tensor, Tensor]:
         around = (self._offsets[:, None] + cells).flatten()
         times = self._times.index_select(0, around).view(8, -1)
         origins = self._origins.index_select(0, around).view(8, -1)
@@ -124,7 +143,10 @@ class Spreading:
             return self.minutes_now.index_select(0, first + origin)
 
         at = Places(place // self._width, place % self._width, self._width, time_of)
-        return arrival(times, origins, self._metric(travel, cells), at)
+        times, origins = arrival(times, origins, metric, at)
+        times = times.clamp(min=earliest)
+        holds = (self._origins[cells] == place) & (self._times[cells] <= times)
+        return torch.where(holds, self._times[cells], times), torch.where(holds, place, origins)
 
     @property
     def minutes_now(self) -> Tensor:
@@ -132,39 +154,44 @@ class Spreading:
         return self._times
 
     def _metric(self, travel: Tensor, cells: Tensor) -> Metric:
-        pace, place = self._pace.index_select(0, cells), self._place(cells).long()
-        if travel.shape[1] > self._map:
-            place = place + cells // (len(self._pace) * self._map // travel.shape[1]) * self._map
+        pace, place = self._pace.index_select(0, cells), self._on_travel(travel, cells)
         slowness, east, north = (part.index_select(0, place) * pace for part in travel)
         return slowness, east, north
+
+    def _on_travel(self, travel: Tensor, cells: Tensor) -> Tensor:
+        """Return the flat index of cells in planes of travel, int64 [n]."""
+        place = self._place(cells).long()
+        if travel.shape[1] > self._map:
+            place = place + cells // (len(self._pace) // (travel.shape[1] // self._map)) * self._map
+        return place
 
     def _place(self, cells: Tensor) -> Tensor:
         return (cells % self._map).to(torch.int32)
 
     def _change(self, before: Tensor, after: Tensor) -> None:
         """Go on in another weather, as ``RateFire.in_air`` does."""
-        around = (self._waiting[:, None] + self._offsets).flatten()
-        edge = self._once(around[self._burned[around]])
-        self._scale(edge, self._rates_out(before, edge), self._rates_out(after, edge))
-        self._scale(self._waiting, self._rates_into(before, self._waiting), self._rates_into(after, self._waiting))
-        self._origins[edge] = self._place(edge)
-        self._origins[self._waiting] = NOWHERE
-        self._changed = torch.cat((edge, self._waiting))
+        waiting = self._waiting
+        waiting = waiting[differ(self._metric(before, waiting), self._metric(after, waiting))]
+        around = waiting + self._offsets[:, None]
+        burned = self._burned[around]
+        edge = self._once(around[burned])
+        begun = since(self._times[edge], self._now, self._least_ratio(before, after, edge))
+        ahead = self._times[waiting] > self._now
+        waiting, around, beside = waiting[ahead], around[:, ahead], burned[:, ahead].any(0)
+        old, new = self._metric(before, waiting), self._metric(after, waiting)
+        comes = until(self._times[waiting], self._now, self._times[around], old, new)
+        comes = torch.where(beside, comes, NEVER)
+        self._times[edge], self._origins[edge] = begun, self._place(edge)
+        self._times[waiting], self._near[waiting] = comes, kindling(comes, new[0])
+        self._origins[waiting] = torch.where(comes < NEVER, self._place(waiting), NOWHERE)
+        self._beside[waiting], self._free[waiting] = beside, ~beside
+        self._waiting, self._joined = (each[self._beside[each]] for each in (self._waiting, self._joined))
+        self._changed = torch.cat((self._changed, edge, waiting))
+        self._kindle()
 
-    def _scale(self, cells: Tensor, before: Tensor, after: Tensor) -> None:
-        self._times[cells] = at_other_rates(self._times[cells], self._now, before, after)
-
-    def _rates_into(self, travel: Tensor, cells: Tensor) -> Tensor:
-        metric, total = self._metric(travel, cells), torch.zeros(len(cells), device=cells.device)
-        for direction in range(8):
-            neighbour = self._burned[cells + self._offsets[direction]].to(torch.float32)
-            total = total + rate_from(direction, metric) * neighbour
-        return total
-
-    def _rates_out(self, travel: Tensor, cells: Tensor) -> Tensor:
-        total = torch.zeros(len(cells), device=cells.device)
-        for direction in range(8):
-            target = cells - self._offsets[direction]
-            fuel = self._fuel[self._place(target).long()] & ~self._burned[target]
-            total = total + rate_from(direction, self._metric(travel, target)) * fuel.to(torch.float32)
-        return total
+    def _least_ratio(self, before: Tensor, after: Tensor, edge: Tensor) -> Tensor:
+        """Return the least ratio of F into the neighbours of burned cells that can ignite, float32 [n]."""
+        around = (edge + self._offsets[:, None]).flatten()
+        one, other = self._metric(before, around), self._metric(after, around)
+        changes = (self._beside[around] | self._free[around]) & differ(one, other)
+        return torch.where(changes, least_ratio(one, other), 1.0).view(8, -1).amin(0)

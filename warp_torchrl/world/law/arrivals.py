@@ -6,9 +6,20 @@ import torch
 from torch import Tensor
 
 from warp_torchrl.world.arrays.batch import Batch
-from warp_torchrl.world.arrays.geometry import grow, neighbour_in, neighbours
+from warp_torchrl.world.arrays.geometry import grow, neighbours
 from warp_torchrl.world.law.cells import is_burning, is_tree
-from warp_torchrl.world.law.travel import NEVER, NOWHERE, Metric, Places, arrival, at_other_rates, rate_from
+from warp_torchrl.world.law.travel import (
+    NEVER,
+    NOWHERE,
+    Metric,
+    Places,
+    arrival,
+    differ,
+    kindling,
+    least_ratio,
+    since,
+    until,
+)
 from warp_torchrl.world.state.state import Air, Ground, WorldState
 
 RATE = "rate"
@@ -76,8 +87,8 @@ def lit(state: WorldState, where: Tensor, now: Tensor) -> WorldState:
 def in_air(state: WorldState, air: Air, now: Tensor, spreads: Tensor, fuel: Tensor) -> WorldState:
     """Return worlds in another air: the fire has gone as far as it has, and spreads at the new rates.
 
-    What a cell has waited, or has to wait, changes by the ratio of the mean rates to or from its neighbours. Every
-    burning cell is an origin from now on.
+    The trees beside it have times of their own from then on, which hold until the fire comes earlier; these trees and
+    the burning cells beside them are origins. Where rates stay, so do times and origins.
 
     Args:
         state: The worlds.
@@ -86,15 +97,34 @@ def in_air(state: WorldState, air: Air, now: Tensor, spreads: Tensor, fuel: Tens
         spreads: The burning cells that ignite others, bool [B, H, W].
         fuel: The trees that can ignite, bool [B, H, W].
     """
-    before, after = (_mean_rate(metric(state.ground, each), spreads, fuel) for each in (state.air, air))
-    minutes = at_other_rates(arrivals_in(state).minutes, now, before, after)
-    origin = torch.where(is_burning(state.cells), own_cell(state.cells), NOWHERE)
+    kept, before, after = arrivals_in(state), metric(state.ground, state.air), metric(state.ground, air)
+    waits, changes = is_waiting(kept, now, fuel), differ(before, after)
+    around = neighbours(torch.where(spreads | waits, kept.minutes, NEVER), NEVER)
+    comes = until(kept.minutes, now, around, before, after)
+    comes = torch.where(grow(spreads), comes, NEVER)
+    ratio = neighbours(torch.where(fuel & changes, least_ratio(before, after), 1.0), torch.inf)
+    begun = since(kept.minutes, now, ratio.amin(0))
+    sends, waits = spreads & grow(fuel & changes), waits & changes
+    minutes = torch.where(sends, begun, torch.where(waits, comes, kept.minutes))
+    origin = torch.where(sends | waits, own_cell(state.cells), kept.origin)
+    origin = torch.where(waits & (comes == NEVER), NOWHERE, origin)
     return state.replace(air=air).with_planes(RATE, Arrivals(minutes, origin))
 
 
-def beside(spreads: Tensor, fuel: Tensor) -> Tensor:
-    """Return the cells of fuel beside those that spread fire, bool [B, H, W] as both are."""
-    return grow(spreads) & fuel
+def is_waiting(kept: Arrivals, now: Tensor, fuel: Tensor) -> Tensor:
+    """Return the trees that the fire has not reached yet and comes to, bool [B, H, W]."""
+    return fuel & (kept.minutes > now) & (kept.minutes < NEVER / 2)
+
+
+def beside(spreads: Tensor, fuel: Tensor, kindled: Tensor) -> Tensor:
+    """Return the cells of fuel beside those that spread fire, or that kindle their neighbours, bool [B, H, W]."""
+    return grow(spreads | kindled) & fuel
+
+
+def kindled(state: WorldState, now: Tensor, fuel: Tensor) -> Tensor:
+    """Return the trees that the fire is about to reach, bool [B, H, W]; the arguments are those of ``in_air``."""
+    kept, (made, pace) = arrivals_in(state), terms_of(state.ground, state.air)
+    return is_waiting(kept, now, fuel) & (kindling(kept.minutes, made[:, 0] * pace) <= now)
 
 
 def sources(state: WorldState, now: Tensor, spreads: Tensor, fuel: Tensor) -> Tensor:
@@ -107,27 +137,33 @@ def sources(state: WorldState, now: Tensor, spreads: Tensor, fuel: Tensor) -> Te
     return torch.where(spreads | (fuel & (minutes > now)), minutes, NEVER)
 
 
-def reached(state: WorldState) -> Tensor:
-    """Return when the fire reached the cells that burn or have burned, else ``NEVER``, float32 [B, H, W]."""
-    return torch.where(is_tree(state.cells), NEVER, arrivals_in(state).minutes)
+def known(state: WorldState, times: Tensor) -> Tensor:
+    """Return when the fire reached the cells that burn or have burned, else ``sources``, float32 [B, H, W]."""
+    return torch.where(is_tree(state.cells), times, arrivals_in(state).minutes)
 
 
-def next_arrivals(state: WorldState, times: Tensor, beside: Tensor) -> Arrivals:
+def next_arrivals(state: WorldState, times: Tensor, spreads: Tensor, beside: Tensor, earliest: Tensor) -> Arrivals:
     """Return when the fire reaches some cells that can ignite, else ``NEVER``.
 
     Args:
         state: The worlds.
         times: When it reaches their neighbours, float32 [B, H, W] [minutes]; ``NEVER`` where it does not.
+        spreads: The burning cells that ignite others, bool [B, H, W].
         beside: The cells, bool [B, H, W].
+        earliest: What counts as late: a cell that has a time only after that takes it, float32 [B, 1, 1] [minutes].
     """
-    known, (row, column) = reached(state).flatten(1), _rows_and_columns(state.cells)
+    at_origin, (row, column) = known(state, times).flatten(1), _rows_and_columns(state.cells)
+    kept, own = arrivals_in(state), own_cell(state.cells)
 
     def time_of(origin: Tensor) -> Tensor:
-        return known.gather(1, origin.flatten(1).to(torch.int64)).view(origin.shape)
+        return at_origin.gather(1, origin.flatten(1).to(torch.int64)).view(origin.shape)
 
     places = Places(row, column, state.cells.shape[2], time_of)
-    around = neighbours(times, NEVER), neighbours(arrivals_in(state).origin, NOWHERE)
+    around = neighbours(times, NEVER), neighbours(kept.origin, NOWHERE)
     minutes, origin = arrival(*around, metric(state.ground, state.air), places)
+    minutes = torch.maximum(minutes, earliest)
+    holds = (kept.origin == own) & (times <= minutes) & grow(spreads)
+    minutes, origin = torch.where(holds, times, minutes), torch.where(holds, own, origin)
     return Arrivals(torch.where(beside, minutes, NEVER), torch.where(beside, origin, NOWHERE))
 
 
@@ -135,17 +171,6 @@ def own_cell(cells: Tensor) -> Tensor:
     """Return the flat index of each cell, int32 [B, H, W]."""
     row, column = _rows_and_columns(cells)
     return row * cells.shape[2] + column
-
-
-def _mean_rate(rates: Metric, spreads: Tensor, fuel: Tensor) -> Tensor:
-    """Return the sum of the rates from each burning cell to fuel, or from burning cells into fuel [B, H, W]."""
-    burning, trees = spreads.to(torch.float32), fuel.to(torch.float32)
-    into, out = torch.zeros_like(trees), torch.zeros_like(trees)
-    for direction in range(8):
-        rate = rate_from(direction, rates)
-        into = into + rate * neighbour_in(direction, burning)
-        out = out + neighbour_in((direction + 4) % 8, rate * trees)
-    return torch.where(spreads, out, into * trees)
 
 
 def _rows_and_columns(cells: Tensor) -> tuple[Tensor, Tensor]:

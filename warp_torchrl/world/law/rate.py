@@ -261,10 +261,12 @@ class RateFire(Automaton):
         return arrivals.in_air(state, air, self.now(state), self.spreads(state), self.can_ignite(state))
 
     def next_arrivals(self, state: WorldState) -> Arrivals:
-        """Return when the fire reaches each cell that can ignite and is beside it, else ``NEVER``."""
+        """Return when the fire reaches each cell that can ignite and is near it, else ``NEVER``."""
         spreads, fuel = self.spreads(state), self.can_ignite(state)
-        times = arrivals.sources(state, self.now(state), spreads, fuel)
-        return arrivals.next_arrivals(state, times, arrivals.beside(spreads, fuel))
+        now = self.now(state)
+        times, kindled = arrivals.sources(state, now, spreads, fuel), arrivals.kindled(state, now, fuel)
+        beside = arrivals.beside(spreads, fuel, kindled)
+        return arrivals.next_arrivals(state, times, spreads, beside, self.earliest(state))
 
     def tick(self, state: WorldState, u: Tensor, ticks_now: Tensor) -> WorldState:
         """See ``Automaton``. What the fire reaches within the tick ignites, at the minute when it does."""
@@ -334,6 +336,14 @@ class RateFire(Automaton):
     def now(self, state: WorldState) -> Tensor:
         """Return the minutes since ignition, float32 [B, 1, 1]."""
         return (state.tick * self.minutes)[:, None, None]
+
+    def earliest(self, state: WorldState) -> Tensor:
+        """Return the least time of arrival that a cell gets in the next tick, float32 [B, 1, 1] [minutes].
+
+        Fire that passes between cells comes to some before their neighbours have times. They burn when these have, and
+        no more than a tick after the time that they get.
+        """
+        return self.now(state) - self.minutes
 
     def _held(self, before: WorldState, after: WorldState) -> WorldState:
         """Return the worlds after a tick in which cells that are about to burn out wait for their neighbours."""

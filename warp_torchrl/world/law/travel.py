@@ -11,7 +11,10 @@ circle that the wind carries along. The times follow from a cell's eight neighbo
 * ``from_edges``: the fire comes over the edge between two adjacent neighbours, between which T is linear (Tsitsiklis
   1995; Sethian and Vladimirsky 2003). Right for any front that is straight, and for a start from a neighbour.
 * ``along_ray``: it comes straight from the cell that its neighbours have had it from, at the mean slowness that they
-  met. Right for the narrow tip of a young fire, which is sharper than a cell.
+  met. Right for the narrow tip of a young fire, which is sharper than a cell. A way that is shut bends at a cell beside
+  the obstacle, which is the origin of the fire behind it.
+
+A narrow head passes between two cells before it has reached either. So times go ahead of the fire: see ``kindling``.
 
 Times are in minutes, lengths in cells. The functions read stacks of the neighbours of any cells, [8, ...], directions
 in the order of ``geometry.DIRECTIONS``.
@@ -41,6 +44,8 @@ _ACROSS = (1, 1, 3, 3, 5, 5, 7, 7)
 """Directions of the two ends of the eight edges about a cell: beside it, and across its corner."""
 _WHOLE = 1.0 / math.sqrt(2.0) - 1e-5
 _LEAST = 1e-9
+_AHEAD = 0.08
+"""Share of a, for ``kindling``: 22.5 degrees off the head a cell takes 0.076 a e more than at the head."""
 
 
 def travel(head: Tensor, direction: Tensor, length_to_breadth: Tensor, cell_size: float) -> Tensor:
@@ -100,31 +105,82 @@ def arrival(times: Tensor, origins: Tensor, metric: Metric, at: Places) -> tuple
     Returns:
         float32 [...] [minutes], ``NEVER`` where it does not come, and int32 [...] like ``origins``.
     """
-    time, direction, from_one = from_edges(times, metric)
-    handed = origins.gather(0, direction[None])[0]
+    time, nearer, farther, from_one = from_edges(times, metric)
+    handed = origins.gather(0, nearer[None])[0]
+    handed = torch.where(handed >= 0, handed, origins.gather(0, farther[None])[0])
     straight = along_ray(times, origins, handed, metric, at)
     on_ray = straight <= time + ROUNDING * metric[0]
-    neighbour = _neighbour(direction, at)
+    neighbour = _neighbour(nearer, at)
     time = torch.where(on_ray, straight, time)
     origin = torch.where(on_ray, handed, torch.where(from_one, neighbour, NOWHERE))
     comes = time < NEVER / 2
     return torch.where(comes, time, NEVER), torch.where(comes, origin, NOWHERE)
 
 
-def at_other_rates(times: Tensor, now: Tensor | float, before: Tensor, after: Tensor) -> Tensor:
-    """Return times at which rates of spread change: what is left of them, or past, changes by the ratio of the rates.
+def kindling(times: Tensor, slowness: Tensor) -> Tensor:
+    """Return from when on the neighbours of cells that the fire comes to have times too, float32 [...] [minutes].
 
     Args:
-        times: float32 [...] [minutes]; ``NEVER`` stays.
-        now: When they change [minutes].
-        before: Mean rates to or from the neighbours so far, float32 [...]; where either is 0, times stay.
+        times: When it reaches the cells, float32 [...] [minutes].
+        slowness: a of the cells, float32 [...] [minutes a cell].
+    """
+    return times - _AHEAD * slowness
+
+
+def differ(before: Metric, after: Metric) -> Tensor:
+    """Return where the rates of two weathers differ, bool [...]."""
+    return (before[0] != after[0]) | (before[1] != after[1]) | (before[2] != after[2])
+
+
+def least_ratio(before: Metric, after: Metric) -> Tensor:
+    """Return the least ratio of F in one weather to F in the weather before, over all directions, float32 [...].
+
+        rho = a' / a (1 - e'^2) / (B + sqrt(B^2 - (1 - e^2) (1 - e'^2))),   B = 1 - e . e',   e = w / a
+
+    It is the lower root of (a' - rho a)^2 = |w' - rho w|^2; 1 exactly in the same weather.
+    """
+    (east, north), (new_east, new_north) = ((m[1] / m[0], m[2] / m[0]) for m in (before, after))
+    old, new = 1.0 - (east * east + north * north), 1.0 - (new_east * new_east + new_north * new_north)
+    both = 1.0 - (east * new_east + north * new_north)
+    return after[0] / before[0] * new / (both + torch.sqrt((both * both - old * new).clamp(min=0.0)))
+
+
+def since(times: Tensor, now: Tensor | float, ratio: Tensor) -> Tensor:
+    """Return the times from which cells spread fire in another weather, float32 [...] [minutes].
+
+    A cell has sent the fire as far as F tells of the minutes that it has burned. In each direction that way takes them
+    times F' / F in the other weather, and at least times ``ratio``: so fire comes nowhere before ``now``.
+
+    Args:
+        times: When the fire reached them, float32 [...] [minutes].
+        now: When the weather changes.
+        ratio: ``least_ratio``, the least of the cells about that can ignite, float32 [...].
+    """
+    return times + (now - times) * (1.0 - ratio)
+
+
+def until(times: Tensor, now: Tensor | float, around: Tensor, before: Metric, after: Metric) -> Tensor:
+    """Return when the fire reaches cells that it is near, in another weather, float32 [...] [minutes].
+
+        t' = now + (t - now) min_d F'_d / (t - t_d) / min_d F_d / (t - t_d)
+
+    The front lies (t - now) / (t - t_d) of the way back to each neighbour d that burns before the cell, and what is
+    left takes that direction's F' in place of its F. Never before ``now``; t in the same weather.
+
+    Args:
+        times: When it would have, float32 [...] [minutes], after ``now``.
+        now: When the weather changes.
+        around: The same of the neighbours, float32 [8, ...]; ``NEVER`` where it does not come.
+        before: Of the cells.
         after: The same from now on.
     """
-    ratio = torch.where((before > 0.0) & (after > 0.0), before / after, 1.0)
-    return torch.where(times < NEVER / 2, now + (times - now) * ratio, times)
+    lasts = torch.where(around < times, times - around, _LEAST)
+    old, new = ((_from_each(metric, times) / lasts).amin(0) for metric in (before, after))
+    changed = times + (times - now) * (new / old - 1.0)
+    return torch.where(changed < NEVER / 2, changed, NEVER)
 
 
-def from_edges(times: Tensor, metric: Metric) -> tuple[Tensor, Tensor, Tensor]:
+def from_edges(times: Tensor, metric: Metric) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """Return when fire comes over an edge between two adjacent neighbours, or from one of them.
 
         T = min over s in [0, 1] of (1 - s) T_a + s T_b + a sqrt(1 + s^2)
@@ -132,8 +188,8 @@ def from_edges(times: Tensor, metric: Metric) -> tuple[Tensor, Tensor, Tensor]:
     of the neighbour a beside the cell and b across its corner, at s / sqrt(1 + s^2) = (T_a - T_b) / a.
 
     Returns:
-        The time, float32 [...] [minutes]; the direction of the nearer neighbour, int64 [...]; and whether the fire
-        comes from that one alone, bool [...].
+        The time, float32 [...] [minutes]; the directions of the nearer and of the farther neighbour, int64 [...] each;
+        and whether the fire comes from the nearer one alone, bool [...].
     """
     slowness = metric[0]
     carried = times - _drift(metric, times)
@@ -143,18 +199,21 @@ def from_edges(times: Tensor, metric: Metric) -> tuple[Tensor, Tensor, Tensor]:
     time = (1.0 - part) * beside + part * across + slowness * torch.sqrt(1.0 + part * part)
     time, edge = time.min(dim=0)
     part = part.gather(0, edge[None])[0]
-    nearer = torch.where(part < 0.5, _table(_BESIDE, edge), _table(_ACROSS, edge))
-    return time, nearer, (part == 0.0) | (part == 1.0)
+    beside, across = _table(_BESIDE, edge), _table(_ACROSS, edge)
+    nearer, farther = torch.where(part < 0.5, beside, across), torch.where(part < 0.5, across, beside)
+    return time, nearer, farther, (part == 0.0) | (part == 1.0)
 
 
 def along_ray(times: Tensor, origins: Tensor, origin: Tensor, metric: Metric, at: Places) -> Tensor:
-    """Return when the fire comes straight from an origin that both neighbours on the way have had it from.
+    """Return when the fire comes straight from an origin that the neighbours on the way have had it from.
 
     Their mean slownesses from there, t / F, tell that of the way to the edge between them:
 
         t = t_o + F(x - o) (m (1 - 1 / n) + 1 / n),   m = (1 - s) (t_a - t_o) / F(a - o) + s (t_b - t_o) / F(b - o)
 
-    n is the distance from the origin in rows or columns, whichever is more, and s n the other.
+    n is the distance from the origin in rows or columns, whichever is more, and s n the other. The way passes nearer to
+    one of the neighbours, b where s is over a half. Where that one alone has had the fire from the origin, m is that of
+    it: a cell does not stop a fire that clips less than half of it.
 
     Args:
         times: See ``arrival``.
@@ -169,22 +228,28 @@ def along_ray(times: Tensor, origins: Tensor, origin: Tensor, metric: Metric, at
     south, east = at.row - origin // at.width, at.column - origin % at.width
     steps, sideways = torch.maximum(south.abs(), east.abs()), torch.minimum(south.abs(), east.abs())
     beside, across = _towards(south, east)
-    t_beside, t_across = times.gather(0, beside[None])[0], times.gather(0, across[None])[0]
-    shares = (origins.gather(0, beside[None])[0] == origin) | (sideways == steps)
-    shares &= (origins.gather(0, across[None])[0] == origin) | (sideways == 0)
     begun = at.time_of(origin.clamp(min=0))
+    s, share = sideways / steps.clamp(min=1), 1.0 / steps.clamp(min=1)
 
-    def slowness(time: Tensor, direction: Tensor) -> Tensor:
+    def weighed(part: Tensor, direction: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the part of a neighbour in the mean, and that times its slowness."""
         down, right = _table(_SOUTH, direction), _table(_EAST, direction)
         way = duration(metric, (east + right).to(torch.float32), -(south + down).to(torch.float32))
-        return (time - begun) / way.clamp(min=_LEAST)
+        part = part * (origins.gather(0, direction[None])[0] == origin)
+        return part, part * (times.gather(0, direction[None])[0] - begun) / way.clamp(min=_LEAST)
 
-    s, share = sideways / steps.clamp(min=1), 1.0 / steps.clamp(min=1)
-    mean = torch.where(sideways == 0, 0.0, s * slowness(t_across, across))
-    mean = mean + torch.where(sideways == steps, 0.0, (1.0 - s) * slowness(t_beside, beside))
+    (part_a, slow_a), (part_b, slow_b) = weighed(1.0 - s, beside), weighed(s, across)
+    parts = part_a + part_b
+    mean = (slow_a + slow_b) / parts.clamp(min=0.5)
     whole = duration(metric, east.to(torch.float32), -south.to(torch.float32))
     time = begun + whole * (mean * (1.0 - share) + share)
-    return torch.where(shares & (origin >= 0) & (steps > 1) & (begun < NEVER / 2), time, NEVER)
+    return torch.where((parts >= 0.5) & (origin >= 0) & (steps > 1) & (begun < NEVER / 2), time, NEVER)
+
+
+def _from_each(metric: Metric, like: Tensor) -> Tensor:
+    """Return F into cells from each neighbour, float32 [8, ...] [minutes]."""
+    east, north = (_part(part, like[None]) for part in (0, 1))
+    return duration(metric, -east, -north)
 
 
 def _drift(metric: Metric, times: Tensor) -> Tensor:
