@@ -147,14 +147,15 @@ class GrowingFires(Spreading):
         self._move(self.window.with_cells(row, column))
         place = (row - self.window.top + 1) * self._width + column - self.window.left + 1
         lit = fire * self._map + place
-        new = self._fuel[place] & ~self._burned[lit] & (minutes < self._times[lit])
+        new = (self._free[lit] | self._beside[lit]) & (minutes < self._times[lit])
         self._times.scatter_reduce_(0, lit[new], minutes[new], "amin")
         lit = self._once(lit[new])
-        self._burned[lit] = True
+        self._burned[lit], self._beside[lit], self._free[lit], self._near[lit] = True, False, False, NEVER
         self.minutes[lit] = self._times[lit]
         self._origins[lit] = self._place(lit)
-        self._waiting = self._waiting[~self._burned[self._waiting]]
-        self._changed = torch.cat((self._changed, self._lighted(lit)))
+        self._waiting, self._joined = (each[self._beside[each]] for each in (self._waiting, self._joined))
+        self._changed = torch.cat((self._changed, lit))
+        self._join(lit)
         self._spotted = lit
 
     def _caught(self) -> Caught:
