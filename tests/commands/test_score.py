@@ -90,7 +90,7 @@ def test_a_prediction_s_folder_is_read_by_its_half_of_the_fires(fire):
     bands = {"median": column * 9.0, "half": column * 0.5}
     write_geotiff(fire / "prediction" / "arrival_hours.tif", bands, grid, unit="h")
     found = scored(fire, f"arrival={fire}/prediction", f"observed={fire}/scar.tif", "hours=2")
-    assert found["observations"][0]["forecast"]["jaccard"] == 1.0
+    assert found["observations"][0]["forecast"]["jaccard"] == 1.0 and found["observations"][0]["areas"] is None
 
 
 def test_what_was_seen_after_the_prediction_s_end_is_left_out(fire):
@@ -127,12 +127,10 @@ def test_a_refusal_is_one_line(fire, given, line, capsys):
     assert line.format(fire) in capsys.readouterr().err.strip().splitlines()[-1]
 
 
-def test_what_burned_stays_burned(fire):
-    features = [
-        {"type": "Feature", "properties": {"hours": hours}, "geometry": box(east)}
-        for hours, east in ((1, 500.0), (2, 300.0))
-    ]
-    path = fire / "shrinks.geojson"
-    path.write_text(json.dumps({"type": "FeatureCollection", "crs": None, "features": features}))
-    found, times = read_seen([str(path)], local_grid(SIZE, 100.0), Reading(moment=float))
-    assert [int(each.burned.sum()) for each in found] == [60, 60] and times is None
+def test_what_burned_stays_burned_in_other_files_too(fire):
+    path, grid = fire / "early.geojson", local_grid(SIZE, 100.0)
+    feature = {"type": "Feature", "properties": {"hours": 1}, "geometry": box(700.0)}
+    path.write_text(json.dumps({"type": "FeatureCollection", "crs": None, "features": [feature]}))
+    found, times = read_seen([f"{fire}/scar.tif", str(path)], grid, Reading(moment=float))
+    assert [each.kind for each in found] == ["perimeter", "scar"] and times is None
+    assert [int(each.burned.sum()) for each in found] == [84, 84], "the scar alone has 60 cells"

@@ -179,10 +179,12 @@ def _correct(case: Case, options: PredictionOptions, seen: Sequence[Observation]
 
 def _members(case: Case, options: PredictionOptions) -> Members | None:
     """Return by what fires differ from the ignition on, in rate, wind and moisture; None where they do not."""
-    if options.uncertain != "all":
+    if options.uncertain == "none" or options.fires == 1:
         return None
-    keys = world_key(options.seed + torch.arange(options.fires))
-    return Members.drawn(keys, _deviations(case, options), case.ignition)
+    keys, deviations = world_key(options.seed + torch.arange(options.fires)), _deviations(case, options)
+    if options.uncertain == "rate":
+        return Members.by_rate(keys, deviations.rate)
+    return Members.drawn(keys, deviations, case.ignition)
 
 
 def _deviations(case: Case, options: PredictionOptions) -> Deviations:
@@ -200,7 +202,7 @@ def _burn(case: Case, options: PredictionOptions, corrected: Corrected | None) -
             case.ground,
             case.weather,
             case.ignition if corrected is None else corrected.burned,
-            fire=_differing(case, options) if members is None else case.fire.alike(),
+            fire=case.fire if members is None else case.fire.alike(),
             cell_size=case.cell_size,
             hours=options.hours if corrected is None else (_minutes(case, options) - begun) / 60.0,
             area=options.area,
@@ -215,13 +217,6 @@ def _burn(case: Case, options: PredictionOptions, corrected: Corrected | None) -
             keep_every=options.arrivals,
             progress=bar.update,
         )
-
-
-def _differing(case: Case, options: PredictionOptions) -> RateFire:
-    """Return the law of fires that differ in their rates; a single fire is that of the law as given."""
-    if options.uncertain == "none" or options.fires == 1:
-        return case.fire
-    return case.fire.differing(_deviations(case, options).rate)
 
 
 def _report(

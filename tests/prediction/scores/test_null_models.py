@@ -80,6 +80,8 @@ def test_a_walking_ellipse_over_open_fuel_is_nearly_the_plain_one():
 
 
 def test_a_knight_s_step_needs_one_of_the_cells_that_it_crosses():
-    start = drawn("#..", "...")
-    for fuel, reached in ((drawn("#..", "..#"), 1), (drawn("##.", "..#"), 3)):
-        assert int(walking_ellipse_cells(start, fuel, 9, torch.zeros(2)).sum()) == reached
+    start, fuel = drawn("..#", "...", "..."), drawn("###", ".#.", ".#.")
+    wind = torch.tensor([0.87, 0.0])  # e = 0.3
+    # (2, 1) by a knight's step over (1, 1): sqrt(5) + e, 2.54; two steps to the west 2 + 2 e, 2.60
+    assert torch.equal(walking_ellipse_cells(start, fuel, 4, wind), drawn(".##", ".#.", ".#."))
+    assert int(walking_ellipse_cells(start, drawn("..#", "...", ".#."), 9, wind).sum()) == 1

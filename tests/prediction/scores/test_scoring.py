@@ -59,6 +59,9 @@ def test_an_ensemble_has_an_interval_of_areas_and_a_probability():
     (only,) = fire_scores(two, seen("###..."), place=START).observations
     assert only.areas.median == 2.0 and only.areas.low == pytest.approx(2.1) and only.areas.high == pytest.approx(3.9)
     assert only.areas.holds and only.forecast.brier == pytest.approx((0.0 + 0.25 + 0.25) / 2)
+    whole = fire_scores(two, seen("#.....", "###..."), place=START)
+    assert whole.brier == pytest.approx((0.25 + 0.25) / 3), "three cells burned; two of the second, of which half"
+    assert [row[2] for row in whole.reliability if row[2]] == [2, 2]
     wrong = fire_scores(two, seen("######"), place=START).observations[0]
     assert not wrong.areas.holds
 

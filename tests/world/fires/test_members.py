@@ -113,3 +113,11 @@ def test_a_fire_that_is_seen_is_half_a_cell_ahead():
     ]
     assert float(times[1][20, 21]) == pytest.approx(0.5 * float(times[0][20, 21]))
     assert float(times[1][20, 23]) == pytest.approx(float(times[0][20, 23]) * 2.5 / 3.0, rel=0.02)
+
+
+def test_members_that_differ_in_rate_alone_have_one_factor_in_each_part_of_its_distribution():
+    members = Members.by_rate(world_key(torch.arange(101)), 0.4)
+    rates = members.rate.sort().values
+    assert rates[50] == pytest.approx(1.0, abs=1e-6) and not bool(members.values[:, 1:].any())
+    assert float(rates.std() / rates.mean()) == pytest.approx(0.4, abs=0.02)
+    assert not torch.equal(members.rate, rates), "keys order them"

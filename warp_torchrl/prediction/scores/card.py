@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _BOTH, _MISSED, _FALSE = "#8c8c8c", BLUE, VERMILION
+_WIDTH, _HIGHEST = 10.5, 4.5  # of the card, and of its maps [inches]
 _MAPS = 3  # of hits and misses
 _MARGIN = 0.04  # about the fire, of the map's longer side
 _COLUMNS = {
@@ -62,16 +63,18 @@ def write_card(path: Path, predicted: Predicted, seen: Sequence[Seen], numbers: 
     panels = [*maps, "chance"]
     layout = [[name for name in panels for _ in range(12 // len(panels))]]
     layout += [["area"] * 6 + ["reliability"] * 6, ["table"] * 12]
-    rows = len(numbers["observations"]) + 3
-    height = 3.6 * window.height / window.width if window.height < window.width else 3.6
-    sizes = [min(3.6, height) + 0.5, 2.3, 0.2 * rows]
+    rows = len(numbers["observations"]) + 5
+    height = min(_HIGHEST, (_WIDTH / len(panels) - 0.3) * window.height / window.width)
+    sizes = [height + 0.6, 2.3, 0.2 * rows]
     with disk.with_path(path), style():
-        figure, axes = sheet(layout, (10.5, sum(sizes) + 1.0), numbers["title"], height_ratios=sizes)
+        figure, axes = sheet(layout, (_WIDTH, sum(sizes) + 1.0), numbers["title"], height_ratios=sizes)
         for name, number in zip(maps, shown, strict=True):
             is_last = number == len(seen) - 1
             _hits(axes[name], predicted, seen[number], window, is_last)
             axes[name].set_title(_title(numbers["observations"][number]))
         _chance(axes["chance"], predicted, seen[-1], window)
+        for name in panels:
+            axes[name].set_anchor("N")  # one has a colour bar below
         _areas(axes["area"], predicted, seen, numbers)
         _reliability(axes["reliability"], predicted, numbers)
         _table(axes["table"], numbers)
@@ -94,7 +97,7 @@ def _some(count: int) -> list[int]:
 
 
 def _title(row: Mapping[str, Any]) -> str:
-    when = "at the end" if row["minutes"] is None else f"after {hours_of(row)} h"
+    when = "at the end" if row["minutes"] is None else f"{hours_of(row)} h"
     return f"{when}: Jaccard {row['forecast']['jaccard']:.2f}, kappa {row['forecast']['kappa']:.2f}"
 
 
@@ -172,21 +175,28 @@ def _reliability(axes: "Axes", predicted: Predicted, numbers: Mapping[str, Any])
         _shapes(axes, numbers)
         return
     axes.plot([0, 1], [0, 1], color=SOFT, linewidth=0.8)
-    bins = [row for row in numbers["observations"][-1]["forecast"]["reliability"] if row[2]]
+    bins = [row for row in numbers["reliability"] if row[2]]
     most = max(row[2] for row in bins)
     axes.plot([row[0] for row in bins], [row[1] for row in bins], color=VERMILION)
     sizes = [10.0 + 90.0 * row[2] / most for row in bins]
     axes.scatter([row[0] for row in bins], [row[1] for row in bins], s=sizes, color=VERMILION)
     axes.set(
-        title="reliability at the last observation; size: cells", xlabel="burn probability", ylabel="share that burned"
+        title="reliability at the last observation, whole fire; size: cells",
+        xlabel="burn probability",
+        ylabel="share that burned",
     )
 
 
 def _shapes(axes: "Axes", numbers: Mapping[str, Any]) -> None:
     """Draw the Jaccard index at the area beside the null models."""
     found = {name: each["jaccard_at_area"] for name, each in numbers["at_area"].items()}
-    axes.barh(list(found), list(found.values()), color=[VERMILION if name == "predicted" else SOFT for name in found])
-    axes.set(title="Jaccard index at the area last seen", xlim=(0.0, 1.0))
+    axes.barh(
+        list(found),
+        list(found.values()),
+        height=0.5,
+        color=[VERMILION if name == "predicted" else SOFT for name in found],
+    )
+    axes.set(title="Jaccard index at the area last seen", xlim=(0.0, 1.0), ylim=(-0.7, max(3, len(found)) - 0.3))
     axes.invert_yaxis()
 
 
@@ -200,7 +210,9 @@ def _table(axes: "Axes", numbers: Mapping[str, Any]) -> None:
     drawn.auto_set_column_width(list(range(len(_COLUMNS))))
     others = [f"{name} {each['jaccard_at_area']:.2f}" for name, each in numbers["at_area"].items()]
     text = [f"Jaccard at the area last seen: {', '.join(others)}."] if others else []
+    text.append(f"Brier score over the whole fire: {numbers['brier']:.2f}.")
     if numbers["arrival"] is not None:
         error = numbers["arrival"]
         text.append(f"Arrival: bias {error['bias']:+.0f} min, mean absolute error {error['mean_absolute']:.0f} min.")
-    axes.text(0.0, 0.0, "  ".join(text), transform=axes.transAxes, fontsize=7.5, va="bottom")
+    line = axes.text(0.0, 0.0, "\n".join(text), transform=axes.transAxes, fontsize=7.5, va="bottom")
+    line.set_in_layout(False)

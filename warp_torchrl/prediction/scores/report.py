@@ -22,6 +22,8 @@ def score_numbers(found: FireScores, title: str) -> dict[str, Any]:
             "title": title,
             "observations": [_observation(each) for each in found.observations],
             "at_area": {name: asdict(scores) for name, scores in found.at_area.items()},
+            "brier": found.brier,
+            "reliability": found.reliability,
             "arrival": None if found.arrival is None else asdict(found.arrival),
         }
     )
@@ -39,6 +41,7 @@ def score_lines(numbers: Mapping[str, Any]) -> list[str]:
             f"| {name} | {each['jaccard_at_area']:.3f} | {each['sorensen_at_area']:.3f} |"
             for name, each in numbers["at_area"].items()
         ]
+    lines += ["", f"Brier score over the whole fire at the last observation: {numbers['brier']:.3f}."]
     if numbers["arrival"] is not None:
         error = numbers["arrival"]
         lines += [

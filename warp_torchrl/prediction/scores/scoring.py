@@ -1,5 +1,6 @@
 """Scores of a predicted fire at each observation, beside persistence and null models."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -13,12 +14,12 @@ from warp_torchrl.prediction.scores.cells import jaccard, kappa, sorensen
 from warp_torchrl.prediction.scores.growth import STEPS, ForecastScores, forecast_scores, time_between
 from warp_torchrl.prediction.scores.null_models import circle_cells, ellipse_cells, walking_ellipse_cells
 from warp_torchrl.prediction.scores.predicted import Predicted
-from warp_torchrl.prediction.scores.probabilities import crps, interval
+from warp_torchrl.prediction.scores.probabilities import Reliability, brier, crps, interval, reliability
 from warp_torchrl.prediction.scores.scar import Scores, scores_at_area, scores_of
 from warp_torchrl.prediction.scores.seen import Seen
 from warp_torchrl.world.fires.sightings import Front
 
-_OF_GROWTH = ("growth_jaccard", "growth_sorensen", "brier", "crps")
+_NO_GROWTH: dict[str, Any] = dict.fromkeys(("growth_jaccard", "growth_sorensen", "brier", "crps"), math.nan)
 """Scores that have no meaning where nothing burned since the observation before."""
 
 
@@ -59,11 +60,15 @@ class FireScores:
         observations: In the order of time.
         at_area: Of the last observation: the prediction, ``predicted``, and null models by their names.
         arrival: Errors of times of arrival; None where nowhere are times known.
+        brier: Brier score of the burn probability at the last observation, over the whole fire.
+        reliability: Of the same probability.
     """
 
     observations: Sequence[ObservationScores]
     at_area: Mapping[str, Scores]
     arrival: ArrivalError | None
+    brier: float
+    reliability: Reliability
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -104,7 +109,14 @@ def fire_scores(
     error = None
     if predicted.arrival is not None and times is not None:
         error = arrival_error(predicted.arrival, times, last.minutes)
-    return FireScores(observations=rows, at_area=_at_area(predicted, last, place), arrival=error)
+    chance = predicted.chance(last.minutes, is_last=True)
+    return FireScores(
+        observations=rows,
+        at_area=_at_area(predicted, last, place),
+        arrival=error,
+        brier=float(brier(chance, last.burned)),
+        reliability=reliability(chance.flatten(), last.burned.flatten()),
+    )
 
 
 def times_seen(seen: Sequence[Seen]) -> Tensor | None:
@@ -134,8 +146,7 @@ def _at(predicted: Predicted, before: Seen, each: Seen, is_last: bool) -> Observ
     if predicted.arrival is None or each.kind == "scar":
         forecast = replace(forecast, crps=torch.nan)  # when cells burned, or would, is not known
     if not bool(front.growth.any()):
-        of_growth: dict[str, Any] = dict.fromkeys(_OF_GROWTH, torch.nan)
-        forecast = replace(forecast, **of_growth)
+        forecast = replace(forecast, **_NO_GROWTH)
     areas, seen_ha = predicted.areas(each.minutes), float(each.burned.sum()) * hectare
     return ObservationScores(
         minutes=each.minutes,

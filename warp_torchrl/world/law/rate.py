@@ -163,11 +163,7 @@ class RateFire(Automaton):
 
     def alike(self) -> Self:
         """Return the law under which fires differ from cell to cell alone."""
-        return self.differing(0.0)
-
-    def differing(self, deviation: float) -> Self:
-        """Return the law with another coefficient of variation of the rates from fire to fire."""
-        return replace(self, fire_deviation=deviation)._going_by(self._by_cover)
+        return replace(self, fire_deviation=0.0)._going_by(self._by_cover)
 
     def _going_by(self, cover: bool) -> Self:
         """Return the law that takes the fuel of the cover, or of the landscape's codes."""
