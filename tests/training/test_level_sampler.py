@@ -5,6 +5,7 @@ import torch
 
 from tests.training.test_loop import REPLAY, rows, tiny
 from warp_torchrl.runs.checkpoint import newest
+from warp_torchrl.training.evaluations import EvaluationsOnTheWay
 
 CLIMBS = [
     "curriculum=success",
@@ -71,7 +72,9 @@ def test_evaluation_plays_the_scenario_whatever_is_learned(tmp_path):
     plain = tiny(tmp_path / "without", *overrides)
     plain.learner.loss.load_state_dict(training.learner.loss.state_dict())
     plain.frames = plain.last_batch = 64
-    assert numbers(tmp_path / "with", "evaluation/saved")[-1] == plain._evaluate()["evaluation/saved"]
+    row = {}
+    EvaluationsOnTheWay(plain.run_config).on_batch(plain, row)
+    assert numbers(tmp_path / "with", "evaluation/saved")[-1] == row["evaluation/saved"]
     assert plain.env.world == training.run_config.make_env(1, 0).world
 
 

@@ -61,15 +61,15 @@ def test_no_learner_takes_in_what_is_not_finite(tmp_path, name):
 def test_a_first_batch_that_is_bad_where_agents_look_ends_a_training(tmp_path):
     """What is shown is bad while it is collected: chances are NaN, and the run still ends with its own line."""
     training = tiny(tmp_path, *TINIER)
-    pack, steps = training.env._pack, iter(range(1000))
+    act, steps = training.env._acted, iter(range(1000))
 
     def poisoned(*given):
-        shown = pack(*given)
-        if next(steps) == 6:
-            shown[(*OBSERVATION, "status")][1] = NAN
+        shown = act(*given)
+        if next(steps) == 5:
+            shown["agents"]["observation"]["status"][1] = NAN
         return shown
 
-    training.env._pack = poisoned
+    training.env._acted = poisoned
     with pytest.raises(NumericalFailure, match="after 16 frames an observation is not finite"):
         training.train()
     assert not (tmp_path / "checkpoints").exists()

@@ -112,8 +112,7 @@ def tidied(config: DictConfig, overrides: Sequence[str]) -> DictConfig:
                 with open_dict(config):
                     del config[group][key]
     if "landscape=array" in given_options and "landscape.size" not in given:
-        with open_dict(config):  # the scenario's size would be a window: the whole array is the world
-            config.landscape.pop("size", None)
+        config.landscape.size = None  # the scenario's would be a window: the whole array is the world
     return config
 
 
