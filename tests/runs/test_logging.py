@@ -1,8 +1,8 @@
 """Trackers get a run's configuration, rows and evaluations; one that fails does not end the run."""
 
 import json
-import time
 import struct
+import time
 from types import SimpleNamespace
 
 import numpy as np
